@@ -1,0 +1,7 @@
+"""Run the command line as ``python -m seqopt``."""
+
+import sys
+
+from seqopt.cli import main
+
+sys.exit(main())

@@ -1,0 +1,38 @@
+"""The exceptions of seqopt: one small tree that says who must act."""
+
+from __future__ import annotations
+
+
+class SeqoptError(Exception):
+    """Base of every error seqopt raises on purpose; its text is one line a user can act on."""
+
+
+class SceneError(SeqoptError, ValueError):
+    """A scene, or a file that describes one, is wrong: its author must act."""
+
+
+class StepError(SeqoptError, ValueError):
+    """A step of a sequence or plan is impossible in its scene: the plan's author must act."""
+
+
+class GripError(SeqoptError, ValueError):
+    """A grip set handed to an engine is malformed: the caller must act."""
+
+
+class MechanismError(SeqoptError, ArithmeticError):
+    """Bricks, joints and grips leave a motion that nothing resists.
+
+    Attributes
+    ----------
+    mode : tuple of (int, tuple of 6 float)
+        The unresisted motion: per brick its name and (translation, rotation), the largest
+        component of all scaled to 1.
+    """
+
+    def __init__(self, message: str, mode: tuple[tuple[int, tuple[float, ...]], ...] = ()) -> None:
+        super().__init__(message)
+        self.mode = mode
+
+
+class SolverError(SeqoptError, ArithmeticError):
+    """A numerical method failed to answer; this says nothing about the structure."""

@@ -1,0 +1,37 @@
+"""Reading and writing files so that nothing is left half-written."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from pathlib import Path
+
+from seqopt.errors import SeqoptError
+
+
+class FileError(SeqoptError, OSError):
+    """A file cannot be read or written: the caller must name another."""
+
+
+def read_text(path: Path) -> str:
+    """Return the text of a UTF-8 file, or raise a `FileError` that says why not."""
+    try:
+        return path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        reason = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
+        raise FileError(f"cannot read {path}: {reason}; name a readable file") from error
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a file whole: it is put in place only once complete."""
+    try:
+        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+        try:
+            with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as stream:
+                stream.write(text)
+            Path(name).replace(path)
+        except BaseException:
+            Path(name).unlink(missing_ok=True)
+            raise
+    except OSError as error:
+        raise FileError(f"cannot write {path}: {error.strerror}; name a writable file") from error

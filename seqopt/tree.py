@@ -1,0 +1,119 @@
+"""The spanning tree of springs that a build order grows, and the wrenches in it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from seqopt.network import GROUND, Floats, Ints, Network
+from seqopt.statics import skew
+
+
+@dataclass(frozen=True)
+class Tree:
+    """A tree in which every brick hangs on one spring; arrays run over bricks in build order.
+
+    Attributes
+    ----------
+    spring : (B,) int
+        The spring that each brick hangs on.
+    parent : (B,) int
+        The brick at the spring's other end, or `GROUND`.
+    on_path : (B, B) bool
+        Whether the row's brick lies between the column's brick and the ground, itself included.
+    closures : (C,) int
+        Springs outside the tree, in the order in which they begin to act.
+    """
+
+    spring: Ints
+    parent: Ints
+    on_path: np.ndarray
+    closures: Ints
+
+
+def grow_tree(network: Network) -> Tree | None:
+    """Return the tree that hangs every brick, when placed, on the spring nearest to the ground.
+
+    None if a spring has no stiffness in some direction or a brick is placed without a spring to
+    what stands: such a structure has no compliance of its own, and `seqopt.rigid` solves it.
+    """
+    springs = network.springs
+    if min(springs.translational_stiffness.min(), springs.rotational_stiffness.min()) <= 0:
+        return None
+    count = len(network.inner)
+    spring, parent = np.empty((2, count), dtype=np.int64)
+    depth = np.zeros(count + 1, dtype=np.int64)  # the ground, index -1, comes last
+    on_path = np.eye(count, dtype=bool)
+    for b in range(count):
+        mine = np.flatnonzero((springs.bodies[:, 1] == b) & (springs.since == b + 1))
+        if not len(mine):
+            return None
+        best = mine[np.argmin(depth[springs.bodies[mine, 0]])]
+        spring[b], parent[b] = best, springs.bodies[best, 0]
+        depth[b] = depth[parent[b]] + 1
+        if parent[b] != GROUND:
+            on_path[:, b] |= on_path[:, parent[b]]
+    return Tree(spring, parent, on_path, np.setdiff1d(np.arange(len(springs.since)), spring))
+
+
+def compliances(network: Network, which: Ints) -> Floats:
+    """Return the 6 × 6 compliances of springs in global axes, (len(which), 6, 6)."""
+    springs = network.springs
+    axes = springs.axes[which]
+    out = np.zeros((len(which), 6, 6))
+    for block, stiffness in (
+        (slice(0, 3), springs.translational_stiffness[which]),
+        (slice(3, 6), springs.rotational_stiffness[which]),
+    ):
+        out[:, block, block] = axes.transpose(0, 2, 1) / stiffness[:, None, :] @ axes
+    return out
+
+
+def node_wrenches(network: Network, tree: Tree) -> Floats:
+    """Return the wrenches that unit forces at the inner nodes send through the tree, (B, 6, 2B, 3).
+
+    The wrench through a brick's spring is the sum of the loads beyond it, taken about the spring.
+    """
+    at = network.springs.position[tree.spring]
+    owner = np.repeat(np.arange(len(at)), 2)
+    out = _levers(network.node_position[network.inner.ravel()], at)
+    out *= tree.on_path[:, None, owner, None]
+    return out
+
+
+def closure_wrenches(network: Network, tree: Tree) -> Floats:
+    """Return the wrenches that unit wrenches of the closures send through the tree, (B, 6, C, 6).
+
+    A closure's wrench acts on its second body, and against its first.
+    """
+    springs = network.springs
+    at, point = springs.position[tree.spring], springs.position[tree.closures]
+    path = np.hstack([tree.on_path, np.zeros((len(at), 1), bool)]).astype(float)  # ground: no path
+    first, second = springs.bodies[tree.closures].T
+    out = np.zeros((len(at), 6, len(point), 6))
+    out[..., :3] = _levers(point, at)
+    out[:, 3:, :, 3:] = np.eye(3)[:, None, :]
+    out *= (path[:, second] - path[:, first])[:, None, :, None]
+    return out
+
+
+def twists(network: Network, tree: Tree, strain: Floats, centroid: Floats) -> Floats:
+    """Return the bricks' twists (B, 6, K) for the deformations (B, 6, K) of the tree's springs."""
+    at = network.springs.position[tree.spring]
+    arm = skew(centroid - at)
+    out = strain.copy()
+    out[:, :3] -= arm @ strain[:, 3:]
+    for b in np.flatnonzero(tree.parent != GROUND):
+        parent = tree.parent[b]
+        out[b] += out[parent]
+        out[b, :3] -= skew(centroid[b] - centroid[parent]) @ out[parent, 3:]
+    return out
+
+
+def _levers(points: Floats, at: Floats) -> Floats:
+    """Return the wrenches about ``at`` (P, 3) of unit forces at ``points`` (M, 3), (P, 6, M, 3)."""
+    out = np.empty((len(at), 6, len(points), 3))
+    out[:, :3] = np.eye(3)[:, None, :]
+    out[:, 3:] = skew(points - at[:, None, :]).transpose(0, 2, 1, 3)
+    return out
