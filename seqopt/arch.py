@@ -35,6 +35,8 @@ class ArchShape:
     yaw : sequence of float, optional
         Per brick: rotation in the surface; positive turns a brick that lies along the arch to the
         left, and the left side of one that lies across it forward.
+    offset : sequence of float, optional
+        Per brick: its distance outward from the line between its joints.
     pattern : str
         A letter per brick, repeated: ``V`` lies along the arch, ``L`` and ``R`` lie across it and
         stick out to the left or right of the building direction.
@@ -57,6 +59,7 @@ class ArchShape:
     pitch: Sequence[float]
     roll: Sequence[float] | None = None
     yaw: Sequence[float] | None = None
+    offset: Sequence[float] | None = None
     pattern: str = LETTERS
     gap: float = 0.0145
     overhang: float = 0.0615
@@ -71,11 +74,11 @@ class ArchShape:
         count = len(self.pitch)
         if not count:
             raise SceneError("arch: pitch is empty; give one angle per brick")
-        for name in ("roll", "yaw"):
-            angles = getattr(self, name)
-            if angles is not None and len(angles) != count:
+        for name in ("roll", "yaw", "offset"):
+            values = getattr(self, name)
+            if values is not None and len(values) != count:
                 raise SceneError(
-                    f"arch: {len(angles)} {name} and {count} pitch angles; give as many"
+                    f"arch: {len(values)} {name} and {count} pitch values; give as many"
                 )
         if not self.pattern or set(self.pattern) - set(LETTERS):
             raise SceneError(f"arch: pattern is {self.pattern!r}; give letters of {LETTERS}")
@@ -105,11 +108,12 @@ def arch_scene(
     """
     tangent, left, ends = _axes(shape)
     pattern = _pattern(shape)
+    offset = np.zeros(len(pattern)) if shape.offset is None else np.asarray(shape.offset, float)
+    middle = 0.5 * (ends[:-1] + ends[1:]) + offset[:, None] * np.cross(tangent, left)
     bricks = [
-        _brick(shape, b, pattern[b - 1], (tangent[b - 1], left[b - 1], ends[b - 1 : b + 1]),
-               (line_nodes or {}).get(b, 2 * b - 2))
-        for b in range(1, len(pattern) + 1)
-    ]  # fmt: skip
+        _brick(shape, b, (tangent[i], left[i], middle[i]), (line_nodes or {}).get(b, 2 * b - 2))
+        for i, b in enumerate(range(1, len(pattern) + 1))
+    ]
     bisector = tangent[:-1] + tangent[1:]
     joints = [
         Joint(
@@ -158,12 +162,11 @@ def _axes(shape: ArchShape) -> tuple[Floats, Floats, Floats]:
     return tangent, left, ends
 
 
-def _brick(
-    shape: ArchShape, b: int, letter: str, axes: tuple[Floats, Floats, Floats], line_node: int
-) -> Brick:
-    tangent, left, ends = axes
+def _brick(shape: ArchShape, b: int, place: tuple[Floats, Floats, Floats], line_node: int) -> Brick:
+    """Return brick ``b`` from its direction along the arch, its left, and its middle."""
+    tangent, left, position = place
+    letter = _pattern(shape)[b - 1]
     nodes = (2 * b - 2, 2 * b - 1)
-    position = ends.mean(axis=0)
     if letter == "V":
         length_axis, width_axis, placing = tangent, left, nodes[1]
     else:

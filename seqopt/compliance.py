@@ -7,11 +7,14 @@ response is then the sum of the response to the weight and to ``λ``.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from itertools import combinations
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from seqopt.batch_solve import solve_positive
+from seqopt.errors import SolverError
 from seqopt.fields import Fields, Want, grip_columns
 from seqopt.network import Floats, Ints, Network
 from seqopt.operator import Operator, OperatorBuilder
@@ -54,6 +57,7 @@ def solve_batch(operator: Operator, columns: Ints, want: Want = Want.TABLE) -> F
         (operator.displacement, Want.DISPLACEMENTS),
         (operator.support, Want.SUPPORT),
         (operator.joint_wrench, Want.JOINTS),
+        (operator.brick_twist, Want.BRICKS),
     )
     maps = [rows[:, : rows.shape[1] if want & flag else 0] for rows, flag in asked]
     out = [np.empty((sets, rows.shape[1])) for rows in maps]
@@ -68,38 +72,56 @@ def solve_batch(operator: Operator, columns: Ints, want: Want = Want.TABLE) -> F
         for rows, result in zip(maps, out, strict=True):
             np.matmul(load, rows, out=result[part])
         forces[part] = force.reshape(len(index), held, 3)
-    edge_force, displacement, support, joint = out
-    motion = displacement.reshape(sets, displacement.shape[1] // 3, 3)
-    return Fields(edge_force, motion, forces, support, joint.reshape(sets, joint.shape[1] // 6, 6))
+    edge_force, displacement, support, joint, twist = out
+    return Fields(
+        edge_force,
+        displacement.reshape(sets, displacement.shape[1] // 3, 3),
+        forces,
+        support,
+        joint.reshape(sets, joint.shape[1] // 6, 6),
+        twist.reshape(sets, twist.shape[1] // 6, 6),
+    )
 
 
 def grip_forces(operator: Operator, columns: Ints, index: Ints) -> Floats:
-    """Return the grips' forces (S, 3r) that hold still the degrees of freedom ``index``.
+    """Return the grips' forces (S, 3r) that hold still the degrees of freedom ``index`` (S, 3r).
 
     Two grips on one rigid brick leave the force between them along the brick undetermined. Each
     takes what reaches its own node, so that the inner edge between them carries nothing: the limit
     of a stiff bar with both ends held.
+
+    Raises
+    ------
+    SolverError
+        If a system of equations is not positive definite within rounding.
     """
-    matrix = operator.flexibility[index[:, :, None], index[:, None, :]]
-    pairs = []
+    size = len(operator.flexibility)
+    held = np.ascontiguousarray(index.T)
+    matrix = operator.flexibility.take(held[:, None] * size + held)
+    pairs = list(_pairs(operator, columns))
+    for sets, _, free in pairs:
+        scale = np.trace(matrix[:, :, sets])
+        matrix[:, :, sets] += scale * free.T[:, None] * free.T
+    force = solve_positive(matrix, -operator.dead_displacement.take(held)).T
+    if not np.isfinite(force).all():
+        raise SolverError(
+            f"{operator.bricks} bricks: grips too close for double precision on so flexible a "
+            "structure; drop one of them"
+        )
+    for sets, brick, free in pairs:
+        edge = operator.inner_edge[brick]
+        share = operator.edge_force[index[sets], edge[:, None]]
+        carried = operator.edge_force[-1, edge] + np.einsum("sk,sk->s", force[sets], share)
+        force[sets] -= (carried / np.einsum("sk,sk->s", free, share))[:, None] * free
+    return force
+
+
+def _pairs(operator: Operator, columns: Ints) -> Iterator[tuple[Ints, Ints, Floats]]:
+    """Yield sets with two grips on one brick, that brick, and the free pair of forces (len, 3r)."""
     for i, j in combinations(range(columns.shape[1]), 2):
         sets = np.flatnonzero(columns[:, i] // 2 == columns[:, j] // 2)
         if len(sets):
-            free = np.zeros((len(sets), index.shape[1]))
             brick = columns[sets, i] // 2
-            free[:, 3 * i : 3 * i + 3] = operator.axis[brick]
-            free[:, 3 * j : 3 * j + 3] = -operator.axis[brick]
-            pairs.append((sets, brick, free))
-            scale = np.trace(matrix[sets], axis1=1, axis2=2)[:, None, None]
-            matrix[sets] += scale * free[:, :, None] * free[:, None, :]
-    force: Floats = np.asarray(
-        np.linalg.solve(matrix, -operator.dead_displacement[index][:, :, None])
-    )[..., 0]
-    for sets, brick, free in pairs:
-        edge = operator.inner_edge[brick]
-        carried = operator.edge_force[-1, edge] + np.einsum(
-            "sk,sk->s", force[sets], operator.edge_force[index[sets], edge[:, None]]
-        )
-        relief = np.einsum("sk,sk->s", free, operator.edge_force[index[sets], edge[:, None]])
-        force[sets] -= (carried / relief)[:, None] * free
-    return force
+            free = np.zeros((len(sets), columns.shape[1], 3))
+            free[:, i], free[:, j] = operator.axis[brick], -operator.axis[brick]
+            yield sets, brick, free.reshape(len(sets), -1)

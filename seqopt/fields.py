@@ -20,8 +20,9 @@ class Want(Flag):
     DISPLACEMENTS = auto()
     SUPPORT = auto()
     JOINTS = auto()
+    BRICKS = auto()
     TABLE = EDGES | DISPLACEMENTS | SUPPORT  # what the columns of Table A.1 need
-    ALL = TABLE | JOINTS
+    ALL = TABLE | JOINTS | BRICKS
 
 
 @dataclass(frozen=True)
@@ -44,6 +45,8 @@ class Fields:
     joint_wrench : (S, J, 6) float
         Force and moment, about its position, of every spring of the network on its second body
         (`Springs.bodies`), N and N m; zero where it does not act.
+    brick_twist : (S, b, 6) float
+        Translation of every brick's centroid and its rotation, m and rad.
     """
 
     edge_force: Floats
@@ -51,6 +54,7 @@ class Fields:
     grip_force: Floats
     support: Floats
     joint_wrench: Floats
+    brick_twist: Floats
 
 
 class Engine(Protocol):

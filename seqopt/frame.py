@@ -23,7 +23,7 @@ from seqopt.fields import Fields, Want, grip_columns
 from seqopt.network import Floats, Ints, Kind, Network
 from seqopt.rigid import require_resistance
 
-CONTRAST = 4e6  # bar over joint stiffness
+CONTRAST = 1e7  # bar over joint stiffness; see experiments/frame_contrast.py
 REFINEMENTS = 3
 CONVERGED = 1e-6  # largest last correction of an accepted solution, relative to it
 SUSPICIOUS = 1e-9  # a smallest scaled eigenvalue below this, over the contrast, is looked into
@@ -60,7 +60,7 @@ class FrameEngine:
         answers = [_solve_one(network, bricks, row, self._contrast) for row in columns]
         edges, nodes = network.count_edges(bricks), network.count_nodes(bricks)
         joints = len(network.springs.since)
-        shapes = (edges,), (nodes, 3), (columns.shape[1], 3), (6,), (joints, 6)
+        shapes = (edges,), (nodes, 3), (columns.shape[1], 3), (6,), (joints, 6), (bricks, 6)
         return Fields(
             *(
                 np.array([answer[i] for answer in answers]).reshape(len(answers), *shape)
@@ -101,12 +101,14 @@ def _solve_one(network: Network, bricks: int, columns: Ints, contrast: float) ->
     stress = frame.stiffness * (frame.deformation @ motion)
     reaction = (frame.deformation.T @ stress).reshape(load.shape) - load
     support = base[network.node_spring[base] == network.springs.support]
+    twist = motion.reshape(load.shape)[network.inner[:bricks]].mean(axis=1)
     return (
         stress[:edges],
         motion.reshape(load.shape)[:nodes, :3],
         reaction[gripped, :3],
         reaction[support].sum(axis=0),
         _joint_wrenches(network, bricks, stress[-6 * frame.halves :]),
+        twist,
     )
 
 

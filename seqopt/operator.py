@@ -31,6 +31,7 @@ class Operator:
     support : (6b + 1, 6) float
         Force and moment at the first ground end.
     joint_wrench : (6b + 1, 6S) float
+    brick_twist : (6b + 1, 6b) float
     axis : (b, 3) float
         Unit vectors along the inner edges.
     inner_edge : (b,) int
@@ -44,6 +45,7 @@ class Operator:
     displacement: Floats
     support: Floats
     joint_wrench: Floats
+    brick_twist: Floats
     axis: Floats
     inner_edge: np.ndarray
 
@@ -89,6 +91,7 @@ class OperatorBuilder:
             displacement=_with_weight(displacement, weight),
             support=_with_weight(support, weight),
             joint_wrench=_with_weight(force.reshape(-1, size), weight),
+            brick_twist=_with_weight(twist.reshape(size, size), weight),
             axis=network.edge_axis[inner_edge],
             inner_edge=inner_edge,
         )

@@ -71,7 +71,14 @@ def solve_rigid(network: Network, bricks: int, columns: Ints) -> Fields:
     parts = _structure(network, bricks)
     answers = [_solve_one(network, parts, grips) for grips in columns]
     edges, nodes = network.count_edges(bricks), network.count_nodes(bricks)
-    shapes = (edges,), (nodes, 3), (columns.shape[1], 3), (6,), (len(network.springs.since), 6)
+    shapes = (
+        (edges,),
+        (nodes, 3),
+        (columns.shape[1], 3),
+        (6,),
+        (len(network.springs.since), 6),
+        (bricks, 6),
+    )
     return Fields(
         *(
             np.array([answer[i] for answer in answers]).reshape(len(answers), *shape)
@@ -99,7 +106,8 @@ def _solve_one(network: Network, parts: _Structure, grips: Ints) -> tuple[Floats
     carried += maps.edge_of_load[:edges, : load.size] @ load.ravel()
     _split_pairs(network, grips, force, carried)
     support = maps.support_of_spring @ wrench[network.springs.support]
-    return carried, (parts.motion @ twist).reshape(-1, 3), force, support, wrench
+    motion = (parts.motion @ twist).reshape(-1, 3)
+    return carried, motion, force, support, wrench, twist.reshape(-1, 6)
 
 
 def _spectrum(network: Network, matrix: Floats, fixed: Floats) -> tuple[Floats, Floats, Floats]:

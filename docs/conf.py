@@ -1,0 +1,29 @@
+"""Sphinx configuration: the site is built with warnings as errors (see CONTRIBUTING.md)."""
+
+from importlib.metadata import version as installed_version
+
+project = "seqopt"
+author = "The seqopt developers"
+copyright = "2026, the seqopt developers"
+version = release = installed_version("seqopt")
+
+extensions = [
+    "myst_nb",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.viewcode",
+    "numpydoc",
+]
+html_theme = "furo"
+html_title = "seqopt"
+exclude_patterns = ["_build"]
+myst_enable_extensions = ["amsmath", "dollarmath", "deflist"]
+myst_heading_anchors = 3
+
+nb_execution_mode = "force"
+nb_execution_raise_on_error = True
+nb_execution_timeout = 120
+nb_merge_streams = True
+
+autodoc_member_order = "bysource"
+autodoc_typehints = "none"  # the numpydoc sections carry shapes and units
+numpydoc_show_class_members = False

@@ -1,0 +1,1 @@
+"""Experiments: one file per claim; each states claim, method, inputs and command."""

@@ -1,0 +1,159 @@
+"""Claim: the fast engine answers grip sets a thousand times faster than the frame it is checked by.
+
+Method: on `arch25` with 17 bricks, random sets of three grips, every edge force and every node
+displacement evaluated; fast and reference engine take turns in one process on one core; the best
+round and the median of the rounds' ratios are printed. Then the time to prepare the operators of
+all 25 brick counts, and the growth with brick count of a chain: operator, and one set of grips.
+
+Inputs: the shipped scene; seed 0. Command: ``python -m experiments.engine_speed [--quick]``. Writes
+``experiments/results/engine_speed.csv`` and ``docs/figures/engine_growth.png``.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+import pandas as pd
+
+from experiments.plotting import RESULTS, new_figure, save_figure
+from seqopt.arch import ArchShape, arch_scene
+from seqopt.compliance import ComplianceEngine
+from seqopt.fields import Want
+from seqopt.frame import FrameEngine
+from seqopt.network import Ints, Network, network
+from seqopt.operator import OperatorBuilder
+from seqopt.scene_file import load_scene
+from seqopt.tree import Tree, grow_tree
+
+ASKED = Want.EDGES | Want.DISPLACEMENTS
+
+
+def best(call: Callable[[], object], rounds: int) -> float:
+    """Return the shortest of several runs, s."""
+    times = []
+    for _ in range(rounds):
+        start = time.perf_counter()
+        call()
+        times.append(time.perf_counter() - start)
+    return min(times)
+
+
+def grip_sets(net: Network, bricks: int, count: int) -> Ints:
+    """Return random sets of three different free nodes."""
+    blocked = net.scene.blocked_nodes
+    free = [n for b in net.scene.placed[:bricks] for n in b.nodes if n not in blocked]
+    rng = np.random.default_rng(0)
+    return np.array([rng.choice(free, 3, replace=False) for _ in range(count)])
+
+
+def chain(count: int) -> Network:
+    """Return the network of a chain that leans forward a little and stays off the ground."""
+    return network(arch_scene(ArchShape(pitch=np.linspace(1.4, -0.2, count), closed=False)))
+
+
+def tree_of(net: Network) -> Tree:
+    tree = grow_tree(net)
+    assert tree is not None
+    return tree
+
+
+def engines_side_by_side(sets: int, models: int, rounds: int) -> dict[str, float]:
+    """Return seconds per grip set of both engines and their ratio, in turns."""
+    net = network(load_scene("arch25"))
+    fast, frame = ComplianceEngine(net), FrameEngine(net)
+    many, few = grip_sets(net, 17, sets), grip_sets(net, 17, models)
+    fast.solve(17, few)
+    pairs = [
+        (
+            best(lambda: fast.solve(17, many, ASKED), 1) / sets,
+            best(lambda: frame.solve(17, few), 1) / models,
+        )
+        for _ in range(rounds)
+    ]
+    ratios = [b / a for a, b in pairs]
+    return {
+        "fast_s_per_set": min(a for a, _ in pairs),
+        "frame_s_per_set": min(b for _, b in pairs),
+        "ratio_median": float(np.median(ratios)),
+        "ratio_lowest": min(ratios),
+    }
+
+
+def preparation(rounds: int) -> float:
+    """Return the time to load arch25 and prepare the operators of all its brick counts, s."""
+
+    def prepare() -> None:
+        net = network(load_scene("arch25"))
+        builder = OperatorBuilder(net, tree_of(net))
+        for bricks in range(1, 26):
+            builder.operator(bricks)
+
+    return best(prepare, rounds)
+
+
+def build_operator(net: Network, tree: Tree, bricks: int) -> None:
+    OperatorBuilder(net, tree).operator(bricks)
+
+
+def growth(counts: list[int], rounds: int) -> pd.DataFrame:
+    """Return times of operator and batch over the brick count of a chain."""
+    rows = []
+    for count in counts:
+        net = chain(count)
+        tree = tree_of(net)
+        repeat = rounds if count <= 200 else 1
+        build = best(
+            lambda net=net, tree=tree, n=count: OperatorBuilder(net, tree).operator(n), repeat
+        )
+        engine = ComplianceEngine(net)
+        sets = grip_sets(net, count, 2000 if count <= 200 else 200)
+        engine.solve(count, sets[:2], ASKED)
+        batch = best(partial(engine.solve, count, sets, ASKED), repeat) / len(sets)
+        rows.append({"bricks": count, "operator_s": build, "set_s": batch})
+    return pd.DataFrame(rows)
+
+
+def chart(table: pd.DataFrame) -> None:
+    figure = new_figure(6, 3.6)
+    axes = figure.subplots()
+    bricks = table["bricks"].to_numpy(float)
+    axes.loglog(bricks, table["operator_s"], "o-", label="operator of one brick count")
+    axes.loglog(bricks, table["set_s"], "s-", label="one set of three grips, all edges and nodes")
+    guide = table["operator_s"].iloc[-1] * (bricks / bricks[-1]) ** 2
+    axes.loglog(bricks, guide, "k:", lw=0.8, label="square of the brick count")
+    axes.set(xlabel="bricks in the chain", ylabel="time [s]")
+    axes.grid(visible=True, which="both", lw=0.2)
+    axes.legend(frameon=False, fontsize=8)
+    save_figure(figure, "engine_growth.png")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--quick", action="store_true", help="small sizes, nothing written")
+    quick = parser.parse_args().quick
+    size = (2000, 3, 2) if quick else (50_000, 100, 5)
+    figures = engines_side_by_side(*size)
+    figures["prepare_all_counts_s"] = preparation(2 if quick else 10)
+    for name, value in figures.items():
+        print(f"{name:24}{value:12.3g}")
+    print(f"{'fast_sets_per_s':24}{1 / figures['fast_s_per_set']:12.3g}")
+    table = growth([2, 10, 25] if quick else [2, 5, 10, 25, 50, 100, 200, 500, 1000], 3)
+    print(table.to_string(index=False, float_format="%.3g"))
+    if not quick:
+        RESULTS.mkdir(exist_ok=True)
+        table.to_csv(RESULTS / "engine_growth.csv", index=False, float_format="%.4g")
+        pd.Series(figures).to_csv(
+            RESULTS / "engine_speed.csv", header=["value"], float_format="%.4g"
+        )
+        chart(table)
+    holds = 1 / figures["fast_s_per_set"] >= 3e5 and figures["ratio_median"] >= 1000
+    holds = holds and figures["prepare_all_counts_s"] <= 0.05
+    print(f"verdict: {'the claim holds' if holds else 'the claim does not hold on this run'}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,120 @@
+"""Claim: the pictures of the documentation come from the shipped scene.
+
+Method: draw `arch25` with its network; the twisting step 35 of the sequential method beside the same
+state under the cantilever method; responses along all methods; printed against computed responses.
+
+Inputs: the shipped scene and tables. Command: ``python -m experiments.figures``. Writes
+``docs/figures/*.png``.
+"""
+
+from __future__ import annotations
+
+from experiments.plotting import new_figure, save_figure
+from experiments.yardstick import VALUES
+from seqopt.compare import compare
+from seqopt.compliance import ComplianceEngine
+from seqopt.draw import View, draw_bricks, draw_grips, draw_network, draw_responses
+from seqopt.fields import Engine, Want
+from seqopt.network import network
+from seqopt.paper import printed_steps
+from seqopt.scene_file import load_scene
+
+VIEW = View(azimuth=35, elevation=22)
+MAGNIFY = 2000.0
+COLUMNS = {
+    "F_rob1_N": "F_rob1 [N]",
+    "M_sup_Nm": "M_sup [N m]",
+    "F_max_N": "T_max [N]",
+    "D_max_1e-3mm": "D_max [1e-3 mm]",
+}
+
+
+def twisting_step(engine: Engine) -> None:
+    """The whole arch; 18 bricks held off their line; the same held on a brick that lies along."""
+    net = engine.network
+    figure = new_figure(10, 4.2)
+    whole, twist, calm = figure.subplots(1, 3)
+    draw_bricks(whole, net, 25, VIEW)
+    whole.set_title("25 bricks", fontsize=9)
+    for axes, node, name in (
+        (twist, 35, "sequential, step 35"),
+        (calm, 31, "cantilever, step 35"),
+    ):
+        fields = engine.solve(18, [[node]], Want.ALL)
+        draw_bricks(axes, net, 18, VIEW, alpha=0.1)
+        draw_bricks(axes, net, 18, VIEW, twist=fields.brick_twist[0], magnify=MAGNIFY)
+        draw_grips(axes, net, (None, node, None), VIEW)
+        axes.set_title(f"{name}, motion x {MAGNIFY:g}", fontsize=9)
+    save_figure(figure, "twisting_step.png")
+
+
+def network_picture(engine: Engine) -> None:
+    net = engine.network
+    figure = new_figure(8, 6)
+    axes = figure.subplots()
+    draw_bricks(axes, net, 25, VIEW, alpha=0.15)
+    draw_network(axes, net, 25, VIEW, numbers=True)
+    save_figure(figure, "network.png")
+
+
+def axial_forces(engine: Engine) -> None:
+    """The edges of one state, red in tension, blue in compression."""
+    net = engine.network
+    figure = new_figure(9, 4.2)
+    axes = figure.subplots(1, 2)
+    for panel, (bricks, grips) in zip(
+        axes, ((12, (None, 19, None)), (17, (33, 31, None))), strict=True
+    ):
+        held = [[g for g in grips if g is not None]]
+        draw_bricks(panel, net, bricks, VIEW, alpha=0.1)
+        draw_network(panel, net, bricks, VIEW, edge_force=engine.solve(bricks, held).edge_force[0])
+        draw_grips(panel, net, grips, VIEW)
+        panel.set_title(f"{bricks} bricks", fontsize=9)
+    save_figure(figure, "axial_forces.png")
+
+
+def responses_along_the_build(engine: Engine) -> None:
+    figure = new_figure(8, 8)
+    axes = figure.subplots(len(COLUMNS), 1, sharex=True)
+    draw_responses(axes, compare(engine).tables, COLUMNS)
+    save_figure(figure, "responses.png")
+
+
+def printed_against_computed(engine: Engine) -> None:
+    tables = compare(engine).tables
+    figure = new_figure(9, 6.5)
+    panels = figure.subplots(3, 4).ravel()
+    for panel, column in zip(panels, VALUES, strict=False):
+        for name, marker in (("sequential", "o"), ("cantilever", "x")):
+            want = printed_steps(name)[column].abs()
+            panel.plot(want, tables[name][column].abs(), marker, ms=3, mfc="none", label=name)
+        low, high = panel.get_xlim()
+        panel.plot([low, high], [low, high], "k:", lw=0.6)
+        panel.set_title(column, fontsize=8)
+        panel.tick_params(labelsize=6)
+    handles, labels = panels[0].get_legend_handles_labels()
+    panels[-1].set_axis_off()
+    panels[-1].legend(handles, labels, frameon=False, fontsize=8, loc="center")
+    panels[2].clear()
+    panels[2].set_axis_off()  # rob3 takes no part in these methods
+    figure.supxlabel("printed", fontsize=9)
+    figure.supylabel("computed", fontsize=9)
+    save_figure(figure, "agreement.png")
+
+
+def main() -> None:
+    engine = ComplianceEngine(network(load_scene("arch25")))
+    for draw in (
+        twisting_step,
+        network_picture,
+        axial_forces,
+        responses_along_the_build,
+        printed_against_computed,
+    ):
+        draw(engine)
+        print(f"drawn: {draw.__name__}")
+    print("verdict: the claim holds: every picture was drawn from the shipped scene")
+
+
+if __name__ == "__main__":
+    main()

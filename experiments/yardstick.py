@@ -1,0 +1,55 @@
+"""How far a table of responses is from a printed one, beyond the rounding of print."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+VALUES = (
+    "F_rob1_N",
+    "F_rob2_N",
+    "F_rob3_N",
+    "F_sup_N",
+    "M_sup_Nm",
+    "F_min_N",
+    "F_max_N",
+    "F_avg_N",
+    "D_max_1e-3mm",
+    "D_avg_1e-3mm",
+    "D_std_1e-3mm",
+)
+ROUNDING = 0.0501  # the tables print one digit; a little more for binary fractions
+
+
+def errors(produced: pd.DataFrame, printed: pd.DataFrame) -> pd.DataFrame:
+    """Return errors in percent, a row per step and a column per response.
+
+    The error is what exceeds the rounding, over the printed size or 1, whichever is larger. Signed
+    sizes (F_rob, F_sup) are compared without sign. NaN where the table prints nothing.
+    """
+    out = {}
+    by_step = produced.set_index("step").loc[printed["step"]]
+    for column in VALUES:
+        want = printed[column].to_numpy(float)
+        got = by_step[column].to_numpy(float)
+        if column.startswith("F_rob") or column == "F_sup_N":
+            want, got = np.abs(want), np.abs(got)
+        excess = np.maximum(0.0, np.abs(got - want) - ROUNDING)
+        out[column] = 100 * excess / np.maximum(np.abs(want), 1.0)
+    return pd.DataFrame(out, index=printed["step"].to_numpy())
+
+
+def percentiles(table: pd.DataFrame) -> tuple[float, float, float]:
+    """Return the median, 90th and 95th percentile of all errors of a table."""
+    values = table.to_numpy()
+    a, b, c = np.nanpercentile(values, [50, 90, 95])
+    return float(a), float(b), float(c)
+
+
+def tension_share(produced: pd.DataFrame, printed: pd.DataFrame) -> float:
+    """Return the share of rows whose T_pct is within two edges of the printed one."""
+    bricks = printed["bricks"].to_numpy(float)
+    edges = np.where(bricks < bricks.max(), 3 * bricks + 1, 3 * bricks + 2)
+    by_step = produced.set_index("step").loc[printed["step"]]
+    gap = np.abs(by_step["T_pct"].to_numpy(float) - printed["T_pct"].to_numpy(float))
+    return float(np.mean(gap <= 200 / edges + 0.0501))

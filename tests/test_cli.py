@@ -1,0 +1,169 @@
+"""The command line as a user meets it."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+
+import pandas as pd
+import pytest
+
+from seqopt.cli import main
+from seqopt.methods import sequential
+from seqopt.paper import printed_steps
+from seqopt.responses import analyze
+
+
+def run(capsys, *arguments):
+    """Exit status, standard output and standard error of one command."""
+    try:
+        status = main(list(arguments))
+    except SystemExit as stop:
+        status = int(stop.code or 0)
+    out, err = capsys.readouterr()
+    return status, out, err
+
+
+def test_compare(capsys):
+    status, out, _ = run(capsys, "compare")
+    assert status == 0
+    assert "three-robot" in out
+    assert "study" in out
+    assert "406.0" in out  # the study's F_rob2 of the sequential method
+    assert "step 47" in out
+    assert "22" in out
+
+
+def test_compare_of_another_scene_shows_no_study(capsys, tmp_path):
+    path = scene_file(capsys, tmp_path, lambda d: d.update(name="mine"))
+    status, out, _ = run(capsys, "compare", str(path))
+    assert status == 0
+    assert "mine" in out
+    assert "study" not in out
+    assert "three-robot" not in out
+
+
+def scene_file(capsys, tmp_path, change):
+    path = tmp_path / "scene.json"
+    assert run(capsys, "scene", "--export", str(path))[0] == 0
+    document = json.loads(path.read_text(encoding="utf-8"))
+    change(document)
+    path.write_text(json.dumps(document), encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize("engine", ["compliance", "frame"])
+def test_analyze_writes_the_columns_of_table_a1(capsys, tmp_path, engine, engine25):
+    path = tmp_path / "out.csv"
+    arguments = ("analyze", "--method", "sequential", "--engine", engine, "--out", str(path))
+    status, out, _ = run(capsys, *arguments)
+    assert (status, out.count("\n")) == (0, 1)
+    table = pd.read_csv(path)
+    study = printed_steps("sequential").columns[: table.shape[1]]
+    assert list(table.columns) == list(study)
+    values = analyze(engine25, sequential(engine25.network))
+    for column in ("F_rob1_N", "M_sup_Nm", "D_max_1e-3mm"):
+        close = 1e-5 * values[column].abs().max()
+        assert (table[column] - values[column]).abs().max() <= close
+
+
+def test_analyze_prints_without_out(capsys):
+    status, out, _ = run(capsys, "analyze", "--method", "three-robot")
+    assert status == 0
+    assert out.startswith("step,type,bricks,rob1_brick")
+    assert out.count("\n") == 91
+
+
+def test_a_plan_from_a_file(capsys, tmp_path):
+    plan = tmp_path / "plan.csv"
+    plan.write_text(
+        "step,type,bricks,rob1_node,rob2_node,rob3_node\n1,place,1,1,,\n2,place,2,1,2,\n",
+        encoding="utf-8",
+    )
+    status, out, _ = run(capsys, "analyze", "--method", "three-robot", "--plan", str(plan))
+    assert status == 0
+    assert out.count("\n") == 3
+
+
+def test_scene(capsys, tmp_path):
+    path = tmp_path / "copy.json"
+    status, out, _ = run(capsys, "scene", "--export", str(path))
+    assert status == 0
+    assert "77 edges" in out
+    again = tmp_path / "again.json"
+    run(capsys, "scene", str(path), "--export", str(again))
+    assert again.read_bytes() == path.read_bytes()
+
+
+@pytest.mark.parametrize("command", [(), ("compare",), ("analyze",), ("scene",)])
+def test_help_teaches(capsys, command):
+    status, out, _ = run(capsys, *command, "--help")
+    assert status == 0
+    assert len(out.splitlines()) > 8
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        ((), "COMMAND"),
+        (("optimise",), "'optimise'"),
+        (("analyze",), "--method"),
+        (("analyze", "--method", "seq"), "'seq' (choose from 'sequential', 'cantilever'"),
+        (("analyze", "--method", "sequential", "--engine", "fem"), "'fem'"),
+        (("analyze", "arch52", "--method", "sequential"), "scene arch52"),
+        (("analyze", "no/such.json", "--method", "sequential"), "no/such.json"),
+        (("analyze", "--method", "three-robot", "--plan", "no.csv"), "no.csv"),
+        (("analyze", "--method", "sequential", "--plan", "no.csv"), "--plan no.csv"),
+        (("analyze", "--method", "sequential", "--out", "no/dir/x.csv"), "no/dir/x.csv"),
+        (("scene", "--export", "no/dir/x.json"), "no/dir/x.json"),
+    ],
+)
+def test_bad_arguments_get_one_line(capsys, arguments, named):
+    status, out, err = run(capsys, *arguments)
+    assert status == 2
+    assert err.count("\n") == 1
+    assert named in err
+    assert "Traceback" not in out + err
+
+
+@pytest.mark.parametrize(
+    ("change", "named"),
+    [
+        (lambda d: d["bricks"][4].update(density="heavy"), "bricks[4].density"),
+        (lambda d: d["joints"].pop(3), "nothing resists"),
+        (lambda d: d["robots"].pop(), "--plan FILE"),
+    ],
+)
+def test_bad_scenes_get_one_line(capsys, tmp_path, change, named):
+    path = scene_file(capsys, tmp_path, change)
+    target = tmp_path / "out.csv"
+    status, _, err = run(
+        capsys, "analyze", str(path), "--method", "three-robot", "--out", str(target)
+    )
+    status2, _, err2 = run(
+        capsys, "analyze", str(path), "--method", "sequential", "--out", str(target)
+    )
+    assert 2 in (status, status2)
+    assert named in err + err2
+    assert all(text.count("\n") <= 1 for text in (err, err2))
+    assert not target.exists() or status2 == 0
+
+
+def test_it_runs_as_a_program():
+    done = subprocess.run(
+        [sys.executable, "-m", "seqopt", "scene"], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.startswith("arch25: 25 bricks")
+    assert done.stderr == ""
+
+
+def test_a_closed_pipe_is_no_error():
+    done = subprocess.run(
+        f"{sys.executable} -m seqopt analyze --method three-robot | head -1",
+        shell=True,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stderr == ""

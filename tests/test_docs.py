@@ -1,0 +1,55 @@
+"""The documentation: built strictly, tutorials executed; the README's commands are real."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from seqopt.cli import main
+
+ROOT = Path(__file__).parent.parent
+
+
+def build(source, target):
+    """Build a site with warnings as errors."""
+    command = [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-q", "-b", "html"]
+    return subprocess.run([*command, source, target], capture_output=True, text=True, check=False)
+
+
+def test_the_site_builds_strictly(tmp_path):
+    done = build(ROOT / "docs", tmp_path / "html")
+    assert done.returncode == 0, done.stderr
+    page = (tmp_path / "html" / "tutorials" / "reference_arch.html").read_text(encoding="utf-8")
+    assert "306.5" in page  # a number that only the executed tutorial prints
+
+
+@pytest.mark.parametrize("flaw", ["[lost](nowhere.md)", "```{code-cell}\nassert 1 == 2\n```"])
+def test_a_flaw_fails_the_build(tmp_path, flaw):
+    source = tmp_path / "docs"
+    source.mkdir()
+    (source / "conf.py").write_bytes((ROOT / "docs" / "conf.py").read_bytes())
+    front = "---\nfile_format: mystnb\nkernelspec:\n  name: python3\n---\n"
+    (source / "index.md").write_text(f"{front}# Page\n\n{flaw}\n", encoding="utf-8")
+    assert build(source, tmp_path / "html").returncode != 0
+
+
+def test_readme_shows_two_commands_that_exist(capsys):
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    commands = re.findall(r"```sh\n(.*?)\n```", text, flags=re.DOTALL)
+    assert len(commands) >= 2
+    assert commands[0].endswith("seqopt compare")
+    assert commands[1].endswith("-m pytest")
+    assert main(["compare"]) == 0
+    assert "three-robot" in capsys.readouterr().out
+
+
+def test_pictures_exist():
+    for page in [ROOT / "README.md", *(ROOT / "docs").rglob("*.md")]:
+        if "_build" in page.parts:
+            continue
+        for target in re.findall(r"!\[[^\]]*\]\(([^)]+)\)", page.read_text(encoding="utf-8")):
+            assert (page.parent / target).exists(), f"{page}: {target}"
