@@ -1,7 +1,7 @@
 """Claim: the pictures of the documentation come from the shipped scene.
 
-Method: draw `arch25` with its network; the twisting step 35 of the sequential method beside the same
-state under the cantilever method; responses along all methods; printed against computed responses.
+Method: draw `arch25` with its network; the twisting step 35 of the sequential method beside the
+cantilever method at the same step; responses along all methods; printed against computed ones.
 
 Inputs: the shipped scene and tables. Command: ``python -m experiments.figures``. Writes
 ``docs/figures/*.png``.
@@ -30,7 +30,7 @@ COLUMNS = {
 
 
 def twisting_step(engine: Engine) -> None:
-    """The whole arch; 18 bricks held off their line; the same held on a brick that lies along."""
+    """Draw the arch, 18 bricks held off their line, and the same held on a brick along it."""
     net = engine.network
     figure = new_figure(10, 4.2)
     whole, twist, calm = figure.subplots(1, 3)
@@ -58,7 +58,7 @@ def network_picture(engine: Engine) -> None:
 
 
 def axial_forces(engine: Engine) -> None:
-    """The edges of one state, red in tension, blue in compression."""
+    """Draw the edges of two states, red in tension, blue in compression."""
     net = engine.network
     figure = new_figure(9, 4.2)
     axes = figure.subplots(1, 2)
@@ -77,6 +77,7 @@ def responses_along_the_build(engine: Engine) -> None:
     figure = new_figure(8, 8)
     axes = figure.subplots(len(COLUMNS), 1, sharex=True)
     draw_responses(axes, compare(engine).tables, COLUMNS)
+    axes[-1].set(yscale="log", ylim=(0.1, 500))
     save_figure(figure, "responses.png")
 
 

@@ -16,10 +16,10 @@ from seqopt.vectors import Vector
 LEFT = np.array([0.0, 1.0, 0.0])
 LETTERS = "VLR"
 ROBOTS = (
-    Robot(name="rob1", payload=392.4, reach=Side(toward=(0.0, 1.0, 0.0), point=(0.0, -0.03, 0.0))),
-    Robot(name="rob2", payload=392.4, reach=Side(toward=(0.0, -1.0, 0.0), point=(0.0, 0.03, 0.0))),
+    Robot(name="rob1", payload=392.4, reach=Side(toward=(0.0, 1.0, 0.0), point=(0.0, -0.075, 0.0))),
+    Robot(name="rob2", payload=392.4, reach=Side(toward=(0.0, -1.0, 0.0), point=(0.0, 0.075, 0.0))),
     Robot(name="rob3", payload=392.4, reach=Anywhere()),
-)  # section 3.1: 40 kg; section 5: rob1 and rob2 beside the arch, rob3 mobile
+)  # section 3.1: 40 kg; section 5: two beside the arch reach its line, the third is mobile
 
 
 @dataclass(frozen=True, kw_only=True)

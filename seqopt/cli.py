@@ -12,11 +12,11 @@ from typing import NoReturn
 from seqopt.compare import compare, format_comparison, is_reference_arch
 from seqopt.engines import ENGINES
 from seqopt.errors import SceneError, SeqoptError, SolverError, StepError
-from seqopt.files import write_text
+from seqopt.files import write_bytes, write_text
 from seqopt.methods import METHODS
 from seqopt.network import network
 from seqopt.plan_file import published_plan, read_plan
-from seqopt.responses import analyze
+from seqopt.responses import analyze, fields_archive
 from seqopt.scene import Scene
 from seqopt.scene_file import builtin_scenes, dump_scene, load_scene
 from seqopt.steps import Step
@@ -54,21 +54,7 @@ def _parser() -> argparse.ArgumentParser:
         description="Where should each robot hold a half-built structure, over the whole build?",
     )
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
-    scene = _Parser(add_help=False)
-    scene.add_argument(
-        "scene",
-        nargs="?",
-        default="arch25",
-        metavar="SCENE",
-        help=f"a built-in scene ({', '.join(builtin_scenes())}) or a JSON file; arch25 by default",
-    )
-    engine = _Parser(add_help=False)
-    engine.add_argument(
-        "--engine",
-        choices=tuple(ENGINES),
-        default="compliance",
-        help="compliance: exactly rigid bricks, fast (default); frame: stiff bars, the slow check",
-    )
+    scene, engine = _shared_arguments()
     command = commands.add_parser(
         "compare",
         parents=[scene, engine],
@@ -85,15 +71,7 @@ def _parser() -> argparse.ArgumentParser:
         "A.1 of the study: forces in N, moments in N m, displacements in 1e-3 mm.",
         epilog="example: seqopt analyze arch25 --method cantilever --out cantilever.csv",
     )
-    command.add_argument(
-        "--method", choices=(*METHODS, PLANNED), required=True, help="how the build goes"
-    )
-    command.add_argument(
-        "--plan", type=Path, metavar="FILE", help="CSV of the steps, with --method three-robot"
-    )
-    command.add_argument(
-        "--out", type=Path, metavar="FILE", help="CSV to write; standard output if not given"
-    )
+    _analyze_arguments(command)
     command.set_defaults(run=_analyze)
     command = commands.add_parser(
         "scene",
@@ -106,6 +84,44 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
+def _shared_arguments() -> tuple[_Parser, _Parser]:
+    """Return parsers of the arguments that commands share: the scene, the engine."""
+    scene = _Parser(add_help=False)
+    scene.add_argument(
+        "scene",
+        nargs="?",
+        default="arch25",
+        metavar="SCENE",
+        help=f"a built-in scene ({', '.join(builtin_scenes())}) or a JSON file; arch25 by default",
+    )
+    engine = _Parser(add_help=False)
+    engine.add_argument(
+        "--engine",
+        choices=tuple(ENGINES),
+        default="compliance",
+        help="compliance: exactly rigid bricks, fast (default); frame: stiff bars, the slow check",
+    )
+    return scene, engine
+
+
+def _analyze_arguments(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "--method", choices=(*METHODS, PLANNED), required=True, help="how the build goes"
+    )
+    command.add_argument(
+        "--plan", type=Path, metavar="FILE", help=f"CSV of the steps, with --method {PLANNED}"
+    )
+    command.add_argument(
+        "--out", type=Path, metavar="FILE", help="CSV to write; standard output if not given"
+    )
+    command.add_argument(
+        "--fields",
+        type=Path,
+        metavar="FILE",
+        help="NumPy archive (.npz) to write: every edge force, node displacement and reaction",
+    )
+
+
 def _compare(options: argparse.Namespace) -> None:
     scene = load_scene(options.scene)
     print(format_comparison(compare(ENGINES[options.engine](network(scene))), scene))
@@ -114,8 +130,11 @@ def _compare(options: argparse.Namespace) -> None:
 def _analyze(options: argparse.Namespace) -> None:
     scene = load_scene(options.scene)
     engine = ENGINES[options.engine](network(scene))
-    table = analyze(engine, _steps(scene, options))
+    steps = _steps(scene, options)
+    table = analyze(engine, steps)
     text = table.to_csv(index=False, float_format="%.6g", lineterminator="\n")
+    if options.fields is not None:
+        write_bytes(options.fields, fields_archive(engine, steps))
     if options.out is None:
         sys.stdout.write(text)
     else:

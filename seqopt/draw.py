@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.patheffects import withStroke
 
 from seqopt.network import Floats, Kind, Network
 
@@ -139,17 +140,17 @@ def draw_grips(axes: Axes, network: Network, grips: Sequence[int | None], view: 
             continue
         x, y = view.axes()[:2] @ np.array(network.scene.node_position(node))
         color = ROBOT_COLORS[i % len(ROBOT_COLORS)]
-        axes.scatter(
-            [x],
-            [y],
-            s=120,
-            marker="X",
-            c=color,
-            edgecolors="white",
-            zorder=5,
-            label=f"{robot.name} at {node}",
+        axes.scatter([x], [y], s=120, marker="X", c=color, edgecolors="white", zorder=5)
+        axes.annotate(
+            f"{robot.name} at {node}",
+            (x, y),
+            (9, -3),
+            textcoords="offset points",
+            fontsize=8,
+            color=color,
+            zorder=6,
+            path_effects=[withStroke(linewidth=2.5, foreground="white")],
         )
-    axes.legend(loc="lower left", fontsize=8, frameon=False)
 
 
 def draw_responses(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -84,6 +85,28 @@ def analyze(engine: Engine, steps: Sequence[Step]) -> pd.DataFrame:
 def step_fields(engine: Engine, step: Step) -> Fields:
     """Return the full fields of one step."""
     return engine.solve(step.bricks, np.array([step.held], dtype=np.int64).reshape(1, -1))
+
+
+def fields_archive(engine: Engine, steps: Sequence[Step]) -> bytes:
+    """Return the full fields of every step as a NumPy archive (``.npz``).
+
+    Arrays are named ``step1_edge_force``, ``step1_displacement``, ``step1_grip_force``,
+    ``step1_support`` and so on, as in `Fields` without its first axis; ``edge_nodes`` (E, 2),
+    ``node_position`` (N, 3) and ``node_name`` (N,) say what they run over.
+    """
+    network = engine.network
+    arrays: dict[str, np.ndarray] = {
+        "edge_nodes": network.edge_nodes,
+        "node_position": network.node_position,
+        "node_name": np.array([str(name) for name in network.node_name]),
+    }
+    for step in steps:
+        fields = step_fields(engine, step)
+        for name in ("edge_force", "displacement", "grip_force", "support"):
+            arrays[f"step{step.number}_{name}"] = getattr(fields, name)[0]
+    buffer = io.BytesIO()
+    np.savez_compressed(buffer, allow_pickle=False, **arrays)
+    return buffer.getvalue()
 
 
 def _row(engine: Engine, step: Step) -> dict[str, object]:

@@ -75,7 +75,7 @@ def test_three_routes_agree(state):
     net = network(scene)
     fast = ComplianceEngine(net).solve(bricks, grips, Want.ALL)
     direct = solve_rigid(net, bricks, grip_columns(net, bricks, grips))
-    frame = FrameEngine(net).solve(bricks, grips)
+    frame = FrameEngine(net, contrast=1e6).solve(bricks, grips)  # joints here differ 100-fold
     free = np.abs(ComplianceEngine(net).solve(bricks, np.zeros((1, 0), int)).displacement).max()
     force = np.abs(fast.joint_wrench).max() + np.abs(fast.edge_force).max()
     for other, tolerance in ((direct, 1e-9), (frame, 1e-4)):

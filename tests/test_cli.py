@@ -6,13 +6,14 @@ import json
 import subprocess
 import sys
 
+import numpy as np
 import pandas as pd
 import pytest
 
 from seqopt.cli import main
-from seqopt.methods import sequential
+from seqopt.methods import cantilever, sequential
 from seqopt.paper import printed_steps
-from seqopt.responses import analyze
+from seqopt.responses import analyze, step_fields
 
 
 def run(capsys, *arguments):
@@ -73,6 +74,17 @@ def test_analyze_prints_without_out(capsys):
     assert status == 0
     assert out.startswith("step,type,bricks,rob1_brick")
     assert out.count("\n") == 91
+
+
+def test_full_fields_on_request(capsys, tmp_path, engine25):
+    path = tmp_path / "fields.npz"
+    assert run(capsys, "analyze", "--method", "cantilever", "--fields", str(path))[0] == 0
+    step = cantilever(engine25.network)[34]
+    want = step_fields(engine25, step)
+    with np.load(path) as archive:
+        for name in ("edge_force", "displacement", "grip_force", "support"):
+            assert (archive[f"step35_{name}"] == getattr(want, name)[0]).all()
+        assert len(archive["edge_nodes"]) == 77
 
 
 def test_a_plan_from_a_file(capsys, tmp_path):

@@ -1,0 +1,71 @@
+"""Pictures hold what they should show."""
+
+from __future__ import annotations
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+
+from seqopt.draw import View, draw_bricks, draw_grips, draw_network, draw_responses
+from seqopt.fields import Want
+from seqopt.methods import METHODS
+from seqopt.responses import analyze
+
+mpl.use("Agg")
+import matplotlib.pyplot as plt
+
+
+@pytest.fixture
+def axes():
+    figure, axes = plt.subplots()
+    yield axes
+    plt.close(figure)
+
+
+@pytest.mark.parametrize(("azimuth", "elevation"), [(0, 0), (35, 22), (-120, 80)])
+def test_a_view_is_a_rotation(azimuth, elevation):
+    matrix = View(azimuth, elevation).axes()
+    assert matrix @ matrix.T == pytest.approx(np.eye(3), abs=1e-12)
+    assert np.linalg.det(matrix) == pytest.approx(1)
+
+
+def test_a_brick_is_six_faces(axes, engine25):
+    draw_bricks(axes, engine25.network, 7, View())
+    (faces,) = axes.collections
+    assert len(faces.get_paths()) == 6 * 7
+
+
+def test_twists_move_bricks_and_magnify(axes, engine25):
+    twist = engine25.solve(18, [[35]], Want.ALL).brick_twist[0]
+    spans = []
+    for magnify in (0.0, 1000.0, 2000.0):
+        draw_bricks(axes, engine25.network, 18, View(), twist=twist, magnify=magnify)
+        faces = axes.collections[-1].get_paths()
+        spans.append(np.max([path.vertices.max(axis=0) for path in faces], axis=0))
+    assert np.abs(spans[1] - spans[0]).max() > 0.01
+    assert np.abs(spans[2] - spans[0]).max() == pytest.approx(
+        2 * np.abs(spans[1] - spans[0]).max(), rel=0.5
+    )
+
+
+def test_tension_and_compression_differ_in_color(axes, engine25):
+    force = engine25.solve(12, [[19]]).edge_force[0]
+    draw_network(axes, engine25.network, 12, View(), edge_force=force, numbers=True)
+    colors = axes.collections[0].get_colors()
+    assert len({tuple(color) for color in colors}) == 2
+    assert len(axes.collections[0].get_segments()) == engine25.network.count_edges(12)
+
+
+def test_grips_are_named(axes, engine25):
+    draw_grips(axes, engine25.network, (None, 35, 20), View())
+    assert [text.get_text() for text in axes.texts] == ["rob2 at 35", "rob3 at 20"]
+
+
+def test_methods_share_an_axis(engine25):
+    tables = {name: analyze(engine25, method(engine25.network)) for name, method in METHODS.items()}
+    figure, axes = plt.subplots(2, 1)
+    draw_responses(axes, tables, {"M_sup_Nm": "M", "D_max_1e-3mm": "D"})
+    for line in axes[0].lines:
+        assert line.get_xdata()[-1] == 25
+    assert [line.get_label() for line in axes[0].lines] == list(METHODS)
+    plt.close(figure)
