@@ -96,8 +96,7 @@ def main() -> None:
     fast = ComplianceEngine(network(load_scene("arch25")))
     steps = published_steps(fast)[:: 25 if quick else 1]
     powers = [2, 6, 10] if quick else np.arange(2, 11.5, 0.5).tolist()
-    table = sweep(steps, fast, [10.0**p for p in powers] + [CONTRAST])
-    table = table.sort_values("contrast", ignore_index=True)
+    table = sweep(steps, fast, sorted({CONTRAST, *(10.0**p for p in powers)}))
     print(table.to_string(index=False, float_format="%.2g"))
     gap = direct_gap(steps, fast)
     print(f"direct solve of the same rigid bricks: {gap:.2g}")

@@ -67,24 +67,28 @@ def test_equal_states_are_equal_rows(tables):
 
 @pytest.mark.parametrize("quantity", ["M_sup", "D_max"])
 def test_twisting_steps(tables, quantity):
-    """The study's table of the eight off-center steps, within 2 %."""
+    """The study's table of the eight off-center steps, within print and 2 %."""
     column = {"M_sup": "M_sup_Nm", "D_max": "D_max_1e-3mm"}[quantity]
     study = printed("sequential_offcenter").set_index("step")[column]
     ours = tables["sequential"].set_index("step")[column].loc[study.index]
-    assert np.abs(ours / study - 1).max() <= 0.02
+    assert (np.abs(ours - study) <= 0.05 + 0.02 * study).all()
 
 
 def test_improvement_table(engine25):
     """Maxima of the two-robot methods within 3 %, of the plan, which no fit has seen, within 2 %.
 
-    Left out is the plan's D_max, where no model that fits A.1 and A.2 comes near the printed value:
-    see the page on the agreement with the study.
+    The plan's printed D_max is that of step 88; ours at step 86 is larger: see the page on the
+    agreement with the study.
     """
     result = compare(engine25)
     assert result.printed is not None
     gap = (result.maxima / result.printed - 1).abs()
     assert np.nanmax(gap[["sequential", "cantilever"]].to_numpy()) <= 0.03
     assert gap["three-robot"].drop("D_max [1e-3 mm]").max() <= 0.02
+    plan = result.tables["three-robot"].set_index("step")["D_max_1e-3mm"]
+    assert plan.idxmax() == 86
+    assert plan.drop(86).idxmax() == 88
+    assert plan[88] == pytest.approx(21.9, abs=0.2)
     assert any("step 47" in note for note in result.notes)
 
 
