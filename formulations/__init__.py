@@ -1,5 +1,6 @@
-"""Mathematical programs over a problem of seqopt: one file each, none imports another.
+"""Mathematical programs for support placement: one file each, none imports another.
 
-A formulation takes the problem as one frozen value and returns a selection, a grip per move; its
-module docstring displays the program that it solves. The package is empty until the problem exists.
+A formulation takes the problem as one value (`seqopt.placement.PlacementProblem`) and returns a
+selection, a candidate per move; its module docstring displays the program that it solves. Each is
+registered as an entry point of the group ``seqopt.formulations``.
 """

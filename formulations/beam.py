@@ -1,0 +1,68 @@
+r"""A beam of given width between the cascade and the exact optimum.
+
+Move by move it extends the ``width`` best partial choices by every candidate and, for each
+candidate, keeps the cheapest way to it:
+
+.. math::
+
+   B_k = \text{the } w \text{ candidates } j \text{ with the least } \;
+   s_k(j) = c_k(j) + \min_{i \in B_{k-1}} \left[ s_{k-1}(i) + d_k(i, j) \right] .
+
+With a width of all candidates it is dynamic programming and exact. The greedy choice that ranks
+the shared state among the candidates of one move, as the cascade does, is kept as incumbent: the
+beam never does worse.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from seqopt.placement import PlacementProblem, ProblemError, without_budgets
+from seqopt.selection import Aim, Formulation, Kind, Selection
+
+
+def solve(problem: PlacementProblem, *, width: int = 5) -> Selection:
+    """Return the best choice found with a beam of ``width`` partial choices."""
+    without_budgets(problem, "beam")
+    if width < 1:
+        raise ProblemError(f"beam: width is {width}; give a whole number from 1")
+    placement = problem.sums
+    found = [_beam(problem, width), _greedy(problem)]
+    choice = min(found, key=placement.cost)
+    return Selection(choice, placement.cost(choice))
+
+
+def _beam(problem: PlacementProblem, width: int) -> tuple[int, ...]:
+    placement = problem.sums
+    good = placement.continuable()
+    paths: list[tuple[int, ...]] = [()]
+    spent = np.zeros(1)
+    for k, (single, shared) in enumerate(zip(placement.single, placement.shared, strict=True)):
+        ends = [path[-1] if path else 0 for path in paths]
+        through = spent[:, None] + shared[ends]
+        best = through.argmin(axis=0)
+        total = np.where(good[k], through.min(axis=0) + single, np.inf)
+        order = np.argsort(total, kind="stable")
+        kept = order[np.isfinite(total[order])][:width]
+        if not len(kept):  # no kept path leads on: the incumbent stands
+            return _greedy(problem)
+        paths = [(*paths[best[j]], int(j)) for j in kept]
+        spent = total[kept]
+    return paths[0]
+
+
+def _greedy(problem: PlacementProblem) -> tuple[int, ...]:
+    """Return the choice that takes, move by move, the candidate that is cheapest now."""
+    placement = problem.sums
+    good = placement.continuable()
+    choice: list[int] = []
+    for k, single in enumerate(placement.single):
+        row = problem.row(k, choice[-1]) if choice else placement.shared[0][0]
+        possible = good[k] & np.isfinite(placement.shared[k][choice[-1] if choice else 0])
+        choice.append(int(np.argmin(np.where(possible, single + row, np.inf))))
+    return tuple(choice)
+
+
+FORMULATION = Formulation(
+    "beam", "a beam between cascade and exact", Kind.HEURISTIC, Aim.SUM, solve
+)

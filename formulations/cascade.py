@@ -1,0 +1,59 @@
+r"""The study's simplified cascading scheme: move by move, a shared state charged to one of two.
+
+With ``charge="later"`` move :math:`k` knows the choice before it and takes
+
+.. math::
+
+   o_k = \arg\min_i \; c_k(i) + d_k(o_{k-1}, i)
+
+where :math:`d_k(o_{k-1}, \cdot)` is ranked among the candidates of move :math:`k` alone. With
+``charge="earlier"`` a move answers for the state it shares with the next one, at the next one's
+best:
+
+.. math::
+
+   o_k = \arg\min_i \; c_k(i) + \min_j d_{k+1}(i, j) .
+
+The study's count, four states per optimization from the reposition to the last release, and the
+steps its printed plan optimizes over are those of ``later``, the default. Choices that lead
+nowhere are left out. It is a heuristic: what it leaves to the next move may cost more than it
+saved.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from seqopt.network import Floats
+from seqopt.placement import PlacementProblem, ProblemError, without_budgets
+from seqopt.selection import Aim, Formulation, Kind, Selection
+
+CHARGES = ("later", "earlier")
+
+
+def solve(problem: PlacementProblem, *, charge: str = "later") -> Selection:
+    """Return the choices of the cascade; ``charge`` says which move answers for a shared state."""
+    without_budgets(problem, "cascade")
+    if charge not in CHARGES:
+        raise ProblemError(f"cascade: charge is {charge!r}; give one of {', '.join(CHARGES)}")
+    placement = problem.sums
+    good = placement.continuable()
+    choice: list[int] = []
+    for k, single in enumerate(placement.single):
+        possible = good[k] & np.isfinite(placement.shared[k][choice[-1] if choice else 0])
+        costs = single + _charged(problem, k, choice, charge)
+        choice.append(int(np.argmin(np.where(possible, costs, np.inf))))
+    return Selection(tuple(choice), placement.cost(choice))
+
+
+def _charged(problem: PlacementProblem, k: int, choice: list[int], charge: str) -> Floats:
+    """Return what move ``k`` answers for beside its own states, (C_k,)."""
+    shared = problem.sums.shared
+    if charge == "later":
+        return problem.row(k, choice[-1]) if choice else shared[0][0]
+    return shared[k + 1].min(axis=1) if k + 1 < len(shared) else np.zeros(shared[k].shape[1])
+
+
+FORMULATION = Formulation(
+    "cascade", "the study's cascading scheme over the whole build", Kind.HEURISTIC, Aim.SUM, solve
+)

@@ -1,0 +1,60 @@
+r"""The smallest achievable worst cost over the build: exact.
+
+.. math::
+
+   \min_{o_1, \dots, o_K} \; \max \left\{ \max_k c_k(o_k), \; \max_k d_k(o_{k-1}, o_k) \right\}
+
+where :math:`c_k(i)` is the worst of the states in which move :math:`k` alone is open, and
+:math:`d_k` that of the states it shares. It is a bottleneck path in a layered graph; dynamic
+programming solves it with the maximum in the place of the sum. Among the choices with the same
+worst cost the least sum of costs wins. The certificate proves the value anew: no choice stays
+strictly below it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from seqopt.placement import Placement, PlacementProblem, without_budgets
+from seqopt.selection import Aim, Formulation, Kind, Selection
+
+
+def solve(problem: PlacementProblem) -> Selection:
+    """Return a choice whose worst cost is least."""
+    without_budgets(problem, "minimax")
+    placement = problem.peaks
+    placement.continuable()
+    peak = _least_peak(placement)
+    allowed = Placement(
+        tuple(np.where(single <= peak, single, np.inf) for single in placement.single),
+        tuple(np.where(shared <= peak, shared, np.inf) for shared in placement.shared),
+    )
+    choice = _least_sum(allowed)
+    return Selection(choice, placement.worst(choice), bound=peak)
+
+
+def _least_peak(placement: Placement) -> float:
+    """Return the smallest worst cost."""
+    reached = np.full(1, -np.inf)
+    for single, shared in zip(placement.single, placement.shared, strict=True):
+        reached = np.maximum(single, np.maximum(reached[:, None], shared).min(axis=0))
+    return float(reached.min())
+
+
+def _least_sum(placement: Placement) -> tuple[int, ...]:
+    """Return the choice of least sum; costs too far from zero to add up count as zero."""
+    total = np.zeros(1)
+    back = []
+    for single, shared in zip(placement.single, placement.shared, strict=True):
+        through = total[:, None] + np.where(shared < -1e200, 0.0, shared)
+        back.append(through.argmin(axis=0))
+        total = through.min(axis=0) + np.where(single < -1e200, 0.0, single)
+    choice = [int(total.argmin())]
+    for best in reversed(back[1:]):
+        choice.append(int(best[choice[-1]]))
+    return tuple(reversed(choice))
+
+
+FORMULATION = Formulation(
+    "minimax", "smallest worst cost over the build", Kind.EXACT, Aim.PEAK, solve
+)

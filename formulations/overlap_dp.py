@@ -1,0 +1,45 @@
+r"""The full overlap formulation by dynamic programming: exact.
+
+.. math::
+
+   \min_{o_1, \dots, o_K} \; \sum_{k=1}^{K} c_k(o_k) + \sum_{k=2}^{K} d_k(o_{k-1}, o_k)
+
+with the single costs :math:`c` and the costs :math:`d` of the state that neighboring moves share.
+It is a shortest path in a layered graph; the cost to go
+
+.. math::
+
+   V_K(i) = c_K(i), \qquad V_k(i) = c_k(i) + \min_j \left[ d_{k+1}(i, j) + V_{k+1}(j) \right]
+
+is found backward, the choice forward. Ties go to the first candidate. The costs to go are
+returned as potentials: they prove the optimum to anyone who has the costs.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from seqopt.placement import PlacementProblem, without_budgets
+from seqopt.selection import Aim, Formulation, Kind, Selection
+
+
+def solve(problem: PlacementProblem) -> Selection:
+    """Return the exact optimum of the sum over the build."""
+    without_budgets(problem, "overlap_dp")
+    placement = problem.sums
+    placement.continuable()
+    potentials = [placement.single[-1]]
+    for single, shared in zip(placement.single[-2::-1], placement.shared[:0:-1], strict=True):
+        potentials.insert(0, single + (shared + potentials[0]).min(axis=1))
+    choice, row = [], placement.shared[0][0]
+    for k, potential in enumerate(potentials, start=1):
+        choice.append(int(np.argmin(row + potential)))
+        if k < len(potentials):
+            row = placement.shared[k][choice[-1]]
+    value = placement.cost(choice)
+    return Selection(tuple(choice), value, tuple(potentials), value)
+
+
+FORMULATION = Formulation(
+    "overlap_dp", "full overlap, dynamic programming", Kind.EXACT, Aim.SUM, solve
+)

@@ -1,0 +1,31 @@
+r"""The full overlap formulation as a linear program: a unit flow of least cost (cvxpy, Clarabel).
+
+.. math::
+
+   \min_{y \ge 0} \; & \sum_k \sum_{i,j} \left[ d_k(i, j) + c_k(j) \right] y_k(i, j) \\
+   \text{s.t.} \; & \sum_j y_1(0, j) = 1, \qquad \sum_i y_k(i, j) = \sum_l y_{k+1}(j, l), \\
+   & \sum_k \sum_{i,j} a_k(i, j)\, y_k(i, j) \le b \quad \text{for every budget.}
+
+Without budgets the matrix is totally unimodular and an optimal vertex is a choice. An
+interior-point answer is a mixture where costs tie: the choice follows the largest flow, every arc
+of which lies on an optimal path. The duals of the balances are returned as potentials, those of
+the budgets as prices. With budgets the value is a bound and the choice, if it is within them,
+need not be the best: use ``overlap_mip``.
+"""
+
+from __future__ import annotations
+
+from formulations.solvers import follow, solve_flow
+from seqopt.placement import PlacementProblem
+from seqopt.selection import Aim, Formulation, Kind, Selection
+
+
+def solve(problem: PlacementProblem) -> Selection:
+    """Return the choice that the largest flow follows."""
+    flow = solve_flow(problem, integer=False)
+    choice = follow(flow.arcs)
+    potentials = () if problem.budgets else flow.potentials
+    return Selection(choice, problem.sums.cost(choice), potentials, flow.value, flow.prices)
+
+
+FORMULATION = Formulation("overlap_lp", "full overlap, linear program", Kind.BOUND, Aim.SUM, solve)

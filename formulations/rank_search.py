@@ -1,0 +1,70 @@
+r"""Exhaustive rank search: every combination of the next moves, the first one committed.
+
+At move :math:`k`, with the choices before it committed, it enumerates all combinations of the
+next :math:`h` moves,
+
+.. math::
+
+   \min_{o_k, \dots, o_{k+h-1}} \; \sum_{l=k}^{k+h-1} c_l(o_l) + d_k(o_{k-1}, o_k)
+   + \sum_{l=k+1}^{k+h-1} d_l(o_{l-1}, o_l),
+
+and commits :math:`o_k`. The state shared with the committed choice is ranked among the candidates
+of move :math:`k` alone. With ``horizon=1`` this is the study's search of a single move (equation
+1): every candidate analyzed in every step of its window, ranked per criterion, least sum wins.
+With the whole build as horizon it is brute force, exact, and the judge of all other formulations
+on small builds. The work grows with the product of the candidates' numbers.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from seqopt.network import Floats
+from seqopt.placement import Placement, PlacementProblem, ProblemError, without_budgets
+from seqopt.selection import Aim, Formulation, Kind, Selection
+
+MOST = 20_000_000  # combinations in one enumeration: 160 MB
+
+
+def solve(problem: PlacementProblem, *, horizon: int = 1) -> Selection:
+    """Return the committed choices; ``horizon`` is the number of moves enumerated at once."""
+    without_budgets(problem, "rank_search")
+    placement = problem.sums
+    sizes = placement.sizes
+    if horizon < 1:
+        raise ProblemError(f"rank_search: horizon is {horizon}; give a whole number from 1")
+    good = placement.continuable()
+    choice: list[int] = []
+    while len(choice) < len(sizes):
+        k = len(choice)
+        count = math.prod(sizes[k : k + horizon])
+        if count > MOST:
+            raise ProblemError(
+                f"rank_search: {count:.2g} combinations of {min(horizon, len(sizes) - k)} moves; "
+                f"lower the horizon (at most {MOST:.0e} are enumerated)"
+            )
+        row = problem.row(k, choice[-1]) if choice else placement.shared[0][0]
+        blocked = ~np.isfinite(placement.shared[k][choice[-1] if choice else 0])
+        total = _enumerate(placement, np.where(blocked, np.inf, row), k, horizon, good)
+        best = np.unravel_index(int(np.argmin(total)), total.shape)
+        whole = k + horizon >= len(sizes)  # nothing is left to be decided after these
+        choice += [int(c) for c in (best if whole else best[:1])]
+    return Selection(tuple(choice), placement.cost(choice))
+
+
+def _enumerate(
+    placement: Placement, row: Floats, k: int, horizon: int, good: tuple[np.ndarray, ...]
+) -> Floats:
+    """Return the cost of every combination of the moves from ``k`` on, one axis each."""
+    total = np.where(good[k], row + placement.single[k], np.inf)
+    for move in range(k + 1, min(k + horizon, len(placement.single))):
+        step = placement.shared[move] + np.where(good[move], placement.single[move], np.inf)
+        total = total[..., None] + step
+    return total
+
+
+FORMULATION = Formulation(
+    "rank_search", "exhaustive search of the next moves", Kind.HEURISTIC, Aim.SUM, solve
+)

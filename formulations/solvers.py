@@ -1,0 +1,127 @@
+"""The one module that talks to solvers: a flow through the layers of a placement problem."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import cvxpy as cp
+import numpy as np
+from scipy import sparse
+
+from seqopt.errors import SolverError
+from seqopt.network import Floats
+from seqopt.placement import Budget, InfeasibleError, Placement, PlacementProblem
+
+
+@dataclass(frozen=True)
+class Flow:
+    """A unit flow through the layers.
+
+    Attributes
+    ----------
+    arcs : tuple of (C_{k-1}, C_k) float
+        Flow from every candidate to every candidate of the next move, zero where not allowed.
+    value : float
+        Objective that the solver reports.
+    potentials : tuple of (C_k,) float
+        Dual values of the candidates; empty for an integer program.
+    prices : mapping of str to float
+        Dual value of every budget.
+    """
+
+    arcs: tuple[Floats, ...]
+    value: float
+    potentials: tuple[Floats, ...]
+    prices: Mapping[str, float]
+
+
+def solve_flow(problem: PlacementProblem, *, integer: bool) -> Flow:
+    """Send one unit through the layers at least cost, within the budgets.
+
+    Raises
+    ------
+    InfeasibleError
+        If the solver proves that no flow is within the budgets.
+    SolverError
+        If the solver ends in any other way than with an optimum.
+    """
+    placement = problem.sums
+    placement.continuable()
+    pairs = zip(placement.shared, placement.single, strict=True)
+    costs = [shared + single for shared, single in pairs]
+    kept = [np.isfinite(cost) for cost in costs]
+    cost = np.concatenate([c[k] for c, k in zip(costs, kept, strict=True)])
+    scale = max(float(np.abs(cost).max()), np.finfo(float).tiny)
+    balance, source = _balance(placement, kept)
+    flow = cp.Variable(len(cost), boolean=True) if integer else cp.Variable(len(cost), nonneg=True)
+    conserve = cp.Zero(balance @ flow - source)
+    caps = [cp.NonPos(_amounts(b, kept) @ flow - b.bound) for b in problem.budgets]
+    program = cp.Problem(cp.Minimize((cost / scale) @ flow), [conserve, *caps])
+    _solve(program, cp.HIGHS if integer else cp.CLARABEL)
+    assert flow.value is not None  # an optimum was reported
+    sizes = [int(mask.sum()) for mask in kept]
+    arcs = []
+    for mask, part in zip(kept, np.split(flow.value, np.cumsum(sizes)[:-1]), strict=True):
+        arc = np.zeros(mask.shape)
+        arc[mask] = part
+        arcs.append(arc)
+    value = float(program.value) * scale
+    if integer:
+        return Flow(tuple(arcs), value, (), {})
+    ahead = np.split(-scale * conserve.dual_value, np.cumsum([1, *placement.sizes[:-1]])[:-1])[1:]
+    ahead.append(np.zeros(placement.sizes[-1]))
+    potentials = tuple(c + rest for c, rest in zip(placement.single, ahead, strict=True))
+    names = [budget.name for budget in problem.budgets]
+    prices = {n: float(scale * cap.dual_value) for n, cap in zip(names, caps, strict=True)}
+    return Flow(tuple(arcs), value, potentials, prices)
+
+
+def follow(arcs: tuple[Floats, ...]) -> tuple[int, ...]:
+    """Return the choice that the largest flow takes.
+
+    Where costs tie an interior-point flow is a mixture; every arc it uses lies on an optimal path.
+    """
+    choice: list[int] = []
+    for arc in arcs:
+        choice.append(int(arc[choice[-1] if choice else 0].argmax()))
+    return tuple(choice)
+
+
+def _solve(program: cp.Problem, solver: str) -> None:
+    try:
+        program.solve(solver=solver)
+    except cp.SolverError as error:
+        raise SolverError(f"{solver} failed: {error}; rescale the costs") from error
+    if program.status == cp.INFEASIBLE:
+        raise InfeasibleError("no choice is within all budgets; raise a bound")
+    if program.status != cp.OPTIMAL:
+        raise SolverError(f"{solver} ended with status {program.status!r}; rescale the costs")
+
+
+def _balance(placement: Placement, kept: list[np.ndarray]) -> tuple[sparse.csr_array, Floats]:
+    """Return matrix and right side that conserve the unit.
+
+    Row 0 is the source; a row follows for each candidate but those of the last move.
+    """
+    starts = np.cumsum([0, 1, *placement.sizes])
+    rows, columns, values, arc = [], [], [], 0
+    for k, mask in enumerate(kept):
+        first, second = np.nonzero(mask)
+        index = np.arange(arc, arc + len(first))
+        ends = [(starts[k] + first, 1.0)]
+        if k + 1 < len(kept):
+            ends.append((starts[k + 1] + second, -1.0))
+        for row, sign in ends:
+            rows.append(row)
+            columns.append(index)
+            values.append(np.full(len(row), sign))
+        arc += len(first)
+    size = int(starts[len(kept)])
+    entries = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
+    return sparse.csr_array(entries, shape=(size, arc)), np.eye(1, size).ravel()
+
+
+def _amounts(budget: Budget, kept: list[np.ndarray]) -> Floats:
+    parts = [shared + single for shared, single in zip(budget.shared, budget.single, strict=True)]
+    return np.concatenate([part[mask] for part, mask in zip(parts, kept, strict=True)])

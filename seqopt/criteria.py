@@ -1,0 +1,182 @@
+"""Criteria: what a state costs, from the responses of all choices that compete in it.
+
+Every criterion turns responses over choices, ``(C,)`` for one open move or ``(C, D)`` for two, into
+costs of the same shape. A name stands for a response: ``T_max``, ``M_sup``, ``D_max``, ``F_move``
+(the robot that takes its grip), ``F_largest`` (the largest grip force), ``F_rob1`` and so on (the
+robot of that name).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from scipy.stats import rankdata
+
+from seqopt.network import Floats
+
+Responses = Mapping[str, Floats]
+CROWN = 13  # bricks of the reference arch up to its crown
+RESOLUTION = (("F", 1.0), ("T", 1.0), ("M", 1.0), ("D", 1e-6))  # N, N, N m, m
+
+
+class Criterion(Protocol):
+    """What a state costs."""
+
+    @property
+    def name(self) -> str:
+        """What the criterion is called."""
+
+    def wanted(self, bricks: int) -> tuple[str, ...]:
+        """Return the responses it needs of a move that is made with so many bricks placed."""
+
+    def costs(self, responses: Responses, bricks: int, choices: int) -> Floats:
+        """Return the costs of all choices in one state, NaN where they are impossible.
+
+        Parameters
+        ----------
+        responses : mapping of str to (C,) or (C, D) float
+            SI units; NaN where a choice is impossible, all NaN where a robot does not grip.
+        bricks : int
+            Bricks placed at the move that decides the state.
+        choices : int
+            How many candidates that move has.
+        """
+
+
+@dataclass(frozen=True)
+class RankSum:
+    """The study's criteria: ranks of responses, averaged, least is best (a Borda count).
+
+    Ranks start at 1; ties share the mean of their ranks. Responses are rounded to a resolution
+    before they are ranked, so that differences without meaning decide nothing. In a state with two
+    open moves the ranks run over all pairs and are scaled down to as many as the deciding move has
+    candidates, so that it weighs as much as any other state. A robot that does not grip ranks all
+    choices equal. Source: equations (1) to (3) of the study.
+
+    Parameters
+    ----------
+    name : str
+    before, after : tuple of (str, float)
+        Weight of every response in moves before the crown and from it on.
+    crown : int
+        Brick count of a move from which ``after`` holds.
+    resolution : tuple of (str, float)
+        What a response is rounded to, by its first letter: N, N m, m.
+    """
+
+    name: str
+    before: tuple[tuple[str, float], ...]
+    after: tuple[tuple[str, float], ...]
+    crown: int = CROWN
+    resolution: tuple[tuple[str, float], ...] = RESOLUTION
+
+    def wanted(self, bricks: int) -> tuple[str, ...]:
+        """Return the responses it needs of a move that is made with so many bricks placed."""
+        return tuple(name for name, _ in self._terms(bricks))
+
+    def costs(self, responses: Responses, bricks: int, choices: int) -> Floats:
+        """Return the weighted mean of the ranks; see `Criterion.costs`."""
+        terms = self._terms(bricks)
+        total: Floats = np.zeros_like(responses[terms[0][0]])
+        steps = dict(self.resolution)
+        for name, weight in terms:
+            total = total + weight * scaled_ranks(responses[name] / steps[name[0]], choices)
+        return total / sum(weight for _, weight in terms)
+
+    def _terms(self, bricks: int) -> tuple[tuple[str, float], ...]:
+        return self.before if bricks < self.crown else self.after
+
+
+def scaled_ranks(values: Floats, choices: int) -> Floats:
+    """Return mean ranks of rounded values; ranks over pairs are scaled to as many as ``choices``.
+
+    NaN stays NaN, but where all values are NaN all ranks are equal.
+    """
+    flat = values.ravel()
+    known = np.isfinite(flat)
+    out = np.full(flat.shape, np.nan)
+    if not known.any():
+        return np.full(values.shape, 0.5 * (choices + 1))
+    ranks = rankdata(np.round(flat[known]), method="average")
+    out[known] = ranks if values.ndim == 1 else (ranks - 0.5) * choices / known.sum() + 0.5
+    return out.reshape(values.shape)
+
+
+@dataclass(frozen=True)
+class WeightedSum:
+    """A weighted sum of responses, each divided by a scale of its own.
+
+    Parameters
+    ----------
+    name : str
+    terms : tuple of (str, float, float)
+        Response, weight, scale (N, N m or m).
+    """
+
+    name: str
+    terms: tuple[tuple[str, float, float], ...]
+
+    def wanted(self, bricks: int) -> tuple[str, ...]:
+        """Return the responses it needs; the same for every state."""
+        return tuple(name for name, _, _ in self.terms)
+
+    def costs(self, responses: Responses, bricks: int, choices: int) -> Floats:
+        """Return the weighted sums; see `Criterion.costs`."""
+        parts = [w / scale * _present(responses[name]) for name, w, scale in self.terms]
+        return np.asarray(sum(parts))
+
+
+@dataclass(frozen=True)
+class WorstRatio:
+    """The largest ratio of a response to its limit: a state is as bad as its worst response.
+
+    Parameters
+    ----------
+    name : str
+    limits : tuple of (str, float)
+        Response and limit (N, N m or m).
+    """
+
+    name: str
+    limits: tuple[tuple[str, float], ...]
+
+    def wanted(self, bricks: int) -> tuple[str, ...]:
+        """Return the responses it needs; the same for every state."""
+        return tuple(name for name, _ in self.limits)
+
+    def costs(self, responses: Responses, bricks: int, choices: int) -> Floats:
+        """Return the largest ratios; see `Criterion.costs`."""
+        parts = [_present(responses[name]) / limit for name, limit in self.limits]
+        return np.asarray(np.max(np.stack(parts), axis=0))
+
+
+def _present(values: Floats) -> Floats:
+    """Return the values, or zeros where the robot does not grip in any choice."""
+    return np.zeros_like(values) if np.isnan(values).all() else values
+
+
+def equal(*names: str) -> tuple[tuple[str, float], ...]:
+    """Return equally weighted terms."""
+    return tuple((name, 1.0) for name in names)
+
+
+EQUATIONS = RankSum(
+    "equations-2-3",
+    before=equal("T_max", "M_sup", "F_rob1", "F_rob2", "F_rob3"),
+    after=equal("T_max", "M_sup", "F_move", "D_max"),
+)
+LARGEST_FORCE = RankSum(
+    "largest-force",
+    before=equal("T_max", "M_sup", "F_move", "F_largest"),
+    after=equal("T_max", "M_sup", "F_move", "F_largest"),
+)
+PUBLISHED_BEST = (("F_largest", 270.0), ("M_sup", 21.5), ("T_max", 87.7), ("D_max", 15.9e-6))
+WEIGHTED = WeightedSum("weighted", tuple((name, 1.0, limit) for name, limit in PUBLISHED_BEST))
+WORST_RATIO = WorstRatio("worst-ratio", PUBLISHED_BEST)
+
+CRITERIA: dict[str, Criterion] = {
+    c.name: c for c in (EQUATIONS, LARGEST_FORCE, WEIGHTED, WORST_RATIO)
+}

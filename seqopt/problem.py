@@ -1,0 +1,134 @@
+"""The problem of support placement over a whole build, as one frozen value."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+import pandas as pd
+
+from seqopt.criteria import Criterion
+from seqopt.fields import Engine
+from seqopt.network import Floats
+from seqopt.placement import Budget, Placement
+from seqopt.schedule import Schedule
+from seqopt.states import Evaluation, State, evaluate
+
+
+@dataclass(frozen=True)
+class Limit:
+    """No state may exceed a value: response (as in `seqopt.criteria`) and bound, SI units."""
+
+    response: str
+    bound: float
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Support placement over a whole build.
+
+    Attributes
+    ----------
+    schedule : Schedule
+        The steps and moves.
+    criterion : Criterion
+        What a state costs.
+    limits : tuple of Limit
+        What no state may exceed.
+    evaluation : Evaluation
+        Raw responses of every open state.
+    budgets : tuple of Budget
+        Caps on totals over the build.
+    """
+
+    schedule: Schedule
+    criterion: Criterion
+    limits: tuple[Limit, ...]
+    evaluation: Evaluation = field(repr=False)
+    budgets: tuple[Budget, ...] = ()
+
+    @cached_property
+    def sums(self) -> Placement:
+        """The costs whose sum over the build is to be least."""
+        return self._placement(np.add)
+
+    @cached_property
+    def peaks(self) -> Placement:
+        """The costs whose largest over the build is to be least."""
+        return self._placement(np.maximum)
+
+    def _placement(self, join: np.ufunc) -> Placement:
+        sizes = [len(move.candidates) for move in self.schedule.moves]
+        lowest = 0.0 if join is np.add else -1e300
+        single = [np.full(size, lowest) for size in sizes]
+        shared = [np.full(pair, lowest) for pair in zip([1, *sizes[:-1]], sizes, strict=True)]
+        for state in self.evaluation.states:
+            k = state.moves[-1]
+            costs = self.state_costs(state)
+            if len(state.moves) == 1:
+                single[k] = join(single[k], costs)
+            else:
+                shared[k] = join(shared[k], costs)
+        return Placement(tuple(single), tuple(shared))
+
+    def row(self, move: int, before: int) -> Floats:
+        """Return the cost of a move's candidates in the shared states, given the move before.
+
+        Ranks are those among the candidates of this move alone.
+        """
+        out = np.zeros(len(self.schedule.moves[move].candidates))
+        for state in self.evaluation.states:
+            if len(state.moves) == 2 and state.moves[1] == move:
+                out = out + self.state_costs(state, before)
+        return out
+
+    def state_costs(self, state: State, rows: slice | int = slice(None)) -> Floats:
+        """Return the costs of a state's choices, infinite where they are not allowed.
+
+        ``rows`` fixes the earlier move of a shared state to one candidate: costs, ranks included,
+        are then those among the candidates of the later move alone.
+        """
+        responses = {name: values[rows] for name, values in state.responses.items()}
+        move = self.schedule.moves[state.moves[-1]]
+        costs = self.criterion.costs(responses, move.bricks, len(move.candidates))
+        costs = np.where(np.isfinite(costs), costs, np.inf)
+        for limit in self.limits:
+            over = responses[limit.response] > limit.bound
+            costs[over] = np.inf
+        return costs
+
+    def table(self, state: State) -> pd.DataFrame:
+        """Return raw responses and cost of a state, a row per choice, labeled by nodes."""
+        moves = [self.schedule.moves[m] for m in state.moves]
+        names = [f"{move.robot}_node" for move in moves]
+        index = pd.MultiIndex.from_product([move.candidates for move in moves], names=names)
+        columns: Mapping[str, Floats] = {**state.responses, "cost": self.state_costs(state)}
+        return pd.DataFrame({name: values.ravel() for name, values in columns.items()}, index=index)
+
+    def nodes(self, choice: Sequence[int]) -> tuple[int, ...]:
+        """Return the nodes that candidates stand for."""
+        return tuple(m.candidates[c] for m, c in zip(self.schedule.moves, choice, strict=True))
+
+    @property
+    def paper_models(self) -> tuple[int, int]:
+        """How many models the study counts: cascading, and with the shared step over all pairs.
+
+        It counts 2n candidates for every brick count n from 3 to the last, four states each, and
+        2n times 2(n-1) pairs for the shared one.
+        """
+        counts = range(3, len(self.schedule.scene.bricks) + 1)
+        cascading = sum(4 * 2 * n for n in counts)
+        return cascading, sum(3 * 2 * n + 2 * n * 2 * (n - 1) for n in counts)
+
+
+def pose(
+    engine: Engine, schedule: Schedule, criterion: Criterion, limits: Sequence[Limit] = ()
+) -> Problem:
+    """Return the problem, with every response that its criterion and limits ask for evaluated."""
+
+    def wanted(bricks: int) -> set[str]:
+        return {*criterion.wanted(bricks), *(limit.response for limit in limits)}
+
+    return Problem(schedule, criterion, tuple(limits), evaluate(engine, schedule, wanted))

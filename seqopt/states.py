@@ -1,0 +1,153 @@
+"""Responses of every state of a schedule over the choices that are open in it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from seqopt.fields import Engine, Fields, Want
+from seqopt.network import Floats, Ints
+from seqopt.schedule import Open, OpenStep, Schedule
+
+SOURCES = {"T_max": Want.EDGES, "M_sup": Want.SUPPORT, "D_max": Want.DISPLACEMENTS}
+
+
+@dataclass(frozen=True)
+class State:
+    """One step of a schedule and what every choice in it leads to.
+
+    Attributes
+    ----------
+    step : OpenStep
+    moves : tuple of int
+        The open moves: one, or two neighboring ones.
+    responses : mapping of str to (C,) or (C, D) float
+        Over the candidates of the moves; SI units, sizes without sign; NaN where two robots would
+        hold one node, all NaN for a robot that does not grip.
+    """
+
+    step: OpenStep
+    moves: tuple[int, ...]
+    responses: Mapping[str, Floats]
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """All open states of a schedule, and how many models were solved for them."""
+
+    states: tuple[State, ...]
+    models: int
+
+
+def evaluate(
+    engine: Engine, schedule: Schedule, wanted: Callable[[int], Iterable[str]]
+) -> Evaluation:
+    """Solve every distinct model that the open states of a schedule contain, once.
+
+    Parameters
+    ----------
+    engine : Engine
+    schedule : Schedule
+    wanted : callable
+        The names of the responses that a move needs when it is made with so many bricks placed.
+    """
+    names = {
+        step.number: set(wanted(schedule.moves[step.moves[-1]].bricks))
+        for step in schedule.steps
+        if step.moves
+    }
+    combos = {step.number: _combinations(schedule, step) for step in schedule.steps if step.moves}
+    states: dict[int, State] = {}
+    models = 0
+    shapes = {(s.bricks, len(_held(s))) for s in schedule.steps if s.moves}
+    for bricks, held in sorted(shapes):
+        steps = [
+            s for s in schedule.steps if s.moves and (s.bricks, len(_held(s))) == (bricks, held)
+        ]
+        valid = [_valid(combos[s.number]) for s in steps]
+        rows = np.concatenate([combos[s.number][ok] for s, ok in zip(steps, valid, strict=True)])
+        distinct, back = np.unique(np.sort(rows, axis=1), axis=0, return_inverse=True)
+        models += len(distinct)
+        union = set().union(*(names[s.number] for s in steps))
+        answers = _selected(engine.solve(bricks, distinct, _want(union)), union)
+        starts = np.cumsum([0, *(ok.sum() for ok in valid)])
+        for i, step in enumerate(steps):
+            part = slice(starts[i], starts[i + 1])
+            order = np.argsort(np.argsort(rows[part], axis=1), axis=1)
+            index = back.ravel()[part]
+            found = {name: values[index] for name, values in answers.items() if values.ndim == 1}
+            forces = np.take_along_axis(answers["F"][index], order, axis=1)
+            found |= _robot_forces(schedule, step, forces)
+            states[step.number] = _state(schedule, step, found, valid[i], names[step.number])
+    return Evaluation(tuple(states[n] for n in sorted(states)), models)
+
+
+def _held(step: OpenStep) -> list[int]:
+    """Return the places of the robots that grip."""
+    return [i for i, grip in enumerate(step.grips) if grip is not None]
+
+
+def _combinations(schedule: Schedule, step: OpenStep) -> Ints:
+    """Return the nodes held, (choices, grips), for all combinations of the open moves."""
+    candidates = [np.array(schedule.moves[m].candidates, dtype=np.int64) for m in step.moves]
+    grid = np.meshgrid(*candidates, indexing="ij")
+    columns = []
+    for robot in _held(step):
+        grip = step.grips[robot]
+        if isinstance(grip, Open):
+            columns.append(grid[step.moves.index(grip.move)].ravel())
+        else:
+            columns.append(np.full(grid[0].size, grip))
+    return np.stack(columns, axis=1).astype(np.int64)
+
+
+def _valid(rows: Ints) -> np.ndarray:
+    """Return which rows name no node twice."""
+    return np.asarray((np.diff(np.sort(rows, axis=1), axis=1) > 0).all(axis=1))
+
+
+def _want(names: set[str]) -> Want:
+    want = Want(0)
+    for name in names & SOURCES.keys():
+        want |= SOURCES[name]
+    return want
+
+
+def _selected(fields: Fields, names: set[str]) -> dict[str, Floats]:
+    """Return the wanted scalar responses and, as ``F``, the size of every grip force."""
+    out = {"F": np.linalg.norm(fields.grip_force, axis=2)}
+    if "T_max" in names:
+        out["T_max"] = fields.edge_force.max(axis=1)
+    if "M_sup" in names:
+        out["M_sup"] = np.linalg.norm(fields.support[:, 3:], axis=1)
+    if "D_max" in names:
+        out["D_max"] = np.sqrt((fields.displacement**2).sum(axis=2).max(axis=1))
+    return out
+
+
+def _robot_forces(schedule: Schedule, step: OpenStep, forces: Floats) -> dict[str, Floats]:
+    """Return the forces by robot, of the robot whose move decides the state, and the largest."""
+    robots = [schedule.scene.robots[i].name for i in _held(step)]
+    out = {f"F_{name}": forces[:, i] for i, name in enumerate(robots)}
+    out["F_move"] = out[f"F_{schedule.moves[step.moves[-1]].robot}"]
+    out["F_largest"] = forces.max(axis=1)
+    return out
+
+
+def _state(
+    schedule: Schedule,
+    step: OpenStep,
+    found: Mapping[str, Floats],
+    valid: np.ndarray,
+    names: set[str],
+) -> State:
+    shape = tuple(len(schedule.moves[m].candidates) for m in step.moves)
+    spread = {}
+    for name in sorted(names):
+        values = np.full(valid.shape, np.nan)
+        if name in found:
+            values[valid] = found[name]
+        spread[name] = values.reshape(shape)
+    return State(step, step.moves, spread)
