@@ -26,7 +26,7 @@ import numpy as np
 
 from seqopt.network import Floats
 from seqopt.placement import PlacementProblem, ProblemError, without_budgets
-from seqopt.selection import Aim, Formulation, Kind, Selection
+from seqopt.selection import Aim, Formulation, Kind, Reads, Selection
 
 CHARGES = ("later", "earlier")
 
@@ -55,5 +55,10 @@ def _charged(problem: PlacementProblem, k: int, choice: list[int], charge: str) 
 
 
 FORMULATION = Formulation(
-    "cascade", "the study's cascading scheme over the whole build", Kind.HEURISTIC, Aim.SUM, solve
+    "cascade",
+    "the study's cascading scheme over the whole build",
+    Kind.HEURISTIC,
+    Aim.SUM,
+    solve,
+    Reads.WINDOW,
 )

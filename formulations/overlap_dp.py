@@ -11,8 +11,7 @@ It is a shortest path in a layered graph; the cost to go
 
    V_K(i) = c_K(i), \qquad V_k(i) = c_k(i) + \min_j \left[ d_{k+1}(i, j) + V_{k+1}(j) \right]
 
-is found backward, the choice forward. Ties go to the first candidate. The costs to go are
-returned as potentials: they prove the optimum to anyone who has the costs.
+is found backward, the choice forward. Ties go to the first candidate.
 """
 
 from __future__ import annotations
@@ -28,16 +27,14 @@ def solve(problem: PlacementProblem) -> Selection:
     without_budgets(problem, "overlap_dp")
     placement = problem.sums
     placement.continuable()
-    potentials = [placement.single[-1]]
+    to_go = [placement.single[-1]]
     for single, shared in zip(placement.single[-2::-1], placement.shared[:0:-1], strict=True):
-        potentials.insert(0, single + (shared + potentials[0]).min(axis=1))
-    choice, row = [], placement.shared[0][0]
-    for k, potential in enumerate(potentials, start=1):
-        choice.append(int(np.argmin(row + potential)))
-        if k < len(potentials):
-            row = placement.shared[k][choice[-1]]
+        to_go.insert(0, single + (shared + to_go[0]).min(axis=1))
+    choice: list[int] = []
+    for shared, rest in zip(placement.shared, to_go, strict=True):
+        choice.append(int(np.argmin(shared[choice[-1] if choice else 0] + rest)))
     value = placement.cost(choice)
-    return Selection(tuple(choice), value, tuple(potentials), value)
+    return Selection(tuple(choice), value, bound=value)
 
 
 FORMULATION = Formulation(

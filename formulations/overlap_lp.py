@@ -8,8 +8,8 @@ r"""The full overlap formulation as a linear program: a unit flow of least cost 
 
 Without budgets the matrix is totally unimodular and an optimal vertex is a choice. An
 interior-point answer is a mixture where costs tie: the choice follows the largest flow, every arc
-of which lies on an optimal path. The duals of the balances are returned as potentials, those of
-the budgets as prices. With budgets the value is a bound and the choice, if it is within them,
+of which lies on an optimal path. The duals of the budgets are reported as prices: what one more
+unit of each would save. With budgets the value is a bound and the choice, if it is within them,
 need not be the best: use ``overlap_mip``.
 """
 
@@ -24,8 +24,7 @@ def solve(problem: PlacementProblem) -> Selection:
     """Return the choice that the largest flow follows."""
     flow = solve_flow(problem, integer=False)
     choice = follow(flow.arcs)
-    potentials = () if problem.budgets else flow.potentials
-    return Selection(choice, problem.sums.cost(choice), potentials, flow.value, flow.prices)
+    return Selection(choice, problem.sums.cost(choice), flow.bound, flow.prices)
 
 
 FORMULATION = Formulation("overlap_lp", "full overlap, linear program", Kind.BOUND, Aim.SUM, solve)

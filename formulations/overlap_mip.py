@@ -22,7 +22,7 @@ def solve(problem: PlacementProblem) -> Selection:
     """Return the exact optimum within the budgets."""
     flow = solve_flow(problem, integer=True)
     choice = follow(flow.arcs)
-    return Selection(choice, problem.sums.cost(choice), bound=flow.value)
+    return Selection(choice, problem.sums.cost(choice), flow.bound)
 
 
 FORMULATION = Formulation(

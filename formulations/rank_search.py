@@ -23,7 +23,7 @@ import numpy as np
 
 from seqopt.network import Floats
 from seqopt.placement import Placement, PlacementProblem, ProblemError, without_budgets
-from seqopt.selection import Aim, Formulation, Kind, Selection
+from seqopt.selection import Aim, Formulation, Kind, Reads, Selection
 
 MOST = 20_000_000  # combinations in one enumeration: 160 MB
 
@@ -66,5 +66,10 @@ def _enumerate(
 
 
 FORMULATION = Formulation(
-    "rank_search", "exhaustive search of the next moves", Kind.HEURISTIC, Aim.SUM, solve
+    "rank_search",
+    "exhaustive search of the next moves",
+    Kind.HEURISTIC,
+    Aim.SUM,
+    solve,
+    Reads.WINDOW,
 )

@@ -13,6 +13,9 @@ from seqopt.errors import SolverError
 from seqopt.network import Floats
 from seqopt.placement import Budget, InfeasibleError, Placement, PlacementProblem
 
+ACCURACY = 1e-7  # how far a reported optimum may lie above the true one, relative to it
+OPTIONS = {cp.CLARABEL: {}, cp.HIGHS: {"mip_rel_gap": 1e-9}}
+
 
 @dataclass(frozen=True)
 class Flow:
@@ -22,17 +25,14 @@ class Flow:
     ----------
     arcs : tuple of (C_{k-1}, C_k) float
         Flow from every candidate to every candidate of the next move, zero where not allowed.
-    value : float
-        Objective that the solver reports.
-    potentials : tuple of (C_k,) float
-        Dual values of the candidates; empty for an integer program.
+    bound : float
+        Lower bound on the cost, from the solver's optimum.
     prices : mapping of str to float
         Dual value of every budget.
     """
 
     arcs: tuple[Floats, ...]
-    value: float
-    potentials: tuple[Floats, ...]
+    bound: float
     prices: Mapping[str, float]
 
 
@@ -56,7 +56,7 @@ def solve_flow(problem: PlacementProblem, *, integer: bool) -> Flow:
     balance, source = _balance(placement, kept)
     flow = cp.Variable(len(cost), boolean=True) if integer else cp.Variable(len(cost), nonneg=True)
     conserve = cp.Zero(balance @ flow - source)
-    caps = [cp.NonPos(_amounts(b, kept) @ flow - b.bound) for b in problem.budgets]
+    caps = [cp.NonNeg(b.bound - _amounts(b, kept) @ flow) for b in problem.budgets]
     program = cp.Problem(cp.Minimize((cost / scale) @ flow), [conserve, *caps])
     _solve(program, cp.HIGHS if integer else cp.CLARABEL)
     assert flow.value is not None  # an optimum was reported
@@ -67,14 +67,11 @@ def solve_flow(problem: PlacementProblem, *, integer: bool) -> Flow:
         arc[mask] = part
         arcs.append(arc)
     value = float(program.value) * scale
-    if integer:
-        return Flow(tuple(arcs), value, (), {})
-    ahead = np.split(-scale * conserve.dual_value, np.cumsum([1, *placement.sizes[:-1]])[:-1])[1:]
-    ahead.append(np.zeros(placement.sizes[-1]))
-    potentials = tuple(c + rest for c, rest in zip(placement.single, ahead, strict=True))
-    names = [budget.name for budget in problem.budgets]
-    prices = {n: float(scale * cap.dual_value) for n, cap in zip(names, caps, strict=True)}
-    return Flow(tuple(arcs), value, potentials, prices)
+    prices = {}
+    if not integer:
+        for budget, cap in zip(problem.budgets, caps, strict=True):
+            prices[budget.name] = float(scale * cap.dual_value)
+    return Flow(tuple(arcs), value - ACCURACY * abs(value), prices)
 
 
 def follow(arcs: tuple[Floats, ...]) -> tuple[int, ...]:
@@ -90,7 +87,7 @@ def follow(arcs: tuple[Floats, ...]) -> tuple[int, ...]:
 
 def _solve(program: cp.Problem, solver: str) -> None:
     try:
-        program.solve(solver=solver)
+        program.solve(solver=solver, **OPTIONS[solver])
     except cp.SolverError as error:
         raise SolverError(f"{solver} failed: {error}; rescale the costs") from error
     if program.status == cp.INFEASIBLE:

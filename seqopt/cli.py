@@ -1,42 +1,41 @@
-"""The command line: ``seqopt compare | analyze | scene``."""
+"""The command line: ``seqopt compare | analyze | optimize | scene``."""
 
 from __future__ import annotations
 
 import argparse
+import io
+import json
 import os
 import sys
-from collections.abc import Sequence
+import time
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import NoReturn
 
+from seqopt.arguments import PLANNED, USAGE, parse_criterion, parse_limit, parse_options, parser
 from seqopt.compare import compare, format_comparison, is_reference_arch
+from seqopt.contest import Contest, contest, format_contest
 from seqopt.engines import ENGINES
 from seqopt.errors import SceneError, SeqoptError, SolverError, StepError
-from seqopt.files import write_bytes, write_text
+from seqopt.files import FileError, make_folder, write_bytes, write_text
+from seqopt.loops import SCHEDULES
 from seqopt.methods import METHODS
 from seqopt.network import network
+from seqopt.optimize import optimize, plan_table, prepare, responses_table, selection_table, summary
 from seqopt.plan_file import published_plan, read_plan
 from seqopt.responses import analyze, fields_archive
 from seqopt.scene import Scene
-from seqopt.scene_file import builtin_scenes, dump_scene, load_scene
+from seqopt.scene_file import dump_scene, load_scene
+from seqopt.selection import formulation
 from seqopt.steps import Step
 
-PLANNED = "three-robot"
-USAGE, FAILED = 2, 3  # exit statuses: the user must act; a solver failed
-
-
-class _Parser(argparse.ArgumentParser):
-    """A parser whose errors are one line."""
-
-    def error(self, message: str) -> NoReturn:
-        self.exit(USAGE, f"{self.prog}: error: {message} (see {self.prog} --help)\n")
+FAILED = 3  # exit status where a solver failed; USAGE where the user must act
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; return its exit status."""
-    options = _parser().parse_args(arguments)
+    options = parser().parse_args(arguments)
     try:
-        options.run(options)
+        COMMANDS[options.command](options)
     except SolverError as error:
         print(f"seqopt: solver failed: {error}", file=sys.stderr)
         return FAILED
@@ -48,83 +47,78 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 0
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = _Parser(
-        prog="seqopt",
-        description="Where should each robot hold a half-built structure, over the whole build?",
-    )
-    commands = parser.add_subparsers(required=True, metavar="COMMAND")
-    scene, engine = _shared_arguments()
-    command = commands.add_parser(
-        "compare",
-        parents=[scene, engine],
-        help="all methods side by side",
-        description="Analyze every method on a scene; show the largest responses side by side, for "
-        "the reference arch beside those the study printed, and name what does not add up.",
-    )
-    command.set_defaults(run=_compare)
-    command = commands.add_parser(
-        "analyze",
-        parents=[scene, engine],
-        help="responses of every step of one method",
-        description="Analyze every step of a method and write a table with the columns of Table "
-        "A.1 of the study: forces in N, moments in N m, displacements in 1e-3 mm.",
-        epilog="example: seqopt analyze arch25 --method cantilever --out cantilever.csv",
-    )
-    _analyze_arguments(command)
-    command.set_defaults(run=_analyze)
-    command = commands.add_parser(
-        "scene",
-        parents=[scene],
-        help="check, describe and export a scene",
-        description="Check a scene, say what is in it, and write it as JSON if asked.",
-    )
-    command.add_argument("--export", type=Path, metavar="FILE", help="JSON file to write")
-    command.set_defaults(run=_scene)
-    return parser
-
-
-def _shared_arguments() -> tuple[_Parser, _Parser]:
-    """Return parsers of the arguments that commands share: the scene, the engine."""
-    scene = _Parser(add_help=False)
-    scene.add_argument(
-        "scene",
-        nargs="?",
-        default="arch25",
-        metavar="SCENE",
-        help=f"a built-in scene ({', '.join(builtin_scenes())}) or a JSON file; arch25 by default",
-    )
-    engine = _Parser(add_help=False)
-    engine.add_argument(
-        "--engine",
-        choices=tuple(ENGINES),
-        default="compliance",
-        help="compliance: exactly rigid bricks, fast (default); frame: stiff bars, the slow check",
-    )
-    return scene, engine
-
-
-def _analyze_arguments(command: argparse.ArgumentParser) -> None:
-    command.add_argument(
-        "--method", choices=(*METHODS, PLANNED), required=True, help="how the build goes"
-    )
-    command.add_argument(
-        "--plan", type=Path, metavar="FILE", help=f"CSV of the steps, with --method {PLANNED}"
-    )
-    command.add_argument(
-        "--out", type=Path, metavar="FILE", help="CSV to write; standard output if not given"
-    )
-    command.add_argument(
-        "--fields",
-        type=Path,
-        metavar="FILE",
-        help="NumPy archive (.npz) to write: every edge force, node displacement and reaction",
-    )
-
-
 def _compare(options: argparse.Namespace) -> None:
     scene = load_scene(options.scene)
-    print(format_comparison(compare(ENGINES[options.engine](network(scene))), scene))
+    engine = ENGINES[options.engine](network(scene))
+    criterion = parse_criterion(options.criteria)
+    if options.out is not None:
+        make_folder(options.out)
+    if len(scene.robots) < 3 or len(scene.bricks) < 4:
+        print(format_comparison(compare(engine), scene))
+        return
+    result = contest(engine, criterion, _progress)
+    print(format_comparison(result.methods, scene))
+    print()
+    print(format_contest(result, criterion))
+    if options.out is not None:
+        _write_contest(options.out, result)
+
+
+def _progress(stage: str) -> None:
+    """Say what is being done where a person watches."""
+    if sys.stderr.isatty():
+        print(f"\r\033[K{stage} …", end="\r", file=sys.stderr, flush=True)
+
+
+def _write_contest(folder: Path, result: Contest) -> None:
+    try:
+        from seqopt.charts import contest_figures  # noqa: PLC0415  # matplotlib is an extra
+    except ImportError as error:
+        raise FileError(
+            f'figures for {folder} need matplotlib: pip install "seqopt[plot]"'
+        ) from error
+    write_text(folder / "contest.csv", result.table.to_csv(float_format="%.6g"))
+    if result.ranks is not None:
+        write_text(folder / "published_ranks.csv", result.ranks.to_csv(index=False))
+    for name, table in result.tables.items():
+        text = table.to_csv(index=False, float_format="%.6g", lineterminator="\n")
+        write_text(folder / f"steps_{name.replace(' ', '_')}.csv", text)
+    for name, figure in contest_figures(result).items():
+        buffer = io.BytesIO()
+        figure.savefig(buffer, dpi=130)
+        write_bytes(folder / name, buffer.getvalue())
+    print(f"tables and figures written to {folder}")
+
+
+def _optimize(options: argparse.Namespace) -> None:
+    which = formulation(options.formulation)
+    chosen = parse_options(which, options.option)
+    criterion = parse_criterion(options.criteria)
+    limits = [parse_limit(text) for text in options.limit]
+    scene = load_scene(options.scene)
+    make_folder(options.out)
+    start = time.perf_counter()
+    net = network(scene)
+    engine = ENGINES[options.engine](net)
+    schedule = SCHEDULES[options.method](net)
+    assemble = time.perf_counter() - start
+    outcome = optimize(prepare(engine, schedule, criterion, limits), which, **chosen)
+    report = summary(outcome)
+    report["seconds"] = {"assemble": round(assemble, 6), **outcome.seconds}
+    files = {
+        "plan.csv": plan_table(engine, outcome),
+        "selection.csv": selection_table(outcome),
+        "responses.csv": responses_table(outcome.problem),
+    }
+    for name, table in files.items():
+        text = table.to_csv(index=False, float_format="%.6g", lineterminator="\n")
+        write_text(options.out / name, text)
+    write_text(options.out / "summary.json", json.dumps(report, indent=2) + "\n")
+    print(
+        f"{which.name} ({which.kind.value}): objective {report['objective']:.6g}, "
+        f"gap {100 * outcome.certificate.gap:.3g} %, "
+        f"{report['models_evaluated']} models; written to {options.out}"
+    )
 
 
 def _analyze(options: argparse.Namespace) -> None:
@@ -177,3 +171,11 @@ def _scene(options: argparse.Namespace) -> None:
     if options.export is not None:
         write_text(options.export, dump_scene(scene))
         print(f"written to {options.export}")
+
+
+COMMANDS: dict[str, Callable[[argparse.Namespace], None]] = {
+    "compare": _compare,
+    "analyze": _analyze,
+    "optimize": _optimize,
+    "scene": _scene,
+}

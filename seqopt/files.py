@@ -43,6 +43,14 @@ def write_bytes(path: Path, content: bytes) -> None:
         raise FileError(f"cannot write {path}: {error.strerror}; name a writable file") from error
 
 
+def make_folder(path: Path) -> None:
+    """Make a folder unless it is there, or raise a `FileError`."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise FileError(f"cannot make folder {path}: {error.strerror}; name another") from error
+
+
 def _umask() -> int:
     """Return the mask that an ordinary new file would get (a temporary one is private)."""
     mask = os.umask(0)

@@ -124,11 +124,15 @@ class Problem:
 
 
 def pose(
-    engine: Engine, schedule: Schedule, criterion: Criterion, limits: Sequence[Limit] = ()
+    engine: Engine,
+    schedule: Schedule,
+    criterion: Criterion,
+    limits: Sequence[Limit] = (),
+    also: Sequence[str] = (),
 ) -> Problem:
-    """Return the problem, with every response that its criterion and limits ask for evaluated."""
+    """Return the problem; only responses that criterion, limits and ``also`` name are evaluated."""
 
     def wanted(bricks: int) -> set[str]:
-        return {*criterion.wanted(bricks), *(limit.response for limit in limits)}
+        return {*criterion.wanted(bricks), *(limit.response for limit in limits), *also}
 
     return Problem(schedule, criterion, tuple(limits), evaluate(engine, schedule, wanted))

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from seqopt.errors import SolverError
-from seqopt.network import Floats
 from seqopt.placement import Placement, PlacementProblem, ProblemError
 
 TOLERANCE = 1e-6  # of the objective, or 1: how far a claim may be from what the data say
@@ -23,6 +22,13 @@ class Kind(Enum):
     EXACT = "exact"
     HEURISTIC = "heuristic"
     BOUND = "bound"  # a proven bound; its choice is exact where nothing couples the moves
+
+
+class Reads(Enum):
+    """Which states a formulation looks at."""
+
+    ALL = "all"  # every pair of every shared state
+    WINDOW = "window"  # by default, shared states only for choices already made
 
 
 class Aim(Enum):
@@ -42,17 +48,14 @@ class Selection:
         Place of the chosen node among each move's candidates.
     objective : float
         Claimed value.
-    potentials : tuple of (C_k,) float, optional
-        Cost to go from each candidate, its own single cost included, or less: a proof of a bound.
     bound : float
-        Claimed lower bound; minus infinity if none.
+        Claimed lower bound, budgets included; minus infinity if none.
     prices : mapping of str to float
         What one more unit of each budget would save.
     """
 
     choice: tuple[int, ...]
     objective: float
-    potentials: tuple[Floats, ...] = ()
     bound: float = -np.inf
     prices: Mapping[str, float] = field(default_factory=dict)
 
@@ -68,6 +71,8 @@ class Formulation:
     aim : Aim
     solve : callable
         Takes the problem and named options, returns a `Selection`.
+    reads : Reads
+        Which states it looks at with its default options.
     """
 
     name: str
@@ -75,6 +80,7 @@ class Formulation:
     kind: Kind
     aim: Aim
     solve: Callable[..., Selection]
+    reads: Reads = Reads.ALL
 
 
 @dataclass(frozen=True)
@@ -86,8 +92,8 @@ class Certificate:
     objective : float
         Recomputed.
     bound : float
-        The best lower bound that the data prove: from potentials, or for a peak from the lack of
-        any path below it. Minus infinity if none is proven.
+        The least value of any choice, found anew from the data; where budgets forbid choices, the
+        least without them.
     gap : float
         Objective less bound, over the larger of the objective's size and 1.
     spent : mapping of str to float
@@ -125,44 +131,42 @@ def certify(problem: PlacementProblem, selection: Selection, aim: Aim) -> Certif
         if spent[budget.name] > budget.bound + TOLERANCE * max(abs(budget.bound), 1.0):
             raise SolverError(f"the choice takes {spent[budget.name]:.6g} of {budget.name}, "
                               f"more than {budget.bound:.6g}")  # fmt: skip
-    bound = (
-        proven_sum(placement, selection.potentials)
-        if aim is Aim.SUM
-        else proven_peak(placement, value)
-    )
-    if bound > value + TOLERANCE * scale:
-        raise SolverError(
-            f"a bound of {bound:.9g} above the value {value:.9g} of an allowed choice"
-        )
+    bound = least_sum(placement) if aim is Aim.SUM else least_peak(placement)
+    if selection.bound > value + TOLERANCE * scale:
+        raise SolverError(f"the claimed bound {selection.bound:.9g} exceeds the value {value:.9g}")
     return Certificate(value, bound, max(0.0, value - bound) / scale, spent)
 
 
-def proven_sum(placement: Placement, potentials: tuple[Floats, ...]) -> float:
-    """Return the lower bound on the sum that potentials prove, minus infinity if none.
+def least_sum(placement: Placement) -> float:
+    """Return the least sum that any choice reaches, budgets aside: forward, layer by layer."""
+    reached = np.zeros(1)
+    for single, shared in zip(placement.single, placement.shared, strict=True):
+        reached = (reached[:, None] + shared).min(axis=0) + single
+    return float(reached.min())
 
-    Wherever a potential exceeds what the next ones allow, the excess is charged to the bound.
+
+def least_peak(placement: Placement) -> float:
+    """Return the least worst cost of any choice, by bisection over all costs that occur.
+
+    A value is reached if the choices whose costs do not exceed it connect the first move to the
+    last.
     """
-    if len(potentials) != len(placement.single):
-        return -np.inf
-    excess = 0.0
-    for k, (single, potential) in enumerate(zip(placement.single, potentials, strict=True)):
-        if potential.shape != single.shape or np.isnan(potential).any():
-            return -np.inf
-        rest = np.zeros(len(single))
-        if k + 1 < len(potentials):
-            rest = (placement.shared[k + 1] + potentials[k + 1]).min(axis=1)
-        allowed = single + rest
-        finite = np.isfinite(allowed)
-        excess += max(0.0, float((potential[finite] - allowed[finite]).max(initial=0.0)))
-    return float((placement.shared[0][0] + potentials[0]).min()) - excess
+    levels = np.unique(np.concatenate([a.ravel() for a in (*placement.single, *placement.shared)]))
+    low, high = 0, len(levels) - 1
+    while low < high:
+        middle = (low + high) // 2
+        if _connected(placement, float(levels[middle])):
+            high = middle
+        else:
+            low = middle + 1
+    return float(levels[low])
 
 
-def proven_peak(placement: Placement, value: float) -> float:
-    """Return the value if no choice stays strictly below it, else minus infinity."""
+def _connected(placement: Placement, level: float) -> bool:
     reached = np.ones(1, dtype=bool)
     for single, shared in zip(placement.single, placement.shared, strict=True):
-        reached = (single < value) & ((shared < value) & reached[:, None]).any(axis=0)
-    return -np.inf if reached.any() else value
+        reached = (single <= level) & ((shared <= level) & reached[:, None]).any(axis=0)
+    return bool(reached.any())
 
 
 def formulations() -> dict[str, Formulation]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -82,6 +82,27 @@ def evaluate(
             found |= _robot_forces(schedule, step, forces)
             states[step.number] = _state(schedule, step, found, valid[i], names[step.number])
     return Evaluation(tuple(states[n] for n in sorted(states)), models)
+
+
+def window_models(schedule: Schedule, choice: Sequence[int]) -> int:
+    """Return how many distinct models a search of one move after the other looks at.
+
+    A state that two moves share is then solved for the later one's candidates only, the earlier
+    choice being made.
+    """
+    seen: set[tuple[int, ...]] = set()
+    for step in schedule.steps:
+        if not step.moves:
+            continue
+        rows = _combinations(schedule, step)
+        if len(step.moves) == 2:
+            first = step.moves[0]
+            node = schedule.moves[first].candidates[choice[first]]
+            at = _held(step).index(step.grips.index(Open(first)))
+            rows = rows[rows[:, at] == node]
+        rows = np.sort(rows[_valid(rows)], axis=1)
+        seen |= {(step.bricks, *row) for row in rows.tolist()}
+    return len(seen)
 
 
 def _held(step: OpenStep) -> list[int]:

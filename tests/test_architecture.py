@@ -21,8 +21,12 @@ LAYERS = (
     {"operator", "fields", "draw", "loops"},
     {"rigid", "responses", "states"},
     {"problem"},
+    {"budgets", "ranking"},
+    {"optimize"},
     {"compliance", "frame"},
     {"engines", "compare"},
+    {"contest", "arguments"},
+    {"charts"},
     {"cli"},
     {"__main__", "__init__"},
 )  # a module imports from layers above it in this list only

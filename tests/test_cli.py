@@ -41,8 +41,9 @@ def test_compare_of_another_scene_shows_no_study(capsys, tmp_path):
     status, out, _ = run(capsys, "compare", str(path))
     assert status == 0
     assert "mine" in out
-    assert "study" not in out
-    assert "three-robot" not in out
+    assert "406.0" not in out  # the study's numbers belong to its own arch
+    assert "published" not in out
+    assert "overlap_dp" in out
 
 
 def scene_file(capsys, tmp_path, change):
@@ -96,6 +97,69 @@ def test_a_plan_from_a_file(capsys, tmp_path):
     status, out, _ = run(capsys, "analyze", "--method", "three-robot", "--plan", str(plan))
     assert status == 0
     assert out.count("\n") == 3
+
+
+def test_optimize(capsys, tmp_path):
+    folder = tmp_path / "new" / "out"
+    arguments = ("optimize", "--formulation", "overlap_dp", "--out", str(folder))
+    status, out, _ = run(capsys, *arguments)
+    assert (status, out.count("\n")) == (0, 1)
+    report = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    assert report["status"] == "optimal"
+    assert report["gap"] == pytest.approx(0)
+    assert report["models_paper_count"] == {"cascading": 2576, "overlap": 22724}
+    assert set(report["seconds"]) == {"assemble", "respond", "rank", "solve", "verify"}
+    plan = pd.read_csv(folder / "plan.csv")
+    study = list(printed_steps("sequential").columns[:21])
+    assert list(plan.columns[:21]) == study
+    selection = pd.read_csv(folder / "selection.csv")
+    total = selection["single_cost"].sum() + selection["shared_cost"].sum()
+    assert total == pytest.approx(report["objective"], rel=1e-5)
+    assert len(pd.read_csv(folder / "responses.csv")) > 10_000
+    again = ("analyze", "--method", "three-robot", "--plan", str(folder / "plan.csv"))
+    status, out, _ = run(capsys, *again)  # what it writes can be read as a plan
+    assert (status, out.count("\n")) == (0, 91)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        (("--formulation", "simplex"), "formulation 'simplex'"),
+        (("--formulation", "beam", "--option", "depth=3"), "--option depth=3: beam has width"),
+        (("--formulation", "beam", "--option", "width=wide"), "width is 'wide'; give an int"),
+        (("--formulation", "beam", "--option", "width=0"), "width is 0"),
+        (("--formulation", "overlap_dp", "--criteria", "beauty"), "--criteria beauty"),
+        (("--formulation", "overlap_dp", "--criteria", "T_max=heavy"), "'heavy' is not a positive"),
+        (("--formulation", "overlap_dp", "--limit", "T_max"), "--limit T_max"),
+        (("--formulation", "overlap_dp", "--limit", "F_largest=9"), "relax a limit"),
+    ],
+)
+def test_optimize_refuses_in_one_line(capsys, tmp_path, arguments, named):
+    status, _, err = run(capsys, "optimize", *arguments, "--out", str(tmp_path / "out"))
+    assert status == 2
+    assert err.count("\n") == 1
+    assert named in err
+    assert not list(tmp_path.rglob("*.*"))  # no half-written folder of results
+
+
+def test_optimize_with_words_of_ones_own(capsys, tmp_path):
+    arguments = ("--criteria", "T_max,M_sup=2,F_move", "--limit", "F_largest=392.4")
+    chosen = ("--formulation", "beam", "--option", "width=10", "--method", "modified-sequential")
+    status, _, err = run(capsys, "optimize", *arguments, *chosen, "--out", str(tmp_path))
+    assert (status, err) == (0, "")
+    report = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
+    assert report["criterion"] == "T_max,M_sup=2,F_move"
+    assert report["method"] == "modified-sequential"
+
+
+def test_compare_writes_tables_and_figures(capsys, tmp_path):
+    assert run(capsys, "compare", "--out", str(tmp_path), "--criteria", "weighted")[0] == 0
+    names = {path.name for path in tmp_path.iterdir()}
+    assert {"contest.csv", "published_ranks.csv", "steps_overlap_dp.csv"} <= names
+    for name in ("maxima.png", "responses.png", "gap_against_cost.png"):
+        assert (tmp_path / name).read_bytes().startswith(b"\x89PNG")
+    ranks = pd.read_csv(tmp_path / "published_ranks.csv")
+    assert len(ranks) == 22
 
 
 def test_scene(capsys, tmp_path):

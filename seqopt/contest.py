@@ -1,0 +1,209 @@
+"""Every method and formulation on one scene, in one table, beside what the study printed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from seqopt.compare import Comparison, compare, is_reference_arch
+from seqopt.criteria import Criterion
+from seqopt.fields import Engine
+from seqopt.loops import modified_sequential, three_robot_loop
+from seqopt.network import Floats
+from seqopt.optimize import Outcome, optimize, prepare
+from seqopt.placement import Placement
+from seqopt.plan_file import published_plan
+from seqopt.problem import Problem
+from seqopt.ranking import move_costs
+from seqopt.responses import analyze
+from seqopt.scene import Scene
+from seqopt.selection import Reads, formulations
+from seqopt.states import window_models
+
+Progress = Callable[[str], None]
+PUBLISHED = "published plan"
+
+
+@dataclass(frozen=True)
+class Contest:
+    """Methods and formulations side by side.
+
+    Attributes
+    ----------
+    methods : Comparison
+        Methods without a choice, and the published plan, step by step.
+    table : pandas.DataFrame
+        A row per method or formulation: ``objective`` and ``gap`` to the exact optimum of its aim,
+        the largest ``F_rob`` [N], ``M_sup`` [N m], ``T_max`` [N] and ``D_max`` [1e-3 mm] of any
+        step, the distinct ``models`` it looks at, and ``seconds`` with all of them evaluated.
+    tables : mapping of str to pandas.DataFrame
+        Responses of every step, by row of ``table``.
+    ranks : pandas.DataFrame or None
+        Where the published plan's nodes rank, move by move: in the window of the move alone, with
+        the cost to go of the full overlap, and with the worst cost to go.
+    paper_models : tuple of int
+        Models that the study counts: cascading, full overlap.
+    """
+
+    methods: Comparison
+    table: pd.DataFrame
+    tables: Mapping[str, pd.DataFrame]
+    ranks: pd.DataFrame | None
+    paper_models: tuple[int, int]
+
+
+def contest(engine: Engine, criterion: Criterion, progress: Progress = lambda _: None) -> Contest:
+    """Solve the three-robot loop of a scene by every registered formulation."""
+    scene = engine.network.scene
+    progress("methods")
+    methods = compare(engine)
+    tables = dict(methods.tables)
+    rows = {name: maxima(scene, table) for name, table in tables.items()}
+    progress("modified sequential method")
+    modified = prepare(engine, modified_sequential(engine.network), criterion)
+    outcome = optimize(modified, formulations()["rank_search"])
+    tables["modified-sequential"] = analyze(engine, outcome.plan)
+    rows["modified-sequential"] = _row(engine, outcome, tables["modified-sequential"])
+    posed = prepare(engine, three_robot_loop(engine.network), criterion)
+    for name, which in formulations().items():
+        progress(f"three-robot loop by {name}")
+        outcome = optimize(posed, which)
+        tables[name] = analyze(engine, outcome.plan)
+        rows[name] = _row(engine, outcome, tables[name])
+    ranks = None
+    if is_reference_arch(scene):
+        choice = published_choice(posed.problem)
+        ranks = published_ranks(posed.problem, choice)
+        best = rows["overlap_dp"]["objective"]
+        value = posed.problem.sums.cost(choice)
+        rows["three-robot"] |= {"objective": value, "gap": (value - best) / max(abs(best), 1.0)}
+    table = pd.DataFrame.from_dict(rows, orient="index").rename(index={"three-robot": PUBLISHED})
+    tables[PUBLISHED] = tables.pop("three-robot") if "three-robot" in tables else pd.DataFrame()
+    if tables[PUBLISHED].empty:
+        del tables[PUBLISHED]
+    return Contest(methods, _ordered(table), tables, ranks, posed.problem.paper_models)
+
+
+def maxima(scene: Scene, table: pd.DataFrame) -> dict[str, float]:
+    """Return the largest responses of any step."""
+    forces = table[[f"F_{robot.name}_N" for robot in scene.robots]].abs()
+    return {
+        "F_rob": float(np.nanmax(forces.to_numpy(float))),
+        "M_sup": float(table["M_sup_Nm"].max()),
+        "T_max": float(table["F_max_N"].max()),
+        "D_max": float(table["D_max_1e-3mm"].max()),
+    }
+
+
+def _row(engine: Engine, outcome: Outcome, table: pd.DataFrame) -> dict[str, float]:
+    return {
+        "objective": outcome.certificate.objective,
+        "gap": outcome.certificate.gap,
+        **maxima(engine.network.scene, table),
+        "models": (
+            window_models(outcome.problem.schedule, outcome.selection.choice)
+            if outcome.which.reads is Reads.WINDOW
+            else outcome.problem.evaluation.models
+        ),
+        "seconds": sum(outcome.seconds.values()),
+        "solve_seconds": outcome.seconds["solve"],
+    }
+
+
+def _ordered(table: pd.DataFrame) -> pd.DataFrame:
+    columns = ["objective", "gap", "F_rob", "M_sup", "T_max", "D_max", "models", "seconds"]
+    return table.reindex(columns=[*columns, "solve_seconds"])
+
+
+def published_choice(problem: Problem) -> tuple[int, ...]:
+    """Return the published plan's nodes as places among the candidates of the loop's moves."""
+    scene = problem.schedule.scene
+    plan = published_plan(scene)
+    names = [robot.name for robot in scene.robots]
+    nodes = [plan[m.step - 1].grips[names.index(m.robot)] for m in problem.schedule.moves]
+    return tuple(
+        move.candidates.index(int(node or 0))
+        for move, node in zip(problem.schedule.moves, nodes, strict=True)
+    )
+
+
+def published_ranks(problem: Problem, choice: tuple[int, ...]) -> pd.DataFrame:
+    """Return where chosen nodes rank, move by move, the choice before each being fixed."""
+    sums = _to_go(problem.sums, np.add)
+    peaks = _to_go(problem.peaks, np.maximum)
+    rows = []
+    for k, move in enumerate(problem.schedule.moves):
+        before = choice[k - 1] if k else 0
+        window = move_costs(problem, k, before)
+        rows.append(
+            {
+                "move": k + 1,
+                "step": move.step,
+                "bricks": move.bricks,
+                "robot": move.robot,
+                "node": move.candidates[choice[k]],
+                "candidates": len(move.candidates),
+                "first_in_window": move.candidates[int(window.argmin())],
+                "rank_in_window": _place(window, choice[k]),
+                "rank_overlap": _place(problem.sums.shared[k][before] + sums[k], choice[k]),
+                "rank_peak": _place(
+                    np.maximum(problem.peaks.shared[k][before], peaks[k]), choice[k]
+                ),
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def _to_go(placement: Placement, join: np.ufunc) -> list[Floats]:
+    """Return the least cost from each candidate to the end, its own single cost included."""
+    out = [placement.single[-1]]
+    for single, shared in zip(placement.single[-2::-1], placement.shared[:0:-1], strict=True):
+        out.insert(0, join(single, join(shared, out[0]).min(axis=1)))
+    return out
+
+
+def _place(costs: Floats, chosen: int) -> int:
+    tolerance = 1e-9 * max(1.0, abs(float(costs[chosen])))
+    return int((costs < costs[chosen] - tolerance).sum()) + 1
+
+
+def format_contest(result: Contest, criterion: Criterion) -> str:
+    """Return the contest as text."""
+    cascading, overlap = result.paper_models
+    lines = [
+        f"Three-robot loop, criterion {criterion.name}; models counted the study's way: "
+        f"{cascading:,} cascading,",
+        f"{overlap:,} with the full overlap; below, the different ones that each looks at",
+        "",
+        f"{'':20}{'objective':>11}{'gap':>8}{'F_rob':>8}{'M_sup':>8}{'T_max':>8}{'D_max':>8}"
+        f"{'models':>8}{'seconds':>9}",
+    ]
+    for name, row in result.table.iterrows():
+        cells = [
+            f"{row['objective']:11.2f}" if np.isfinite(row["objective"]) else f"{'-':>11}",
+            f"{100 * row['gap']:7.2f}%" if np.isfinite(row["gap"]) else f"{'-':>8}",
+            *(f"{row[column]:8.1f}" for column in ("F_rob", "M_sup", "T_max", "D_max")),
+            f"{row['models']:8.0f}" if np.isfinite(row["models"]) else f"{'-':>8}",
+            f"{row['seconds']:9.4f}" if np.isfinite(row["seconds"]) else f"{'-':>9}",
+        ]
+        lines.append(f"{name!s:20}" + "".join(cells))
+    lines.append(
+        "(N, N m, N, 1e-3 mm; gap to the exact optimum of the same aim; minimax has its own)"
+    )
+    if result.ranks is not None:
+        lines += ["", "Where the published plan's nodes rank, optimization by optimization"]
+        for column, label in (
+            ("rank_in_window", "rank_search, cascade"),
+            ("rank_overlap", "overlap"),
+            ("rank_peak", "minimax"),
+        ):
+            ranks = result.ranks[column]
+            places = " ".join(map(str, ranks))
+            lines.append(
+                f"  {label:21}first in {(ranks == 1).sum()} of {len(ranks)}, "
+                f"among three in {(ranks <= 3).sum()}: {places}"
+            )
+    return "\n".join(lines)

@@ -1,0 +1,156 @@
+"""One placement problem from scene to checked plan, with the time of every stage."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+import pandas as pd
+
+from seqopt.criteria import Criterion
+from seqopt.fields import Engine
+from seqopt.problem import Limit, Problem, pose
+from seqopt.ranking import move_costs
+from seqopt.responses import analyze
+from seqopt.schedule import Schedule
+from seqopt.selection import Aim, Certificate, Formulation, Selection, certify
+from seqopt.steps import Step
+
+Result = TypeVar("Result")
+
+
+@dataclass(frozen=True)
+class Posed:
+    """A problem with its costs computed, and the seconds that took by stage."""
+
+    problem: Problem
+    seconds: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """A problem solved and checked.
+
+    Attributes
+    ----------
+    problem : Problem
+    which : Formulation
+    selection : Selection
+    certificate : Certificate
+    plan : tuple of Step
+        The schedule with every move at its chosen node.
+    seconds : mapping of str to float
+        By stage: respond, rank, solve, verify.
+    """
+
+    problem: Problem
+    which: Formulation
+    selection: Selection
+    certificate: Certificate
+    plan: tuple[Step, ...]
+    seconds: Mapping[str, float]
+
+
+def prepare(
+    engine: Engine, schedule: Schedule, criterion: Criterion, limits: Sequence[Limit] = ()
+) -> Posed:
+    """Pose a problem and compute its costs."""
+    seconds: dict[str, float] = {}
+    problem = _timed(seconds, "respond", lambda: pose(engine, schedule, criterion, limits))
+    _timed(seconds, "rank", lambda: (problem.sums, problem.peaks))
+    return Posed(problem, seconds)
+
+
+def optimize(posed: Posed, which: Formulation, **options: Any) -> Outcome:
+    """Solve a posed problem by one formulation, check the answer and fill in the plan."""
+    seconds = dict(posed.seconds)
+    problem = posed.problem
+    selection = _timed(seconds, "solve", lambda: which.solve(problem, **options))
+
+    def verify() -> tuple[Certificate, tuple[Step, ...]]:
+        plan = problem.schedule.fill(problem.nodes(selection.choice))
+        return certify(problem, selection, which.aim), plan
+
+    certificate, plan = _timed(seconds, "verify", verify)
+    return Outcome(problem, which, selection, certificate, plan, seconds)
+
+
+def summary(outcome: Outcome) -> dict[str, object]:
+    """Return what there is to say about an outcome, ready for JSON."""
+    cascading, overlap = outcome.problem.paper_models
+    return {
+        "scene": outcome.problem.schedule.scene.name,
+        "method": outcome.problem.schedule.method,
+        "formulation": outcome.which.name,
+        "kind": outcome.which.kind.value,
+        "aim": outcome.which.aim.value,
+        "criterion": outcome.problem.criterion.name,
+        "status": "optimal" if outcome.certificate.gap <= 1e-6 else "feasible",
+        "objective": outcome.certificate.objective,
+        "bound": outcome.certificate.bound,
+        "gap": outcome.certificate.gap,
+        "models_paper_count": {"cascading": cascading, "overlap": overlap},
+        "models_evaluated": outcome.problem.evaluation.models,
+        "seconds": {stage: round(value, 6) for stage, value in outcome.seconds.items()},
+    }
+
+
+def selection_table(outcome: Outcome) -> pd.DataFrame:
+    """Return a row per move: where, which robot, which node, what it costs, how it ranks."""
+    rows, before = [], 0
+    placement = outcome.problem.sums if outcome.which.aim is Aim.SUM else outcome.problem.peaks
+    for k, (move, now) in enumerate(
+        zip(outcome.problem.schedule.moves, outcome.selection.choice, strict=True)
+    ):
+        costs = move_costs(outcome.problem, k, before)
+        node = move.candidates[now]
+        rows.append(
+            {
+                "move": k + 1,
+                "step": move.step,
+                "bricks": move.bricks,
+                "robot": move.robot,
+                "brick": outcome.problem.schedule.scene.brick_of_node[node].name,
+                "node": node,
+                "candidates": len(move.candidates),
+                "single_cost": placement.single[k][now],
+                "shared_cost": placement.shared[k][before, now],
+                "rank_in_window": int((costs < costs[now] - 1e-9 * abs(costs[now])).sum()) + 1,
+            }
+        )
+        before = now
+    return pd.DataFrame(rows)
+
+
+def plan_table(engine: Engine, outcome: Outcome) -> pd.DataFrame:
+    """Return the plan with the columns of Table A.1 and the robot that each move optimizes."""
+    table = analyze(engine, outcome.plan)
+    open_at = {step.number: step.moves for step in outcome.problem.schedule.steps}
+    moves = outcome.problem.schedule.moves
+    table["optimized_robot"] = [
+        ";".join(moves[m].robot for m in open_at[number]) for number in table["step"]
+    ]
+    return table
+
+
+def responses_table(problem: Problem) -> pd.DataFrame:
+    """Return raw responses and cost of every choice in every open state, a row each."""
+    parts = []
+    for state in problem.evaluation.states:
+        table = problem.table(state)
+        nodes = pd.DataFrame(
+            table.index.to_frame(index=False).to_numpy(),
+            columns=["node", "second_node"][: len(state.moves)],
+        )
+        step = pd.Series(state.step.number, index=nodes.index, name="step")
+        parts.append(pd.concat([step, nodes, table.reset_index(drop=True)], axis=1))
+    return pd.concat(parts, ignore_index=True)
+
+
+def _timed(seconds: dict[str, float], stage: str, call: Callable[[], Result]) -> Result:
+    start = time.perf_counter()
+    result = call()
+    seconds[stage] = time.perf_counter() - start
+    return result
