@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullFormatter
 
 from seqopt.contest import PUBLISHED, Contest
 from seqopt.draw import draw_responses
@@ -61,6 +62,7 @@ def _gaps(result: Contest) -> Figure:
                 values[place], gap[place], marker, ms=9, mfc="none", mew=1.5, label=str(name)
             )
         panel.set_xlabel(label)
+        panel.xaxis.set_minor_formatter(NullFormatter())
         panel.grid(visible=True, which="both", lw=0.2)
     left.set_ylabel(f"gap to the exact optimum (0 drawn at {FLOOR:g})")
     handles, labels = left.get_legend_handles_labels()

@@ -11,6 +11,15 @@ import pytest
 ROOT = Path(__file__).parent.parent
 
 
+QUICK = [
+    "engine_speed",
+    "frame_contrast",
+    "identify_arch25",
+    "criteria_variants",
+    "formulation_cost",
+]
+
+
 def run(name, *arguments):
     done = subprocess.run(
         [sys.executable, "-W", "error", "-m", f"experiments.{name}", *arguments],
@@ -23,7 +32,7 @@ def run(name, *arguments):
     return done.stdout
 
 
-@pytest.mark.parametrize("name", ["engine_speed", "frame_contrast", "identify_arch25"])
+@pytest.mark.parametrize("name", QUICK)
 def test_a_quick_run_ends_with_a_verdict(name):
     before = sorted((ROOT / "experiments" / "results").glob("*"))
     times = [path.stat().st_mtime_ns for path in before]
