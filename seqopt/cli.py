@@ -11,6 +11,8 @@ import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+import numpy as np
+
 from seqopt.arguments import PLANNED, USAGE, parse_criterion, parse_limit, parse_options, parser
 from seqopt.compare import compare, format_comparison, is_reference_arch
 from seqopt.contest import Contest, contest, format_contest
@@ -21,6 +23,7 @@ from seqopt.loops import SCHEDULES
 from seqopt.methods import METHODS
 from seqopt.network import network
 from seqopt.optimize import optimize, plan_table, prepare, responses_table, selection_table, summary
+from seqopt.placement import ProblemError
 from seqopt.plan_file import published_plan, read_plan
 from seqopt.responses import analyze, fields_archive
 from seqopt.scene import Scene
@@ -53,12 +56,13 @@ def _compare(options: argparse.Namespace) -> None:
     criterion = parse_criterion(options.criteria)
     if options.out is not None:
         make_folder(options.out)
-    if len(scene.robots) < 3 or len(scene.bricks) < 4:
-        print(format_comparison(compare(engine), scene))
+    methods = compare(engine)
+    print(format_comparison(methods, scene), end="\n\n")
+    try:
+        result = contest(engine, methods, criterion, _progress)
+    except (StepError, ProblemError) as error:
+        print(f"Three-robot loop: not possible here; {error}")
         return
-    result = contest(engine, criterion, _progress)
-    print(format_comparison(result.methods, scene))
-    print()
     print(format_contest(result, criterion))
     if options.out is not None:
         _write_contest(options.out, result)
@@ -165,7 +169,7 @@ def _scene(options: argparse.Namespace) -> None:
         print(
             f"{robot.name}: payload {robot.payload:g} N, reach {type(robot.reach).__name__.lower()}"
         )
-    print(f"weight: {sum(brick.mass for brick in scene.bricks) * 9.81:.1f} N")
+    print(f"weight: {np.linalg.norm(parts.weight.sum(axis=0)):.1f} N")
     if scene.provenance:
         print(f"provenance: {scene.provenance}")
     if options.export is not None:

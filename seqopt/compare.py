@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
+from seqopt.errors import StepError
 from seqopt.fields import Engine
 from seqopt.methods import METHODS
 from seqopt.paper import IRREGULARITIES, printed
@@ -15,7 +16,6 @@ from seqopt.plan_file import published_plan
 from seqopt.responses import analyze
 from seqopt.scene import Scene
 from seqopt.scene_file import load_scene
-from seqopt.steps import Step
 
 PAPER_COLUMN = {
     "sequential": "sequential",
@@ -51,20 +51,28 @@ def is_reference_arch(scene: Scene) -> bool:
     return scene == load_scene("arch25")
 
 
-def method_steps(engine: Engine) -> dict[str, tuple[Step, ...]]:
-    """Return the sequences of all methods that exist for the engine's scene."""
-    steps = {name: method(engine.network) for name, method in METHODS.items()}
-    if is_reference_arch(engine.network.scene):
-        steps["three-robot"] = published_plan(engine.network.scene)
-    return steps
-
-
 def compare(engine: Engine) -> Comparison:
-    """Analyze every method that exists for the engine's scene."""
+    """Analyze every method that exists for the engine's scene.
+
+    Raises
+    ------
+    StepError
+        If no method can build the scene.
+    """
     scene = engine.network.scene
-    tables = {name: analyze(engine, steps) for name, steps in method_steps(engine).items()}
+    tables, notes, refused = {}, [], []
+    for name, method in METHODS.items():
+        try:
+            tables[name] = analyze(engine, method(engine.network))
+        except StepError as error:
+            refused.append(error)
+            notes.append(f"{name}: not possible here; {error}")
+    if not tables:
+        raise refused[0]
+    if is_reference_arch(scene):
+        tables["three-robot"] = analyze(engine, published_plan(scene))
     maxima = pd.DataFrame({name: _maxima(scene, table) for name, table in tables.items()})
-    notes = list(_overloads(scene, tables))
+    notes += _overloads(scene, tables)
     reference = None
     if is_reference_arch(scene):
         notes += [f"In the study: {text}" for text in IRREGULARITIES]

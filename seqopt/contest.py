@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from seqopt.compare import Comparison, compare, is_reference_arch
+from seqopt.compare import Comparison, is_reference_arch
 from seqopt.criteria import Criterion
 from seqopt.fields import Engine
 from seqopt.loops import modified_sequential, three_robot_loop
@@ -25,6 +25,8 @@ from seqopt.states import window_models
 
 Progress = Callable[[str], None]
 PUBLISHED = "published plan"
+RESPONSES = ["F_rob", "M_sup", "T_max", "D_max"]
+COLUMNS = ["objective", "gap", *RESPONSES, "models", "seconds", "solve_seconds"]
 
 
 @dataclass(frozen=True)
@@ -55,11 +57,20 @@ class Contest:
     paper_models: tuple[int, int]
 
 
-def contest(engine: Engine, criterion: Criterion, progress: Progress = lambda _: None) -> Contest:
-    """Solve the three-robot loop of a scene by every registered formulation."""
+def contest(
+    engine: Engine,
+    methods: Comparison,
+    criterion: Criterion,
+    progress: Progress = lambda _: None,
+) -> Contest:
+    """Solve the three-robot loop of a scene by every registered formulation.
+
+    Raises
+    ------
+    StepError, ProblemError
+        If the scene has no such loop, or no choice in it is allowed.
+    """
     scene = engine.network.scene
-    progress("methods")
-    methods = compare(engine)
     tables = dict(methods.tables)
     rows = {name: maxima(scene, table) for name, table in tables.items()}
     progress("modified sequential method")
@@ -80,11 +91,10 @@ def contest(engine: Engine, criterion: Criterion, progress: Progress = lambda _:
         best = rows["overlap_dp"]["objective"]
         value = posed.problem.sums.cost(choice)
         rows["three-robot"] |= {"objective": value, "gap": (value - best) / max(abs(best), 1.0)}
-    table = pd.DataFrame.from_dict(rows, orient="index").rename(index={"three-robot": PUBLISHED})
-    tables[PUBLISHED] = tables.pop("three-robot") if "three-robot" in tables else pd.DataFrame()
-    if tables[PUBLISHED].empty:
-        del tables[PUBLISHED]
-    return Contest(methods, _ordered(table), tables, ranks, posed.problem.paper_models)
+    names = {name: PUBLISHED if name == "three-robot" else name for name in rows}
+    table = pd.DataFrame.from_dict(rows, orient="index").rename(index=names)
+    tables = {names[name]: steps for name, steps in tables.items()}
+    return Contest(methods, table[COLUMNS], tables, ranks, posed.problem.paper_models)
 
 
 def maxima(scene: Scene, table: pd.DataFrame) -> dict[str, float]:
@@ -111,11 +121,6 @@ def _row(engine: Engine, outcome: Outcome, table: pd.DataFrame) -> dict[str, flo
         "seconds": sum(outcome.seconds.values()),
         "solve_seconds": outcome.seconds["solve"],
     }
-
-
-def _ordered(table: pd.DataFrame) -> pd.DataFrame:
-    columns = ["objective", "gap", "F_rob", "M_sup", "T_max", "D_max", "models", "seconds"]
-    return table.reindex(columns=[*columns, "solve_seconds"])
 
 
 def published_choice(problem: Problem) -> tuple[int, ...]:
@@ -185,7 +190,7 @@ def format_contest(result: Contest, criterion: Criterion) -> str:
         cells = [
             f"{row['objective']:11.2f}" if np.isfinite(row["objective"]) else f"{'-':>11}",
             f"{100 * row['gap']:7.2f}%" if np.isfinite(row["gap"]) else f"{'-':>8}",
-            *(f"{row[column]:8.1f}" for column in ("F_rob", "M_sup", "T_max", "D_max")),
+            *(f"{row[column]:8.1f}" for column in RESPONSES),
             f"{row['models']:8.0f}" if np.isfinite(row["models"]) else f"{'-':>8}",
             f"{row['seconds']:9.4f}" if np.isfinite(row["seconds"]) else f"{'-':>9}",
         ]

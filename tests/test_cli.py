@@ -46,6 +46,18 @@ def test_compare_of_another_scene_shows_no_study(capsys, tmp_path):
     assert "overlap_dp" in out
 
 
+def test_compare_says_what_is_not_possible(capsys, tmp_path):
+    path = scene_file(capsys, tmp_path, lambda d: d["robots"].pop())
+    status, out, _ = run(capsys, "compare", str(path))
+    assert status == 0
+    assert "cantilever" in out
+    assert "Three-robot loop: not possible here; " in out
+    path = scene_file(capsys, tmp_path, lambda d: d.update(robots=d["robots"][:1]))
+    status, _, err = run(capsys, "compare", str(path))
+    assert (status, err.count("\n")) == (2, 1)
+    assert "needs two" in err
+
+
 def scene_file(capsys, tmp_path, change):
     path = tmp_path / "scene.json"
     assert run(capsys, "scene", "--export", str(path))[0] == 0

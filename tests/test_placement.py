@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from seqopt.arch import ArchShape, arch_scene
+from seqopt.compare import compare
 from seqopt.compliance import ComplianceEngine
 from seqopt.contest import contest, published_choice, published_ranks
 from seqopt.criteria import (
@@ -250,7 +251,7 @@ def test_tables_are_labeled(problem):
 
 
 def test_contest(engine25):
-    result = contest(engine25, EQUATIONS)
+    result = contest(engine25, compare(engine25), EQUATIONS)
     assert {"sequential", "cantilever", "published plan", "modified-sequential"} <= set(
         result.table.index
     )
