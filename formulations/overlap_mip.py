@@ -7,8 +7,8 @@ r"""The full overlap formulation as a mixed-integer program (cvxpy, HiGHS): exac
    & \sum_k \sum_{i,j} a_k(i, j)\, y_k(i, j) \le b \quad \text{for every budget.}
 
 It earns its price where budgets couple all moves: a cap on robot travel, on how often a robot is
-used away from the newest bricks, on the count of steps over a limit (`seqopt.budgets`). Without
-them dynamic programming gives the same answer in a ten-thousandth of the time.
+used, on the count of steps over a level (`seqopt.budgets`). Without them dynamic programming gives
+the same answer hundreds of times faster.
 """
 
 from __future__ import annotations

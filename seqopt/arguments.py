@@ -16,10 +16,11 @@ from seqopt.placement import ProblemError
 from seqopt.problem import Limit
 from seqopt.scene_file import builtin_scenes
 from seqopt.selection import Formulation, formulations
+from seqopt.states import SCALARS
 
 PLANNED = "three-robot"
 USAGE = 2  # exit status where the user must act
-RESPONSES = ("T_max", "M_sup", "D_max", "F_move", "F_largest")
+RESPONSES = (*SCALARS, "F_each")
 
 
 def parse_criterion(text: str) -> Criterion:
@@ -62,8 +63,8 @@ def parse_options(which: Formulation, texts: Sequence[str]) -> dict[str, int | s
 
 
 def _response(name: str, where: str) -> str:
-    if name not in RESPONSES and not name.startswith("F_rob"):
-        known = ", ".join((*CRITERIA, *RESPONSES, "F_rob1 …"))
+    if name not in RESPONSES and not name.startswith("F_"):
+        known = ", ".join((*CRITERIA, *RESPONSES, "F_ROBOT"))
         raise ProblemError(f"{where} {name}: there is no such; give {known}")
     return name
 

@@ -2,15 +2,15 @@
 
 Every criterion turns responses over choices, ``(C,)`` for one open move or ``(C, D)`` for two, into
 costs of the same shape. A name stands for a response: ``T_max``, ``M_sup``, ``D_max``, ``F_move``
-(the robot that takes its grip), ``F_largest`` (the largest grip force), ``F_rob1`` and so on (the
-robot of that name).
+(the robot that takes its grip), ``F_largest`` (the largest grip force), ``F_`` and a robot's name
+(its force), ``F_each`` (the forces of all robots, a term each).
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Protocol
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Protocol
 
 import numpy as np
 from scipy.stats import rankdata
@@ -18,6 +18,7 @@ from scipy.stats import rankdata
 from seqopt.network import Floats
 
 Responses = Mapping[str, Floats]
+Term = tuple[Any, ...]  # a name and its numbers
 CROWN = 13  # bricks of the reference arch up to its crown
 RESOLUTION = (("F", 1.0), ("T", 1.0), ("M", 1.0), ("D", 1e-6))  # N, N, N m, m
 
@@ -31,6 +32,9 @@ class Criterion(Protocol):
 
     def wanted(self, bricks: int) -> tuple[str, ...]:
         """Return the responses it needs of a move that is made with so many bricks placed."""
+
+    def for_robots(self, robots: Sequence[str]) -> Criterion:
+        """Return the criterion with ``F_each`` spelled out for the robots of a scene."""
 
     def costs(self, responses: Responses, bricks: int, choices: int) -> Floats:
         """Return the costs of all choices in one state, NaN where they are impossible.
@@ -76,6 +80,10 @@ class RankSum:
     def wanted(self, bricks: int) -> tuple[str, ...]:
         """Return the responses it needs of a move that is made with so many bricks placed."""
         return tuple(name for name, _ in self._terms(bricks))
+
+    def for_robots(self, robots: Sequence[str]) -> RankSum:
+        """Return the criterion with ``F_each`` spelled out for the robots of a scene."""
+        return replace(self, before=_each(self.before, robots), after=_each(self.after, robots))
 
     def costs(self, responses: Responses, bricks: int, choices: int) -> Floats:
         """Return the weighted mean of the ranks; see `Criterion.costs`."""
@@ -123,6 +131,10 @@ class WeightedSum:
         """Return the responses it needs; the same for every state."""
         return tuple(name for name, _, _ in self.terms)
 
+    def for_robots(self, robots: Sequence[str]) -> WeightedSum:
+        """Return the criterion with ``F_each`` spelled out for the robots of a scene."""
+        return replace(self, terms=_each(self.terms, robots))
+
     def costs(self, responses: Responses, bricks: int, choices: int) -> Floats:
         """Return the weighted sums; see `Criterion.costs`."""
         parts = [w / scale * _present(responses[name]) for name, w, scale in self.terms]
@@ -147,6 +159,10 @@ class WorstRatio:
         """Return the responses it needs; the same for every state."""
         return tuple(name for name, _ in self.limits)
 
+    def for_robots(self, robots: Sequence[str]) -> WorstRatio:
+        """Return the criterion with ``F_each`` spelled out for the robots of a scene."""
+        return replace(self, limits=_each(self.limits, robots))
+
     def costs(self, responses: Responses, bricks: int, choices: int) -> Floats:
         """Return the largest ratios; see `Criterion.costs`."""
         parts = [_present(responses[name]) / limit for name, limit in self.limits]
@@ -158,6 +174,15 @@ def _present(values: Floats) -> Floats:
     return np.zeros_like(values) if np.isnan(values).all() else values
 
 
+def _each(terms: tuple[Term, ...], robots: Sequence[str]) -> tuple[Term, ...]:
+    """Return terms in which ``F_each`` stands once for every robot."""
+    out: list[Term] = []
+    for term in terms:
+        names = [f"F_{robot}" for robot in robots] if term[0] == "F_each" else [term[0]]
+        out += [(name, *term[1:]) for name in names]
+    return tuple(out)
+
+
 def equal(*names: str) -> tuple[tuple[str, float], ...]:
     """Return equally weighted terms."""
     return tuple((name, 1.0) for name in names)
@@ -165,7 +190,7 @@ def equal(*names: str) -> tuple[tuple[str, float], ...]:
 
 EQUATIONS = RankSum(
     "equations-2-3",
-    before=equal("T_max", "M_sup", "F_rob1", "F_rob2", "F_rob3"),
+    before=equal("T_max", "M_sup", "F_each"),
     after=equal("T_max", "M_sup", "F_move", "D_max"),
 )
 CLOSEST = RankSum(  # of the variants tried, the one that names the published plan most often

@@ -15,7 +15,7 @@ from seqopt.problem import Limit, Problem, pose
 from seqopt.ranking import move_costs
 from seqopt.responses import analyze
 from seqopt.schedule import Schedule
-from seqopt.selection import Aim, Certificate, Formulation, Selection, certify
+from seqopt.selection import Aim, Certificate, Formulation, Selection, check
 from seqopt.steps import Step
 
 Result = TypeVar("Result")
@@ -71,7 +71,7 @@ def optimize(posed: Posed, which: Formulation, **options: Any) -> Outcome:
 
     def verify() -> tuple[Certificate, tuple[Step, ...]]:
         plan = problem.schedule.fill(problem.nodes(selection.choice))
-        return certify(problem, selection, which.aim), plan
+        return check(problem, selection, which), plan
 
     certificate, plan = _timed(seconds, "verify", verify)
     return Outcome(problem, which, selection, certificate, plan, seconds)

@@ -12,14 +12,17 @@ import pandas as pd
 from seqopt.criteria import Criterion
 from seqopt.fields import Engine
 from seqopt.network import Floats
-from seqopt.placement import Budget, Placement
+from seqopt.placement import Budget, Placement, ProblemError
 from seqopt.schedule import Schedule
-from seqopt.states import Evaluation, State, evaluate
+from seqopt.states import SCALARS, Evaluation, State, evaluate
 
 
 @dataclass(frozen=True)
 class Limit:
-    """No state may exceed a value: response (as in `seqopt.criteria`) and bound, SI units."""
+    """No state with an open grip may exceed a value: response and bound, SI units.
+
+    Responses are named as in `seqopt.criteria`.
+    """
 
     response: str
     bound: float
@@ -131,8 +134,16 @@ def pose(
     also: Sequence[str] = (),
 ) -> Problem:
     """Return the problem; only responses that criterion, limits and ``also`` name are evaluated."""
+    robots = [robot.name for robot in schedule.scene.robots]
+    named = criterion.for_robots(robots)
+    known = {*SCALARS, *(f"F_{name}" for name in robots)}
 
     def wanted(bricks: int) -> set[str]:
-        return {*criterion.wanted(bricks), *(limit.response for limit in limits), *also}
+        names = {*named.wanted(bricks), *(limit.response for limit in limits), *also}
+        if names - known:
+            raise ProblemError(
+                f"response {min(names - known)}: there is no such; give {', '.join(sorted(known))}"
+            )
+        return names
 
-    return Problem(schedule, criterion, tuple(limits), evaluate(engine, schedule, wanted))
+    return Problem(schedule, named, tuple(limits), evaluate(engine, schedule, wanted))

@@ -51,7 +51,7 @@ class Selection:
     bound : float
         Claimed lower bound, budgets included; minus infinity if none.
     prices : mapping of str to float
-        What one more unit of each budget would save.
+        Dual value of each budget: the rate at which one more unit would lower the bound.
     """
 
     choice: tuple[int, ...]
@@ -96,6 +96,9 @@ class Certificate:
         least without them.
     gap : float
         Objective less bound, over the larger of the objective's size and 1.
+    claimed_gap : float
+        The same with the formulation's own bound where that is higher; it is not proven, but knows
+        the budgets.
     spent : mapping of str to float
         What the selection takes of each budget.
     """
@@ -103,6 +106,7 @@ class Certificate:
     objective: float
     bound: float
     gap: float
+    claimed_gap: float
     spent: Mapping[str, float]
 
 
@@ -116,25 +120,37 @@ def certify(problem: PlacementProblem, selection: Selection, aim: Aim) -> Certif
         worth what was claimed.
     """
     placement = problem.sums if aim is Aim.SUM else problem.peaks
-    sizes = placement.sizes
-    choice = selection.choice
-    if len(choice) != len(sizes) or any(not 0 <= c < n for c, n in zip(choice, sizes, strict=True)):
-        raise SolverError(f"no incumbent: {list(choice)} is not one candidate per move of {sizes}")
-    value = placement.cost(choice) if aim is Aim.SUM else placement.worst(choice)
-    if not np.isfinite(value):
-        raise SolverError("the choice is not allowed by the problem; the solver's answer is wrong")
+    value = _value(placement, selection.choice, aim)
     scale = max(abs(value), 1.0)
     if not abs(value - selection.objective) <= TOLERANCE * scale:
         raise SolverError(f"the objective is {value:.9g}, not {selection.objective:.9g} as claimed")
-    spent = {budget.name: budget.spent(choice) for budget in problem.budgets}
+    spent = {budget.name: budget.spent(selection.choice) for budget in problem.budgets}
     for budget in problem.budgets:
         if spent[budget.name] > budget.bound + TOLERANCE * max(abs(budget.bound), 1.0):
-            raise SolverError(f"the choice takes {spent[budget.name]:.6g} of {budget.name}, "
-                              f"more than {budget.bound:.6g}")  # fmt: skip
+            raise SolverError(
+                f"the choice takes {spent[budget.name]:.6g} of {budget.name}, more than "
+                f"{budget.bound:.6g}; use overlap_mip (the claimed bound is {selection.bound:.9g})"
+            )
     bound = least_sum(placement) if aim is Aim.SUM else least_peak(placement)
-    if selection.bound > value + TOLERANCE * scale:
-        raise SolverError(f"the claimed bound {selection.bound:.9g} exceeds the value {value:.9g}")
-    return Certificate(value, bound, max(0.0, value - bound) / scale, spent)
+    highest = value if problem.budgets else bound
+    if selection.bound > highest + TOLERANCE * scale:
+        raise SolverError(f"the claimed bound {selection.bound:.9g} exceeds {highest:.9g}")
+    gap, claimed = (max(0.0, value - b) / scale for b in (bound, max(bound, selection.bound)))
+    return Certificate(value, bound, gap, claimed, spent)
+
+
+def _value(placement: Placement, choice: tuple[int, ...], aim: Aim) -> float:
+    """Return what a choice is worth, or raise a `SolverError` if it is none."""
+    sizes = placement.sizes
+    if len(choice) != len(sizes):
+        raise SolverError(f"the answer names {len(choice)} candidates for {len(sizes)} moves")
+    for k, (place, size) in enumerate(zip(choice, sizes, strict=True), start=1):
+        if not 0 <= place < size:
+            raise SolverError(f"the answer names candidate {place} of {size} for move {k}")
+    value = placement.cost(choice) if aim is Aim.SUM else placement.worst(choice)
+    if not np.isfinite(value):
+        raise SolverError("the choice is not allowed by the problem; the solver's answer is wrong")
+    return value
 
 
 def least_sum(placement: Placement) -> float:
@@ -188,6 +204,23 @@ def formulation(name: str) -> Formulation:
 def run(
     problem: PlacementProblem, which: Formulation, **options: Any
 ) -> tuple[Selection, Certificate]:
-    """Solve a problem and check the answer."""
+    """Solve a problem and check the answer; see `check`."""
     selection = which.solve(problem, **options)
-    return selection, certify(problem, selection, which.aim)
+    return selection, check(problem, selection, which)
+
+
+def check(problem: PlacementProblem, selection: Selection, which: Formulation) -> Certificate:
+    """Certify a selection, and hold its formulation to what it promises.
+
+    Raises
+    ------
+    SolverError
+        If the certificate fails, or an exact formulation misses the optimum.
+    """
+    certificate = certify(problem, selection, which.aim)
+    if which.kind is Kind.EXACT and not problem.budgets and certificate.gap > TOLERANCE:
+        raise SolverError(
+            f"{which.name} promises the optimum {certificate.bound:.9g}, "
+            f"but its choice is worth {certificate.objective:.9g}"
+        )
+    return certificate

@@ -11,6 +11,7 @@ from seqopt.fields import Engine, Fields, Want
 from seqopt.network import Floats, Ints
 from seqopt.schedule import Open, OpenStep, Schedule
 
+SCALARS = ("T_max", "M_sup", "D_max", "F_move", "F_largest")  # beside the force of every robot
 SOURCES = {"T_max": Want.EDGES, "M_sup": Want.SUPPORT, "D_max": Want.DISPLACEMENTS}
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from seqopt.cli import main
+from seqopt.selection import formulations
 
 ROOT = Path(__file__).parent.parent
 
@@ -55,3 +56,26 @@ def test_pictures_exist_and_no_number_is_missing():
         assert "{{" not in text, page
         for target in re.findall(r"!\[[^\]]*\]\(([^)]+)\)", text):
             assert (page.parent / target).exists(), f"{page}: {target}"
+
+
+def examples():
+    """Python blocks of the documentation that are followed by the output they print."""
+    pattern = re.compile(r"```python\n(.*?)```\n\n```text\n(.*?)```", flags=re.DOTALL)
+    for page in sorted((ROOT / "docs").rglob("*.md")):
+        for number, match in enumerate(pattern.finditer(page.read_text(encoding="utf-8"))):
+            yield pytest.param(*match.groups(), id=f"{page.stem}-{number}")
+
+
+@pytest.mark.parametrize(("code", "printed"), [*examples()])
+def test_examples_print_what_they_show(code, printed, capsys):
+    exec(compile(code, "example", "exec"), {})
+    assert capsys.readouterr().out.strip() == printed.strip()
+
+
+def test_every_formulation_has_a_page_with_an_example():
+    shown = {param.id.rsplit("-", 1)[0] for param in examples()}
+    for name in formulations():
+        page = (ROOT / "docs" / "formulations" / f"{name}.md").read_text(encoding="utf-8")
+        for heading in ("Background", "Program", "Example", "When it fails"):
+            assert f"## {heading}" in page, name
+        assert name in shown

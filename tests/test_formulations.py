@@ -279,6 +279,23 @@ def test_a_false_answer_is_caught(problem25, fault):
         certify(problem25, FAULTS[fault](good), Aim.SUM)
 
 
+def test_promises_are_held(problem25):
+    """A heuristic that calls itself exact is refused, and so is a bound above the optimum."""
+    cascade = ALL["cascade"]
+    with pytest.raises(SolverError, match="promises the optimum"):
+        run(problem25, replace(cascade, kind=Kind.EXACT))
+    poor = cascade.solve(problem25)
+    with pytest.raises(SolverError, match="claimed bound"):
+        certify(problem25, replace(poor, bound=poor.objective), Aim.SUM)
+
+
+def test_a_budget_keeps_its_claimed_bound(problem25):
+    capped = replace(problem25, budgets=(travel(problem25, 20.0),))
+    certificate = run(capped, ALL["overlap_mip"])[1]
+    assert certificate.gap > 0  # from the least value without the budget
+    assert certificate.claimed_gap <= 1e-6
+
+
 def test_a_choice_that_is_not_allowed_is_caught():
     problem = CostProblem(Placement((np.array([0.0, np.inf]),), (np.zeros((1, 2)),)))
     with pytest.raises(SolverError, match="not allowed"):

@@ -29,6 +29,7 @@ from seqopt.loops import SCHEDULES, modified_sequential, three_robot_loop
 from seqopt.methods import sequential
 from seqopt.network import network
 from seqopt.paper import printed
+from seqopt.placement import ProblemError
 from seqopt.plan_file import published_plan
 from seqopt.problem import pose
 from seqopt.ranking import move_costs, ranking
@@ -151,6 +152,20 @@ def test_states_hold_the_responses_of_their_steps(engine25, method):
         for i, node in enumerate(step.grips):
             found = state.responses[f"F_rob{i + 1}"][place]
             assert np.isnan(found) if node is None else found == pytest.approx(next(forces))
+
+
+def test_unknown_responses_are_refused(engine25, loop):
+    with pytest.raises(ProblemError, match="response F_rob9: there is no such; give D_max"):
+        pose(engine25, loop, RankSum("x", equal("F_rob9"), equal("F_rob9")))
+
+
+def test_each_robot_is_a_term_whatever_its_name(arch25):
+    """Equation 2 ranks the forces of all robots of a scene."""
+    robots = tuple(replace(r, name=n) for r, n in zip(arch25.robots, "abc", strict=True))
+    net = network(replace(arch25, robots=robots))
+    renamed = pose(ComplianceEngine(net), three_robot_loop(net), EQUATIONS)
+    first = renamed.evaluation.states[0].responses
+    assert {"F_a", "F_b", "F_c", "T_max", "M_sup"} == set(first)
 
 
 def test_only_what_is_asked_is_evaluated(engine25, loop):
