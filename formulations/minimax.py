@@ -42,13 +42,13 @@ def _least_peak(placement: Placement) -> float:
 
 
 def _least_sum(placement: Placement) -> tuple[int, ...]:
-    """Return the choice of least sum; costs too far from zero to add up count as zero."""
+    """Return the choice of least sum."""
     total = np.zeros(1)
     back = []
     for single, shared in zip(placement.single, placement.shared, strict=True):
-        through = total[:, None] + np.where(shared < -1e200, 0.0, shared)
+        through = total[:, None] + shared
         back.append(through.argmin(axis=0))
-        total = through.min(axis=0) + np.where(single < -1e200, 0.0, single)
+        total = through.min(axis=0) + single
     choice = [int(total.argmin())]
     for best in reversed(back[1:]):
         choice.append(int(best[choice[-1]]))

@@ -15,14 +15,14 @@ need not be the best: use ``overlap_mip``.
 
 from __future__ import annotations
 
-from formulations.solvers import follow, solve_flow
+from formulations.solvers import Program, follow, solve_flow
 from seqopt.placement import PlacementProblem
 from seqopt.selection import Aim, Formulation, Kind, Selection
 
 
 def solve(problem: PlacementProblem) -> Selection:
     """Return the choice that the largest flow follows."""
-    flow = solve_flow(problem, integer=False)
+    flow = solve_flow(problem, Program.LINEAR)
     choice = follow(flow.arcs)
     return Selection(choice, problem.sums.cost(choice), flow.bound, flow.prices)
 

@@ -13,14 +13,14 @@ the same answer hundreds of times faster.
 
 from __future__ import annotations
 
-from formulations.solvers import follow, solve_flow
+from formulations.solvers import Program, follow, solve_flow
 from seqopt.placement import PlacementProblem
 from seqopt.selection import Aim, Formulation, Kind, Selection
 
 
 def solve(problem: PlacementProblem) -> Selection:
     """Return the exact optimum within the budgets."""
-    flow = solve_flow(problem, integer=True)
+    flow = solve_flow(problem, Program.INTEGER)
     choice = follow(flow.arcs)
     return Selection(choice, problem.sums.cost(choice), flow.bound)
 

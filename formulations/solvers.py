@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from enum import Enum
 
 import cvxpy as cp
 import numpy as np
@@ -15,6 +16,13 @@ from seqopt.placement import Budget, InfeasibleError, Placement, PlacementProble
 
 ACCURACY = 1e-7  # how far a reported optimum may lie above the true one, relative to it
 OPTIONS = {cp.CLARABEL: {}, cp.HIGHS: {"mip_rel_gap": 1e-9}}
+
+
+class Program(Enum):
+    """Whether the flow may be divided."""
+
+    LINEAR = "linear"
+    INTEGER = "integer"
 
 
 @dataclass(frozen=True)
@@ -36,7 +44,7 @@ class Flow:
     prices: Mapping[str, float]
 
 
-def solve_flow(problem: PlacementProblem, *, integer: bool) -> Flow:
+def solve_flow(problem: PlacementProblem, program: Program) -> Flow:
     """Send one unit through the layers at least cost, within the budgets.
 
     Raises
@@ -54,11 +62,12 @@ def solve_flow(problem: PlacementProblem, *, integer: bool) -> Flow:
     cost = np.concatenate([c[k] for c, k in zip(costs, kept, strict=True)])
     scale = max(float(np.abs(cost).max()), np.finfo(float).tiny)
     balance, source = _balance(placement, kept)
-    flow = cp.Variable(len(cost), boolean=True) if integer else cp.Variable(len(cost), nonneg=True)
+    whole = program is Program.INTEGER
+    flow = cp.Variable(len(cost), boolean=whole, nonneg=not whole)
     conserve = cp.Zero(balance @ flow - source)
     caps = [cp.NonNeg(b.bound - _amounts(b, kept) @ flow) for b in problem.budgets]
-    program = cp.Problem(cp.Minimize((cost / scale) @ flow), [conserve, *caps])
-    _solve(program, cp.HIGHS if integer else cp.CLARABEL)
+    posed = cp.Problem(cp.Minimize((cost / scale) @ flow), [conserve, *caps])
+    _solve(posed, cp.HIGHS if whole else cp.CLARABEL)
     assert flow.value is not None  # an optimum was reported
     sizes = [int(mask.sum()) for mask in kept]
     arcs = []
@@ -66,9 +75,9 @@ def solve_flow(problem: PlacementProblem, *, integer: bool) -> Flow:
         arc = np.zeros(mask.shape)
         arc[mask] = part
         arcs.append(arc)
-    value = float(program.value) * scale
+    value = float(posed.value) * scale
     prices = {}
-    if not integer:
+    if not whole:
         for budget, cap in zip(problem.budgets, caps, strict=True):
             prices[budget.name] = float(scale * cap.dual_value)
     return Flow(tuple(arcs), value - ACCURACY * abs(value), prices)

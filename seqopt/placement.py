@@ -46,26 +46,29 @@ class Placement:
     shared: tuple[Floats, ...]
 
     def __post_init__(self) -> None:
+        for name in ("single", "shared"):
+            object.__setattr__(self, name, tuple(_frozen(costs) for costs in getattr(self, name)))
         if not self.single:
             raise ProblemError("the problem has no moves; give at least one")
         if len(self.shared) != len(self.single):
             raise ProblemError(
                 f"{len(self.single)} single and {len(self.shared)} shared costs; give as many"
             )
-        before = 1
-        for k, (single, shared) in enumerate(zip(self.single, self.shared, strict=True), start=1):
-            if not len(single):
-                raise ProblemError(f"move {k} has no candidates; widen a reach or free a node")
-            if shared.shape != (before, len(single)):
+        for k, shape in enumerate(zip((1, *self.sizes[:-1]), self.sizes, strict=True)):
+            self._check_move(k, shape)
+
+    def _check_move(self, k: int, shape: tuple[int, int]) -> None:
+        if not shape[1]:
+            raise ProblemError(f"move {k + 1} has no candidates; widen a reach or free a node")
+        if self.shared[k].shape != shape:
+            raise ProblemError(
+                f"move {k + 1}: shared costs {self.shared[k].shape}; give them for {shape}"
+            )
+        for name, costs in (("single", self.single[k]), ("shared", self.shared[k])):
+            if np.isnan(costs).any() or (costs == -np.inf).any():
                 raise ProblemError(
-                    f"move {k}: shared costs {shared.shape}; give them for {(before, len(single))}"
+                    f"move {k + 1}: a {name} cost is NaN or -inf; mark what is not allowed as inf"
                 )
-            for name, costs in (("single", single), ("shared", shared)):
-                if np.isnan(costs).any() or (costs == -np.inf).any():
-                    raise ProblemError(
-                        f"move {k}: a {name} cost is NaN or -inf; mark what is not allowed as inf"
-                    )
-            before = len(single)
 
     @property
     def sizes(self) -> tuple[int, ...]:
@@ -108,6 +111,13 @@ class Placement:
         for single, shared in zip(self.single[-2::-1], self.shared[:0:-1], strict=True):
             good.insert(0, np.isfinite(single) & (np.isfinite(shared) & good[0]).any(axis=1))
         return tuple(good)
+
+
+def _frozen(costs: Floats) -> Floats:
+    """Return a copy that cannot be written to."""
+    out = np.array(costs, dtype=float)
+    out.flags.writeable = False
+    return out
 
 
 @dataclass(frozen=True)

@@ -63,17 +63,15 @@ class Problem:
         return self._placement(np.maximum)
 
     def _placement(self, join: np.ufunc) -> Placement:
+        costs = [(state.moves, self.state_costs(state)) for state in self.evaluation.states]
+        known = [c[np.isfinite(c)].min() for _, c in costs if np.isfinite(c).any()]
+        least = 0.0 if join is np.add else min(known, default=0.0)  # where no state is open
         sizes = [len(move.candidates) for move in self.schedule.moves]
-        lowest = 0.0 if join is np.add else -1e300
-        single = [np.full(size, lowest) for size in sizes]
-        shared = [np.full(pair, lowest) for pair in zip([1, *sizes[:-1]], sizes, strict=True)]
-        for state in self.evaluation.states:
-            k = state.moves[-1]
-            costs = self.state_costs(state)
-            if len(state.moves) == 1:
-                single[k] = join(single[k], costs)
-            else:
-                shared[k] = join(shared[k], costs)
+        single = [np.full(size, least) for size in sizes]
+        shared = [np.full(pair, least) for pair in zip([1, *sizes[:-1]], sizes, strict=True)]
+        for moves, cost in costs:
+            target = single if len(moves) == 1 else shared
+            target[moves[-1]] = join(target[moves[-1]], cost)
         return Placement(tuple(single), tuple(shared))
 
     def row(self, move: int, before: int) -> Floats:

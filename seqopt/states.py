@@ -171,5 +171,6 @@ def _state(
         values = np.full(valid.shape, np.nan)
         if name in found:
             values[valid] = found[name]
+        values.flags.writeable = False
         spread[name] = values.reshape(shape)
     return State(step, step.moves, spread)
