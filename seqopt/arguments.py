@@ -13,7 +13,8 @@ from seqopt.engines import ENGINES
 from seqopt.loops import SCHEDULES
 from seqopt.methods import METHODS
 from seqopt.placement import ProblemError
-from seqopt.problem import Limit
+from seqopt.problem import Limit, payload_limits
+from seqopt.scene import Scene
 from seqopt.scene_file import builtin_scenes
 from seqopt.selection import Formulation, formulations
 from seqopt.states import SCALARS
@@ -34,10 +35,16 @@ def parse_criterion(text: str) -> Criterion:
     return RankSum(text, tuple(terms), tuple(terms))
 
 
-def parse_limit(text: str) -> Limit:
-    """Return a limit from ``RESPONSE=VALUE``."""
-    name, _, value = text.partition("=")
-    return Limit(_response(name, "--limit"), _number(value, f"--limit {text}"))
+def parse_limits(texts: Sequence[str], scene: Scene) -> tuple[Limit, ...]:
+    """Return limits from words ``payload`` or ``RESPONSE=VALUE``."""
+    out: list[Limit] = []
+    for text in texts:
+        name, _, value = text.partition("=")
+        if text == "payload":
+            out += payload_limits(scene)
+        else:
+            out.append(Limit(_response(name, "--limit"), _number(value, f"--limit {text}")))
+    return tuple(out)
 
 
 def parse_options(which: Formulation, texts: Sequence[str]) -> dict[str, int | str]:
@@ -198,8 +205,8 @@ def _optimize_arguments(command: argparse.ArgumentParser) -> None:
         "--limit",
         action="append",
         default=[],
-        metavar="RESPONSE=VALUE",
-        help="no open step may exceed it, as F_largest=392.4 (SI units); may be repeated",
+        metavar="LIMIT",
+        help="no open step may exceed it: payload, or as F_largest=300 (SI units); may be repeated",
     )
     command.add_argument(
         "--option",

@@ -9,11 +9,12 @@ import os
 import sys
 import time
 from collections.abc import Callable, Sequence
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
 
-from seqopt.arguments import PLANNED, USAGE, parse_criterion, parse_limit, parse_options, parser
+from seqopt.arguments import PLANNED, USAGE, parse_criterion, parse_limits, parse_options, parser
 from seqopt.compare import compare, format_comparison, is_reference_arch
 from seqopt.contest import Contest, contest, format_contest
 from seqopt.engines import ENGINES
@@ -55,6 +56,7 @@ def _compare(options: argparse.Namespace) -> None:
     engine = ENGINES[options.engine](network(scene))
     criterion = parse_criterion(options.criteria)
     if options.out is not None:
+        _require_matplotlib(options.out)
         make_folder(options.out)
     methods = compare(engine)
     print(format_comparison(methods, scene), end="\n\n")
@@ -74,13 +76,14 @@ def _progress(stage: str) -> None:
         print(f"\r\033[K{stage} …", end="\r", file=sys.stderr, flush=True)
 
 
+def _require_matplotlib(folder: Path) -> None:
+    if find_spec("matplotlib") is None:
+        raise FileError(f'figures for {folder} need matplotlib: pip install "seqopt[plot]"')
+
+
 def _write_contest(folder: Path, result: Contest) -> None:
-    try:
-        from seqopt.charts import contest_figures  # noqa: PLC0415  # matplotlib is an extra
-    except ImportError as error:
-        raise FileError(
-            f'figures for {folder} need matplotlib: pip install "seqopt[plot]"'
-        ) from error
+    from seqopt.charts import contest_figures  # noqa: PLC0415  # matplotlib is an extra
+
     write_text(folder / "contest.csv", result.table.to_csv(float_format="%.6g"))
     if result.ranks is not None:
         write_text(folder / "published_ranks.csv", result.ranks.to_csv(index=False))
@@ -98,8 +101,8 @@ def _optimize(options: argparse.Namespace) -> None:
     which = formulation(options.formulation)
     chosen = parse_options(which, options.option)
     criterion = parse_criterion(options.criteria)
-    limits = [parse_limit(text) for text in options.limit]
     scene = load_scene(options.scene)
+    limits = parse_limits(options.limit, scene)
     make_folder(options.out)
     start = time.perf_counter()
     net = network(scene)

@@ -13,6 +13,7 @@ from seqopt.criteria import Criterion
 from seqopt.fields import Engine
 from seqopt.network import Floats
 from seqopt.placement import Budget, Placement, ProblemError
+from seqopt.scene import Scene
 from seqopt.schedule import Schedule
 from seqopt.states import SCALARS, Evaluation, State, evaluate
 
@@ -26,6 +27,11 @@ class Limit:
 
     response: str
     bound: float
+
+
+def payload_limits(scene: Scene) -> tuple[Limit, ...]:
+    """Return limits that keep every robot within its payload."""
+    return tuple(Limit(f"F_{robot.name}", robot.payload) for robot in scene.robots)
 
 
 @dataclass(frozen=True)

@@ -155,7 +155,7 @@ def test_optimize_refuses_in_one_line(capsys, tmp_path, arguments, named):
 
 
 def test_optimize_with_words_of_ones_own(capsys, tmp_path):
-    arguments = ("--criteria", "T_max,M_sup=2,F_move", "--limit", "F_largest=392.4")
+    arguments = ("--criteria", "T_max,M_sup=2,F_move", "--limit", "payload")
     chosen = ("--formulation", "beam", "--option", "width=10", "--method", "modified-sequential")
     status, _, err = run(capsys, "optimize", *arguments, *chosen, "--out", str(tmp_path))
     assert (status, err) == (0, "")

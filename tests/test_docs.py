@@ -58,6 +58,14 @@ def test_pictures_exist_and_no_number_is_missing():
             assert (page.parent / target).exists(), f"{page}: {target}"
 
 
+def test_readme_python_runs(capsys):
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    blocks = re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
+    assert len(blocks) == 2
+    exec(compile("".join(blocks), "README", "exec"), {})
+    assert capsys.readouterr().out.startswith("(4, ")
+
+
 def examples():
     """Python blocks of the documentation that are followed by the output they print."""
     pattern = re.compile(r"```python\n(.*?)```\n\n```text\n(.*?)```", flags=re.DOTALL)

@@ -31,9 +31,9 @@ from seqopt.network import network
 from seqopt.paper import printed
 from seqopt.placement import ProblemError
 from seqopt.plan_file import published_plan
-from seqopt.problem import pose
+from seqopt.problem import payload_limits, pose
 from seqopt.ranking import move_costs, ranking
-from seqopt.responses import responses, step_fields
+from seqopt.responses import analyze, responses, step_fields
 from seqopt.schedule import Open, Schedule
 from seqopt.selection import formulations, run
 from seqopt.steps import StepKind
@@ -153,6 +153,15 @@ def test_states_hold_the_responses_of_their_steps(engine25, method):
         for i, node in enumerate(step.grips):
             found = state.responses[f"F_rob{i + 1}"][place]
             assert np.isnan(found) if node is None else found == pytest.approx(next(forces))
+
+
+def test_payloads_can_be_kept(engine25, loop):
+    """The printed equations overload no robot once its payload is a limit."""
+    problem = pose(engine25, loop, EQUATIONS, payload_limits(loop.scene))
+    selection, _ = run(problem, formulations()["overlap_dp"])
+    plan = analyze(engine25, loop.fill(problem.nodes(selection.choice)))
+    forces = plan[["F_rob1_N", "F_rob2_N", "F_rob3_N"]].to_numpy(float)
+    assert np.nanmax(np.abs(forces)) <= 392.4
 
 
 def test_unknown_responses_are_refused(engine25, loop):
