@@ -78,7 +78,7 @@ def _progress(stage: str) -> None:
 
 def _require_matplotlib(folder: Path) -> None:
     if find_spec("matplotlib") is None:
-        raise FileError(f'figures for {folder} need matplotlib: pip install "seqopt[plot]"')
+        raise FileError(f"figures for {folder} need matplotlib: pip install matplotlib")
 
 
 def _write_contest(folder: Path, result: Contest) -> None:
