@@ -19,9 +19,10 @@ printed size or 1 and forgiving the rounding of print, with equal states counted
 several local minima; the first stage starts from several plan angles and the best goes on.
 
 Inputs: the tables that ship with the package. Command: ``python -m experiments.identify_arch25
-[--quick] [--cross]``. Writes ``seqopt/data/scenes/arch25.json`` and
+[--quick] [--cross] [--variants]``. Writes ``seqopt/data/scenes/arch25.json`` and
 ``experiments/results/identify_arch25.csv``; ``--cross`` fits one table, scores the states that only
-the other has, and writes ``identify_arch25_cross.csv``.
+the other has, and writes ``identify_arch25_cross.csv``; ``--variants`` repeats the first stage with
+other sets of numbers and writes ``identify_arch25_variants.csv``.
 """
 
 from __future__ import annotations
@@ -53,6 +54,7 @@ SPAN, HEIGHT, BRICKS = 2.08, 1.93, 25  # m, section 3.1
 LINE_NODES = {2: 2, 3: 4, 5: 9, 6: 10, 8: 15, 9: 16, 11: 21, 12: 22, 14: 26, 15: 28,
               17: 32, 18: 34, 20: 39, 21: 40, 23: 45, 24: 46}  # fmt: skip
 ALONG = [b for b in range(BRICKS) if b % 3 == 0]
+ACROSS = [b for b in range(BRICKS) if b % 3 != 0]
 PLAN_ANGLES = np.radians([-5.0, 5.0])
 SOFTENING = (0.1, 0.03, 0.02, 0.01)  # residuals above this share count less and less
 OFFSET_PRIOR = 5.0  # residual per m: an offset of 1 mm weighs like an error of 0.5 %
@@ -85,6 +87,19 @@ SHAPE = (
     Free("log_rotational_stiffness", "ln N m/rad", 1, 0.05),
 )
 OFFSETS = Free("offset", "m", BRICKS, 1e-3)
+TILTS = Free("tilt", "rad", BRICKS - len(ALONG), 0.03)  # in the place of the plan angle
+ALONG_AND_ACROSS = (
+    Free("log_translational_stiffness", "ln N/m", 2, 0.05),
+    Free("log_rotational_stiffness", "ln N m/rad", 2, 0.05),
+)
+NO_YAW = tuple(group for group in SHAPE if group.name != "yaw")
+VARIANTS = {
+    "first stage": SHAPE,
+    "line in a plane": NO_YAW,
+    "free tilts": tuple(TILTS if g.name == "plan_angle" else g for g in SHAPE),
+    "free tilts, line in a plane": tuple(TILTS if g.name == "plan_angle" else g for g in NO_YAW),
+    "joints along and across": (*SHAPE[:-2], *ALONG_AND_ACROSS),
+}
 
 
 def unpack(numbers: Floats, groups: Sequence[Free]) -> dict[str, Floats]:
@@ -97,18 +112,24 @@ def scene_of(numbers: Floats, groups: Sequence[Free]) -> Scene:
     """Return the scene that the numbers describe."""
     part = unpack(numbers, groups)
     pitch = part["pitch"]
-    yaw = np.zeros(BRICKS)
-    yaw[ALONG] = part["yaw"]
+    yaw, roll = np.zeros(BRICKS), part.get("plan_angle", 0.0) * np.sin(pitch)
+    if "yaw" in part:
+        yaw[ALONG] = part["yaw"]
+    if "tilt" in part:
+        roll[ACROSS] = part["tilt"]
+    linear, angular = (
+        np.exp(part[f"log_{kind}_stiffness"]) for kind in ("translational", "rotational")
+    )
     shape = ArchShape(
         pitch=pitch.tolist(),
-        roll=(part["plan_angle"] * np.sin(pitch)).tolist(),
+        roll=roll.tolist(),
         yaw=yaw.tolist(),
         offset=part.get("offset", np.zeros(BRICKS)).tolist(),
         gap=float(part["gap"][0]),
         overhang=float(part["overhang"][0]),
         stub=float(part["stub"][0]),
-        translational_stiffness=(float(np.exp(part["log_translational_stiffness"][0])),) * 3,
-        rotational_stiffness=(float(np.exp(part["log_rotational_stiffness"][0])),) * 3,
+        translational_stiffness=(float(linear[0]), float(linear[-1]), float(linear[-1])),
+        rotational_stiffness=(float(angular[0]), float(angular[-1]), float(angular[-1])),
     )
     return arch_scene(shape, "arch25", line_nodes=LINE_NODES, provenance=PROVENANCE)
 
@@ -245,6 +266,25 @@ def cross(most: int) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=["fitted", "scored", "median_pct", "p90_pct", "p95_pct"])
 
 
+def start_of(groups: Sequence[Free]) -> Floats:
+    """Return the starting guess for a set of numbers, tilted by the first plan angle."""
+    begin = unpack(starting_guess(), SHAPE)
+    begin["plan_angle"] = PLAN_ANGLES[:1]
+    begin["tilt"] = (PLAN_ANGLES[0] * np.sin(begin["pitch"]))[ACROSS]
+    return np.concatenate([np.resize(begin[group.name], group.count) for group in groups])
+
+
+def compare_variants(wanted: Target, most: int) -> pd.DataFrame:
+    """Fit the first stage with every set of numbers, from the same start."""
+    rows = []
+    for name, groups in VARIANTS.items():
+        numbers, remaining = fit(start_of(groups), groups, wanted, most)
+        limits = scores(scene_of(numbers, groups)).loc["both"]
+        rows.append({"variant": name, "numbers": len(numbers), "cost": remaining, **limits})
+        print(pd.DataFrame(rows[-1:]).to_string(index=False, header=len(rows) == 1), flush=True)
+    return pd.DataFrame(rows).drop(columns="T_pct_within_2_edges_pct")
+
+
 def report(numbers: Floats, groups: Sequence[Free]) -> pd.DataFrame:
     """Return every fitted number with its name and unit."""
     rows = [
@@ -259,6 +299,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--quick", action="store_true", help="two iterations, nothing written")
     parser.add_argument("--cross", action="store_true", help="cross-validation between the tables")
+    parser.add_argument("--variants", action="store_true", help="other sets of numbers")
     options = parser.parse_args()
     if options.cross:
         table = cross(40)
@@ -266,6 +307,10 @@ def main() -> None:
         table.to_csv(RESULTS / "identify_arch25_cross.csv", index=False, float_format="%.3f")
         return
     both = target([printed_steps(name) for name in METHODS])
+    if options.variants:
+        table = compare_variants(both, 40)
+        table.to_csv(RESULTS / "identify_arch25_variants.csv", index=False, float_format="%.4g")
+        return
     angles, most = (PLAN_ANGLES[:1], 2) if options.quick else (PLAN_ANGLES, 40)
     numbers, groups = identify(both, angles, most)
     print(scores(scene_of(numbers, groups)).to_string(float_format="%.2f"))

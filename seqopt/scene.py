@@ -34,7 +34,7 @@ class Brick:
     density : float
         kg/m³.
     nodes : tuple of 2 int
-        Numbers of the inner nodes a quarter of the length before and behind the centroid.
+        Numbers of the inner nodes a quarter of the length behind and before the centroid.
     placing_node : int
         The node held while the brick is placed by a robot that is on no side of the structure.
 
