@@ -115,17 +115,7 @@ def arch_scene(
         for i, b in enumerate(range(1, len(pattern) + 1))
     ]
     bisector = tangent[:-1] + tangent[1:]
-    joints = [
-        Joint(
-            bricks=(b, b + 1),
-            position=_vector(ends[b]),
-            along=_vector(bisector[b - 1] / np.linalg.norm(bisector[b - 1])),
-            across=_across(bisector[b - 1]),
-            translational_stiffness=shape.translational_stiffness,
-            rotational_stiffness=shape.rotational_stiffness,
-        )
-        for b in range(1, len(pattern))
-    ]
+    joints = [_joint(shape, b, ends[b], bisector[b - 1]) for b in range(1, len(pattern))]
     grounds = [_ground(shape, 1, ends[0], tangent[0], -1.0)]
     if shape.closed:
         grounds.append(_ground(shape, len(pattern), ends[-1], tangent[-1], 1.0))
@@ -186,6 +176,18 @@ def _brick(shape: ArchShape, b: int, place: tuple[Floats, Floats, Floats], line_
         density=shape.density,
         nodes=nodes,
         placing_node=placing,
+    )
+
+
+def _joint(shape: ArchShape, brick: int, position: Floats, direction: Floats) -> Joint:
+    """Return the joint between a brick and the next one."""
+    return Joint(
+        bricks=(brick, brick + 1),
+        position=_vector(position),
+        along=_vector(direction / np.linalg.norm(direction)),
+        across=_across(direction),
+        translational_stiffness=shape.translational_stiffness,
+        rotational_stiffness=shape.rotational_stiffness,
     )
 
 

@@ -17,7 +17,7 @@ from seqopt.optimize import Outcome, optimize, prepare
 from seqopt.placement import Placement
 from seqopt.plan_file import published_plan
 from seqopt.problem import Problem
-from seqopt.ranking import move_costs
+from seqopt.ranking import move_costs, place
 from seqopt.responses import analyze
 from seqopt.scene import Scene
 from seqopt.selection import Reads, formulations
@@ -152,9 +152,9 @@ def published_ranks(problem: Problem, choice: tuple[int, ...]) -> pd.DataFrame:
                 "node": move.candidates[choice[k]],
                 "candidates": len(move.candidates),
                 "first_in_window": move.candidates[int(window.argmin())],
-                "rank_in_window": _place(window, choice[k]),
-                "rank_overlap": _place(problem.sums.shared[k][before] + sums[k], choice[k]),
-                "rank_peak": _place(
+                "rank_in_window": place(window, choice[k]),
+                "rank_overlap": place(problem.sums.shared[k][before] + sums[k], choice[k]),
+                "rank_peak": place(
                     np.maximum(problem.peaks.shared[k][before], peaks[k]), choice[k]
                 ),
             }
@@ -168,11 +168,6 @@ def _to_go(placement: Placement, join: np.ufunc) -> list[Floats]:
     for single, shared in zip(placement.single[-2::-1], placement.shared[:0:-1], strict=True):
         out.insert(0, join(single, join(shared, out[0]).min(axis=1)))
     return out
-
-
-def _place(costs: Floats, chosen: int) -> int:
-    tolerance = 1e-9 * max(1.0, abs(float(costs[chosen])))
-    return int((costs < costs[chosen] - tolerance).sum()) + 1
 
 
 def format_contest(result: Contest, criterion: Criterion) -> str:

@@ -12,7 +12,7 @@ import pandas as pd
 from seqopt.criteria import Criterion
 from seqopt.fields import Engine
 from seqopt.problem import Limit, Problem, pose
-from seqopt.ranking import move_costs
+from seqopt.ranking import move_costs, place
 from seqopt.responses import analyze
 from seqopt.schedule import Schedule
 from seqopt.selection import Aim, Certificate, Formulation, Selection, check
@@ -117,7 +117,7 @@ def selection_table(outcome: Outcome) -> pd.DataFrame:
                 "candidates": len(move.candidates),
                 "single_cost": placement.single[k][now],
                 "shared_cost": placement.shared[k][before, now],
-                "rank_in_window": int((costs < costs[now] - 1e-9 * abs(costs[now])).sum()) + 1,
+                "rank_in_window": place(costs, now),
             }
         )
         before = now

@@ -33,6 +33,15 @@ def move_costs(problem: Problem, move: int, before: int, without: int | None = N
     return total
 
 
+def place(costs: Floats, chosen: int) -> int:
+    """Return the rank of a candidate: 1 if none costs less."""
+    return int((costs < costs[chosen] - _tie(costs)).sum()) + 1
+
+
+def _tie(costs: Floats) -> float:
+    return TIE * max(1.0, float(np.abs(costs[np.isfinite(costs)]).max(initial=0.0)))
+
+
 def ranking(problem: Problem, choice: Sequence[int]) -> pd.DataFrame:
     """Return, move by move, where the chosen candidate ranks and how firm the first place is.
 
@@ -45,7 +54,6 @@ def ranking(problem: Problem, choice: Sequence[int]) -> pd.DataFrame:
     for k, move in enumerate(problem.schedule.moves):
         before = choice[k - 1] if k else 0
         costs = move_costs(problem, k, before)
-        scale = TIE * max(1.0, float(np.abs(costs[np.isfinite(costs)]).max(initial=0.0)))
         winner = int(np.argmin(costs))
         others = np.delete(costs, winner)
         turned = [
@@ -68,10 +76,10 @@ def ranking(problem: Problem, choice: Sequence[int]) -> pd.DataFrame:
                 "bricks": move.bricks,
                 "robot": move.robot,
                 "node": move.candidates[choice[k]],
-                "rank": int((costs < costs[choice[k]] - scale).sum()) + 1,
+                "rank": place(costs, choice[k]),
                 "winner": move.candidates[winner],
                 "margin": float(others.min() - costs[winner]) if len(others) else np.inf,
-                "tied": int((costs <= costs[winner] + scale).sum()),
+                "tied": int((costs <= costs[winner] + _tie(costs)).sum()),
                 "turned_by_candidates": " ".join(str(move.candidates[j]) for j in turned),
                 "turned_by_criteria": " ".join(dropped),
             }

@@ -108,4 +108,4 @@ def test_modules_stay_small():
             assert len(path.read_text(encoding="utf-8").splitlines()) <= 300, path
             for node in ast.walk(tree):
                 if isinstance(node, ast.FunctionDef):
-                    assert (node.end_lineno or 0) - node.lineno < 60, f"{path}: {node.name}"
+                    assert (node.end_lineno or 0) - node.lineno < 50, f"{path}: {node.name}"

@@ -15,6 +15,7 @@ from seqopt.paper import printed_steps
 ROOT = Path(__file__).parent.parent
 
 
+TIMED = {"engine_speed", "formulation_cost"}  # their verdicts depend on the machine
 QUICK = [
     "engine_speed",
     "frame_contrast",
@@ -40,7 +41,10 @@ def run(name, *arguments):
 def test_a_quick_run_ends_with_a_verdict(name):
     before = sorted((ROOT / "experiments" / "results").glob("*"))
     times = [path.stat().st_mtime_ns for path in before]
-    assert "verdict: the claim" in run(name, "--quick").splitlines()[-1]
+    verdict = run(name, "--quick").splitlines()[-1]
+    assert verdict.startswith("verdict: the claim")
+    if name not in TIMED:
+        assert "the claim holds" in verdict
     assert [path.stat().st_mtime_ns for path in before] == times  # a quick run writes nothing
 
 
