@@ -41,8 +41,7 @@ def touching(centroid: Floats, weight: Floats, contacts: Sequence[Contact]) -> A
     """Return an assembly without grips from centroids, weights (N) and contacts."""
     faces = [contact.corner for contact in contacts]
     bodies = np.array([contact.bodies for contact in contacts])
-    normal, area = zip(*(_flat(face) for face in faces), strict=True)
-    normals = np.array(normal)
+    normals = np.array([_normal(face) for face in faces])
     middle = np.array([face.mean(axis=0) for face in faces])
     start = np.where(
         (bodies[:, 0] == GROUND)[:, None], middle, centroid[bodies[:, 0]]
@@ -58,7 +57,6 @@ def touching(centroid: Floats, weight: Floats, contacts: Sequence[Contact]) -> A
         ),
         bodies=bodies,
         normal=normals,
-        area=np.array(area),
         corner=np.concatenate(faces),
         contact=np.repeat(np.arange(len(faces)), [len(face) for face in faces]),
         grip_block=np.empty(0, dtype=np.int64),
@@ -101,11 +99,10 @@ def ring(blocks: int, radius: float, thickness: float, half_angle: float = np.pi
     return Blocks(np.concatenate([faces[:-1], faces[1:]], axis=1), (*ends, *contacts))
 
 
-def _flat(face: Floats) -> tuple[Floats, float]:
-    """Return unit normal and area of a flat polygon (m, 3)."""
+def _normal(face: Floats) -> Floats:
+    """Return the unit normal of a flat polygon (m, 3)."""
     fan = np.cross(face[1:-1] - face[0], face[2:] - face[0]).sum(axis=0)
-    size = float(np.linalg.norm(fan))
-    return fan / size, 0.5 * size
+    return np.asarray(fan / np.linalg.norm(fan))
 
 
 def _tetrahedra(block: Floats) -> tuple[Floats, Floats]:

@@ -59,10 +59,8 @@ class Assembly:
         The two blocks of a contact; the ground is -1 and comes first.
     normal : (C, 3) float
         Unit vectors from the first body into the second.
-    area : (C,) float
-        m².
     corner : (K, 3) float
-        Corners of all contact faces, m.
+        Corners of all contact faces, each face once around, m.
     contact : (K,) int
         The contact of every corner.
     grip_block : (G,) int
@@ -83,7 +81,6 @@ class Assembly:
     contact_name: tuple[str, ...]
     bodies: Ints
     normal: Floats
-    area: Floats
     corner: Floats
     contact: Ints
     grip_block: Ints
@@ -91,7 +88,7 @@ class Assembly:
     payload: Floats
 
     def __post_init__(self) -> None:
-        for name in ("centroid", "weight", "normal", "area", "corner", "grip_position", "payload"):
+        for name in ("centroid", "weight", "normal", "corner", "grip_position", "payload"):
             if not np.isfinite(getattr(self, name)).all():
                 raise SceneError(f"assembly: {name} holds a number that is not finite")
         blocks = len(self.centroid)
@@ -103,18 +100,47 @@ class Assembly:
             raise SceneError(f"assembly: bodies name blocks beyond 0 to {blocks - 1}")
         if (self.bodies[:, 1] == GROUND).any():
             raise SceneError("assembly: the ground is a contact's second body; name it first")
-        flat = np.flatnonzero((self.area <= 0) | (self._corners_of_contact == 0))
+        flat = np.flatnonzero(~(self.area > 0))
         if len(flat):
             raise SceneError(f"contact {self.contact_name[flat[0]]}: its face has no area")
 
-    @property
-    def _corners_of_contact(self) -> Ints:
-        return np.bincount(self.contact, minlength=len(self.area))
-
     @cached_property
     def corner_area(self) -> Floats:
-        """Share of the face that each corner stands for, (K,) m²."""
-        return np.asarray((self.area / self._corners_of_contact)[self.contact])
+        """Share of its face that each corner stands for, (K,) m².
+
+        Half of the two triangles between the face's centroid and the edges that meet in the
+        corner: one more corner on an edge or on a corner changes no sum.
+        """
+        corners = np.bincount(self.contact, minlength=len(self.bodies))
+        mean = self._sums(self.corner) / np.maximum(corners, 1)[:, None]
+        spoke, follows, triangle = self._triangles(mean)
+        middle = self._sums(triangle[:, None] * (spoke + spoke[follows]) / 3)
+        area = self._sums(triangle[:, None])
+        centroid = mean + np.divide(middle, area, out=np.zeros_like(middle), where=area > 0)
+        _, follows, triangle = self._triangles(centroid)
+        out = 0.5 * triangle
+        np.add.at(out, follows, 0.5 * triangle)
+        return np.asarray(out)
+
+    def _triangles(self, middle: Floats) -> tuple[Floats, Ints, Floats]:
+        """Return spokes from points (C, 3) to the corners, the next corners, and areas between."""
+        corners = np.bincount(self.contact, minlength=len(self.bodies))
+        after = np.cumsum(corners)
+        follows = np.arange(1, len(self.contact) + 1)
+        follows[after[corners > 0] - 1] = (after - corners)[corners > 0]
+        spoke = self.corner - middle[self.contact]
+        return spoke, follows, 0.5 * np.linalg.norm(np.cross(spoke, spoke[follows]), axis=1)
+
+    def _sums(self, values: Floats) -> Floats:
+        """Return the sums over the corners (K, m) of every contact, (C, m)."""
+        out = np.zeros((len(self.bodies), values.shape[1]))
+        np.add.at(out, self.contact, values)
+        return out
+
+    @cached_property
+    def area(self) -> Floats:
+        """Area of every contact face, (C,) m²."""
+        return self._sums(self.corner_area[:, None])[:, 0]
 
     @cached_property
     def axes(self) -> Floats:

@@ -46,7 +46,6 @@ def step_assembly(network: Network, step: Step) -> Assembly:
         contact_name=tuple(names),
         bodies=springs.bodies[acting].reshape(-1, 2),
         normal=np.array(normals).reshape(-1, 3),
-        area=np.array([_area(face) for face in faces]),
         corner=np.concatenate([np.empty((0, 3)), *faces]),
         contact=np.repeat(np.arange(len(faces)), [len(face) for face in faces]),
         grip_block=np.array([block[node] for node, _ in held], dtype=np.int64),
@@ -114,9 +113,3 @@ def _clip(polygon: Floats, other: Floats) -> Floats:
 def _polygon_area(polygon: Floats) -> float:
     x, y = polygon.T
     return 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
-
-
-def _area(face: Floats) -> float:
-    """Return the area of a flat convex polygon (m, 3)."""
-    fan = np.cross(face[1:-1] - face[0], face[2:] - face[0])
-    return 0.5 * float(np.linalg.norm(fan, axis=1).sum())

@@ -146,7 +146,6 @@ def test_a_block_that_only_a_robot_holds():
         contact_name=(),
         bodies=np.empty((0, 2), dtype=np.int64),
         normal=np.empty((0, 3)),
-        area=np.empty(0),
         corner=np.empty((0, 3)),
         contact=np.empty(0, dtype=np.int64),
         grip_block=np.array([0]),
@@ -183,7 +182,6 @@ def test_units_change_no_verdict(length, force, offset, blocks):
         plain,
         centroid=plain.centroid * size,
         corner=plain.corner * size,
-        area=plain.area * size**2,
         weight=plain.weight * pull,
     )
     a, b = certify(plain, DRY), certify(scaled, DRY)
@@ -412,7 +410,7 @@ def test_sideways_pulls_are_at_right_angles_to_gravity():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"area": np.array([1.0, 0.0])}, "contact 1-2: its face has no area"),
+        ({"corner": np.zeros((8, 3))}, "contact ground-1: its face has no area"),
         ({"weight": np.full((2, 3), np.nan)}, "weight holds a number that is not finite"),
         ({"bodies": np.array([[GROUND, 0], [0, 2]])}, "beyond 0 to 1"),
         ({"bodies": np.array([[0, GROUND], [0, 1]])}, "name it first"),
