@@ -8,7 +8,7 @@ grips; over the heaviest block's weight, lengths over the longest lever::
                 f_n + a (s + z s') >= 0
                 |f_t| <= m f_n + a (c + z c')
                 |g| <= p + z p'
-                0 <= z <= 1000
+                0 <= z <= 100000
 
 with E and G from `seqopt.assembly.Assembly`, a the share of a corner in the contact area, and the
 other letters from `seqopt.equilibrium.Case`. The multipliers of the first line are the motion in

@@ -5,9 +5,11 @@ from __future__ import annotations
 import argparse
 import inspect
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import NoReturn
 
+from seqopt.assembly import MORTARS, Mortar
 from seqopt.criteria import CRITERIA, EQUATIONS, Criterion, RankSum
 from seqopt.engines import ENGINES
 from seqopt.loops import SCHEDULES
@@ -69,6 +71,17 @@ def parse_options(which: Formulation, texts: Sequence[str]) -> dict[str, int | s
     return out
 
 
+def parse_mortar(options: argparse.Namespace) -> Mortar:
+    """Return the named mortar with the numbers that are given in place of its own."""
+    base = MORTARS[options.mortar]
+    given = {
+        name: _number(text, f"--{name.replace('_', '-')}", zero="allowed")
+        for name in ("friction", "tensile_strength", "cohesion")
+        if (text := getattr(options, name)) is not None
+    }
+    return replace(base, **given)
+
+
 def _response(name: str, where: str) -> str:
     if name not in RESPONSES and not name.startswith("F_"):
         known = ", ".join((*CRITERIA, *RESPONSES, "F_ROBOT"))
@@ -76,13 +89,15 @@ def _response(name: str, where: str) -> str:
     return name
 
 
-def _number(text: str, where: str) -> float:
+def _number(text: str, where: str, zero: str = "") -> float:
     try:
         value = float(text)
     except ValueError:
         value = -1.0
-    if not 0 < value < float("inf"):
-        raise ProblemError(f"{where}: {text!r} is not a positive number")
+    if not 0 < value < float("inf") and not (zero and value == 0):
+        raise ProblemError(
+            f"{where}: {text!r} is not a positive number" + (" or zero" if zero else "")
+        )
     return value
 
 
@@ -130,6 +145,16 @@ def parser() -> argparse.ArgumentParser:
     )
     _optimize_arguments(command)
     command = commands.add_parser(
+        "certify",
+        parents=[scene],
+        help="does every step stand, and with what margins",
+        description="Certify every step of a build as rigid blocks that touch: does it stand, the "
+        "least bond and friction with which it does, the tilt it survives, the force robots must "
+        "have, and what goes first. A verdict is proven by forces or by a motion.",
+        epilog="example: seqopt certify arch25 --method cantilever --mortar dry --out dry.csv",
+    )
+    _certify_arguments(command)
+    command = commands.add_parser(
         "scene",
         parents=[scene],
         help="check, describe and export a scene",
@@ -174,6 +199,28 @@ def _analyze_arguments(command: argparse.ArgumentParser) -> None:
         type=Path,
         metavar="FILE",
         help="NumPy archive (.npz) to write: every edge force, node displacement and reaction",
+    )
+
+
+def _certify_arguments(command: argparse.ArgumentParser) -> None:
+    steps = command.add_mutually_exclusive_group(required=True)
+    steps.add_argument("--method", choices=(*METHODS, PLANNED), help="how the build goes")
+    steps.add_argument("--plan", type=Path, metavar="FILE", help="CSV of the steps")
+    command.add_argument(
+        "--mortar",
+        choices=tuple(MORTARS),
+        default="epoxy",
+        help="what is in the joints: the study's epoxy (25°, 3 MPa, 2 MPa) or nothing "
+        "(default: %(default)s)",
+    )
+    for name, metavar, text in (
+        ("--friction", "NUMBER", "coefficient of friction"),
+        ("--tensile-strength", "PA", "tensile strength"),
+        ("--cohesion", "PA", "cohesion"),
+    ):
+        command.add_argument(name, metavar=metavar, help=f"{text}, in place of the mortar's own")
+    command.add_argument(
+        "--out", type=Path, metavar="FILE", help="CSV to write; standard output if not given"
     )
 
 

@@ -1,4 +1,4 @@
-"""The command line: ``seqopt compare | analyze | optimize | scene``."""
+"""The command line: ``seqopt compare | analyze | optimize | certify | scene``."""
 
 from __future__ import annotations
 
@@ -14,7 +14,16 @@ from pathlib import Path
 
 import numpy as np
 
-from seqopt.arguments import PLANNED, USAGE, parse_criterion, parse_limits, parse_options, parser
+from seqopt.arguments import (
+    PLANNED,
+    USAGE,
+    parse_criterion,
+    parse_limits,
+    parse_mortar,
+    parse_options,
+    parser,
+)
+from seqopt.certificates import certify_steps, format_verdicts, stability_table
 from seqopt.compare import compare, format_comparison, is_reference_arch
 from seqopt.contest import Contest, contest, format_contest
 from seqopt.engines import ENGINES
@@ -30,6 +39,7 @@ from seqopt.responses import analyze, fields_archive
 from seqopt.scene import Scene
 from seqopt.scene_file import dump_scene, load_scene
 from seqopt.selection import formulation
+from seqopt.stability import Verdict
 from seqopt.steps import Step
 
 FAILED = 3  # exit status where a solver failed; USAGE where the user must act
@@ -143,7 +153,32 @@ def _analyze(options: argparse.Namespace) -> None:
         print(f"{len(table)} steps written to {options.out}")
 
 
+def _certify(options: argparse.Namespace) -> None:
+    scene = load_scene(options.scene)
+    mortar = parse_mortar(options)
+    net = network(scene)
+    steps = _steps(scene, options)
+    results = certify_steps(net, steps, mortar, _progress)
+    text = stability_table(steps, results).to_csv(
+        index=False, float_format="%.6g", lineterminator="\n"
+    )
+    if options.out is None:
+        sys.stdout.write(text)
+    else:
+        write_text(options.out, text)
+        print(f"{format_verdicts(results)}; written to {options.out}")
+    undecided = [
+        s.number for s, r in zip(steps, results, strict=True) if r.verdict is Verdict.UNDECIDED
+    ]
+    if undecided:
+        raise SolverError(
+            f"steps {', '.join(map(str, undecided))} are undecided; this says nothing about them"
+        )
+
+
 def _steps(scene: Scene, options: argparse.Namespace) -> tuple[Step, ...]:
+    if options.method is None:
+        return read_plan(scene, options.plan)
     if options.method != PLANNED:
         if options.plan is not None:
             raise StepError(
@@ -184,5 +219,6 @@ COMMANDS: dict[str, Callable[[argparse.Namespace], None]] = {
     "compare": _compare,
     "analyze": _analyze,
     "optimize": _optimize,
+    "certify": _certify,
     "scene": _scene,
 }

@@ -29,7 +29,7 @@ from seqopt.vectors import Vector
 EXACT = 1e-6  # largest violation of an accepted proof, over the force scale and max(1, z)
 GAP = 1e-3  # largest difference between the two proofs, relative to max(1, z)
 LARGEST_FORCE = 10.0  # of a corner, over total weight and payloads: prices motions that violate
-CAP = 1e3  # z is sought between 0 and this
+CAP = 1e5  # z is sought between 0 and this
 
 
 class Sense(Enum):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import subprocess
 import sys
@@ -174,6 +175,69 @@ def test_compare_writes_tables_and_figures(capsys, tmp_path):
     assert len(ranks) == 22
 
 
+CERTIFIED = [
+    "step",
+    "type",
+    "bricks",
+    "verdict",
+    "bond_needed_Pa",
+    "friction_needed",
+    "tilt_survived_deg",
+    "largest_grip_force_N",
+    "first_brick",
+    "first_joint",
+]
+
+
+def test_certify(capsys, tmp_path):
+    out = tmp_path / "dry.csv"
+    words = ("certify", "arch25", "--method", "cantilever", "--mortar", "dry", "--out", str(out))
+    status, text, err = run(capsys, *words)
+    assert (status, err) == (0, "")
+    assert text.startswith("49 steps: 27 stand, 22 do not stand, 0 are undecided; ")
+    table = pd.read_csv(out)
+    assert table.columns[:10].tolist() == CERTIFIED
+    assert (table["unproven"] == 0).all()
+    falls = table["verdict"] == "does not stand"
+    assert (table["bond_needed_Pa"] > 0).tolist() == falls.tolist()
+    assert table["tilt_survived_deg"].isna().tolist() == falls.tolist()
+    assert table["first_joint"].notna().all()
+    hanging = table.set_index("step").loc[29]
+    assert hanging["first_joint"] == "13-14"
+
+
+def test_certify_a_plan_with_a_mortar_of_ones_own(capsys, tmp_path):
+    """The bond that a step needs is what makes it stand."""
+    plan = tmp_path / "plan.csv"
+    rows = ["step,type,bricks,rob1_node,rob2_node,rob3_node", "1,place,1,1,,", "2,place,2,1,2,"]
+    rows += ["3,release,2,1,,"]
+    plan.write_text("\n".join(rows) + "\n", encoding="utf-8")
+    for strength, verdict in (("600", "does not stand"), ("640", "stands")):
+        mortar = ("--mortar", "dry", "--tensile-strength", strength, "--cohesion", "1e4")
+        status, out, _ = run(capsys, "certify", "--plan", str(plan), *mortar)
+        assert status == 0
+        last = pd.read_csv(io.StringIO(out)).iloc[-1]
+        assert last["verdict"] == verdict
+        assert 600 < last["bond_needed_Pa"] < 640
+
+
+def test_certify_says_what_it_cannot_decide(capsys, tmp_path, monkeypatch):
+    """A solver out of time is neither 'stands' nor 'does not stand'; the table is still written."""
+    monkeypatch.setattr("formulations.solvers.SECONDS", 1e-9)
+    plan, out = tmp_path / "plan.csv", tmp_path / "out.csv"
+    plan.write_text(
+        "step,type,bricks,rob1_node,rob2_node,rob3_node\n1,place,1,1,,\n", encoding="utf-8"
+    )
+    status, text, err = run(capsys, "certify", "--plan", str(plan), "--out", str(out))
+    assert (status, err.count("\n")) == (3, 1)
+    assert "steps 1 are undecided" in err
+    assert "1 are undecided" in text
+    row = pd.read_csv(out).iloc[0]
+    assert row["verdict"] == "undecided"
+    assert row["stalled"] == 2 * row["unproven"] > 0
+    assert np.isnan(row["bond_needed_Pa"])
+
+
 def test_scene(capsys, tmp_path):
     path = tmp_path / "copy.json"
     status, out, _ = run(capsys, "scene", "--export", str(path))
@@ -184,7 +248,7 @@ def test_scene(capsys, tmp_path):
     assert again.read_bytes() == path.read_bytes()
 
 
-@pytest.mark.parametrize("command", [(), ("compare",), ("analyze",), ("scene",)])
+@pytest.mark.parametrize("command", [(), ("compare",), ("analyze",), ("certify",), ("scene",)])
 def test_help_teaches(capsys, command):
     status, out, _ = run(capsys, *command, "--help")
     assert status == 0
@@ -205,6 +269,11 @@ def test_help_teaches(capsys, command):
         (("analyze", "--method", "sequential", "--plan", "no.csv"), "--plan no.csv"),
         (("analyze", "--method", "sequential", "--out", "no/dir/x.csv"), "no/dir/x.csv"),
         (("scene", "--export", "no/dir/x.json"), "no/dir/x.json"),
+        (("certify",), "--method --plan is required"),
+        (("certify", "--method", "sequential", "--plan", "x.csv"), "not allowed with"),
+        (("certify", "--method", "sequential", "--mortar", "glue"), "'glue' (choose from 'epoxy'"),
+        (("certify", "--method", "sequential", "--friction", "-1"), "--friction: '-1' is not"),
+        (("certify", "--plan", "no.csv"), "no.csv"),
     ],
 )
 def test_bad_arguments_get_one_line(capsys, arguments, named):
