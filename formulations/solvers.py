@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,10 +15,19 @@ from scipy import sparse
 from seqopt.equilibrium import Claim
 from seqopt.errors import SolverError
 from seqopt.network import Floats
-from seqopt.placement import Budget, InfeasibleError, Placement, PlacementProblem
+from seqopt.placement import (
+    TINY,
+    Budget,
+    InfeasibleError,
+    Placement,
+    PlacementProblem,
+    ProblemError,
+)
+from seqopt.selection import TOLERANCE, least_sum
 
-ACCURACY = 1e-7  # how far a reported optimum may lie above the true one, relative to it
-OPTIONS = {cp.CLARABEL: {}, cp.HIGHS: {"mip_rel_gap": 1e-9}}
+ACCURACY = 1e-7  # how far a reported optimum may lie above the true one, relative to the larger of
+# it and the largest cost
+OPTIONS = {cp.CLARABEL: {}, cp.HIGHS: {"mip_rel_gap": 1e-9, "mip_abs_gap": 1e-9}}
 
 
 CONE_OPTIONS: tuple[dict[str, object], ...] = (
@@ -62,27 +72,38 @@ class Flow:
 def solve_flow(problem: PlacementProblem, program: Program) -> Flow:
     """Send one unit through the layers at least cost, within the budgets.
 
+    Costs and budgets are scaled, since solvers have absolute tolerances.
+
     Raises
     ------
     InfeasibleError
-        If the solver proves that no flow is within the budgets.
+        If no choice is within one of the budgets, or the solver proves that no flow is within all.
+    ProblemError
+        If a budget is not for the moves and candidates of the problem.
     SolverError
-        If the solver ends in any other way than with an optimum.
+        If the solver ends in any other way than with an optimum, or calls a problem infeasible that
+        is not.
     """
     placement = problem.sums
     placement.continuable()
+    feasible = _within_each(problem)
     pairs = zip(placement.shared, placement.single, strict=True)
     costs = [shared + single for shared, single in pairs]
     kept = [np.isfinite(cost) for cost in costs]
     cost = np.concatenate([c[k] for c, k in zip(costs, kept, strict=True)])
-    scale = max(float(np.abs(cost).max()), np.finfo(float).tiny)
+    scale = max(float(np.abs(cost).max()), TINY)
     balance, source = _balance(placement, kept)
     whole = program is Program.INTEGER
     flow = cp.Variable(len(cost), boolean=whole, nonneg=not whole)
     conserve = cp.Zero(balance @ flow - source)
-    caps = [cp.NonNeg(b.bound - _amounts(b, kept) @ flow) for b in problem.budgets]
+    amounts = [_amounts(b, kept) for b in problem.budgets]
+    units = [_unit(a) for a in amounts]
+    caps = [
+        cp.NonNeg(b.bound / unit - (a / unit) @ flow)
+        for b, a, unit in zip(problem.budgets, amounts, units, strict=True)
+    ]
     posed = cp.Problem(cp.Minimize((cost / scale) @ flow), [conserve, *caps])
-    _solve(posed, cp.HIGHS if whole else cp.CLARABEL)
+    _solve(posed, cp.HIGHS if whole else cp.CLARABEL, feasible=feasible)
     assert flow.value is not None  # an optimum was reported
     sizes = [int(mask.sum()) for mask in kept]
     arcs = []
@@ -93,9 +114,9 @@ def solve_flow(problem: PlacementProblem, program: Program) -> Flow:
     value = float(posed.value) * scale
     prices = {}
     if not whole:
-        for budget, cap in zip(problem.budgets, caps, strict=True):
-            prices[budget.name] = float(scale * cap.dual_value)
-    return Flow(tuple(arcs), value - ACCURACY * abs(value), prices)
+        for budget, cap, unit in zip(problem.budgets, caps, units, strict=True):
+            prices[budget.name] = float(scale / unit * cap.dual_value)
+    return Flow(tuple(arcs), value - ACCURACY * max(abs(value), scale), prices)
 
 
 def follow(arcs: tuple[Floats, ...]) -> tuple[int, ...]:
@@ -109,11 +130,40 @@ def follow(arcs: tuple[Floats, ...]) -> tuple[int, ...]:
     return tuple(choice)
 
 
-def _solve(program: cp.Problem, solver: str) -> None:
+def _within_each(problem: PlacementProblem) -> bool:
+    """Return whether a choice is known to be within all budgets; each is tried on its own."""
+    allowed = problem.sums
+    known = True
+    for budget in problem.budgets:
+        if Placement(budget.single, budget.shared).sizes != allowed.sizes:
+            raise ProblemError(f"budget {budget.name!r} is for other moves or candidates")
+        pairs = [*zip(budget.single, allowed.single, strict=True)]
+        coupled = [*zip(budget.shared, allowed.shared, strict=True)]
+        single, shared = (
+            tuple(np.where(np.isfinite(cost), amount, np.inf) for amount, cost in part)
+            for part in (pairs, coupled)
+        )
+        least = least_sum(Placement(single, shared))
+        sizes = sum(float(np.abs(a).max()) for a in (*budget.single, *budget.shared))
+        if least > budget.bound + TOLERANCE * max(abs(budget.bound), sizes):
+            raise InfeasibleError(
+                f"no choice is within all budgets: any takes at least {least:.6g} of "
+                f"{budget.name!r}, more than {budget.bound:.6g}; raise that bound"
+            )
+        known = known and len(problem.budgets) == 1 and least <= budget.bound
+    return known
+
+
+def _solve(program: cp.Problem, solver: str, *, feasible: bool) -> None:
+    """Solve a program, known to be feasible or not."""
     try:
-        program.solve(solver=solver, **OPTIONS[solver])
+        with warnings.catch_warnings():  # an inaccurate end is refused below
+            warnings.filterwarnings("ignore", "Solution may be inaccurate", UserWarning)
+            program.solve(solver=solver, **OPTIONS[solver])
     except cp.SolverError as error:
         raise SolverError(f"{solver} failed: {error}; rescale the costs") from error
+    if program.status == cp.INFEASIBLE and feasible:
+        raise SolverError(f"{solver} calls a problem infeasible that is not; rescale the costs")
     if program.status == cp.INFEASIBLE:
         raise InfeasibleError("no choice is within all budgets; raise a bound")
     if program.status != cp.OPTIMAL:
@@ -154,6 +204,12 @@ def _balance(placement: Placement, kept: list[np.ndarray]) -> tuple[sparse.csr_a
     size = int(starts[len(kept)])
     entries = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
     return sparse.csr_array(entries, shape=(size, arc)), np.eye(1, size).ravel()
+
+
+def _unit(amounts: Floats) -> float:
+    """Return the power of ten just below the largest amount, or 1 if all are zero."""
+    largest = float(np.abs(amounts).max())
+    return float(10.0 ** math.floor(math.log10(largest))) if largest else 1.0
 
 
 def _amounts(budget: Budget, kept: list[np.ndarray]) -> Floats:

@@ -144,16 +144,7 @@ def parser() -> argparse.ArgumentParser:
         epilog="example: seqopt optimize arch25 --formulation overlap_dp --out best",
     )
     _optimize_arguments(command)
-    command = commands.add_parser(
-        "certify",
-        parents=[scene],
-        help="does every step stand, and with what margins",
-        description="Certify every step of a build as rigid blocks that touch: does it stand, the "
-        "least bond and friction with which it does, the tilt it survives, the force robots must "
-        "have, and what goes first. A verdict is proven by forces or by a motion.",
-        epilog="example: seqopt certify arch25 --method cantilever --mortar dry --out dry.csv",
-    )
-    _certify_arguments(command)
+    _add_certify(commands, scene)
     command = commands.add_parser(
         "scene",
         parents=[scene],
@@ -202,7 +193,16 @@ def _analyze_arguments(command: argparse.ArgumentParser) -> None:
     )
 
 
-def _certify_arguments(command: argparse.ArgumentParser) -> None:
+def _add_certify(commands: argparse._SubParsersAction[_Parser], scene: _Parser) -> None:
+    command = commands.add_parser(
+        "certify",
+        parents=[scene],
+        help="does every step stand, and with what margins",
+        description="Certify every step of a build as rigid blocks that touch: does it stand, the "
+        "least bond and friction with which it does, the tilt it survives, the force robots must "
+        "have, and what goes first. A verdict is proven by forces or by a motion.",
+        epilog="example: seqopt certify arch25 --method cantilever --mortar dry --out dry.csv",
+    )
     steps = command.add_mutually_exclusive_group(required=True)
     steps.add_argument("--method", choices=(*METHODS, PLANNED), help="how the build goes")
     steps.add_argument("--plan", type=Path, metavar="FILE", help="CSV of the steps")

@@ -14,7 +14,7 @@ from seqopt.fields import Engine
 from seqopt.loops import modified_sequential, three_robot_loop
 from seqopt.network import Floats
 from seqopt.optimize import Outcome, optimize, prepare
-from seqopt.placement import Placement
+from seqopt.placement import TINY, Placement
 from seqopt.plan_file import published_plan
 from seqopt.problem import Problem
 from seqopt.ranking import move_costs, place
@@ -90,7 +90,7 @@ def contest(
         ranks = published_ranks(posed.problem, choice)
         best = rows["overlap_dp"]["objective"]
         value = posed.problem.sums.cost(choice)
-        rows["three-robot"] |= {"objective": value, "gap": (value - best) / max(abs(best), 1.0)}
+        rows["three-robot"] |= {"objective": value, "gap": (value - best) / max(abs(value), TINY)}
     names = {name: PUBLISHED if name == "three-robot" else name for name in rows}
     table = pd.DataFrame.from_dict(rows, orient="index").rename(index=names)
     tables = {names[name]: steps for name, steps in tables.items()}

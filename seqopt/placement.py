@@ -11,6 +11,8 @@ import numpy as np
 from seqopt.errors import SeqoptError
 from seqopt.network import Floats
 
+TINY = float(np.finfo(float).tiny)
+
 
 class ProblemError(SeqoptError, ValueError):
     """A placement problem is malformed, or not of the kind a formulation solves."""
@@ -39,7 +41,8 @@ class Placement:
     Raises
     ------
     ProblemError
-        If there is no move, a move has no candidates, a shape is wrong or a value is NaN.
+        If there is no move, a move has no candidates, a shape is wrong, a value is NaN, or values
+        are so large that their sum overflows.
     """
 
     single: tuple[Floats, ...]
@@ -56,6 +59,8 @@ class Placement:
             )
         for k, shape in enumerate(zip((1, *self.sizes[:-1]), self.sizes, strict=True)):
             self._check_move(k, shape)
+        if sum(_largest(costs) for costs in (*self.single, *self.shared)) == np.inf:
+            raise ProblemError("the costs are so large that their sum overflows; rescale them")
 
     def _check_move(self, k: int, shape: tuple[int, int]) -> None:
         if not shape[1]:
@@ -113,6 +118,11 @@ class Placement:
         return tuple(good)
 
 
+def _largest(costs: Floats) -> float:
+    """Return the largest size of a cost, those that are not allowed aside."""
+    return float(np.abs(costs[np.isfinite(costs)]).max(initial=0.0))
+
+
 def _frozen(costs: Floats) -> Floats:
     """Return a copy that cannot be written to."""
     out = np.array(costs, dtype=float)
@@ -130,8 +140,14 @@ class Budget:
         What is capped, with its unit.
     single : tuple of (C_k,) float
     shared : tuple of (C_{k-1}, C_k) float
-        What each choice, and each pair, takes of the budget.
+        What each choice, and each pair, takes of the budget: finite.
     bound : float
+        Infinite if there is no cap.
+
+    Raises
+    ------
+    ProblemError
+        If a shape is wrong, an amount is not finite, or the bound is NaN or -inf.
     """
 
     name: str
@@ -139,9 +155,28 @@ class Budget:
     shared: tuple[Floats, ...]
     bound: float
 
+    def __post_init__(self) -> None:
+        try:
+            Placement(self.single, self.shared)
+        except ProblemError as error:
+            raise ProblemError(f"budget {self.name!r}: {error}") from error
+        if not all(np.isfinite(amounts).all() for amounts in (*self.single, *self.shared)):
+            raise ProblemError(f"budget {self.name!r}: an amount is infinite; limit the choice")
+        if not self.bound > -np.inf:
+            raise ProblemError(f"budget {self.name!r}: the bound is {self.bound}; give a number")
+
     def spent(self, choice: Sequence[int]) -> float:
         """Return what the choices take."""
         return Placement(self.single, self.shared).cost(choice)
+
+    def slack(self, choice: Sequence[int]) -> float:
+        """Return what the choices leave of the budget, over the size of what they take, or of it.
+
+        Signs aside: amounts that cancel count in full. Zero divided by zero is zero.
+        """
+        taken = Placement(self.single, self.shared).parts(choice)
+        left = self.bound - sum(taken)
+        return left / max(abs(self.bound), sum(map(abs, taken)), TINY) if left else 0.0
 
 
 class PlacementProblem(Protocol):

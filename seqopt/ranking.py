@@ -39,7 +39,7 @@ def place(costs: Floats, chosen: int) -> int:
 
 
 def _tie(costs: Floats) -> float:
-    return TIE * max(1.0, float(np.abs(costs[np.isfinite(costs)]).max(initial=0.0)))
+    return TIE * float(np.abs(costs[np.isfinite(costs)]).max(initial=0.0))
 
 
 def ranking(problem: Problem, choice: Sequence[int]) -> pd.DataFrame:

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from seqopt.errors import SolverError
-from seqopt.placement import Placement, PlacementProblem, ProblemError
+from seqopt.placement import TINY, Placement, PlacementProblem, ProblemError
 
-TOLERANCE = 1e-6  # of the objective, or 1: how far a claim may be from what the data say
+TOLERANCE = 1e-6  # of the costs that a choice meets: how far a claim may be from what the data say
 
 
 class Kind(Enum):
@@ -95,7 +95,8 @@ class Certificate:
         The least value of any choice, found anew from the data; where budgets forbid choices, the
         least without them.
     gap : float
-        Objective less bound, over the larger of the objective's size and 1.
+        Objective less bound, over the size of the costs that the choice meets, signs aside: their
+        sum, or the largest for a peak. It has no unit.
     claimed_gap : float
         The same with the formulation's own bound where that is higher; it is not proven, but knows
         the budgets.
@@ -121,19 +122,20 @@ def certify(problem: PlacementProblem, selection: Selection, aim: Aim) -> Certif
     """
     placement = problem.sums if aim is Aim.SUM else problem.peaks
     value = _value(placement, selection.choice, aim)
-    scale = max(abs(value), 1.0)
+    sizes = [abs(part) for part in placement.parts(selection.choice)]
+    scale = max(sum(sizes) if aim is Aim.SUM else max(sizes), TINY)
     if not abs(value - selection.objective) <= TOLERANCE * scale:
         raise SolverError(f"the objective is {value:.9g}, not {selection.objective:.9g} as claimed")
     spent = {budget.name: budget.spent(selection.choice) for budget in problem.budgets}
     for budget in problem.budgets:
-        if spent[budget.name] > budget.bound + TOLERANCE * max(abs(budget.bound), 1.0):
+        if budget.slack(selection.choice) < -TOLERANCE:
             raise SolverError(
                 f"the choice takes {spent[budget.name]:.6g} of {budget.name}, more than "
                 f"{budget.bound:.6g}; use overlap_mip (the claimed bound is {selection.bound:.9g})"
             )
     bound = least_sum(placement) if aim is Aim.SUM else least_peak(placement)
     highest = value if problem.budgets else bound
-    if selection.bound > highest + TOLERANCE * scale:
+    if not selection.bound <= highest + TOLERANCE * scale:  # NaN is no bound
         raise SolverError(f"the claimed bound {selection.bound:.9g} exceeds {highest:.9g}")
     gap, claimed = (max(0.0, value - b) / scale for b in (bound, max(bound, selection.bound)))
     return Certificate(value, bound, gap, claimed, spent)
@@ -215,10 +217,12 @@ def check(problem: PlacementProblem, selection: Selection, which: Formulation) -
     Raises
     ------
     SolverError
-        If the certificate fails, or an exact formulation misses the optimum.
+        If the certificate fails, or without budgets a formulation that is no heuristic misses the
+        optimum.
     """
     certificate = certify(problem, selection, which.aim)
-    if which.kind is Kind.EXACT and not problem.budgets and certificate.gap > TOLERANCE:
+    exact = which.kind is not Kind.HEURISTIC and not problem.budgets
+    if exact and certificate.gap > TOLERANCE:
         raise SolverError(
             f"{which.name} promises the optimum {certificate.bound:.9g}, "
             f"but its choice is worth {certificate.objective:.9g}"

@@ -22,6 +22,9 @@ QUICK = [
     "identify_arch25",
     "criteria_variants",
     "formulation_cost",
+    "failing_steps",
+    "decision_sensitivity",
+    "degenerate_placement",
 ]
 
 

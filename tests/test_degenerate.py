@@ -1,0 +1,251 @@
+"""Degenerate placement problems against enumeration, and answers that are not what they claim."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import cvxpy as cp
+import numpy as np
+import pytest
+
+from experiments.degenerate_cases import CASES, Size, capped, costs, opposed, whole
+from experiments.degenerate_placement import MALFORMED, judge, outcomes
+from formulations import overlap_lp, overlap_mip, solvers
+from seqopt.errors import SolverError
+from seqopt.placement import Budget, CostProblem, InfeasibleError, Placement, ProblemError
+from seqopt.selection import Aim, Formulation, Kind, Selection, certify, formulations, run
+
+ALL = formulations()
+SMALL = Size(3, 3, 6)
+FLOWS = {"overlap_lp": overlap_lp, "overlap_mip": overlap_mip}
+EXACT = ("minimax", "overlap_dp", "overlap_lp", "overlap_mip")
+flows = pytest.mark.parametrize("name", FLOWS)
+NONE_ALLOWED = {
+    "limit nobody meets",
+    "no pair allowed",
+    "all costs infinite",
+    "budget cannot be met",
+    "budgets not met by mixtures",
+}
+LOOSE = {"costs 1e-9 and 1e9"}  # further apart than the accuracy of a solver
+
+
+def small(seed=0, scale=1.0):
+    return whole(SMALL.sizes, np.random.default_rng(seed), scale)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_no_answer_is_wrong(case):
+    for row in outcomes(case, CASES[case], SMALL, draws=3):
+        status, name = row["status"], row["formulation"]
+        assert status != "wrong", row
+        if case in MALFORMED:
+            assert status == "refused", row
+        elif case.startswith("budget") and name not in FLOWS:
+            assert "couples all moves" in row["message"]
+        elif case in NONE_ALLOWED:
+            assert status == "infeasible", row
+        elif case == "budgets met by mixtures only":
+            assert status == ("infeasible" if name == "overlap_mip" else "rejected"), row
+        elif case not in LOOSE and name in EXACT:
+            binds = case.startswith("budget") and name == "overlap_lp"  # then it is a bound
+            assert status in ({"optimal", "feasible", "rejected"} if binds else {"optimal"}), row
+
+
+def test_budgets_only_mixtures_meet():
+    """The relaxation has a solution, a choice has none: a bound is no proof of feasibility."""
+    problem = opposed(SMALL, np.random.default_rng(0), 1.0)
+    with pytest.raises(InfeasibleError, match="budgets"):
+        ALL["overlap_mip"].solve(problem)
+    selection = ALL["overlap_lp"].solve(problem)
+    assert np.isfinite(selection.bound)
+    with pytest.raises(SolverError, match="use overlap_mip"):
+        certify(problem, selection, Aim.SUM)
+
+
+@pytest.mark.parametrize("name", ["overlap_dp", "rank_search", "cascade", "beam", "minimax"])
+def test_equal_costs_go_to_the_first(name):
+    problem = costs(SMALL.sizes, lambda shape: np.full(shape, 5.0))
+    assert ALL[name].solve(problem).choice == (0, 0, 0)
+
+
+@pytest.mark.parametrize("scale", [1e-9, 1e-3, 1e3, 1e9])
+@pytest.mark.parametrize("name", ALL)
+def test_units_change_no_value(name, scale):
+    value, same = (run(small(seed=1, scale=s), ALL[name])[1] for s in (1.0, scale))
+    assert same.objective == pytest.approx(scale * value.objective, rel=1e-9)
+    assert same.gap == pytest.approx(value.gap, abs=1e-9)
+
+
+def answers(reply) -> Formulation:
+    """An exact formulation that gives a fixed reply, or raises it."""
+
+    def solve(problem):
+        if isinstance(reply, Exception):
+            raise reply
+        return reply(problem)
+
+    return Formulation("fake", "", Kind.EXACT, Aim.SUM, solve)
+
+
+def worst(problem):
+    choice = tuple(int(np.argmax(single)) for single in problem.sums.single)
+    return Selection(choice, problem.sums.cost(choice))
+
+
+@pytest.mark.parametrize(
+    ("reply", "status"),
+    [
+        (worst, "rejected"),
+        (lambda p: Selection((0, 0, 0), 0.0), "rejected"),
+        (lambda p: Selection((0, 0, 0), np.nan), "rejected"),
+        (lambda p: replace(ALL["overlap_dp"].solve(p), bound=np.nan), "rejected"),
+        (SolverError("stalled"), "solver failed"),
+        (InfeasibleError("none"), "wrong"),
+        (ProblemError("odd"), "wrong"),
+        (ZeroDivisionError("traceback"), "wrong"),
+        (ALL["overlap_dp"].solve, "optimal"),
+    ],
+)
+@pytest.mark.parametrize("scale", [1e-9, 1.0, 1e9])
+def test_the_judge_tells_them_apart(reply, status, scale):
+    """Negative control: what is wrong with an answer shows in its status, in any unit."""
+    assert judge(small(scale=scale), answers(reply))["status"] == status
+
+
+def test_the_judge_sees_a_false_bound_and_an_answer_where_there_is_none():
+    """With budgets the certificate cannot check a bound below the answer's own value."""
+    problem = capped(SMALL, np.random.default_rng(0), 1.0, 0.6)
+    assert judge(problem, answers(ALL["overlap_mip"].solve))["status"] == "optimal"
+    dearest = tuple(int(np.argmin(takes)) for takes in problem.budgets[0].single)
+    value = problem.sums.cost(dearest)
+    bad = answers(lambda p: Selection(dearest, value, bound=value))
+    assert judge(problem, bad)["status"] == "wrong"
+    impossible = CASES["no pair allowed"](SMALL, np.random.default_rng(0))
+    assert judge(impossible, answers(ALL["overlap_dp"].solve))["status"] == "infeasible"
+    assert judge(impossible, answers(worst))["status"] == "rejected"
+    assert judge(impossible, answers(SolverError("stalled")))["status"] == "solver failed"
+
+
+@pytest.mark.parametrize("scale", [1e-9, 1.0, 1e9])
+@pytest.mark.parametrize("factor", [0.9, 1.1])
+def test_claims_are_measured_in_the_units_of_the_costs(scale, factor):
+    problem = small(scale=scale)
+    good = ALL["overlap_dp"].solve(problem)
+    assert certify(problem, good, Aim.SUM).gap == 0
+    with pytest.raises(SolverError, match="as claimed"):
+        certify(problem, replace(good, objective=factor * good.objective), Aim.SUM)
+    if factor > 1:
+        with pytest.raises(SolverError, match="claimed bound"):
+            certify(problem, replace(good, bound=factor * good.bound), Aim.SUM)
+
+
+@pytest.mark.parametrize("amount", [1e-9, 1.0, 1e9])
+def test_budgets_are_measured_in_their_own_units(amount):
+    problem = capped(SMALL, np.random.default_rng(0), amount, 0.6)
+    free = ALL["overlap_dp"].solve(replace(problem, budgets=()))
+    with pytest.raises(SolverError, match="more than"):
+        certify(problem, free, Aim.SUM)
+    certificate = run(problem, ALL["overlap_mip"])[1]
+    assert certificate.spent["use"] <= problem.budgets[0].bound * (1 + 1e-9)
+    plain = capped(SMALL, np.random.default_rng(0), 1.0, 0.6)
+    assert certificate.objective == pytest.approx(run(plain, ALL["overlap_mip"])[1].objective)
+    prices = [ALL["overlap_lp"].solve(p).prices["use"] for p in (problem, plain)]
+    assert amount * prices[0] == pytest.approx(prices[1], abs=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("change", "named"),
+    [
+        ({"bound": np.nan}, "budget 'use': the bound is nan"),
+        ({"bound": -np.inf}, "budget 'use': the bound is -inf"),
+        ({"single": (np.array([np.inf, 0.0]),)}, "budget 'use': an amount is infinite"),
+        ({"single": (np.array([np.nan, 0.0]),)}, "budget 'use': move 1: a single cost is NaN"),
+        ({"single": (np.zeros(3),)}, r"budget 'use': move 1: shared costs \(1, 2\)"),
+    ],
+)
+def test_malformed_budgets_are_refused(change, named):
+    budget = Budget("use", (np.array([1.0, 0.0]),), (np.zeros((1, 2)),), 1.0)
+    with pytest.raises(ProblemError, match=named):
+        replace(budget, **change)
+
+
+@flows
+def test_budgets_of_another_problem_are_refused(name):
+    other = capped(Size(2, 3, 6), np.random.default_rng(0), 1.0, 1.0).budgets
+    with pytest.raises(ProblemError, match="other moves or candidates"):
+        ALL[name].solve(replace(small(), budgets=other))
+
+
+@flows
+def test_a_bound_of_infinity_is_no_cap(name):
+    free = ALL[name].solve(small())
+    budget = replace(capped(SMALL, np.random.default_rng(0), 1.0, 1.0).budgets[0], bound=np.inf)
+    capless = run(replace(small(), budgets=(budget,)), ALL[name])[1]
+    assert capless.objective == pytest.approx(free.objective)
+
+
+def test_sums_that_overflow_are_refused():
+    with pytest.raises(ProblemError, match="sum overflows; rescale"):
+        CostProblem(Placement((np.full(2, 1e308),), (np.full((1, 2), 1e308),)))
+
+
+@flows
+@pytest.mark.parametrize(
+    ("status", "named"),
+    [
+        (cp.INFEASIBLE, "infeasible that is not"),
+        (cp.OPTIMAL_INACCURATE, "ended with status"),
+        (cp.INFEASIBLE_INACCURATE, "ended with status"),
+        (cp.USER_LIMIT, "ended with status"),
+        (None, "ended with status"),
+        (cp.SolverError("out of memory"), "failed: out of memory"),
+    ],
+)
+def test_a_solver_that_fails_never_calls_the_problem_infeasible(monkeypatch, name, status, named):
+    def solve(program, **options):
+        if isinstance(status, Exception):
+            raise status
+
+    monkeypatch.setattr(cp.Problem, "solve", solve)
+    monkeypatch.setattr(cp.Problem, "status", status, raising=False)
+    for problem in (small(), capped(SMALL, np.random.default_rng(0), 1.0, 0.6)):
+        with pytest.raises(SolverError, match=named):
+            ALL[name].solve(problem)
+
+
+@flows
+@pytest.mark.parametrize("amount", [1e-9, 1.0, 1e9])
+def test_a_budget_that_cannot_be_met_is_named(name, amount):
+    problem = capped(SMALL, np.random.default_rng(0), amount, -1.0)
+    with pytest.raises(InfeasibleError, match="any takes at least 0 of 'use', more than -"):
+        ALL[name].solve(problem)
+
+
+@flows
+def test_two_budgets_leave_the_proof_to_the_solver(name):
+    """Each can be met on its own; that both cannot is the solver's word."""
+    with pytest.raises(InfeasibleError, match="no choice is within all budgets; raise a bound"):
+        ALL[name].solve(opposed(SMALL, np.random.default_rng(0), 0.9))
+
+
+FLAWS = {
+    "zeros": lambda f: replace(f, arcs=tuple(np.zeros_like(a) for a in f.arcs)),
+    "NaN": lambda f: replace(f, arcs=tuple(np.full_like(a, np.nan) for a in f.arcs)),
+    "bound too high": lambda f: replace(f, bound=1.1 * f.bound),
+    "NaN bound": lambda f: replace(f, bound=np.nan),
+    "another path": lambda f: replace(f, arcs=tuple(1 - a for a in f.arcs)),
+}
+
+
+@flows
+@pytest.mark.parametrize("flaw", FLAWS)
+@pytest.mark.parametrize("scale", [1e-9, 1.0, 1e9])
+def test_a_flow_that_is_wrong_is_caught(monkeypatch, name, flaw, scale):
+    problem = small(seed=1, scale=scale)
+    assert ALL["overlap_dp"].solve(problem).choice != (0, 0, 0)
+    monkeypatch.setattr(
+        FLOWS[name], "solve_flow", lambda *given: FLAWS[flaw](solvers.solve_flow(*given))
+    )
+    with pytest.raises(SolverError, match=r"promises the optimum|claimed bound"):
+        run(problem, ALL[name])
