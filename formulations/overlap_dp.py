@@ -11,7 +11,7 @@ It is a shortest path in a layered graph; the cost to go
 
    V_K(i) = c_K(i), \qquad V_k(i) = c_k(i) + \min_j \left[ d_{k+1}(i, j) + V_{k+1}(j) \right]
 
-is found backward, the choice forward. Of sums that are equal to the last bit the first candidate wins.
+is found backward, the choice forward. Of sums equal to the last bit the first candidate wins.
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 
-def solve_positive(matrix: Floats, load: Floats) -> Floats:
+def solve_positive(matrix: Floats, load: Floats) -> tuple[Floats, Floats]:
     """Solve S positive definite systems of k unknowns, the batch along the last axis.
 
     Two and a half times as fast as ``numpy.linalg.solve`` for thousands of 9 x 9 systems, which
@@ -22,8 +22,10 @@ def solve_positive(matrix: Floats, load: Floats) -> Floats:
 
     Returns
     -------
-    (k, S) float
+    answer : (k, S) float
         Not finite where a matrix is not positive definite.
+    pivot : (S,) float
+        Smallest pivot over its diagonal entry: small where the equations nearly repeat each other.
     """
     size = len(load)
     factor = np.empty_like(matrix)
@@ -37,4 +39,6 @@ def solve_positive(matrix: Floats, load: Floats) -> Floats:
         for j in reversed(range(size)):
             known = np.einsum("ps,ps->s", factor[j + 1 :, j], answer[j + 1 :])
             answer[j] = (answer[j] - known) / factor[j, j]
-    return answer
+        every = np.arange(size)
+        pivot = np.min(factor[every, every] ** 2 / matrix[every, every], axis=0, initial=1.0)
+    return answer, pivot

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import linalg
 
 from seqopt.kinematics import centroids, node_motion
 from seqopt.network import Floats, Network
@@ -106,11 +107,13 @@ class OperatorBuilder:
             return np.zeros((0, 6, size)), wrench, twist
         columns = slice(first, first + 6 * active)
         strain = self.strain[:bricks, :, columns].reshape(size, -1)
-        matrix = strain.T @ self.wrench[:bricks, :, columns].reshape(size, -1)
-        own = compliances(self.network, closures[:active])
-        for c in range(active):
-            matrix[6 * c : 6 * c + 6, 6 * c : 6 * c + 6] += own[c]
-        unknown = -np.linalg.solve(matrix, strain.T @ wrench.reshape(size, size))
+        through = self.wrench[:bricks, :, columns].reshape(size, -1)
+        own = linalg.block_diag(*compliances(self.network, closures[:active]))
+        factors = linalg.lu_factor(strain.T @ through + own)
+        unknown = -linalg.lu_solve(factors, strain.T @ wrench.reshape(size, size))
+        # what a loop leaves open, summed along it: its small difference survives rounding
+        strains = self.strain[:bricks, :, :size].reshape(size, size) + strain @ unknown
+        unknown -= linalg.lu_solve(factors, through.T @ strains + own @ unknown)
         return (
             unknown.reshape(active, 6, size),
             wrench + self.wrench[:bricks, :, columns] @ unknown,

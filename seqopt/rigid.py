@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy import linalg
+from scipy import linalg, sparse
 
 from seqopt.errors import MechanismError, SolverError
 from seqopt.fields import Fields
@@ -70,6 +70,13 @@ def solve_rigid(network: Network, bricks: int, columns: Ints) -> Fields:
     """Return the fields of grip sets (S, r), given as places in ``network.inner.ravel()``."""
     parts = _structure(network, bricks)
     answers = [_solve_one(network, parts, grips) for grips in columns]
+    return stack(network, bricks, columns, answers)
+
+
+def stack(
+    network: Network, bricks: int, columns: Ints, answers: list[tuple[Floats, ...]]
+) -> Fields:
+    """Return the fields of grip sets (S, r) from the answer of each."""
     edges, nodes = network.count_edges(bricks), network.count_nodes(bricks)
     shapes = (
         (edges,),
@@ -90,7 +97,6 @@ def solve_rigid(network: Network, bricks: int, columns: Ints) -> Fields:
 def _solve_one(network: Network, parts: _Structure, grips: Ints) -> tuple[Floats, ...]:
     """Return the fields of one grip set, in the order of `Fields`."""
     bricks = len(parts.matrix) // 6
-    edges = network.count_edges(bricks)
     weight = np.repeat(0.5 * network.weight[:bricks], 2, axis=0)
     pull = parts.held.T @ weight.ravel()
     fixed = parts.held[(3 * grips[:, None] + np.arange(3)).ravel()]
@@ -99,15 +105,39 @@ def _solve_one(network: Network, parts: _Structure, grips: Ints) -> tuple[Floats
     wrench[parts.acting] = -np.einsum("sij,sjk,k->si", parts.stiffness, parts.gap, twist)
     missing = parts.matrix @ twist - pull
     force = np.linalg.lstsq(fixed.T, missing, rcond=None)[0].reshape(-1, 3)
-    load = weight.copy()
+    return respond(network, grips, motion=parts.motion, twist=twist, wrench=wrench, force=force)
+
+
+def respond(
+    network: Network,
+    grips: Ints,
+    *,
+    motion: Floats | sparse.csr_array,
+    twist: Floats,
+    wrench: Floats,
+    force: Floats,
+) -> tuple[Floats, ...]:
+    """Return the fields of one grip set, in the order of `Fields`, from what determines them.
+
+    Parameters
+    ----------
+    grips : (r,) int
+    motion : (3N, 6b) float
+        Displacements of the nodes for unit twists.
+    twist, wrench, force : (6b,), (S, 6), (r, 3) float
+        Of bricks, springs and grips; two grips on one brick may share their force in any way.
+    """
+    bricks = len(twist) // 6
+    edges = network.count_edges(bricks)
+    load = np.repeat(0.5 * network.weight[:bricks], 2, axis=0)
     load[grips] += force
     maps = statics(network)
     carried = maps.edge_of_spring[:edges] @ wrench[:, :3].ravel()
     carried += maps.edge_of_load[:edges, : load.size] @ load.ravel()
     _split_pairs(network, grips, force, carried)
     support = maps.support_of_spring @ wrench[network.springs.support]
-    motion = (parts.motion @ twist).reshape(-1, 3)
-    return carried, motion, force, support, wrench, twist.reshape(-1, 6)
+    moved = (motion @ twist).reshape(-1, 3)
+    return carried, moved, force, support, wrench, twist.reshape(-1, 6)
 
 
 def _spectrum(network: Network, matrix: Floats, fixed: Floats) -> tuple[Floats, Floats, Floats]:

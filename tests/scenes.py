@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 from hypothesis import strategies as st
 
+from experiments.walls import running_bond
 from seqopt.arch import ArchShape, arch_scene
 from seqopt.network import network
-from tests.walls import running_bond
 
 angles = st.floats(-0.3, 0.3)
 

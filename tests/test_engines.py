@@ -7,11 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from experiments.limit_scenes import HELD, LOOSE_AT, chain, loosened
+from experiments.reference_chain import solve_exactly
 from seqopt.arch import ArchShape, arch_scene
+from seqopt.compliance import ComplianceEngine, solve_batch
 from seqopt.engines import ENGINES
-from seqopt.errors import GripError, MechanismError
-from seqopt.fields import Want
+from seqopt.errors import GripError, MechanismError, SolverError
+from seqopt.fields import Want, grip_columns
 from seqopt.network import network
+from seqopt.operator import OperatorBuilder
+from seqopt.tree import grow_tree
 
 
 @pytest.fixture(params=ENGINES)
@@ -97,3 +102,73 @@ def test_an_end_that_closes_late(name):
     assert np.abs(forces[0] - forces[1]).max() > 1
     closed = ENGINES[name](network(late)).solve(4, [[3]]).support[0, :3]
     assert np.abs(closed - forces[0]).max() > 1
+
+
+def error(net, fields, row, grips):
+    """The largest relative error of displacements, joint forces and joint moments."""
+    bricks = len(net.inner)
+    columns = grip_columns(net, bricks, np.array([grips], dtype=int))[0]
+    exact = solve_exactly(net, bricks, columns)
+    wrench = fields.joint_wrench[row]
+    pairs = (
+        (fields.displacement[row, net.inner.ravel()], exact.displacement),
+        (wrench[:, :3], exact.joint_wrench[:, :3]),
+        (wrench[:, 3:], exact.joint_wrench[:, 3:]),
+    )
+    return max(np.abs(got - want).max() / np.abs(want).max() for got, want in pairs)
+
+
+@pytest.mark.parametrize("only_turning", [True, False])
+@pytest.mark.parametrize("factor", [1e-3, 1e-6, 1e-9, 1e-12, 1e-15])
+def test_grips_beyond_a_loose_joint(factor, only_turning):
+    """The force method alone loses every digit here and says nothing: the second assertion."""
+    net = network(loosened(chain(25), factor, only_turning=only_turning))
+    sets = [HELD, (30, 37, 49), (3, 8, 10)]
+    fields = ComplianceEngine(net).solve(25, sets, Want.ALL)
+    for row, grips in enumerate(sets):
+        assert error(net, fields, row, grips) <= 1e-9
+    operator = OperatorBuilder(net, grow_tree(net)).operator(25)
+    columns = grip_columns(net, 25, np.array(sets))
+    _, trusted = solve_batch(operator, columns)
+    assert trusted.tolist() == [factor > 1e-5, factor > 1e-5, True]
+
+
+def test_what_is_solved_again_fits_what_was_asked():
+    net = network(loosened(chain(25), 1e-9, only_turning=True))
+    engine = ComplianceEngine(net)
+    whole = engine.solve(25, [HELD, (3, 8, 10), (48, 49, 30)], Want.ALL)
+    part = engine.solve(25, [HELD, (3, 8, 10), (48, 49, 30)], Want.SUPPORT)
+    assert (part.support == whole.support).all()
+    assert (part.grip_force == whole.grip_force).all()
+    assert part.edge_force.shape == (3, 0)
+    held = whole.displacement[2, [net.place_of_node[n] for n in (48, 49, 30)]]
+    assert np.abs(held).max() < 1e-12 * np.abs(whole.displacement[2]).max()
+    inner = np.flatnonzero((net.edge_brick == 24) & (net.edge_spring < 0))
+    assert whole.edge_force[2, inner] == 0  # nothing between two grips on one brick
+
+
+def test_grips_close_together_on_a_long_chain():
+    net = network(chain(150))
+    sets = [(296, 297, 299), (297, 298, 299), (297, 299, 295)]
+    fields = ComplianceEngine(net).solve(150, sets, Want.ALL)
+    for row, grips in enumerate(sets):
+        assert error(net, fields, row, grips) <= 1e-12
+
+
+def test_a_hundred_bricks_with_a_hinge():
+    """A spring without stiffness leaves no operator."""
+    scene = chain(100)
+    joints = list(scene.joints)
+    joints[50] = replace(joints[50], rotational_stiffness=(0.0, 0.0, 0.0))
+    net = network(replace(scene, joints=tuple(joints)))
+    fields = ComplianceEngine(net).solve(100, [(150, 199)], Want.ALL)
+    assert error(net, fields, 0, (150, 199)) <= 1e-12
+
+
+def test_what_double_precision_cannot_tell_from_a_mechanism_is_refused():
+    net = network(loosened(chain(25), 1e-13, only_turning=False))
+    with pytest.raises((MechanismError, SolverError)) as caught:
+        ComplianceEngine(net).solve(25, [[30, 49]])
+    if isinstance(caught.value, MechanismError):
+        moving = np.array([np.abs(row).max() for _, row in caught.value.mode])
+        assert moving[: LOOSE_AT + 1].max() < 1e-6

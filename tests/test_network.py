@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 
+from experiments.walls import running_bond
 from seqopt.network import Kind, network
 from tests.scenes import arches
-from tests.walls import running_bond
 
 
 def test_edge_counts_of_the_study(engine25):
