@@ -50,7 +50,7 @@ Solve = Callable[[Ints, Ints], Fields]  # of node numbers and of places, (1, r)
 BOUND = 1e-9  # promised up to this many bricks
 PROMISED = 100
 ROUNDING = 1e-12  # two errors below this are alike: three digits from what doubles can hold
-DIRECT_MOST, FRAME_MOST = 200, 338  # bricks: dense eigenvalues, minutes beyond
+MOST = 338  # bricks of the direct solve and the frame: their dense and stiff matrices end there
 
 
 def relative(got: Floats, want: Floats) -> float:
@@ -93,9 +93,9 @@ def engines(net: Network) -> dict[str, Solve]:
         "fast": lambda names, _: fast.solve(count, names, Want.ALL),
         "mixed": lambda _, columns: solve_mixed(net, count, columns),
     }
-    if count <= DIRECT_MOST:
+    if count <= MOST:
         every["direct"] = lambda _, columns: solve_rigid(net, count, columns)
-    if count <= FRAME_MOST:
+    if count <= MOST:
         every["frame"] = lambda names, _: frame.solve(count, names)
     return every
 

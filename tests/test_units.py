@@ -1,0 +1,111 @@
+"""Units and scale change no rank, no choice and no verdict."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from seqopt.assembly import DRY
+from seqopt.compliance import ComplianceEngine
+from seqopt.contact import step_assembly
+from seqopt.criteria import CLOSEST, EQUATIONS
+from seqopt.loops import three_robot_loop
+from seqopt.methods import cantilever
+from seqopt.network import network
+from seqopt.problem import pose
+from seqopt.reach import Side
+from seqopt.selection import formulation, run
+from seqopt.stability import certify
+
+
+def times(vector, factor):
+    return tuple(factor * x for x in vector)
+
+
+def rescaled(scene, length, force, softness):
+    """The scene with lengths, weights and payloads, and joint flexibilities multiplied.
+
+    Forces grow with ``force``, moments with ``force * length``, and displacements with ``force *
+    softness`` where the softness of turning is that of shifting over the square of the length.
+    """
+
+    def spring(s):
+        out = replace(
+            s,
+            position=times(s.position, length),
+            translational_stiffness=times(s.translational_stiffness, 1 / softness),
+            rotational_stiffness=times(s.rotational_stiffness, length**2 / softness),
+        )
+        return replace(out, anchor=times(s.anchor, length)) if hasattr(s, "anchor") else out
+
+    def robot(r):
+        if isinstance(r.reach, Side):
+            r = replace(r, reach=replace(r.reach, point=times(r.reach.point, length)))
+        return replace(r, payload=force * r.payload)
+
+    return replace(
+        scene,
+        bricks=tuple(
+            replace(
+                b,
+                position=times(b.position, length),
+                dimensions=times(b.dimensions, length),
+                density=b.density * force / length**3,
+            )
+            for b in scene.bricks
+        ),
+        joints=tuple(map(spring, scene.joints)),
+        grounds=tuple(map(spring, scene.grounds)),
+        robots=tuple(map(robot, scene.robots)),
+    )
+
+
+SCALES = [(1e3, 1, 1), (1e-3, 1, 1), (1, 1e3, 1), (1, 1e-3, 1), (1, 1, 1e3), (1, 1, 1e-3)]
+SCALES += [(1e3, 1e-3, 1e3), (1e-3, 1e3, 1e-3)]
+
+
+def solved(scene, criterion):
+    problem = pose(ComplianceEngine(network(scene)), three_robot_loop(network(scene)), criterion)
+    selection, certificate = run(problem, formulation("overlap_dp"))
+    return problem, problem.nodes(selection.choice), certificate
+
+
+@pytest.mark.parametrize("criterion", [EQUATIONS, CLOSEST], ids=lambda c: c.name)
+@pytest.mark.parametrize("scales", SCALES)
+def test_ranks_and_choices_do_not_know_units(arch25, criterion, scales):
+    """Where responses are rounded for ranks, the resolution is given in the same units."""
+    length, force, softness = scales
+    shift = force * softness
+    units = {"F": force, "T": force, "M": force * length, "D": shift}
+    same = replace(
+        criterion, resolution=tuple((n, units[n] * size) for n, size in criterion.resolution)
+    )
+    plain, nodes, certificate = solved(arch25, criterion)
+    other, others, certified = solved(rescaled(arch25, length, force, softness), same)
+    assert others == nodes
+    assert certified.objective == pytest.approx(certificate.objective, rel=1e-9)
+    for a, b in zip(plain.sums.shared, other.sums.shared, strict=True):
+        np.testing.assert_allclose(b, a, rtol=1e-9)
+
+
+@pytest.mark.parametrize("scales", SCALES)
+def test_verdicts_do_not_know_units(arch25, scales):
+    length, force, softness = scales
+    net, other = network(arch25), network(rescaled(arch25, length, force, softness))
+    for step in cantilever(net)[26:31]:
+        a, b = (certify(step_assembly(n, step), DRY) for n in (net, other))
+        assert a.verdict is b.verdict
+        assert b.bond == pytest.approx(a.bond * force / length**2, rel=1e-3)
+        assert b.friction == pytest.approx(a.friction, abs=2e-4)
+        np.testing.assert_allclose(b.pull, a.pull, rtol=2e-3)
+        assert b.grip == pytest.approx(a.grip * force, rel=1e-3)
+        assert (a.first_block, a.first_contact) == (b.first_block, b.first_contact)
+
+
+def test_a_resolution_in_other_units_is_another_criterion(arch25):
+    """The control: forces in kN rounded to 1 kN decide nothing."""
+    _, nodes, _ = solved(arch25, EQUATIONS)
+    _, others, _ = solved(rescaled(arch25, 1, 1e-3, 1), EQUATIONS)
+    assert others != nodes
