@@ -112,7 +112,7 @@ def tabulate(engine: ComplianceEngine, name: str, steps: tuple[Step, ...]) -> pd
     )
 
 
-def longer(scene: Scene, times: int) -> Scene:
+def longer(scene: Scene, times: float) -> Scene:
     """Return an arch of the same shape and bricks, about as many times longer.
 
     The line of the reference arch, without its twists; 24 bricks more each time end in the brick
@@ -122,7 +122,7 @@ def longer(scene: Scene, times: int) -> Scene:
     line = np.array([*joints, scene.grounds[1].position])
     chord = np.diff(line, axis=0)
     angle = np.unwrap(np.arctan2(chord[:, 2], chord[:, 0]))
-    count = 24 * times + 1
+    count = round(24 * times) + 1
     pitch = np.interp(np.linspace(0, 1, count), np.linspace(0, 1, len(angle)), angle)
     joint = scene.joints[0]
     shape = ArchShape(

@@ -24,7 +24,8 @@ def solve(problem: PlacementProblem) -> Selection:
     """Return the choice that the largest flow follows."""
     flow = solve_flow(problem, Program.LINEAR)
     choice = follow(flow.arcs)
-    return Selection(choice, problem.sums.cost(choice), flow.bound, flow.prices)
+    objective = problem.sums.cost(choice)
+    return Selection(choice, objective, flow.bound, flow.prices, flow.compile_seconds)
 
 
 FORMULATION = Formulation("overlap_lp", "full overlap, linear program", Kind.BOUND, Aim.SUM, solve)

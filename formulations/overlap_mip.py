@@ -22,7 +22,8 @@ def solve(problem: PlacementProblem) -> Selection:
     """Return the exact optimum within the budgets."""
     flow = solve_flow(problem, Program.INTEGER)
     choice = follow(flow.arcs)
-    return Selection(choice, problem.sums.cost(choice), flow.bound)
+    objective = problem.sums.cost(choice)
+    return Selection(choice, objective, flow.bound, compile_seconds=flow.compile_seconds)
 
 
 FORMULATION = Formulation(

@@ -62,11 +62,14 @@ class Flow:
         Lower bound on the cost, from the solver's optimum.
     prices : mapping of str to float
         Dual value of every budget.
+    compile_seconds : float
+        What cvxpy took to write the program down for the solver.
     """
 
     arcs: tuple[Floats, ...]
     bound: float
     prices: Mapping[str, float]
+    compile_seconds: float
 
 
 def solve_flow(problem: PlacementProblem, program: Program) -> Flow:
@@ -116,7 +119,8 @@ def solve_flow(problem: PlacementProblem, program: Program) -> Flow:
     if not whole:
         for budget, cap, unit in zip(problem.budgets, caps, units, strict=True):
             prices[budget.name] = float(scale / unit * cap.dual_value)
-    return Flow(tuple(arcs), value - ACCURACY * max(abs(value), scale), prices)
+    bound = value - ACCURACY * max(abs(value), scale)
+    return Flow(tuple(arcs), bound, prices, float(posed.compilation_time or 0.0))
 
 
 def follow(arcs: tuple[Floats, ...]) -> tuple[int, ...]:

@@ -42,7 +42,7 @@ class Outcome:
     plan : tuple of Step
         The schedule with every move at its chosen node.
     seconds : mapping of str to float
-        By stage: respond, rank, solve, verify.
+        By stage: respond, rank, compile (writing a program down for a solver), solve, verify.
     """
 
     problem: Problem
@@ -68,6 +68,8 @@ def optimize(posed: Posed, which: Formulation, **options: Any) -> Outcome:
     seconds = dict(posed.seconds)
     problem = posed.problem
     selection = _timed(seconds, "solve", lambda: which.solve(problem, **options))
+    seconds["compile"] = selection.compile_seconds
+    seconds["solve"] -= selection.compile_seconds
 
     def verify() -> tuple[Certificate, tuple[Step, ...]]:
         plan = problem.schedule.fill(problem.nodes(selection.choice))

@@ -52,12 +52,15 @@ class Selection:
         Claimed lower bound, budgets included; minus infinity if none.
     prices : mapping of str to float
         Dual value of each budget: the rate at which one more unit would lower the bound.
+    compile_seconds : float
+        Part of the time to solve that went into writing the program down for a solver.
     """
 
     choice: tuple[int, ...]
     objective: float
     bound: float = -np.inf
     prices: Mapping[str, float] = field(default_factory=dict)
+    compile_seconds: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -121,7 +121,14 @@ def test_optimize(capsys, tmp_path):
     assert report["status"] == "optimal"
     assert report["gap"] == pytest.approx(0)
     assert report["models_paper_count"] == {"cascading": 2576, "overlap": 22724}
-    assert set(report["seconds"]) == {"assemble", "respond", "rank", "solve", "verify"}
+    assert set(report["seconds"]) == {
+        "assemble",
+        "respond",
+        "rank",
+        "compile",
+        "solve",
+        "verify",
+    }
     plan = pd.read_csv(folder / "plan.csv")
     study = list(printed_steps("sequential").columns[:21])
     assert list(plan.columns[:21]) == study

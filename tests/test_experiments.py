@@ -15,7 +15,11 @@ from seqopt.paper import printed_steps
 ROOT = Path(__file__).parent.parent
 
 
-TIMED = {"engine_speed", "formulation_cost"}  # their verdicts depend on the machine
+TIMED = {
+    "engine_speed",
+    "formulation_cost",
+    "speed_accuracy",
+}  # their verdicts depend on the machine
 QUICK = [
     "engine_speed",
     "frame_contrast",
@@ -25,6 +29,8 @@ QUICK = [
     "failing_steps",
     "decision_sensitivity",
     "degenerate_placement",
+    "calibration",
+    "speed_accuracy",
 ]
 
 

@@ -1,0 +1,226 @@
+"""Eight full-scale barrel-vault load tests: their geometry, scenes, and stiffness by two routes.
+
+A vault is a chain of rigid bricks with a joint between neighbors and one at either abutment. A
+line load across its whole width acts at one place; stiffness is load over vertical displacement
+there. `load_stiffness` takes it from the compliance operator of a scene. `planar_parts` and
+`planar_stiffness` derive it by hand: cut one abutment, let statics give what every joint
+transmits, and let the energy of the springs (Castigliano) give the three unknowns and the
+displacement.
+
+Sources: `arch_tests.csv` and `arch_stiffness.csv` in ``seqopt/data/paper``. Lengths are in m,
+forces in N.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from seqopt.arch import ArchShape, arch_scene
+from seqopt.network import Floats, network
+from seqopt.operator import OperatorBuilder
+from seqopt.paper import SOURCE, printed
+from seqopt.scene import Scene
+from seqopt.tree import grow_tree
+
+
+@dataclass(frozen=True, kw_only=True)
+class Vault:
+    """One tested vault: as printed, with measured and the study's stiffness in N/m."""
+
+    test: int
+    reference: str
+    span: float
+    rise: float
+    width: float
+    thickness: float
+    bricks: int
+    fill: float
+    load_at: float
+    density: float
+    measured: float
+    study: float
+
+
+def vaults() -> tuple[Vault, ...]:
+    """Return the eight tests; column ``r`` is the rise (see the documentation)."""
+    table = printed("arch_tests").merge(printed("arch_stiffness"), on=["test", "reference"])
+    return tuple(
+        Vault(
+            test=int(row["test"]),
+            reference=str(row["reference"]),
+            span=float(row["L_m"]),
+            rise=float(row["r_m"]),
+            width=float(row["b_m"]),
+            thickness=float(row["t_mm"]) / 1e3,
+            bricks=int(row["n_bricks"]),
+            fill=float(row["h_mm"]) / 1e3,
+            load_at=float(row["x_m"]),
+            density=float(row["gamma_m_kg_m3"]),
+            measured=float(row["k_e_kN_mm"]) * 1e6,
+            study=float(row["k_m_kN_mm"]) * 1e6,
+        )
+        for row in table.to_dict("records")
+    )
+
+
+class Chain(NamedTuple):
+    """Joints (J, 2) from the first abutment to the last, slopes (J,), and where loads act (Q,)."""
+
+    points: Floats
+    slope: Floats
+    loads: Floats
+
+
+def _arc(vault: Vault, outward: float, bricks: int) -> tuple[Floats, Floats]:
+    """Return joints on an arc through springings and crown, shifted outward from it."""
+    half = 2 * np.arctan(2 * vault.rise / vault.span)
+    radius = vault.span / 2 / np.sin(half) + outward
+    turn = np.linspace(-half, half, bricks + 1)
+    return radius * np.stack([np.sin(turn), np.cos(turn)], axis=1), -turn
+
+
+def _parabola(vault: Vault, bricks: int) -> tuple[Floats, Floats]:
+    """Return joints at equal distances along a parabola through springings and crown."""
+    x = np.linspace(-vault.span / 2, vault.span / 2, 4001)
+    y = vault.rise * (1 - (2 * x / vault.span) ** 2)
+    way = np.append(0.0, np.cumsum(np.hypot(np.diff(x), np.diff(y))))
+    at = np.interp(np.linspace(0, way[-1], bricks + 1), way, x)
+    points = np.stack([at, vault.rise * (1 - (2 * at / vault.span) ** 2)], axis=1)
+    return points, np.arctan(-8 * vault.rise * at / vault.span**2)
+
+
+LINES: dict[str, Callable[[Vault, int], tuple[Floats, Floats]]] = {
+    "intrados": lambda vault, bricks: _arc(vault, vault.thickness / 2, bricks),
+    "center line": lambda vault, bricks: _arc(vault, 0.0, bricks),
+    "extrados": lambda vault, bricks: _arc(vault, -vault.thickness / 2, bricks),
+    "parabola": _parabola,
+}  # what the printed span and rise measure; joints lie at half the thickness
+PLACES: dict[str, Callable[[Vault, Floats], float]] = {
+    "x from springing": lambda vault, _points: vault.load_at - vault.span / 2,
+    "x from first joint": lambda vault, points: float(points[0, 0]) + vault.load_at,
+    "x from crown": lambda vault, points: min(vault.load_at, 0.999 * float(points[-1, 0])),
+    "quarter of span": lambda vault, _points: -vault.span / 4,
+    "crown": lambda _vault, _points: 0.0,
+}
+
+
+def chain(
+    vault: Vault,
+    line: str = "intrados",
+    place: str = "x from springing",
+    *,
+    fewer: int = 0,
+    strip: float = 0.0,
+) -> Chain:
+    """Return the joints and the load of a vault in one reading of its printed numbers.
+
+    Parameters
+    ----------
+    vault : Vault
+    line, place : str
+        Key of `LINES` and of `PLACES`.
+    fewer : int
+        Bricks by which the chain is shorter than printed.
+    strip : float
+        Width over which the load is spread, m; zero is a line.
+    """
+    points, slope = LINES[line](vault, vault.bricks - fewer)
+    at = PLACES[place](vault, points) + strip * np.linspace(-0.5, 0.5, 9 if strip else 1)
+    return Chain(points - points[0], slope, at - points[0, 0])
+
+
+def scene(vault: Vault, translational: float, rotational: float) -> Scene:
+    """Return a vault as a scene; every joint has these stiffnesses in all directions."""
+    points = chain(vault).points
+    step = np.diff(points, axis=0)
+    shape = ArchShape(
+        pitch=np.arctan2(step[:, 1], step[:, 0]).tolist(),
+        pattern="V",
+        gap=0.0,
+        dimensions=(float(np.hypot(*step[0])), vault.width, vault.thickness),
+        density=vault.density,
+        translational_stiffness=(translational,) * 3,
+        rotational_stiffness=(rotational,) * 3,
+    )
+    provenance = f"test {vault.test}, {vault.reference}, after {SOURCE}"
+    return arch_scene(shape, f"vault{vault.test}", provenance=provenance)
+
+
+def load_stiffness(built: Scene, at: float) -> float:
+    """Return load over vertical displacement of a line load at a distance from the first joint.
+
+    A brick is rigid: a load between its inner nodes acts on both in inverse proportion to the
+    distance, and what it displaces follows from theirs in the same proportion.
+    """
+    frame = network(built)
+    tree = grow_tree(frame)
+    if tree is None:
+        raise ValueError("a joint has no stiffness; give it some")
+    bricks = len(built.bricks)
+    vertical = OperatorBuilder(frame, tree).operator(bricks).flexibility[2::3, 2::3]
+    x = frame.node_position[frame.inner, 0]
+    far_ends = x.mean(axis=1) + (x[:, 1] - x[:, 0])
+    brick = int((far_ends[:-1] <= at).sum())
+    share = (at - x[brick, 0]) / (x[brick, 1] - x[brick, 0])
+    weight = np.zeros(2 * bricks)
+    weight[2 * brick : 2 * brick + 2] = 1 - share, share
+    return float(1 / (weight @ vertical @ weight))
+
+
+class Parts(NamedTuple):
+    """Energies of unit forces: of the three unknowns, mixed, and of the load.
+
+    Those of translation are per unit compliance along a joint, those of rotation per unit
+    compliance of turning.
+    """
+
+    unknown: tuple[Floats, Floats]
+    mixed: tuple[Floats, Floats]
+    load: tuple[float, float]
+
+
+def _transmitted(points: Floats, slope: Floats, at: Floats) -> Floats:
+    """Return thrust, shear and moment (J, 3, 3) at joints of a force in x, in y, a couple at x."""
+    cos, sin = np.cos(slope), np.sin(slope)
+    arm = at - points
+    out = np.zeros((len(points), 3, 3))
+    out[:, 0, 0], out[:, 0, 1] = cos, sin
+    out[:, 1, 0], out[:, 1, 1] = -sin, cos
+    out[:, 2, 0], out[:, 2, 1], out[:, 2, 2] = -arm[:, 1], arm[:, 0], 1.0
+    return out
+
+
+def planar_parts(chain: Chain, shear: float = 1.0) -> Parts:
+    """Return the energies of a chain; ``shear`` is the compliance across a joint over along it."""
+    points, slope, loads = chain
+    share = np.array([1.0, shear])
+    free = _transmitted(points, slope, points[-1])
+    load = np.zeros((len(points), 3))
+    for x in loads:
+        acts = (points[:, 0] <= x)[:, None]
+        load += acts * _transmitted(points, slope, np.array([x, 0.0]))[:, :, 1] / len(loads)
+    return Parts(
+        (
+            np.einsum("jki,k,jkl->il", free[:, :2], share, free[:, :2]),
+            np.einsum("ji,jl->il", free[:, 2], free[:, 2]),
+        ),
+        (
+            np.einsum("jki,k,jk->i", free[:, :2], share, load[:, :2]),
+            np.einsum("ji,j->i", free[:, 2], load[:, 2]),
+        ),
+        (float((load[:, :2] ** 2 @ share).sum()), float((load[:, 2] ** 2).sum())),
+    )
+
+
+def planar_stiffness(parts: Parts, translational: Floats, rotational: Floats) -> Floats:
+    """Return load over displacement for pairs of joint stiffnesses (R,), N/m and N m/rad."""
+    slide, turn = 1 / np.asarray(translational), 1 / np.asarray(rotational)
+    matrix = slide[:, None, None] * parts.unknown[0] + turn[:, None, None] * parts.unknown[1]
+    right = slide[:, None] * parts.mixed[0] + turn[:, None] * parts.mixed[1]
+    unknown = np.linalg.solve(matrix, right[..., None])[..., 0]
+    energy = slide * parts.load[0] + turn * parts.load[1] - (right * unknown).sum(axis=1)
+    return np.asarray(1 / energy)

@@ -1,0 +1,137 @@
+"""One scene, engine and criterion: a row per formulation, with time by stage and what it is worth.
+
+A choice is judged by the reference: the responses of exactly rigid bricks, and dynamic programming
+over them. ``gap`` is how far the choice lies above the reference's optimum of the same aim,
+whatever engine it was made with; ``error`` is the largest difference of the engine's responses from
+the reference's, over the largest of each kind in its state. Times are medians of repeats after one
+run that does not count; stages before the choice are shared by all formulations.
+
+Command: ``python -m experiments.runs SCENE ENGINE CRITERION REPEATS`` prints rows as JSON.
+"""
+
+from __future__ import annotations
+
+import json
+import resource
+import statistics
+import sys
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from experiments.failing_steps import longer
+from seqopt.compliance import ComplianceEngine
+from seqopt.criteria import CRITERIA
+from seqopt.fields import Engine
+from seqopt.frame import FrameEngine
+from seqopt.loops import three_robot_loop
+from seqopt.network import Network, network
+from seqopt.optimize import Outcome, Posed, optimize, prepare
+from seqopt.problem import Problem
+from seqopt.scene import Scene
+from seqopt.scene_file import load_scene
+from seqopt.selection import Aim, Formulation, Reads, formulations, least_peak, least_sum
+from seqopt.states import window_models
+
+Row = dict[str, object]
+ENGINES: dict[str, Callable[[Network], Engine]] = {
+    "rigid bricks": ComplianceEngine,
+    "frame 1e7": FrameEngine,
+    "frame 1e3": lambda net: FrameEngine(net, 1e3),
+}
+REFERENCE = "rigid bricks"
+
+
+def scene_named(name: str) -> Scene:
+    """Return ``arch25``, or an arch of the same shape by its brick count, as ``chain13``."""
+    reference = load_scene("arch25")
+    if name == "arch25":
+        return reference
+    return longer(reference, (int(name.removeprefix("chain")) - 1) / 24)
+
+
+def rows(scene: str, engine: str, criterion: str, repeats: int) -> list[Row]:
+    """Return a row per formulation."""
+    built = scene_named(scene)
+    reference = _pose(built, REFERENCE, criterion).problem
+    ready = [_pose(built, engine, criterion) for _ in range(repeats + 1)][1:]
+    posed = ready[-1]
+    shared = {
+        stage: statistics.median(one.seconds[stage] for one in ready) for stage in posed.seconds
+    }
+    base: Row = {
+        "scene": scene,
+        "bricks": len(posed.problem.schedule.scene.bricks),
+        "moves": len(posed.problem.schedule.moves),
+        "engine": engine,
+        "criterion": criterion,
+        "error": error(posed.problem, reference),
+    }
+    return [
+        base | _row(posed, which, reference, shared, repeats) for which in formulations().values()
+    ]
+
+
+def _pose(scene: Scene, engine: str, criterion: str) -> Posed:
+    start = time.perf_counter()
+    net = network(scene)
+    solver = ENGINES[engine](net)
+    schedule = three_robot_loop(net)
+    seconds = {"assemble": time.perf_counter() - start}
+    posed = prepare(solver, schedule, CRITERIA[criterion])
+    return Posed(posed.problem, seconds | dict(posed.seconds))
+
+
+def _row(
+    posed: Posed, which: Formulation, reference: Problem, shared: dict[str, float], repeats: int
+) -> Row:
+    outcomes = [optimize(posed, which) for _ in range(repeats + 1)][1:]
+    last = outcomes[-1]
+    seconds = shared | {
+        stage: statistics.median(outcome.seconds[stage] for outcome in outcomes)
+        for stage in ("compile", "solve", "verify")
+    }
+    objective, gap = worth(reference, which.aim, last.selection.choice)
+    return {
+        "formulation": which.name,
+        "aim": which.aim.value,
+        "status": "optimal" if gap <= 1e-6 else "feasible",
+        **seconds,
+        "total": sum(seconds.values()),
+        "models": _models(last),
+        "objective": objective,
+        "gap": gap,
+        "memory_MB": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
+    }
+
+
+def _models(outcome: Outcome) -> int:
+    if outcome.which.reads is Reads.WINDOW:
+        return window_models(outcome.problem.schedule, outcome.selection.choice)
+    return outcome.problem.evaluation.models
+
+
+def worth(reference: Problem, aim: Aim, choice: tuple[int, ...]) -> tuple[float, float]:
+    """Return the value of a choice by the reference's data, and its gap to the optimum there."""
+    placement = reference.sums if aim is Aim.SUM else reference.peaks
+    parts = placement.parts(choice)
+    value = float(sum(parts) if aim is Aim.SUM else max(parts))
+    least = least_sum(placement) if aim is Aim.SUM else least_peak(placement)
+    return value, max(0.0, value - least) / max(abs(least), np.finfo(float).tiny)
+
+
+def error(problem: Problem, reference: Problem) -> float:
+    """Return the largest difference of responses over the largest of each kind in its state."""
+    worst = 0.0
+    for own, exact in zip(problem.evaluation.states, reference.evaluation.states, strict=True):
+        for name, values in exact.responses.items():
+            known = np.isfinite(values)
+            if known.any():
+                size = np.abs(values[known]).max() or 1.0
+                worst = max(worst, np.abs(own.responses[name] - values)[known].max() / size)
+    return float(worst)
+
+
+if __name__ == "__main__":
+    print(json.dumps(rows(*sys.argv[1:4], repeats=int(sys.argv[4]))))

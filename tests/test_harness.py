@@ -1,0 +1,132 @@
+"""The comparison harness: what it stores, what it charges, and the profiles it draws."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from experiments.__main__ import claims
+from experiments.profiles import data_profile, pareto, performance_profile, shifted_mean
+from experiments.runs import ENGINES, REFERENCE, rows
+from experiments.speed_accuracy import KEY, collect, holds, measure, specs, summarize
+from experiments.speed_charts import headline, profile_charts
+from seqopt.criteria import CRITERIA
+from seqopt.selection import formulations
+
+ROOT = Path(__file__).parent.parent
+STAGES = ["assemble", "respond", "rank", "compile", "solve", "verify"]
+
+
+@pytest.fixture(scope="module")
+def smoke():
+    """Every engine with every formulation and criterion on the smallest arch."""
+    table = pd.concat(
+        [pd.DataFrame(rows("chain7", engine, c, repeats=1)) for engine in ENGINES for c in CRITERIA]
+    )
+    return table.reset_index(drop=True)
+
+
+def test_everything_runs_and_is_a_row(smoke):
+    assert len(smoke) == len(ENGINES) * len(CRITERIA) * len(formulations())
+    assert smoke[[*STAGES, "gap", "error", "objective", "models"]].notna().all(axis=None)
+    assert smoke["total"].to_numpy() == pytest.approx(smoke[STAGES].sum(axis=1).to_numpy())
+    exact = smoke[(smoke["engine"] == REFERENCE) & (smoke["formulation"] == "overlap_dp")]
+    assert (exact["gap"] <= 1e-12).all()
+    assert (exact["error"] == 0).all()
+    errors = smoke.groupby("engine")["error"].max()
+    assert 0 < errors["frame 1e7"] < 1e-5 < errors["frame 1e3"]
+    windows = smoke[smoke["formulation"].isin(["rank_search", "cascade"])]
+    assert windows["models"].max() < exact["models"].min()
+    compiled = smoke[smoke["formulation"].isin(["overlap_lp", "overlap_mip"])]
+    assert (compiled["compile"] > 0).all()
+
+
+def test_stored_runs_are_not_repeated(smoke, monkeypatch):
+    calls = []
+    monkeypatch.setattr(
+        "experiments.speed_accuracy.measure",
+        lambda spec: calls.append(spec) or measured(smoke, spec),
+    )
+    wanted = [("chain7", REFERENCE, c, 1) for c in CRITERIA]
+    first = collect(wanted[:2], pd.DataFrame())
+    again = collect(wanted, first)
+    assert calls == [*wanted[:2], *wanted[2:]]
+    assert not again.duplicated([*KEY, "formulation"]).any()
+
+
+def measured(smoke, spec):
+    from importlib.metadata import version  # noqa: PLC0415
+
+    part = smoke[(smoke["engine"] == spec[1]) & (smoke["criterion"] == spec[2])]
+    return part.assign(version=version("seqopt")).to_dict("records")
+
+
+def test_a_run_out_of_time_is_charged_its_limit():
+    charged = pd.DataFrame(measure(("chain7", REFERENCE, "weighted", 1), limit=0.01))
+    assert (charged["status"] == "time limit").all()
+    assert (charged["total"] == 0.01).all()
+    assert (charged["gap"] == 1.0).all()
+    failed = pd.DataFrame(measure(("chain7", "no such engine", "weighted", 1)))
+    assert (failed["status"] == "failed").all()
+
+
+def test_the_claim_can_fail(smoke):
+    assert holds(smoke)["dynamic programming has no gap"]
+    corner = (smoke["formulation"] == "overlap_dp") & (smoke["engine"] == REFERENCE)
+    slow = smoke.assign(total=smoke["total"].where(~corner, 10 * smoke["total"]))
+    assert not holds(slow)["nothing is sooner by more than a tenth"]
+    worse = smoke.assign(gap=smoke["gap"].where(~corner, 0.1))
+    assert not holds(worse)["dynamic programming has no gap"]
+
+
+def test_charts_and_table_come_from_rows(smoke, monkeypatch):
+    saved = []
+    for name in ("headline", "profile_charts"):
+        assert name in globals()
+    monkeypatch.setattr(
+        "experiments.speed_charts.save_figure", lambda figure, name: saved.append((name, figure))
+    )
+    table = smoke.assign(scene="arch25")
+    headline(table)
+    profile_charts(table)
+    assert [name for name, _ in saved] == ["speed_accuracy.png", "profiles.png"]
+    for _, figure in saved:
+        figure.canvas.draw()
+    means = summarize(smoke).set_index("formulation")
+    assert means.loc["overlap_dp", "optimal"] == means.loc["overlap_dp", "runs"] == len(CRITERIA)
+    assert set(specs(quick=True)) < {(s, e, "weighted", 1) for s in ("chain7",) for e in ENGINES}
+
+
+def test_pareto_front():
+    cost, loss = np.array([1.0, 2.0, 3.0, 2.0, 4.0]), np.array([3.0, 1.0, 1.0, 2.0, 0.0])
+    assert pareto(cost, loss).tolist() == [True, True, False, False, True]
+    assert pareto(np.ones(2), np.ones(2)).all()  # equals do not beat each other
+
+
+def test_profiles():
+    costs = pd.DataFrame({"a": [1.0, 4.0, np.inf], "b": [2.0, 2.0, 3.0]})
+    profile = performance_profile(costs, np.array([1.0, 2.0]))
+    assert profile["a"].tolist() == pytest.approx([1 / 3, 2 / 3])
+    assert profile["b"].tolist() == pytest.approx([2 / 3, 1.0])
+    assert data_profile(costs, np.array([1.0, 3.0]))["b"].tolist() == [0.0, 1.0]
+
+
+def test_shifted_mean():
+    """Equal values keep their mean; a large shift makes it the arithmetic one."""
+    assert shifted_mean(np.full(3, 0.2), 0.01) == pytest.approx(0.2)
+    assert shifted_mean(np.array([1.0, 3.0]), 1e6) == pytest.approx(2.0, rel=1e-5)
+    assert shifted_mean(np.array([1.0, 4.0]), 0.0) == pytest.approx(2.0)
+
+
+def test_all_claims_are_listed():
+    listed = subprocess.run(
+        [sys.executable, "-m", "experiments"], cwd=ROOT, capture_output=True, text=True, check=True
+    ).stdout.splitlines()
+    assert [line.split()[0] for line in listed] == list(claims())
+    assert {"engine_speed", "failing_steps", "speed_accuracy"} <= set(claims())
+    assert "blocks" not in claims()
