@@ -30,6 +30,7 @@ QUICK = [
     "decision_sensitivity",
     "degenerate_placement",
     "calibration",
+    "discrete_arches",
     "speed_accuracy",
 ]
 

@@ -1,0 +1,296 @@
+"""Claim: on the full overlap of `arch25` the fast engine is far ahead of the tools one would take.
+
+That is: at least 60 times as fast as the best package at its leanest, 20 times as the best loop
+that one would write with SciPy, and within 3 times of its own matrix products, whether only what
+the criterion needs is asked or every edge force and node displacement.
+
+Method: the distinct models of the three-robot loop under equations 2 and 3, which the study counts
+as 22,724. Engine and peers take turns in one process on one core. The engine answers all models; a
+peer a few random ones of every brick count and number of grips, drawn anew in every round, and its
+time is extended to all. Models kept by a peer and operators of the engine are timed and counted.
+Medians of rounds. The bound is the engine's own dense products alone, same shapes, ready memory.
+Then one placement problem by general tools.
+
+Inputs: the shipped scene; seed 0; PyNiteFEA, openseespy and pyconmech if installed. Command:
+``OPENBLAS_NUM_THREADS=1 python -m experiments.peers [--quick]``. Writes
+``experiments/results/peers.csv`` and ``docs/figures/peers.png``.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Callable
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike
+
+from experiments.engine_speed import best
+from experiments.peer_chain import Answer, Peer, chain_of
+from experiments.peer_chart import BOUND, OURS, chart
+from experiments.peer_frames import PACKAGES, missing_packages
+from experiments.peer_loops import LOOPS, loop
+from experiments.peer_paths import PATHS, SLOW
+from experiments.plotting import RESULTS
+from seqopt.compliance import ComplianceEngine
+from seqopt.criteria import EQUATIONS
+from seqopt.fields import Fields, Want, grip_columns
+from seqopt.loops import three_robot_loop
+from seqopt.network import Floats, Ints, Network, network
+from seqopt.problem import Problem, pose
+from seqopt.scene_file import load_scene
+
+EXTRA = 'pip install "seqopt[peers]" openseespy'
+SETTINGS = ("reactions", "criterion", "all fields")
+SETTINGS = ("criterion", "all fields")
+PACKAGE, LOOP = 60.0, 20.0  # times the engine's time
+NEAR = 3.0  # times the engine's own products
+LIKE_RIGID, LIKE_BARS = 1e-9, 1e-4  # largest difference of peers with rigid bricks, stiff bars
+SLOWEST = ("PyNite", "pyconmech")  # answer one model of a kind in a round
+
+
+class Case(NamedTuple):
+    """The models of one brick count and number of grips: node numbers, places, what is asked."""
+
+    bricks: int
+    grips: Ints
+    columns: Ints
+    want: Want
+
+    def asked(self, setting: str) -> Want:
+        """Return what a setting asks of these models."""
+        return {"reactions": Want.SUPPORT, "criterion": self.want, "all fields": Want.TABLE}[
+            setting
+        ]
+
+
+class Recorder:
+    """An engine that remembers what it was asked."""
+
+    def __init__(self, net: Network) -> None:
+        self.engine = ComplianceEngine(net)
+        self.cases: list[Case] = []
+
+    @property
+    def network(self) -> Network:
+        """The engine's network."""
+        return self.engine.network
+
+    def solve(self, bricks: int, grips: ArrayLike, want: Want = Want.TABLE) -> Fields:
+        """Answer and remember."""
+        columns = grip_columns(self.network, bricks, grips)
+        self.cases.append(Case(bricks, np.asarray(grips), columns, want))
+        return self.engine.solve(bricks, grips, want)
+
+
+def workload(net: Network) -> tuple[Problem, list[Case]]:
+    """Return the posed problem and all models it takes."""
+    recorder = Recorder(net)
+    problem = pose(recorder, three_robot_loop(net), EQUATIONS)
+    return problem, recorder.cases
+
+
+def answer_all(engine: ComplianceEngine, cases: list[Case], setting: str) -> None:
+    for case in cases:
+        engine.solve(case.bricks, case.grips, case.asked(setting))
+
+
+def operators(net: Network, cases: list[Case]) -> ComplianceEngine:
+    """Return an engine that has prepared all its operators."""
+    engine = ComplianceEngine(net)
+    for case in cases:
+        engine.solve(case.bricks, case.grips[:1], Want(0))
+    return engine
+
+
+def products(net: Network, cases: list[Case], setting: str) -> tuple[Callable[[], None], float]:
+    """Return a call that does only the engine's dense products, and how many flops they are."""
+    rng = np.random.default_rng(0)
+    work = []
+    for case in cases:
+        asked = case.asked(setting)
+        widths = (
+            (Want.EDGES, net.count_edges(case.bricks)),
+            (Want.DISPLACEMENTS, 3 * net.count_nodes(case.bricks)),
+            (Want.SUPPORT, 6),
+        )
+        load = rng.standard_normal((len(case.grips), 6 * case.bricks + 1))
+        for width in (w for flag, w in widths if asked & flag):
+            rows = rng.standard_normal((load.shape[1], width))
+            work.append((load, rows, np.empty((len(load), width))))
+
+    def call() -> None:
+        for load, rows, out in work:
+            np.matmul(load, rows, out=out)
+
+    call()
+    return call, float(sum(2 * a.shape[0] * b.size for a, b, _ in work))
+
+
+class Round(NamedTuple):
+    """One peer's turn: time to make kept models, times of all models, answers given."""
+
+    setup: float
+    seconds: dict[str, float]
+    answers: list[tuple[Case, int, Answer]]
+
+
+def make(net: Network, name: str, bricks: int) -> Peer:
+    """Return a peer's kept model of one brick count."""
+    return loop(net, bricks, name) if name in LOOPS else PACKAGES[name](chain_of(net, bricks))
+
+
+def turn(net: Network, cases: list[Case], name: str, few: int, rng: np.random.Generator) -> Round:
+    """Return what a peer takes for all models, from a few of each kind."""
+    setup, seconds = 0.0, dict.fromkeys(SETTINGS, 0.0)
+    answers = []
+    for bricks in sorted({case.bricks for case in cases}):
+        start = time.perf_counter()
+        peer = make(net, name, bricks)
+        setup += time.perf_counter() - start
+        for case in (c for c in cases if c.bricks == bricks):
+            size = len(case.columns)
+            chosen = rng.choice(size, min(few, size), replace=False)
+            peer.solve(case.columns[chosen[0]], Want.TABLE)
+            for setting in SETTINGS:
+                asked = case.asked(setting)
+                start = time.perf_counter()
+                found = [peer.solve(case.columns[i], asked) for i in chosen]
+                seconds[setting] += (time.perf_counter() - start) * size / len(chosen)
+            answers += [(case, int(i), a) for i, a in zip(chosen, found, strict=True)]
+    return Round(setup, seconds, answers)
+
+
+def difference(engine: ComplianceEngine, answers: list[tuple[Case, int, Answer]]) -> float:
+    """Return the largest difference of any field from the engine's, over its largest entry.
+
+    Force and moment of the support are fields of their own.
+    """
+    worst = 0.0
+    for case, i, answer in answers:
+        exact = engine.solve(case.bricks, case.grips[i : i + 1])
+        pairs = {n: (x, getattr(exact, n)[0]) for n, x in answer._asdict().items()}
+        found, true = pairs.pop("support")
+        pairs |= {"support_force": (found[:3], true[:3]), "support_moment": (found[3:], true[3:])}
+        worst = max(worst, *(_gap(*pair) for pair in pairs.values()))
+    return worst
+
+
+def _gap(found: Floats, true: Floats) -> float:
+    return float(np.abs(found - true).max() / np.abs(true).max())
+
+
+def compete(
+    net: Network, cases: list[Case], names: list[str], rounds: int, few: int
+) -> pd.DataFrame:
+    """Return a row per round, setting and tool; tools take turns."""
+    rng, rows = np.random.default_rng(0), []
+    engine = operators(net, cases)
+    calls = {s: products(net, cases, s) for s in SETTINGS}
+    for number in range(rounds):
+        prepare = best(partial(operators, net, cases), 1)
+        for s, (call, flops) in calls.items():
+            ours = best(partial(answer_all, engine, cases, s), 3)
+            rows.append((number, s, OURS, prepare, ours, np.nan, np.nan))
+            rows.append((number, s, BOUND, 0.0, best(call, 3), np.nan, flops))
+        for name in names:
+            done = turn(net, cases, name, 1 if name in SLOWEST else few, rng)
+            gap = difference(engine, done.answers)
+            rows += [(number, s, name, done.setup, t, gap, np.nan) for s, t in done.seconds.items()]
+    columns = ["round", "setting", "tool", "setup_s", "models_s", "difference", "flops"]
+    return pd.DataFrame(rows, columns=columns)
+
+
+def summarize(rounds: pd.DataFrame, models: int) -> pd.DataFrame:
+    """Return a row per setting and tool: medians of times and of ratios within rounds."""
+    keys = ["setting", "tool"]
+    ours = rounds[rounds["tool"] == OURS].set_index(["round", "setting"])
+    index = pd.MultiIndex.from_frame(rounds[["round", "setting"]])
+    whole = (ours["setup_s"] + ours["models_s"]).reindex(index).to_numpy()
+    table = rounds.assign(
+        model_us=rounds["models_s"] / models * 1e6,
+        ratio=rounds["models_s"] / ours["models_s"].reindex(index).to_numpy(),
+        ratio_whole=(rounds["models_s"] + rounds["setup_s"]) / whole,
+    )
+    grouped = table.groupby(keys, sort=False)
+    times = ["setup_s", "models_s", "model_us", "ratio", "ratio_whole"]
+    worst = {"ratio_lowest": grouped["ratio"].min(), "difference": grouped["difference"].max()}
+    return grouped[times].median().assign(**worst).reset_index()
+
+
+def paths(problem: Problem, names: list[str], rounds: int) -> pd.DataFrame:
+    """Return time and least cost of every tool on one placement problem; costs are ready."""
+    rows = []
+    for name in names:
+        solve = PATHS[name]
+        value = solve(problem)
+        seconds = best(partial(solve, problem), 1 if name in SLOW else rounds)
+        rows.append({"tool": name, "seconds": seconds, "objective": value})
+    table = pd.DataFrame(rows)
+    first = table.iloc[0]
+    table["ratio"] = table["seconds"] / first["seconds"]
+    table["gap"] = (table["objective"] / first["objective"] - 1).abs()
+    return table
+
+
+def judge(table: pd.DataFrame, ways: pd.DataFrame) -> bool:
+    """Print what is claimed against what was measured; return whether all of it holds."""
+    holds = [bool(ways["gap"].max() <= 1e-6)]
+    for setting in SETTINGS:
+        part = table[table["setting"] == setting].set_index("tool")
+        near = 1 / float(part["ratio"][BOUND])
+        peers = part.drop(index=[OURS, BOUND])
+        packaged = peers.index.isin(list(PACKAGES))
+        for label, those, target in (
+            ("package", peers[packaged], PACKAGE),
+            ("loop", peers[~packaged], LOOP),
+        ):
+            for name, row in those.nsmallest(1, "ratio").iterrows():
+                print(
+                    f"{setting}: best {label} {name}: {row['ratio']:.0f} times (lowest "
+                    f"{row['ratio_lowest']:.0f}; preparation counted {row['ratio_whole']:.0f}); "
+                    f"claimed {target:.0f}"
+                )
+                holds.append(float(row["ratio"]) >= target)
+        print(f"{setting}: {near:.1f} times its own products; claimed {NEAR:.0f}")
+        holds.append(near <= NEAR)
+        for name, gap in peers["difference"].items():
+            holds.append(gap <= (LIKE_RIGID if "bricks" in str(name) else LIKE_BARS))
+    return all(holds)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--quick", action="store_true", help="loops and paths, nothing written")
+    quick = parser.parse_args().quick
+    net = network(load_scene("arch25"))
+    problem, cases = workload(net)
+    print(
+        f"{problem.evaluation.models} distinct models; the study counts {problem.paper_models[1]}"
+    )
+    lacking = list(PACKAGES) if quick else missing_packages()
+    if lacking:
+        print(f"not measured: {', '.join(lacking)}" + ("" if quick else f"; {EXTRA}"))
+    names = [*(n for n in PACKAGES if n not in lacking), *LOOPS]
+    cases = [c for c in cases if not quick or c.bricks % 8 == 1]
+    rounds = compete(net, cases, names, *((1, 3) if quick else (9, 10)))
+    table = summarize(rounds, sum(len(c.grips) for c in cases))
+    print(table.to_string(index=False, float_format="%.3g"))
+    flops = rounds[rounds["tool"] == BOUND]
+    speed = (flops["flops"] / flops["models_s"]).groupby(flops["setting"]).median() / 1e9
+    print("products at", ", ".join(f"{v:.1f} Gflop/s ({s})" for s, v in speed.items()))
+    ways = paths(problem, [n for n in PATHS if not quick or n not in SLOW], 1 if quick else 5)
+    print(ways.to_string(index=False, float_format="%.4g"))
+    if not quick:
+        RESULTS.mkdir(exist_ok=True)
+        both = pd.concat({"models": table, "placement": ways}, names=["part"]).reset_index(level=0)
+        both.to_csv(RESULTS / "peers.csv", index=False, float_format="%.4g")
+        chart(table)
+    print(f"verdict: the claim {'holds' if judge(table, ways) else 'does not hold'}")
+
+
+if __name__ == "__main__":
+    main()
