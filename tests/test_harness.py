@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from experiments.__main__ import claims
+from experiments.__main__ import claims, run
 from experiments.profiles import data_profile, pareto, performance_profile, shifted_mean
 from experiments.runs import ENGINES, REFERENCE, rows
 from experiments.speed_accuracy import KEY, collect, holds, measure, specs, summarize
@@ -121,6 +121,23 @@ def test_shifted_mean():
     assert shifted_mean(np.full(3, 0.2), 0.01) == pytest.approx(0.2)
     assert shifted_mean(np.array([1.0, 3.0]), 1e6) == pytest.approx(2.0, rel=1e-5)
     assert shifted_mean(np.array([1.0, 4.0]), 0.0) == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize(
+    ("printed", "status", "verdict"),
+    [
+        ("verdict: the claim holds", 0, "holds"),
+        ("verdict: the claim holds: all pictures drawn", 0, "holds"),
+        ("verdict: the claim does not hold on this run", 0, "does not hold on this run"),
+        ("no verdict", 0, "failed: no verdict"),
+        ("verdict: the claim holds", 1, "failed: verdict: the claim holds"),
+        ("pip install extra", 2, "left out: pip install extra"),
+    ],
+)
+def test_a_verdict_is_the_last_line_of_a_run_that_ended_well(monkeypatch, printed, status, verdict):
+    done = subprocess.CompletedProcess([], status, f"table\n{printed}\n", "")
+    monkeypatch.setattr("experiments.__main__.subprocess.run", lambda *_, **__: done)
+    assert run("any")[0] == verdict
 
 
 def test_all_claims_are_listed():
