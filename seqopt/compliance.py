@@ -9,17 +9,20 @@ set is solved again with wrenches and motions side by side (`seqopt.mixed`).
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from dataclasses import replace
 from itertools import combinations
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy import sparse
 
 from seqopt.batch_solve import solve_positive
 from seqopt.fields import Fields, Want, grip_columns
 from seqopt.mixed import solve_mixed
 from seqopt.network import Floats, Ints, Network
 from seqopt.operator import Operator, OperatorBuilder
+from seqopt.plane import SPACE, Basis
 from seqopt.rigid import require_resistance
 from seqopt.tree import grow_tree
 
@@ -30,12 +33,20 @@ CANCEL = 10.0  # what the grips undo over what is left, where pivots do not
 
 
 class ComplianceEngine:
-    """Answers any batch of grip sets on any partial structure of a scene."""
+    """Answers any batch of grip sets on any partial structure of a scene.
 
-    def __init__(self, network: Network) -> None:
+    Parameters
+    ----------
+    network : Network
+    basis : Basis, optional
+        The directions in which bricks are loaded and move; `seqopt.planar` has fewer than all.
+    """
+
+    def __init__(self, network: Network, basis: Basis = SPACE) -> None:
         self._network = network
+        self._basis = basis
         tree = grow_tree(network)
-        self._builder = None if tree is None else OperatorBuilder(network, tree)
+        self._builder = None if tree is None else OperatorBuilder(network, tree, basis)
         self._operators: dict[int, Operator] = {}
         springs = network.springs
         self._even = all(
@@ -58,26 +69,13 @@ class ComplianceEngine:
         if bricks not in self._operators:
             self._operators[bricks] = self._builder.operator(bricks)
         operator = self._operators[bricks]
-        fields, trusted = solve_batch(operator, columns, want)
-        if not self._even:
-            trusted &= ~cancels(operator, columns, fields.grip_force)
+        fields, trusted = solve_batch(operator, columns, want, even=self._even)
+        if self._basis is not SPACE:
+            fields = replace(fields, grip_force=fields.grip_force @ self._basis.force)
         again = np.flatnonzero(~trusted)
         if len(again):
             _replace(fields, again, solve_mixed(self._network, bricks, columns[again]))
         return fields
-
-
-def cancels(operator: Operator, columns: Ints, force: Floats) -> np.ndarray:
-    """Return whether motions cancel at the grips of sets (S, r) under their forces (S, r, 3)."""
-    out = np.zeros(len(columns), dtype=bool)
-    motion = operator.displacement
-    for row, grips in enumerate(columns if columns.size else ()):
-        index = (3 * grips[:, None] + np.arange(3)).ravel()
-        parts = np.abs(operator.flexibility[np.ix_(index, index)]) @ np.abs(force[row].ravel())
-        parts += np.abs(operator.dead_displacement[index])
-        left = np.abs(motion[-1] + force[row].ravel() @ motion[index]).max()
-        out[row] = parts.max() > CANCEL * left
-    return out
 
 
 def _replace(fields: Fields, sets: Ints, better: Fields) -> None:
@@ -89,14 +87,24 @@ def _replace(fields: Fields, sets: Ints, better: Fields) -> None:
 
 
 def solve_batch(
-    operator: Operator, columns: Ints, want: Want = Want.TABLE
+    operator: Operator, columns: Ints, want: Want = Want.TABLE, *, even: bool = True
 ) -> tuple[Fields, np.ndarray]:
     """Return the fields of grip sets (S, r) and which of them are accurate, (S,) bool.
 
-    Grip sets are given as places in ``network.inner.ravel()``.
+    Grip sets are given as places in ``network.inner.ravel()``. Where the joints are not ``even``,
+    pivots do not tell the whole error.
     """
     sets, held = columns.shape
-    size = len(operator.flexibility)
+    index = load_index(operator, columns)
+    force = np.empty(index.shape)
+    trusted = np.empty(sets, dtype=bool)
+    for start in range(0, sets, CHUNK):
+        part = slice(start, start + CHUNK)
+        force[part], pivot = grip_forces(operator, columns[part], index[part])
+        trusted[part] = pivot >= TRUSTED
+    force[~trusted] = 0.0
+    if not even:
+        trusted &= ~cancels(operator, index, force)
     asked = (
         (operator.edge_force, Want.EDGES),
         (operator.displacement, Want.DISPLACEMENTS),
@@ -104,27 +112,15 @@ def solve_batch(
         (operator.joint_wrench, Want.JOINTS),
         (operator.brick_twist, Want.BRICKS),
     )
-    maps = [rows[:, : rows.shape[1] if want & flag else 0] for rows, flag in asked]
-    out = [np.empty((sets, rows.shape[1])) for rows in maps]
-    forces = np.empty((sets, held, 3))
-    trusted = np.ones(sets, dtype=bool)
-    for start in range(0, sets, CHUNK):
-        part = slice(start, min(start + CHUNK, sets))
-        index = (3 * columns[part, :, None] + np.arange(3)).reshape(part.stop - start, 3 * held)
-        force, pivot = grip_forces(operator, columns[part], index)
-        trusted[part] = pivot >= TRUSTED
-        force[~trusted[part]] = 0.0
-        load = np.zeros((len(index), size + 1))
-        load[np.arange(len(index))[:, None], index] = force
-        load[:, -1] = 1.0
-        for rows, result in zip(maps, out, strict=True):
-            np.matmul(load, rows, out=result[part])
-        forces[part] = force.reshape(len(index), held, 3)
-    edge_force, displacement, support, joint, twist = out
+    load = _loads(index, force, len(operator.flexibility))
+    edge_force, displacement, support, joint, twist = (
+        load @ rows if want & flag else np.empty((sets, 0)) for rows, flag in asked
+    )
+    grip_force = force.reshape(sets, held, directions(operator))  # loads act along x, y and z
     fields = Fields(
         edge_force,
         displacement.reshape(sets, displacement.shape[1] // 3, 3),
-        forces,
+        grip_force,
         support,
         joint.reshape(sets, joint.shape[1] // 6, 6),
         twist.reshape(sets, twist.shape[1] // 6, 6),
@@ -132,8 +128,46 @@ def solve_batch(
     return fields, trusted
 
 
+def directions(operator: Operator) -> int:
+    """Return in how many directions a node is loaded and held."""
+    return len(operator.flexibility) // (2 * operator.bricks)
+
+
+def load_index(operator: Operator, columns: Ints) -> Ints:
+    """Return the rows of the operator (S, rd) that are the ``d`` loads at every grip (S, r)."""
+    count = directions(operator)
+    rows = count * columns[:, :, None] + np.arange(count)
+    return np.asarray(rows.reshape(len(columns), count * columns.shape[1]))
+
+
+def _loads(index: Ints, force: Floats, size: int) -> sparse.csr_array:
+    """Return forces (S, k) at the rows ``index``, and the weight, as a matrix (S, size + 1).
+
+    A few entries of hundreds: multiplying only these takes half the time of a dense product.
+    """
+    sets, count = index.shape
+    place = np.full((sets, count + 1), size, dtype=np.int32)
+    place[:, :-1] = index
+    value = np.ones((sets, count + 1))
+    value[:, :-1] = force
+    first = np.arange(0, place.size + 1, count + 1, dtype=np.int32)
+    return sparse.csr_array((value.ravel(), place.ravel(), first), shape=(sets, size + 1))
+
+
+def cancels(operator: Operator, index: Ints, force: Floats) -> np.ndarray:
+    """Return whether motions cancel at the grips of sets under their forces (S, k) at ``index``."""
+    out = np.zeros(len(index), dtype=bool)
+    motion = operator.displacement
+    for row, rows in enumerate(index if index.size else ()):
+        parts = np.abs(operator.flexibility[np.ix_(rows, rows)]) @ np.abs(force[row])
+        parts += np.abs(operator.dead_displacement[rows])
+        left = np.abs(motion[-1] + force[row] @ motion[rows]).max()
+        out[row] = parts.max() > CANCEL * left
+    return out
+
+
 def grip_forces(operator: Operator, columns: Ints, index: Ints) -> tuple[Floats, Floats]:
-    """Return the grips' forces (S, 3r) that hold still the degrees of freedom ``index`` (S, 3r).
+    """Return the grips' forces (S, k) that hold still the degrees of freedom ``index`` (S, k).
 
     The second array (S,) is the smallest scaled pivot of their equations: rounding over it bounds
     the error.
@@ -142,29 +176,68 @@ def grip_forces(operator: Operator, columns: Ints, index: Ints) -> tuple[Floats,
     takes what reaches its own node, so that the inner edge between them carries nothing: the limit
     of a stiff bar with both ends held.
     """
+    sets, count = index.shape
     size = len(operator.flexibility)
     held = np.ascontiguousarray(index.T)
-    matrix = operator.flexibility.take(held[:, None] * size + held)
-    pairs = list(_pairs(operator, columns))
-    for sets, _, free in pairs:
-        scale = np.trace(matrix[:, :, sets])
-        matrix[:, :, sets] += scale * free.T[:, None] * free.T
-    answer, pivot = solve_positive(matrix, -operator.dead_displacement.take(held))
-    force = answer.T
-    for sets, brick, free in pairs:
-        edge = operator.inner_edge[brick]
-        share = operator.edge_force[index[sets], edge[:, None]]
-        carried = operator.edge_force[-1, edge] + np.einsum("sk,sk->s", force[sets], share)
-        force[sets] -= (carried / np.einsum("sk,sk->s", free, share))[:, None] * free
+    system = np.empty((count + 1, count, sets))
+    operator.flexibility.take(
+        held[:, None] * size + held,
+        out=system[:-1],
+        mode="clip",  # other modes copy once more
+    )
+    np.negative(operator.dead_displacement.take(held), out=system[-1])
+    pairs = _pairs(operator, columns)
+    if len(pairs.sets):
+        _brace(system, pairs)
+    answer, pivot = solve_positive(system)
+    force = np.ascontiguousarray(answer.T)
+    if len(pairs.sets):
+        _release(operator, index, force, pairs)
     return force, pivot
 
 
-def _pairs(operator: Operator, columns: Ints) -> Iterator[tuple[Ints, Ints, Floats]]:
-    """Yield sets with two grips on one brick, that brick, and the free pair of forces (len, 3r)."""
-    for i, j in combinations(range(columns.shape[1]), 2):
-        sets = np.flatnonzero(columns[:, i] // 2 == columns[:, j] // 2)
-        if len(sets):
-            brick = columns[sets, i] // 2
-            free = np.zeros((len(sets), columns.shape[1], 3))
-            free[:, i], free[:, j] = operator.axis[brick], -operator.axis[brick]
-            yield sets, brick, free.reshape(len(sets), -1)
+class Pairs(NamedTuple):
+    """Two grips on one brick: the set, their places in it, the brick, its axis (len, d)."""
+
+    sets: Ints
+    first: Ints
+    second: Ints
+    brick: Ints
+    axis: Floats
+
+
+def _pairs(operator: Operator, columns: Ints) -> Pairs:
+    """Return all pairs of grips of the sets (S, r) that share a brick."""
+    places = np.array([*combinations(range(columns.shape[1]), 2)], dtype=np.int64).reshape(-1, 2)
+    bricks = columns.T // 2
+    hits = np.flatnonzero(bricks[places[:, 0]] == bricks[places[:, 1]])
+    pair, sets = np.divmod(hits, max(len(columns), 1))
+    brick = bricks[places[pair, 0], sets]
+    return Pairs(sets, places[pair, 0], places[pair, 1], brick, operator.axis[brick])
+
+
+def _brace(system: Floats, pairs: Pairs) -> None:
+    """Give the force between two grips on one brick a flexibility, so that there is one answer."""
+    count, sets = system.shape[1:]
+    width = pairs.axis.shape[1]
+    blocks = system[:-1].reshape(count // width, width, count // width, width, sets)
+    every = np.arange(count)[:, None]
+    scaled = system[every, every, pairs.sets].sum(axis=0)[:, None] * pairs.axis
+    block = scaled[:, :, None] * pairs.axis[:, None]
+    rows = np.array([pairs.first, pairs.second, pairs.second])
+    columns = np.array([pairs.first, pairs.second, pairs.first])
+    blocks[rows, :, columns, :, pairs.sets] += np.array([block, block, -block])
+
+
+def _release(operator: Operator, index: Ints, force: Floats, pairs: Pairs) -> None:
+    """Shift the forces (S, k) of the pairs until their inner edges carry nothing."""
+    edge = operator.inner_edge[pairs.brick]
+    share = operator.edge_force[index[pairs.sets], edge[:, None]]
+    carried = operator.edge_force[-1, edge] + np.einsum("sk,sk->s", force[pairs.sets], share)
+    width = pairs.axis.shape[1]
+    share = share.reshape(len(edge), -1, width)
+    every = np.arange(len(edge))
+    between = share[every, pairs.first] - share[every, pairs.second]
+    shift = (carried / np.einsum("sk,sk->s", between, pairs.axis))[:, None] * pairs.axis
+    nodes = force.reshape(len(force), -1, width)
+    nodes[pairs.sets, [pairs.first, pairs.second]] += np.array([-shift, shift])

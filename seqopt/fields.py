@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Flag, auto
+from itertools import combinations
 from typing import Protocol
 
 import numpy as np
@@ -78,6 +79,37 @@ class Engine(Protocol):
         """
 
 
+FLAGS = {
+    "edge_force": Want.EDGES,
+    "displacement": Want.DISPLACEMENTS,
+    "support": Want.SUPPORT,
+    "joint_wrench": Want.JOINTS,
+    "brick_twist": Want.BRICKS,
+}
+
+
+def only(fields: Fields, want: Want) -> Fields:
+    """Return fields without what is not asked for."""
+    dropped = [name for name, flag in FLAGS.items() if not want & flag]
+    return replace(fields, **{name: getattr(fields, name)[:, :0] for name in dropped})
+
+
+def rows(fields: Fields, which: np.ndarray) -> Fields:
+    """Return the fields of some grip sets, (S,) bool or int."""
+    return Fields(*(getattr(fields, name)[which] for name in Fields.__dataclass_fields__))
+
+
+def joined(which: np.ndarray, inside: Fields, outside: Fields) -> Fields:
+    """Return the fields of grip sets of which ``which`` (S,) come from the first, in order."""
+    out = []
+    for name in Fields.__dataclass_fields__:
+        first, second = getattr(inside, name), getattr(outside, name)
+        whole = np.empty((len(which), *first.shape[1:]))
+        whole[which], whole[~which] = first, second
+        out.append(whole)
+    return Fields(*out)
+
+
 def grip_columns(network: Network, bricks: int, grips: ArrayLike) -> Ints:
     """Return the grips (S, r) as places in ``network.inner.ravel()``, checked."""
     total = len(network.inner)
@@ -88,21 +120,19 @@ def grip_columns(network: Network, bricks: int, grips: ArrayLike) -> Ints:
         raise GripError(
             f"grips have shape {numbers.shape}; give integer node numbers, (sets, grips)"
         )
-    known = np.array([network.node_name[i] for i in network.inner[:bricks].ravel()], dtype=np.int64)
-    order = np.argsort(known)
-    place = np.searchsorted(known[order], numbers).clip(max=len(known) - 1)
-    columns = order[place]
-    free = ~np.isin(known, network.scene.blocked_nodes)
-    wrong = (known[columns] != numbers) | ~free[columns]
+    known, place = network.place_of_grip
+    at = np.searchsorted(known, numbers).clip(max=len(known) - 1)
+    columns = place[at]
+    wrong = (known[at] != numbers) | (columns >= 2 * bricks)
     if wrong.any():
         raise GripError(
             f"grip on node {numbers[wrong][0]}: with {bricks} bricks the free nodes are "
-            f"{sorted(known[free].tolist())}"
+            f"{known[place < 2 * bricks].tolist()}"
         )
-    ranked = np.sort(columns, axis=1)
-    twice = (np.diff(ranked, axis=1) == 0).any(axis=1)
-    if twice.any():
-        raise GripError(
-            f"grip set {numbers[twice][0].tolist()}: a node is held twice; name it once"
-        )
+    for i, j in combinations(range(columns.shape[1]), 2):
+        twice = columns[:, i] == columns[:, j]
+        if twice.any():
+            raise GripError(
+                f"grip set {numbers[twice][0].tolist()}: a node is held twice; name it once"
+            )
     return np.asarray(columns, dtype=np.int64)

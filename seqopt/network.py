@@ -127,6 +127,17 @@ class Network:
             if self.node_kind[i] == Kind.INNER
         }
 
+    @cached_property
+    def place_of_grip(self) -> tuple[Ints, Ints]:
+        """Numbers of all inner nodes in the scene, ascending, and their places in ``inner``.
+
+        A node that must not be held has a place after all others.
+        """
+        numbers = np.array([self.node_name[i] for i in self.inner.ravel()], dtype=np.int64)
+        order = np.argsort(numbers)
+        blocked = np.isin(numbers[order], self.scene.blocked_nodes)
+        return numbers[order], np.where(blocked, len(numbers), order)
+
     def count_nodes(self, bricks: int) -> int:
         """Return how many nodes the structure of the first ``bricks`` bricks has."""
         return int(np.searchsorted(self.node_since, bricks, side="right"))

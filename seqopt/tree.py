@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from seqopt.network import GROUND, Floats, Ints, Network
-from seqopt.statics import skew
+from seqopt.plane import SPACE, Basis
 
 
 @dataclass(frozen=True)
@@ -57,33 +57,35 @@ def grow_tree(network: Network) -> Tree | None:
     return Tree(spring, parent, on_path, np.setdiff1d(np.arange(len(springs.since)), spring))
 
 
-def compliances(network: Network, which: Ints) -> Floats:
-    """Return the 6 × 6 compliances of springs in global axes, (len(which), 6, 6)."""
+def compliances(network: Network, which: Ints, basis: Basis = SPACE) -> Floats:
+    """Return the compliances of springs (len(which), k, k), k directions of a basis."""
     springs = network.springs
     axes = springs.axes[which]
-    out = np.zeros((len(which), 6, 6))
-    for block, stiffness in (
-        (slice(0, 3), springs.translational_stiffness[which]),
-        (slice(3, 6), springs.rotational_stiffness[which]),
+    count = len(basis.force)
+    out = np.zeros((len(which), *2 * basis.wrench.shape[:1]))
+    for block, directions, stiffness in (
+        (slice(0, count), basis.force, springs.translational_stiffness[which]),
+        (slice(count, None), basis.moment, springs.rotational_stiffness[which]),
     ):
-        out[:, block, block] = axes.transpose(0, 2, 1) / stiffness[:, None, :] @ axes
+        own = axes @ directions.T
+        out[:, block, block] = own.transpose(0, 2, 1) / stiffness[:, None, :] @ own
     return out
 
 
-def node_wrenches(network: Network, tree: Tree) -> Floats:
-    """Return the wrenches that unit forces at the inner nodes send through the tree, (B, 6, 2B, 3).
+def node_wrenches(network: Network, tree: Tree, basis: Basis = SPACE) -> Floats:
+    """Return the wrenches that unit forces at the inner nodes send through the tree, (B, k, 2B, d).
 
     The wrench through a brick's spring is the sum of the loads beyond it, taken about the spring.
     """
     at = network.springs.position[tree.spring]
     owner = np.repeat(np.arange(len(at)), 2)
-    out = _levers(network.node_position[network.inner.ravel()], at)
+    out = _unit_wrenches(network.node_position[network.inner.ravel()], at, basis)
     out *= tree.on_path[:, None, owner, None]
     return out
 
 
-def closure_wrenches(network: Network, tree: Tree) -> Floats:
-    """Return the wrenches that unit wrenches of the closures send through the tree, (B, 6, C, 6).
+def closure_wrenches(network: Network, tree: Tree, basis: Basis = SPACE) -> Floats:
+    """Return the wrenches that unit wrenches of the closures send through the tree, (B, k, C, k).
 
     A closure's wrench acts on its second body, and against its first.
     """
@@ -91,29 +93,38 @@ def closure_wrenches(network: Network, tree: Tree) -> Floats:
     at, point = springs.position[tree.spring], springs.position[tree.closures]
     path = np.hstack([tree.on_path, np.zeros((len(at), 1), bool)]).astype(float)  # ground: no path
     first, second = springs.bodies[tree.closures].T
-    out = np.zeros((len(at), 6, len(point), 6))
-    out[..., :3] = _levers(point, at)
-    out[:, 3:, :, 3:] = np.eye(3)[:, None, :]
+    forces, size = len(basis.force), len(basis.wrench)
+    out = np.zeros((len(at), size, len(point), size))
+    out[..., :forces] = _unit_wrenches(point, at, basis)
+    out[:, forces:, :, forces:] = np.eye(size - forces)[:, None, :]
     out *= (path[:, second] - path[:, first])[:, None, :, None]
     return out
 
 
-def twists(network: Network, tree: Tree, strain: Floats, centroid: Floats) -> Floats:
-    """Return the bricks' twists (B, 6, K) for the deformations (B, 6, K) of the tree's springs."""
+def twists(
+    network: Network, tree: Tree, strain: Floats, centroid: Floats, basis: Basis = SPACE
+) -> Floats:
+    """Return the bricks' twists (B, k, K) for the deformations (B, k, K) of the tree's springs."""
     at = network.springs.position[tree.spring]
-    arm = skew(centroid - at)
+    shift = len(basis.force)
     out = strain.copy()
-    out[:, :3] -= arm @ strain[:, 3:]
+    out[:, :shift] += _carried(basis, centroid - at) @ strain[:, shift:]
     for b in np.flatnonzero(tree.parent != GROUND):
         parent = tree.parent[b]
         out[b] += out[parent]
-        out[b, :3] -= skew(centroid[b] - centroid[parent]) @ out[parent, 3:]
+        out[b, :shift] += _carried(basis, centroid[b] - centroid[parent]) @ out[parent, shift:]
     return out
 
 
-def _levers(points: Floats, at: Floats) -> Floats:
-    """Return the wrenches about ``at`` (P, 3) of unit forces at ``points`` (M, 3), (P, 6, M, 3)."""
-    out = np.empty((len(at), 6, len(points), 3))
-    out[:, :3] = np.eye(3)[:, None, :]
-    out[:, 3:] = skew(points - at[:, None, :]).transpose(0, 2, 1, 3)
+def _carried(basis: Basis, arms: Floats) -> Floats:
+    """Return the translations (..., d, m) at the ends of arms (..., 3) that unit rotations make."""
+    return np.asarray(basis.levers(arms).swapaxes(-1, -2))
+
+
+def _unit_wrenches(points: Floats, at: Floats, basis: Basis) -> Floats:
+    """Return the wrenches about ``at`` (P, 3) of unit forces at ``points`` (M, 3), (P, k, M, d)."""
+    forces = len(basis.force)
+    out = np.empty((len(at), len(basis.wrench), len(points), forces))
+    out[:, :forces] = np.eye(forces)[:, None, :]
+    out[:, forces:] = basis.levers(points - at[:, None, :]).transpose(0, 2, 1, 3)
     return out

@@ -9,15 +9,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from seqopt import states as evaluation
+from seqopt.arch import ArchShape, arch_scene
 from seqopt.compliance import ComplianceEngine
 from seqopt.errors import MechanismError, SolverError
 from seqopt.fields import Want, grip_columns
 from seqopt.frame import FrameEngine
+from seqopt.loops import three_robot_loop
 from seqopt.methods import METHODS
 from seqopt.network import network
 from seqopt.plan_file import published_plan
 from seqopt.responses import step_fields
 from seqopt.rigid import solve_rigid
+from seqopt.states import SCALARS, evaluate
 from tests.scenes import arches, states, walls
 from tests.test_laws import scaled
 
@@ -102,6 +106,30 @@ def test_a_batch_equals_its_sets_one_by_one(state, data):
         for name in FIELDS:
             a, b = getattr(whole, name)[i], getattr(single, name)[0]
             assert np.abs(a - b).max(initial=0) <= 1e-9 * np.abs(b).max(initial=1e-300)
+
+
+def test_two_bricks_held_at_both_nodes():
+    """Each inner edge carries nothing, whatever the order of the grips."""
+    net = network(arch_scene(ArchShape(pitch=[1.2, 0.7, 0.2, -0.3, -0.8, -1.2])))
+    sets = np.array([[4, 5, 8, 9], [9, 4, 8, 5], [4, 8, 1, 11], [10, 11, 4, 7]])
+    fast = ComplianceEngine(net).solve(6, sets, Want.ALL)
+    direct = solve_rigid(net, 6, grip_columns(net, 6, sets))
+    assert max(gap(direct, fast, name) for name in FIELDS) <= 1e-9
+    held = np.flatnonzero((net.edge_spring < 0) & np.isin(net.edge_brick, [2, 4]))
+    largest = np.abs(fast.edge_force).max()
+    assert np.abs(fast.edge_force[:2][:, held]).max() <= 1e-12 * largest
+
+
+def test_fields_are_asked_for_in_blocks(engine25, monkeypatch):
+    schedule = three_robot_loop(engine25.network)
+    monkeypatch.setattr(evaluation, "BLOCK", 10**9)
+    whole = evaluate(engine25, schedule, lambda _: SCALARS)
+    monkeypatch.setattr(evaluation, "BLOCK", 100)
+    parts = evaluate(engine25, schedule, lambda _: SCALARS)
+    assert parts.models == whole.models
+    for a, b in zip(parts.states, whole.states, strict=True):
+        for name in SCALARS:
+            assert a.responses[name] == pytest.approx(b.responses[name], rel=1e-12, nan_ok=True)
 
 
 def hinge(scene, joint):

@@ -9,7 +9,9 @@ import pytest
 
 from experiments.limit_scenes import HELD, LOOSE_AT, chain, loosened
 from experiments.reference_chain import solve_exactly
+from seqopt import compliance
 from seqopt.arch import ArchShape, arch_scene
+from seqopt.batch_solve import solve_positive
 from seqopt.compliance import ComplianceEngine, solve_batch
 from seqopt.engines import ENGINES
 from seqopt.errors import GripError, MechanismError, SolverError
@@ -19,9 +21,14 @@ from seqopt.operator import OperatorBuilder
 from seqopt.tree import grow_tree
 
 
+def pattern(name):
+    """Bricks that the engine accepts: along the arch where all must lie in one plane."""
+    return "V" if name == "planar" else "VLR"
+
+
 @pytest.fixture(params=ENGINES)
 def engine(request):
-    shape = ArchShape(pitch=[1.2, 0.7, 0.2, -0.3, -0.8, -1.2])
+    shape = ArchShape(pitch=[1.2, 0.7, 0.2, -0.3, -0.8, -1.2], pattern=pattern(request.param))
     return ENGINES[request.param](network(arch_scene(shape)))
 
 
@@ -77,7 +84,7 @@ def test_bad_grips_are_refused(engine, bricks, grips, named):
 @pytest.mark.parametrize("name", ENGINES)
 def test_a_brick_held_by_robots_alone(name):
     """One grip leaves it turning, two leave it turning about their line, whatever the engine."""
-    scene = arch_scene(ArchShape(pitch=[1.2, 0.7], closed=False))
+    scene = arch_scene(ArchShape(pitch=[1.2, 0.7], pattern=pattern(name), closed=False))
     alone = replace(scene, joints=())
     engine = ENGINES[name](network(alone))
     engine.solve(1, [[1]])
@@ -89,7 +96,7 @@ def test_a_brick_held_by_robots_alone(name):
 @pytest.mark.parametrize("name", ENGINES)
 def test_an_end_that_closes_late(name):
     """A ground end with ``closes_with`` carries nothing before that brick is placed."""
-    scene = arch_scene(ArchShape(pitch=[1.0, 0.3, -0.3, -1.0]))
+    scene = arch_scene(ArchShape(pitch=[1.0, 0.3, -0.3, -1.0], pattern=pattern(name)))
     near, far = scene.grounds
     early = replace(far, brick=3, position=scene.joints[2].position, anchor=far.anchor)
     late = replace(scene, grounds=(near, replace(early, closes_with=4)))
@@ -131,6 +138,67 @@ def test_grips_beyond_a_loose_joint(factor, only_turning):
     columns = grip_columns(net, 25, np.array(sets))
     _, trusted = solve_batch(operator, columns)
     assert trusted.tolist() == [factor > 1e-5, factor > 1e-5, True]
+
+
+@pytest.mark.parametrize("count", [1, 2, 6, 9])
+def test_many_small_systems(count):
+    rng = np.random.default_rng(count)
+    root = rng.standard_normal((7, count, count))
+    matrix, load = root @ root.transpose(0, 2, 1), rng.standard_normal((7, count))
+    system = np.concatenate([np.tril(matrix), load[:, None]], axis=1).transpose(1, 2, 0).copy()
+    answer, pivot = solve_positive(system)
+    expected = np.linalg.solve(matrix, load[..., None])[..., 0]
+    assert np.abs(answer.T - expected).max() <= 1e-9 * np.abs(expected).max()
+    diagonals = np.linalg.cholesky(matrix).diagonal(axis1=1, axis2=2) ** 2
+    scaled = diagonals / matrix.diagonal(axis1=1, axis2=2)
+    assert pivot == pytest.approx(scaled.min(axis=1), rel=1e-6)
+
+
+@pytest.mark.parametrize("last", [-1.0, 0.0, 0.5, 1.0, 1.0 + 1e-9])
+def test_a_system_that_is_not_positive_is_seen(last):
+    """Beside a sound one, whose answer stays."""
+    system = np.empty((4, 3, 2))
+    system[:3, :, 0] = [[2, 0, 0], [1, 1, 0], [1, 1, last]]  # positive definite beyond 1
+    system[:3, :, 1] = 2 * np.eye(3)
+    system[3] = 1.0
+    answer, pivot = solve_positive(system)
+    assert not pivot[0] >= 1e-8  # also where it is no number
+    assert pivot[1] == 1
+    assert answer[:, 1].tolist() == [0.5, 0.5, 0.5]
+
+
+def test_a_batch_of_many_passes(monkeypatch):
+    net = network(chain(8))
+    sets = [(1, 9, 14), (14, 15, 3), (4, 5, 2), (12, 10, 7), (8, 9, 15)]
+    whole = ComplianceEngine(net).solve(8, sets, Want.ALL)
+    monkeypatch.setattr(compliance, "CHUNK", 2)
+    parts = ComplianceEngine(net).solve(8, sets, Want.ALL)
+    for name in ("edge_force", "displacement", "grip_force", "support"):
+        gap = np.abs(getattr(parts, name) - getattr(whole, name)).max()
+        assert gap <= 1e-12 * np.abs(getattr(whole, name)).max()
+
+
+def test_loads_in_two_directions():
+    """Held and loaded in its plane, a plane arch knows no third direction."""
+    net = network(arch_scene(ArchShape(pitch=[1.2, 0.7, 0.2, -0.3, -0.8, -1.2], pattern="V")))
+    assert not np.ptp(net.node_position[:, 1])
+    space = OperatorBuilder(net, grow_tree(net)).operator(6)
+    kept = np.flatnonzero(np.arange(36) % 3 != 1)
+    rows = ("edge_force", "displacement", "support", "joint_wrench", "brick_twist")
+    plane = replace(
+        space,
+        flexibility=space.flexibility[np.ix_(kept, kept)],
+        dead_displacement=space.dead_displacement[kept],
+        axis=space.axis[:, [0, 2]],
+        **{name: getattr(space, name)[[*kept, 36]] for name in rows},
+    )
+    columns = np.array([(0, 7, 11), (6, 7, 2), (3, 9, 8), (4, 1, 10)])
+    (more, sound), (less, trusted) = (solve_batch(o, columns, Want.ALL) for o in (space, plane))
+    assert sound.all()
+    assert trusted.all()
+    for name in rows[:3]:
+        gap = np.abs(getattr(less, name) - getattr(more, name)).max()
+        assert gap <= 1e-12 * np.abs(getattr(more, name)).max()
 
 
 def test_what_is_solved_again_fits_what_was_asked():
