@@ -170,7 +170,15 @@ def _shared_arguments() -> tuple[_Parser, _Parser]:
         "--engine",
         choices=tuple(ENGINES),
         default="compliance",
-        help="compliance: exactly rigid bricks, fast (default); frame: stiff bars, the slow check",
+        help="compliance: exactly rigid bricks, fast (default); frame: stiff bars, the slow check; "
+        "planar: three unknowns per brick where all lies in a plane; discrete: joints that "
+        "part and slip; auto: the cheapest of planar, compliance and discrete that is enough",
+    )
+    engine.add_argument(
+        "--mortar",
+        choices=tuple(MORTARS),
+        help="what holds the joints of the engines auto and discrete: the study's epoxy or nothing "
+        "(default: epoxy)",
     )
     return scene, engine
 

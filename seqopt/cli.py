@@ -23,15 +23,18 @@ from seqopt.arguments import (
     parse_options,
     parser,
 )
+from seqopt.assembly import MORTARS
 from seqopt.certificates import certify_steps, format_verdicts, stability_table
 from seqopt.compare import compare, format_comparison, is_reference_arch
 from seqopt.contest import Contest, contest, format_contest
-from seqopt.engines import ENGINES
+from seqopt.engines import make_engine
 from seqopt.errors import SceneError, SeqoptError, SolverError, StepError
+from seqopt.fidelity import AutoEngine
+from seqopt.fields import Engine
 from seqopt.files import FileError, make_folder, write_bytes, write_text
 from seqopt.loops import SCHEDULES
 from seqopt.methods import METHODS
-from seqopt.network import network
+from seqopt.network import Network, network
 from seqopt.optimize import optimize, plan_table, prepare, responses_table, selection_table, summary
 from seqopt.placement import ProblemError
 from seqopt.plan_file import published_plan, read_plan
@@ -63,7 +66,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _compare(options: argparse.Namespace) -> None:
     scene = load_scene(options.scene)
-    engine = ENGINES[options.engine](network(scene))
+    engine = _engine(options, network(scene))
     criterion = parse_criterion(options.criteria)
     if options.out is not None:
         _require_matplotlib(options.out)
@@ -75,9 +78,28 @@ def _compare(options: argparse.Namespace) -> None:
     except (StepError, ProblemError) as error:
         print(f"Three-robot loop: not possible here; {error}")
         return
+    finally:
+        _say_levels(engine)
     print(format_contest(result, criterion))
     if options.out is not None:
         _write_contest(options.out, result)
+
+
+def _engine(options: argparse.Namespace, net: Network) -> Engine:
+    mortar = None if options.mortar is None else MORTARS[options.mortar]
+    return make_engine(options.engine, net, mortar)
+
+
+def _say_levels(engine: Engine) -> None:
+    """Say which levels an engine that picks them took, and why."""
+    if not isinstance(engine, AutoEngine):
+        return
+    for choice, sets in engine.tally.items():
+        print(
+            f"engine: {choice.level.value} for {sets} grip sets: {choice.reason}", file=sys.stderr
+        )
+    if engine.unchecked:
+        print(f"engine: {engine.unchecked}", file=sys.stderr)
 
 
 def _progress(stage: str) -> None:
@@ -116,10 +138,11 @@ def _optimize(options: argparse.Namespace) -> None:
     make_folder(options.out)
     start = time.perf_counter()
     net = network(scene)
-    engine = ENGINES[options.engine](net)
+    engine = _engine(options, net)
     schedule = SCHEDULES[options.method](net)
     assemble = time.perf_counter() - start
     outcome = optimize(prepare(engine, schedule, criterion, limits), which, **chosen)
+    _say_levels(engine)
     report = summary(outcome)
     report["seconds"] = {"assemble": round(assemble, 6), **outcome.seconds}
     files = {
@@ -140,9 +163,10 @@ def _optimize(options: argparse.Namespace) -> None:
 
 def _analyze(options: argparse.Namespace) -> None:
     scene = load_scene(options.scene)
-    engine = ENGINES[options.engine](network(scene))
+    engine = _engine(options, network(scene))
     steps = _steps(scene, options)
     table = analyze(engine, steps)
+    _say_levels(engine)
     text = table.to_csv(index=False, float_format="%.6g", lineterminator="\n")
     if options.fields is not None:
         write_bytes(options.fields, fields_archive(engine, steps))

@@ -8,7 +8,7 @@ from seqopt.assembly import Assembly
 from seqopt.errors import SceneError
 from seqopt.network import GROUND, Floats, Network
 from seqopt.scene import Brick
-from seqopt.steps import Step
+from seqopt.steps import Step, StepKind
 
 SLIVER = 1e-6  # smallest overlap of two faces, as a share of the smaller one
 
@@ -52,6 +52,12 @@ def step_assembly(network: Network, step: Step) -> Assembly:
         grip_position=np.array([network.scene.node_position(n) for n, _ in held]).reshape(-1, 3),
         payload=np.array([robot.payload for _, robot in held]),
     )
+
+
+def bare_assembly(network: Network, bricks: int) -> Assembly:
+    """Return the first bricks held by nobody; see `step_assembly`."""
+    nobody = (None,) * len(network.scene.robots)
+    return step_assembly(network, Step(0, StepKind.RELEASE, bricks, nobody))
 
 
 def _oriented(axes: Floats, point: Floats, between: list[Brick]) -> Floats:

@@ -152,11 +152,11 @@ def _spectrum(network: Network, matrix: Floats, fixed: Floats) -> tuple[Floats, 
     reduced = free.T @ matrix @ free
     diagonal = np.diag(reduced)
     if not diagonal.max() > 0:
-        raise _mechanism(network, free[:, 0])
+        raise mechanism(network, free[:, 0])
     motions = free / np.sqrt(np.maximum(diagonal, MECHANISM * diagonal.max()))
     values, vectors = np.linalg.eigh(motions.T @ matrix @ motions)
     if values[0] < MECHANISM * values[-1]:
-        raise _mechanism(network, motions @ vectors[:, 0])
+        raise mechanism(network, motions @ vectors[:, 0])
     return values, vectors, motions
 
 
@@ -171,8 +171,8 @@ def _constrained(network: Network, matrix: Floats, fixed: Floats, load: Floats) 
     return np.asarray(motions @ answer)
 
 
-def _mechanism(network: Network, twist: Floats) -> MechanismError:
-    """Return the error that shows an unresisted motion, largest component 1."""
+def mechanism(network: Network, twist: Floats) -> MechanismError:
+    """Return the error that shows an unresisted motion (6b,), its largest component scaled to 1."""
     shape = (twist / np.abs(twist).max()).reshape(-1, 6)
     worst = int(np.abs(shape).max(axis=1).argmax())
     names = [brick.name for brick in network.scene.placed[: len(shape)]]

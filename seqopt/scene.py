@@ -155,6 +155,8 @@ class Ground(Spring):
         where = f"ground end of brick {self.brick}"
         self._check(where)
         _set(self, "anchor", vector(f"{where}: anchor", self.anchor))
+        if self.anchor == self.position:
+            raise SceneError(f"{where}: anchor and position are one point; give the stub a length")
 
 
 @dataclass(frozen=True, kw_only=True)
