@@ -1,14 +1,15 @@
 """Claim: on the full overlap of `arch25` the fast engine is far ahead of the tools one would take.
 
-That is: at least 60 times as fast as the best package at its leanest, 20 times as the best loop
-that one would write with SciPy, and within 3 times of its own matrix products, whether only what
-the criterion needs is asked or every edge force and node displacement.
+That is: at least 60 times as fast as the best package at its leanest and 20 times as the best loop
+that one would write with SciPy, whether only reactions are asked, what the criterion needs, or
+every edge force and node displacement; with the latter two within 3 times of the dense matrix
+products that such a batch takes. (The engine's own products are sparse; they are measured too.)
 
 Method: the distinct models of the three-robot loop under equations 2 and 3, which the study counts
 as 22,724. Engine and peers take turns in one process on one core. The engine answers all models; a
 peer a few random ones of every brick count and number of grips, drawn anew in every round, and its
 time is extended to all. Models kept by a peer and operators of the engine are timed and counted.
-Medians of rounds. The bound is the engine's own dense products alone, same shapes, ready memory.
+Medians of rounds. Bounds are the products alone, same shapes, dense in ready memory and sparse.
 Then one placement problem by general tools.
 
 Inputs: the shipped scene; seed 0; PyNiteFEA, openseespy and pyconmech if installed. Command:
@@ -27,10 +28,11 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
+from scipy import sparse
 
 from experiments.engine_speed import best
 from experiments.peer_chain import Answer, Peer, chain_of
-from experiments.peer_chart import BOUND, OURS, chart
+from experiments.peer_chart import BOUND, OURS, SPARSE, chart
 from experiments.peer_frames import PACKAGES, missing_packages
 from experiments.peer_loops import LOOPS, loop
 from experiments.peer_paths import PATHS, SLOW
@@ -45,9 +47,8 @@ from seqopt.scene_file import load_scene
 
 EXTRA = 'pip install "seqopt[peers]" openseespy'
 SETTINGS = ("reactions", "criterion", "all fields")
-SETTINGS = ("criterion", "all fields")
 PACKAGE, LOOP = 60.0, 20.0  # times the engine's time
-NEAR = 3.0  # times the engine's own products
+NEAR = 3.0  # times the dense products of the batch
 LIKE_RIGID, LIKE_BARS = 1e-9, 1e-4  # largest difference of peers with rigid bricks, stiff bars
 SLOWEST = ("PyNite", "pyconmech")  # answer one model of a kind in a round
 
@@ -106,28 +107,52 @@ def operators(net: Network, cases: list[Case]) -> ComplianceEngine:
     return engine
 
 
-def products(net: Network, cases: list[Case], setting: str) -> tuple[Callable[[], None], float]:
-    """Return a call that does only the engine's dense products, and how many flops they are."""
+def products(
+    net: Network, cases: list[Case], setting: str, *, sparsely: bool = False
+) -> tuple[Callable[[], None], float]:
+    """Return a call that does only the products of a batch, and how many flops they are."""
     rng = np.random.default_rng(0)
-    work = []
+    work: list[tuple[Floats | sparse.csr_array, Floats, Floats]] = []
+    flops = 0.0
     for case in cases:
-        asked = case.asked(setting)
-        widths = (
-            (Want.EDGES, net.count_edges(case.bricks)),
-            (Want.DISPLACEMENTS, 3 * net.count_nodes(case.bricks)),
-            (Want.SUPPORT, 6),
-        )
         load = rng.standard_normal((len(case.grips), 6 * case.bricks + 1))
-        for width in (w for flag, w in widths if asked & flag):
+        index = np.hstack([load_index(case), np.full((len(load), 1), load.shape[1] - 1)])
+        few = _spread(index, rng.standard_normal(index.shape), load.shape[1])
+        each = index.shape[1] if sparsely else load.shape[1]
+        for width in _widths(net, case, setting):
             rows = rng.standard_normal((load.shape[1], width))
-            work.append((load, rows, np.empty((len(load), width))))
+            work.append((few if sparsely else load, rows, np.empty((len(load), width))))
+            flops += 2 * len(load) * each * width
 
     def call() -> None:
         for load, rows, out in work:
-            np.matmul(load, rows, out=out)
+            if isinstance(load, np.ndarray):
+                np.matmul(load, rows, out=out)
+            else:
+                load @ rows
 
     call()
-    return call, float(sum(2 * a.shape[0] * b.size for a, b, _ in work))
+    return call, flops
+
+
+def load_index(case: Case) -> Ints:
+    """Return the loads (S, 3r) that the grips of a case exert."""
+    return np.asarray(3 * case.columns[:, :, None] + np.arange(3)).reshape(len(case.columns), -1)
+
+
+def _spread(index: Ints, values: Floats, size: int) -> sparse.csr_array:
+    starts = np.arange(0, index.size + 1, index.shape[1])
+    return sparse.csr_array((values.ravel(), index.ravel(), starts), shape=(len(index), size))
+
+
+def _widths(net: Network, case: Case, setting: str) -> list[int]:
+    """Return the sizes of the fields that a setting asks of a case."""
+    sizes = (
+        (Want.EDGES, net.count_edges(case.bricks)),
+        (Want.DISPLACEMENTS, 3 * net.count_nodes(case.bricks)),
+        (Want.SUPPORT, 6),
+    )
+    return [size for flag, size in sizes if case.asked(setting) & flag]
 
 
 class Round(NamedTuple):
@@ -189,13 +214,18 @@ def compete(
     """Return a row per round, setting and tool; tools take turns."""
     rng, rows = np.random.default_rng(0), []
     engine = operators(net, cases)
-    calls = {s: products(net, cases, s) for s in SETTINGS}
+    bounds = {
+        (s, name): products(net, cases, s, sparsely=name == SPARSE)
+        for s in SETTINGS
+        for name in (BOUND, SPARSE)
+    }
     for number in range(rounds):
         prepare = best(partial(operators, net, cases), 1)
-        for s, (call, flops) in calls.items():
+        for s in SETTINGS:
             ours = best(partial(answer_all, engine, cases, s), 3)
             rows.append((number, s, OURS, prepare, ours, np.nan, np.nan))
-            rows.append((number, s, BOUND, 0.0, best(call, 3), np.nan, flops))
+        for (s, bound), (call, flops) in bounds.items():
+            rows.append((number, s, bound, 0.0, best(call, 3), np.nan, flops))
         for name in names:
             done = turn(net, cases, name, 1 if name in SLOWEST else few, rng)
             gap = difference(engine, done.answers)
@@ -242,7 +272,7 @@ def judge(table: pd.DataFrame, ways: pd.DataFrame) -> bool:
     for setting in SETTINGS:
         part = table[table["setting"] == setting].set_index("tool")
         near = 1 / float(part["ratio"][BOUND])
-        peers = part.drop(index=[OURS, BOUND])
+        peers = part.drop(index=[OURS, BOUND, SPARSE])
         packaged = peers.index.isin(list(PACKAGES))
         for label, those, target in (
             ("package", peers[packaged], PACKAGE),
@@ -255,8 +285,11 @@ def judge(table: pd.DataFrame, ways: pd.DataFrame) -> bool:
                     f"claimed {target:.0f}"
                 )
                 holds.append(float(row["ratio"]) >= target)
-        print(f"{setting}: {near:.1f} times its own products; claimed {NEAR:.0f}")
-        holds.append(near <= NEAR)
+        print(
+            f"{setting}: {near:.2g} times the dense products; claimed {NEAR:.0f} "
+            f"({1 / float(part['ratio'][SPARSE]):.2g} times its own sparse ones)"
+        )
+        holds.append(near <= NEAR or setting == "reactions")  # no products to speak of
         for name, gap in peers["difference"].items():
             holds.append(gap <= (LIKE_RIGID if "bricks" in str(name) else LIKE_BARS))
     return all(holds)

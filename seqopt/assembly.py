@@ -41,7 +41,7 @@ class Mortar:
 FRICTION = math.tan(math.radians(25.0))
 DRY = Mortar(friction=FRICTION)
 EPOXY = Mortar(friction=FRICTION, tensile_strength=3e6, cohesion=2e6)
-"""The study's epoxy putty (section 3.4: 25°, 3 MPa, and 2 MPa printed as "2 MPa/m")."""
+"""The study's epoxy putty (section 3.2.3: 25°, 3 MPa, and 2 MPa printed as "2 MPa/m")."""
 MORTARS = {"epoxy": EPOXY, "dry": DRY}
 
 

@@ -3,7 +3,7 @@ r"""The discrete-element engine: rigid bricks on beds of springs that part, slip
 A joint is its own elastic spring in series with a bed of points over the face between its bricks,
 so that within the elastic limits the answer is that of exactly rigid bricks; the bed takes over
 where tension or shear exceeds what the mortar holds (`seqopt.friction_law`). With a `BedStiffness`
-the bed alone is the joint, as in the study's discrete-element models (section 3.4). Every grip
+the bed alone is the joint, as in the study's discrete-element models (section 3.2.3). Every grip
 holds its node, or pinches its brick between two pads.
 
 One grip set at a time: Newton's method with the exact tangent, the load in steps once a bond

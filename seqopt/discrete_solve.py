@@ -14,6 +14,7 @@ from seqopt.network import Floats
 
 ITERATIONS = 60
 BALANCED = 1e-10  # largest force left on a body, over the heaviest body's weight
+ROUNDING = 1e-13  # relative
 LARGEST_STEP, SMALLEST_STEP = 0.1, 1e-3  # of the load, once a bond breaks
 FIRST = 1.0  # resistance to motion at first, over the stiffness
 MOVES = 120  # against a resistance
@@ -49,6 +50,15 @@ class Held:
         carried = system.gap.T @ system.bed_wrenches(force).ravel()
         return np.asarray(load + carried - (system.layers + self.pads) @ (self.free @ motion))
 
+    def rounding(self, motion: Floats, force: Floats) -> float:
+        """Return what rounding leaves of a balance between large forces, N."""
+        moved = np.abs(self.free @ motion)
+        return ROUNDING * float((self._sizes @ moved).max() + np.abs(force).sum())
+
+    @cached_property
+    def _sizes(self) -> sparse.csr_array:
+        return sparse.csr_array(abs(self.system.layers) + abs(self.pads))
+
     def gone(self, state: Settled) -> bool:
         """Return whether a state has moved too far for the bricks to be where they were."""
         return bool(np.abs(state.motion).max(initial=0.0) > FAR * self.system.length)
@@ -77,7 +87,7 @@ class Settled:
         m.
     broken : (P,) bool
     left : float
-        Largest force not balanced, over the heaviest body's weight.
+        Largest force not balanced, over the heaviest body's weight or what rounding makes of it.
     """
 
     motion: Floats
@@ -146,6 +156,7 @@ def _balance(held: Held, state: Settled, share: float) -> Settled:
     (pseudo-transient continuation, Kelley and Keyes 1998), friction keeping track of every slip.
     """
     found = _newton(held, state, share, 0.0)
+    state = replace(state, left=np.inf)
     resistance = FIRST
     for _ in range(MOVES):
         if found is not None and (found.rests or held.gone(found)):
@@ -169,10 +180,10 @@ def _newton(held: Held, state: Settled, share: float, resistance: float) -> Sett
         left = held.left(motion, force, share * system.load)
         missing = left - resistance * held.diagonal * (motion - state.motion)
         size = np.linalg.norm(missing)
-        if np.abs(missing).max() <= BALANCED * system.scale:
+        unit = max(system.scale, held.rounding(motion, force) / BALANCED)
+        if np.abs(missing).max() <= BALANCED * unit:
             slip = system.points.slipped(opening, force)
-            done = np.abs(left).max() / system.scale
-            return Settled(motion, force, slip, state.broken, float(done))
+            return Settled(motion, force, slip, state.broken, float(np.abs(left).max() / unit))
         if size >= best and shorter < HALVINGS:
             step *= 0.5
             motion, shorter = motion - step, shorter + 1

@@ -37,7 +37,7 @@ class BedStiffness:
 
 
 STUDY_BED = BedStiffness(normal=100e9, tangential=10e9)
-"""jKn and jKs of the study's discrete-element models (section 3.4)."""
+"""jKn and jKs of the study's discrete-element models (section 3.2.3)."""
 
 
 class Across(IntEnum):

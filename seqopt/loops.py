@@ -19,7 +19,7 @@ def three_robot_loop(network: Network) -> Schedule:
     The first three robots place a brick each. Then, once per brick: the robot whose grip was chosen
     before last releases and places the next brick, the one that placed the brick before releases,
     and takes a new grip, which is to be chosen. At least two robots grip, and the newest brick is
-    held, at every step after the first. Source: section 5.2.2 and figure 14 of the study.
+    held, at every step after the first. Source: section 5.2.2 and figure 12 of the study.
     """
     scene = network.scene
     total = len(scene.placed)
