@@ -2,17 +2,21 @@
 
 Command: ``python -m experiments`` lists; ``python -m experiments all [--quick]`` runs each one in
 a process of its own and, unless quick, stores verdicts and seconds in
-``experiments/results/verdicts.csv``. An experiment that an extra is missing for is named and left
-out. The exit status is 1 if a claim does not hold.
+``experiments/results/verdicts.csv``. Experiments that take the clock run alone, the others two at a
+time, those first that took longest the last time. An experiment that an extra is missing for is
+named and left out. The exit status is 1 if a claim does not hold.
 """
 
 from __future__ import annotations
 
 import argparse
 import ast
+import os
 import subprocess
 import sys
 import time
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
 
 import pandas as pd
@@ -23,6 +27,8 @@ HOME = Path(__file__).parent
 STORE = RESULTS / "verdicts.csv"
 PREFIX = "verdict: the claim "
 MISSING = 2  # exit status of an experiment whose extra is not installed
+TOGETHER = 2  # experiments at a time, a core each, where no time is a result
+ONE_CORE = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 
 
 def claims() -> dict[str, str]:
@@ -35,11 +41,35 @@ def claims() -> dict[str, str]:
     return out
 
 
+def imports(name: str) -> set[str]:
+    """Return the modules that an experiment or one of its helpers imports."""
+    out = set()
+    for node in ast.walk(ast.parse((HOME / f"{name}.py").read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            out |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            out.add(node.module)
+    return out
+
+
+def takes_time(name: str) -> bool:
+    """Return whether times are a result: the experiment or a direct helper imports the clock."""
+    own = imports(name)
+    helpers = [part.removeprefix("experiments.") for part in own if part.startswith("experiments.")]
+    return "time" in own or any("time" in imports(helper) for helper in helpers)
+
+
 def run(name: str, *arguments: str) -> tuple[str, float]:
     """Return how an experiment ended and the seconds it took."""
     start = time.perf_counter()
-    command = [sys.executable, "-m", f"experiments.{name}", *arguments]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=HOME.parent)
+    done = subprocess.run(
+        [sys.executable, "-m", f"experiments.{name}", *arguments],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=HOME.parent,
+        env=os.environ | ONE_CORE,
+    )
     seconds = time.perf_counter() - start
     last = (done.stdout.splitlines() or [""])[-1]
     if done.returncode == 0 and last.startswith(PREFIX):
@@ -48,14 +78,33 @@ def run(name: str, *arguments: str) -> tuple[str, float]:
     return ("left out: " if done.returncode == MISSING else "failed: ") + why, seconds
 
 
+def stored(column: str) -> dict[str, object]:
+    """Return a column of the last run of all, by experiment."""
+    return pd.read_csv(STORE, index_col=0)[column].to_dict() if STORE.exists() else {}
+
+
+def ended(
+    names: Sequence[str], together: int, *arguments: str
+) -> Iterator[tuple[str, tuple[str, float]]]:
+    """Run experiments, so many at a time; yield each with how it ended, as it ends."""
+    with ThreadPoolExecutor(together) as pool:
+        jobs = {pool.submit(run, name, *arguments): name for name in names}
+        for job in as_completed(jobs):
+            yield jobs[job], job.result()
+
+
 def run_all(*arguments: str) -> pd.DataFrame:
     """Run every experiment; return a row each."""
-    rows = []
-    for name, claim in claims().items():
-        verdict, seconds = run(name, *arguments)
-        print(f"{name:22}{seconds:7.1f} s  {verdict}", flush=True)
-        rows.append({"experiment": name, "verdict": verdict, "seconds": seconds, "claim": claim})
-    return pd.DataFrame(rows)
+    last, rows = stored("seconds"), []
+    names = sorted(claims(), key=lambda name: -float(str(last.get(name, "inf"))))
+    alone = [name for name in names if takes_time(name)]
+    others = [name for name in names if name not in alone]
+    for group, together in ((others, TOGETHER), (alone, 1)):
+        for name, (verdict, seconds) in ended(group, together, *arguments):
+            print(f"{name:22}{seconds:7.1f} s  {verdict}", flush=True)
+            rows.append({"experiment": name, "verdict": verdict, "seconds": seconds})
+    table = pd.DataFrame(rows).sort_values("experiment", ignore_index=True)
+    return table.assign(claim=table["experiment"].map(claims()))
 
 
 def main() -> int:
@@ -66,15 +115,14 @@ def main() -> int:
     parser.add_argument("--quick", action="store_true", help="reduced size, nothing stored")
     options = parser.parse_args()
     if options.what == "list":
-        stored = pd.read_csv(STORE, index_col=0)["verdict"].to_dict() if STORE.exists() else {}
+        verdicts = stored("verdict")
         for name, claim in claims().items():
-            print(f"{name:22}{stored.get(name, 'not run'):14}{claim}")
+            print(f"{name:22}{verdicts.get(name, 'not run')!s:22}{claim}")
         return 0
     table = run_all(*(["--quick"] if options.quick else []))
     if not options.quick:
         table.to_csv(STORE, index=False, float_format="%.1f", lineterminator="\n")
-    good = table["verdict"].isin(["holds"]) | table["verdict"].str.startswith("left out")
-    return int(not good.all())
+    return int(not table["verdict"].str.startswith(("holds", "left out")).all())
 
 
 if __name__ == "__main__":

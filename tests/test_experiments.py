@@ -7,9 +7,18 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
-from experiments.identify_arch25 import VARIANTS, fit, residuals, scene_of, start_of, target
+from experiments.arch_numbers import OFFSETS, SHAPE, VARIANTS, report, scene_of, start_of
+from experiments.identify_arch25 import (
+    beside_shipped,
+    fit,
+    holds,
+    residuals,
+    target,
+)
+from experiments.plotting import RESULTS
 from seqopt.paper import printed_steps
 
 ROOT = Path(__file__).parent.parent
@@ -32,6 +41,9 @@ QUICK = [
     "calibration",
     "discrete_arches",
     "speed_accuracy",
+    "paper_counterparts",
+    "fidelity_ladder",
+    "contact_steps",
 ]
 
 
@@ -74,3 +86,15 @@ def test_a_few_iterations_improve_the_start():
     numbers, _ = fit(start_of(groups), groups, wanted, 6)
     after = np.abs(residuals(scene_of(numbers, groups), wanted))
     assert np.minimum(after, 0.1).sum() < 0.8 * np.minimum(before, 0.1).sum()
+
+
+def test_the_stored_numbers_describe_the_shipped_scene_and_worse_ones_fail():
+    numbers = pd.read_csv(RESULTS / "identify_arch25.csv")["value"].to_numpy()
+    groups = (*SHAPE, OFFSETS)
+    same = beside_shipped(report(numbers, groups), scene_of(numbers, groups))
+    assert same["difference"].abs().max() <= 0.01
+    assert holds(same, quick=False)
+    off = numbers * np.where(np.arange(len(numbers)) == 35, 1.1, 1.0)  # the gap
+    worse = beside_shipped(report(off, groups), scene_of(off, groups))
+    assert not holds(worse, quick=False)
+    assert holds(worse, quick=True)  # a quick fit is not judged, the shipped one is

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import threading
+import time
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from experiments.__main__ import claims, run
+from experiments.__main__ import TOGETHER, claims, main, run, run_all, takes_time
 from experiments.profiles import data_profile, pareto, performance_profile, shifted_mean
 from experiments.runs import ENGINES, REFERENCE, rows
 from experiments.speed_accuracy import KEY, collect, holds, measure, specs, summarize
@@ -147,3 +149,65 @@ def test_all_claims_are_listed():
     assert [line.split()[0] for line in listed] == list(claims())
     assert {"engine_speed", "failing_steps", "speed_accuracy"} <= set(claims())
     assert "blocks" not in claims()
+
+
+TIMED = {
+    "engine_speed",
+    "fidelity_ladder",
+    "formulation_cost",
+    "peers",
+    "speed_accuracy",
+    "witnesses",
+}
+
+
+def test_what_takes_the_clock_is_known():
+    assert {name for name in claims() if takes_time(name)} == TIMED
+
+
+def test_timed_experiments_run_alone_the_others_two_at_a_time(monkeypatch, capsys):
+    running, seen, lock = set(), {}, threading.Lock()
+
+    def pretend(name, *arguments):
+        assert arguments == ("--quick",)
+        with lock:
+            running.add(name)
+            for other in running:
+                seen.setdefault(other, set()).update(running)
+            assert len(running) <= TOGETHER
+        time.sleep(0.02)
+        with lock:
+            running.remove(name)
+        return "holds", 1.0
+
+    monkeypatch.setattr("experiments.__main__.run", pretend)
+    table = run_all("--quick")
+    assert table["experiment"].tolist() == list(claims())
+    assert all(seen[name] == {name} for name in TIMED)
+    assert any(len(seen[name]) == TOGETHER for name in set(claims()) - TIMED)
+    assert len(capsys.readouterr().out.splitlines()) == len(claims())
+
+
+def test_the_longest_start_first(monkeypatch):
+    order = []
+    seconds = {name: float(place) for place, name in enumerate(claims()) if name != "figures"}
+    monkeypatch.setattr("experiments.__main__.stored", lambda _: seconds)
+    monkeypatch.setattr("experiments.__main__.TOGETHER", 1)
+    monkeypatch.setattr(
+        "experiments.__main__.run", lambda name, *_: (order.append(name), ("holds", 1.0))[1]
+    )
+    run_all()
+    others = [name for name in order if name not in TIMED]
+    assert others[0] == "figures"  # what never ran may take long
+    assert others[1:] == sorted(others[1:], reverse=True)
+    assert set(order[len(others) :]) == TIMED
+
+
+@pytest.mark.parametrize(
+    ("verdict", "status"),
+    [("holds", 0), ("holds, by one witness", 0), ("left out: pip", 0), ("does not hold", 1)],
+)
+def test_the_exit_status_says_whether_all_claims_hold(monkeypatch, verdict, status):
+    monkeypatch.setattr("experiments.__main__.run", lambda *_: (verdict, 1.0))
+    monkeypatch.setattr("sys.argv", ["experiments", "all", "--quick"])
+    assert main() == status

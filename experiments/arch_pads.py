@@ -1,0 +1,150 @@
+"""Partial arches on springs at the corners of faces, as rigid blocks in discrete elements have.
+
+A face is springs at its corners, each with an equal share of its area. It is three times too stiff
+against bending, as the corners of a rectangle are √3 times as far out as points that stand for an
+even bed. With the spread "even" the faces are therefore drawn in by √3 and stiffened threefold.
+
+`AtCorners` is the discrete-element engine with such faces. For LMGC90, `padded` makes the pads of a
+`Pinch` contacts with the ground; `bed_at_corners` then says where exactly these springs let the
+blocks rest.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy import linalg
+
+from seqopt.assembly import EPOXY, Assembly
+from seqopt.bed import opening_maps
+from seqopt.contact import bare_assembly, step_assembly
+from seqopt.discrete import DiscreteEngine
+from seqopt.discrete_system import STUDY_BED, BedStiffness, Pinch, System, build
+from seqopt.fields import Fields, Want
+from seqopt.network import GROUND, Floats, Network
+from seqopt.steps import Step
+
+STIFFER = 10  # contacts per pad: its joint over those between bricks, as in section 3.2.3
+CLEAR = 1e-3  # m, between a pad's plane and the joints' corners: on one plane, facets would merge
+SPREADS = ("corners", "even")
+
+
+class AtCorners(DiscreteEngine):
+    """Discrete elements on the study's bed, all of it at the corners of the faces."""
+
+    def solve(self, bricks: int, grips: ArrayLike, want: Want = Want.TABLE) -> Fields:
+        """Return the fields; see `DiscreteEngine.solve`."""
+        if bricks not in self._systems:
+            system = build(self.network, bricks, EPOXY, STUDY_BED)
+            self._systems[bricks] = at_corners(self.network, system)
+        return super().solve(bricks, grips, want)
+
+
+def at_corners(network: Network, system: System) -> System:
+    """Return a system whose beds are springs at the corners of the faces."""
+    assembly = bare_assembly(network, system.bricks)
+    area, where = shares(assembly), network.springs.position[system.acting]
+    normal, tangential = STUDY_BED.normal * area, STUDY_BED.tangential * area
+    return replace(
+        system,
+        points=replace(system.points, area=area, normal=normal, tangential=tangential),
+        face=assembly.contact,
+        maps=opening_maps(assembly, assembly.corner, assembly.contact, where),
+    )
+
+
+def pads_at_corners(pinch: Pinch) -> Pinch:
+    """Return even pads that hold a brick as a pinch would with springs at its pads' corners."""
+    normal, tangential = pinch.stiffness.normal / 3, pinch.stiffness.tangential / 3
+    return replace(pinch, side=np.sqrt(3) * pinch.side, stiffness=BedStiffness(normal, tangential))
+
+
+def shares(assembly: Assembly) -> Floats:
+    """Return every corner's share of its face, (K,), m²."""
+    return np.asarray((assembly.area / np.bincount(assembly.contact))[assembly.contact])
+
+
+def padded(
+    network: Network, step: Step, pinch: Pinch, spread: str = "even", *, flush: bool = False
+) -> Assembly:
+    """Return a step held by two pads; a pad is `STIFFER` contacts with the ground in one place.
+
+    LMGC90's blocks are convex hulls of their contacts, and the joint's corners reach beyond the
+    plane of a pad by half the mortar. A pad therefore leans, by a few degrees about its middle,
+    until it is a facet with the joint spread as asked; ``flush`` leaves it on the brick's surface.
+    """
+    assembly = step_assembly(network, step)
+    brick = network.scene.brick_of_node[step.held[0]]
+    block, node = int(assembly.grip_block[0]), assembly.grip_position[0]
+    length, width = np.array(brick.length_axis), np.array(brick.width_axis)
+    axes = np.stack([length, width, np.cross(length, width)])
+    touching = (assembly.bodies == block).any(axis=1)[assembly.contact]
+    corner = posed(assembly, spread)[0].corner[touching]
+    faces, inward = [], []
+    for sign in np.repeat([-1.0, 1.0], STIFFER):
+        out = sign * axes[pinch.across]
+        middle = node + 0.5 * brick.dimensions[pinch.across] * out
+        away = corner - middle
+        lean = 0.0 if flush else np.arctan2(away @ out + CLEAR, -away @ length).max()
+        along = np.cos(lean) * length - np.sin(lean) * out if lean > 0 else length
+        other = axes[3 - pinch.across]
+        square = [a * along + b * other for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+        faces.append(middle + 0.5 * pinch.side * np.array(square))
+        normal = np.cross(along, other)
+        inward.append(normal if normal @ out < 0 else -normal)
+    return _with_contacts(assembly, np.array(faces), np.array(inward), block)
+
+
+def _with_contacts(assembly: Assembly, faces: Floats, inward: Floats, block: int) -> Assembly:
+    """Return the assembly with a block on further ground faces (F, 4, 3), no longer gripped."""
+    count = len(faces)
+    return replace(
+        assembly,
+        contact_name=assembly.contact_name + ("pad",) * count,
+        bodies=np.vstack([assembly.bodies, np.tile([GROUND, block], (count, 1))]),
+        normal=np.vstack([assembly.normal, inward]),
+        corner=np.vstack([assembly.corner, faces.reshape(-1, 3)]),
+        contact=np.append(assembly.contact, len(assembly.bodies) + np.repeat(np.arange(count), 4)),
+        grip_block=np.empty(0, dtype=np.int64),
+        grip_position=np.empty((0, 3)),
+        payload=np.empty(0),
+    )
+
+
+def drawn_in(assembly: Assembly) -> Assembly:
+    """Return the assembly with every face drawn in about its middle by √3."""
+    count = np.bincount(assembly.contact)
+    middle = np.stack(
+        [np.bincount(assembly.contact, weights=x) / count for x in assembly.corner.T], axis=1
+    )[assembly.contact]
+    return replace(assembly, corner=middle + (assembly.corner - middle) / np.sqrt(3))
+
+
+def posed(assembly: Assembly, spread: str) -> tuple[Assembly, BedStiffness]:
+    """Return an assembly with its faces spread as asked, and the stiffness they need."""
+    if spread == "corners":
+        return assembly, STUDY_BED
+    return drawn_in(assembly), BedStiffness(3 * STUDY_BED.normal, 3 * STUDY_BED.tangential)
+
+
+def bed_at_corners(assembly: Assembly, bed: BedStiffness) -> tuple[Floats, Floats]:
+    """Return twists (B, 6) of the blocks and forces (K, 3) on second bodies at the corners.
+
+    Forces are normal and tangential, N.
+    """
+    moduli = np.array([bed.normal, bed.tangential, bed.tangential])
+    stiffness = (shares(assembly)[:, None] * moduli).ravel()
+    own = assembly.contact_map
+    load = assembly.load() * assembly.scales[0]
+    motion = linalg.solve((own.multiply(stiffness) @ own.T).toarray(), load, assume_a="pos")
+    twist = motion.reshape(-1, 6) / np.repeat([1.0, assembly.scales[1]], 3)
+    return twist, -(stiffness * (own.T @ motion)).reshape(-1, 3)
+
+
+def ground_forces(assembly: Assembly, corner_force: Floats) -> Floats:
+    """Return the forces (F, 3) of the ground on the blocks, a row per contact with it, N."""
+    force = np.einsum("ki,kij->kj", corner_force, assembly.axes[assembly.contact])
+    total = np.stack([np.bincount(assembly.contact, weights=x) for x in force.T], axis=1)
+    return np.asarray(total[assembly.bodies[:, 0] == GROUND])
