@@ -27,6 +27,8 @@ from seqopt.network import Floats, Ints, Network
 from seqopt.rigid import mechanism, require_resistance, respond, stack
 from seqopt.statics import skew
 
+GONE = "joints part or slip and brick {brick} goes; add a grip, a bond or friction"
+
 
 class DiscreteEngine:
     """Solves each grip set by discrete elements.
@@ -96,7 +98,7 @@ def _not_at_rest(network: Network, held: Held, found: Settled, nodes: Ints) -> S
     system = held.system
     if held.gone(found):
         moved = system.unit * (held.free @ found.motion)
-        return mechanism(network, moved[: 6 * system.bricks])
+        return mechanism(network, moved[: 6 * system.bricks], GONE)
     names = ", ".join(str(network.node_name[n]) for n in nodes) or "nothing"
     return SolverError(
         f"{system.bricks} bricks held at {names}: discrete elements came to no rest and went "

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
+from seqopt.errors import MechanismError, SolverError
 from seqopt.fields import Engine, Fields
 from seqopt.network import Floats
 from seqopt.steps import Step
@@ -83,8 +84,19 @@ def analyze(engine: Engine, steps: Sequence[Step]) -> pd.DataFrame:
 
 
 def step_fields(engine: Engine, step: Step) -> Fields:
-    """Return the full fields of one step."""
-    return engine.solve(step.bricks, np.array([step.held], dtype=np.int64).reshape(1, -1))
+    """Return the full fields of one step.
+
+    Raises
+    ------
+    MechanismError, SolverError
+        As the engine does, the step named.
+    """
+    try:
+        return engine.solve(step.bricks, np.array([step.held], dtype=np.int64).reshape(1, -1))
+    except MechanismError as error:
+        raise MechanismError(f"step {step.number}: {error}", error.mode) from error
+    except SolverError as error:
+        raise SolverError(f"step {step.number}: {error}") from error
 
 
 def fields_archive(engine: Engine, steps: Sequence[Step]) -> bytes:

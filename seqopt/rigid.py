@@ -171,14 +171,17 @@ def _constrained(network: Network, matrix: Floats, fixed: Floats, load: Floats) 
     return np.asarray(motions @ answer)
 
 
-def mechanism(network: Network, twist: Floats) -> MechanismError:
+def mechanism(
+    network: Network,
+    twist: Floats,
+    text: str = "nothing resists a motion of brick {brick}; add a grip, a joint or stiffness",
+) -> MechanismError:
     """Return the error that shows an unresisted motion (6b,), its largest component scaled to 1."""
     shape = (twist / np.abs(twist).max()).reshape(-1, 6)
     worst = int(np.abs(shape).max(axis=1).argmax())
     names = [brick.name for brick in network.scene.placed[: len(shape)]]
     return MechanismError(
-        f"{len(shape)} bricks: nothing resists a motion of brick {names[worst]}; "
-        "add a grip, a joint or stiffness",
+        f"{len(shape)} bricks: {text.format(brick=names[worst])}",
         tuple((name, tuple(row)) for name, row in zip(names, shape.tolist(), strict=True)),
     )
 

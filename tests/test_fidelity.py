@@ -163,7 +163,7 @@ def test_a_block_slides_beyond_the_angle_of_friction(angle):
     scene = block(lean=math.radians(angle))
     engine = DiscreteEngine(network(scene), DRY)  # 25 degrees
     if angle > 25:
-        with pytest.raises(MechanismError, match="motion of brick 1"):
+        with pytest.raises(MechanismError, match="1 bricks: joints part or slip and brick 1 goes"):
             engine.solve(1, HERE)
     else:
         force = engine.solve(1, HERE).support[0, :3]
@@ -291,6 +291,9 @@ def test_the_command_line_says_why(capsys):
     assert main(["analyze", "--method", "sequential", "--engine", "auto"]) == 0
     said = capsys.readouterr().err
     assert "engine: compliance for 49 grip sets: brick 11: its centroid lies 65.2 mm" in said
+    dry = ["analyze", "--method", "sequential", "--engine", "auto", "--mortar", "dry"]
+    assert main(dry) == 2
+    assert "step 9: 5 bricks: joints part or slip and brick" in capsys.readouterr().err
     assert main(["analyze", "--method", "sequential", "--engine", "planar"]) == 2
     assert "use the compliance engine" in capsys.readouterr().err
     assert main(["analyze", "--method", "sequential", "--mortar", "dry"]) == 2
