@@ -160,7 +160,7 @@ def chart(table: pd.DataFrame) -> None:
         right.plot(row["set_us"], y, "o", ms=7, color=color, mfc=fill)
         right.plot(row["against_us"], y, "s", ms=5, color="#888888")
         right.annotate(
-            f"{row['ratio']:.3g} ×",
+            f"{float(f'{row.ratio:.2g}'):,g} ×",
             (max(row["set_us"], row["against_us"]), y),
             xytext=(6, -3),
             textcoords="offset points",
@@ -176,7 +176,7 @@ def chart(table: pd.DataFrame) -> None:
         axes.spines[["top", "right"]].set_visible(False)
     figure.supxlabel(
         "Filled: the condition of the level is met. Open: it is not, and auto does not take it. "
-        "Squares: the other.",
+        "Squares: the other.\nAt the left edge: no difference, auto takes the same engine.",
         fontsize=8,
     )
     save_figure(figure, "fidelity_ladder.png")
