@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 
 from experiments.plotting import new_figure, save_figure
 from experiments.profiles import data_profile, pareto, performance_profile
-from experiments.runs import REFERENCE
+from experiments.runs import NO_PROOF, REFERENCE
 
 CLOSE = 0.01  # gap up to which an answer counts as close in profiles
 COLORS = {
@@ -27,14 +27,18 @@ def headline(runs: pd.DataFrame) -> None:
     table = runs[
         (runs["scene"] == "arch25")
         & (runs["criterion"] == "equations-2-3")
-        & runs["formulation"].isin(COLORS)
+        & runs["formulation"].isin([*COLORS, NO_PROOF])
     ]
     figure = new_figure(9, 3.9)
     axes, growth = figure.subplots(1, 2, width_ratios=[1.35, 1])
     gap = 100 * table["gap"]
     for (engine, name), row in table.assign(gap=gap).groupby(["engine", "formulation"]):
-        color, marker = COLORS[str(name)], MARKERS[str(engine)]
-        axes.scatter(row["total"], row["gap"], s=46, color=color, marker=marker, alpha=0.85)
+        color = COLORS.get(str(name), "white")  # open: without proof
+        edge = "#555555" if name == NO_PROOF else color
+        marker = MARKERS[str(engine)]
+        axes.scatter(
+            row["total"], row["gap"], s=46, c=color, marker=marker, edgecolors=edge, alpha=0.85
+        )
     for engine, part in table.assign(gap=gap).groupby("engine"):
         _label(axes, str(engine), part)
     front = pareto(table["total"].to_numpy(), gap.to_numpy().round(9))
@@ -67,10 +71,11 @@ def _label(axes: Axes, engine: str, table: pd.DataFrame) -> None:
             near[0][2].append(str(row["formulation"]))
         else:
             clusters.append((row["total"], row["gap"], [str(row["formulation"])]))
-    low = 0
+    low = high = 0
     for time, gap, names in sorted(clusters):
-        shift = (0, 8) if gap > 0.01 else (0, -14 - 11 * low)
+        shift = (0, 8 + 11 * high) if gap > 0.01 else (0, -14 - 11 * low)
         low += gap <= 0.01
+        high += gap > 0.01
         axes.annotate(
             ", ".join(names),
             (time, gap),

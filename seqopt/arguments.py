@@ -270,4 +270,10 @@ def _optimize_arguments(command: argparse.ArgumentParser) -> None:
         metavar="NAME=VALUE",
         help="option of the formulation, as horizon=2 or width=10; may be repeated",
     )
+    command.add_argument(
+        "--no-proof",
+        action="store_true",
+        help="with cascade or rank_search: solve only the models that the search meets, a fifth "
+        "or so; how far the choice is from the optimum stays unknown",
+    )
     command.add_argument("--out", type=Path, metavar="DIR", required=True, help="folder to write")

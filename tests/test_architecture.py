@@ -26,7 +26,7 @@ LAYERS = (
     {"compliance", "frame", "discrete"},
     {"planar"},
     {"fidelity"},
-    {"engines", "compare"},
+    {"engines", "compare", "search"},
     {"contest", "arguments", "certificates"},
     {"charts"},
     {"cli"},

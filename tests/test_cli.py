@@ -152,6 +152,8 @@ def test_optimize(capsys, tmp_path):
         (("--formulation", "overlap_dp", "--criteria", "T_max=heavy"), "'heavy' is not a positive"),
         (("--formulation", "overlap_dp", "--limit", "T_max"), "--limit T_max"),
         (("--formulation", "overlap_dp", "--limit", "F_largest=9"), "relax a limit"),
+        (("--formulation", "cascade", "--no-proof", "--limit", "F_largest=9"), "no allowed grip"),
+        (("--formulation", "minimax", "--no-proof"), "--no-proof: minimax looks beyond"),
     ],
 )
 def test_optimize_refuses_in_one_line(capsys, tmp_path, arguments, named):
@@ -170,6 +172,23 @@ def test_optimize_with_words_of_ones_own(capsys, tmp_path):
     report = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
     assert report["criterion"] == "T_max,M_sup=2,F_move"
     assert report["method"] == "modified-sequential"
+
+
+def test_optimize_without_proof(capsys, tmp_path):
+    chosen = ("--formulation", "rank_search", "--engine", "auto")
+    for folder, words in (("with", ()), ("without", ("--no-proof",))):
+        status, out, _ = run(capsys, "optimize", *chosen, *words, "--out", str(tmp_path / folder))
+        assert (status, out.count("\n")) == (0, 1)
+        assert ("not compared with the optimum" in out) == (folder == "without")
+    plans = [pd.read_csv(tmp_path / name / "plan.csv") for name in ("with", "without")]
+    pd.testing.assert_frame_equal(*plans)
+    report = json.loads((tmp_path / "without" / "summary.json").read_text(encoding="utf-8"))
+    assert report["status"] == "unproven"
+    assert report["gap"] is report["bound"] is report["objective"] is None
+    assert set(report["seconds"]) == {"assemble", "respond", "rank", "verify"}
+    responses = pd.read_csv(tmp_path / "without" / "responses.csv")
+    assert responses["step"].is_monotonic_increasing
+    assert report["models_evaluated"] < len(responses) < 2 * report["models_evaluated"]
 
 
 def test_compare_writes_tables_and_figures(capsys, tmp_path):

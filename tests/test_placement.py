@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.stats import rankdata
 
 from seqopt.arch import ArchShape, arch_scene
 from seqopt.compare import compare
@@ -21,6 +22,7 @@ from seqopt.criteria import (
     WORST_RATIO,
     RankSum,
     equal,
+    mean_ranks,
     scaled_ranks,
 )
 from seqopt.errors import StepError
@@ -196,6 +198,13 @@ def test_ranks():
     assert scaled_ranks(values, 5) == pytest.approx([4, 1.5, 1.5, np.nan, 3], nan_ok=True)
     assert scaled_ranks(np.array([1.2, 0.9, 1.4]), 3) == pytest.approx([2, 2, 2])  # all round to 1
     assert scaled_ranks(np.full(3, np.nan), 3) == pytest.approx([2, 2, 2])
+
+
+@given(values=st.lists(st.integers(-5, 5), min_size=1, max_size=30))
+def test_ranks_are_those_of_scipy(values):
+    found = mean_ranks(np.array(values, dtype=float))
+    assert found.tolist() == rankdata(values, method="average").tolist()
+    assert found.sum() == pytest.approx(len(values) * (len(values) + 1) / 2)
 
 
 @given(st.lists(st.integers(0, 9), min_size=12, max_size=12))

@@ -1,0 +1,108 @@
+"""The search that solves only the models it meets, against the one that is given all costs."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from seqopt.compliance import ComplianceEngine
+from seqopt.criteria import CRITERIA, EQUATIONS, WEIGHTED
+from seqopt.loops import SCHEDULES, three_robot_loop
+from seqopt.network import network
+from seqopt.placement import ProblemError
+from seqopt.problem import Limit, pose
+from seqopt.search import require_search, search, search_responses, search_table, window
+from seqopt.selection import formulation, run
+from seqopt.states import window_models
+from tests.scenes import arches
+from tests.test_methods import far_reaching
+
+
+class Counting:
+    """An engine that counts the grip sets it is asked for."""
+
+    def __init__(self, engine):
+        self.engine, self.sets = engine, 0
+
+    @property
+    def network(self):
+        return self.engine.network
+
+    def solve(self, bricks, grips, want):
+        self.sets += len(grips)
+        return self.engine.solve(bricks, grips, want)
+
+
+@pytest.mark.parametrize("criterion", CRITERIA)
+@pytest.mark.parametrize("method", SCHEDULES)
+def test_it_chooses_as_the_cascade_does(engine25, method, criterion):
+    schedule = SCHEDULES[method](engine25.network)
+    counting = Counting(engine25)
+    found = search(counting, schedule, CRITERIA[criterion])
+    problem = pose(engine25, schedule, CRITERIA[criterion])
+    for name in ("cascade", "rank_search"):
+        assert found.choice == run(problem, formulation(name))[0].choice
+    assert found.plan == schedule.fill(problem.nodes(found.choice))
+    assert found.models == counting.sets
+    fewest = window_models(schedule, found.choice)
+    assert fewest <= found.models <= fewest + len(schedule.moves)
+    assert found.models <= problem.evaluation.models
+
+
+@given(scene=arches(max_bricks=7).map(far_reaching), share=st.floats(0.5, 1.5))
+def test_with_limits_it_finds_what_the_cascade_finds_or_nothing(scene, share):
+    if len(scene.bricks) < 4:
+        return
+    engine = ComplianceEngine(network(scene))
+    schedule = three_robot_loop(engine.network)
+    free = search(engine, schedule, WEIGHTED, [Limit("F_largest", 1e9)])
+    largest = search_responses(free)["F_largest"].max()
+    limits = [Limit("F_largest", share * largest)]
+    try:
+        found = search(engine, schedule, WEIGHTED, limits)
+    except ProblemError:
+        return  # the cascade looks ahead
+    selection, _ = run(pose(engine, schedule, WEIGHTED, limits), formulation("cascade"))
+    assert found.choice == selection.choice
+
+
+def test_a_window_depends_on_the_choices_before_it(engine25):
+    schedule = three_robot_loop(engine25.network)
+    found = search(engine25, schedule, EQUATIONS)
+    nodes = [m.candidates[c] for m, c in zip(schedule.moves, found.choice, strict=True)]
+    own = pose(engine25, window(schedule, 9, nodes), EQUATIONS).sums.single[0]
+    assert own.tolist() == found.shared[9].sums.single[0].tolist()
+    nodes[8] = next(n for n in schedule.moves[8].candidates if n != nodes[8])
+    other = pose(engine25, window(schedule, 9, nodes), EQUATIONS).sums.single[0]
+    assert other.tolist() != own.tolist()
+
+
+def test_the_table_says_what_the_next_one_costs(engine25):
+    found = search(engine25, three_robot_loop(engine25.network), WEIGHTED)
+    table = search_table(found)
+    assert len(table) == 22
+    assert (table["margin"] >= 0).all()
+    last = np.sort(found.costs(21))
+    assert table["cost"].iloc[-1] == last[0]
+    assert table["margin"].iloc[-1] == last[1] - last[0]
+
+
+def test_a_dead_end_is_named(engine25):
+    schedule = three_robot_loop(engine25.network)
+    with pytest.raises(ProblemError, match="move 1, step 3: rob3 has no allowed grip"):
+        search(engine25, schedule, EQUATIONS, [Limit("F_largest", 9.0)])
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "said"),
+    [
+        ("overlap_dp", {}, "overlap_dp looks beyond"),
+        ("beam", {}, "beam looks beyond"),
+        ("cascade", {"charge": "earlier"}, "cascade --option charge=earlier looks beyond"),
+    ],
+)
+def test_what_looks_further_is_refused(name, options, said):
+    with pytest.raises(ProblemError, match=said):
+        require_search(formulation(name), options)
