@@ -3,9 +3,10 @@
 A choice is judged by the reference: the responses of exactly rigid bricks, and dynamic programming
 over them. ``gap`` is how far the choice lies above the reference's optimum of the same aim,
 whatever engine it was made with; ``error`` is the largest difference of the engine's responses from
-the reference's, over the largest of each kind in its state. Times are medians of repeats after one
-run that does not count; stages before the choice are shared by all formulations. One more row is
-the search that solves only the models it meets and proves nothing (`seqopt.search`).
+the reference's, over the largest of each kind in its state. Times are medians of repeats; where
+there are several, one run before them does not count. Stages before the choice are shared by all
+formulations. One more row is the search that solves only the models it meets and proves nothing
+(`seqopt.search`).
 
 Command: ``python -m experiments.runs SCENE ENGINE CRITERION REPEATS`` prints rows as JSON.
 """
@@ -18,12 +19,15 @@ import statistics
 import sys
 import time
 from collections.abc import Callable
+from typing import TypeVar
 
 import numpy as np
 
 from experiments.failing_steps import longer
 from seqopt.compliance import ComplianceEngine
 from seqopt.criteria import CRITERIA
+from seqopt.discrete import DiscreteEngine
+from seqopt.fidelity import AutoEngine
 from seqopt.fields import Engine
 from seqopt.frame import FrameEngine
 from seqopt.loops import three_robot_loop
@@ -37,10 +41,13 @@ from seqopt.selection import Aim, Formulation, Reads, formulations, least_peak, 
 from seqopt.states import window_models
 
 Row = dict[str, object]
+Result = TypeVar("Result")
 ENGINES: dict[str, Callable[[Network], Engine]] = {
     "rigid bricks": ComplianceEngine,
     "frame 1e7": FrameEngine,
     "frame 1e3": lambda net: FrameEngine(net, 1e3),
+    "auto": AutoEngine,
+    "discrete": DiscreteEngine,
 }
 REFERENCE = "rigid bricks"
 NO_PROOF = "rank_search, no proof"
@@ -58,7 +65,7 @@ def rows(scene: str, engine: str, criterion: str, repeats: int) -> list[Row]:
     """Return a row per formulation."""
     built = scene_named(scene)
     reference = _pose(built, REFERENCE, criterion).problem
-    ready = [_pose(built, engine, criterion) for _ in range(repeats + 1)][1:]
+    ready = _repeated(repeats, lambda: _pose(built, engine, criterion))
     posed = ready[-1]
     shared = {
         stage: statistics.median(one.seconds[stage] for one in ready) for stage in posed.seconds
@@ -80,6 +87,12 @@ def rows(scene: str, engine: str, criterion: str, repeats: int) -> list[Row]:
     ]
 
 
+def _repeated(repeats: int, call: Callable[[], Result]) -> list[Result]:
+    """Return what repeated calls return, without the first if there are several."""
+    warm_up = int(repeats > 1)
+    return [call() for _ in range(repeats + warm_up)][warm_up:]
+
+
 def contenders() -> dict[str, Aim]:
     """Return the names of what chooses, and what each makes least, in the order of the rows."""
     return {f.name: f.aim for f in formulations().values()} | {NO_PROOF: Aim.SUM}
@@ -98,7 +111,7 @@ def _pose(scene: Scene, engine: str, criterion: str) -> Posed:
 def _row(
     posed: Posed, which: Formulation, reference: Problem, shared: dict[str, float], repeats: int
 ) -> Row:
-    outcomes = [optimize(posed, which) for _ in range(repeats + 1)][1:]
+    outcomes = _repeated(repeats, lambda: optimize(posed, which))
     last = outcomes[-1]
     seconds = shared | {
         stage: statistics.median(outcome.seconds[stage] for outcome in outcomes)
@@ -109,7 +122,7 @@ def _row(
 
 
 def _search_row(scene: Scene, engine: str, criterion: str, reference: Problem, repeats: int) -> Row:
-    found = [_search(scene, engine, criterion) for _ in range(repeats + 1)][1:]
+    found = _repeated(repeats, lambda: _search(scene, engine, criterion))
     stages = {"compile": 0.0, "solve": 0.0}  # choosing is part of the search
     stages |= {name: statistics.median(one[0][name] for one in found) for name in found[0][0]}
     last = found[-1][1]

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 
 from experiments.plotting import new_figure, save_figure
 from experiments.profiles import data_profile, pareto, performance_profile
@@ -19,71 +21,73 @@ COLORS = {
     "overlap_lp": "#b2182b",
     "overlap_mip": "#7b3294",
 }
-MARKERS = {"rigid bricks": "o", "frame 1e7": "s", "frame 1e3": "^"}
+MARKERS = {"rigid bricks": "o", "auto": "P", "frame 1e7": "s", "frame 1e3": "^", "discrete": "D"}
+OPEN = "#555555"  # edge of what has no proof
+EXACT = 1e-13  # errors below are drawn there
 
 
 def headline(runs: pd.DataFrame) -> None:
-    """Draw time against gap on the reference arch, and how time grows with the brick count."""
-    table = runs[
-        (runs["scene"] == "arch25")
-        & (runs["criterion"] == "equations-2-3")
-        & runs["formulation"].isin([*COLORS, NO_PROOF])
-    ]
-    figure = new_figure(9, 3.9)
-    axes, growth = figure.subplots(1, 2, width_ratios=[1.35, 1])
-    gap = 100 * table["gap"]
-    for (engine, name), row in table.assign(gap=gap).groupby(["engine", "formulation"]):
-        color = COLORS.get(str(name), "white")  # open: without proof
-        edge = "#555555" if name == NO_PROOF else color
-        marker = MARKERS[str(engine)]
-        axes.scatter(
-            row["total"], row["gap"], s=46, c=color, marker=marker, edgecolors=edge, alpha=0.85
-        )
-    for engine, part in table.assign(gap=gap).groupby("engine"):
-        _label(axes, str(engine), part)
-    front = pareto(table["total"].to_numpy(), gap.to_numpy().round(9))
-    best = table.assign(gap=gap)[front].sort_values("total")
-    axes.plot(best["total"], best["gap"], "k-", lw=0.8, zorder=0)
-    top = 1.5 * max(gap.max(), 0.1)
-    axes.set(xscale="log", xlabel="time from scene to certified plan [s]", ylim=(-0.25 * top, top))
-    axes.set_yticks([tick for tick in axes.get_yticks() if 0 <= tick <= top])
-    axes.set(ylabel="gap to the optimum [%]", title="arch25, equations 2 and 3")
-    axes.set_xlim(0.6 * table["total"].min(), 3 * table["total"].max())
-    for engine, marker in MARKERS.items():
-        axes.scatter([], [], color="k", marker=marker, s=24, label=engine)
-    axes.legend(frameon=False, fontsize=8, loc="upper center")
+    """Draw time against gap and against error on the reference arch, and growth with the bricks."""
+    table = runs[(runs["scene"] == "arch25") & (runs["criterion"] == "equations-2-3")]
+    table = table.assign(gap=100 * table["gap"])
+    figure = new_figure(12, 4.6)
+    gaps, errors, growth = figure.subplots(1, 3, width_ratios=[1.2, 1, 1])
+    _gaps(gaps, table)
+    _errors(errors, table[table["formulation"] == "overlap_dp"])
     _growth(growth, runs)
-    for part in (axes, growth):
+    for part in (gaps, errors, growth):
         part.spines[["top", "right"]].set_visible(False)
         part.grid(visible=True, lw=0.2)
         part.minorticks_off()
+    words = [Line2D([], [], color="k", marker=m, ls="", label=e) for e, m in MARKERS.items()]
+    words += [Patch(color=color, label=name) for name, color in COLORS.items()]
+    words.append(Patch(facecolor="white", edgecolor=OPEN, label=NO_PROOF))
+    figure.legend(handles=words, loc="outside lower center", ncols=6, fontsize=8, frameon=False)
     save_figure(figure, "speed_accuracy.png")
 
 
-def _label(axes: Axes, engine: str, table: pd.DataFrame) -> None:
-    """Name the points of an engine, those that lie on each other together."""
-    if engine == "frame 1e3":
-        return  # beside the other frame
-    clusters: list[tuple[float, float, list[str]]] = []
-    for _, row in table.sort_values("total").iterrows():
-        near = [c for c in clusters if abs(c[1] - row["gap"]) < 0.01 and row["total"] < 1.1 * c[0]]
-        if near:
-            near[0][2].append(str(row["formulation"]))
-        else:
-            clusters.append((row["total"], row["gap"], [str(row["formulation"])]))
-    low = high = 0
-    for time, gap, names in sorted(clusters):
-        shift = (0, 8 + 11 * high) if gap > 0.01 else (0, -14 - 11 * low)
-        low += gap <= 0.01
-        high += gap > 0.01
-        axes.annotate(
-            ", ".join(names),
-            (time, gap),
-            shift,
-            textcoords="offset points",
-            fontsize=7,
-            ha="left" if engine == REFERENCE else "right",
+def _gaps(axes: Axes, table: pd.DataFrame) -> None:
+    """Draw time against gap [%] of every engine and formulation, those that coincide as rings."""
+    sizes = {name: (4.5 + 2 * place) ** 2 for place, name in enumerate(COLORS)} | {NO_PROOF: 40.0}
+    shown = table[table["formulation"].isin(sizes)]
+    order = shown["formulation"].map(sizes).sort_values(ascending=False, kind="stable").index
+    for _, row in shown.loc[order].iterrows():
+        name = row["formulation"]
+        axes.scatter(
+            row["total"],
+            row["gap"],
+            s=sizes[name],
+            c=COLORS.get(name, "white"),
+            edgecolors=OPEN if name == NO_PROOF else "white",
+            linewidths=0.8 if name == NO_PROOF else 0.3,
+            marker=MARKERS[row["engine"]],
         )
+    _front(axes, shown, "gap")
+    top = 1.25 * max(shown["gap"].max(), 0.1)
+    axes.set(xscale="log", xlabel="time from scene to plan [s]", ylim=(-0.1 * top, top))
+    axes.set(ylabel="gap to the optimum [%]", title="arch25, equations 2 and 3")
+
+
+def _errors(axes: Axes, table: pd.DataFrame) -> None:
+    """Draw time against error of every engine, with the exact formulation."""
+    shown = table.assign(error=table["error"].clip(lower=EXACT))
+    for _, row in shown.iterrows():
+        axes.scatter(row["total"], row["error"], s=46, color="k", marker=MARKERS[row["engine"]])
+    for _, row in shown[shown["engine"] == REFERENCE].iterrows():
+        axes.annotate(
+            "the reference", (row["total"], EXACT), (-4, 8), textcoords="offset points", fontsize=8
+        )
+    _front(axes, shown, "error")
+    axes.set(xscale="log", yscale="log", xlabel="time from scene to plan [s]")
+    axes.set(ylabel="largest error of a response", title="engines, with overlap_dp")
+    axes.set(ylim=(EXACT / 10, 1))
+
+
+def _front(axes: Axes, table: pd.DataFrame, column: str) -> None:
+    """Draw the Pareto front: what nothing else beats in time and in a column at once."""
+    loss = table[column].to_numpy()
+    best = table[pareto(table["total"].to_numpy(), loss.round(15))].sort_values("total")
+    axes.step(best["total"], best[column], "k-", lw=0.8, where="post", zorder=0)
 
 
 def _growth(axes: Axes, runs: pd.DataFrame) -> None:
@@ -105,6 +109,8 @@ def _growth(axes: Axes, runs: pd.DataFrame) -> None:
         axes.loglog(
             table["bricks"], choose, color=COLORS[name], marker=".", lw=1, label=f"choose: {name}"
         )
+    table = own[own["formulation"] == NO_PROOF].sort_values("bricks")
+    axes.loglog(table["bricks"], table["total"], "--", color=OPEN, lw=1, label="no proof")
     axes.set(xlabel="bricks", ylabel="time [s]")
     axes.set_xticks([7, 13, 25, 49], ["7", "13", "25", "49"])
     axes.legend(frameon=False, fontsize=7, loc="upper left")

@@ -41,7 +41,8 @@ def test_everything_runs_and_is_a_row(smoke):
     assert (exact["gap"] <= 1e-12).all()
     assert (exact["error"] == 0).all()
     errors = smoke.groupby("engine")["error"].max()
-    assert 0 < errors["frame 1e7"] < 1e-5 < errors["frame 1e3"]
+    assert errors["auto"] == 0 < errors["discrete"] < 1e-8
+    assert errors["discrete"] < errors["frame 1e7"] < 1e-5 < errors["frame 1e3"]
     windows = smoke[smoke["formulation"].isin(["rank_search", "cascade"])]
     assert windows["models"].max() < exact["models"].min()
     alone = smoke[smoke["formulation"] == NO_PROOF].reset_index(drop=True)
