@@ -80,22 +80,44 @@ def optimize(posed: Posed, which: Formulation, **options: Any) -> Outcome:
 
 
 def summary(outcome: Outcome) -> dict[str, object]:
-    """Return what there is to say about an outcome, ready for JSON."""
-    cascading, overlap = outcome.problem.paper_models
+    """Return what there is to say about an outcome, but times, ready for JSON."""
+    certificate = outcome.certificate
     return {
-        "scene": outcome.problem.schedule.scene.name,
-        "method": outcome.problem.schedule.method,
-        "formulation": outcome.which.name,
-        "kind": outcome.which.kind.value,
-        "aim": outcome.which.aim.value,
-        "criterion": outcome.problem.criterion.name,
-        "status": "optimal" if outcome.certificate.gap <= 1e-6 else "feasible",
-        "objective": outcome.certificate.objective,
-        "bound": outcome.certificate.bound,
-        "gap": outcome.certificate.gap,
-        "models_paper_count": {"cascading": cascading, "overlap": overlap},
+        **header(outcome.problem, outcome.which),
+        "status": "optimal" if certificate.gap <= 1e-6 else "feasible",
+        "objective": certificate.objective,
+        "bound": certificate.bound,
+        "gap": certificate.gap,
         "models_evaluated": outcome.problem.evaluation.models,
-        "seconds": {stage: round(value, 6) for stage, value in outcome.seconds.items()},
+    }
+
+
+def header(problem: Problem, which: Formulation) -> dict[str, object]:
+    """Return what was asked, ready for JSON."""
+    cascading, overlap = problem.paper_models
+    return {
+        "scene": problem.schedule.scene.name,
+        "method": problem.schedule.method,
+        "formulation": which.name,
+        "kind": which.kind.value,
+        "aim": which.aim.value,
+        "criterion": problem.criterion.name,
+        "models_paper_count": {"cascading": cascading, "overlap": overlap},
+    }
+
+
+def chosen(schedule: Schedule, move: int, place: int) -> dict[str, object]:
+    """Return a move and the node that a candidate stands for, a row."""
+    asked = schedule.moves[move]
+    node = asked.candidates[place]
+    return {
+        "move": move + 1,
+        "step": asked.step,
+        "bricks": asked.bricks,
+        "robot": asked.robot,
+        "brick": schedule.scene.brick_of_node[node].name,
+        "node": node,
+        "candidates": len(asked.candidates),
     }
 
 
@@ -103,23 +125,13 @@ def selection_table(outcome: Outcome) -> pd.DataFrame:
     """Return a row per move: where, which robot, which node, what it costs, how it ranks."""
     rows, before = [], 0
     placement = outcome.problem.sums if outcome.which.aim is Aim.SUM else outcome.problem.peaks
-    for k, (move, now) in enumerate(
-        zip(outcome.problem.schedule.moves, outcome.selection.choice, strict=True)
-    ):
-        costs = move_costs(outcome.problem, k, before)
-        node = move.candidates[now]
+    for k, now in enumerate(outcome.selection.choice):
         rows.append(
-            {
-                "move": k + 1,
-                "step": move.step,
-                "bricks": move.bricks,
-                "robot": move.robot,
-                "brick": outcome.problem.schedule.scene.brick_of_node[node].name,
-                "node": node,
-                "candidates": len(move.candidates),
+            chosen(outcome.problem.schedule, k, now)
+            | {
                 "single_cost": placement.single[k][now],
                 "shared_cost": placement.shared[k][before, now],
-                "rank_in_window": place(costs, now),
+                "rank_in_window": place(move_costs(outcome.problem, k, before), now),
             }
         )
         before = now

@@ -19,7 +19,7 @@ import pandas as pd
 from seqopt.criteria import Criterion
 from seqopt.fields import Engine
 from seqopt.network import Floats
-from seqopt.optimize import responses_table
+from seqopt.optimize import chosen, header, responses_table
 from seqopt.placement import ProblemError
 from seqopt.problem import Limit, Problem, pose
 from seqopt.schedule import Open, Schedule
@@ -143,46 +143,24 @@ def search(
 
 
 def search_summary(found: Search, which: Formulation) -> dict[str, object]:
-    """Return what there is to say about a search, ready for JSON; nothing bounds its choice."""
-    cascading, overlap = found.alone.paper_models
+    """Return what there is to say about a search, but times; nothing bounds its choice."""
     return {
-        "scene": found.schedule.scene.name,
-        "method": found.schedule.method,
-        "formulation": which.name,
-        "kind": which.kind.value,
-        "aim": which.aim.value,
-        "criterion": found.alone.criterion.name,
+        **header(found.alone, which),
         "status": "unproven",
         "objective": None,
         "bound": None,
         "gap": None,
-        "models_paper_count": {"cascading": cascading, "overlap": overlap},
         "models_evaluated": found.models,
-        "seconds": dict(found.seconds),
     }
 
 
 def search_table(found: Search) -> pd.DataFrame:
     """Return a row per move: where, which robot, which node, its cost, and how far to the next."""
     rows = []
-    scene = found.schedule.scene
-    for k, (move, now) in enumerate(zip(found.schedule.moves, found.choice, strict=True)):
+    for k, now in enumerate(found.choice):
         costs = found.costs(k)
-        others = np.delete(costs, now)
-        node = move.candidates[now]
-        rows.append(
-            {
-                "move": k + 1,
-                "step": move.step,
-                "bricks": move.bricks,
-                "robot": move.robot,
-                "brick": scene.brick_of_node[node].name,
-                "node": node,
-                "candidates": len(move.candidates),
-                "cost": costs[now],
-                "margin": others.min(initial=np.inf) - costs[now],
-            }
-        )
+        margin = np.delete(costs, now).min(initial=np.inf) - costs[now]
+        rows.append(chosen(found.schedule, k, now) | {"cost": costs[now], "margin": margin})
     return pd.DataFrame(rows)
 
 
