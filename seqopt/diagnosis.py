@@ -19,7 +19,7 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 from seqopt.errors import MechanismError, SolverError
 from seqopt.fields import Engine, Fields, Want, grip_columns
 from seqopt.kinematics import centroids
-from seqopt.mixed import Mixed, factor, mixed, solve_mixed
+from seqopt.mixed import Mixed, factor, mixed, solve_mixed, ungripped
 from seqopt.network import GROUND, Floats, Ints, Network
 
 WELL = 1e-9  # largest backward error of fields that keep the nine digits an engine promises
@@ -235,20 +235,20 @@ def spectrum(network: Network, bricks: int, columns: Ints) -> tuple[float, float
     The inverse is applied by the mixed system, which keeps small eigenvalues that the stiffness
     matrix has lost to rounding; a mechanism is shifted.
     """
-    system = mixed(network, bricks, columns)
-    root = np.sqrt(system.stiffness)[:, None]
-    diagonal = np.asarray((system.deformation * root).power(2).sum(axis=0)).ravel()
+    parts = ungripped(network, bricks)
+    root = np.sqrt(parts.stiffness)[:, None]
+    diagonal = np.asarray((parts.deformation * root).power(2).sum(axis=0)).ravel()
     most = max(diagonal.max(), 1.0 if not diagonal.any() else 0.0)
     scale = np.sqrt(np.maximum(diagonal, FLOOR * most))
     try:
-        lowest, motion = _lowest(system, scale)
+        lowest, motion = _lowest(mixed(parts, columns), scale, len(root))
     except RuntimeError:  # exactly singular, or the iteration broke down
         lowest = 0.0
     if not lowest > MECHANISM:
-        shifted = mixed(network, bricks, columns, shift=SHIFT * scale**2)
-        lowest, motion = _lowest(shifted, scale)
+        shifted = mixed(parts, columns, shift=SHIFT * scale**2)
+        lowest, motion = _lowest(shifted, scale, len(root))
         lowest = max(lowest - SHIFT, 0.0)
-    scaled = sparse.diags_array(root.ravel()) @ system.deformation @ sparse.diags_array(1 / scale)
+    scaled = sparse.diags_array(root.ravel()) @ parts.deformation @ sparse.diags_array(1 / scale)
     condition = _highest(scaled) / lowest if lowest else np.inf
     return lowest, condition, (motion / motion[np.abs(motion).argmax()]).reshape(-1, 6)
 
@@ -259,10 +259,10 @@ def _highest(scaled: sparse.csr_array) -> float:
     return float(value[0])
 
 
-def _lowest(system: Mixed, scale: Floats) -> tuple[float, Floats]:
-    """Return the smallest eigenvalue and its motion in scaled twists."""
+def _lowest(system: Mixed, scale: Floats, before: int) -> tuple[float, Floats]:
+    """Return the smallest eigenvalue and its motion in scaled twists, which stand after others."""
     factors = factor(system)
-    before, moves = len(system.stiffness), len(scale)
+    moves = len(scale)
     load = np.zeros(system.matrix.shape[0])
 
     def inverse(vector: Floats) -> Floats:

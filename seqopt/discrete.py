@@ -25,7 +25,7 @@ from seqopt.fields import Fields, Want, grip_columns
 from seqopt.kinematics import centroids, node_motion
 from seqopt.network import Floats, Ints, Network
 from seqopt.rigid import mechanism, require_resistance, respond, stack
-from seqopt.statics import skew
+from seqopt.statics import skew, statics
 
 GONE = "joints part or slip and brick {brick} goes; add a grip, a bond or friction"
 
@@ -141,6 +141,7 @@ def _fields(
     return respond(
         network,
         columns,
+        maps=statics(network),
         motion=node_motion(network, system.bricks),
         twist=(system.unit * moved)[:size],
         wrench=wrench,

@@ -23,7 +23,7 @@ from seqopt.fields import Fields
 from seqopt.kinematics import centroids, node_motion
 from seqopt.network import GROUND, Floats, Ints, Network
 from seqopt.rigid import require_resistance, respond, stack
-from seqopt.statics import skew
+from seqopt.statics import Statics, skew, statics
 
 REFINEMENTS = 3
 CONVERGED = 1e-10  # largest last correction of forces, moments, shifts and turns, relative to each
@@ -31,46 +31,65 @@ EMPTY = 1e-6  # forces this small beside the moments over a brick's length are n
 
 
 @dataclass(frozen=True)
-class Mixed:
-    """The system of one grip set, scaled to entries of order one.
+class Ungripped:
+    """What the systems of all grip sets of a partial structure have in common, scaled to order one.
 
     Attributes
     ----------
+    network : Network
+    bricks : int
+    motion : (3N, 6b) sparse
+        Displacements of the nodes for unit twists.
+    maps : Statics
     deformation : (6s, 6b) sparse
         Scaled deformation of the acting springs, in their own axes, for scaled twists.
     stiffness : (6s,) float
         Over ``unit``.
-    held : (c, 6b) sparse
-        Motions that the grips forbid, of scaled twists.
-    matrix : (6s + 6b + c,) square sparse
+    matrix : (6s + 6b,) square sparse
+        The system without grips.
+    load : (6b,) float
+        The weight, scaled.
     acting : (s,) int
     twist_unit, wrench_unit : (6b,), (6s,) float
         What turns scaled twists into m and rad, scaled wrenches into N and N m.
     unit : float
         N/m.
-    hand : (3r, c) float
-        Forces of the grips for unit multipliers.
     """
 
+    network: Network
+    bricks: int
+    motion: sparse.csr_array
+    maps: Statics
     deformation: sparse.csr_array
     stiffness: Floats
-    held: sparse.csr_array
-    matrix: sparse.csc_array
+    matrix: sparse.csr_array
+    load: Floats
     acting: Ints
     twist_unit: Floats
     wrench_unit: Floats
     unit: float
+
+
+@dataclass(frozen=True)
+class Mixed:
+    """The system of one grip set.
+
+    Attributes
+    ----------
+    held : (c, 6b) sparse
+        Motions that the grips forbid, of scaled twists.
+    matrix : (6s + 6b + c,) square sparse
+    hand : (3r, c) float
+        Forces of the grips for unit multipliers.
+    """
+
+    held: sparse.csr_array
+    matrix: sparse.csc_array
     hand: Floats
 
 
-def mixed(network: Network, bricks: int, grips: Ints, shift: Floats | None = None) -> Mixed:
-    """Return the system of one grip set, places in ``network.inner.ravel()``.
-
-    Parameters
-    ----------
-    shift : (6b,) float, optional
-        Added to the diagonal of the scaled stiffness, so that a mechanism can be factored.
-    """
+def ungripped(network: Network, bricks: int) -> Ungripped:
+    """Return what all systems of a partial structure have in common."""
     springs = network.springs
     acting = np.flatnonzero(springs.since <= bricks)
     steps = np.diff(network.node_position[network.inner[:bricks]], axis=1)
@@ -84,18 +103,49 @@ def mixed(network: Network, bricks: int, grips: Ints, shift: Floats | None = Non
     deformation = _deformation(network, bricks, acting)
     deformation = sparse.diags_array(np.tile(lever, len(acting))) @ deformation
     deformation = deformation @ sparse.diags_array(twist_unit)
-    rows, hand = _constraints(network, bricks, grips)
-    held = rows @ sparse.diags_array(twist_unit)
     row = 1 / np.maximum(1.0, stiffness)  # keeps a stiff joint's equation of order one
     blocks = [
         [sparse.diags_array(row), sparse.diags_array(row * stiffness) @ deformation],
-        [-deformation.T, None if shift is None else sparse.diags_array(shift)],
+        [-deformation.T, None],
     ]
+    motion = node_motion(network, bricks)
+    weight = np.repeat(0.5 * network.weight[:bricks], 2, axis=0).ravel()
+    inner = (3 * network.inner[:bricks].ravel()[:, None] + np.arange(3)).ravel()
+    return Ungripped(
+        network=network,
+        bricks=bricks,
+        motion=motion,
+        maps=statics(network),
+        deformation=deformation,
+        stiffness=stiffness,
+        matrix=sparse.csr_array(sparse.block_array(blocks)),
+        load=motion[inner].T @ weight * twist_unit / unit,
+        acting=acting,
+        twist_unit=twist_unit,
+        wrench_unit=unit * np.tile(lever, len(acting)),
+        unit=unit,
+    )
+
+
+def mixed(parts: Ungripped, grips: Ints, shift: Floats | None = None) -> Mixed:
+    """Return the system of one grip set, places in ``network.inner.ravel()``.
+
+    Parameters
+    ----------
+    shift : (6b,) float, optional
+        Added to the diagonal of the scaled stiffness, so that a mechanism can be factored.
+    """
+    rows, hand = _constraints(parts, grips)
+    held = sparse.csr_array(rows @ sparse.diags_array(parts.twist_unit))
+    matrix, joints = parts.matrix, len(parts.wrench_unit)
+    if shift is not None:
+        below = sparse.diags_array(np.concatenate([np.zeros(joints), shift]))
+        matrix = sparse.csr_array(matrix + below)
     if len(hand):
-        blocks = [[*blocks[0], None], [*blocks[1], -held.T], [None, held, None]]
-    matrix = sparse.csc_array(sparse.block_array(blocks))
-    wrench_unit = unit * np.tile(lever, len(acting))
-    return Mixed(deformation, stiffness, held, matrix, acting, twist_unit, wrench_unit, unit, hand)
+        of_all = (held.data, held.indices + joints, held.indptr)
+        rows = sparse.csr_array(of_all, shape=(held.shape[0], matrix.shape[0]))
+        matrix = sparse.block_array([[matrix, -rows.T], [rows, None]], format="csr")
+    return Mixed(held, sparse.csc_array(matrix), hand)
 
 
 def factor(system: Mixed) -> SuperLU:
@@ -115,21 +165,16 @@ def solve_mixed(network: Network, bricks: int, columns: Ints) -> Fields:
     SolverError
         If the answer still changes by more than `CONVERGED`.
     """
-    motion = node_motion(network, bricks)
-    return stack(
-        network, bricks, columns, [_solve_one(network, bricks, grips, motion) for grips in columns]
-    )
+    parts = ungripped(network, bricks)
+    return stack(network, bricks, columns, [_solve_one(parts, grips) for grips in columns])
 
 
-def _solve_one(
-    network: Network, bricks: int, grips: Ints, motion: sparse.csr_array
-) -> tuple[Floats, ...]:
-    system = mixed(network, bricks, grips)
-    weight = np.repeat(0.5 * network.weight[:bricks], 2, axis=0).ravel()
-    inner = (3 * network.inner[:bricks].ravel()[:, None] + np.arange(3)).ravel()
-    joints, moves = len(system.wrench_unit), len(system.twist_unit)
+def _solve_one(parts: Ungripped, grips: Ints) -> tuple[Floats, ...]:
+    network, bricks = parts.network, parts.bricks
+    system = mixed(parts, grips)
+    joints, moves = len(parts.wrench_unit), len(parts.twist_unit)
     load = np.zeros(system.matrix.shape[0])
-    load[joints : joints + moves] = motion[inner].T @ weight * system.twist_unit / system.unit
+    load[joints : joints + moves] = parts.load
     try:
         factors = factor(system)
     except RuntimeError as error:
@@ -139,8 +184,11 @@ def _solve_one(
     for _ in range(REFINEMENTS):
         correction = factors.solve(load - system.matrix @ result)
         result += correction
-    parts = np.arange(joints + moves).reshape(-1, 2, 3)
-    kinds = [p[:, i].ravel() for p in (parts[: joints // 6], parts[joints // 6 :]) for i in (0, 1)]
+    kinds = [
+        p[:, i].ravel()
+        for p in np.split(np.arange(joints + moves).reshape(-1, 2, 3), [joints // 6])
+        for i in (0, 1)
+    ]
     size = [np.abs(result[kind]).max() for kind in kinds]
     least = [EMPTY * max(size[:2])] * 2 + [EMPTY * max(size[2:])] * 2
     change = [np.abs(correction[kind]).max() for kind in kinds]
@@ -150,13 +198,19 @@ def _solve_one(
             f"{bricks} bricks: too close to a mechanism for double precision; "
             "add a grip or stiffness"
         )
-    twist = result[joints : joints + moves] * system.twist_unit
     wrench = np.zeros((len(network.springs.since), 6))
-    own = (result[:joints] * system.wrench_unit).reshape(-1, 2, 3)
-    axes = network.springs.axes[system.acting]
-    wrench[system.acting] = np.einsum("shi,sij->shj", own, axes).reshape(-1, 6)
-    force = (system.hand @ (result[joints + moves :] * system.unit)).reshape(-1, 3)
-    return respond(network, grips, motion=motion, twist=twist, wrench=wrench, force=force)
+    own = (result[:joints] * parts.wrench_unit).reshape(-1, 2, 3)
+    axes = network.springs.axes[parts.acting]
+    wrench[parts.acting] = np.einsum("shi,sij->shj", own, axes).reshape(-1, 6)
+    return respond(
+        network,
+        grips,
+        maps=parts.maps,
+        motion=parts.motion,
+        twist=result[joints : joints + moves] * parts.twist_unit,
+        wrench=wrench,
+        force=(system.hand @ (result[joints + moves :] * parts.unit)).reshape(-1, 3),
+    )
 
 
 def _deformation(network: Network, bricks: int, acting: Ints) -> sparse.csr_array:
@@ -176,13 +230,14 @@ def _deformation(network: Network, bricks: int, acting: Ints) -> sparse.csr_arra
     )
 
 
-def _constraints(network: Network, bricks: int, grips: Ints) -> tuple[sparse.csr_array, Floats]:
+def _constraints(parts: Ungripped, grips: Ints) -> tuple[sparse.csr_array, Floats]:
     """Return independent motions that grips forbid (c, 6b), and their forces (3r, c).
 
     A second grip on a brick forbids nothing along the line to the first.
     """
-    inner = network.inner[:bricks].ravel()[grips]
-    held = node_motion(network, bricks)[(3 * inner[:, None] + np.arange(3)).ravel()]
+    network = parts.network
+    inner = network.inner.ravel()[grips]
+    held = parts.motion[(3 * inner[:, None] + np.arange(3)).ravel()]
     directions = []
     for i, place in enumerate(grips):
         free = np.eye(3)

@@ -11,7 +11,7 @@ from seqopt.errors import MechanismError, SolverError
 from seqopt.fields import Fields
 from seqopt.kinematics import centroids, node_motion
 from seqopt.network import GROUND, Floats, Ints, Network
-from seqopt.statics import skew, statics
+from seqopt.statics import Statics, skew, statics
 
 MECHANISM = 1e-13  # smallest scaled eigenvalue of a structure that resists every motion
 BACKWARD = 1e-10  # largest backward error of an accepted solution
@@ -40,7 +40,7 @@ def spring_maps(network: Network, bricks: int) -> tuple[Ints, Floats, Floats]:
 
 
 class _Structure(NamedTuple):
-    """One partial structure: its springs, stiffness (6b, 6b), and motion of nodes (3N, 6b)."""
+    """One partial structure: springs, stiffness (6b, 6b), motion of nodes (3N, 6b), statics."""
 
     acting: Ints
     gap: Floats
@@ -48,6 +48,7 @@ class _Structure(NamedTuple):
     matrix: Floats
     motion: Floats
     held: Floats
+    maps: Statics
 
 
 def _structure(network: Network, bricks: int) -> _Structure:
@@ -56,7 +57,7 @@ def _structure(network: Network, bricks: int) -> _Structure:
     motion = node_motion(network, bricks).toarray()
     inner = network.inner[:bricks].ravel()
     held = motion[(3 * inner[:, None] + np.arange(3)).ravel()]
-    return _Structure(acting, gap, stiffness, matrix, motion, held)
+    return _Structure(acting, gap, stiffness, matrix, motion, held, statics(network))
 
 
 def require_resistance(network: Network, bricks: int, columns: Ints) -> None:
@@ -105,13 +106,22 @@ def _solve_one(network: Network, parts: _Structure, grips: Ints) -> tuple[Floats
     wrench[parts.acting] = -np.einsum("sij,sjk,k->si", parts.stiffness, parts.gap, twist)
     missing = parts.matrix @ twist - pull
     force = np.linalg.lstsq(fixed.T, missing, rcond=None)[0].reshape(-1, 3)
-    return respond(network, grips, motion=parts.motion, twist=twist, wrench=wrench, force=force)
+    return respond(
+        network,
+        grips,
+        maps=parts.maps,
+        motion=parts.motion,
+        twist=twist,
+        wrench=wrench,
+        force=force,
+    )
 
 
 def respond(
     network: Network,
     grips: Ints,
     *,
+    maps: Statics,
     motion: Floats | sparse.csr_array,
     twist: Floats,
     wrench: Floats,
@@ -122,6 +132,8 @@ def respond(
     Parameters
     ----------
     grips : (r,) int
+    maps : Statics
+        Of the network.
     motion : (3N, 6b) float
         Displacements of the nodes for unit twists.
     twist, wrench, force : (6b,), (S, 6), (r, 3) float
@@ -131,7 +143,6 @@ def respond(
     edges = network.count_edges(bricks)
     load = np.repeat(0.5 * network.weight[:bricks], 2, axis=0)
     load[grips] += force
-    maps = statics(network)
     carried = maps.edge_of_spring[:edges] @ wrench[:, :3].ravel()
     carried += maps.edge_of_load[:edges, : load.size] @ load.ravel()
     _split_pairs(network, grips, force, carried)
