@@ -2,9 +2,10 @@
 
 Method: on `arch25` with 17 bricks, random sets of three grips, every edge force and every node
 displacement evaluated; fast and reference engine take turns in one process on one core; the best
-round and the median of the rounds' ratios are printed. Then the time to prepare the operators of
-all 25 brick counts, and the growth with brick count of a chain: operator, one set of grips solved
-once, and on average, as some sets are solved again.
+round and the median of the rounds' ratios are printed. Then what a call costs for one set, and what
+a further set in a batch of hundreds; the time to prepare the operators of all 25 brick counts; and
+the growth with brick count of a chain: operator, one set of grips solved once, and on average, as
+some sets are solved again.
 
 Inputs: the shipped scene; seed 0. Command: ``python -m experiments.engine_speed [--quick]``. Writes
 ``experiments/results/engine_speed.csv`` and ``docs/figures/engine_growth.png``.
@@ -84,6 +85,17 @@ def engines_side_by_side(sets: int, models: int, rounds: int) -> dict[str, float
     }
 
 
+def calls(few: int, many: int) -> dict[str, float]:
+    """Return the time of a call with one set, and of a further set in a large batch, s."""
+    net = network(load_scene("arch25"))
+    engine = ComplianceEngine(net)
+    sets = grip_sets(net, 17, many)
+    one, some, all_of = (
+        best(partial(engine.solve, 17, sets[:size], ASKED), 100) for size in (1, few, many)
+    )
+    return {"call_s": one, "further_set_s": (all_of - some) / (many - few)}
+
+
 def preparation(rounds: int) -> float:
     """Return the time to load arch25 and prepare the operators of all its brick counts, s."""
 
@@ -154,6 +166,7 @@ def main() -> None:
     quick = parser.parse_args().quick
     size = (2000, 3, 2) if quick else (50_000, 100, 5)
     figures = engines_side_by_side(*size)
+    figures |= calls(400, 800)
     figures["prepare_all_counts_s"] = preparation(2 if quick else 10)
     for name, value in figures.items():
         print(f"{name:24}{value:12.3g}")

@@ -242,11 +242,12 @@ def summarize(rounds: pd.DataFrame, models: int) -> pd.DataFrame:
     whole = (ours["setup_s"] + ours["models_s"]).reindex(index).to_numpy()
     table = rounds.assign(
         model_us=rounds["models_s"] / models * 1e6,
+        gflops=rounds["flops"] / rounds["models_s"] / 1e9,
         ratio=rounds["models_s"] / ours["models_s"].reindex(index).to_numpy(),
         ratio_whole=(rounds["models_s"] + rounds["setup_s"]) / whole,
     )
     grouped = table.groupby(keys, sort=False)
-    times = ["setup_s", "models_s", "model_us", "ratio", "ratio_whole"]
+    times = ["setup_s", "models_s", "model_us", "ratio", "ratio_whole", "gflops"]
     worst = {"ratio_lowest": grouped["ratio"].min(), "difference": grouped["difference"].max()}
     return grouped[times].median().assign(**worst).reset_index()
 
@@ -312,9 +313,6 @@ def main() -> None:
     rounds = compete(net, cases, names, *((1, 3) if quick else (9, 10)))
     table = summarize(rounds, sum(len(c.grips) for c in cases))
     print(table.to_string(index=False, float_format="%.3g"))
-    flops = rounds[rounds["tool"] == BOUND]
-    speed = (flops["flops"] / flops["models_s"]).groupby(flops["setting"]).median() / 1e9
-    print("products at", ", ".join(f"{v:.1f} Gflop/s ({s})" for s, v in speed.items()))
     ways = paths(problem, [n for n in PATHS if not quick or n not in SLOW], 1 if quick else 5)
     print(ways.to_string(index=False, float_format="%.4g"))
     if not quick and not lacking:  # stored rows of packages are not given up

@@ -36,6 +36,7 @@ from seqopt.optimize import Outcome, Posed, optimize, prepare
 from seqopt.problem import Problem
 from seqopt.scene import Scene
 from seqopt.scene_file import load_scene
+from seqopt.schedule import Schedule
 from seqopt.search import Search, search
 from seqopt.selection import Aim, Formulation, Reads, formulations, least_peak, least_sum
 from seqopt.states import window_models
@@ -98,12 +99,16 @@ def contenders() -> dict[str, Aim]:
     return {f.name: f.aim for f in formulations().values()} | {NO_PROOF: Aim.SUM}
 
 
-def _pose(scene: Scene, engine: str, criterion: str) -> Posed:
+def _assemble(scene: Scene, engine: str) -> tuple[Engine, Schedule, dict[str, float]]:
+    """Return an engine, the loop, and the time that took."""
     start = time.perf_counter()
     net = network(scene)
-    solver = ENGINES[engine](net)
-    schedule = three_robot_loop(net)
-    seconds = {"assemble": time.perf_counter() - start}
+    solver, schedule = ENGINES[engine](net), three_robot_loop(net)
+    return solver, schedule, {"assemble": time.perf_counter() - start}
+
+
+def _pose(scene: Scene, engine: str, criterion: str) -> Posed:
+    solver, schedule, seconds = _assemble(scene, engine)
     posed = prepare(solver, schedule, CRITERIA[criterion])
     return Posed(posed.problem, seconds | dict(posed.seconds))
 
@@ -131,13 +136,9 @@ def _search_row(scene: Scene, engine: str, criterion: str, reference: Problem, r
 
 
 def _search(scene: Scene, engine: str, criterion: str) -> tuple[dict[str, float], Search]:
-    start = time.perf_counter()
-    net = network(scene)
-    solver = ENGINES[engine](net)
-    schedule = three_robot_loop(net)
-    assemble = time.perf_counter() - start
+    solver, schedule, seconds = _assemble(scene, engine)
     found = search(solver, schedule, CRITERIA[criterion])
-    return {"assemble": assemble, **found.seconds}, found
+    return seconds | dict(found.seconds), found
 
 
 def _judged(

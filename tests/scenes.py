@@ -15,9 +15,9 @@ angles = st.floats(-0.3, 0.3)
 
 
 @st.composite
-def arches(draw, max_bricks=7):
+def arches(draw, max_bricks=7, min_bricks=1):
     """An arch of a few bricks, bent, rolled and yawed at random, with unequal joint stiffnesses."""
-    count = draw(st.integers(1, max_bricks))
+    count = draw(st.integers(min_bricks, max_bricks))
     bend = draw(st.floats(-0.5, 0.2))
     start = draw(st.floats(0.2, 1.5))
     stiffness = st.tuples(*[st.floats(1e7, 1e9)] * 3)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from hypothesis import given
-from hypothesis import strategies as st
 
 from seqopt.compliance import ComplianceEngine
 from seqopt.criteria import CRITERIA, EQUATIONS, WEIGHTED
@@ -13,7 +12,7 @@ from seqopt.loops import SCHEDULES, three_robot_loop
 from seqopt.network import network
 from seqopt.placement import ProblemError
 from seqopt.problem import Limit, pose
-from seqopt.search import require_search, search, search_responses, search_table, window
+from seqopt.search import require_search, search, search_table, window
 from seqopt.selection import formulation, run
 from seqopt.states import window_models
 from tests.scenes import arches
@@ -51,21 +50,29 @@ def test_it_chooses_as_the_cascade_does(engine25, method, criterion):
     assert found.models <= problem.evaluation.models
 
 
-@given(scene=arches(max_bricks=7).map(far_reaching), share=st.floats(0.5, 1.5))
-def test_with_limits_it_finds_what_the_cascade_finds_or_nothing(scene, share):
-    if len(scene.bricks) < 4:
-        return
+@pytest.mark.parametrize(("response", "bound"), [("F_largest", 300), ("M_sup", 12), ("T_max", 80)])
+def test_under_a_limit_that_binds_it_chooses_as_the_cascade_does(engine25, response, bound):
+    schedule, limits = three_robot_loop(engine25.network), [Limit(response, bound)]
+    found = search(engine25, schedule, EQUATIONS, limits)
+    selection, _ = run(pose(engine25, schedule, EQUATIONS, limits), formulation("cascade"))
+    assert found.choice == selection.choice != search(engine25, schedule, EQUATIONS).choice
+
+
+@given(scene=arches(min_bricks=4, max_bricks=7).map(far_reaching))
+def test_on_any_chain_it_chooses_as_the_cascade_does(scene):
     engine = ComplianceEngine(network(scene))
     schedule = three_robot_loop(engine.network)
-    free = search(engine, schedule, WEIGHTED, [Limit("F_largest", 1e9)])
-    largest = search_responses(free)["F_largest"].max()
-    limits = [Limit("F_largest", share * largest)]
-    try:
-        found = search(engine, schedule, WEIGHTED, limits)
-    except ProblemError:
-        return  # the cascade looks ahead
-    selection, _ = run(pose(engine, schedule, WEIGHTED, limits), formulation("cascade"))
-    assert found.choice == selection.choice
+    problem = pose(engine, schedule, WEIGHTED)
+    found = search(engine, schedule, WEIGHTED)
+    assert found.choice == run(problem, formulation("cascade"))[0].choice
+
+
+def test_a_dead_end_that_the_cascade_foresees(engine25):
+    schedule, limits = three_robot_loop(engine25.network), [Limit("T_max", 64.0)]
+    with pytest.raises(ProblemError, match="move 8, step 31: rob2 has no allowed grip after"):
+        search(engine25, schedule, EQUATIONS, limits)
+    selection, _ = run(pose(engine25, schedule, EQUATIONS, limits), formulation("cascade"))
+    assert len(selection.choice) == len(schedule.moves)
 
 
 def test_a_window_depends_on_the_choices_before_it(engine25):
