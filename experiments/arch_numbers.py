@@ -9,9 +9,10 @@ import numpy as np
 import pandas as pd
 from scipy.optimize import brentq
 
-from seqopt.arch import ArchShape, arch_scene
-from seqopt.network import Floats
-from seqopt.scene import Scene
+from seqopt.arrays import Floats
+from seqopt.scene.arch import ArchShape, arch_scene
+from seqopt.scene.scene import Scene
+from seqopt.study.presets import ROBOTS
 
 SPAN, HEIGHT, BRICKS = 2.08, 1.93, 25  # m, section 3.1
 # Which node of a brick that lies across is on the arch line: the grips that twist in A.1 and A.2.
@@ -92,7 +93,7 @@ def scene_of(numbers: Floats, groups: Sequence[Free]) -> Scene:
         translational_stiffness=(float(linear[0]), float(linear[-1]), float(linear[-1])),
         rotational_stiffness=(float(angular[0]), float(angular[-1]), float(angular[-1])),
     )
-    return arch_scene(shape, "arch25", line_nodes=LINE_NODES, provenance=PROVENANCE)
+    return arch_scene(shape, "arch25", robots=ROBOTS, line_nodes=LINE_NODES, provenance=PROVENANCE)
 
 
 def starting_guess() -> Floats:

@@ -17,14 +17,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import linalg
 
-from seqopt.assembly import EPOXY, Assembly
-from seqopt.bed import opening_maps
-from seqopt.contact import bare_assembly, step_assembly
-from seqopt.discrete import DiscreteEngine
-from seqopt.discrete_system import STUDY_BED, BedStiffness, Pinch, System, build
-from seqopt.fields import Fields, Want
-from seqopt.network import GROUND, Floats, Network
-from seqopt.steps import Step
+from seqopt.arrays import Floats
+from seqopt.contact.assembly import Assembly
+from seqopt.contact.faces import bare_assembly, step_assembly
+from seqopt.contact.mortar import EPOXY
+from seqopt.contact.quadrature import opening_maps
+from seqopt.engines.discrete.engine import DiscreteEngine
+from seqopt.engines.discrete.system import BedStiffness, Pinch, System, build
+from seqopt.engines.interface import Fields, Want
+from seqopt.network.network import GROUND, Network
+from seqopt.sequence.steps import Step
+from seqopt.study.presets import STUDY_BED
 
 STIFFER = 10  # contacts per pad: its joint over those between bricks, as in section 3.2.3
 CLEAR = 1e-3  # m, between a pad's plane and the joints' corners: on one plane, facets would merge
@@ -75,7 +78,7 @@ def padded(
     plane of a pad by half the mortar. A pad therefore leans, by a few degrees about its middle,
     until it is a facet with the joint spread as asked; ``flush`` leaves it on the brick's surface.
     """
-    assembly = step_assembly(network, step)
+    assembly = step_assembly(network, step.bricks, step.grips)
     brick = network.scene.brick_of_node[step.held[0]]
     block, node = int(assembly.grip_block[0]), assembly.grip_position[0]
     length, width = np.array(brick.length_axis), np.array(brick.width_axis)

@@ -30,14 +30,17 @@ from experiments.arch_pads import (
     posed,
 )
 from experiments.witness_lmgc90 import python_with_lmgc90
-from seqopt.assembly import EPOXY, Assembly
-from seqopt.compliance import ComplianceEngine
-from seqopt.discrete import DiscreteEngine
-from seqopt.discrete_system import STUDY_BED, Across, BedStiffness, Pinch
-from seqopt.fields import Engine, Want
-from seqopt.kinematics import node_motion
-from seqopt.network import GROUND, Floats, Network
-from seqopt.steps import Step
+from seqopt.arrays import Floats
+from seqopt.contact.assembly import Assembly
+from seqopt.contact.mortar import EPOXY
+from seqopt.engines.discrete.engine import DiscreteEngine
+from seqopt.engines.discrete.system import Across, BedStiffness, Pinch
+from seqopt.engines.interface import Engine, Want
+from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.network.kinematics import node_motion
+from seqopt.network.network import GROUND, Network
+from seqopt.sequence.steps import Step
+from seqopt.study.presets import STUDY_BED
 
 PAD = 0.02  # m, side of the square that a pad touches: not printed
 THICK = 0.02  # m, of pads and ground; they are fixed and have no weight

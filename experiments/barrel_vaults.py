@@ -19,12 +19,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from seqopt.arch import ArchShape, arch_scene
-from seqopt.network import Floats, network
-from seqopt.operator import OperatorBuilder
-from seqopt.paper import SOURCE, printed
-from seqopt.scene import Scene
-from seqopt.tree import grow_tree
+from seqopt.arrays import Floats
+from seqopt.engines.rigid.operator import OperatorBuilder
+from seqopt.engines.rigid.spanning_tree import grow_tree
+from seqopt.network.build import build_network
+from seqopt.scene.arch import ArchShape, arch_scene
+from seqopt.scene.scene import Scene
+from seqopt.study.tables import SOURCE, printed
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -156,7 +157,7 @@ def load_stiffness(built: Scene, at: float) -> float:
     A brick is rigid: a load between its inner nodes acts on both in inverse proportion to the
     distance, and what it displaces follows from theirs in the same proportion.
     """
-    frame = network(built)
+    frame = build_network(built)
     tree = grow_tree(frame)
     if tree is None:
         raise ValueError("a joint has no stiffness; give it some")

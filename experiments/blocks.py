@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from seqopt.assembly import Assembly
-from seqopt.network import GROUND, Floats
+from seqopt.arrays import Floats
+from seqopt.contact.assembly import Assembly
+from seqopt.network.network import GROUND
 
 BOX = ((0, 1, 2, 3), (7, 6, 5, 4), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0))
 

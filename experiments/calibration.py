@@ -46,7 +46,7 @@ from experiments.barrel_vaults import (
 from experiments.calibration_chart import chart
 from experiments.calibration_readings import entries, readings, summary
 from experiments.plotting import RESULTS
-from seqopt.network import Floats
+from seqopt.arrays import Floats
 
 LAWS: dict[str, Callable[[Vault], float]] = {
     "b t": lambda v: v.width * v.thickness,

@@ -7,7 +7,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 
 from experiments.plotting import new_figure, save_figure
-from seqopt.network import Floats
+from seqopt.arrays import Floats
 
 COLORS = {"b t": "tab:orange", "b t2": "tab:green", "b t3/12": "tab:blue"}
 TEXTS = {"b t": "$b\\,t$", "b t2": "$b\\,t^2$", "b t3/12": "$b\\,t^3/12$"}

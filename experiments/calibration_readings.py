@@ -25,7 +25,7 @@ from experiments.barrel_vaults import (
     planar_stiffness,
     vaults,
 )
-from seqopt.network import Floats
+from seqopt.arrays import Floats
 
 PRINTED = (1e11, 0.9e9)  # N/m³ and what is printed in kN/(rad m²), in N
 POWERS = {"b": (0, 1.0), "b t": (1, 1.0), "b t2": (2, 1.0), "b t3/12": (3, 1 / 12)}

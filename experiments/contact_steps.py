@@ -20,17 +20,18 @@ import numpy as np
 import pandas as pd
 
 from experiments.plotting import RESULTS, new_figure, save_figure
-from seqopt.assembly import DRY
-from seqopt.certificates import certify_steps
-from seqopt.compliance import ComplianceEngine
-from seqopt.discrete import DiscreteEngine
+from seqopt.contact.mortar import DRY
+from seqopt.engines.discrete.engine import DiscreteEngine
+from seqopt.engines.interface import Engine, Want
+from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import MechanismError, SolverError
-from seqopt.fields import Engine, Want
-from seqopt.methods import METHODS
-from seqopt.network import Network, network
-from seqopt.scene_file import load_scene
-from seqopt.stability import Verdict
-from seqopt.steps import Step
+from seqopt.network.build import build_network
+from seqopt.network.network import Network
+from seqopt.scene.scene_file import load_scene
+from seqopt.sequence.steps import Step
+from seqopt.sequence.two_robots import METHODS
+from seqopt.stability.assessment import Verdict
+from seqopt.stability.steps import assess_steps
 
 RESTS, GOES, NEITHER = "rests", "goes", "neither"
 SHOWN = {RESTS: "#2166ac", GOES: "#b2182b", NEITHER: "#bbbbbb"}
@@ -57,7 +58,7 @@ def largest(engine: Engine, step: Step) -> float:
 def rows(net: Network, method: str, steps: Sequence[Step]) -> list[dict[str, object]]:
     """Return a row per step."""
     discrete, rigid = DiscreteEngine(net, DRY), ComplianceEngine(net)
-    results = certify_steps(net, steps, DRY)
+    results = assess_steps(net, steps, DRY)
     out: list[dict[str, object]] = []
     for step, result in zip(steps, results, strict=True):
         ends, moved = ending(discrete, step)
@@ -109,7 +110,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--quick", action="store_true", help="ten steps, nothing written")
     quick = parser.parse_args().quick
-    net = network(load_scene("arch25"))
+    net = build_network(load_scene("arch25"))
     methods = ("sequential",) if quick else ("sequential", "cantilever")
     table = pd.DataFrame(
         [

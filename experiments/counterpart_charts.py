@@ -16,9 +16,9 @@ from experiments.counterpart_page import NEAR, TITLES, caption
 from experiments.counterpart_rows import LOOP, RESPONSES, plan_rows
 from experiments.discrete_arches import STEPS
 from experiments.plotting import new_figure, save_figure
-from seqopt.draw import ROBOT_COLORS, View, draw_bricks, draw_grips
-from seqopt.fields import Want
-from seqopt.paper import printed
+from seqopt.engines.interface import Want
+from seqopt.report.draw import ROBOT_COLORS, View, draw_bricks, draw_grips
+from seqopt.study.tables import printed
 
 OURS, STUDY, OFF = "#2166ac", "#222222", "#c8102e"
 VIEW = View(azimuth=35, elevation=22)

@@ -17,18 +17,19 @@ from experiments.barrel_vaults import chain, vaults
 from experiments.calibration import BED, fit, laws
 from experiments.discrete_arches import STEPS, Reading
 from experiments.yardstick import ROUNDING
-from seqopt.compare import Comparison
-from seqopt.compare import compare as compare_methods
-from seqopt.compliance import ComplianceEngine
-from seqopt.criteria import EQUATIONS
-from seqopt.fields import Engine
-from seqopt.loops import three_robot_loop
-from seqopt.methods import METHODS
-from seqopt.network import Floats, network
-from seqopt.paper import printed
-from seqopt.problem import Problem, pose
-from seqopt.scene import Scene
-from seqopt.scene_file import load_scene
+from seqopt.arrays import Floats
+from seqopt.engines.interface import Engine
+from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.network.build import build_network
+from seqopt.placement.problem import Problem, pose
+from seqopt.report.comparison import Comparison
+from seqopt.report.comparison import compare_methods
+from seqopt.scene.scene import Scene
+from seqopt.scene.scene_file import load_scene
+from seqopt.sequence.three_robots import three_robot_loop
+from seqopt.sequence.two_robots import METHODS
+from seqopt.study.presets import EQUATIONS
+from seqopt.study.tables import printed
 
 Rows = Iterator["Row"]
 
@@ -63,7 +64,7 @@ class Ours:
 
 
 def ours() -> Ours:
-    engine = ComplianceEngine(network(load_scene("arch25")))
+    engine = ComplianceEngine(build_network(load_scene("arch25")))
     problem = pose(engine, three_robot_loop(engine.network), EQUATIONS)
     return Ours(engine, compare_methods(engine), problem)
 

@@ -26,12 +26,12 @@ from experiments.counterpart_models import (
 )
 from experiments.paper_items import CASCADE, COMPARED, MODIFIED, ROBOTS, TENSION
 from experiments.yardstick import ROUNDING, VALUES
-from seqopt.contest import published_choice, published_ranks
-from seqopt.loops import modified_sequential, three_robot_loop
-from seqopt.methods import METHODS
-from seqopt.paper import printed, printed_steps
-from seqopt.schedule import Open, OpenStep
-from seqopt.steps import Step
+from seqopt.sequence.schedule import OpenGrip, OpenStep
+from seqopt.sequence.steps import Step
+from seqopt.sequence.three_robots import modified_sequential, three_robot_loop
+from seqopt.sequence.two_robots import METHODS
+from seqopt.study.published import published_choice, published_ranks
+from seqopt.study.tables import printed, printed_steps
 
 TWISTING = (9, 11, 21, 23, 33, 35, 45, 47)
 CROWN = 25  # last step of the two-robot methods up to the crown brick, 13
@@ -72,7 +72,7 @@ def two_robots(own: Ours) -> Rows:
 
 def cell(grip: object, base: int = 0) -> float:
     """Return a grip as a number: a node, an optimized grip O3 as 1003, none as -1."""
-    if isinstance(grip, Open):
+    if isinstance(grip, OpenGrip):
         return 1000.0 + grip.move + 1 - base
     text = "" if grip is None else str(grip)
     if text in ("", "nan", "<NA>"):

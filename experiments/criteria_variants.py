@@ -18,13 +18,14 @@ from dataclasses import replace
 import pandas as pd
 
 from experiments.plotting import RESULTS, new_figure, save_figure
-from seqopt.compliance import ComplianceEngine
-from seqopt.contest import published_choice, published_ranks
-from seqopt.criteria import CLOSEST, CROWN, EQUATIONS, RESOLUTION, RankSum, equal
-from seqopt.loops import three_robot_loop
-from seqopt.network import network
-from seqopt.problem import Problem, pose
-from seqopt.scene_file import load_scene
+from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.network.build import build_network
+from seqopt.placement.criteria import RESOLUTION, RankSum, equal
+from seqopt.placement.problem import Problem, pose
+from seqopt.scene.scene_file import load_scene
+from seqopt.sequence.three_robots import three_robot_loop
+from seqopt.study.presets import CLOSEST, CROWN, EQUATIONS
+from seqopt.study.published import published_choice, published_ranks
 
 FINE = tuple((letter, 1e-6 * size) for letter, size in RESOLUTION)
 SETS = {
@@ -97,7 +98,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--quick", action="store_true", help="few variants, nothing written")
     quick = parser.parse_args().quick
-    engine = ComplianceEngine(network(load_scene("arch25")))
+    engine = ComplianceEngine(build_network(load_scene("arch25")))
     also = ("T_max", "M_sup", "D_max", "F_move", "F_largest", "F_rob1", "F_rob2", "F_rob3")
     problem = pose(engine, three_robot_loop(engine.network), EQUATIONS, also=also)
     tried = variants()

@@ -30,17 +30,19 @@ import numpy as np
 import pandas as pd
 
 from experiments.plotting import RESULTS, new_figure, save_figure
-from seqopt.compliance import ComplianceEngine
-from seqopt.criteria import CLOSEST, EQUATIONS, WEIGHTED, WORST_RATIO, Criterion
-from seqopt.loops import three_robot_loop
-from seqopt.network import network
-from seqopt.problem import Problem, pose
-from seqopt.ranking import move_costs, place
-from seqopt.scene import Ground, Joint, Scene
-from seqopt.scene_file import load_scene
-from seqopt.schedule import Schedule
-from seqopt.selection import formulation, run
-from seqopt.vectors import Vector
+from seqopt.arrays import Vector
+from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.network.build import build_network
+from seqopt.placement.criteria import Criterion
+from seqopt.placement.formulation import find_formulation
+from seqopt.placement.plan import run
+from seqopt.placement.problem import Problem, pose
+from seqopt.placement.ranking import move_costs, rank_of
+from seqopt.scene.scene import Ground, Joint, Scene
+from seqopt.scene.scene_file import load_scene
+from seqopt.sequence.schedule import Schedule
+from seqopt.sequence.three_robots import three_robot_loop
+from seqopt.study.presets import CLOSEST, EQUATIONS, WEIGHTED, WORST_RATIO
 
 End = TypeVar("End", Joint, Ground)
 TESTED: tuple[Criterion, ...] = (EQUATIONS, CLOSEST, WEIGHTED, WORST_RATIO)
@@ -176,21 +178,21 @@ def scenarios(grids: Grids, seeds: int) -> Iterator[tuple[str, float, int]]:
 
 def problems(scene: Scene, schedule: Schedule) -> dict[str, Problem]:
     """Return the problem under every criterion, the models of all solved once."""
-    posed = pose(ComplianceEngine(network(scene)), schedule, EQUATIONS, also=ALSO)
+    posed = pose(ComplianceEngine(build_network(scene)), schedule, EQUATIONS, also=ALSO)
     robots = [robot.name for robot in scene.robots]
     return {c.name: replace(posed, criterion=c.for_robots(robots)) for c in TESTED}
 
 
 def judge(problem: Problem, nominal: Decision) -> dict[str, float]:
     """Return how far a scenario's decisions are from the nominal ones."""
-    selection, certificate = run(problem, formulation("overlap_dp"))
+    selection, certificate = run(problem, find_formulation("overlap_dp"))
     best = certificate.objective
     regret = max(0.0, problem.sums.cost(nominal.best) - best)
     first, three = [], []
     for k, chosen in enumerate(nominal.searched):
         costs = move_costs(problem, k, nominal.searched[k - 1] if k else 0)
         first.append(int(np.argmin(costs)) == chosen)
-        three.append(place(costs, chosen) <= 3)
+        three.append(rank_of(costs, chosen) <= 3)
     average = sum(
         float(costs[np.isfinite(costs)].mean())
         for costs in (*problem.sums.single, *problem.sums.shared)
@@ -208,11 +210,11 @@ def judge(problem: Problem, nominal: Decision) -> dict[str, float]:
 
 def measure(scene: Scene, wanted: Iterator[tuple[str, float, int]]) -> pd.DataFrame:
     """Return a row per scenario and criterion."""
-    schedule = three_robot_loop(network(scene))
+    schedule = three_robot_loop(build_network(scene))
     nominal = {
         name: Decision(
-            formulation("overlap_dp").solve(problem).choice,
-            formulation("rank_search").solve(problem).choice,
+            find_formulation("overlap_dp").solve(problem).choice,
+            find_formulation("rank_search").solve(problem).choice,
         )
         for name, problem in problems(scene, schedule).items()
     }

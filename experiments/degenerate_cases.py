@@ -9,13 +9,14 @@ from itertools import pairwise, product
 import numpy as np
 
 from experiments.formulation_cost import half_circle
-from seqopt.compliance import ComplianceEngine
-from seqopt.criteria import EQUATIONS, RESOLUTION, Criterion, WorstRatio
-from seqopt.loops import three_robot_loop
-from seqopt.network import Floats
-from seqopt.placement import Budget, CostProblem, Placement, PlacementProblem
-from seqopt.problem import Limit, Problem, pose
-from seqopt.selection import Aim
+from seqopt.arrays import Floats
+from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.placement.costs import Budget, CostProblem, LayeredCosts, PlacementProblem
+from seqopt.placement.criteria import RESOLUTION, Criterion, WorstRatio
+from seqopt.placement.formulation import Aim
+from seqopt.placement.problem import Limit, Problem, pose
+from seqopt.sequence.three_robots import three_robot_loop
+from seqopt.study.presets import EQUATIONS
 
 COARSE = replace(
     EQUATIONS, name="coarse", resolution=tuple((name, 100 * size) for name, size in RESOLUTION)
@@ -60,7 +61,7 @@ def enumerated(problem: PlacementProblem, aim: Aim) -> tuple[float, list[tuple[i
 def costs(sizes: tuple[int, ...], draw: Callable[[tuple[int, ...]], Floats]) -> CostProblem:
     """Return a problem with costs drawn by shape; nothing is shared before the first move."""
     shared = (np.zeros((1, sizes[0])), *(draw(pair) for pair in pairwise(sizes)))
-    return CostProblem(Placement(tuple(draw((size,)) for size in sizes), shared))
+    return CostProblem(LayeredCosts(tuple(draw((size,)) for size in sizes), shared))
 
 
 def whole(sizes: tuple[int, ...], rng: Rng, scale: float = 1.0, least: int = 0) -> CostProblem:
@@ -91,14 +92,14 @@ def one_left(size: Size, rng: Rng) -> CostProblem:
         np.where(np.arange(size.candidates) == k, cost, np.inf)
         for k, cost in zip(kept, problem.sums.single, strict=True)
     )
-    return CostProblem(Placement(single, problem.sums.shared))
+    return CostProblem(LayeredCosts(single, problem.sums.shared))
 
 
 def dead_end(size: Size, rng: Rng) -> CostProblem:
     """Return a problem whose candidates are all allowed, but no pair of the last two moves is."""
     sums = whole(size.sizes, rng).sums
     return CostProblem(
-        Placement(sums.single, (*sums.shared[:-1], np.full_like(sums.shared[-1], np.inf)))
+        LayeredCosts(sums.single, (*sums.shared[:-1], np.full_like(sums.shared[-1], np.inf)))
     )
 
 
@@ -107,7 +108,7 @@ def altered(size: Size, rng: Rng, value: float) -> CostProblem:
     sums = whole(size.sizes, rng).sums
     first = sums.single[0].copy()
     first[0] = value
-    return CostProblem(Placement((first, *sums.single[1:]), sums.shared))
+    return CostProblem(LayeredCosts((first, *sums.single[1:]), sums.shared))
 
 
 def capped(size: Size, rng: Rng, amount: float, share: float) -> CostProblem:

@@ -31,9 +31,10 @@ import pandas as pd
 
 from experiments.degenerate_cases import CASES, Case, Size, enumerated
 from experiments.plotting import RESULTS
-from seqopt.errors import SolverError
-from seqopt.placement import InfeasibleError, PlacementProblem, ProblemError
-from seqopt.selection import Formulation, Kind, check, formulations
+from seqopt.errors import InfeasibleError, ProblemError, SolverError
+from seqopt.placement.certificate import check_selection
+from seqopt.placement.costs import PlacementProblem
+from seqopt.placement.formulation import Formulation, FormulationKind, formulations
 
 FULL, SMALL = Size(5, 4, 7), Size(3, 3, 6)
 DRAWS = 20
@@ -53,7 +54,7 @@ def answer(problem: PlacementProblem, which: Formulation) -> dict[str, object]:
         return row | {"status": "wrong", "message": repr(error)}
     row |= {"bound": selection.bound, "choice": selection.choice}
     try:
-        certificate = check(problem, selection, which)
+        certificate = check_selection(problem, selection, which)
     except SolverError as error:
         return row | {"status": "rejected", "message": str(error)}
     return row | {"status": "answered", "value": certificate.objective}
@@ -78,7 +79,9 @@ def judge(problem: PlacementProblem, which: Formulation) -> dict[str, object]:
     if status != "answered":
         return row
     if value > best + room:
-        promised = which.kind is Kind.EXACT or (which.kind is Kind.BOUND and not problem.budgets)
+        promised = which.kind is FormulationKind.EXACT or (
+            which.kind is FormulationKind.BOUND and not problem.budgets
+        )
         return row | {"status": "wrong" if promised else "feasible"}
     ends: dict[object, str] = {winners[0]: "first", winners[-1]: "last"}
     chosen = ends.get(row["choice"], "between") if len(winners) > 1 else "only"

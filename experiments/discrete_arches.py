@@ -2,7 +2,7 @@
 
 Method: the study compares its model with discrete elements on four partial arches (17, 18, 23 and
 24 bricks, one robot holding the last) and prints the mean difference of the displacements of all
-inner nodes that no robot holds (section 3.2.3, table 3). Here `seqopt.discrete.DiscreteEngine`
+inner nodes that no robot holds (section 3.2.3, table 3). Here `seqopt.engines.discrete.engine.DiscreteEngine`
 solves the same arches with rigid bricks on beds of 100e6 kN/m³ normal and 10e6 kN/m³ tangential.
 What print leaves open is read in several ways:
 
@@ -37,17 +37,20 @@ from experiments.arches_lmgc90 import PAD, READINGS, error, moved, witness
 from experiments.discrete_chart import chart
 from experiments.plotting import RESULTS
 from experiments.witness_lmgc90 import python_with_lmgc90
-from seqopt.assembly import EPOXY
-from seqopt.compliance import ComplianceEngine
-from seqopt.discrete import DiscreteEngine
-from seqopt.discrete_system import STUDY_BED, Across, BedStiffness, Pinch
-from seqopt.elastic import elastic_limits
-from seqopt.fields import Want
-from seqopt.methods import sequential
-from seqopt.network import Floats, Network, network
-from seqopt.paper import printed
-from seqopt.scene_file import load_scene
-from seqopt.steps import Step
+from seqopt.arrays import Floats
+from seqopt.contact.elastic_limits import find_elastic_limits
+from seqopt.contact.mortar import EPOXY
+from seqopt.engines.discrete.engine import DiscreteEngine
+from seqopt.engines.discrete.system import Across, BedStiffness, Pinch
+from seqopt.engines.interface import Want
+from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.network.build import build_network
+from seqopt.network.network import Network
+from seqopt.scene.scene_file import load_scene
+from seqopt.sequence.steps import Step
+from seqopt.sequence.two_robots import sequential
+from seqopt.study.presets import STUDY_BED
+from seqopt.study.tables import printed
 
 STEPS = {17: 33, 18: 35, 23: 45, 24: 47}  # steps of the sequential method, by bricks
 PADS = (0.012, 0.02, 0.03)  # m
@@ -116,7 +119,7 @@ def row_of(engine: ComplianceEngine, step: Step, reading: Reading) -> dict[str, 
 def stresses(engine: DiscreteEngine, step: Step) -> tuple[float, float]:
     """Return the largest tension of the joints, Pa, and shear over what the epoxy allows."""
     wrench = engine.solve(step.bricks, [list(step.held)], Want.ALL).joint_wrench[0]
-    limits = elastic_limits(engine.network, EPOXY)
+    limits = find_elastic_limits(engine.network, EPOXY)
     stress = np.einsum("kij,kj->ki", limits.stress, wrench[limits.assembly.contact])
     shear = np.linalg.norm(stress[:, 1:], axis=1)
     allowed = EPOXY.cohesion + EPOXY.friction * stress[:, 0]
@@ -236,7 +239,7 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="two arches, nothing written")
     parser.add_argument("--lmgc90", default=sys.executable, help="a Python with compas_lmgc90")
     options = parser.parse_args()
-    engine = ComplianceEngine(network(load_scene("arch25")))
+    engine = ComplianceEngine(build_network(load_scene("arch25")))
     steps = arches(engine, quick=options.quick)
     study = printed("de_validation").set_index("bricks")["error_percent"]
     study = study.loc[[step.bricks for step in steps]]

@@ -6,7 +6,7 @@ frame (over its contrast; else at its default), direct solve by the stiffness ma
 against sixty-digit arithmetic on the same rigid bricks. The error is the largest of displacements,
 joint forces and joint moments, each relative to its largest entry, over the grip sets of a point; a
 point counts as refused if any set is. Backward error and smallest scaled eigenvalue are those of
-`seqopt.diagnosis`. The claim also asks that a mechanism is called one, with its mode, and that a
+`seqopt.engines.diagnosis`. The claim also asks that a mechanism is called one, with its mode, and that a
 frame that is wrong by more than 1e-3 is not found to be solved well.
 
 Inputs: none. Command: ``python -m experiments.engine_limits [--quick]``. Writes
@@ -37,14 +37,16 @@ from experiments.limit_scenes import (
 )
 from experiments.plotting import RESULTS
 from experiments.reference_chain import Reference, solve_exactly
-from seqopt.compliance import ComplianceEngine
-from seqopt.diagnosis import MECHANISM, WELL, residual, spectrum
+from seqopt.arrays import Floats, Ints
+from seqopt.engines.diagnosis import UNRESISTED, WELL, residual, spectrum
+from seqopt.engines.frame import FrameEngine
+from seqopt.engines.interface import Fields, Want, grip_columns
+from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.engines.rigid.dense import solve_dense
+from seqopt.engines.rigid.mixed import solve_mixed
 from seqopt.errors import MechanismError, SolverError
-from seqopt.fields import Fields, Want, grip_columns
-from seqopt.frame import FrameEngine
-from seqopt.mixed import solve_mixed
-from seqopt.network import Floats, Ints, Network, network
-from seqopt.rigid import solve_rigid
+from seqopt.network.build import build_network
+from seqopt.network.network import Network
 
 Solve = Callable[[Ints, Ints], Fields]  # of node numbers and of places, (1, r)
 BOUND = 1e-9  # promised up to this many bricks
@@ -94,7 +96,7 @@ def engines(net: Network) -> dict[str, Solve]:
         "mixed": lambda _, columns: solve_mixed(net, count, columns),
     }
     if count <= MOST:
-        every["direct"] = lambda _, columns: solve_rigid(net, count, columns)
+        every["direct"] = lambda _, columns: solve_dense(net, count, columns)
     if count <= MOST:
         every["frame"] = lambda names, _: frame.solve(count, names)
     return every
@@ -133,7 +135,7 @@ def examine(case: Case, solvers: dict[str, Solve]) -> Iterator[dict[str, object]
 
 def contrasts(powers: Iterable[float], bricks: int) -> Iterator[dict[str, object]]:
     """Yield rows of the frame over its contrast, and of the engines that have none."""
-    net = network(chain(bricks))
+    net = build_network(chain(bricks))
     powers = list(powers)
     sets = far_grips(bricks)[:3]
     for power in powers:
@@ -186,8 +188,8 @@ def judge(table: pd.DataFrame) -> dict[str, bool]:
         ),
         "fast: refuses only next to a mechanism": bool((near["smallest_eigenvalue"] < 1e-9).all()),
         "mechanisms are called so": bool((table.loc[absent, "status"] == "mechanism").all()),
-        f"their smallest eigenvalue is below {MECHANISM:g}": bool(
-            (table.loc[table["mechanism"], "smallest_eigenvalue"] < MECHANISM).all()
+        f"their smallest eigenvalue is below {UNRESISTED:g}": bool(
+            (table.loc[table["mechanism"], "smallest_eigenvalue"] < UNRESISTED).all()
         ),
         "frames wrong by 1e-3 are seen": bool((frame["backward_error"] > WELL).all()),
     }

@@ -22,14 +22,16 @@ import numpy as np
 import pandas as pd
 
 from experiments.plotting import RESULTS, new_figure, save_figure
-from seqopt.arch import ArchShape, arch_scene
-from seqopt.compliance import ComplianceEngine, solve_batch
-from seqopt.fields import Want, grip_columns
-from seqopt.frame import FrameEngine
-from seqopt.network import Ints, Network, network
-from seqopt.operator import OperatorBuilder
-from seqopt.scene_file import load_scene
-from seqopt.tree import Tree, grow_tree
+from seqopt.arrays import Ints
+from seqopt.engines.frame import FrameEngine
+from seqopt.engines.interface import Want, grip_columns
+from seqopt.engines.rigid.compliance import ComplianceEngine, solve_batch
+from seqopt.engines.rigid.operator import OperatorBuilder
+from seqopt.engines.rigid.spanning_tree import SpanningTree, grow_tree
+from seqopt.network.build import build_network
+from seqopt.network.network import Network
+from seqopt.scene.arch import ArchShape, arch_scene
+from seqopt.scene.scene_file import load_scene
 
 ASKED = Want.EDGES | Want.DISPLACEMENTS
 
@@ -54,10 +56,10 @@ def grip_sets(net: Network, bricks: int, count: int) -> Ints:
 
 def chain(count: int) -> Network:
     """Return the network of a chain that leans forward a little and stays off the ground."""
-    return network(arch_scene(ArchShape(pitch=np.linspace(1.4, -0.2, count), closed=False)))
+    return build_network(arch_scene(ArchShape(pitch=np.linspace(1.4, -0.2, count), closed=False)))
 
 
-def tree_of(net: Network) -> Tree:
+def tree_of(net: Network) -> SpanningTree:
     tree = grow_tree(net)
     assert tree is not None
     return tree
@@ -65,7 +67,7 @@ def tree_of(net: Network) -> Tree:
 
 def engines_side_by_side(sets: int, models: int, rounds: int) -> dict[str, float]:
     """Return seconds per grip set of both engines and their ratio, in turns."""
-    net = network(load_scene("arch25"))
+    net = build_network(load_scene("arch25"))
     fast, frame = ComplianceEngine(net), FrameEngine(net)
     many, few = grip_sets(net, 17, sets), grip_sets(net, 17, models)
     fast.solve(17, few)
@@ -87,7 +89,7 @@ def engines_side_by_side(sets: int, models: int, rounds: int) -> dict[str, float
 
 def calls(few: int, many: int) -> dict[str, float]:
     """Return the time of a call with one set, and of a further set in a large batch, s."""
-    net = network(load_scene("arch25"))
+    net = build_network(load_scene("arch25"))
     engine = ComplianceEngine(net)
     sets = grip_sets(net, 17, many)
     one, some, all_of = (
@@ -100,7 +102,7 @@ def preparation(rounds: int) -> float:
     """Return the time to load arch25 and prepare the operators of all its brick counts, s."""
 
     def prepare() -> None:
-        net = network(load_scene("arch25"))
+        net = build_network(load_scene("arch25"))
         builder = OperatorBuilder(net, tree_of(net))
         for bricks in range(1, 26):
             builder.operator(bricks)
@@ -108,7 +110,7 @@ def preparation(rounds: int) -> float:
     return best(prepare, rounds)
 
 
-def build_operator(net: Network, tree: Tree, bricks: int) -> None:
+def build_operator(net: Network, tree: SpanningTree, bricks: int) -> None:
     OperatorBuilder(net, tree).operator(bricks)
 
 

@@ -27,26 +27,27 @@ import pandas as pd
 from matplotlib.axes import Axes
 
 from experiments.plotting import RESULTS, new_figure, save_figure
-from formulations.equilibrium import compile_equilibrium
-from seqopt.arch import ROBOTS, ArchShape, arch_scene
-from seqopt.assembly import DRY, EPOXY
-from seqopt.certificates import certify_steps, stability_table
-from seqopt.compliance import ComplianceEngine
-from seqopt.contact import step_assembly
-from seqopt.criteria import EQUATIONS
-from seqopt.loops import modified_sequential, three_robot_loop
-from seqopt.methods import METHODS
-from seqopt.network import GROUND, Network, network
-from seqopt.optimize import optimize, prepare
-from seqopt.plan_file import published_plan
-from seqopt.proof import Prover
-from seqopt.responses import analyze
-from seqopt.scene import Scene, Spring
-from seqopt.scene_file import load_scene
-from seqopt.selection import formulation
-from seqopt.stability import bonded
-from seqopt.steps import Step
-from seqopt.vectors import Vector
+from formulations.limit_analysis import compile_equilibrium
+from seqopt.arrays import Vector
+from seqopt.contact.faces import step_assembly
+from seqopt.contact.mortar import DRY, EPOXY
+from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.network.build import build_network
+from seqopt.network.network import GROUND, Network
+from seqopt.placement.formulation import find_formulation
+from seqopt.placement.plan import optimize, prepare
+from seqopt.responses.table import analyze
+from seqopt.scene.arch import ArchShape, arch_scene
+from seqopt.scene.scene import Scene, Spring
+from seqopt.scene.scene_file import load_scene
+from seqopt.sequence.steps import Step
+from seqopt.sequence.three_robots import modified_sequential, three_robot_loop
+from seqopt.sequence.two_robots import METHODS
+from seqopt.stability.assessment import bonded
+from seqopt.stability.prover import Prover
+from seqopt.stability.steps import assess_steps, stability_table
+from seqopt.study.presets import EQUATIONS, ROBOTS
+from seqopt.study.published import published_plan
 
 ORDINARY = 0.10e6  # Pa: flexural bond of general-purpose mortar, EN 1996-1-1, 3.6.4
 LIMITS = {"D_max_1e-3mm": 100.0, "M_sup_Nm": 30.0, "F_largest_N": 392.4}
@@ -63,11 +64,11 @@ def plans(engine: ComplianceEngine) -> Plans:
     net = engine.network
     out = {name: method(net) for name, method in METHODS.items()}
     modified = prepare(engine, modified_sequential(net), EQUATIONS)
-    out["modified sequential"] = optimize(modified, formulation("rank_search")).plan
+    out["modified sequential"] = optimize(modified, find_formulation("rank_search")).plan
     out["three-robot, published"] = published_plan(net.scene)
     loop = prepare(engine, three_robot_loop(net), EQUATIONS)
-    out["three-robot, optimized"] = optimize(loop, formulation("overlap_dp")).plan
-    out["three-robot, minimax"] = optimize(loop, formulation("minimax")).plan
+    out["three-robot, optimized"] = optimize(loop, find_formulation("overlap_dp")).plan
+    out["three-robot, minimax"] = optimize(loop, find_formulation("minimax")).plan
     return out
 
 
@@ -85,8 +86,8 @@ def tabulate(engine: ComplianceEngine, name: str, steps: tuple[Step, ...]) -> pd
     table = analyze(engine, steps)
     robots = [f"F_{robot.name}_N" for robot in net.scene.robots]
     largest = table[robots].abs().max(axis=1).fillna(0.0)
-    dry = stability_table(steps, certify_steps(net, steps, DRY))
-    bound = stability_table(steps, certify_steps(net, steps, EPOXY))
+    dry = stability_table(steps, assess_steps(net, steps, DRY))
+    bound = stability_table(steps, assess_steps(net, steps, EPOXY))
     return pd.DataFrame(
         {
             "method": name,
@@ -178,7 +179,7 @@ def bonds(net: Network, steps: tuple[Step, ...]) -> list[float]:
     """Return the bond that every step needs, Pa."""
     out = []
     for step in steps:
-        assembly = step_assembly(net, step)
+        assembly = step_assembly(net, step.bricks, step.grips)
         proven = Prover(assembly, compile_equilibrium)(bonded(assembly, DRY))
         out.append(proven.value * assembly.stress_scale)
     return out
@@ -186,7 +187,7 @@ def bonds(net: Network, steps: tuple[Step, ...]) -> list[float]:
 
 def extremes(label: str, times: float, scene: Scene, methods: Plans) -> Rows:
     """Yield the largest bond and responses of every method on a scene."""
-    engine = ComplianceEngine(network(scene))
+    engine = ComplianceEngine(build_network(scene))
     for name, steps in methods.items():
         table = analyze(engine, steps)
         robots = [f"F_{robot.name}_N" for robot in scene.robots]
@@ -210,11 +211,11 @@ def growth(scene: Scene, methods: Plans, sizes: tuple[int, ...]) -> Rows:
         for label, size, density in (("larger", times, 1.0), ("heavier", 1.0, times)):
             yield from extremes(label, times, scaled(scene, size, density), methods)
         line = longer(scene, times)
-        net = network(line)
+        net = build_network(line)
         made = {name: method(net) for name, method in METHODS.items()}
         if times <= 2:  # the choice for longer arches is a study of its own
             loop = prepare(ComplianceEngine(net), three_robot_loop(net), EQUATIONS)
-            made["three-robot, optimized"] = optimize(loop, formulation("overlap_dp")).plan
+            made["three-robot, optimized"] = optimize(loop, find_formulation("overlap_dp")).plan
         yield from extremes("longer", times, line, made)
 
 
@@ -318,7 +319,7 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="late steps only, nothing written")
     quick = parser.parse_args().quick
     scene = load_scene("arch25")
-    engine = ComplianceEngine(network(scene))
+    engine = ComplianceEngine(build_network(scene))
     made = plans(engine)
     if quick:
         made = {name: made[name] for name in (*METHODS, "three-robot, published")}

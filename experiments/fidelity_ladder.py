@@ -30,17 +30,18 @@ import pandas as pd
 from experiments.engine_speed import best, grip_sets
 from experiments.fidelity_scenes import flat_arch, flattened
 from experiments.plotting import RESULTS, new_figure, save_figure
-from seqopt.assembly import DRY
-from seqopt.compliance import ComplianceEngine
-from seqopt.discrete import DiscreteEngine
-from seqopt.fidelity import AutoEngine
-from seqopt.fields import Engine, Want
-from seqopt.frame import FrameEngine
-from seqopt.methods import sequential
-from seqopt.network import Floats, Ints, network
-from seqopt.planar import PlanarEngine
-from seqopt.scene import Scene
-from seqopt.scene_file import load_scene
+from seqopt.arrays import Floats, Ints
+from seqopt.contact.mortar import DRY
+from seqopt.engines.auto import AutoEngine
+from seqopt.engines.discrete.engine import DiscreteEngine
+from seqopt.engines.frame import FrameEngine
+from seqopt.engines.interface import Engine, Want
+from seqopt.engines.planar import PlanarEngine
+from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.network.build import build_network
+from seqopt.scene.scene import Scene
+from seqopt.scene.scene_file import load_scene
+from seqopt.sequence.two_robots import sequential
 
 EXACT, FRAME, WRONG = 1e-8, 1e-5, 0.1
 SIZES = (10, 25, 50, 100, 200)
@@ -73,7 +74,7 @@ def steps_of(scene: Scene, numbers: tuple[int, ...] | None = None) -> list[Quest
     """Return the steps of the sequential method, or some of them."""
     return [
         Question(step.bricks, np.array([step.held], dtype=np.int64).reshape(1, -1))
-        for step in sequential(network(scene))
+        for step in sequential(build_network(scene))
         if numbers is None or step.number in numbers
     ]
 
@@ -81,14 +82,14 @@ def steps_of(scene: Scene, numbers: tuple[int, ...] | None = None) -> list[Quest
 def pairs(*, quick: bool) -> Iterator[Pair]:
     """Yield what is compared."""
     for count in SIZES[: 1 if quick else None]:
-        net = network(flat_arch(count))
+        net = build_network(flat_arch(count))
         asked = [Question(count, grip_sets(net, count, SETS))]
         case = f"flat arch, {count} bricks"
         yield Pair("planar", "rigid", case, MET, PlanarEngine(net), ComplianceEngine(net), asked)
     scene = load_scene("arch25")
-    net, all_steps = network(scene), steps_of(scene)[: 12 if quick else None]
+    net, all_steps = build_network(scene), steps_of(scene)[: 12 if quick else None]
     rigid = ComplianceEngine(net)
-    flat = PlanarEngine(network(flattened(scene)))
+    flat = PlanarEngine(build_network(flattened(scene)))
     yield Pair("planar", "rigid", "arch25 pressed flat", NOT_MET, flat, rigid, all_steps)
     yield Pair("rigid", "frame", "arch25", MET, rigid, FrameEngine(net), all_steps)
     bonded, dry = DiscreteEngine(net), DiscreteEngine(net, DRY)

@@ -8,9 +8,9 @@ from typing import TypeVar
 
 import numpy as np
 
-from seqopt.arch import ArchShape, arch_scene
-from seqopt.scene import Brick, Ground, Joint, Scene
-from seqopt.vectors import Vector
+from seqopt.arrays import Vector
+from seqopt.scene.arch import ArchShape, arch_scene
+from seqopt.scene.scene import Brick, Ground, Joint, Scene
 
 S = TypeVar("S", Joint, Ground)
 SPAN = 6.0  # m along the line of a flat arch

@@ -11,13 +11,13 @@ from __future__ import annotations
 
 from experiments.plotting import new_figure, save_figure
 from experiments.yardstick import VALUES
-from seqopt.compare import compare
-from seqopt.compliance import ComplianceEngine
-from seqopt.draw import View, draw_bricks, draw_grips, draw_network, draw_responses
-from seqopt.fields import Engine, Want
-from seqopt.network import network
-from seqopt.paper import printed_steps
-from seqopt.scene_file import load_scene
+from seqopt.engines.interface import Engine, Want
+from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.network.build import build_network
+from seqopt.report.comparison import compare_methods
+from seqopt.report.draw import View, draw_bricks, draw_grips, draw_network, draw_responses
+from seqopt.scene.scene_file import load_scene
+from seqopt.study.tables import printed_steps
 
 VIEW = View(azimuth=35, elevation=22)
 MAGNIFY = 2000.0
@@ -76,13 +76,13 @@ def axial_forces(engine: Engine) -> None:
 def responses_along_the_build(engine: Engine) -> None:
     figure = new_figure(8, 8)
     axes = figure.subplots(len(COLUMNS), 1, sharex=True)
-    draw_responses(axes, compare(engine).tables, COLUMNS)
+    draw_responses(axes, compare_methods(engine).tables, COLUMNS)
     axes[-1].set(yscale="log", ylim=(0.1, 500))
     save_figure(figure, "responses.png")
 
 
 def printed_against_computed(engine: Engine) -> None:
-    tables = compare(engine).tables
+    tables = compare_methods(engine).tables
     figure = new_figure(9, 6.5)
     panels = figure.subplots(3, 4).ravel()
     for panel, column in zip(panels, VALUES, strict=False):
@@ -104,7 +104,7 @@ def printed_against_computed(engine: Engine) -> None:
 
 
 def main() -> None:
-    engine = ComplianceEngine(network(load_scene("arch25")))
+    engine = ComplianceEngine(build_network(load_scene("arch25")))
     for draw in (
         twisting_step,
         network_picture,

@@ -19,21 +19,23 @@ import pandas as pd
 
 from experiments.engine_speed import best
 from experiments.plotting import RESULTS, new_figure, save_figure
-from seqopt.arch import ArchShape, arch_scene
-from seqopt.compliance import ComplianceEngine
-from seqopt.criteria import EQUATIONS, WEIGHTED, Criterion
-from seqopt.loops import three_robot_loop
-from seqopt.network import Network, network
-from seqopt.optimize import Posed, prepare
-from seqopt.scene_file import load_scene
-from seqopt.selection import Aim, formulations, run
+from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.network.build import build_network
+from seqopt.network.network import Network
+from seqopt.placement.criteria import Criterion
+from seqopt.placement.formulation import Aim, formulations
+from seqopt.placement.plan import Posed, prepare, run
+from seqopt.scene.arch import ArchShape, arch_scene
+from seqopt.scene.scene_file import load_scene
+from seqopt.sequence.three_robots import three_robot_loop
+from seqopt.study.presets import EQUATIONS, ROBOTS, WEIGHTED
 
 
 def half_circle(count: int) -> Network:
     """Return the network of an arch that turns from upright to upright."""
     pitch = np.linspace(1.4, -1.4, count).tolist()
     shape = ArchShape(pitch=pitch)
-    return network(arch_scene(shape))
+    return build_network(arch_scene(shape, robots=ROBOTS))
 
 
 def problem_of(net: Network, criterion: Criterion) -> Posed:
@@ -83,7 +85,7 @@ def main() -> None:
     counts = [6, 9] if quick else [6, 9, 13, 18, 25, 36, 50]
     table = pd.DataFrame([measure(half_circle(n), WEIGHTED, rounds) for n in counts])
     print(table.to_string(index=False, float_format="%.3g"))
-    reference = measure(network(load_scene("arch25")), EQUATIONS, rounds)
+    reference = measure(build_network(load_scene("arch25")), EQUATIONS, rounds)
     whole = reference["pose"] + reference["overlap_dp"]
     print(f"arch25, equations 2 and 3: posed and solved exactly in {whole:.3f} s")
     ratio = {n: reference[n] / reference["overlap_dp"] for n in ("overlap_lp", "overlap_mip")}

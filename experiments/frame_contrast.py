@@ -17,17 +17,17 @@ import numpy as np
 import pandas as pd
 
 from experiments.plotting import RESULTS, new_figure, save_figure
-from seqopt.compliance import ComplianceEngine
+from seqopt.engines.frame import CONTRAST, FrameEngine
+from seqopt.engines.interface import Engine, Fields, grip_columns
+from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.engines.rigid.dense import solve_dense
 from seqopt.errors import SolverError
-from seqopt.fields import Engine, Fields, grip_columns
-from seqopt.frame import CONTRAST, FrameEngine
-from seqopt.methods import METHODS
-from seqopt.network import network
-from seqopt.plan_file import published_plan
-from seqopt.responses import step_fields
-from seqopt.rigid import solve_rigid
-from seqopt.scene_file import load_scene
-from seqopt.steps import Step
+from seqopt.network.build import build_network
+from seqopt.responses.table import step_fields
+from seqopt.scene.scene_file import load_scene
+from seqopt.sequence.steps import Step
+from seqopt.sequence.two_robots import METHODS
+from seqopt.study.published import published_plan
 
 FIELDS = ("edge_force", "displacement", "grip_force", "support")
 
@@ -72,7 +72,7 @@ def direct_gap(steps: list[Step], fast: Engine) -> float:
     for step in steps:
         grips = np.array([step.held], dtype=np.int64).reshape(1, -1)
         columns = grip_columns(fast.network, step.bricks, grips)
-        direct = solve_rigid(fast.network, step.bricks, columns)
+        direct = solve_dense(fast.network, step.bricks, columns)
         worst = max(worst, *difference(direct, step_fields(fast, step)).values())
     return worst
 
@@ -93,7 +93,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--quick", action="store_true", help="few states, nothing written")
     quick = parser.parse_args().quick
-    fast = ComplianceEngine(network(load_scene("arch25")))
+    fast = ComplianceEngine(build_network(load_scene("arch25")))
     steps = published_steps(fast)[:: 25 if quick else 1]
     powers = [2, 6, 10] if quick else np.arange(2, 11.5, 0.5).tolist()
     table = sweep(steps, fast, sorted({CONTRAST, *(10.0**p for p in powers)}))

@@ -4,7 +4,7 @@ The study prints span, height, brick and pattern of its arch but no coordinates,
 stiffnesses per area. This experiment recovers the rest from Tables A.1 and A.2 alone. The responses
 of the three-robot plan take no part.
 
-Method: the shape is a chain of bricks (`seqopt.arch`) with
+Method: the shape is a chain of bricks (`seqopt.scene.arch`) with
 
 - a pitch per brick (25 numbers), at first a catenary over the stated span and height;
 - one angle by which the surface is turned in plan against the arch's plane, which tilts every
@@ -62,13 +62,15 @@ from experiments.arch_numbers import (
 )
 from experiments.plotting import RESULTS
 from experiments.yardstick import ROUNDING, VALUES, errors, percentiles, tension_share
-from seqopt.compliance import ComplianceEngine
-from seqopt.methods import METHODS
-from seqopt.network import Floats, network
-from seqopt.paper import printed_steps
-from seqopt.responses import TO_1E_3MM, analyze, responses
-from seqopt.scene import Scene
-from seqopt.scene_file import load_scene, save_scene
+from seqopt.arrays import Floats
+from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.network.build import build_network
+from seqopt.responses.quantities import step_responses
+from seqopt.responses.table import TO_1E_3MM, analyze
+from seqopt.scene.scene import Scene
+from seqopt.scene.scene_file import load_scene, save_scene
+from seqopt.sequence.two_robots import METHODS
+from seqopt.study.tables import printed_steps
 
 SCENE = Path(__file__).parent.parent / "seqopt" / "data" / "scenes" / "arch25.json"
 NUMBERS = RESULTS / "identify_arch25.csv"
@@ -108,10 +110,10 @@ def target(tables: Sequence[pd.DataFrame]) -> Target:
 
 def produced(scene: Scene, wanted: Target) -> Floats:
     """Return the responses of a scene in the states of a target, in its order and columns."""
-    engine = ComplianceEngine(network(scene))
+    engine = ComplianceEngine(build_network(scene))
     out = []
     for bricks, grips, robots in wanted.groups:
-        answer = responses(engine, engine.solve(bricks, grips))
+        answer = step_responses(engine, engine.solve(bricks, grips))
         force = np.full((len(grips), 3), np.nan)
         force[:, robots] = answer.F_rob
         size = [TO_1E_3MM * d for d in (answer.D_max, answer.D_avg, answer.D_std)]
@@ -176,7 +178,7 @@ def identify(wanted: Target, angles: Sequence[float], most: int) -> tuple[Floats
 
 def scores(scene: Scene) -> pd.DataFrame:
     """Return the yardstick of a scene on both tables."""
-    engine = ComplianceEngine(network(scene))
+    engine = ComplianceEngine(build_network(scene))
     rows, all_errors = {}, []
     for name, method in METHODS.items():
         printed, table = printed_steps(name), analyze(engine, method(engine.network))
@@ -192,7 +194,7 @@ def cross(most: int) -> pd.DataFrame:
     rows = []
     for known, other in (("sequential", "cantilever"), ("cantilever", "sequential")):
         numbers, groups = identify(target([printed_steps(known)]), PLAN_ANGLES, most)
-        engine = ComplianceEngine(network(scene_of(numbers, groups)))
+        engine = ComplianceEngine(build_network(scene_of(numbers, groups)))
         table = errors(analyze(engine, METHODS[other](engine.network)), printed_steps(other))
         unseen = printed_steps(other)["same_in_both"].to_numpy() == 0
         rows.append((known, other, *percentiles(table[unseen])))

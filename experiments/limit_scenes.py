@@ -9,9 +9,10 @@ from typing import NamedTuple
 import numpy as np
 
 from experiments.walls import running_bond
-from seqopt.arch import ArchShape, arch_scene
-from seqopt.network import Network, network
-from seqopt.scene import Scene
+from seqopt.network.build import build_network
+from seqopt.network.network import Network
+from seqopt.scene.arch import ArchShape, arch_scene
+from seqopt.scene.scene import Scene
 
 Grips = tuple[int, ...]
 LOOSE_AT = 11  # the joint that is loosened: between bricks 12 and 13 of 25
@@ -58,7 +59,7 @@ def far_grips(count: int) -> tuple[Grips, ...]:
 
 def long_chains(counts: list[int]) -> Iterator[Case]:
     for count in counts:
-        yield Case("bricks", count, str(count), network(chain(count)), far_grips(count))
+        yield Case("bricks", count, str(count), build_network(chain(count)), far_grips(count))
 
 
 def walls(sizes: list[tuple[int, int]]) -> Iterator[Case]:
@@ -67,13 +68,13 @@ def walls(sizes: list[tuple[int, int]]) -> Iterator[Case]:
         last = scene.placed[-1].nodes[1]
         grips: tuple[Grips, ...] = ((), (last,), (last - 2, last), (last - 4, last - 2, last))
         count = columns * courses
-        yield Case("wall", count, f"{columns} × {courses}", network(scene), grips)
+        yield Case("wall", count, f"{columns} × {courses}", build_network(scene), grips)
 
 
 def slender(ratios: list[float]) -> Iterator[Case]:
     for ratio in ratios:
         scene = chain(25, dimensions=(0.116 * ratio, 0.116, 0.053))
-        yield Case("slenderness", ratio, f"{ratio:g}", network(scene), far_grips(25))
+        yield Case("slenderness", ratio, f"{ratio:g}", build_network(scene), far_grips(25))
 
 
 def loose(factors: list[float]) -> Iterator[Case]:
@@ -82,12 +83,12 @@ def loose(factors: list[float]) -> Iterator[Case]:
         for grips, end in ((HELD, "held"), ((), "free")):
             for factor in factors:
                 scene = loosened(chain(25), factor, only_turning=turning)
-                yield Case(f"{name} {end}", factor, f"{factor:g}", network(scene), (grips,))
+                yield Case(f"{name} {end}", factor, f"{factor:g}", build_network(scene), (grips,))
 
 
 def placements(count: int) -> Iterator[Case]:
     """Yield grips close together at the tip of a long chain, and grips in one line."""
-    net, n = network(chain(count)), 2 * count - 1
+    net, n = build_network(chain(count)), 2 * count - 1
     sets: dict[str, Grips] = {
         "1 grip": (n,),
         "2, one brick": (n - 1, n),
@@ -99,13 +100,13 @@ def placements(count: int) -> Iterator[Case]:
     for place, (label, grips) in enumerate(sets.items()):
         yield Case("grips", place, label, net, (grips,))
     pitch = np.full(count, 0.3)
-    straight = network(arch_scene(ArchShape(pitch=pitch, pattern="V", closed=False)))
+    straight = build_network(arch_scene(ArchShape(pitch=pitch, pattern="V", closed=False)))
     yield Case("grips", len(sets), "3 in a line", straight, ((n - 4, n - 2, n),))
 
 
 def without_joint(scene: Scene) -> Network:
     joints = scene.joints[:LOOSE_AT] + scene.joints[LOOSE_AT + 1 :]
-    return network(replace(scene, joints=joints))
+    return build_network(replace(scene, joints=joints))
 
 
 def parted() -> Iterator[Case]:

@@ -14,16 +14,16 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from scipy import sparse
 
-from seqopt.fields import Want
-from seqopt.network import GROUND, Floats, Ints, Kind, Network
-from seqopt.statics import skew
+from seqopt.arrays import Floats, Ints, skew
+from seqopt.engines.interface import Want
+from seqopt.network.network import GROUND, Network, PartKind
 
 CONTRAST = 1e6  # bar over joint stiffness, where frames without corrections err least: bending and
 # rounding are each some 2e-5 of the fields here, at 1e5 and 1e7 ten and four times as much
 
 
 class Answer(NamedTuple):
-    """Fields of one model as in `seqopt.fields.Fields`; what was not asked for is empty."""
+    """Fields of one model as in `seqopt.engines.interface.Fields`; what was not asked for is empty."""
 
     edge_force: Floats
     displacement: Floats
@@ -113,12 +113,12 @@ def chain_of(network: Network, bricks: int) -> Chain:
     sides: list[tuple[int, int, float]] = []
     for edge in range(network.count_edges(bricks)):
         spring = int(network.edge_spring[edge])
-        if network.edge_kind[edge] == Kind.INNER or spring not in row:
+        if network.edge_kind[edge] == PartKind.INNER or spring not in row:
             continue
         first = network.edge_brick[edge] == springs.bodies[spring, 0]
-        if network.edge_kind[edge] == Kind.JOINT:
+        if network.edge_kind[edge] == PartKind.JOINT:
             joints[row[spring], 0 if first else 1] = place[int(network.edge_nodes[edge, 0])]
-        first = first and network.edge_kind[edge] == Kind.JOINT
+        first = first and network.edge_kind[edge] == PartKind.JOINT
         sides.append((edge, row[spring], -1.0 if first else 1.0))
     return Chain(
         bricks=bricks,
@@ -154,7 +154,7 @@ def _motion(network: Network, bricks: int) -> sparse.csr_array:
         if i < 2 * bricks:
             out[3 * node : 3 * node + 3, 6 * i : 6 * i + 3] = np.eye(3)
     for edge in range(network.count_edges(bricks)):
-        if network.edge_kind[edge] != Kind.JOINT:
+        if network.edge_kind[edge] != PartKind.JOINT:
             continue
         near, far = (int(n) for n in network.edge_nodes[edge])
         spring = network.edge_spring[edge]

@@ -18,8 +18,9 @@ from typing import Any
 import numpy as np
 
 from experiments.peer_chain import CONTRAST, Answer, Chain, Peer, about_anchor, beams
-from seqopt.fields import Want
-from seqopt.network import GROUND, Floats, Ints
+from seqopt.arrays import Floats, Ints
+from seqopt.engines.interface import Want
+from seqopt.network.network import GROUND
 
 CASE = "Combo 1"  # PyNite's name of the one load combination
 LIBRARIES = ("libquadmath.so.0", "libgfortran.so.4", "libblas.so.3", "liblapack.so.3")

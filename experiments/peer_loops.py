@@ -17,9 +17,10 @@ from scipy import linalg, sparse
 from scipy.sparse.linalg import splu
 
 from experiments.peer_chain import CONTRAST, Answer, Chain, chain_of
-from seqopt.fields import Want
-from seqopt.network import GROUND, Floats, Ints, Network
-from seqopt.statics import skew, statics
+from seqopt.arrays import Floats, Ints, skew
+from seqopt.engines.interface import Want
+from seqopt.network.network import GROUND, Network
+from seqopt.network.statics import build_statics
 
 
 @dataclass(frozen=True)
@@ -102,7 +103,7 @@ def kept(network: Network, bricks: int, *, rigid: bool, factor: float = 1.0) -> 
     edge = chain.half @ force[:, :3].reshape(-1, matrix.shape[0])
     onto = np.zeros((edge.shape[0], 6 * bricks))
     if rigid:
-        maps = statics(network)
+        maps = build_statics(network)
         node = _from_first(chain)
         spread = np.zeros((len(network.springs.since), 3, matrix.shape[0]))
         spread[chain.springs] = force[:, :3]

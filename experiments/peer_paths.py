@@ -10,8 +10,8 @@ import numpy as np
 from scipy import sparse
 from scipy.optimize import linprog
 
-from seqopt.placement import Placement, PlacementProblem
-from seqopt.selection import formulation
+from seqopt.placement.costs import LayeredCosts, PlacementProblem
+from seqopt.placement.formulation import find_formulation
 
 GOAL = "goal"
 Node = tuple[int, int] | str
@@ -62,11 +62,11 @@ def by_linprog(method: Literal["highs-ds", "highs-ipm"]) -> Callable[[PlacementP
 
 def by_formulation(name: str) -> Callable[[PlacementProblem], float]:
     """Return a registered formulation as a solver of the same kind."""
-    which = formulation(name)
+    which = find_formulation(name)
     return lambda problem: float(which.solve(problem).objective)
 
 
-def _arcs(placement: Placement) -> list[np.ndarray]:
+def _arcs(placement: LayeredCosts) -> list[np.ndarray]:
     pairs = zip(placement.shared, placement.single, strict=True)
     return [shared + single for shared, single in pairs]
 

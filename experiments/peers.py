@@ -37,13 +37,15 @@ from experiments.peer_frames import PACKAGES, missing_packages
 from experiments.peer_loops import LOOPS, loop
 from experiments.peer_paths import PATHS, SLOW
 from experiments.plotting import RESULTS
-from seqopt.compliance import ComplianceEngine
-from seqopt.criteria import EQUATIONS
-from seqopt.fields import Fields, Want, grip_columns
-from seqopt.loops import three_robot_loop
-from seqopt.network import Floats, Ints, Network, network
-from seqopt.problem import Problem, pose
-from seqopt.scene_file import load_scene
+from seqopt.arrays import Floats, Ints
+from seqopt.engines.interface import Fields, Want, grip_columns
+from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.network.build import build_network
+from seqopt.network.network import Network
+from seqopt.placement.problem import Problem, pose
+from seqopt.scene.scene_file import load_scene
+from seqopt.sequence.three_robots import three_robot_loop
+from seqopt.study.presets import EQUATIONS
 
 EXTRA = 'pip install "seqopt[peers]" openseespy'
 SETTINGS = ("reactions", "criterion", "all fields")
@@ -300,7 +302,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--quick", action="store_true", help="loops and paths, nothing written")
     quick = parser.parse_args().quick
-    net = network(load_scene("arch25"))
+    net = build_network(load_scene("arch25"))
     problem, cases = workload(net)
     print(
         f"{problem.evaluation.models} distinct models; the study counts {problem.paper_models[1]}"

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from seqopt.network import Floats
+from seqopt.arrays import Floats
 
 
 def pareto(cost: Floats, loss: Floats) -> np.ndarray:

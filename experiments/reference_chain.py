@@ -14,8 +14,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from seqopt.arrays import Floats, Ints
 from seqopt.errors import MechanismError
-from seqopt.network import GROUND, Floats, Ints, Network
+from seqopt.network.network import GROUND, Network
 
 DIGITS = 60
 ZERO = Decimal("1e-40")  # a pivot that falls below this share of its start is zero

@@ -6,7 +6,7 @@ whatever engine it was made with; ``error`` is the largest difference of the eng
 the reference's, over the largest of each kind in its state. Times are medians of repeats; where
 there are several, one run before them does not count. Stages before the choice are shared by all
 formulations. One more row is the search that solves only the models it meets and proves nothing
-(`seqopt.search`).
+(`seqopt.placement.window_search`).
 
 Command: ``python -m experiments.runs SCENE ENGINE CRITERION REPEATS`` prints rows as JSON.
 """
@@ -24,22 +24,24 @@ from typing import TypeVar
 import numpy as np
 
 from experiments.failing_steps import longer
-from seqopt.compliance import ComplianceEngine
-from seqopt.criteria import CRITERIA
-from seqopt.discrete import DiscreteEngine
-from seqopt.fidelity import AutoEngine
-from seqopt.fields import Engine
-from seqopt.frame import FrameEngine
-from seqopt.loops import three_robot_loop
-from seqopt.network import Network, network
-from seqopt.optimize import Outcome, Posed, optimize, prepare
-from seqopt.problem import Problem
-from seqopt.scene import Scene
-from seqopt.scene_file import load_scene
-from seqopt.schedule import Schedule
-from seqopt.search import Search, search
-from seqopt.selection import Aim, Formulation, Reads, formulations, least_peak, least_sum
-from seqopt.states import window_models
+from seqopt.engines.auto import AutoEngine
+from seqopt.engines.discrete.engine import DiscreteEngine
+from seqopt.engines.frame import FrameEngine
+from seqopt.engines.interface import Engine
+from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.network.build import build_network
+from seqopt.network.network import Network
+from seqopt.placement.certificate import least_peak, least_sum
+from seqopt.placement.formulation import Aim, Formulation, Reads, formulations
+from seqopt.placement.plan import Outcome, Posed, optimize, prepare
+from seqopt.placement.problem import Problem
+from seqopt.placement.window_search import Search, search_windows
+from seqopt.responses.choices import window_models
+from seqopt.scene.scene import Scene
+from seqopt.scene.scene_file import load_scene
+from seqopt.sequence.schedule import Schedule
+from seqopt.sequence.three_robots import three_robot_loop
+from seqopt.study.presets import CRITERIA
 
 Row = dict[str, object]
 Result = TypeVar("Result")
@@ -102,7 +104,7 @@ def contenders() -> dict[str, Aim]:
 def _assemble(scene: Scene, engine: str) -> tuple[Engine, Schedule, dict[str, float]]:
     """Return an engine, the loop, and the time that took."""
     start = time.perf_counter()
-    net = network(scene)
+    net = build_network(scene)
     solver, schedule = ENGINES[engine](net), three_robot_loop(net)
     return solver, schedule, {"assemble": time.perf_counter() - start}
 
@@ -137,7 +139,7 @@ def _search_row(scene: Scene, engine: str, criterion: str, reference: Problem, r
 
 def _search(scene: Scene, engine: str, criterion: str) -> tuple[dict[str, float], Search]:
     solver, schedule, seconds = _assemble(scene, engine)
-    found = search(solver, schedule, CRITERIA[criterion])
+    found = search_windows(solver, schedule, CRITERIA[criterion])
     return seconds | dict(found.seconds), found
 
 

@@ -34,7 +34,7 @@ from experiments.plotting import RESULTS
 from experiments.profiles import shifted_mean
 from experiments.runs import NO_PROOF, REFERENCE, contenders
 from experiments.speed_charts import headline, profile_charts
-from seqopt.criteria import CRITERIA
+from seqopt.study.presets import CRITERIA
 
 STORE = RESULTS / "runs.csv"
 LIMIT = 100.0  # seconds per process; what fails is charged as much

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from seqopt.scene import Brick, Ground, Joint, Robot, Scene
+from seqopt.scene.scene import Brick, Ground, Joint, Robot, Scene
 
 LENGTH, HEIGHT = 0.2, 0.06
 SPRING = {

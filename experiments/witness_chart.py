@@ -9,8 +9,8 @@ from matplotlib.patches import Rectangle
 
 from experiments.plotting import new_figure, save_figure
 from experiments.witness_cra import SOUND, TORN
-from seqopt.equilibrium import EXACT
-from seqopt.stability import Verdict
+from seqopt.stability.assessment import Verdict
+from seqopt.stability.limit_analysis import EXACT
 
 STANDS, FALLS, OPEN = (verdict.value for verdict in Verdict)
 COLOURS = {STANDS: "#0072B2", FALLS: "#D55E00", OPEN: "0.6"}

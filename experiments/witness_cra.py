@@ -25,7 +25,7 @@ import numpy as np
 from scipy.optimize import linprog
 
 from experiments.witness_scenes import Scene, Solid, Touch
-from seqopt.stability import Verdict
+from seqopt.stability.assessment import Verdict
 
 SOUND = 3e-5  # tension up to this, over the mean weight of the free blocks, is none
 TORN = 1e-3  # from this on it is real; between the two it decides nothing

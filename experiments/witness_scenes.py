@@ -7,8 +7,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from experiments.blocks import BOX, Blocks, Contact, ring, stack, touching
-from seqopt.assembly import Assembly
-from seqopt.network import GROUND, Floats
+from seqopt.arrays import Floats
+from seqopt.contact.assembly import Assembly
+from seqopt.network.network import GROUND
 
 SLOPE = np.pi / 6
 VOUSSOIRS = 24

@@ -53,10 +53,10 @@ from experiments.witness_chart import chart
 from experiments.witness_cra import SAMPLES, coupled, force_only, sample_scene, without_tension
 from experiments.witness_lmgc90 import moved_by, python_with_lmgc90
 from experiments.witness_scenes import Scene, arch, incline, scene_of
-from seqopt.assembly import Mortar
-from seqopt.equilibrium import compile_equilibrium
-from seqopt.proof import Prover
-from seqopt.stability import Verdict, bonded, verdict_of
+from seqopt.contact.mortar import Mortar
+from seqopt.stability.assessment import Verdict, bonded, verdict_of
+from seqopt.stability.limit_analysis import compile_equilibrium
+from seqopt.stability.prover import Prover
 
 LARGEST = "armadillo_cra"
 SOONER = 5.0

@@ -17,8 +17,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from seqopt.placement import PlacementProblem, ProblemError, without_budgets
-from seqopt.selection import Aim, Formulation, Kind, Selection
+from seqopt.errors import ProblemError
+from seqopt.placement.costs import PlacementProblem, without_budgets
+from seqopt.placement.formulation import Aim, Formulation, FormulationKind, Selection
 
 
 def solve(problem: PlacementProblem, *, width: int = 5) -> Selection:
@@ -64,5 +65,5 @@ def _greedy(problem: PlacementProblem) -> tuple[int, ...]:
 
 
 FORMULATION = Formulation(
-    "beam", "a beam between cascade and exact", Kind.HEURISTIC, Aim.SUM, solve
+    "beam", "a beam between cascade and exact", FormulationKind.HEURISTIC, Aim.SUM, solve
 )

@@ -24,9 +24,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from seqopt.network import Floats
-from seqopt.placement import PlacementProblem, ProblemError, without_budgets
-from seqopt.selection import Aim, Formulation, Kind, Reads, Selection
+from seqopt.arrays import Floats
+from seqopt.errors import ProblemError
+from seqopt.placement.costs import PlacementProblem, without_budgets
+from seqopt.placement.formulation import Aim, Formulation, FormulationKind, Reads, Selection
 
 CHARGES = ("later", "earlier")
 
@@ -57,7 +58,7 @@ def _charged(problem: PlacementProblem, k: int, choice: list[int], charge: str) 
 FORMULATION = Formulation(
     "cascade",
     "the study's cascading scheme over the whole build",
-    Kind.HEURISTIC,
+    FormulationKind.HEURISTIC,
     Aim.SUM,
     solve,
     Reads.WINDOW,

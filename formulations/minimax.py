@@ -15,8 +15,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from seqopt.placement import Placement, PlacementProblem, without_budgets
-from seqopt.selection import Aim, Formulation, Kind, Selection
+from seqopt.placement.costs import LayeredCosts, PlacementProblem, without_budgets
+from seqopt.placement.formulation import Aim, Formulation, FormulationKind, Selection
 
 
 def solve(problem: PlacementProblem) -> Selection:
@@ -25,7 +25,7 @@ def solve(problem: PlacementProblem) -> Selection:
     placement = problem.peaks
     placement.continuable()
     peak = _least_peak(placement)
-    allowed = Placement(
+    allowed = LayeredCosts(
         tuple(np.where(single <= peak, single, np.inf) for single in placement.single),
         tuple(np.where(shared <= peak, shared, np.inf) for shared in placement.shared),
     )
@@ -33,7 +33,7 @@ def solve(problem: PlacementProblem) -> Selection:
     return Selection(choice, placement.worst(choice), bound=peak)
 
 
-def _least_peak(placement: Placement) -> float:
+def _least_peak(placement: LayeredCosts) -> float:
     """Return the smallest worst cost."""
     reached = np.full(1, -np.inf)
     for single, shared in zip(placement.single, placement.shared, strict=True):
@@ -41,7 +41,7 @@ def _least_peak(placement: Placement) -> float:
     return float(reached.min())
 
 
-def _least_sum(placement: Placement) -> tuple[int, ...]:
+def _least_sum(placement: LayeredCosts) -> tuple[int, ...]:
     """Return the choice of least sum."""
     total = np.zeros(1)
     back = []
@@ -56,5 +56,5 @@ def _least_sum(placement: Placement) -> tuple[int, ...]:
 
 
 FORMULATION = Formulation(
-    "minimax", "smallest worst cost over the build", Kind.EXACT, Aim.PEAK, solve
+    "minimax", "smallest worst cost over the build", FormulationKind.EXACT, Aim.PEAK, solve
 )

@@ -18,8 +18,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from seqopt.placement import PlacementProblem, without_budgets
-from seqopt.selection import Aim, Formulation, Kind, Selection
+from seqopt.placement.costs import PlacementProblem, without_budgets
+from seqopt.placement.formulation import Aim, Formulation, FormulationKind, Selection
 
 
 def solve(problem: PlacementProblem) -> Selection:
@@ -38,5 +38,5 @@ def solve(problem: PlacementProblem) -> Selection:
 
 
 FORMULATION = Formulation(
-    "overlap_dp", "full overlap, dynamic programming", Kind.EXACT, Aim.SUM, solve
+    "overlap_dp", "full overlap, dynamic programming", FormulationKind.EXACT, Aim.SUM, solve
 )

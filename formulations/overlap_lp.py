@@ -16,8 +16,8 @@ need not be the best: use ``overlap_mip``.
 from __future__ import annotations
 
 from formulations.solvers import Program, follow, solve_flow
-from seqopt.placement import PlacementProblem
-from seqopt.selection import Aim, Formulation, Kind, Selection
+from seqopt.placement.costs import PlacementProblem
+from seqopt.placement.formulation import Aim, Formulation, FormulationKind, Selection
 
 
 def solve(problem: PlacementProblem) -> Selection:
@@ -28,4 +28,6 @@ def solve(problem: PlacementProblem) -> Selection:
     return Selection(choice, objective, flow.bound, flow.prices, flow.compile_seconds)
 
 
-FORMULATION = Formulation("overlap_lp", "full overlap, linear program", Kind.BOUND, Aim.SUM, solve)
+FORMULATION = Formulation(
+    "overlap_lp", "full overlap, linear program", FormulationKind.BOUND, Aim.SUM, solve
+)

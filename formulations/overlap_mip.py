@@ -7,15 +7,15 @@ r"""The full overlap formulation as a mixed-integer program (cvxpy, HiGHS): exac
    & \sum_k \sum_{i,j} a_k(i, j)\, y_k(i, j) \le b \quad \text{for every budget.}
 
 It earns its price where budgets couple all moves: a cap on robot travel, on how often a robot is
-used, on the count of steps over a level (`seqopt.budgets`). Without them dynamic programming gives
+used, on the count of steps over a level (`seqopt.placement.budgets`). Without them dynamic programming gives
 the same answer hundreds of times faster.
 """
 
 from __future__ import annotations
 
 from formulations.solvers import Program, follow, solve_flow
-from seqopt.placement import PlacementProblem
-from seqopt.selection import Aim, Formulation, Kind, Selection
+from seqopt.placement.costs import PlacementProblem
+from seqopt.placement.formulation import Aim, Formulation, FormulationKind, Selection
 
 
 def solve(problem: PlacementProblem) -> Selection:
@@ -27,5 +27,9 @@ def solve(problem: PlacementProblem) -> Selection:
 
 
 FORMULATION = Formulation(
-    "overlap_mip", "full overlap, integer program with budgets", Kind.EXACT, Aim.SUM, solve
+    "overlap_mip",
+    "full overlap, integer program with budgets",
+    FormulationKind.EXACT,
+    Aim.SUM,
+    solve,
 )

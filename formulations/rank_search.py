@@ -21,9 +21,10 @@ import math
 
 import numpy as np
 
-from seqopt.network import Floats
-from seqopt.placement import Placement, PlacementProblem, ProblemError, without_budgets
-from seqopt.selection import Aim, Formulation, Kind, Reads, Selection
+from seqopt.arrays import Floats
+from seqopt.errors import ProblemError
+from seqopt.placement.costs import LayeredCosts, PlacementProblem, without_budgets
+from seqopt.placement.formulation import Aim, Formulation, FormulationKind, Reads, Selection
 
 MOST = 20_000_000  # combinations in one enumeration: 160 MB
 
@@ -55,7 +56,7 @@ def solve(problem: PlacementProblem, *, horizon: int = 1) -> Selection:
 
 
 def _enumerate(
-    placement: Placement, row: Floats, k: int, horizon: int, good: tuple[np.ndarray, ...]
+    placement: LayeredCosts, row: Floats, k: int, horizon: int, good: tuple[np.ndarray, ...]
 ) -> Floats:
     """Return the cost of every combination of the moves from ``k`` on, one axis each."""
     total = np.where(good[k], row + placement.single[k], np.inf)
@@ -68,7 +69,7 @@ def _enumerate(
 FORMULATION = Formulation(
     "rank_search",
     "exhaustive search of the next moves",
-    Kind.HEURISTIC,
+    FormulationKind.HEURISTIC,
     Aim.SUM,
     solve,
     Reads.WINDOW,

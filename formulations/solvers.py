@@ -12,18 +12,11 @@ import cvxpy as cp
 import numpy as np
 from scipy import sparse
 
-from seqopt.equilibrium import Claim
-from seqopt.errors import SolverError
-from seqopt.network import Floats
-from seqopt.placement import (
-    TINY,
-    Budget,
-    InfeasibleError,
-    Placement,
-    PlacementProblem,
-    ProblemError,
-)
-from seqopt.selection import TOLERANCE, least_sum
+from seqopt.arrays import Floats
+from seqopt.errors import InfeasibleError, ProblemError, SolverError
+from seqopt.placement.certificate import TOLERANCE, least_sum
+from seqopt.placement.costs import TINY, Budget, LayeredCosts, PlacementProblem
+from seqopt.stability.limit_analysis import Claim
 
 ACCURACY = 1e-7  # how far a reported optimum may lie above the true one, relative to the larger of
 # it and the largest cost
@@ -139,7 +132,7 @@ def _within_each(problem: PlacementProblem) -> bool:
     allowed = problem.sums
     known = True
     for budget in problem.budgets:
-        if Placement(budget.single, budget.shared).sizes != allowed.sizes:
+        if LayeredCosts(budget.single, budget.shared).sizes != allowed.sizes:
             raise ProblemError(f"budget {budget.name!r} is for other moves or candidates")
         pairs = [*zip(budget.single, allowed.single, strict=True)]
         coupled = [*zip(budget.shared, allowed.shared, strict=True)]
@@ -147,7 +140,7 @@ def _within_each(problem: PlacementProblem) -> bool:
             tuple(np.where(np.isfinite(cost), amount, np.inf) for amount, cost in part)
             for part in (pairs, coupled)
         )
-        least = least_sum(Placement(single, shared))
+        least = least_sum(LayeredCosts(single, shared))
         sizes = sum(float(np.abs(a).max()) for a in (*budget.single, *budget.shared))
         if least > budget.bound + TOLERANCE * max(abs(budget.bound), sizes):
             raise InfeasibleError(
@@ -187,7 +180,7 @@ def end_of(program: cp.Problem, attempt: int) -> Claim:
     return ENDS.get(program.status, Claim.STALLED)
 
 
-def _balance(placement: Placement, kept: list[np.ndarray]) -> tuple[sparse.csr_array, Floats]:
+def _balance(placement: LayeredCosts, kept: list[np.ndarray]) -> tuple[sparse.csr_array, Floats]:
     """Return matrix and right side that conserve the unit.
 
     Row 0 is the source; a row follows for each candidate but those of the last move.

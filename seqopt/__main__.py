@@ -2,6 +2,6 @@
 
 import sys
 
-from seqopt.cli import main
+from seqopt.cli.main import main
 
 sys.exit(main())

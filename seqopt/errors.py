@@ -4,7 +4,21 @@ from __future__ import annotations
 
 
 class SeqoptError(Exception):
-    """Base of every error seqopt raises on purpose; its text is one line a user can act on."""
+    """Base of every error seqopt raises on purpose; its text is one line a user can act on.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> try:
+    ...     seqopt.load_scene("arch26")
+    ... except seqopt.SeqoptError as error:
+    ...     print(error)
+    scene arch26: no such built-in scene or file; built in: arch25
+    """
+
+
+class FileError(SeqoptError, OSError):
+    """A file cannot be read or written: the caller must name another."""
 
 
 class SceneError(SeqoptError, ValueError):
@@ -17,6 +31,14 @@ class StepError(SeqoptError, ValueError):
 
 class GripError(SeqoptError, ValueError):
     """A grip set handed to an engine is malformed: the caller must act."""
+
+
+class ProblemError(SeqoptError, ValueError):
+    """A placement problem is malformed, or not of the kind a formulation solves."""
+
+
+class InfeasibleError(ProblemError):
+    """No choice of candidates is allowed."""
 
 
 class MechanismError(SeqoptError, ArithmeticError):

@@ -6,11 +6,7 @@ import os
 import tempfile
 from pathlib import Path
 
-from seqopt.errors import SeqoptError
-
-
-class FileError(SeqoptError, OSError):
-    """A file cannot be read or written: the caller must name another."""
+from seqopt.errors import FileError
 
 
 def read_text(path: Path) -> str:

@@ -8,8 +8,9 @@ import numpy as np
 from hypothesis import strategies as st
 
 from experiments.walls import running_bond
-from seqopt.arch import ArchShape, arch_scene
-from seqopt.network import network
+from seqopt.network.build import build_network
+from seqopt.scene.arch import ArchShape, arch_scene
+from seqopt.study.presets import ROBOTS
 
 angles = st.floats(-0.3, 0.3)
 
@@ -32,7 +33,7 @@ def arches(draw, max_bricks=7, min_bricks=1):
         rotational_stiffness=draw(turning),
         closed=draw(st.booleans()),
     )
-    return arch_scene(shape)
+    return arch_scene(shape, robots=ROBOTS)
 
 
 @st.composite
@@ -86,4 +87,4 @@ def moved(scene, change):
 
 
 def solve(engine_type, scene, bricks, grips, want):
-    return engine_type(network(scene)).solve(bricks, grips, want)
+    return engine_type(build_network(scene)).solve(bricks, grips, want)

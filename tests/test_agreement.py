@@ -9,19 +9,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seqopt import states as evaluation
-from seqopt.arch import ArchShape, arch_scene
-from seqopt.compliance import ComplianceEngine
+from seqopt.engines.frame import FrameEngine
+from seqopt.engines.interface import Want, grip_columns
+from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.engines.rigid.dense import solve_dense
 from seqopt.errors import MechanismError, SolverError
-from seqopt.fields import Want, grip_columns
-from seqopt.frame import FrameEngine
-from seqopt.loops import three_robot_loop
-from seqopt.methods import METHODS
-from seqopt.network import network
-from seqopt.plan_file import published_plan
-from seqopt.responses import step_fields
-from seqopt.rigid import solve_rigid
-from seqopt.states import SCALARS, evaluate
+from seqopt.network.build import build_network
+from seqopt.responses import choices as evaluation
+from seqopt.responses.choices import SCALARS, evaluate_choices
+from seqopt.responses.table import step_fields
+from seqopt.scene.arch import ArchShape, arch_scene
+from seqopt.sequence.three_robots import three_robot_loop
+from seqopt.sequence.two_robots import METHODS
+from seqopt.study.published import published_plan
 from tests.scenes import arches, states, walls
 from tests.test_laws import scaled
 
@@ -68,7 +68,7 @@ def test_published_states_agree_with_the_direct_solve(engine25, published):
         columns = grip_columns(
             engine25.network, step.bricks, np.array([step.held], int).reshape(1, -1)
         )
-        direct = solve_rigid(engine25.network, step.bricks, columns)
+        direct = solve_dense(engine25.network, step.bricks, columns)
         fast = step_fields(engine25, step)
         assert max(gap(direct, fast, name) for name in FIELDS[:4]) <= 1e-9
 
@@ -76,9 +76,9 @@ def test_published_states_agree_with_the_direct_solve(engine25, published):
 @given(state=states(st.one_of(arches(), walls())))
 def test_three_routes_agree(state):
     scene, bricks, grips = state
-    net = network(scene)
+    net = build_network(scene)
     fast = ComplianceEngine(net).solve(bricks, grips, Want.ALL)
-    direct = solve_rigid(net, bricks, grip_columns(net, bricks, grips))
+    direct = solve_dense(net, bricks, grip_columns(net, bricks, grips))
     frame = FrameEngine(net, contrast=1e6).solve(bricks, grips)  # joints here differ 100-fold
     free = np.abs(ComplianceEngine(net).solve(bricks, np.zeros((1, 0), int)).displacement).max()
     force = np.abs(net.weight).max() + np.abs(fast.joint_wrench).max()
@@ -94,7 +94,7 @@ def test_three_routes_agree(state):
 @given(state=states(max_grips=3), data=st.data())
 def test_a_batch_equals_its_sets_one_by_one(state, data):
     scene, bricks, grips = state
-    engine = ComplianceEngine(network(scene))
+    engine = ComplianceEngine(build_network(scene))
     nodes = [n for b in scene.placed[:bricks] for n in b.nodes if n not in scene.blocked_nodes]
     count = grips.shape[1]
     one = st.lists(st.sampled_from(nodes), min_size=count, max_size=count, unique=True)
@@ -110,10 +110,10 @@ def test_a_batch_equals_its_sets_one_by_one(state, data):
 
 def test_two_bricks_held_at_both_nodes():
     """Each inner edge carries nothing, whatever the order of the grips."""
-    net = network(arch_scene(ArchShape(pitch=[1.2, 0.7, 0.2, -0.3, -0.8, -1.2])))
+    net = build_network(arch_scene(ArchShape(pitch=[1.2, 0.7, 0.2, -0.3, -0.8, -1.2])))
     sets = np.array([[4, 5, 8, 9], [9, 4, 8, 5], [4, 8, 1, 11], [10, 11, 4, 7]])
     fast = ComplianceEngine(net).solve(6, sets, Want.ALL)
-    direct = solve_rigid(net, 6, grip_columns(net, 6, sets))
+    direct = solve_dense(net, 6, grip_columns(net, 6, sets))
     assert max(gap(direct, fast, name) for name in FIELDS) <= 1e-9
     held = np.flatnonzero((net.edge_spring < 0) & np.isin(net.edge_brick, [2, 4]))
     largest = np.abs(fast.edge_force).max()
@@ -123,9 +123,9 @@ def test_two_bricks_held_at_both_nodes():
 def test_fields_are_asked_for_in_blocks(engine25, monkeypatch):
     schedule = three_robot_loop(engine25.network)
     monkeypatch.setattr(evaluation, "BLOCK", 10**9)
-    whole = evaluate(engine25, schedule, lambda _: SCALARS)
+    whole = evaluate_choices(engine25, schedule, lambda _: SCALARS)
     monkeypatch.setattr(evaluation, "BLOCK", 100)
-    parts = evaluate(engine25, schedule, lambda _: SCALARS)
+    parts = evaluate_choices(engine25, schedule, lambda _: SCALARS)
     assert parts.models == whole.models
     for a, b in zip(parts.states, whole.states, strict=True):
         for name in SCALARS:
@@ -143,7 +143,7 @@ def hinge(scene, joint):
 @pytest.mark.parametrize("factor", [1e-3, 1.0, 1e3])
 def test_mechanisms_are_told_from_sound_structures(arch25, engine_type, factor):
     """A hinge below one grip is a mechanism, below two it is not; in any unit of length."""
-    hinged = engine_type(network(scaled(hinge(arch25, 3), length=factor)))
+    hinged = engine_type(build_network(scaled(hinge(arch25, 3), length=factor)))
     for grips in ([[]], [[47]]):
         with pytest.raises(MechanismError) as caught:
             hinged.solve(24, np.array(grips, dtype=int).reshape(1, -1))
@@ -158,7 +158,9 @@ def test_mechanisms_are_told_from_sound_structures(arch25, engine_type, factor):
 
 @pytest.mark.parametrize("engine_type", [ComplianceEngine, FrameEngine])
 def test_a_loose_brick_needs_grips(arch25, engine_type):
-    apart = engine_type(network(replace(arch25, joints=arch25.joints[:11] + arch25.joints[12:])))
+    apart = engine_type(
+        build_network(replace(arch25, joints=arch25.joints[:11] + arch25.joints[12:]))
+    )
     for grips in ([[]], [[24, 25]]):
         with pytest.raises(MechanismError, match="nothing resists"):
             apart.solve(13, np.array(grips, dtype=int).reshape(1, -1))
@@ -167,7 +169,7 @@ def test_a_loose_brick_needs_grips(arch25, engine_type):
 
 
 def test_engines_agree_where_grips_hold_a_hinged_chain(arch25):
-    net = network(hinge(arch25, 3))
+    net = build_network(hinge(arch25, 3))
     grips = [[47, 43], [44, 20]]
     a, b = (engine(net).solve(24, grips) for engine in (ComplianceEngine, FrameEngine))
     for name in FIELDS[:4]:

@@ -33,11 +33,13 @@ from experiments.arches_lmgc90 import (
     witness,
 )
 from experiments.witness_lmgc90 import python_with_lmgc90
-from seqopt.compliance import ComplianceEngine
-from seqopt.discrete_system import STUDY_BED, Across, BedStiffness, Pinch
-from seqopt.methods import sequential
-from seqopt.network import GROUND, network
-from seqopt.scene_file import load_scene
+from seqopt.engines.discrete.system import Across, BedStiffness, Pinch
+from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.network.build import build_network
+from seqopt.network.network import GROUND
+from seqopt.scene.scene_file import load_scene
+from seqopt.sequence.two_robots import sequential
+from seqopt.study.presets import STUDY_BED
 
 PYTHON = python_with_lmgc90(os.environ.get("SEQOPT_LMGC90", sys.executable))
 with_lmgc90 = pytest.mark.skipif(PYTHON is None, reason="LMGC90 is not installed")
@@ -49,7 +51,7 @@ BOTH = pytest.mark.parametrize("pinch", [ACROSS, THROUGH], ids=["width", "thickn
 
 @pytest.fixture(scope="module")
 def engine():
-    return ComplianceEngine(network(load_scene("arch25")))
+    return ComplianceEngine(build_network(load_scene("arch25")))
 
 
 @pytest.fixture(scope="module")

@@ -30,9 +30,9 @@ from experiments.calibration import (
     turning_share,
 )
 from experiments.calibration_readings import GROUPS, RATIO, against_study, closest
-from seqopt.network import network
-from seqopt.paper import printed
-from seqopt.rigid import spring_maps
+from seqopt.network.build import build_network
+from seqopt.network.kinematics import spring_maps
+from seqopt.study.tables import printed
 
 VAULTS = vaults()
 MODELS = laws(VAULTS)
@@ -49,7 +49,7 @@ def direct(vault, slide, turn):
     """A third route: springs assembled to a stiffness matrix, unit load on one rigid brick."""
     built, at = scene(vault, slide, turn), chain(vault).loads[0]
     count = len(built.bricks)
-    _, gap, stiffness = spring_maps(network(built), count)
+    _, gap, stiffness = spring_maps(build_network(built), count)
     matrix = np.einsum("sik,sij,sjl->kl", gap, stiffness, gap, optimize=True)
     ends = chain(vault).points[:, 0]
     brick = int(np.searchsorted(ends, at)) - 1

@@ -11,10 +11,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from seqopt.cli import main
-from seqopt.methods import cantilever, sequential
-from seqopt.paper import printed_steps
-from seqopt.responses import analyze, step_fields
+from seqopt.cli.main import main
+from seqopt.responses.table import analyze, step_fields
+from seqopt.sequence.two_robots import cantilever, sequential
+from seqopt.study.tables import printed_steps
 
 
 def run(capsys, *arguments):

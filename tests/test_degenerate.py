@@ -11,9 +11,11 @@ import pytest
 from experiments.degenerate_cases import CASES, Size, capped, costs, opposed, whole
 from experiments.degenerate_placement import MALFORMED, judge, outcomes
 from formulations import overlap_lp, overlap_mip, solvers
-from seqopt.errors import SolverError
-from seqopt.placement import Budget, CostProblem, InfeasibleError, Placement, ProblemError
-from seqopt.selection import Aim, Formulation, Kind, Selection, certify, formulations, run
+from seqopt.errors import InfeasibleError, ProblemError, SolverError
+from seqopt.placement.certificate import certify
+from seqopt.placement.costs import Budget, CostProblem, LayeredCosts
+from seqopt.placement.formulation import Aim, Formulation, FormulationKind, Selection, formulations
+from seqopt.placement.plan import run
 
 ALL = formulations()
 SMALL = Size(3, 3, 6)
@@ -85,7 +87,7 @@ def answers(reply) -> Formulation:
             raise reply
         return reply(problem)
 
-    return Formulation("fake", "", Kind.EXACT, Aim.SUM, solve)
+    return Formulation("fake", "", FormulationKind.EXACT, Aim.SUM, solve)
 
 
 def worst(problem):
@@ -187,7 +189,7 @@ def test_a_bound_of_infinity_is_no_cap(name):
 
 def test_sums_that_overflow_are_refused():
     with pytest.raises(ProblemError, match="sum overflows; rescale"):
-        CostProblem(Placement((np.full(2, 1e308),), (np.full((1, 2), 1e308),)))
+        CostProblem(LayeredCosts((np.full(2, 1e308),), (np.full((1, 2), 1e308),)))
 
 
 @flows

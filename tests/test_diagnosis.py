@@ -10,13 +10,13 @@ import pytest
 from experiments.limit_scenes import HELD, LOOSE_AT, chain, loosened, without_joint
 from experiments.reference_chain import solve_exactly
 from experiments.walls import running_bond
-from seqopt.compliance import ComplianceEngine
-from seqopt.diagnosis import FLOOR, MECHANISM, WELL, Finding, diagnose, residual, spectrum
-from seqopt.fields import Want, grip_columns
-from seqopt.frame import FrameEngine
-from seqopt.mixed import mixed, ungripped
-from seqopt.network import network
-from seqopt.rigid import solve_rigid
+from seqopt.engines.diagnosis import FLOOR, UNRESISTED, WELL, Finding, diagnose, residual, spectrum
+from seqopt.engines.frame import FrameEngine
+from seqopt.engines.interface import Want, grip_columns
+from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.engines.rigid.dense import solve_dense
+from seqopt.engines.rigid.mixed import mixed_system, ungripped
+from seqopt.network.build import build_network
 
 
 def places(net, bricks, grips):
@@ -66,10 +66,10 @@ def test_spoiled_fields_are_seen(engine25, name, share):
 
 
 def test_the_smallest_eigenvalue_is_that_of_the_dense_matrix():
-    net = network(running_bond(3, 3))
+    net = build_network(running_bond(3, 3))
     grips = places(net, 9, [13, 18])
     parts = ungripped(net, 9)
-    system = mixed(parts, grips)
+    system = mixed_system(parts, grips)
     dense = parts.deformation.toarray()
     matrix = dense.T * parts.stiffness @ dense
     scale = np.sqrt(np.maximum(matrix.diagonal(), FLOOR * matrix.diagonal().max()))
@@ -94,7 +94,7 @@ def test_a_missing_joint_is_a_mechanism_beyond_it(grips):
         assert told.backward_error == np.inf
         assert np.abs(told.mode[: LOOSE_AT + 1]).max() < 1e-6
         assert np.abs(told.mode[LOOSE_AT + 1 :]).max() == 1
-    assert told.smallest_eigenvalue < MECHANISM
+    assert told.smallest_eigenvalue < UNRESISTED
 
 
 def test_three_grips_hold_what_is_cut_off():
@@ -107,7 +107,7 @@ def test_three_grips_hold_what_is_cut_off():
 
 @pytest.mark.parametrize("only_turning", [True, False])
 def test_a_joint_without_stiffness_is_a_mechanism(only_turning):
-    net = network(loosened(chain(25), 0.0, only_turning=only_turning))
+    net = build_network(loosened(chain(25), 0.0, only_turning=only_turning))
     told = diagnose(ComplianceEngine(net), 25, [])
     assert told.finding is Finding.MECHANISM
     moving = np.abs(told.mode).max(axis=1)
@@ -120,7 +120,7 @@ def test_the_smallest_eigenvalue_follows_a_loose_joint(power):
     """Down to what double precision loses in the stiffness matrix itself."""
     nothing = np.zeros(0, dtype=int)
     base, less = (
-        spectrum(network(loosened(chain(25), 10.0**-p, only_turning=True)), 25, nothing)[0]
+        spectrum(build_network(loosened(chain(25), 10.0**-p, only_turning=True)), 25, nothing)[0]
         for p in (power, power + 3)
     )
     assert less == pytest.approx(1e-3 * base, rel=0.3)
@@ -130,7 +130,7 @@ def test_nearly_loose_is_solved_or_refused_never_wrong():
     seen = set()
     for power in range(0, 18, 3):
         for grips in ([], [49], [30, 49], HELD):
-            net = network(loosened(chain(25), 10.0**-power, only_turning=False))
+            net = build_network(loosened(chain(25), 10.0**-power, only_turning=False))
             told = diagnose(ComplianceEngine(net), 25, grips)
             seen.add(told.finding)
             if told.residuals is not None:
@@ -145,39 +145,39 @@ def test_nearly_loose_is_solved_or_refused_never_wrong():
 
 
 def test_a_long_chain_is_solved_well_though_the_plain_residual_says_no():
-    told = diagnose(network(chain(1500)), 1500, [])
+    told = diagnose(build_network(chain(1500)), 1500, [])
     assert told.finding is Finding.SOLVED_WELL
     assert told.backward_error < 1e-14
     assert told.residuals.plain > 1e-5  # by this measure, hopeless
     assert told.condition > 1e12
     assert np.abs(told.mode).max(axis=1).argmax() == 1499
-    engine = ComplianceEngine(network(chain(338)))
+    engine = ComplianceEngine(build_network(chain(338)))
     assert diagnose(engine, 338, [675]).finding is Finding.SOLVED_WELL
 
 
 @pytest.mark.parametrize("contrast", [1e2, 1e4, 1e12])
 def test_a_frame_at_a_bad_contrast_is_seen(contrast):
-    told = diagnose(FrameEngine(network(chain(2)), contrast), 2, [3])
+    told = diagnose(FrameEngine(build_network(chain(2)), contrast), 2, [3])
     assert told.finding is Finding.ILL_CONDITIONED
     assert told.backward_error > 1e-5
     assert told.condition < 1e3  # it is the frame, not the structure
 
 
 def test_a_frame_at_its_best_is_told_from_rigid_bricks():
-    told = diagnose(FrameEngine(network(chain(10))), 10, [19])
+    told = diagnose(FrameEngine(build_network(chain(10))), 10, [19])
     assert WELL < told.backward_error < 1e-6
 
 
 def test_a_direct_solve_of_a_long_chain_is_not_solved_well():
-    net = network(chain(120))
+    net = build_network(chain(120))
     columns = places(net, 120, [])
-    direct = residual(net, 120, columns, solve_rigid(net, 120, columns[None]))
+    direct = residual(net, 120, columns, solve_dense(net, 120, columns[None]))
     fast = residual(net, 120, columns, ComplianceEngine(net).solve(120, [[]], Want.ALL))
     assert direct.backward_error > 1e3 * fast.backward_error
 
 
 def test_a_large_wall():
-    net = network(running_bond(20, 20))
+    net = build_network(running_bond(20, 20))
     told = diagnose(net, 400, [net.scene.placed[-1].nodes[0]])
     assert told.finding is Finding.SOLVED_WELL
     assert told.smallest_eigenvalue > 1e-6

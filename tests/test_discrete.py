@@ -26,15 +26,16 @@ from experiments.discrete_arches import (
     witness_rows,
 )
 from experiments.plotting import RESULTS
-from seqopt.bed import spread
-from seqopt.compliance import ComplianceEngine
-from seqopt.discrete import DiscreteEngine
-from seqopt.discrete_system import STUDY_BED, Across, Pinch, pads
-from seqopt.fields import Want
-from seqopt.methods import sequential
-from seqopt.network import network
-from seqopt.paper import printed
-from seqopt.scene_file import load_scene
+from seqopt.contact.quadrature import face_quadrature
+from seqopt.engines.discrete.engine import DiscreteEngine
+from seqopt.engines.discrete.system import Across, Pinch, pads
+from seqopt.engines.interface import Want
+from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.network.build import build_network
+from seqopt.scene.scene_file import load_scene
+from seqopt.sequence.two_robots import sequential
+from seqopt.study.presets import STUDY_BED
+from seqopt.study.tables import printed
 from tests.test_fidelity import HERE, block
 
 NORMAL, TANGENTIAL = STUDY_BED.normal, STUDY_BED.tangential
@@ -42,7 +43,7 @@ NORMAL, TANGENTIAL = STUDY_BED.normal, STUDY_BED.tangential
 
 @pytest.fixture(scope="module")
 def engine():
-    return ComplianceEngine(network(load_scene("arch25")))
+    return ComplianceEngine(build_network(load_scene("arch25")))
 
 
 @pytest.fixture(scope="module")
@@ -54,7 +55,7 @@ def step(engine):
 def test_a_bed_has_the_moments_of_its_face(size):
     length, width, _ = size
     assembly = stack([], size).assembly(2000.0)
-    bed = spread(assembly)
+    bed = face_quadrature(assembly)
     away = bed.point - assembly.corner.mean(axis=0)
     assert bed.area.sum() == pytest.approx(length * width)
     assert bed.area @ away[:, 0] ** 2 == pytest.approx(width * length**3 / 12)
@@ -65,7 +66,7 @@ def test_a_bed_has_the_moments_of_its_face(size):
 
 def twist_of(scene, kind=DiscreteEngine):
     """How a block moves and turns on the study's bed, and its weight."""
-    net = network(scene)
+    net = build_network(scene)
     return kind(net, bed=STUDY_BED).solve(1, HERE, Want.ALL).brick_twist[0, 0], -net.weight[0, 2]
 
 

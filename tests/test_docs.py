@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from seqopt.cli import main
-from seqopt.selection import formulations
+from seqopt.cli.main import main
+from seqopt.placement.formulation import formulations
 
 ROOT = Path(__file__).parent.parent
 

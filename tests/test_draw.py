@@ -6,10 +6,10 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 
-from seqopt.draw import View, draw_bricks, draw_grips, draw_network, draw_responses
-from seqopt.fields import Want
-from seqopt.methods import METHODS
-from seqopt.responses import analyze
+from seqopt.engines.interface import Want
+from seqopt.report.draw import View, draw_bricks, draw_grips, draw_network, draw_responses
+from seqopt.responses.table import analyze
+from seqopt.sequence.two_robots import METHODS
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt

@@ -9,16 +9,16 @@ import pytest
 
 from experiments.limit_scenes import HELD, LOOSE_AT, chain, loosened
 from experiments.reference_chain import solve_exactly
-from seqopt import compliance
-from seqopt.arch import ArchShape, arch_scene
-from seqopt.batch_solve import solve_positive
-from seqopt.compliance import ComplianceEngine, solve_batch
-from seqopt.engines import ENGINES
+from seqopt.engines.interface import Want, grip_columns
+from seqopt.engines.registry import ENGINES
+from seqopt.engines.rigid import compliance
+from seqopt.engines.rigid.compliance import ComplianceEngine, solve_batch
+from seqopt.engines.rigid.ldlt import solve_positive
+from seqopt.engines.rigid.operator import OperatorBuilder
+from seqopt.engines.rigid.spanning_tree import grow_tree
 from seqopt.errors import GripError, MechanismError, SolverError
-from seqopt.fields import Want, grip_columns
-from seqopt.network import network
-from seqopt.operator import OperatorBuilder
-from seqopt.tree import grow_tree
+from seqopt.network.build import build_network
+from seqopt.scene.arch import ArchShape, arch_scene
 
 
 def pattern(name):
@@ -29,7 +29,7 @@ def pattern(name):
 @pytest.fixture(params=ENGINES)
 def engine(request):
     shape = ArchShape(pitch=[1.2, 0.7, 0.2, -0.3, -0.8, -1.2], pattern=pattern(request.param))
-    return ENGINES[request.param](network(arch_scene(shape)))
+    return ENGINES[request.param](build_network(arch_scene(shape)))
 
 
 def test_shapes(engine):
@@ -86,7 +86,7 @@ def test_a_brick_held_by_robots_alone(name):
     """One grip leaves it turning, two leave it turning about their line, whatever the engine."""
     scene = arch_scene(ArchShape(pitch=[1.2, 0.7], pattern=pattern(name), closed=False))
     alone = replace(scene, joints=())
-    engine = ENGINES[name](network(alone))
+    engine = ENGINES[name](build_network(alone))
     engine.solve(1, [[1]])
     for grips in ([[2]], [[2, 3]]):
         with pytest.raises(MechanismError, match="motion of brick 2"):
@@ -103,11 +103,12 @@ def test_an_end_that_closes_late(name):
     at_once = replace(scene, grounds=(near, early))
     free = replace(scene, grounds=(near,))
     forces = [
-        ENGINES[name](network(s)).solve(3, [[3]]).support[0, :3] for s in (late, at_once, free)
+        ENGINES[name](build_network(s)).solve(3, [[3]]).support[0, :3]
+        for s in (late, at_once, free)
     ]
     assert forces[0] == pytest.approx(forces[2], rel=1e-5)
     assert np.abs(forces[0] - forces[1]).max() > 1
-    closed = ENGINES[name](network(late)).solve(4, [[3]]).support[0, :3]
+    closed = ENGINES[name](build_network(late)).solve(4, [[3]]).support[0, :3]
     assert np.abs(closed - forces[0]).max() > 1
 
 
@@ -129,7 +130,7 @@ def error(net, fields, row, grips):
 @pytest.mark.parametrize("factor", [1e-3, 1e-6, 1e-9, 1e-12, 1e-15])
 def test_grips_beyond_a_loose_joint(factor, only_turning):
     """The force method alone loses every digit here and says nothing: the second assertion."""
-    net = network(loosened(chain(25), factor, only_turning=only_turning))
+    net = build_network(loosened(chain(25), factor, only_turning=only_turning))
     sets = [HELD, (30, 37, 49), (3, 8, 10)]
     fields = ComplianceEngine(net).solve(25, sets, Want.ALL)
     for row, grips in enumerate(sets):
@@ -168,7 +169,7 @@ def test_a_system_that_is_not_positive_is_seen(last):
 
 
 def test_a_batch_of_many_passes(monkeypatch):
-    net = network(chain(8))
+    net = build_network(chain(8))
     sets = [(1, 9, 14), (14, 15, 3), (4, 5, 2), (12, 10, 7), (8, 9, 15)]
     whole = ComplianceEngine(net).solve(8, sets, Want.ALL)
     monkeypatch.setattr(compliance, "CHUNK", 2)
@@ -180,7 +181,7 @@ def test_a_batch_of_many_passes(monkeypatch):
 
 def test_loads_in_two_directions():
     """Held and loaded in its plane, a plane arch knows no third direction."""
-    net = network(arch_scene(ArchShape(pitch=[1.2, 0.7, 0.2, -0.3, -0.8, -1.2], pattern="V")))
+    net = build_network(arch_scene(ArchShape(pitch=[1.2, 0.7, 0.2, -0.3, -0.8, -1.2], pattern="V")))
     assert not np.ptp(net.node_position[:, 1])
     space = OperatorBuilder(net, grow_tree(net)).operator(6)
     kept = np.flatnonzero(np.arange(36) % 3 != 1)
@@ -202,7 +203,7 @@ def test_loads_in_two_directions():
 
 
 def test_what_is_solved_again_fits_what_was_asked():
-    net = network(loosened(chain(25), 1e-9, only_turning=True))
+    net = build_network(loosened(chain(25), 1e-9, only_turning=True))
     engine = ComplianceEngine(net)
     whole = engine.solve(25, [HELD, (3, 8, 10), (48, 49, 30)], Want.ALL)
     part = engine.solve(25, [HELD, (3, 8, 10), (48, 49, 30)], Want.SUPPORT)
@@ -216,7 +217,7 @@ def test_what_is_solved_again_fits_what_was_asked():
 
 
 def test_grips_close_together_on_a_long_chain():
-    net = network(chain(150))
+    net = build_network(chain(150))
     sets = [(296, 297, 299), (297, 298, 299), (297, 299, 295)]
     fields = ComplianceEngine(net).solve(150, sets, Want.ALL)
     for row, grips in enumerate(sets):
@@ -228,13 +229,13 @@ def test_a_hundred_bricks_with_a_hinge():
     scene = chain(100)
     joints = list(scene.joints)
     joints[50] = replace(joints[50], rotational_stiffness=(0.0, 0.0, 0.0))
-    net = network(replace(scene, joints=tuple(joints)))
+    net = build_network(replace(scene, joints=tuple(joints)))
     fields = ComplianceEngine(net).solve(100, [(150, 199)], Want.ALL)
     assert error(net, fields, 0, (150, 199)) <= 1e-12
 
 
 def test_what_double_precision_cannot_tell_from_a_mechanism_is_refused():
-    net = network(loosened(chain(25), 1e-13, only_turning=False))
+    net = build_network(loosened(chain(25), 1e-13, only_turning=False))
     with pytest.raises((MechanismError, SolverError)) as caught:
         ComplianceEngine(net).solve(25, [[30, 49]])
     if isinstance(caught.value, MechanismError):

@@ -19,7 +19,7 @@ from experiments.identify_arch25 import (
     target,
 )
 from experiments.plotting import RESULTS
-from seqopt.paper import printed_steps
+from seqopt.study.tables import printed_steps
 
 ROOT = Path(__file__).parent.parent
 

@@ -10,25 +10,26 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from seqopt.arch import ArchShape, arch_scene
-from seqopt.assembly import DRY, EPOXY, Mortar
-from seqopt.certificates import certify_steps
-from seqopt.cli import main
-from seqopt.compliance import ComplianceEngine
-from seqopt.discrete import DiscreteEngine, held_nodes
-from seqopt.discrete_solve import settle
-from seqopt.discrete_system import STUDY_BED, Across, BedStiffness, Pinch, build
-from seqopt.elastic import elastic_limits
+from seqopt.cli.main import main
+from seqopt.contact.elastic_limits import find_elastic_limits
+from seqopt.contact.mortar import DRY, EPOXY, Mortar
+from seqopt.engines.auto import BEYOND, IN_PLANE, AutoEngine, Level
+from seqopt.engines.discrete.engine import DiscreteEngine, held_nodes
+from seqopt.engines.discrete.equilibrium_path import settle
+from seqopt.engines.discrete.system import Across, BedStiffness, Pinch, build
+from seqopt.engines.interface import Want
+from seqopt.engines.planar import PlanarEngine
+from seqopt.engines.plane import find_plane
+from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import GripError, MechanismError, SceneError, SolverError
-from seqopt.fidelity import BEYOND, IN_PLANE, AutoEngine, Level
-from seqopt.fields import Want
-from seqopt.methods import METHODS
-from seqopt.network import network
-from seqopt.planar import PlanarEngine
-from seqopt.plane import find_plane
-from seqopt.scene import Brick, Ground, Robot, Scene
-from seqopt.scene_file import load_scene
-from seqopt.stability import Verdict
+from seqopt.network.build import build_network
+from seqopt.scene.arch import ArchShape, arch_scene
+from seqopt.scene.scene import Brick, Ground, Robot, Scene
+from seqopt.scene.scene_file import load_scene
+from seqopt.sequence.two_robots import METHODS
+from seqopt.stability.assessment import Verdict
+from seqopt.stability.steps import assess_steps
+from seqopt.study.presets import STUDY_BED
 from tests.scenes import arches, moved, states, walls
 
 HERE = np.zeros((1, 0), dtype=int)  # one set of no grips
@@ -71,7 +72,7 @@ def flat_arches(draw):
 @given(states(scenes=st.one_of(flat_arches(), walls())))
 def test_in_a_plane_three_unknowns_say_what_six_do(state):
     scene, bricks, grips = state
-    net = network(scene)
+    net = build_network(scene)
     flat = PlanarEngine(net).solve(bricks, grips, Want.ALL)
     whole = ComplianceEngine(net).solve(bricks, grips, Want.ALL)
     assert largest_difference(flat, whole, net) <= 1e-9
@@ -80,13 +81,13 @@ def test_in_a_plane_three_unknowns_say_what_six_do(state):
 def test_the_plane_is_looked_for():
     shape = ArchShape(pitch=[1.2, 0.8, 0.4], pattern="V")
     scene = arch_scene(shape)
-    assert np.abs(find_plane(network(scene)).normal @ [0, 1, 0]) == pytest.approx(1)
+    assert np.abs(find_plane(build_network(scene)).normal @ [0, 1, 0]) == pytest.approx(1)
     column = arch_scene(ArchShape(pitch=[math.pi / 2] * 3, pattern="V", closed=False))
-    assert np.abs(find_plane(network(column)).normal[2]) < 1e-12
+    assert np.abs(find_plane(build_network(column)).normal[2]) < 1e-12
     x, y, z = scene.bricks[1].position
     off = replace(scene.bricks[1], position=(x, y + 0.01, z))
     with pytest.raises(SceneError, match=r"brick 2: its centroid lies 9\.\d+ mm outside"):
-        PlanarEngine(network(replace(scene, bricks=(scene.bricks[0], off, scene.bricks[2]))))
+        PlanarEngine(build_network(replace(scene, bricks=(scene.bricks[0], off, scene.bricks[2]))))
     a, _, c = scene.joints[0].along
     turned = replace(
         scene.joints[0],
@@ -94,12 +95,12 @@ def test_the_plane_is_looked_for():
         translational_stiffness=(3e8, 2e8, 1e8),
     )
     with pytest.raises(SceneError, match="joint 1-2: its axes are turned"):
-        PlanarEngine(network(replace(scene, joints=(turned, scene.joints[1]))))
+        PlanarEngine(build_network(replace(scene, joints=(turned, scene.joints[1]))))
 
 
 def test_a_grip_outside_the_plane_is_refused_and_would_matter():
     """Bricks laid across and centered: their nodes lie on either side of the plane."""
-    net = network(arch_scene(ArchShape(pitch=[1.2, 0.8, 0.4], pattern="L", overhang=0.0)))
+    net = build_network(arch_scene(ArchShape(pitch=[1.2, 0.8, 0.4], pattern="L", overhang=0.0)))
     engine = PlanarEngine(net)
     engine.solve(3, HERE)
     with pytest.raises(GripError, match=r"grip on node 3: it lies 61\.5 mm outside"):
@@ -112,7 +113,7 @@ def test_a_grip_outside_the_plane_is_refused_and_would_matter():
 @given(states(scenes=st.one_of(arches(max_bricks=5), walls())))
 def test_within_the_elastic_limits_discrete_elements_are_rigid_bricks(state):
     scene, bricks, grips = state
-    net = network(scene)
+    net = build_network(scene)
     strong = Mortar(friction=1.0, tensile_strength=1e12, cohesion=1e12)
     found = DiscreteEngine(net, strong).solve(bricks, grips, Want.ALL)
     exact = ComplianceEngine(net).solve(bricks, grips, Want.ALL)
@@ -161,7 +162,7 @@ def block(size=(0.4, 0.3, 0.1), lean=0.0, gravity=9.81, **stiffness):
 @pytest.mark.parametrize("angle", [20.0, 24.9, 25.1, 30.0])
 def test_a_block_slides_beyond_the_angle_of_friction(angle):
     scene = block(lean=math.radians(angle))
-    engine = DiscreteEngine(network(scene), DRY)  # 25 degrees
+    engine = DiscreteEngine(build_network(scene), DRY)  # 25 degrees
     if angle > 25:
         with pytest.raises(MechanismError, match="1 bricks: joints part or slip and brick 1 goes"):
             engine.solve(1, HERE)
@@ -174,7 +175,7 @@ def test_a_block_slides_beyond_the_angle_of_friction(angle):
 def test_a_slender_block_topples(height):
     """It stands while its weight stays over its base: tan(35°) = 0.7, a base of 0.4."""
     scene = block((0.4, 0.3, height), lean=math.radians(35))
-    engine = DiscreteEngine(network(scene), Mortar(friction=2.0))
+    engine = DiscreteEngine(build_network(scene), Mortar(friction=2.0))
     if height > 0.4 / math.tan(math.radians(35)):
         with pytest.raises(MechanismError):
             engine.solve(1, HERE)
@@ -185,7 +186,7 @@ def test_a_slender_block_topples(height):
 def test_an_open_base_tilts_as_statics_says():
     """A resultant at e from the middle presses on c = 3 (b/2 - e) of a base without tension."""
     size, lean, stiffness = (0.4, 0.3, 0.5), math.radians(25), 1e9
-    net = network(block(size, lean))
+    net = build_network(block(size, lean))
     system = build(net, 1, Mortar(friction=1.0), BedStiffness(stiffness, stiffness))
     found = settle(held_nodes(net, system, np.zeros(0, int), np.zeros((0, 3))))
     assert found.rests
@@ -205,7 +206,7 @@ def test_a_bond_breaks_at_its_strength(strength):
     size = (0.4, 0.3, 0.1)
     stress = 2000 * 9.81 * size[2]
     mortar = Mortar(friction=0.5, tensile_strength=strength * stress, cohesion=1e6)
-    engine = DiscreteEngine(network(block(size, gravity=-9.81)), mortar)
+    engine = DiscreteEngine(build_network(block(size, gravity=-9.81)), mortar)
     if strength < 1:
         with pytest.raises(MechanismError):
             engine.solve(1, HERE)
@@ -216,7 +217,7 @@ def test_a_bond_breaks_at_its_strength(strength):
 def test_stress_at_the_corners_is_that_of_a_beam():
     """Force over area, moment over section modulus, twist over the polar second moment."""
     size = length, width, _ = (0.4, 0.3, 0.5)
-    limits = elastic_limits(network(block(size)), DRY)
+    limits = find_elastic_limits(build_network(block(size)), DRY)
     axes = {"N": (0, 0, 100.0, 0, 0, 0), "M": (0, 0, 0, 7.0, 0, 0), "T": (0, 0, 0, 0, 0, 5.0)}
     stress = {k: np.einsum("kij,j->ki", limits.stress, v) for k, v in axes.items()}
     assert stress["N"][:, 0] == pytest.approx(100 / (length * width))
@@ -231,9 +232,9 @@ def test_stress_at_the_corners_is_that_of_a_beam():
 @pytest.mark.parametrize("number", [3, 7, 9, 20, 24])
 def test_what_comes_to_rest_is_proven_to_stand(number):
     """Forces within the limits are there: the certificate must find some too, without bonds."""
-    net = network(load_scene("arch25"))
+    net = build_network(load_scene("arch25"))
     step = METHODS["sequential"](net)[number - 1]
-    (result,) = certify_steps(net, [step], DRY)
+    (result,) = assess_steps(net, [step], DRY)
     engine = DiscreteEngine(net, DRY)
     if result.verdict is Verdict.FALLS:
         assert number in (9, 20)
@@ -247,7 +248,7 @@ def test_what_comes_to_rest_is_proven_to_stand(number):
 
 
 def test_beds_alone_are_other_joints_and_pads_let_a_brick_turn():
-    net = network(load_scene("arch25"))
+    net = build_network(load_scene("arch25"))
     own, study = DiscreteEngine(net), DiscreteEngine(net, bed=STUDY_BED)
     first, second = (e.solve(10, [[19]], Want.ALL) for e in (own, study))
     assert largest_difference(first, second, net) > 0.5
@@ -262,7 +263,9 @@ def test_beds_alone_are_other_joints_and_pads_let_a_brick_turn():
 
 
 def test_the_cheapest_level_is_taken_and_counted():
-    net = network(arch_scene(ArchShape(pitch=[1.2, 0.8, 0.4, 0.0], pattern="VVLV", overhang=0.0)))
+    net = build_network(
+        arch_scene(ArchShape(pitch=[1.2, 0.8, 0.4, 0.0], pattern="VVLV", overhang=0.0))
+    )
     engine = AutoEngine(net)
     sets = np.array([[7], [4], [1]])  # node 4 sticks out
     found = engine.solve(4, sets, Want.EDGES)
@@ -275,10 +278,10 @@ def test_the_cheapest_level_is_taken_and_counted():
 
 @pytest.mark.parametrize("share", [0.999, 1.001])
 def test_contact_is_modeled_where_a_joint_would_leave_its_limits(share):
-    net = network(load_scene("arch25"))
+    net = build_network(load_scene("arch25"))
     weak = Mortar(friction=EPOXY.friction, tensile_strength=0.0, cohesion=1e9)
     wrench = ComplianceEngine(net).solve(6, [[11]], Want.JOINTS).joint_wrench
-    tension = float(elastic_limits(net, weak).excess(wrench).max())
+    tension = float(find_elastic_limits(net, weak).excess(wrench).max())
     assert tension > 0
     engine = AutoEngine(net, replace(weak, tensile_strength=share * tension))
     engine.solve(6, [[11]])

@@ -10,20 +10,30 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from seqopt.arch import ArchShape, arch_scene
-from seqopt.budgets import robot_use, steps_over, travel
-from seqopt.compliance import ComplianceEngine
-from seqopt.criteria import CRITERIA, EQUATIONS, WORST_RATIO
-from seqopt.errors import SolverError
-from seqopt.loops import SCHEDULES, three_robot_loop
-from seqopt.network import network
-from seqopt.placement import Budget, CostProblem, InfeasibleError, Placement, ProblemError
-from seqopt.problem import Limit, pose
-from seqopt.selection import Aim, Kind, Selection, certify, formulation, formulations, run
+from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.errors import InfeasibleError, ProblemError, SolverError
+from seqopt.network.build import build_network
+from seqopt.placement.budgets import robot_use, steps_over, travel
+from seqopt.placement.certificate import certify
+from seqopt.placement.costs import Budget, CostProblem, LayeredCosts
+from seqopt.placement.formulation import (
+    Aim,
+    FormulationKind,
+    Selection,
+    find_formulation,
+    formulations,
+)
+from seqopt.placement.plan import run
+from seqopt.placement.problem import Limit, pose
+from seqopt.scene.arch import ArchShape, arch_scene
+from seqopt.sequence.three_robots import SCHEDULES, three_robot_loop
+from seqopt.study.presets import CRITERIA, EQUATIONS, WORST_RATIO
 
 ALL = formulations()
-EXACT_SUMS = [n for n, f in ALL.items() if f.aim is Aim.SUM and f.kind is not Kind.HEURISTIC]
-HEURISTICS = [n for n, f in ALL.items() if f.kind is Kind.HEURISTIC]
+EXACT_SUMS = [
+    n for n, f in ALL.items() if f.aim is Aim.SUM and f.kind is not FormulationKind.HEURISTIC
+]
+HEURISTICS = [n for n, f in ALL.items() if f.kind is FormulationKind.HEURISTIC]
 every = pytest.mark.parametrize("name", ALL)
 
 
@@ -39,7 +49,7 @@ def problems(draw, most_moves=5, most_candidates=4):
 
     single = tuple(array(size) for size in sizes)
     shared = tuple(array(a, b) for a, b in zip([1, *sizes[:-1]], sizes, strict=True))
-    return CostProblem(Placement(single, shared))
+    return CostProblem(LayeredCosts(single, shared))
 
 
 def brute_force(problem, aim):
@@ -57,7 +67,7 @@ def problem25(engine25):
 
 def small_arch(count):
     pitch = np.linspace(1.3, -1.3, count)
-    return ComplianceEngine(network(arch_scene(ArchShape(pitch=pitch.tolist()))))
+    return ComplianceEngine(build_network(arch_scene(ArchShape(pitch=pitch.tolist()))))
 
 
 @every
@@ -73,7 +83,7 @@ def test_answers_are_certified_or_refused_as_infeasible(name, problem):
     selection, certificate = run(problem, which)
     assert certificate.objective >= best - 1e-9
     assert certificate.bound == pytest.approx(best, abs=1e-9)
-    if which.kind is not Kind.HEURISTIC:
+    if which.kind is not FormulationKind.HEURISTIC:
         assert certificate.objective == pytest.approx(best, abs=1e-6)
         assert certificate.gap <= 1e-6
     assert selection.bound <= best + 1e-6
@@ -102,7 +112,7 @@ def test_a_beam_never_does_worse_than_the_cascade(problem, width):
 @settings(max_examples=15)
 def test_renumbering_candidates_keeps_the_value_of_exact_ones(name, problem, data):
     which = ALL[name]
-    if which.kind is Kind.HEURISTIC or not np.isfinite(brute_force(problem, which.aim)):
+    if which.kind is FormulationKind.HEURISTIC or not np.isfinite(brute_force(problem, which.aim)):
         return
     order = [data.draw(st.permutations(range(size))) for size in problem.sums.sizes]
     before = [[0], *order[:-1]]
@@ -111,7 +121,7 @@ def test_renumbering_candidates_keeps_the_value_of_exact_ones(name, problem, dat
         c[np.ix_(list(b), list(o))]
         for c, b, o in zip(problem.sums.shared, before, order, strict=True)
     )
-    other = CostProblem(Placement(single, shared))
+    other = CostProblem(LayeredCosts(single, shared))
     a, b = run(problem, which)[1].objective, run(other, which)[1].objective
     assert a == pytest.approx(b, abs=1e-6)
 
@@ -125,13 +135,13 @@ def test_it_is_repeatable(name, problem25):
 def test_malformed_problems_are_refused_before_any_formulation(name):
     one, none = np.zeros(1), np.zeros((1, 0))
     with pytest.raises(ProblemError, match="no moves"):
-        ALL[name].solve(CostProblem(Placement((), ())))
+        ALL[name].solve(CostProblem(LayeredCosts((), ())))
     with pytest.raises(ProblemError, match="move 1 has no candidates"):
-        ALL[name].solve(CostProblem(Placement((np.zeros(0),), (none,))))
+        ALL[name].solve(CostProblem(LayeredCosts((np.zeros(0),), (none,))))
     with pytest.raises(ProblemError, match="move 1: a single cost is NaN"):
-        ALL[name].solve(CostProblem(Placement((np.array([np.nan]),), (np.zeros((1, 1)),))))
+        ALL[name].solve(CostProblem(LayeredCosts((np.array([np.nan]),), (np.zeros((1, 1)),))))
     with pytest.raises(ProblemError, match=r"move 2: shared costs \(1, 2\)"):
-        ALL[name].solve(CostProblem(Placement((one, one), (np.zeros((1, 1)), np.zeros((1, 2))))))
+        ALL[name].solve(CostProblem(LayeredCosts((one, one), (np.zeros((1, 1)), np.zeros((1, 2))))))
 
 
 @every
@@ -140,7 +150,7 @@ def test_budgets_are_kept_or_refused(name):
     single = tuple(np.array([0.0, 1.0]) for _ in range(3))
     shared = (np.zeros((1, 2)), np.zeros((2, 2)), np.zeros((2, 2)))
     amounts = tuple(np.array([1.0, 0.0]) for _ in range(3))
-    capped = CostProblem(Placement(single, shared), (Budget("use", amounts, shared, 1.0),))
+    capped = CostProblem(LayeredCosts(single, shared), (Budget("use", amounts, shared, 1.0),))
     if name in ("overlap_mip", "overlap_lp"):
         selection, certificate = run(capped, ALL[name])
         assert certificate.spent["use"] <= 1
@@ -212,7 +222,7 @@ def test_options_are_checked(problem25):
         with pytest.raises(ProblemError, match=named):
             ALL[name].solve(problem25, **options)
     with pytest.raises(ProblemError, match="there is no such; give one of beam, cascade"):
-        formulation("simplex")
+        find_formulation("simplex")
 
 
 def test_a_longer_horizon_and_a_wider_beam_serve(problem25):
@@ -283,7 +293,7 @@ def test_promises_are_held(problem25):
     """A heuristic that calls itself exact is refused, and so is a bound above the optimum."""
     cascade = ALL["cascade"]
     with pytest.raises(SolverError, match="promises the optimum"):
-        run(problem25, replace(cascade, kind=Kind.EXACT))
+        run(problem25, replace(cascade, kind=FormulationKind.EXACT))
     poor = cascade.solve(problem25)
     with pytest.raises(SolverError, match="claimed bound"):
         certify(problem25, replace(poor, bound=poor.objective), Aim.SUM)
@@ -297,6 +307,6 @@ def test_a_budget_keeps_its_claimed_bound(problem25):
 
 
 def test_a_choice_that_is_not_allowed_is_caught():
-    problem = CostProblem(Placement((np.array([0.0, np.inf]),), (np.zeros((1, 2)),)))
+    problem = CostProblem(LayeredCosts((np.array([0.0, np.inf]),), (np.zeros((1, 2)),)))
     with pytest.raises(SolverError, match="not allowed"):
         certify(problem, Selection((1,), 0.0), Aim.SUM)

@@ -17,8 +17,8 @@ from experiments.profiles import data_profile, pareto, performance_profile, shif
 from experiments.runs import ENGINES, NO_PROOF, REFERENCE, rows
 from experiments.speed_accuracy import KEY, collect, holds, measure, specs, summarize
 from experiments.speed_charts import headline, profile_charts
-from seqopt.criteria import CRITERIA
-from seqopt.selection import formulations
+from seqopt.placement.formulation import formulations
+from seqopt.study.presets import CRITERIA
 
 ROOT = Path(__file__).parent.parent
 STAGES = ["assemble", "respond", "rank", "compile", "solve", "verify"]

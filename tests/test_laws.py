@@ -9,13 +9,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seqopt.compliance import ComplianceEngine
-from seqopt.fields import Want
-from seqopt.frame import FrameEngine
-from seqopt.network import network
-from seqopt.operator import OperatorBuilder
-from seqopt.responses import responses
-from seqopt.tree import grow_tree
+from seqopt.engines.frame import FrameEngine
+from seqopt.engines.interface import Want
+from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.engines.rigid.operator import OperatorBuilder
+from seqopt.engines.rigid.spanning_tree import grow_tree
+from seqopt.network.build import build_network
+from seqopt.responses.quantities import step_responses
 from tests.scenes import arches, moved, solve, states, walls
 
 any_scene = st.one_of(arches(), walls())
@@ -60,7 +60,7 @@ def imbalance(net, bricks, grips, fields):
 @given(state=states(any_scene))
 def test_every_brick_is_in_equilibrium(engine, tolerance, state):
     scene, bricks, grips = state
-    net = network(scene)
+    net = build_network(scene)
     fields = engine(net).solve(bricks, grips, Want.ALL)
     scale = max(np.abs(fields.joint_wrench).max(), np.abs(net.weight).max())
     assert np.abs(imbalance(net, bricks, grips, fields)).max() <= tolerance * scale
@@ -69,7 +69,7 @@ def test_every_brick_is_in_equilibrium(engine, tolerance, state):
 @given(state=states(arches()))
 def test_imbalance_is_seen(state):
     scene, bricks, grips = state
-    net = network(scene)
+    net = build_network(scene)
     fields = ComplianceEngine(net).solve(bricks, grips, Want.ALL)
     wrong = replace(fields, joint_wrench=1.01 * fields.joint_wrench)
     scale = max(np.abs(fields.joint_wrench).max(), np.abs(net.weight).max())
@@ -79,7 +79,7 @@ def test_imbalance_is_seen(state):
 @given(state=states(any_scene))
 def test_reactions_sum_to_the_weight(state):
     scene, bricks, grips = state
-    net = network(scene)
+    net = build_network(scene)
     fields = ComplianceEngine(net).solve(bricks, grips, Want.ALL)
     ends = net.springs.bodies[:, 0] < 0
     total = fields.grip_force[0].sum(axis=0) + fields.joint_wrench[0, ends, :3].sum(axis=0)
@@ -91,7 +91,7 @@ def test_reactions_sum_to_the_weight(state):
 @given(scene=any_scene, data=st.data())
 def test_reciprocity(scene, data):
     """Maxwell-Betti: the flexibility between any two nodes is the same both ways."""
-    net = network(scene)
+    net = build_network(scene)
     bricks = data.draw(st.integers(1, len(scene.bricks)))
     matrix = OperatorBuilder(net, grow_tree(net)).operator(bricks).flexibility
     assert close(matrix, matrix.T, 1e-12)
@@ -101,7 +101,7 @@ def test_reciprocity(scene, data):
 def test_a_further_grip_never_raises_compliance(state, data):
     """The work of the weight, which is the compliance, can only fall."""
     scene, bricks, grips = state
-    net = network(scene)
+    net = build_network(scene)
     nodes = [n for b in scene.placed[:bricks] for n in b.nodes if n not in scene.blocked_nodes]
     more = data.draw(st.sampled_from(nodes))
     if more in grips:
@@ -119,7 +119,7 @@ def test_a_further_grip_never_raises_compliance(state, data):
 @given(state=states(any_scene))
 def test_gripped_nodes_stay(state):
     scene, bricks, grips = state
-    net = network(scene)
+    net = build_network(scene)
     engine = ComplianceEngine(net)
     motion = engine.solve(bricks, grips).displacement[0]
     free = engine.solve(bricks, np.zeros((1, 0), dtype=np.int64)).displacement[0]
@@ -128,8 +128,8 @@ def test_gripped_nodes_stay(state):
 
 
 def scalars(scene, bricks, grips):
-    engine = ComplianceEngine(network(scene))
-    answer = responses(engine, engine.solve(bricks, grips))
+    engine = ComplianceEngine(build_network(scene))
+    answer = step_responses(engine, engine.solve(bricks, grips))
     points = engine.network.node_position
     extent = np.linalg.norm(points - points[0], axis=1).max()
     values = {name: getattr(answer, name)[0] for name in NAMES}

@@ -8,15 +8,16 @@ import pandas as pd
 import pytest
 from hypothesis import given
 
-from seqopt.arch import ArchShape, arch_scene
 from seqopt.errors import StepError
-from seqopt.methods import METHODS, cantilever, lies_along, sequential
-from seqopt.network import network
-from seqopt.paper import printed_steps
-from seqopt.plan_file import parse_plan, published_plan, read_plan
-from seqopt.reach import Side, Sphere
-from seqopt.scene import Robot
-from seqopt.steps import Step, StepKind, check_sequence
+from seqopt.network.build import build_network
+from seqopt.scene.arch import ArchShape, arch_scene
+from seqopt.scene.reach import Side, Sphere
+from seqopt.scene.scene import Robot
+from seqopt.sequence.plan_file import parse_plan, read_plan
+from seqopt.sequence.steps import Step, StepKind, check_sequence
+from seqopt.sequence.two_robots import METHODS, cantilever, lies_along, sequential
+from seqopt.study.published import published_plan
+from seqopt.study.tables import printed_steps
 from tests.scenes import arches
 
 GRIPS = [f"rob{i}_node" for i in (1, 2, 3)]
@@ -56,7 +57,7 @@ def far_reaching(scene):
 @pytest.mark.parametrize("method", METHODS)
 @given(scene=arches().map(far_reaching))
 def test_any_arch_can_be_built(method, scene):
-    steps = METHODS[method](network(scene))
+    steps = METHODS[method](build_network(scene))
     assert [s.bricks for s in steps if s.kind is StepKind.PLACE] == [
         *range(1, len(scene.bricks) + 1)
     ]
@@ -66,23 +67,23 @@ def test_any_arch_can_be_built(method, scene):
 
 @given(scene=arches().map(far_reaching))
 def test_the_sequential_method_holds_the_newest_brick(scene):
-    for step in sequential(network(scene))[:-1]:
+    for step in sequential(build_network(scene))[:-1]:
         assert set(step.held) & set(scene.placed[step.bricks - 1].nodes)
 
 
 def test_where_all_bricks_lie_along_the_methods_are_one():
-    net = network(arch_scene(ArchShape(pitch=[1.0, 0.6, 0.2, -0.2], pattern="V")))
+    net = build_network(arch_scene(ArchShape(pitch=[1.0, 0.6, 0.2, -0.2], pattern="V")))
     assert lies_along(net) == {1, 2, 3, 4}
     assert sequential(net) == cantilever(net)
 
 
 def test_methods_say_what_they_lack(arch25):
     with pytest.raises(StepError, match="1 robots; this method needs two"):
-        sequential(network(replace(arch25, robots=arch25.robots[:1])))
+        sequential(build_network(replace(arch25, robots=arch25.robots[:1])))
     near = Sphere(center=(0.0, 0.0, 0.0), radius=0.5)
     short = tuple(Robot(name=f"rob{i}", payload=300.0, reach=near) for i in (1, 2))
     with pytest.raises(StepError, match="brick 4: rob2 reaches none of its free nodes"):
-        sequential(network(replace(arch25, robots=short)))
+        sequential(build_network(replace(arch25, robots=short)))
 
 
 def edited(plan, number, **changes):

@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given
 
 from experiments.walls import running_bond
-from seqopt.network import Kind, network
+from seqopt.network.build import build_network
+from seqopt.network.network import PartKind
 from tests.scenes import arches
 
 
@@ -41,7 +42,7 @@ def test_partial_structures_are_prefixes(engine25):
 
 @given(scene=arches())
 def test_chains(scene):
-    net = network(scene)
+    net = build_network(scene)
     total = len(scene.bricks)
     for bricks in range(1, total + 1):
         closed = bricks == total and len(scene.grounds) == 2
@@ -53,9 +54,9 @@ def test_chains(scene):
 
 
 def test_a_wall_has_loops():
-    net = network(running_bond(4, 3))
+    net = build_network(running_bond(4, 3))
     graph = net.graph(12)
     assert graph.number_of_edges() == net.count_edges(12)
     assert len(nx.cycle_basis(graph)) > 0
     assert (np.bincount(net.edge_kind) > 0).all()
-    assert net.node_kind[net.inner].max() == Kind.INNER
+    assert net.node_kind[net.inner].max() == PartKind.INNER

@@ -13,9 +13,9 @@ from experiments.peer_frames import MODULES, PACKAGES, missing_packages
 from experiments.peer_loops import LOOPS, kept, loop
 from experiments.peer_paths import PATHS, by_linprog, by_networkx
 from experiments.peers import Case, difference, workload
-from seqopt.fields import Want, grip_columns
-from seqopt.placement import CostProblem, Placement
-from seqopt.selection import formulation
+from seqopt.engines.interface import Want, grip_columns
+from seqopt.placement.costs import CostProblem, LayeredCosts
+from seqopt.placement.formulation import find_formulation
 from tests.test_experiments import run
 
 STATES = [(4, (1, 5, 7)), (17, (1, 20, 33)), (17, (1, 20, 21)), (25, (4, 47)), (25, (12, 13, 46))]
@@ -91,8 +91,8 @@ def test_general_tools_find_the_optimum_of_dynamic_programming(solve):
     single = [rng.standard_normal(size) for size in sizes]
     shared = [rng.standard_normal(pair) for pair in pairs]
     shared[2][rng.random(shared[2].shape) < 0.3] = np.inf
-    problem = CostProblem(Placement(tuple(single), tuple(shared)))
-    best = formulation("overlap_dp").solve(problem).objective
+    problem = CostProblem(LayeredCosts(tuple(single), tuple(shared)))
+    best = find_formulation("overlap_dp").solve(problem).objective
     assert solve(problem) == pytest.approx(best, abs=1e-8)
 
 

@@ -10,35 +10,27 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import rankdata
 
-from seqopt.arch import ArchShape, arch_scene
-from seqopt.compare import compare
-from seqopt.compliance import ComplianceEngine
-from seqopt.contest import contest, published_choice, published_ranks
-from seqopt.criteria import (
-    CLOSEST,
-    CRITERIA,
-    EQUATIONS,
-    WEIGHTED,
-    WORST_RATIO,
-    RankSum,
-    equal,
-    mean_ranks,
-    scaled_ranks,
-)
-from seqopt.errors import StepError
-from seqopt.frame import FrameEngine
-from seqopt.loops import SCHEDULES, modified_sequential, three_robot_loop
-from seqopt.methods import sequential
-from seqopt.network import network
-from seqopt.paper import printed
-from seqopt.placement import ProblemError
-from seqopt.plan_file import published_plan
-from seqopt.problem import payload_limits, pose
-from seqopt.ranking import move_costs, ranking
-from seqopt.responses import analyze, responses, step_fields
-from seqopt.schedule import Open, Schedule
-from seqopt.selection import formulations, run
-from seqopt.steps import StepKind
+from seqopt.engines.frame import FrameEngine
+from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.errors import ProblemError, StepError
+from seqopt.network.build import build_network
+from seqopt.placement.criteria import RankSum, equal, mean_ranks, scaled_ranks
+from seqopt.placement.formulation import formulations
+from seqopt.placement.plan import run
+from seqopt.placement.problem import payload_limits, pose
+from seqopt.placement.ranking import move_costs, rank_moves
+from seqopt.report.comparison import compare_methods
+from seqopt.report.contest import contest
+from seqopt.responses.quantities import step_responses
+from seqopt.responses.table import analyze, step_fields
+from seqopt.scene.arch import ArchShape, arch_scene
+from seqopt.sequence.schedule import OpenGrip, Schedule
+from seqopt.sequence.steps import StepKind
+from seqopt.sequence.three_robots import SCHEDULES, modified_sequential, three_robot_loop
+from seqopt.sequence.two_robots import sequential
+from seqopt.study.presets import CLOSEST, CRITERIA, EQUATIONS, WEIGHTED, WORST_RATIO
+from seqopt.study.published import published_choice, published_plan, published_ranks
+from seqopt.study.tables import printed
 from tests.scenes import arches
 from tests.test_methods import far_reaching
 
@@ -71,9 +63,9 @@ def test_who_moves_when(loop):
 def test_any_chain_can_be_looped(scene, data):
     if len(scene.bricks) < 4:
         with pytest.raises(StepError, match="needs three robots and four bricks"):
-            three_robot_loop(network(scene))
+            three_robot_loop(build_network(scene))
         return
-    schedule = three_robot_loop(network(scene))
+    schedule = three_robot_loop(build_network(scene))
     nodes = []
     for move in schedule.moves:
         free = [n for n in move.candidates if not nodes or n != nodes[-1]]
@@ -102,14 +94,14 @@ def test_a_third_support_ends_twisting(engine25):
     problem = pose(engine25, schedule, EQUATIONS)
     selection, _ = run(problem, formulations()["rank_search"])
     plan = schedule.fill(problem.nodes(selection.choice))
-    worst = max(responses(engine25, step_fields(engine25, s)).D_max[0] for s in plan)
+    worst = max(step_responses(engine25, step_fields(engine25, s)).D_max[0] for s in plan)
     assert worst < 20e-6  # the sequential method reaches 306e-6 m
 
 
 def test_schedules_are_checked(loop):
     with pytest.raises(StepError, match="3 nodes for 22 moves"):
         loop.fill((1, 2, 3))
-    far = replace(loop.steps[0], grips=(Open(0), Open(5), None))
+    far = replace(loop.steps[0], grips=(OpenGrip(0), OpenGrip(5), None))
     with pytest.raises(StepError, match="at most two neighboring"):
         Schedule("x", loop.scene, (far,), loop.moves)
 
@@ -147,7 +139,7 @@ def test_states_hold_the_responses_of_their_steps(engine25, method):
     for state in problem.evaluation.states:
         place = tuple(choice[m] for m in state.moves)
         step = steps[state.step.number]
-        want = responses(engine25, step_fields(engine25, step))
+        want = step_responses(engine25, step_fields(engine25, step))
         assert state.responses["T_max"][place] == pytest.approx(want.F_max[0])
         assert state.responses["M_sup"][place] == pytest.approx(want.M_sup[0])
         assert state.responses["D_max"][place] == pytest.approx(want.D_max[0])
@@ -174,7 +166,7 @@ def test_unknown_responses_are_refused(engine25, loop):
 def test_each_robot_is_a_term_whatever_its_name(arch25):
     """Equation 2 ranks the forces of all robots of a scene."""
     robots = tuple(replace(r, name=n) for r, n in zip(arch25.robots, "abc", strict=True))
-    net = network(replace(arch25, robots=robots))
+    net = build_network(replace(arch25, robots=robots))
     renamed = pose(ComplianceEngine(net), three_robot_loop(net), EQUATIONS)
     first = renamed.evaluation.states[0].responses
     assert {"F_a", "F_b", "F_c", "T_max", "M_sup"} == set(first)
@@ -187,7 +179,7 @@ def test_only_what_is_asked_is_evaluated(engine25, loop):
 
 def test_the_frame_poses_the_same_problem():
     scene = arch_scene(ArchShape(pitch=np.linspace(1.3, -1.3, 6).tolist()))
-    net = network(scene)
+    net = build_network(scene)
     a, b = (pose(e(net), three_robot_loop(net), WEIGHTED) for e in (ComplianceEngine, FrameEngine))
     for x, y in zip(a.sums.single, b.sums.single, strict=True):
         assert x == pytest.approx(y, rel=1e-4)
@@ -253,7 +245,7 @@ def test_the_window_rank_is_the_studys_search(problem):
 
 def test_ranking_diagnostics(problem):
     choice = published_choice(problem)
-    table = ranking(problem, choice)
+    table = rank_moves(problem, choice)
     assert table["node"].tolist() == list(problem.nodes(choice))
     assert (table["rank"] == 1).sum() == (table["node"] == table["winner"]).sum()
     assert (table["tied"] >= 1).all()
@@ -271,7 +263,7 @@ def test_ranking_diagnostics(problem):
 def test_raw_values_do_not_reverse(engine25, loop):
     """A cost that does not depend on the other candidates keeps its winner when one drops out."""
     for criterion in (WEIGHTED, WORST_RATIO):
-        table = ranking(pose(engine25, loop, criterion), (0,) * 2 + (1,) * 20)
+        table = rank_moves(pose(engine25, loop, criterion), (0,) * 2 + (1,) * 20)
         assert (table["turned_by_candidates"] == "").all()
 
 
@@ -285,7 +277,7 @@ def test_tables_are_labeled(problem):
 
 
 def test_contest(engine25):
-    result = contest(engine25, compare(engine25), EQUATIONS)
+    result = contest(engine25, compare_methods(engine25), EQUATIONS)
     assert {"sequential", "cantilever", "published plan", "modified-sequential"} <= set(
         result.table.index
     )

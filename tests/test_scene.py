@@ -10,12 +10,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seqopt.arch import ArchShape, arch_scene
-from seqopt.errors import SceneError, SeqoptError
-from seqopt.files import FileError
-from seqopt.reach import Side, Sphere
-from seqopt.scene import Robot
-from seqopt.scene_file import (
+from seqopt.errors import FileError, SceneError, SeqoptError
+from seqopt.scene.arch import ArchShape, arch_scene
+from seqopt.scene.reach import Side, Sphere
+from seqopt.scene.scene import Robot
+from seqopt.scene.scene_file import (
     dump_scene,
     load_scene,
     parse_scene,

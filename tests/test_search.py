@@ -6,15 +6,16 @@ import numpy as np
 import pytest
 from hypothesis import given
 
-from seqopt.compliance import ComplianceEngine
-from seqopt.criteria import CRITERIA, EQUATIONS, WEIGHTED
-from seqopt.loops import SCHEDULES, three_robot_loop
-from seqopt.network import network
-from seqopt.placement import ProblemError
-from seqopt.problem import Limit, pose
-from seqopt.search import require_search, search, search_table, window
-from seqopt.selection import formulation, run
-from seqopt.states import window_models
+from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.errors import ProblemError
+from seqopt.network.build import build_network
+from seqopt.placement.formulation import find_formulation
+from seqopt.placement.plan import run
+from seqopt.placement.problem import Limit, pose
+from seqopt.placement.window_search import require_search, search_table, search_windows, window
+from seqopt.responses.choices import window_models
+from seqopt.sequence.three_robots import SCHEDULES, three_robot_loop
+from seqopt.study.presets import CRITERIA, EQUATIONS, WEIGHTED
 from tests.scenes import arches
 from tests.test_methods import far_reaching
 
@@ -39,10 +40,10 @@ class Counting:
 def test_it_chooses_as_the_cascade_does(engine25, method, criterion):
     schedule = SCHEDULES[method](engine25.network)
     counting = Counting(engine25)
-    found = search(counting, schedule, CRITERIA[criterion])
+    found = search_windows(counting, schedule, CRITERIA[criterion])
     problem = pose(engine25, schedule, CRITERIA[criterion])
     for name in ("cascade", "rank_search"):
-        assert found.choice == run(problem, formulation(name))[0].choice
+        assert found.choice == run(problem, find_formulation(name))[0].choice
     assert found.plan == schedule.fill(problem.nodes(found.choice))
     assert found.models == counting.sets
     fewest = window_models(schedule, found.choice)
@@ -53,31 +54,31 @@ def test_it_chooses_as_the_cascade_does(engine25, method, criterion):
 @pytest.mark.parametrize(("response", "bound"), [("F_largest", 300), ("M_sup", 12), ("T_max", 80)])
 def test_under_a_limit_that_binds_it_chooses_as_the_cascade_does(engine25, response, bound):
     schedule, limits = three_robot_loop(engine25.network), [Limit(response, bound)]
-    found = search(engine25, schedule, EQUATIONS, limits)
-    selection, _ = run(pose(engine25, schedule, EQUATIONS, limits), formulation("cascade"))
-    assert found.choice == selection.choice != search(engine25, schedule, EQUATIONS).choice
+    found = search_windows(engine25, schedule, EQUATIONS, limits)
+    selection, _ = run(pose(engine25, schedule, EQUATIONS, limits), find_formulation("cascade"))
+    assert found.choice == selection.choice != search_windows(engine25, schedule, EQUATIONS).choice
 
 
 @given(scene=arches(min_bricks=4, max_bricks=7).map(far_reaching))
 def test_on_any_chain_it_chooses_as_the_cascade_does(scene):
-    engine = ComplianceEngine(network(scene))
+    engine = ComplianceEngine(build_network(scene))
     schedule = three_robot_loop(engine.network)
     problem = pose(engine, schedule, WEIGHTED)
-    found = search(engine, schedule, WEIGHTED)
-    assert found.choice == run(problem, formulation("cascade"))[0].choice
+    found = search_windows(engine, schedule, WEIGHTED)
+    assert found.choice == run(problem, find_formulation("cascade"))[0].choice
 
 
 def test_a_dead_end_that_the_cascade_foresees(engine25):
     schedule, limits = three_robot_loop(engine25.network), [Limit("T_max", 64.0)]
     with pytest.raises(ProblemError, match="move 8, step 31: rob2 has no allowed grip after"):
-        search(engine25, schedule, EQUATIONS, limits)
-    selection, _ = run(pose(engine25, schedule, EQUATIONS, limits), formulation("cascade"))
+        search_windows(engine25, schedule, EQUATIONS, limits)
+    selection, _ = run(pose(engine25, schedule, EQUATIONS, limits), find_formulation("cascade"))
     assert len(selection.choice) == len(schedule.moves)
 
 
 def test_a_window_depends_on_the_choices_before_it(engine25):
     schedule = three_robot_loop(engine25.network)
-    found = search(engine25, schedule, EQUATIONS)
+    found = search_windows(engine25, schedule, EQUATIONS)
     nodes = [m.candidates[c] for m, c in zip(schedule.moves, found.choice, strict=True)]
     own = pose(engine25, window(schedule, 9, nodes), EQUATIONS).sums.single[0]
     assert own.tolist() == found.shared[9].sums.single[0].tolist()
@@ -87,7 +88,7 @@ def test_a_window_depends_on_the_choices_before_it(engine25):
 
 
 def test_the_table_says_what_the_next_one_costs(engine25):
-    found = search(engine25, three_robot_loop(engine25.network), WEIGHTED)
+    found = search_windows(engine25, three_robot_loop(engine25.network), WEIGHTED)
     table = search_table(found)
     assert len(table) == 22
     assert (table["margin"] >= 0).all()
@@ -99,7 +100,7 @@ def test_the_table_says_what_the_next_one_costs(engine25):
 def test_a_dead_end_is_named(engine25):
     schedule = three_robot_loop(engine25.network)
     with pytest.raises(ProblemError, match="move 1, step 3: rob3 has no allowed grip"):
-        search(engine25, schedule, EQUATIONS, [Limit("F_largest", 9.0)])
+        search_windows(engine25, schedule, EQUATIONS, [Limit("F_largest", 9.0)])
 
 
 @pytest.mark.parametrize(
@@ -112,4 +113,4 @@ def test_a_dead_end_is_named(engine25):
 )
 def test_what_looks_further_is_refused(name, options, said):
     with pytest.raises(ProblemError, match=said):
-        require_search(formulation(name), options)
+        require_search(find_formulation(name), options)

@@ -11,16 +11,18 @@ from hypothesis import assume, given, reject
 from hypothesis import strategies as st
 
 from experiments.blocks import Blocks, Contact, ring, stack, touching
-from formulations.equilibrium import compile_equilibrium
-from seqopt.assembly import DRY, EPOXY, Assembly, Mortar
-from seqopt.contact import step_assembly
-from seqopt.equilibrium import CAP, EXACT, Answer, Case, Claim, Sense, bound, violation
+from formulations.limit_analysis import compile_equilibrium
+from seqopt.contact.assembly import Assembly
+from seqopt.contact.faces import step_assembly
+from seqopt.contact.mortar import DRY, EPOXY, Mortar
 from seqopt.errors import SceneError
-from seqopt.methods import METHODS
-from seqopt.network import GROUND, network
-from seqopt.proof import Prover, proven_value
-from seqopt.stability import Verdict, bonded, certify, sideways
-from seqopt.steps import Step, StepKind
+from seqopt.network.build import build_network
+from seqopt.network.network import GROUND
+from seqopt.sequence.steps import Step, StepKind
+from seqopt.sequence.two_robots import METHODS
+from seqopt.stability.assessment import Verdict, assess, bonded, sideways
+from seqopt.stability.limit_analysis import CAP, EXACT, Answer, Case, Claim, Sense, bound, violation
+from seqopt.stability.prover import Prover, proven_value
 from tests.scenes import arches, moved
 
 ROUGH = Mortar(friction=5.0)
@@ -62,15 +64,15 @@ def held(assembly, payload, *points):
 
 @pytest.mark.parametrize("degrees", [5.0, 20.0, 35.0])
 def test_a_block_slides_at_the_friction_angle(degrees):
-    result = certify(inclined(radians(degrees)), DRY)
+    result = assess(inclined(radians(degrees)), DRY)
     assert result.verdict is (Verdict.STANDS if degrees < 25 else Verdict.FALLS)
     assert result.friction == pytest.approx(tan(radians(degrees)), abs=2e-4)
 
 
 def test_a_cube_tips_or_slides_sideways():
     cube = stack([]).assembly(2000.0)
-    assert certify(cube, DRY).tilt == pytest.approx(radians(25.0), abs=1e-5)
-    assert certify(cube, ROUGH).tilt == pytest.approx(atan(1.0), abs=1e-5)
+    assert assess(cube, DRY).tilt == pytest.approx(radians(25.0), abs=1e-5)
+    assert assess(cube, ROUGH).tilt == pytest.approx(atan(1.0), abs=1e-5)
 
 
 @pytest.mark.parametrize("blocks", [2, 3, 6])
@@ -79,7 +81,7 @@ def test_the_leaning_stack_is_harmonic(blocks):
     limit = [0.5 / i for i in range(blocks - 1, 0, -1)]
     for factor, verdict in ((0.999, Verdict.STANDS), (1.001, Verdict.FALLS)):
         leaning = stack([factor * x for x in limit]).assembly(1800.0)
-        assert certify(leaning, DRY).verdict is verdict
+        assert assess(leaning, DRY).verdict is verdict
 
 
 def test_the_overhanging_block_needs_a_bond_and_goes_first():
@@ -88,20 +90,20 @@ def test_the_overhanging_block_needs_a_bond_and_goes_first():
     leaning = stack([0.5 + excess]).assembly(2000.0)
     face = 0.5 - excess
     weight = 2000.0 * 9.81
-    result = certify(leaning, DRY)
+    result = assess(leaning, DRY)
     assert result.bond == pytest.approx(weight * excess / (face * face / 2), rel=1e-4)
     assert (result.first_block, result.first_contact) == ("2", "1-2")
     assert np.isnan(result.tilt)
     strong = replace(DRY, tensile_strength=1.01 * result.bond, cohesion=2 * result.bond)
-    assert certify(leaning, strong).verdict is Verdict.STANDS
+    assert assess(leaning, strong).verdict is Verdict.STANDS
     weak = replace(DRY, tensile_strength=0.99 * result.bond, cohesion=2 * result.bond)
-    assert certify(leaning, weak).verdict is Verdict.FALLS
+    assert assess(leaning, weak).verdict is Verdict.FALLS
 
 
 def test_least_thickness_of_a_semicircular_arch():
     """t/R = 0.1075 (Milankovitch 1907; Heyman 1969), and sliding needs friction below 0.4."""
     for ratio, verdict in ((0.107, Verdict.FALLS), (0.108, Verdict.STANDS)):
-        result = certify(ring(60, 5.0, 5.0 * ratio).assembly(2400.0), Mortar(friction=0.7))
+        result = assess(ring(60, 5.0, 5.0 * ratio).assembly(2400.0), Mortar(friction=0.7))
         assert result.verdict is verdict
     assert 0.38 < result.friction < 0.40
 
@@ -114,7 +116,7 @@ def test_three_hinges(half_span, height):
     """
     bars = ladder(half_span, height)
     slope = half_span / height
-    result = certify(bars, Mortar(friction=2.0))
+    result = assess(bars, Mortar(friction=2.0))
     assert result.friction == pytest.approx(slope / 2, abs=2e-4)
     windward = (2.0 + slope / 2) / (1 + 1 / slope)
     leeward = (2.0 - slope / 2) / (1 - 1 / slope) if slope > 1 else np.inf
@@ -130,11 +132,11 @@ def test_a_robot_carries_what_the_lever_says():
     weight = 2000.0 * 9.81
     hand = held(leaning, 0.3 * weight, (1.6, 0.5, 1.5))
     lever = 1.6 - 1.0  # from the edge of the block below
-    result = certify(hand, ROUGH)
+    result = assess(hand, ROUGH)
     assert result.verdict is Verdict.STANDS
     least = weight * 0.1 / sqrt(lever**2 + 0.5**2)  # at right angles to the lever
     assert result.grip == pytest.approx(least, rel=1e-3)
-    assert certify(held(leaning, 0.99 * least, (1.6, 0.5, 1.5)), ROUGH).verdict is Verdict.FALLS
+    assert assess(held(leaning, 0.99 * least, (1.6, 0.5, 1.5)), ROUGH).verdict is Verdict.FALLS
 
 
 def test_a_block_that_only_a_robot_holds():
@@ -152,13 +154,13 @@ def test_a_block_that_only_a_robot_holds():
         grip_position=np.array([[0.0, 0.0, 0.5]]),
         payload=np.array([10.1]),
     )
-    assert certify(alone, EPOXY).verdict is Verdict.STANDS
-    assert certify(alone, EPOXY).grip == pytest.approx(10.0, rel=1e-4)
-    beside = certify(held(alone, 100.0, (0.2, 0.0, 0.0)), EPOXY)
+    assert assess(alone, EPOXY).verdict is Verdict.STANDS
+    assert assess(alone, EPOXY).grip == pytest.approx(10.0, rel=1e-4)
+    beside = assess(held(alone, 100.0, (0.2, 0.0, 0.0)), EPOXY)
     assert beside.verdict is Verdict.FALLS
     assert beside.bond == beside.friction == beside.grip == np.inf
     assert beside.first_block == "1"
-    weak = certify(held(alone, 9.9, (0.0, 0.0, 0.5)), EPOXY)
+    weak = assess(held(alone, 9.9, (0.0, 0.0, 0.5)), EPOXY)
     assert weak.verdict is Verdict.FALLS
     assert weak.grip == pytest.approx(10.0, rel=1e-4)
 
@@ -184,7 +186,7 @@ def test_units_change_no_verdict(length, force, offset, blocks):
         corner=plain.corner * size,
         weight=plain.weight * pull,
     )
-    a, b = certify(plain, DRY), certify(scaled, DRY)
+    a, b = assess(plain, DRY), assess(scaled, DRY)
     assert a.verdict is b.verdict is not Verdict.UNDECIDED
     assert b.bond * size**2 / pull == pytest.approx(a.bond, rel=1e-3, abs=1e-2)
     assert b.friction == pytest.approx(a.friction, abs=2e-4)
@@ -200,7 +202,7 @@ def test_density_does_not_flip_an_arch(density, half_angle, verdict):
     """25 blocks, thickness 1 on span 10."""
     radius = 5.0 / sin(radians(min(half_angle, 90.0)))
     arch = ring(25, radius, 1.0, radians(half_angle)).assembly(density)
-    assert certify(arch, Mortar(friction=0.7)).verdict is verdict
+    assert assess(arch, Mortar(friction=0.7)).verdict is verdict
 
 
 @given(arches(), st.integers(0, 1))
@@ -210,10 +212,12 @@ def test_where_the_scene_stands_changes_nothing(scene, grips):
     last = scene.placed[-1].nodes[1]
     step = Step(1, StepKind.PLACE, len(scene.bricks), (last if grips else None, None, None))
     try:
-        here = step_assembly(network(scene), step)
+        here = step_assembly(build_network(scene), step.bricks, step.grips)
     except SceneError:  # rolled so far that faces miss each other
         reject()
-    there = step_assembly(network(moved(scene, lambda p: turn @ p + [3.0, -2.0, 1.0])), step)
+    there = step_assembly(
+        build_network(moved(scene, lambda p: turn @ p + [3.0, -2.0, 1.0])), step.bricks, step.grips
+    )
     a, b = (Prover(x, compile_equilibrium)(bonded(x, DRY)).value for x in (here, there))
     assert a == pytest.approx(b, rel=2e-3, abs=1e-5)
 
@@ -221,10 +225,10 @@ def test_where_the_scene_stands_changes_nothing(scene, grips):
 @given(st.lists(st.floats(-0.6, 0.6), min_size=1, max_size=4), st.floats(0.1, 1.0))
 def test_more_friction_bond_or_payload_never_hurts(offsets, friction):
     leaning = stack([x or 0.1 for x in offsets]).assembly(2000.0)
-    low, high = (certify(leaning, Mortar(friction=f)) for f in (friction, friction + 0.3))
+    low, high = (assess(leaning, Mortar(friction=f)) for f in (friction, friction + 0.3))
     assert high.bond <= low.bond * (1 + 1e-3) + 1e-2
     end = leaning.corner[-1] + [0.0, 0.0, 1.0]
-    a, b = (certify(held(leaning, p, end), DRY).bond for p in (1e2, 1e4))
+    a, b = (assess(held(leaning, p, end), DRY).bond for p in (1e2, 1e4))
     assert b <= a * (1 + 1e-3) + 1e-2
 
 
@@ -319,7 +323,7 @@ LIES = {
 def test_a_lie_is_not_believed(lie, falls):
     """It may leave the verdict open; it never turns it."""
     leaning = stack([0.7 if falls else 0.2]).assembly(2000.0)
-    result = certify(leaning, DRY, compiled=liar(LIES[lie]))
+    result = assess(leaning, DRY, compiled=liar(LIES[lie]))
     truth = Verdict.FALLS if falls else Verdict.STANDS
     assert result.verdict in (Verdict.UNDECIDED, truth)
     if falls:
@@ -330,13 +334,13 @@ def test_a_lie_is_not_believed(lie, falls):
 
 def test_the_truth_is_believed():
     leaning = stack([0.7]).assembly(2000.0)
-    assert certify(leaning, DRY, compiled=liar(lambda a, _: a)).verdict is Verdict.FALLS
+    assert assess(leaning, DRY, compiled=liar(lambda a, _: a)).verdict is Verdict.FALLS
 
 
 def test_almost_solved_is_counted_and_put_to_the_proof():
     leaning = stack([0.7]).assembly(2000.0)
     almost = liar(lambda a, _: replace(a, claim=Claim.ALMOST))
-    result = certify(leaning, DRY, compiled=almost)
+    result = assess(leaning, DRY, compiled=almost)
     assert result.verdict is Verdict.FALLS
     assert set(result.claims) == {Claim.ALMOST}
 
@@ -344,7 +348,7 @@ def test_almost_solved_is_counted_and_put_to_the_proof():
 def test_a_time_limit_is_a_stall(monkeypatch):
     """The solver itself reaches its limit; that is counted, and no verdict."""
     monkeypatch.setattr("formulations.solvers.SECONDS", 1e-9)
-    result = certify(ring(20, 5.0, 0.6).assembly(2000.0), DRY)
+    result = assess(ring(20, 5.0, 0.6).assembly(2000.0), DRY)
     assert result.verdict is Verdict.UNDECIDED
     assert (
         result.claims[Claim.STALLED] == sum(result.claims.values()) == 2 * result.unproven
@@ -368,8 +372,9 @@ def test_proofs_are_the_assemblys_own():
 
 def test_bricks_touch_where_their_faces_overlap(arch25):
     """The study's joints are 116 × 53 mm; tilted bricks meet a little off."""
-    net = network(arch25)
-    whole = step_assembly(net, METHODS["sequential"](net)[-1])
+    net = build_network(arch25)
+    last = METHODS["sequential"](net)[-1]
+    whole = step_assembly(net, last.bricks, last.grips)
     assert len(whole.area) == 26
     assert np.median(whole.area) == pytest.approx(0.116 * 0.053, rel=0.02)
     assert whole.area.min() > 0.75 * 0.116 * 0.053  # at the crown, where brick 13 turns out of line
@@ -386,17 +391,17 @@ def test_a_joint_beside_its_bricks_is_named(arch25):
     )
     wrong = replace(arch25, joints=(*joints, *arch25.joints[4:]))
     with pytest.raises(SceneError, match="joint 4-5: the faces of its bricks do not overlap"):
-        step_assembly(network(wrong), Step(1, StepKind.PLACE, 6, (None, None, None)))
+        step_assembly(build_network(wrong), 6, (None, None, None))
 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_every_published_step_is_decided(arch25, method):
     """Every seventh here; all of them in the experiment."""
-    net = network(arch25)
+    net = build_network(arch25)
     for step in METHODS[method](net)[::7]:
-        assembly = step_assembly(net, step)
-        assert certify(assembly, EPOXY).verdict is Verdict.STANDS
-        assert certify(assembly, DRY).verdict is not Verdict.UNDECIDED
+        assembly = step_assembly(net, step.bricks, step.grips)
+        assert assess(assembly, EPOXY).verdict is Verdict.STANDS
+        assert assess(assembly, DRY).verdict is not Verdict.UNDECIDED
 
 
 def test_sideways_pulls_are_at_right_angles_to_gravity():

@@ -7,17 +7,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from seqopt.assembly import DRY
-from seqopt.compliance import ComplianceEngine
-from seqopt.contact import step_assembly
-from seqopt.criteria import CLOSEST, EQUATIONS
-from seqopt.loops import three_robot_loop
-from seqopt.methods import cantilever
-from seqopt.network import network
-from seqopt.problem import pose
-from seqopt.reach import Side
-from seqopt.selection import formulation, run
-from seqopt.stability import certify
+from seqopt.contact.faces import step_assembly
+from seqopt.contact.mortar import DRY
+from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.network.build import build_network
+from seqopt.placement.formulation import find_formulation
+from seqopt.placement.plan import run
+from seqopt.placement.problem import pose
+from seqopt.scene.reach import Side
+from seqopt.sequence.three_robots import three_robot_loop
+from seqopt.sequence.two_robots import cantilever
+from seqopt.stability.assessment import assess
+from seqopt.study.presets import CLOSEST, EQUATIONS
 
 
 def times(vector, factor):
@@ -67,8 +68,10 @@ SCALES += [(1e3, 1e-3, 1e3), (1e-3, 1e3, 1e-3)]
 
 
 def solved(scene, criterion):
-    problem = pose(ComplianceEngine(network(scene)), three_robot_loop(network(scene)), criterion)
-    selection, certificate = run(problem, formulation("overlap_dp"))
+    problem = pose(
+        ComplianceEngine(build_network(scene)), three_robot_loop(build_network(scene)), criterion
+    )
+    selection, certificate = run(problem, find_formulation("overlap_dp"))
     return problem, problem.nodes(selection.choice), certificate
 
 
@@ -93,9 +96,9 @@ def test_ranks_and_choices_do_not_know_units(arch25, criterion, scales):
 @pytest.mark.parametrize("scales", SCALES)
 def test_verdicts_do_not_know_units(arch25, scales):
     length, force, softness = scales
-    net, other = network(arch25), network(rescaled(arch25, length, force, softness))
+    net, other = build_network(arch25), build_network(rescaled(arch25, length, force, softness))
     for step in cantilever(net)[26:31]:
-        a, b = (certify(step_assembly(n, step), DRY) for n in (net, other))
+        a, b = (assess(step_assembly(n, step.bricks, step.grips), DRY) for n in (net, other))
         assert a.verdict is b.verdict
         assert b.bond == pytest.approx(a.bond * force / length**2, rel=1e-3)
         assert b.friction == pytest.approx(a.friction, abs=2e-4)

@@ -9,13 +9,13 @@ import pandas as pd
 import pytest
 
 from experiments.yardstick import errors, percentiles, tension_share
-from seqopt.arch import ArchShape, arch_scene
-from seqopt.compare import compare
-from seqopt.compliance import ComplianceEngine
-from seqopt.methods import METHODS
-from seqopt.network import network
-from seqopt.paper import printed, printed_steps
-from seqopt.responses import analyze
+from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.network.build import build_network
+from seqopt.report.comparison import compare_methods
+from seqopt.responses.table import analyze
+from seqopt.scene.arch import ArchShape, arch_scene
+from seqopt.sequence.two_robots import METHODS
+from seqopt.study.tables import printed, printed_steps
 
 TABLES = {"sequential": "Table A.1", "cantilever": "Table A.2"}
 
@@ -80,7 +80,7 @@ def test_improvement_table(engine25):
     The plan's printed D_max is that of step 88; ours at step 86 is larger: see the page on the
     agreement with the study.
     """
-    result = compare(engine25)
+    result = compare_methods(engine25)
     assert result.printed is not None
     gap = (result.maxima / result.printed - 1).abs()
     assert np.nanmax(gap[["sequential", "cantilever"]].to_numpy()) <= 0.03
@@ -113,7 +113,7 @@ def test_cantilever_closed_form(count):
     last brick at x = (n - 1/4) L sinks by the sum of shear / k and moment (x - j L) / k_r.
     """
     scene = horizontal(count)
-    engine = ComplianceEngine(network(scene))
+    engine = ComplianceEngine(build_network(scene))
     fields = engine.solve(count, np.zeros((1, 0), dtype=int))
     length, weight = scene.bricks[0].dimensions[0], scene.bricks[0].mass * 9.81
     beyond = count - np.arange(count)
@@ -131,7 +131,7 @@ def test_propped_cantilever_closed_form():
     """A level cantilever propped at one node: reaction = free displacement / flexibility there."""
     count = 6
     scene = horizontal(count)
-    engine = ComplianceEngine(network(scene))
+    engine = ComplianceEngine(build_network(scene))
     length, weight = scene.bricks[0].dimensions[0], scene.bricks[0].mass * 9.81
     joints = np.arange(count) * length
     arm = (count - 0.25) * length - joints
@@ -146,7 +146,7 @@ def test_a_brick_hanging_from_its_upper_half():
     """A.1 step 1: half the weight hangs below the grip, W/2 cos(lean) along the inner edge."""
     lean = np.radians(11.4)
     scene = arch_scene(ArchShape(pitch=[np.pi / 2 - lean], closed=False))
-    fields = ComplianceEngine(network(scene)).solve(1, [[1]])
+    fields = ComplianceEngine(build_network(scene)).solve(1, [[1]])
     half = scene.bricks[0].mass * 9.81 / 2
     assert half == pytest.approx(17.95, abs=0.01)
     joint = np.abs(fields.support[0, :3]).max()
@@ -169,7 +169,7 @@ def test_robots_carry_a_level_beam_by_symmetry():
     last = scene.grounds[0]
     far = (count * 0.246, 0.0, 0.0)
     other = replace(last, brick=count, position=far, anchor=(far[0] + 0.05, 0.0, 0.0))
-    net = network(replace(scene, grounds=(last, other)))
+    net = build_network(replace(scene, grounds=(last, other)))
     fields = ComplianceEngine(net).solve(count, np.zeros((1, 0), dtype=int))
     weight = count * scene.bricks[0].mass * 9.81
     assert fields.support[0, 2] == pytest.approx(weight / 2, rel=1e-9)

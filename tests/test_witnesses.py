@@ -22,8 +22,8 @@ from experiments.witnesses import (
     row_of,
     sample_trials,
 )
-from seqopt.network import GROUND
-from seqopt.stability import Verdict
+from seqopt.network.network import GROUND
+from seqopt.stability.assessment import Verdict
 from tests.test_experiments import run
 
 

@@ -1,0 +1,280 @@
+"""The words of the command line: what they may be, and their values."""
+
+from __future__ import annotations
+
+import argparse
+import inspect
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import NoReturn
+
+from seqopt.contact.mortar import MORTARS, Mortar
+from seqopt.engines.registry import ENGINES
+from seqopt.errors import ProblemError
+from seqopt.placement.criteria import Criterion, RankSum
+from seqopt.placement.formulation import Formulation, formulations
+from seqopt.placement.problem import Limit, payload_limits
+from seqopt.responses.choices import SCALARS
+from seqopt.scene.scene import Scene
+from seqopt.scene.scene_file import builtin_scenes
+from seqopt.sequence.three_robots import SCHEDULES
+from seqopt.sequence.two_robots import METHODS
+from seqopt.study.presets import CRITERIA, EQUATIONS
+
+PLANNED = "three-robot"
+USAGE = 2  # exit status where the user must act
+RESPONSES = (*SCALARS, "F_each")
+
+
+def parse_criterion(text: str) -> Criterion:
+    """Return a criterion by name, or a rank sum of named responses with weights."""
+    if text in CRITERIA:
+        return CRITERIA[text]
+    terms = []
+    for part in text.split(","):
+        name, _, weight = part.partition("=")
+        terms.append((_response(name, "--criteria"), _number(weight or "1", f"--criteria {part}")))
+    return RankSum(text, tuple(terms), tuple(terms))
+
+
+def parse_limits(texts: Sequence[str], scene: Scene) -> tuple[Limit, ...]:
+    """Return limits from words ``payload`` or ``RESPONSE=VALUE``."""
+    out: list[Limit] = []
+    for text in texts:
+        name, _, value = text.partition("=")
+        if text == "payload":
+            out += payload_limits(scene)
+        else:
+            out.append(Limit(_response(name, "--limit"), _number(value, f"--limit {text}")))
+    return tuple(out)
+
+
+def parse_options(which: Formulation, texts: Sequence[str]) -> dict[str, int | str]:
+    """Return the options of a formulation from ``NAME=VALUE`` words."""
+    known = {
+        name: type(parameter.default)
+        for name, parameter in inspect.signature(which.solve).parameters.items()
+        if parameter.kind is inspect.Parameter.KEYWORD_ONLY
+    }
+    out: dict[str, int | str] = {}
+    for text in texts:
+        name, _, value = text.partition("=")
+        if name not in known:
+            raise ProblemError(
+                f"--option {text}: {which.name} has {', '.join(known) or 'no options'}"
+            )
+        try:
+            out[name] = known[name](value)
+        except ValueError as error:
+            kind = known[name].__name__
+            raise ProblemError(f"--option {text}: {name} is {value!r}; give an {kind}") from error
+    return out
+
+
+def parse_mortar(options: argparse.Namespace) -> Mortar:
+    """Return the named mortar with the numbers that are given in place of its own."""
+    base = MORTARS[options.mortar]
+    given = {
+        name: _number(text, f"--{name.replace('_', '-')}", zero="allowed")
+        for name in ("friction", "tensile_strength", "cohesion")
+        if (text := getattr(options, name)) is not None
+    }
+    return replace(base, **given)
+
+
+def _response(name: str, where: str) -> str:
+    if name not in RESPONSES and not name.startswith("F_"):
+        known = ", ".join((*CRITERIA, *RESPONSES, "F_ROBOT"))
+        raise ProblemError(f"{where} {name}: there is no such; give {known}")
+    return name
+
+
+def _number(text: str, where: str, zero: str = "") -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = -1.0
+    if not 0 < value < float("inf") and not (zero and value == 0):
+        raise ProblemError(
+            f"{where}: {text!r} is not a positive number" + (" or zero" if zero else "")
+        )
+    return value
+
+
+class _Parser(argparse.ArgumentParser):
+    """A parser whose errors are one line."""
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(USAGE, f"{self.prog}: error: {message} (see {self.prog} --help)\n")
+
+
+def parser() -> argparse.ArgumentParser:
+    """Return the parser of the command line; ``command`` names what is to be run."""
+    whole = _Parser(
+        prog="seqopt",
+        description="Where should each robot hold a half-built structure, over the whole build?",
+    )
+    commands = whole.add_subparsers(required=True, metavar="COMMAND", dest="command")
+    scene, engine = _shared_arguments()
+    command = commands.add_parser(
+        "compare",
+        parents=[scene, engine],
+        help="all methods side by side",
+        description="Analyze every method on a scene; show the largest responses side by side, for "
+        "the reference arch beside those the study printed, and name what does not add up.",
+    )
+    _criterion_argument(command)
+    command.add_argument("--out", type=Path, metavar="DIR", help="write tables and figures there")
+    command = commands.add_parser(
+        "analyze",
+        parents=[scene, engine],
+        help="responses of every step of one method",
+        description="Analyze every step of a method and write a table with the columns of Table "
+        "A.1 of the study: forces in N, moments in N m, displacements in 1e-3 mm.",
+        epilog="example: seqopt analyze arch25 --method cantilever --out cantilever.csv",
+    )
+    _analyze_arguments(command)
+    command = commands.add_parser(
+        "optimize",
+        parents=[scene, engine],
+        help="choose every open grip of a build",
+        description="Choose where robots hold, over all steps of a method, by one formulation; "
+        "check the answer from the problem's own data, and write plan, selection, responses and "
+        "summary.",
+        epilog="example: seqopt optimize arch25 --formulation overlap_dp --out best",
+    )
+    _optimize_arguments(command)
+    _add_certify(commands, scene)
+    command = commands.add_parser(
+        "scene",
+        parents=[scene],
+        help="check, describe and export a scene",
+        description="Check a scene, say what is in it, and write it as JSON if asked.",
+    )
+    command.add_argument("--export", type=Path, metavar="FILE", help="JSON file to write")
+    return whole
+
+
+def _shared_arguments() -> tuple[_Parser, _Parser]:
+    """Return parsers of the arguments that commands share: the scene, the engine."""
+    scene = _Parser(add_help=False)
+    scene.add_argument(
+        "scene",
+        nargs="?",
+        default="arch25",
+        metavar="SCENE",
+        help=f"a built-in scene ({', '.join(builtin_scenes())}) or a JSON file; arch25 by default",
+    )
+    engine = _Parser(add_help=False)
+    engine.add_argument(
+        "--engine",
+        choices=tuple(ENGINES),
+        default="compliance",
+        help="compliance: exactly rigid bricks, fast (default); frame: stiff bars, the slow check; "
+        "planar: three unknowns per brick where all lies in a plane; discrete: joints that "
+        "part and slip; auto: the cheapest of planar, compliance and discrete that is enough",
+    )
+    engine.add_argument(
+        "--mortar",
+        choices=tuple(MORTARS),
+        help="what holds the joints of the engines auto and discrete: the study's epoxy or nothing "
+        "(default: epoxy)",
+    )
+    return scene, engine
+
+
+def _analyze_arguments(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "--method", choices=(*METHODS, PLANNED), required=True, help="how the build goes"
+    )
+    command.add_argument(
+        "--plan", type=Path, metavar="FILE", help=f"CSV of the steps, with --method {PLANNED}"
+    )
+    command.add_argument(
+        "--out", type=Path, metavar="FILE", help="CSV to write; standard output if not given"
+    )
+    command.add_argument(
+        "--fields",
+        type=Path,
+        metavar="FILE",
+        help="NumPy archive (.npz) to write: every edge force, node displacement and reaction",
+    )
+
+
+def _add_certify(commands: argparse._SubParsersAction[_Parser], scene: _Parser) -> None:
+    command = commands.add_parser(
+        "certify",
+        parents=[scene],
+        help="does every step stand, and with what margins",
+        description="Certify every step of a build as rigid blocks that touch: does it stand, the "
+        "least bond and friction with which it does, the tilt it survives, the force robots must "
+        "have, and what goes first. A verdict is proven by forces or by a motion.",
+        epilog="example: seqopt certify arch25 --method cantilever --mortar dry --out dry.csv",
+    )
+    steps = command.add_mutually_exclusive_group(required=True)
+    steps.add_argument("--method", choices=(*METHODS, PLANNED), help="how the build goes")
+    steps.add_argument("--plan", type=Path, metavar="FILE", help="CSV of the steps")
+    command.add_argument(
+        "--mortar",
+        choices=tuple(MORTARS),
+        default="epoxy",
+        help="what is in the joints: the study's epoxy (25°, 3 MPa, 2 MPa) or nothing "
+        "(default: %(default)s)",
+    )
+    for name, metavar, text in (
+        ("--friction", "NUMBER", "coefficient of friction"),
+        ("--tensile-strength", "PA", "tensile strength"),
+        ("--cohesion", "PA", "cohesion"),
+    ):
+        command.add_argument(name, metavar=metavar, help=f"{text}, in place of the mortar's own")
+    command.add_argument(
+        "--out", type=Path, metavar="FILE", help="CSV to write; standard output if not given"
+    )
+
+
+def _criterion_argument(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "--criteria",
+        default=EQUATIONS.name,
+        metavar="NAME",
+        help=f"what a state costs: {', '.join(CRITERIA)}, or responses to rank with weights, as "
+        "T_max,M_sup=2,F_move; the study's equations by default",
+    )
+
+
+def _optimize_arguments(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "--formulation",
+        required=True,
+        metavar="NAME",
+        help=f"one of {', '.join(f.name for f in formulations().values())}",
+    )
+    command.add_argument(
+        "--method",
+        choices=tuple(SCHEDULES),
+        default=PLANNED,
+        help="which build has the open grips (default: %(default)s)",
+    )
+    _criterion_argument(command)
+    command.add_argument(
+        "--limit",
+        action="append",
+        default=[],
+        metavar="LIMIT",
+        help="no open step may exceed it: payload, or as F_largest=300 (SI units); may be repeated",
+    )
+    command.add_argument(
+        "--option",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        help="option of the formulation, as horizon=2 or width=10; may be repeated",
+    )
+    command.add_argument(
+        "--no-proof",
+        action="store_true",
+        help="with cascade or rank_search: solve only the models that the search meets, a fifth "
+        "or so; how far the choice is from the optimum stays unknown",
+    )
+    command.add_argument("--out", type=Path, metavar="DIR", required=True, help="folder to write")

@@ -1,0 +1,184 @@
+"""Rigid blocks that touch: what equilibrium with contact needs to know, and no more."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy import sparse
+
+from seqopt.arrays import Floats, Ints, Vector, skew
+from seqopt.errors import SceneError
+from seqopt.network.network import GROUND
+
+
+@dataclass(frozen=True, kw_only=True)
+class Assembly:
+    """Rigid blocks, the faces where they touch, and the grips that hold them.
+
+    Parameters
+    ----------
+    block_name : tuple of int
+    centroid, weight : (B, 3) float
+        m, N.
+    contact_name : tuple of str
+    bodies : (C, 2) int
+        The two blocks of a contact; the ground is -1 and comes first.
+    normal : (C, 3) float
+        Unit vectors from the first body into the second.
+    corner : (K, 3) float
+        Corners of all contact faces, each face once around, m.
+    contact : (K,) int
+        The contact of every corner.
+    grip_block : (G,) int
+    grip_position : (G, 3) float
+        m.
+    payload : (G,) float
+        Largest force that each grip can exert, in any direction, N.
+
+    Raises
+    ------
+    SceneError
+        If a number is not finite, an index is out of range or a face has no area.
+    """
+
+    block_name: tuple[int, ...]
+    centroid: Floats
+    weight: Floats
+    contact_name: tuple[str, ...]
+    bodies: Ints
+    normal: Floats
+    corner: Floats
+    contact: Ints
+    grip_block: Ints
+    grip_position: Floats
+    payload: Floats
+
+    def __post_init__(self) -> None:
+        for name in ("centroid", "weight", "normal", "corner", "grip_position", "payload"):
+            if not np.isfinite(getattr(self, name)).all():
+                raise SceneError(f"assembly: {name} holds a number that is not finite")
+        blocks = len(self.centroid)
+        if not blocks:
+            raise SceneError("assembly: it has no blocks; give at least one")
+        if self.bodies.size and not (
+            (self.bodies >= GROUND).all() and (self.bodies < blocks).all()
+        ):
+            raise SceneError(f"assembly: bodies name blocks beyond 0 to {blocks - 1}")
+        if (self.bodies[:, 1] == GROUND).any():
+            raise SceneError("assembly: the ground is a contact's second body; name it first")
+        flat = np.flatnonzero(~(self.area > 0))
+        if len(flat):
+            raise SceneError(f"contact {self.contact_name[flat[0]]}: its face has no area")
+
+    @cached_property
+    def corner_area(self) -> Floats:
+        """Share of its face that each corner stands for, (K,) m².
+
+        Half of the two triangles between the face's centroid and the edges that meet in the
+        corner: one more corner on an edge or on a corner changes no sum.
+        """
+        corners = np.bincount(self.contact, minlength=len(self.bodies))
+        mean = self._sums(self.corner) / np.maximum(corners, 1)[:, None]
+        spoke, follows, triangle = self._triangles(mean)
+        middle = self._sums(triangle[:, None] * (spoke + spoke[follows]) / 3)
+        area = self._sums(triangle[:, None])
+        centroid = mean + np.divide(middle, area, out=np.zeros_like(middle), where=area > 0)
+        _, follows, triangle = self._triangles(centroid)
+        out = 0.5 * triangle
+        np.add.at(out, follows, 0.5 * triangle)
+        return np.asarray(out)
+
+    def _triangles(self, middle: Floats) -> tuple[Floats, Ints, Floats]:
+        """Return spokes from points (C, 3) to the corners, the next corners, and areas between."""
+        corners = np.bincount(self.contact, minlength=len(self.bodies))
+        after = np.cumsum(corners)
+        follows = np.arange(1, len(self.contact) + 1)
+        follows[after[corners > 0] - 1] = (after - corners)[corners > 0]
+        spoke = self.corner - middle[self.contact]
+        return spoke, follows, 0.5 * np.linalg.norm(np.cross(spoke, spoke[follows]), axis=1)
+
+    def _sums(self, values: Floats) -> Floats:
+        """Return the sums over the corners (K, m) of every contact, (C, m)."""
+        out = np.zeros((len(self.bodies), values.shape[1]))
+        np.add.at(out, self.contact, values)
+        return out
+
+    @cached_property
+    def area(self) -> Floats:
+        """Area of every contact face, (C,) m²."""
+        return self._sums(self.corner_area[:, None])[:, 0]
+
+    @cached_property
+    def axes(self) -> Floats:
+        """Normal and two tangents of every contact, (C, 3, 3), rows are unit vectors."""
+        side = np.eye(3)[np.abs(self.normal).argmin(axis=1)]
+        first = np.cross(self.normal, side)
+        first /= np.linalg.norm(first, axis=1, keepdims=True)
+        return np.stack([self.normal, first, np.cross(self.normal, first)], axis=1)
+
+    @cached_property
+    def scales(self) -> tuple[float, float]:
+        """A force (N) and a length (m) of the assembly: its heaviest block, its longest lever.
+
+        Everything is compared in these, so that units and scale change no verdict.
+        """
+        force = float(np.linalg.norm(self.weight, axis=1).max())
+        levers = [np.linalg.norm(self.grip_position - self.centroid[self.grip_block], axis=1)]
+        for body in self.bodies[self.contact].T:
+            real = body != GROUND
+            levers.append(np.linalg.norm(self.corner[real] - self.centroid[body[real]], axis=1))
+        length = float(np.concatenate(levers).max(initial=0.0))
+        return force or 1.0, length or 1.0
+
+    @property
+    def stress_scale(self) -> float:
+        """The heaviest block's weight over the mean contact area, Pa."""
+        area = float(self.area.mean()) if len(self.area) else self.scales[1] ** 2
+        return self.scales[0] / area
+
+    @cached_property
+    def contact_map(self) -> sparse.csr_array:
+        """Wrenches on the blocks from corner forces, (6B, 3K).
+
+        A corner force acts on the contact's second body and is given by its normal part
+        (compression positive) and its two tangential parts. Wrenches are taken about the
+        centroids, moments divided by the length scale.
+        """
+        axes = self.axes[self.contact]
+        bodies = self.bodies[self.contact]
+        parts = [
+            self._wrenches(bodies[:, i], self.corner, sign * axes)
+            for i, sign in ((0, -1.0), (1, 1.0))
+        ]
+        return sparse.csr_array(parts[0] + parts[1])
+
+    @cached_property
+    def grip_map(self) -> sparse.csr_array:
+        """Wrenches on the blocks from grip forces, (6B, 3G); as `contact_map`."""
+        axes = np.broadcast_to(np.eye(3), (len(self.payload), 3, 3))
+        return self._wrenches(self.grip_block, self.grip_position, axes)
+
+    def _wrenches(self, block: Ints, point: Floats, axes: Floats) -> sparse.csr_array:
+        """Return the wrenches (6B, 3M) of unit forces along the rows of axes (M, 3, 3)."""
+        real = np.flatnonzero(block != GROUND)
+        arm = (point[real] - self.centroid[block[real]]) / self.scales[1]
+        force = axes[real].transpose(0, 2, 1)
+        values = np.concatenate([force, skew(arm) @ force], axis=1)
+        rows = np.broadcast_to(6 * block[real, None, None] + np.arange(6)[:, None], values.shape)
+        columns = np.broadcast_to(3 * real[:, None, None] + np.arange(3), values.shape)
+        entries = (values.ravel(), (rows.ravel(), columns.ravel()))
+        return sparse.csr_array(entries, shape=(6 * len(self.centroid), 3 * len(block)))
+
+    def load(self, direction: Vector | None = None) -> Floats:
+        """Return the weights as wrenches (6B,) over the force scale.
+
+        With a direction, every block is pulled that way as hard as it weighs.
+        """
+        pull = self.weight
+        if direction is not None:
+            pull = np.linalg.norm(self.weight, axis=1, keepdims=True) * np.array(direction)
+        out = np.zeros((len(self.centroid), 6))
+        out[:, :3] = pull / self.scales[0]
+        return out.ravel()

@@ -1,0 +1,90 @@
+"""Elastic limits: whether what joints carry stays below what their mortar holds.
+
+Stress over a face is what the wrench of its joint spreads linearly: force over area, moment over
+second moment. It is largest at the corners, so the corners are asked, tension against the tensile
+strength and shear against cohesion and friction.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from seqopt.arrays import Floats
+from seqopt.contact.assembly import Assembly
+from seqopt.contact.faces import bare_assembly
+from seqopt.contact.mortar import Mortar
+from seqopt.contact.quadrature import (
+    face_quadrature,
+    first_points,
+    opening_maps,
+    quadrature_stiffness,
+)
+from seqopt.network.network import Network
+
+MARGIN = 1e-6  # stress above a limit that counts as none, over the stress scale
+
+
+@dataclass(frozen=True)
+class ElasticLimits:
+    """The faces of a whole structure and what their mortar holds; joints in the network's order.
+
+    Attributes
+    ----------
+    assembly : Assembly
+    mortar : Mortar
+    stress : (K, 3, 6) float
+        Compression and shear at the corners for unit wrenches of their joints, Pa/N, Pa/(N m).
+    """
+
+    assembly: Assembly
+    mortar: Mortar
+    stress: Floats
+
+    def excess(self, wrench: Floats) -> Floats:
+        """Return by how much wrenches (S, J, 6) exceed the limits of the joints, (S, J), Pa.
+
+        Wrenches are those of `seqopt.engines.interface.Fields.joint_wrench`; negative is within.
+        """
+        face, mortar = self.assembly.contact, self.mortar
+        stress = np.einsum("kij,skj->ski", self.stress, wrench[:, face])
+        shear = np.linalg.norm(stress[..., 1:], axis=2)
+        beyond = np.maximum(
+            -stress[..., 0] - mortar.tensile_strength,
+            shear - mortar.cohesion - mortar.friction * stress[..., 0],
+        )
+        most = np.maximum.reduceat(beyond, first_points(face, wrench.shape[1]), axis=1)
+        return np.asarray(np.where(np.any(wrench, axis=2), most, -np.inf))
+
+    def exceeded(self, wrench: Floats) -> np.ndarray:
+        """Return which sets (S,) leave the elastic limits anywhere, beyond rounding."""
+        margin = MARGIN * self.assembly.stress_scale
+        if self._bound(wrench) <= margin:  # as a rule, and a tenth of the work
+            return np.zeros(len(wrench), dtype=bool)
+        return np.asarray(self.excess(wrench).max(axis=1, initial=-np.inf) > margin)
+
+    def _bound(self, wrench: Floats) -> float:
+        """Return what no wrench (S, J, 6) exceeds its limits by, Pa, from the largest of each."""
+        largest = np.abs(wrench).max(axis=0, initial=0.0)[self.assembly.contact]
+        stress = (np.abs(self.stress) @ largest[:, :, None])[:, :, 0]
+        shear = np.linalg.norm(stress[:, 1:], axis=1) + self.mortar.friction * stress[:, 0]
+        tension = stress[:, 0] - self.mortar.tensile_strength
+        return float(np.maximum(tension, shear - self.mortar.cohesion).max())
+
+
+def find_elastic_limits(network: Network, mortar: Mortar) -> ElasticLimits:
+    """Return the elastic limits of a structure's joints.
+
+    Raises
+    ------
+    SceneError
+        If the faces of a joint do not overlap.
+    """
+    assembly = bare_assembly(network, len(network.inner))
+    where = network.springs.position
+    bed = face_quadrature(assembly)
+    maps = opening_maps(assembly, bed.point, bed.face, where)
+    evenly = quadrature_stiffness(bed, maps, np.ones((len(where), 2)))
+    corner = opening_maps(assembly, assembly.corner, assembly.contact, where)
+    return ElasticLimits(assembly, mortar, corner @ np.linalg.inv(evenly)[assembly.contact])

@@ -1,0 +1,131 @@
+"""The faces where bricks touch, and a step of a build as an assembly of rigid blocks."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from seqopt.arrays import Floats
+from seqopt.contact.assembly import Assembly
+from seqopt.errors import SceneError
+from seqopt.network.network import GROUND, Network
+from seqopt.scene.scene import Brick
+
+SLIVER = 1e-6  # smallest overlap of two faces, as a share of the smaller one
+
+
+def step_assembly(network: Network, bricks: int, grips: Sequence[int | None]) -> Assembly:
+    """Return a partial structure with the grips that hold it.
+
+    A joint is a contact over the overlap of the two faces that look at each other, seen along the
+    joint's normal; a ground end is a contact over the whole face of its brick.
+
+    Parameters
+    ----------
+    network : Network
+    bricks : int
+        How many bricks stand, in build order.
+    grips : sequence of (int or None)
+        Node that each of the scene's robots holds.
+
+    Raises
+    ------
+    SceneError
+        If the faces of a joint do not overlap.
+    """
+    placed = network.scene.placed
+    springs = network.springs
+    acting = np.flatnonzero(springs.since <= bricks)
+    names, normals, faces = [], [], []
+    for s in acting:
+        first, second = springs.bodies[s]
+        name = "ground" if first == GROUND else str(placed[first].name)
+        names.append(f"{name}-{placed[second].name}")
+        between = [placed[b] for b in (first, second) if b != GROUND]
+        axes = _oriented(springs.axes[s], springs.position[s], between)
+        normals.append(axes[0])
+        faces.append(_overlap(axes, springs.position[s], between, names[-1]))
+    robots = network.scene.robots
+    held = [(node, r) for node, r in zip(grips, robots, strict=True) if node is not None]
+    block = {node: i for i, brick in enumerate(placed) for node in brick.nodes}
+    return Assembly(
+        block_name=tuple(brick.name for brick in placed[:bricks]),
+        centroid=np.array([brick.position for brick in placed[:bricks]]),
+        weight=network.weight[:bricks],
+        contact_name=tuple(names),
+        bodies=springs.bodies[acting].reshape(-1, 2),
+        normal=np.array(normals).reshape(-1, 3),
+        corner=np.concatenate([np.empty((0, 3)), *faces]),
+        contact=np.repeat(np.arange(len(faces)), [len(face) for face in faces]),
+        grip_block=np.array([block[node] for node, _ in held], dtype=np.int64),
+        grip_position=np.array([network.scene.node_position(n) for n, _ in held]).reshape(-1, 3),
+        payload=np.array([robot.payload for _, robot in held]),
+    )
+
+
+def bare_assembly(network: Network, bricks: int) -> Assembly:
+    """Return the first bricks held by nobody; see `step_assembly`."""
+    nobody = (None,) * len(network.scene.robots)
+    return step_assembly(network, bricks, nobody)
+
+
+def _oriented(axes: Floats, point: Floats, between: list[Brick]) -> Floats:
+    """Return the axes (3, 3) of a contact with the normal into its last brick."""
+    start = np.array(between[0].position) if len(between) > 1 else point
+    sign = np.sign(axes[0] @ (np.array(between[-1].position) - start)) or 1.0
+    return np.asarray(axes * np.array([[sign], [1.0], [sign]]))
+
+
+def _overlap(axes: Floats, point: Floats, between: list[Brick], name: str) -> Floats:
+    """Return the corners (m, 3) of the overlap of the bricks' faces in a contact's plane."""
+    flat = [(_face(brick, axes[0], point) - point) @ axes[1:].T for brick in between]
+    common = _ordered(flat[0])
+    for other in flat[1:]:
+        common = _clip(common, _ordered(other))
+    size = min(_polygon_area(_ordered(face)) for face in flat)
+    if len(common) < 3 or not _polygon_area(common) > SLIVER * size:
+        raise SceneError(
+            f"joint {name}: the faces of its bricks do not overlap along its normal; "
+            "move the joint between them or correct its axis"
+        )
+    return np.asarray(point + common @ axes[1:])
+
+
+def _face(brick: Brick, normal: Floats, point: Floats) -> Floats:
+    """Return the corners (4, 3) of the face of a brick that looks at a plane."""
+    length, width = np.array(brick.length_axis), np.array(brick.width_axis)
+    frame = np.stack([length, width, np.cross(length, width)])
+    half = 0.5 * np.array(brick.dimensions)[:, None] * frame
+    i = int(np.abs(frame @ normal).argmax())
+    toward = np.sign((point - np.array(brick.position)) @ normal) * np.sign(frame[i] @ normal)
+    side, other = half[i - 1], half[i - 2]
+    middle = np.array(brick.position) + toward * half[i]
+    return np.array([middle + a * side + b * other for a in (-1, 1) for b in (-1, 1)])
+
+
+def _ordered(points: Floats) -> Floats:
+    """Return the corners (m, 2) of a convex polygon counterclockwise."""
+    spread = points - points.mean(axis=0)
+    return np.asarray(points[np.argsort(np.arctan2(spread[:, 1], spread[:, 0]))])
+
+
+def _clip(polygon: Floats, other: Floats) -> Floats:
+    """Return the common part of two convex polygons, edge by edge of the second."""
+    for start, end in zip(other, np.roll(other, -1, axis=0), strict=True):
+        across = np.array([start[1] - end[1], end[0] - start[0]])
+        inside = (polygon - start) @ across
+        kept = []
+        for i in range(len(polygon)):
+            if inside[i - 1] * inside[i] < 0:
+                share = inside[i - 1] / (inside[i - 1] - inside[i])
+                kept.append(polygon[i - 1] + share * (polygon[i] - polygon[i - 1]))
+            if inside[i] >= 0:
+                kept.append(polygon[i])
+        polygon = np.array(kept).reshape(-1, 2)
+    return polygon
+
+
+def _polygon_area(polygon: Floats) -> float:
+    x, y = polygon.T
+    return 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))

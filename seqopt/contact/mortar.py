@@ -1,0 +1,38 @@
+"""What holds a joint beside compression: mortars by name."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from seqopt.errors import SceneError
+
+
+@dataclass(frozen=True, kw_only=True)
+class Mortar:
+    """What a contact can carry beside compression: Mohr-Coulomb with a tension cut-off.
+
+    Parameters
+    ----------
+    friction : float
+        Coefficient of friction, the tangent of the friction angle.
+    tensile_strength, cohesion : float
+        Pa; zero for blocks laid dry.
+    """
+
+    friction: float
+    tensile_strength: float = 0.0
+    cohesion: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("friction", "tensile_strength", "cohesion"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value >= 0):
+                raise SceneError(f"mortar: {name} is {value}; give a number that is not negative")
+
+
+FRICTION = math.tan(math.radians(25.0))
+DRY = Mortar(friction=FRICTION)
+EPOXY = Mortar(friction=FRICTION, tensile_strength=3e6, cohesion=2e6)
+"""The study's epoxy putty (section 3.2.3: 25°, 3 MPa, and 2 MPa printed as "2 MPa/m")."""
+MORTARS = {"epoxy": EPOXY, "dry": DRY}

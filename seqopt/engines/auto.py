@@ -1,0 +1,120 @@
+"""The engine that models no more than a scene needs, and says why it needs that much.
+
+Of three levels the cheapest whose condition a grip set meets: planar, where everything lies in one
+plane; exactly rigid bricks, where joints stay within their elastic limits; discrete elements
+beyond. The first two answer what the next would answer, to rounding; that is why they may.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from seqopt.arrays import Ints
+from seqopt.contact.elastic_limits import ElasticLimits, find_elastic_limits
+from seqopt.contact.mortar import EPOXY, Mortar
+from seqopt.engines.discrete.engine import DiscreteEngine
+from seqopt.engines.interface import (
+    Fields,
+    Want,
+    grip_columns,
+    keep_wanted,
+    merge_sets,
+    select_sets,
+)
+from seqopt.engines.planar import PlanarEngine
+from seqopt.engines.plane import off_plane
+from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.errors import SceneError
+from seqopt.network.network import Network
+
+
+class Level(Enum):
+    """How much of a structure is modeled, cheapest first; values are the engines' names."""
+
+    PLANAR = "planar"
+    RIGID = "compliance"
+    DISCRETE = "discrete"
+
+
+@dataclass(frozen=True)
+class LevelChoice:
+    """A level and why it was taken."""
+
+    level: Level
+    reason: str
+
+
+IN_PLANE = LevelChoice(Level.PLANAR, "bricks, springs, gravity and grips lie in one plane")
+OFF_PLANE = LevelChoice(Level.RIGID, "a grip lies outside the plane of the bricks")
+BEYOND = LevelChoice(Level.DISCRETE, "a joint would leave its elastic limits")
+
+
+class AutoEngine:
+    """Answers every grip set at the cheapest level whose condition it meets.
+
+    Parameters
+    ----------
+    network : Network
+    mortar : Mortar
+        What the joints hold; the study's epoxy by default.
+    """
+
+    def __init__(self, network: Network, mortar: Mortar = EPOXY) -> None:
+        self._rigid = ComplianceEngine(network)
+        self._discrete = DiscreteEngine(network, mortar)
+        self._planar: PlanarEngine | None = None
+        self._in_space = OFF_PLANE
+        self._limits: ElasticLimits | None = None
+        self.tally: dict[LevelChoice, int] = {}
+        try:
+            self._planar = PlanarEngine(network)
+        except SceneError as error:
+            self._in_space = LevelChoice(Level.RIGID, str(error).rsplit(";", 1)[0])
+        try:
+            self._limits = find_elastic_limits(network, mortar)
+        except SceneError as error:
+            self.unchecked = f"elastic limits are not checked: {error}"
+        else:
+            self.unchecked = ""
+
+    @property
+    def network(self) -> Network:
+        """The network whose nodes and edges the fields follow."""
+        return self._rigid.network
+
+    def solve(self, bricks: int, grips: ArrayLike, want: Want = Want.TABLE) -> Fields:
+        """Return the fields of the first ``bricks`` bricks; see `seqopt.engines.interface.Engine`.
+
+        ``tally`` counts the grip sets of every choice that was made.
+        """
+        columns = grip_columns(self.network, bricks, grips)
+        sets = np.asarray(grips).reshape(columns.shape)
+        asked = want if self._limits is None else want | Want.JOINTS
+        flat = self._flat(columns)
+        fields = self._rigid.solve(bricks, sets[~flat], asked)
+        if self._planar is not None and flat.any():
+            fields = merge_sets(flat, self._planar.solve(bricks, sets[flat], asked), fields)
+        beyond = np.zeros(len(sets), dtype=bool)
+        if self._limits is not None:
+            beyond = self._limits.exceeded(fields.joint_wrench)
+        if beyond.any():
+            found = self._discrete.solve(bricks, sets[beyond], asked)
+            fields = merge_sets(beyond, keep_wanted(found, asked), select_sets(fields, ~beyond))
+        self._count(IN_PLANE, flat & ~beyond)
+        self._count(self._in_space, ~flat & ~beyond)
+        self._count(BEYOND, beyond)
+        return keep_wanted(fields, want)
+
+    def _flat(self, columns: Ints) -> np.ndarray:
+        """Return which grip sets (S, r) lie in the plane, (S,)."""
+        if self._planar is None:
+            return np.zeros(len(columns), dtype=bool)
+        return np.asarray(~off_plane(self.network, self._planar.plane, columns).any(axis=1))
+
+    def _count(self, choice: LevelChoice, sets: np.ndarray) -> None:
+        if sets.any():
+            self.tally[choice] = self.tally.get(choice, 0) + int(sets.sum())

@@ -1,0 +1,231 @@
+"""A partial structure as bodies, elastic layers and beds, ready to be settled."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+from functools import cached_property
+
+import numpy as np
+from scipy import linalg, sparse
+
+from seqopt.arrays import Floats, Ints, skew
+from seqopt.contact.assembly import Assembly
+from seqopt.contact.faces import bare_assembly
+from seqopt.contact.mortar import Mortar
+from seqopt.contact.quadrature import Quadrature, face_quadrature, first_points, opening_maps
+from seqopt.contact.quadrature import quadrature_stiffness as bed_stiffness
+from seqopt.engines.discrete.friction_law import Points
+from seqopt.errors import SceneError
+from seqopt.network.kinematics import centroids, spring_maps
+from seqopt.network.network import GROUND, Network
+
+SHARE = 10.0  # how much stiffer a bed is than its joint, whichever way it moves
+
+
+@dataclass(frozen=True)
+class BedStiffness:
+    """Stiffness of a joint per area, N/m³, in place of the joint's own springs."""
+
+    normal: float
+    tangential: float
+
+    def __post_init__(self) -> None:
+        for name in ("normal", "tangential"):
+            if not 0 < getattr(self, name) < np.inf:
+                raise SceneError(f"bed: {name} is {getattr(self, name)}; give a positive number")
+
+
+class Across(IntEnum):
+    """Which way two pads press on a brick: along its width or its thickness."""
+
+    WIDTH = 1
+    THICKNESS = 2
+
+
+@dataclass(frozen=True)
+class Pinch:
+    """Two square pads that hold a brick on either side of its node and do not slip.
+
+    Parameters
+    ----------
+    across : Across
+    stiffness : BedStiffness
+        Of the pads; by default ten times the study's bed ("an order of magnitude greater").
+    side : float
+        m; the study does not say how large its pads are.
+    """
+
+    across: Across
+    stiffness: BedStiffness = BedStiffness(1e12, 1e11)
+    side: float = 0.03
+
+
+@dataclass(frozen=True)
+class System:
+    """Bodies, what holds them together, and what pulls at them; the bricks are the first bodies.
+
+    Twists are in m and rad over ``unit``, wrenches in N and N m times it.
+
+    Attributes
+    ----------
+    bricks : int
+    acting : (J,) int
+        The springs whose joints these are.
+    points : Points
+    face : (P,) int
+        The joint of every point, in ascending order.
+    maps : (P, 3, 6) float
+        Openings for unit twists across a joint, taken at its spring.
+    gap : (6J, 6n) sparse
+        Twists across the beds for unit twists of the n bodies.
+    layers : (6n, 6n) sparse
+        Stiffness of the elastic layers.
+    load : (6n,) float
+    unit : (6n,) float
+    length : float
+        Of a brick, m.
+    """
+
+    bricks: int
+    acting: Ints
+    points: Points
+    face: Ints
+    maps: Floats
+    gap: sparse.csr_array
+    layers: sparse.csr_array
+    load: Floats
+    unit: Floats
+    length: float
+
+    def bed_wrenches(self, force: Floats) -> Floats:
+        """Return the wrenches (J, 6) of point forces (P, 3) on second bodies, about the springs."""
+        each = np.einsum("pij,pi->pj", self.maps, force)
+        return np.asarray(np.add.reduceat(each, self._starts, axis=0))
+
+    def stiffness(self, slope: Floats) -> sparse.csr_array:
+        """Return the stiffness (6n, 6n) of layers and beds whose points have slopes (P, 3, 3)."""
+        each = self.maps.transpose(0, 2, 1) @ slope @ self.maps
+        joints = sparse.block_diag(np.add.reduceat(each, self._starts, axis=0), format="csr")
+        return sparse.csr_array(self.gap.T @ joints @ self.gap + self.layers)
+
+    def openings(self, twist: Floats) -> Floats:
+        """Return the openings (P, 3) of the points for twists (6n,) of the bodies."""
+        across = (self.gap @ twist).reshape(-1, 6)
+        return np.asarray(np.einsum("pij,pj->pi", self.maps, across[self.face]))
+
+    @cached_property
+    def scale(self) -> float:
+        """The heaviest body's weight, N."""
+        return float(np.abs(self.load).max()) or 1.0
+
+    @property
+    def _starts(self) -> Ints:
+        return first_points(self.face, len(self.acting))
+
+
+def build(network: Network, bricks: int, mortar: Mortar, bed: BedStiffness | None) -> System:
+    """Return the system of the first ``bricks`` bricks.
+
+    Raises
+    ------
+    SceneError
+        If the faces of a joint do not overlap.
+    """
+    assembly = bare_assembly(network, bricks)
+    acting, _, stiffness = spring_maps(network, bricks)
+    springs = network.springs
+    where = springs.position[acting]
+    points = face_quadrature(assembly)
+    maps = opening_maps(assembly, points.point, points.face, where)
+    moduli = np.ones((len(acting), 2)) if bed is None else _given(bed, len(acting))
+    if bed is None:
+        moduli *= SHARE * _relative_stiffness(stiffness, bed_stiffness(points, maps, moduli))
+    bodies = springs.bodies[acting]
+    center = centroids(network)[:bricks]
+    layers: list[tuple[Ints, Floats]] = []
+    if bed is None:
+        plates = bricks + np.arange(len(acting))
+        own = bed_stiffness(points, maps, moduli)
+        layers = [(np.stack([bodies[:, 0], plates], axis=1), _without(stiffness, own))]
+        bodies = np.stack([plates, bodies[:, 1]], axis=1)
+        center = np.vstack([center, where])
+    unit = np.tile(np.repeat([1.0, 1.0 / _length(network)], 3), len(center))
+    load = np.zeros((len(center), 6))
+    load[:bricks, :3] = network.weight[:bricks]
+    total = sparse.csr_array((load.size, load.size))
+    for pair, blocks in layers:
+        across = _across(pair, where, center) @ sparse.diags_array(unit)
+        total = total + across.T @ sparse.block_diag(blocks, format="csr") @ across
+    return System(
+        bricks=bricks,
+        acting=acting,
+        points=_points(points, moduli, mortar, assembly),
+        face=points.face,
+        maps=maps,
+        gap=sparse.csr_array(_across(bodies, where, center) @ sparse.diags_array(unit)),
+        layers=sparse.csr_array(total),
+        load=load.ravel() * unit,
+        unit=unit,
+        length=_length(network),
+    )
+
+
+def pads(network: Network, brick: int, node: Floats, pinch: Pinch) -> Floats:
+    """Return the stiffness (6, 6) with which two pads beside a node (3,) hold a brick's twists."""
+    held = network.scene.placed[brick]
+    length, width = np.array(held.length_axis), np.array(held.width_axis)
+    axes = np.stack([length, width, np.cross(length, width)])
+    out = axes[pinch.across]
+    sides = np.delete(axes, pinch.across, axis=0)
+    moduli = pinch.stiffness.tangential * np.eye(3)
+    moduli += (pinch.stiffness.normal - pinch.stiffness.tangential) * np.outer(out, out)
+    total = np.zeros((6, 6))
+    reach = pinch.side / np.sqrt(12)  # four points here have a square's second moments
+    for sign in (-0.5, 0.5):
+        for a, b in ((-reach, -reach), (-reach, reach), (reach, -reach), (reach, reach)):
+            point = node + sign * held.dimensions[pinch.across] * out + a * sides[0] + b * sides[1]
+            moved = np.hstack([np.eye(3), -skew(point - centroids(network)[brick])])
+            total += pinch.side**2 / 4 * moved.T @ moduli @ moved
+    return total
+
+
+def _length(network: Network) -> float:
+    return max(network.scene.placed[0].dimensions)
+
+
+def _given(bed: BedStiffness, count: int) -> Floats:
+    return np.tile([bed.normal, bed.tangential], (count, 1))
+
+
+def _points(points: Quadrature, moduli: Floats, mortar: Mortar, assembly: Assembly) -> Points:
+    normal, tangential = (points.area * moduli[points.face, i] for i in (0, 1))
+    return Points(points.area, normal, tangential, mortar, assembly.stress_scale)
+
+
+def _relative_stiffness(stiffness: Floats, bed: Floats) -> Floats:
+    """Return how much stiffer a joint is than a bed (J, 6, 6 both) where most so, (J, 1)."""
+    most = [linalg.eigh(k, b, eigvals_only=True)[-1] for k, b in zip(stiffness, bed, strict=True)]
+    return np.array(most)[:, None]
+
+
+def _without(stiffness: Floats, bed: Floats) -> Floats:
+    """Return the layers (J, 6, 6) that make joints when in series with beds."""
+    share = np.eye(6) - np.linalg.solve(bed, stiffness)
+    out = np.linalg.solve(share.transpose(0, 2, 1), stiffness.transpose(0, 2, 1))
+    return np.asarray(0.5 * (out + out.transpose(0, 2, 1)))
+
+
+def _across(bodies: Ints, at: Floats, center: Floats) -> sparse.csr_array:
+    """Return the twists (6J, 6n) of second bodies (J, 2) against first at points (J, 3)."""
+    rows, columns, values = [], [], []
+    for side, sign in ((0, -1.0), (1, 1.0)):
+        real = np.flatnonzero(bodies[:, side] != GROUND)
+        body = bodies[real, side]
+        block = np.tile(np.eye(6), (len(real), 1, 1))
+        block[:, :3, 3:] = -skew(at[real] - center[body])
+        rows.append((6 * real[:, None, None] + np.arange(6)[:, None] + np.zeros(6, int)).ravel())
+        columns.append((6 * body[:, None, None] + np.arange(6) + np.zeros((6, 1), int)).ravel())
+        values.append(sign * block.ravel())
+    entries = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
+    return sparse.csr_array(entries, shape=(6 * len(bodies), 6 * len(center)))

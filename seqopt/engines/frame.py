@@ -1,0 +1,233 @@
+r"""The reference engine: the double-cross frame with stiff bars, one sparse solve per model.
+
+Every edge of the network is an elastic beam, every joint two equal springs in series, one at the
+end of each half-edge. With the deformations :math:`B u` of beams and springs and their stiffnesses
+:math:`C`, the frame solves :math:`B^T C B u = f` and improves the answer by residuals taken
+through the deformations. It shares no mechanics with `seqopt.engines.rigid.compliance` and exists to check it
+and to show what that generality costs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy import sparse
+from scipy.sparse.linalg import SuperLU, splu
+
+from seqopt.arrays import Floats, Ints
+from seqopt.engines.interface import Fields, Want, grip_columns
+from seqopt.engines.rigid.mechanism import require_resistance
+from seqopt.errors import SolverError
+from seqopt.network.network import Network, PartKind
+
+CONTRAST = 1e7  # bar over joint stiffness; see experiments/frame_contrast.py
+REFINEMENTS = 3
+CONVERGED = 1e-6  # largest last correction of an accepted solution, relative to it
+SUSPICIOUS = 1e-9  # a smallest scaled eigenvalue below this, over the contrast, is looked into
+LOOSE = 1e-12  # stiffness of a spring that has none, over the stiffest: places its joint node
+
+
+class FrameEngine:
+    """Solves each grip set as a frame of its own.
+
+    Parameters
+    ----------
+    network : Network
+    contrast : float
+        Stiffness of the bars over that of the stiffest joint, in stretching and in bending. Low
+        values bend the bars, high ones spoil the conditioning.
+    """
+
+    def __init__(self, network: Network, contrast: float = CONTRAST) -> None:
+        self._network = network
+        self._contrast = contrast
+
+    @property
+    def network(self) -> Network:
+        """The network whose nodes and edges the fields follow."""
+        return self._network
+
+    def solve(self, bricks: int, grips: ArrayLike, want: Want = Want.TABLE) -> Fields:
+        """Return the fields of the first ``bricks`` bricks; see `seqopt.engines.interface.Engine`.
+
+        All fields are evaluated whatever is asked: the factorization dominates the cost.
+        """
+        network = self._network
+        columns = grip_columns(network, bricks, grips)
+        answers = [_solve_one(network, bricks, row, self._contrast) for row in columns]
+        edges, nodes = network.count_edges(bricks), network.count_nodes(bricks)
+        joints = len(network.springs.since)
+        shapes = (edges,), (nodes, 3), (columns.shape[1], 3), (6,), (joints, 6), (bricks, 6)
+        return Fields(
+            *(
+                np.array([answer[i] for answer in answers]).reshape(len(answers), *shape)
+                for i, shape in enumerate(shapes)
+            )
+        )
+
+
+class _Frame(NamedTuple):
+    """Deformations (R, 6n) of n frame nodes and their stiffnesses (R,).
+
+    Stretches of the edges come first, deformations of the half joints last: all translations, then
+    all rotations.
+    """
+
+    nodes: int
+    halves: int
+    deformation: sparse.csr_array
+    stiffness: Floats
+
+
+def _solve_one(network: Network, bricks: int, columns: Ints, contrast: float) -> tuple[Floats, ...]:
+    """Return the fields of one model, in the order of `Fields`."""
+    edges, nodes = network.count_edges(bricks), network.count_nodes(bricks)
+    frame = _frame(network, bricks, contrast)
+    load = np.zeros((frame.nodes, 6))
+    load[network.inner[:bricks], :3] = 0.5 * network.weight[:bricks, None]
+    gripped = network.inner.ravel()[columns]
+    base = np.flatnonzero(network.node_kind[:nodes] == PartKind.BASE)
+    free = np.ones((frame.nodes, 6), dtype=bool)
+    free[base] = False
+    free[gripped, :3] = False
+    unknown = np.flatnonzero(free)
+    motion = np.zeros(load.size)
+    reduced = frame.deformation[:, unknown]
+    examine = partial(require_resistance, network, bricks, columns)
+    motion[unknown] = _solve(reduced, frame.stiffness, load.ravel()[unknown], contrast, examine)
+    stress = frame.stiffness * (frame.deformation @ motion)
+    reaction = (frame.deformation.T @ stress).reshape(load.shape) - load
+    support = base[network.node_spring[base] == network.springs.support]
+    twist = motion.reshape(load.shape)[network.inner[:bricks]].mean(axis=1)
+    return (
+        stress[:edges],
+        motion.reshape(load.shape)[:nodes, :3],
+        reaction[gripped, :3],
+        reaction[support].sum(axis=0),
+        _joint_wrenches(network, bricks, stress[-6 * frame.halves :]),
+        twist,
+    )
+
+
+def _frame(network: Network, bricks: int, contrast: float) -> _Frame:
+    """Return the frame of a partial structure: beams along the edges, springs at the joints.
+
+    An edge that meets a joint ends in a frame node of its own, numbered after the network's.
+    """
+    edges, nodes = network.count_edges(bricks), network.count_nodes(bricks)
+    springs, kind = network.springs, network.edge_kind[:edges]
+    split = np.flatnonzero(kind != PartKind.INNER)
+    which = network.edge_spring[split]
+    total = nodes + len(split)
+    ends = network.edge_nodes[:edges].copy()
+    ends[split, np.where(kind[split] == PartKind.BASE, 0, 1)] = nodes + np.arange(len(split))
+    pairs = np.stack([springs.node[which], nodes + np.arange(len(split))], axis=1)
+    stretch = contrast * springs.translational_stiffness.max()  # EA / L
+    bend = contrast * springs.rotational_stiffness.max()  # EI / L = GJ / L
+    zero, turn = np.zeros_like(springs.axes[which]), springs.axes[which]
+    beams, beam_stiffness = _beams(network, edges, stretch, bend)
+    parts = [
+        *((ends, first, second) for first, second in beams),
+        (pairs, np.dstack([-turn, zero]), np.dstack([turn, zero])),
+        (pairs, np.dstack([zero, -turn]), np.dstack([zero, turn])),
+    ]
+    own = [
+        2 * np.maximum(k[which], LOOSE * k.max()).ravel()
+        for k in (springs.translational_stiffness, springs.rotational_stiffness)
+    ]
+    stiffness = np.concatenate([beam_stiffness, *own])
+    return _Frame(
+        total, len(split), sparse.vstack([_rows(total, *part) for part in parts]).tocsr(), stiffness
+    )
+
+
+def _beams(
+    network: Network, edges: int, stretch: float, bend: float
+) -> tuple[list[tuple[Floats, Floats]], Floats]:
+    """Return the natural deformations of the beams at both ends (E, k, 6) and their stiffnesses.
+
+    Stretch; relative rotation; sum of the rotations across the axis less twice the chord's. Their
+    stiffnesses EA/L, EI/L and 3 EI/L are those of an Euler-Bernoulli beam with GJ = EI.
+    """
+    axis = network.edge_axis[:edges]
+    step = np.diff(network.node_position[network.edge_nodes[:edges]], axis=1)[:, 0]
+    length = np.linalg.norm(step, axis=1)
+    along = axis[:, None, :]
+    none, turn = np.zeros((edges, 3, 3)), np.broadcast_to(np.eye(3), (edges, 3, 3))
+    across = turn - axis[:, :, None] * along
+    chord = np.cross(axis[:, None, :], np.eye(3)).transpose(0, 2, 1) * (2 / length)[:, None, None]
+    modes = [
+        (np.dstack([-along, none[:, :1]]), np.dstack([along, none[:, :1]])),
+        (np.dstack([none, -turn]), np.dstack([none, turn])),
+        (np.dstack([chord, across]), np.dstack([-chord, across])),
+    ]
+    return modes, np.repeat([stretch, bend, 3 * bend], [edges, 3 * edges, 3 * edges])
+
+
+def _joint_wrenches(network: Network, bricks: int, stress: Floats) -> Floats:
+    """Return the wrench (S, 6) of every spring on its second body from half-joint stresses."""
+    springs, edges = network.springs, network.count_edges(bricks)
+    split = np.flatnonzero(network.edge_kind[:edges] != PartKind.INNER)
+    which = network.edge_spring[split]
+    mine = (network.edge_brick[split] == springs.bodies[which, 1]) & (
+        springs.since[which] <= bricks
+    )
+    halves = stress.reshape(2, len(split), 3)[:, mine]
+    out = np.zeros((len(springs.since), 6))
+    out[which[mine]] = -np.einsum("hsk,ski->shi", halves, springs.axes[which[mine]]).reshape(-1, 6)
+    return out
+
+
+def _rows(nodes: int, pairs: Ints, first: Floats, second: Floats) -> sparse.coo_array:
+    """Return the rows (M k, 6 nodes) of k deformations of each of M pairs of nodes."""
+    blocks = np.stack([first, second], axis=2)  # (M, k, 2, 6)
+    row = np.arange(blocks.shape[0] * blocks.shape[1]).reshape(*blocks.shape[:2], 1, 1)
+    column = 6 * pairs[:, None, :, None] + np.arange(6)
+    index = tuple(np.broadcast_to(i, blocks.shape).ravel() for i in (row, column))
+    return sparse.coo_array((blocks.ravel(), index), shape=(row.size, 6 * nodes))
+
+
+def _solve(
+    deformation: sparse.csr_array,
+    stiffness: Floats,
+    load: Floats,
+    contrast: float,
+    examine: Callable[[], None],
+) -> Floats:
+    """Return the displacements under a load, corrected until they no longer change.
+
+    A matrix that looks singular is examined: ``examine`` raises if the structure is a mechanism.
+    """
+    matrix = deformation.T @ sparse.diags_array(stiffness) @ deformation
+    scale = 1 / np.sqrt(np.maximum(matrix.diagonal(), np.finfo(float).tiny))
+    scaled = (sparse.diags_array(scale) @ matrix @ sparse.diags_array(scale)).tocsc()
+    failure = SolverError(
+        f"frame at contrast {contrast:g}: too ill-conditioned; lower the contrast"
+    )
+    try:
+        factor = splu(scaled, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
+    except RuntimeError as error:  # SuperLU met an exactly zero pivot
+        examine()
+        raise failure from error
+    if _smallest_eigenvalue(factor, len(load)) < SUSPICIOUS / contrast:
+        examine()
+    answer = scale * factor.solve(scale * load)
+    for _ in range(REFINEMENTS):
+        residual = load - deformation.T @ (stiffness * (deformation @ answer))
+        correction = scale * factor.solve(scale * residual)
+        answer += correction
+    if not np.abs(correction / scale).max() <= CONVERGED * np.abs(answer / scale).max():
+        raise failure
+    return np.asarray(answer)
+
+
+def _smallest_eigenvalue(factor: SuperLU, size: int) -> float:
+    """Estimate the smallest eigenvalue of a factored symmetric matrix by inverse iteration."""
+    vector = np.random.default_rng(0).standard_normal(size)
+    for _ in range(4):
+        vector = factor.solve(vector / np.linalg.norm(vector))
+    return float(1 / np.linalg.norm(vector))

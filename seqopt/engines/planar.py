@@ -1,0 +1,53 @@
+"""The planar engine: three unknowns per brick, for structures held and loaded in their own plane.
+
+Where bricks, springs and gravity lie in one plane and every grip holds a node in it, nothing turns
+or moves out of it, and forces across it are zero: half of the unknowns go. That is exact, not an
+approximation; what is lost is that motions out of the plane are not asked about.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from seqopt.engines.interface import Fields, Want, grip_columns
+from seqopt.engines.plane import find_plane, off_plane
+from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.errors import GripError
+from seqopt.network.network import Network
+
+
+class PlanarEngine:
+    """Answers any batch of grip sets on any partial structure of a planar scene.
+
+    Raises
+    ------
+    SceneError
+        If bricks, springs or gravity leave the scene's plane.
+    """
+
+    def __init__(self, network: Network) -> None:
+        self.plane = find_plane(network)
+        self._engine = ComplianceEngine(network, self.plane.basis)
+
+    @property
+    def network(self) -> Network:
+        """The network whose nodes and edges the fields follow."""
+        return self._engine.network
+
+    def solve(self, bricks: int, grips: ArrayLike, want: Want = Want.TABLE) -> Fields:
+        """Return the fields of the first ``bricks`` bricks; see `seqopt.engines.interface.Engine`.
+
+        Raises
+        ------
+        GripError
+            Also if a grip lies outside the plane.
+        """
+        away = off_plane(self.network, self.plane, grip_columns(self.network, bricks, grips))
+        if away.any():
+            node = np.asarray(grips).ravel()[away.argmax()]
+            raise GripError(
+                f"grip on node {node}: it lies {1e3 * away.max():.3g} mm outside the scene's "
+                "plane; use the compliance engine"
+            )
+        return self._engine.solve(bricks, grips, want)

@@ -1,0 +1,133 @@
+"""The spanning tree of springs that a build order grows, and the wrenches in it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from seqopt.arrays import Floats, Ints
+from seqopt.engines.basis import SPACE, Basis
+from seqopt.network.network import GROUND, Network
+
+
+@dataclass(frozen=True)
+class SpanningTree:
+    """A tree in which every brick hangs on one spring; arrays run over bricks in build order.
+
+    Attributes
+    ----------
+    spring : (B,) int
+        The spring that each brick hangs on.
+    parent : (B,) int
+        The brick at the spring's other end, or `GROUND`.
+    on_path : (B, B) bool
+        Whether the row's brick lies between the column's brick and the ground, itself included.
+    closures : (C,) int
+        Springs outside the tree, in the order in which they begin to act.
+    """
+
+    spring: Ints
+    parent: Ints
+    on_path: np.ndarray
+    closures: Ints
+
+
+def grow_tree(network: Network) -> SpanningTree | None:
+    """Return the tree that hangs every brick, when placed, on the spring nearest to the ground.
+
+    None if a spring has no stiffness in some direction or a brick is placed without a spring to
+    what stands: such a structure has no compliance of its own, and `seqopt.engines.rigid.dense` solves it.
+    """
+    springs = network.springs
+    if min(springs.translational_stiffness.min(), springs.rotational_stiffness.min()) <= 0:
+        return None
+    count = len(network.inner)
+    spring, parent = np.empty((2, count), dtype=np.int64)
+    depth = np.zeros(count + 1, dtype=np.int64)  # the ground, index -1, comes last
+    on_path = np.eye(count, dtype=bool)
+    for b in range(count):
+        mine = np.flatnonzero((springs.bodies[:, 1] == b) & (springs.since == b + 1))
+        if not len(mine):
+            return None
+        best = mine[np.argmin(depth[springs.bodies[mine, 0]])]
+        spring[b], parent[b] = best, springs.bodies[best, 0]
+        depth[b] = depth[parent[b]] + 1
+        if parent[b] != GROUND:
+            on_path[:, b] |= on_path[:, parent[b]]
+    return SpanningTree(
+        spring, parent, on_path, np.setdiff1d(np.arange(len(springs.since)), spring)
+    )
+
+
+def compliances(network: Network, which: Ints, basis: Basis = SPACE) -> Floats:
+    """Return the compliances of springs (len(which), k, k), k directions of a basis."""
+    springs = network.springs
+    axes = springs.axes[which]
+    count = len(basis.force)
+    out = np.zeros((len(which), *2 * basis.wrench.shape[:1]))
+    for block, directions, stiffness in (
+        (slice(0, count), basis.force, springs.translational_stiffness[which]),
+        (slice(count, None), basis.moment, springs.rotational_stiffness[which]),
+    ):
+        own = axes @ directions.T
+        out[:, block, block] = own.transpose(0, 2, 1) / stiffness[:, None, :] @ own
+    return out
+
+
+def node_wrenches(network: Network, tree: SpanningTree, basis: Basis = SPACE) -> Floats:
+    """Return the wrenches that unit forces at the inner nodes send through the tree, (B, k, 2B, d).
+
+    The wrench through a brick's spring is the sum of the loads beyond it, taken about the spring.
+    """
+    at = network.springs.position[tree.spring]
+    owner = np.repeat(np.arange(len(at)), 2)
+    out = _unit_wrenches(network.node_position[network.inner.ravel()], at, basis)
+    out *= tree.on_path[:, None, owner, None]
+    return out
+
+
+def closure_wrenches(network: Network, tree: SpanningTree, basis: Basis = SPACE) -> Floats:
+    """Return the wrenches that unit wrenches of the closures send through the tree, (B, k, C, k).
+
+    A closure's wrench acts on its second body, and against its first.
+    """
+    springs = network.springs
+    at, point = springs.position[tree.spring], springs.position[tree.closures]
+    path = np.hstack([tree.on_path, np.zeros((len(at), 1), bool)]).astype(float)  # ground: no path
+    first, second = springs.bodies[tree.closures].T
+    forces, size = len(basis.force), len(basis.wrench)
+    out = np.zeros((len(at), size, len(point), size))
+    out[..., :forces] = _unit_wrenches(point, at, basis)
+    out[:, forces:, :, forces:] = np.eye(size - forces)[:, None, :]
+    out *= (path[:, second] - path[:, first])[:, None, :, None]
+    return out
+
+
+def twists(
+    network: Network, tree: SpanningTree, strain: Floats, centroid: Floats, basis: Basis = SPACE
+) -> Floats:
+    """Return the bricks' twists (B, k, K) for the deformations (B, k, K) of the tree's springs."""
+    at = network.springs.position[tree.spring]
+    shift = len(basis.force)
+    out = strain.copy()
+    out[:, :shift] += _carried(basis, centroid - at) @ strain[:, shift:]
+    for b in np.flatnonzero(tree.parent != GROUND):
+        parent = tree.parent[b]
+        out[b] += out[parent]
+        out[b, :shift] += _carried(basis, centroid[b] - centroid[parent]) @ out[parent, shift:]
+    return out
+
+
+def _carried(basis: Basis, arms: Floats) -> Floats:
+    """Return the translations (..., d, m) at the ends of arms (..., 3) that unit rotations make."""
+    return np.asarray(basis.levers(arms).swapaxes(-1, -2))
+
+
+def _unit_wrenches(points: Floats, at: Floats, basis: Basis) -> Floats:
+    """Return the wrenches about ``at`` (P, 3) of unit forces at ``points`` (M, 3), (P, k, M, d)."""
+    forces = len(basis.force)
+    out = np.empty((len(at), len(basis.wrench), len(points), forces))
+    out[:, :forces] = np.eye(forces)[:, None, :]
+    out[:, forces:] = basis.levers(points - at[:, None, :]).transpose(0, 2, 1, 3)
+    return out

@@ -1,0 +1,141 @@
+"""Build the network of a scene."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from seqopt.network.network import GROUND, Network, PartKind, Springs
+from seqopt.scene.scene import Brick, Ground, Joint, Scene
+
+TIE = 1e-6  # two inner nodes are equally far from a joint within this share of the distance
+
+
+@dataclass(frozen=True)
+class _Node:
+    name: object
+    kind: PartKind
+    since: int
+    position: tuple[float, float, float]
+    spring: int = -1
+    brick: int = -1
+
+
+@dataclass(frozen=True)
+class _Edge:
+    nodes: tuple[object, object]
+    kind: PartKind
+    since: int
+    brick: int = -1
+    spring: int = -1
+
+
+def build_network(scene: Scene) -> Network:
+    """Return the network of a whole scene."""
+    place = {brick.name: i for i, brick in enumerate(scene.placed)}
+    springs = _springs(scene, place)
+    names = _joint_names(springs)
+    nodes, edges = [], []
+    for i, brick in enumerate(scene.placed):
+        for number in brick.nodes:
+            nodes.append(_Node(number, PartKind.INNER, i + 1, brick.node_position(number), brick=i))
+        edges.append(_Edge(brick.nodes, PartKind.INNER, i + 1, brick=i))
+    for s, (spring, since) in enumerate(springs):
+        ends = spring.bricks if isinstance(spring, Joint) else (spring.brick,)
+        name = names[s]
+        nodes.append(
+            _Node(name, PartKind.JOINT, min(place[b] for b in ends) + 1, spring.position, s)
+        )
+        for b in ends:
+            brick = scene.placed[place[b]]
+            edges.append(
+                _Edge((_nearest(brick, spring), name), PartKind.JOINT, place[b] + 1, place[b], s)
+            )
+        if isinstance(spring, Ground):
+            base = ("base", *name[1:])
+            nodes.append(_Node(base, PartKind.BASE, since, spring.anchor, s))
+            edges.append(_Edge((name, base), PartKind.BASE, since, spring=s))
+    nodes.sort(key=lambda node: node.since)
+    edges.sort(key=lambda edge: edge.since)
+    return _arrays(scene, place, springs, nodes, edges)
+
+
+def _springs(scene: Scene, place: dict[int, int]) -> list[tuple[Joint | Ground, int]]:
+    """Return joints and ground ends with the brick count from which each acts, in that order."""
+    springs: list[tuple[Joint | Ground, int]] = []
+    for ground in scene.grounds:
+        closes = ground.brick if ground.closes_with is None else ground.closes_with
+        springs.append((ground, max(place[ground.brick], place[closes]) + 1))
+    for joint in scene.joints:
+        springs.append((joint, max(place[b] for b in joint.bricks) + 1))
+    return sorted(springs, key=lambda entry: entry[1])
+
+
+def _joint_names(springs: list[tuple[Joint | Ground, int]]) -> list[tuple[object, ...]]:
+    """Return a name for the joint node of every spring."""
+    names: list[tuple[object, ...]] = []
+    for spring, _ in springs:
+        name = spring.bricks if isinstance(spring, Joint) else ("ground", spring.brick)
+        same = sum(other[1:3] == name for other in names)
+        names.append(("joint", *name, same + 1) if same else ("joint", *name))
+    return names
+
+
+def _nearest(brick: Brick, spring: Joint | Ground) -> int:
+    """Return the inner node through which the brick meets the spring: the nearer, or the first."""
+    first, second = (
+        np.linalg.norm(np.subtract(brick.node_position(n), spring.position)) for n in brick.nodes
+    )
+    return brick.nodes[0] if first <= second * (1 + TIE) else brick.nodes[1]
+
+
+def _arrays(
+    scene: Scene,
+    place: dict[int, int],
+    springs: list[tuple[Joint | Ground, int]],
+    nodes: list[_Node],
+    edges: list[_Edge],
+) -> Network:
+    index = {node.name: i for i, node in enumerate(nodes)}
+    along = np.array([spring.along for spring, _ in springs])
+    across = np.array([spring.across for spring, _ in springs])
+    support = scene.grounds[0]
+    return Network(
+        scene=scene,
+        springs=Springs(
+            bodies=np.array([_bodies(spring, place) for spring, _ in springs]),
+            since=np.array([since for _, since in springs]),
+            node=np.array([index[name] for name in _joint_names(springs)]),
+            position=np.array([spring.position for spring, _ in springs]),
+            anchor=np.array([_anchor(spring) for spring, _ in springs]),
+            axes=np.stack([along, across, np.cross(along, across)], axis=1),
+            translational_stiffness=np.array([s.translational_stiffness for s, _ in springs]),
+            rotational_stiffness=np.array([s.rotational_stiffness for s, _ in springs]),
+            support=next(i for i, (spring, _) in enumerate(springs) if spring is support),
+        ),
+        node_position=np.array([node.position for node in nodes]),
+        node_kind=np.array([node.kind for node in nodes]),
+        node_since=np.array([node.since for node in nodes]),
+        node_spring=np.array([node.spring for node in nodes]),
+        node_brick=np.array([node.brick for node in nodes]),
+        node_name=tuple(node.name for node in nodes),
+        inner=np.array([[index[n] for n in brick.nodes] for brick in scene.placed]),
+        edge_nodes=np.array([[index[name] for name in edge.nodes] for edge in edges]),
+        edge_kind=np.array([edge.kind for edge in edges]),
+        edge_since=np.array([edge.since for edge in edges]),
+        edge_brick=np.array([edge.brick for edge in edges]),
+        edge_spring=np.array([edge.spring for edge in edges]),
+        weight=np.array([brick.mass for brick in scene.placed])[:, None] * np.array(scene.gravity),
+    )
+
+
+def _bodies(spring: Joint | Ground, place: dict[int, int]) -> tuple[int, int]:
+    if isinstance(spring, Joint):
+        a, b = sorted(place[name] for name in spring.bricks)
+        return a, b
+    return GROUND, place[spring.brick]
+
+
+def _anchor(spring: Joint | Ground) -> tuple[float, float, float]:
+    return spring.anchor if isinstance(spring, Ground) else spring.position

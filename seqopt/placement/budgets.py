@@ -1,0 +1,65 @@
+"""Budgets: totals over the build that couple all moves and break the structure of a path."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from seqopt.arrays import Floats
+from seqopt.errors import ProblemError
+from seqopt.placement.costs import Budget
+from seqopt.placement.problem import Problem
+from seqopt.sequence.schedule import OpenGrip
+
+
+def steps_over(problem: Problem, response: str, level: float, bound: float) -> Budget:
+    """Return a cap on the number of open steps in which a response exceeds a level (SI units).
+
+    The response must be among those the problem has evaluated (``also`` of `seqopt.placement.problem.pose`).
+    """
+    single, shared = _empty(problem)
+    for state in problem.evaluation.states:
+        if response not in state.responses:
+            raise ProblemError(
+                f"budget on {response}: step {state.step.number} has only "
+                f"{', '.join(state.responses)}; name it in `also` when the problem is posed"
+            )
+        target = single if len(state.moves) == 1 else shared
+        target[state.moves[-1]] += state.responses[response] > level
+    return Budget(f"steps with {response} over {level:g}", tuple(single), tuple(shared), bound)
+
+
+def robot_use(problem: Problem, robot: str, force: float, bound: float) -> Budget:
+    """Return a cap on how often a robot is used: open steps in which it carries over a force, N."""
+    return steps_over(problem, f"F_{robot}", force, bound)
+
+
+def travel(problem: Problem, bound: float) -> Budget:
+    """Return a cap on the way, m, that robots go to chosen grips and on to their next ones."""
+    single, shared = _empty(problem)
+    schedule = problem.schedule
+    for k, move in enumerate(schedule.moves):
+        robot = [r.name for r in schedule.scene.robots].index(move.robot)
+        grips = [step.grips[robot] for step in schedule.steps]
+        steps = range(len(grips))
+        mine = [i for i in steps if grips[i] == OpenGrip(k)]
+        before = next((grips[i] for i in reversed(steps[: mine[0]]) if grips[i] is not None), None)
+        after = next((grips[i] for i in steps[mine[-1] + 1 :] if grips[i] is not None), None)
+        for other in (before, after):
+            if isinstance(other, int):
+                single[k] += _distances(problem, move.candidates, (other,))[:, 0]
+        if before == OpenGrip(k - 1):
+            shared[k] += _distances(problem, schedule.moves[k - 1].candidates, move.candidates)
+    return Budget("robot travel [m]", tuple(single), tuple(shared), bound)
+
+
+def _empty(problem: Problem) -> tuple[list[Floats], list[Floats]]:
+    sizes = problem.sums.sizes
+    pairs = zip((1, *sizes[:-1]), sizes, strict=True)
+    return [np.zeros(size) for size in sizes], [np.zeros(pair) for pair in pairs]
+
+
+def _distances(problem: Problem, first: tuple[int, ...], second: tuple[int, ...]) -> Floats:
+    at = problem.schedule.scene.node_position
+    return np.array([[math.dist(at(a), at(b)) for b in second] for a in first])

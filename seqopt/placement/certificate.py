@@ -1,0 +1,144 @@
+"""What a formulation returns, and the check of what it claims."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from seqopt.errors import SolverError
+from seqopt.placement.costs import TINY, LayeredCosts, PlacementProblem
+from seqopt.placement.formulation import (
+    Aim,
+    Formulation,
+    FormulationKind,
+    Selection,
+)
+
+TOLERANCE = 1e-6  # of the costs that a choice meets: how far a claim may be from what the data say
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """A selection checked from the problem's data alone.
+
+    Attributes
+    ----------
+    objective : float
+        Recomputed.
+    bound : float
+        The least value of any choice, found anew from the data; where budgets forbid choices, the
+        least without them.
+    gap : float
+        Objective less bound, over the size of the costs that the choice meets, signs aside: their
+        sum, or the largest for a peak. It has no unit.
+    claimed_gap : float
+        The same with the formulation's own bound where that is higher; it is not proven, but knows
+        the budgets.
+    spent : mapping of str to float
+        What the selection takes of each budget.
+    """
+
+    objective: float
+    bound: float
+    gap: float
+    claimed_gap: float
+    spent: Mapping[str, float]
+
+
+def certify(problem: PlacementProblem, selection: Selection, aim: Aim) -> Certificate:
+    """Check a selection from the problem's data, without the solver.
+
+    Raises
+    ------
+    SolverError
+        If the choice is not one candidate per move, is not allowed, exceeds a budget, or is not
+        worth what was claimed.
+    """
+    placement = problem.sums if aim is Aim.SUM else problem.peaks
+    value = _value(placement, selection.choice, aim)
+    sizes = [abs(part) for part in placement.parts(selection.choice)]
+    scale = max(sum(sizes) if aim is Aim.SUM else max(sizes), TINY)
+    if not abs(value - selection.objective) <= TOLERANCE * scale:
+        raise SolverError(f"the objective is {value:.9g}, not {selection.objective:.9g} as claimed")
+    spent = {budget.name: budget.spent(selection.choice) for budget in problem.budgets}
+    for budget in problem.budgets:
+        if budget.slack(selection.choice) < -TOLERANCE:
+            raise SolverError(
+                f"the choice takes {spent[budget.name]:.6g} of {budget.name}, more than "
+                f"{budget.bound:.6g}; use overlap_mip (the claimed bound is {selection.bound:.9g})"
+            )
+    bound = least_sum(placement) if aim is Aim.SUM else least_peak(placement)
+    highest = value if problem.budgets else bound
+    if not selection.bound <= highest + TOLERANCE * scale:  # NaN is no bound
+        raise SolverError(f"the claimed bound {selection.bound:.9g} exceeds {highest:.9g}")
+    gap, claimed = (max(0.0, value - b) / scale for b in (bound, max(bound, selection.bound)))
+    return Certificate(value, bound, gap, claimed, spent)
+
+
+def _value(placement: LayeredCosts, choice: tuple[int, ...], aim: Aim) -> float:
+    """Return what a choice is worth, or raise a `SolverError` if it is none."""
+    sizes = placement.sizes
+    if len(choice) != len(sizes):
+        raise SolverError(f"the answer names {len(choice)} candidates for {len(sizes)} moves")
+    for k, (place, size) in enumerate(zip(choice, sizes, strict=True), start=1):
+        if not 0 <= place < size:
+            raise SolverError(f"the answer names candidate {place} of {size} for move {k}")
+    value = placement.cost(choice) if aim is Aim.SUM else placement.worst(choice)
+    if not np.isfinite(value):
+        raise SolverError("the choice is not allowed by the problem; the solver's answer is wrong")
+    return value
+
+
+def least_sum(placement: LayeredCosts) -> float:
+    """Return the least sum that any choice reaches, budgets aside: forward, layer by layer."""
+    reached = np.zeros(1)
+    for single, shared in zip(placement.single, placement.shared, strict=True):
+        reached = (reached[:, None] + shared).min(axis=0) + single
+    return float(reached.min())
+
+
+def least_peak(placement: LayeredCosts) -> float:
+    """Return the least worst cost of any choice, by bisection over all costs that occur.
+
+    A value is reached if the choices whose costs do not exceed it connect the first move to the
+    last.
+    """
+    levels = np.unique(np.concatenate([a.ravel() for a in (*placement.single, *placement.shared)]))
+    low, high = 0, len(levels) - 1
+    while low < high:
+        middle = (low + high) // 2
+        if _connected(placement, float(levels[middle])):
+            high = middle
+        else:
+            low = middle + 1
+    return float(levels[low])
+
+
+def _connected(placement: LayeredCosts, level: float) -> bool:
+    reached = np.ones(1, dtype=bool)
+    for single, shared in zip(placement.single, placement.shared, strict=True):
+        reached = (single <= level) & ((shared <= level) & reached[:, None]).any(axis=0)
+    return bool(reached.any())
+
+
+def check_selection(
+    problem: PlacementProblem, selection: Selection, which: Formulation
+) -> Certificate:
+    """Certify a selection, and hold its formulation to what it promises.
+
+    Raises
+    ------
+    SolverError
+        If the certificate fails, or without budgets a formulation that is no heuristic misses the
+        optimum.
+    """
+    certificate = certify(problem, selection, which.aim)
+    exact = which.kind is not FormulationKind.HEURISTIC and not problem.budgets
+    if exact and certificate.gap > TOLERANCE:
+        raise SolverError(
+            f"{which.name} promises the optimum {certificate.bound:.9g}, "
+            f"but its choice is worth {certificate.objective:.9g}"
+        )
+    return certificate

@@ -1,0 +1,216 @@
+"""Costs of choices: what every formulation solves, whatever they stand for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+
+from seqopt.arrays import Floats
+from seqopt.errors import InfeasibleError, ProblemError
+
+TINY = float(np.finfo(float).tiny)
+
+
+@dataclass(frozen=True)
+class LayeredCosts:
+    """Costs of single choices and of neighboring pairs.
+
+    One candidate per move is to be chosen; choices ``o`` cost
+    ``sum_k single[k][o[k]] + sum_k shared[k][o[k-1], o[k]]``.
+
+    Parameters
+    ----------
+    single : tuple of (C_k,) float
+        Cost of each candidate in the states in which its move alone is open; infinite where it is
+        not allowed.
+    shared : tuple of (C_{k-1}, C_k) float
+        Cost of each pair in the states that the move shares with the one before. The first move has
+        none before it: an array of shape (1, C_0).
+
+    Raises
+    ------
+    ProblemError
+        If there is no move, a move has no candidates, a shape is wrong, a value is NaN, or values
+        are so large that their sum overflows.
+    """
+
+    single: tuple[Floats, ...]
+    shared: tuple[Floats, ...]
+
+    def __post_init__(self) -> None:
+        for name in ("single", "shared"):
+            object.__setattr__(self, name, tuple(_frozen(costs) for costs in getattr(self, name)))
+        if not self.single:
+            raise ProblemError("the problem has no moves; give at least one")
+        if len(self.shared) != len(self.single):
+            raise ProblemError(
+                f"{len(self.single)} single and {len(self.shared)} shared costs; give as many"
+            )
+        for k, shape in enumerate(zip((1, *self.sizes[:-1]), self.sizes, strict=True)):
+            self._check_move(k, shape)
+        if sum(_largest(costs) for costs in (*self.single, *self.shared)) == np.inf:
+            raise ProblemError("the costs are so large that their sum overflows; rescale them")
+
+    def _check_move(self, k: int, shape: tuple[int, int]) -> None:
+        if not shape[1]:
+            raise ProblemError(f"move {k + 1} has no candidates; widen a reach or free a node")
+        if self.shared[k].shape != shape:
+            raise ProblemError(
+                f"move {k + 1}: shared costs {self.shared[k].shape}; give them for {shape}"
+            )
+        for name, costs in (("single", self.single[k]), ("shared", self.shared[k])):
+            if np.isnan(costs).any() or (costs == -np.inf).any():
+                raise ProblemError(
+                    f"move {k + 1}: a {name} cost is NaN or -inf; mark what is not allowed as inf"
+                )
+
+    @property
+    def sizes(self) -> tuple[int, ...]:
+        """How many candidates every move has."""
+        return tuple(len(single) for single in self.single)
+
+    def parts(self, choice: Sequence[int]) -> list[float]:
+        """Return the single and shared costs that the choices meet, move by move."""
+        out, before = [], 0
+        for single, shared, now in zip(self.single, self.shared, choice, strict=True):
+            out += [float(single[now]), float(shared[before, now])]
+            before = now
+        return out
+
+    def cost(self, choice: Sequence[int]) -> float:
+        """Return the total cost of one candidate per move; infinite if one is not allowed."""
+        return sum(self.parts(choice))
+
+    def worst(self, choice: Sequence[int]) -> float:
+        """Return the largest single or shared cost that the choices meet."""
+        return max(self.parts(choice))
+
+    def continuable(self) -> tuple[np.ndarray, ...]:
+        """Return, per move, which candidates are allowed and can be continued to the last move.
+
+        Raises
+        ------
+        InfeasibleError
+            Naming the move at which the last possible choice ends.
+        """
+        reached = np.ones(1, dtype=bool)
+        for k, (single, shared) in enumerate(zip(self.single, self.shared, strict=True), start=1):
+            reached = np.isfinite(single) & np.isfinite(shared[reached]).any(axis=0)
+            if not reached.any():
+                raise InfeasibleError(
+                    f"move {k}: none of its {len(single)} candidates is allowed after any choice "
+                    "before it; relax a limit or widen a reach"
+                )
+        good = [np.isfinite(self.single[-1])]
+        for single, shared in zip(self.single[-2::-1], self.shared[:0:-1], strict=True):
+            good.insert(0, np.isfinite(single) & (np.isfinite(shared) & good[0]).any(axis=1))
+        return tuple(good)
+
+
+def _largest(costs: Floats) -> float:
+    """Return the largest size of a cost, those that are not allowed aside."""
+    return float(np.abs(costs[np.isfinite(costs)]).max(initial=0.0))
+
+
+def _frozen(costs: Floats) -> Floats:
+    """Return a copy that cannot be written to."""
+    out = np.array(costs, dtype=float)
+    out.flags.writeable = False
+    return out
+
+
+@dataclass(frozen=True)
+class Budget:
+    """A cap on a total over the build.
+
+    Parameters
+    ----------
+    name : str
+        What is capped, with its unit.
+    single : tuple of (C_k,) float
+    shared : tuple of (C_{k-1}, C_k) float
+        What each choice, and each pair, takes of the budget: finite.
+    bound : float
+        Infinite if there is no cap.
+
+    Raises
+    ------
+    ProblemError
+        If a shape is wrong, an amount is not finite, or the bound is NaN or -inf.
+    """
+
+    name: str
+    single: tuple[Floats, ...]
+    shared: tuple[Floats, ...]
+    bound: float
+
+    def __post_init__(self) -> None:
+        try:
+            LayeredCosts(self.single, self.shared)
+        except ProblemError as error:
+            raise ProblemError(f"budget {self.name!r}: {error}") from error
+        if not all(np.isfinite(amounts).all() for amounts in (*self.single, *self.shared)):
+            raise ProblemError(f"budget {self.name!r}: an amount is infinite; limit the choice")
+        if not self.bound > -np.inf:
+            raise ProblemError(f"budget {self.name!r}: the bound is {self.bound}; give a number")
+
+    def spent(self, choice: Sequence[int]) -> float:
+        """Return what the choices take."""
+        return LayeredCosts(self.single, self.shared).cost(choice)
+
+    def slack(self, choice: Sequence[int]) -> float:
+        """Return what the choices leave of the budget, over the size of what they take, or of it.
+
+        Signs aside: amounts that cancel count in full. Zero divided by zero is zero.
+        """
+        taken = LayeredCosts(self.single, self.shared).parts(choice)
+        left = self.bound - sum(taken)
+        return left / max(abs(self.bound), sum(map(abs, taken)), TINY) if left else 0.0
+
+
+class PlacementProblem(Protocol):
+    """What a formulation is given."""
+
+    @property
+    def sums(self) -> LayeredCosts:
+        """The costs whose sum over the build is to be least."""
+
+    @property
+    def peaks(self) -> LayeredCosts:
+        """The costs whose largest over the build is to be least."""
+
+    @property
+    def budgets(self) -> tuple[Budget, ...]:
+        """Caps on totals over the build."""
+
+    def row(self, move: int, before: int) -> Floats:
+        """Return the cost (C_k,) of what a move shares with the one before, that being chosen."""
+
+
+@dataclass(frozen=True)
+class CostProblem:
+    """A problem given by its costs alone."""
+
+    sums: LayeredCosts
+    budgets: tuple[Budget, ...] = field(default=())
+
+    @property
+    def peaks(self) -> LayeredCosts:
+        """The same costs."""
+        return self.sums
+
+    def row(self, move: int, before: int) -> Floats:
+        """Return the shared costs of the candidates, the choice before being fixed."""
+        return np.asarray(self.sums.shared[move][before])
+
+
+def without_budgets(problem: PlacementProblem, formulation: str) -> None:
+    """Raise a `ProblemError` if a problem has budgets, which break the structure of a path."""
+    if problem.budgets:
+        raise ProblemError(
+            f"{formulation}: the budget {problem.budgets[0].name!r} couples all moves; "
+            "use overlap_mip, or overlap_lp for a bound"
+        )

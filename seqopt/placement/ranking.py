@@ -1,0 +1,117 @@
+"""How firm the ranking of each move is: ties, margins, reversals."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+
+from seqopt.arrays import Floats
+from seqopt.placement.criteria import Criterion, RankSum, WeightedSum, WorstRatio
+from seqopt.placement.problem import Problem
+from seqopt.responses.choices import StepChoices
+
+TIE = 1e-9  # costs this close, relative to the largest, are equal
+
+
+def move_costs(problem: Problem, move: int, before: int, without: int | None = None) -> Floats:
+    """Return the costs (C_k,) of a move's candidates, the choice before it being fixed.
+
+    The study's search of a single move: each state of the window is ranked over the candidates of
+    this move alone. ``without`` leaves one candidate out, which then costs infinity.
+    """
+    total = np.zeros(len(problem.schedule.moves[move].candidates))
+    for state in problem.evaluation.states:
+        if state.moves[-1] != move:
+            continue
+        rows = slice(None) if len(state.moves) == 1 else before
+        total += problem.state_costs(_without(state, without), rows)
+    if without is not None:
+        total[without] = np.inf
+    return total
+
+
+def rank_of(costs: Floats, chosen: int) -> int:
+    """Return the rank of a candidate: 1 if none costs less."""
+    return int((costs < costs[chosen] - _tie(costs)).sum()) + 1
+
+
+def _tie(costs: Floats) -> float:
+    return TIE * float(np.abs(costs[np.isfinite(costs)]).max(initial=0.0))
+
+
+def rank_moves(problem: Problem, choice: Sequence[int]) -> pd.DataFrame:
+    """Return, move by move, where the chosen candidate ranks and how firm the first place is.
+
+    Columns: ``move``, ``step``, ``bricks``, ``robot``, ``node`` (chosen), ``rank`` (its place, 1 if
+    none is better), ``winner`` (the node in first place), ``margin`` (cost from first to second),
+    ``tied`` (candidates that share the first place), ``turned_by_candidates`` (others whose absence
+    changes the winner) and ``turned_by_criteria`` (responses whose absence does).
+    """
+    rows = []
+    for k, move in enumerate(problem.schedule.moves):
+        before = choice[k - 1] if k else 0
+        costs = move_costs(problem, k, before)
+        winner = int(np.argmin(costs))
+        others = np.delete(costs, winner)
+        turned = [
+            j
+            for j in range(len(costs))
+            if j != winner
+            and np.isfinite(costs[j])
+            and int(np.argmin(move_costs(problem, k, before, without=j))) != winner
+        ]
+        dropped = [
+            name
+            for name, criterion in _without_one(problem.criterion, move.bricks)
+            if int(np.argmin(move_costs(replace(problem, criterion=criterion), k, before)))
+            != winner
+        ]
+        rows.append(
+            {
+                "move": k + 1,
+                "step": move.step,
+                "bricks": move.bricks,
+                "robot": move.robot,
+                "node": move.candidates[choice[k]],
+                "rank": rank_of(costs, choice[k]),
+                "winner": move.candidates[winner],
+                "margin": float(others.min() - costs[winner]) if len(others) else np.inf,
+                "tied": int((costs <= costs[winner] + _tie(costs)).sum()),
+                "turned_by_candidates": " ".join(str(move.candidates[j]) for j in turned),
+                "turned_by_criteria": " ".join(dropped),
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def _without(state: StepChoices, candidate: int | None) -> StepChoices:
+    """Return a state in which one candidate of its last move is impossible."""
+    if candidate is None:
+        return state
+    responses = {}
+    for name, values in state.responses.items():
+        responses[name] = values.copy()
+        responses[name][..., candidate] = np.nan
+    return replace(state, responses=responses)
+
+
+def _without_one(criterion: Criterion, bricks: int) -> Iterator[tuple[str, Criterion]]:
+    """Yield every criterion with one of its responses left out, and its name."""
+    names = criterion.wanted(bricks)
+    for name in names if len(names) > 1 else ():
+        if isinstance(criterion, RankSum):
+            before, after = (
+                tuple(t for t in terms if t[0] != name) or terms
+                for terms in (criterion.before, criterion.after)
+            )
+            yield name, replace(criterion, before=before, after=after)
+        elif isinstance(criterion, WeightedSum):
+            yield name, replace(criterion, terms=tuple(t for t in criterion.terms if t[0] != name))
+        elif isinstance(criterion, WorstRatio):
+            yield (
+                name,
+                replace(criterion, limits=tuple(t for t in criterion.limits if t[0] != name)),
+            )

@@ -1,0 +1,187 @@
+"""Pictures of a partial structure: bricks, network, grips, and how they move."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.patheffects import withStroke
+
+from seqopt.arrays import Floats
+from seqopt.network.network import Network, PartKind
+
+FACES = ((0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (1, 3, 7, 5))
+CLAY = np.array([0.80, 0.52, 0.38])
+INK, TENSION, COMPRESSION = "#2b2b2b", "#c8102e", "#1f5fa8"
+ROBOT_COLORS = ("#0b7a75", "#7b2d8b", "#d17a00", "#444444")
+
+
+@dataclass(frozen=True)
+class View:
+    """A parallel projection.
+
+    Parameters
+    ----------
+    azimuth : float
+        Direction from which the scene is seen, degrees from -y towards +x.
+    elevation : float
+        Degrees above the horizon.
+    """
+
+    azimuth: float = 25.0
+    elevation: float = 15.0
+
+    def axes(self) -> Floats:
+        """Return the unit vectors to the right, up and towards the viewer, (3, 3)."""
+        a, e = np.radians([self.azimuth, self.elevation])
+        right = np.array([np.cos(a), np.sin(a), 0.0])
+        toward = np.array([np.sin(a) * np.cos(e), -np.cos(a) * np.cos(e), np.sin(e)])
+        return np.stack([right, np.cross(toward, right), toward])
+
+
+def draw_bricks(
+    axes: Axes,
+    network: Network,
+    bricks: int,
+    view: View,
+    *,
+    twist: Floats | None = None,
+    magnify: float = 1.0,
+    alpha: float = 1.0,
+) -> None:
+    """Draw the first bricks as shaded boxes, moved by their twists (b, 6) times ``magnify``."""
+    polygons, depths, colors = [], [], []
+    for b in range(bricks):
+        corners = _corners(network, b)
+        if twist is not None:
+            center = corners.mean(axis=0)
+            turn = np.cross(twist[b, 3:], corners - center)
+            corners = corners + magnify * (twist[b, :3] + turn)
+        seen = corners @ view.axes().T
+        for face in FACES:
+            normal = np.cross(
+                corners[face[1]] - corners[face[0]], corners[face[2]] - corners[face[0]]
+            )
+            light = 0.55 + 0.45 * abs(normal @ [0.3, -0.5, 0.8]) / np.linalg.norm(normal)
+            polygons.append(seen[list(face), :2])
+            depths.append(seen[list(face), 2].mean())
+            colors.append((*(light * CLAY), alpha))
+    order = np.argsort(depths)
+    axes.add_collection(
+        PolyCollection(
+            [polygons[i] for i in order],
+            facecolors=[colors[i] for i in order],
+            edgecolors=(0.25, 0.15, 0.1, alpha),
+            linewidths=0.4,
+        )
+    )
+    _frame(axes)
+
+
+def draw_network(
+    axes: Axes,
+    network: Network,
+    bricks: int,
+    view: View,
+    *,
+    displacement: Floats | None = None,
+    magnify: float = 1.0,
+    edge_force: Floats | None = None,
+    numbers: bool = False,
+) -> None:
+    """Draw nodes and edges, moved by displacements (N, 3), colored by axial force if given."""
+    nodes, edges = network.count_nodes(bricks), network.count_edges(bricks)
+    points = network.node_position[:nodes].copy()
+    if displacement is not None:
+        points += magnify * displacement
+    seen = points @ view.axes()[:2].T
+    segments = list(seen[network.edge_nodes[:edges]])
+    if edge_force is None:
+        lines = LineCollection(segments, colors=INK, linewidths=1.2)
+    else:
+        size = np.abs(edge_force).max() or 1.0
+        colors = [TENSION if force > 0 else COMPRESSION for force in edge_force]
+        widths = 0.6 + 3.4 * np.abs(edge_force) / size
+        lines = LineCollection(segments, colors=colors, linewidths=widths.tolist())
+    axes.add_collection(lines)
+    kind = network.node_kind[:nodes]
+    for which, marker, size_, face in (
+        (PartKind.INNER, "o", 9, INK),
+        (PartKind.JOINT, "o", 12, "white"),
+        (PartKind.BASE, "s", 36, INK),
+    ):
+        at = seen[kind == which]
+        axes.scatter(
+            at[:, 0],
+            at[:, 1],
+            s=size_,
+            marker=marker,
+            c=face,
+            edgecolors=INK,
+            zorder=3,
+            linewidths=0.7,
+        )
+    if numbers:
+        for i in np.flatnonzero(kind == PartKind.INNER):
+            axes.annotate(
+                str(network.node_name[i]), seen[i], (3, 2), textcoords="offset points", fontsize=6
+            )
+    _frame(axes)
+
+
+def draw_grips(axes: Axes, network: Network, grips: Sequence[int | None], view: View) -> None:
+    """Mark the nodes that robots hold."""
+    for i, (robot, node) in enumerate(zip(network.scene.robots, grips, strict=True)):
+        if node is None:
+            continue
+        x, y = view.axes()[:2] @ np.array(network.scene.node_position(node))
+        color = ROBOT_COLORS[i % len(ROBOT_COLORS)]
+        axes.scatter([x], [y], s=120, marker="X", c=color, edgecolors="white", zorder=5)
+        axes.annotate(
+            f"{robot.name} at {node}",
+            (x, y),
+            (9, -3),
+            textcoords="offset points",
+            fontsize=8,
+            color=color,
+            zorder=6,
+            path_effects=[withStroke(linewidth=2.5, foreground="white")],
+        )
+
+
+def draw_responses(
+    axes: Sequence[Axes], tables: Mapping[str, pd.DataFrame], columns: Mapping[str, str]
+) -> None:
+    """Draw responses along the build, one column of the tables on each axes.
+
+    Steps are placed at the share of the build they end, so that methods of different length align.
+    """
+    for axis, (column, label) in zip(axes, columns.items(), strict=True):
+        for name, table in tables.items():
+            count = table.groupby("bricks")["step"].transform("count")
+            rank = table.groupby("bricks").cumcount()
+            axis.plot(table["bricks"] - 1 + (rank + 1) / count, table[column], label=name, lw=1.3)
+        axis.set_ylabel(label)
+        axis.grid(visible=True, lw=0.3)
+    axes[-1].set_xlabel("bricks placed")
+    axes[0].legend(frameon=False, ncols=len(tables), fontsize=8)
+
+
+def _corners(network: Network, b: int) -> Floats:
+    """Return the corners of a brick, (8, 3), m."""
+    brick = network.scene.placed[b]
+    first, second = np.array(brick.length_axis), np.array(brick.width_axis)
+    frame = np.stack([first, second, np.cross(first, second)]) * np.array(brick.dimensions)[:, None]
+    signs = np.array(list(product((-0.5, 0.5), repeat=3)))
+    return np.asarray(np.array(brick.position) + signs @ frame)
+
+
+def _frame(axes: Axes) -> None:
+    axes.set_aspect("equal")
+    axes.autoscale_view()
+    axes.set_axis_off()

@@ -1,0 +1,233 @@
+"""Build the scene of an arch one brick wide: a chain of bricks end to end."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from seqopt.arrays import Floats, Vector
+from seqopt.errors import SceneError
+from seqopt.scene.reach import Anywhere, Reach, Side
+from seqopt.scene.scene import Brick, Ground, Joint, Robot, Scene
+
+LEFT = np.array([0.0, 1.0, 0.0])
+LETTERS = "VLR"
+STANDARD_GRAVITY = 9.81  # m/s²
+
+
+@dataclass(frozen=True, kw_only=True)
+class ArchShape:
+    """The numbers that shape a chain of bricks; lengths in m, angles in rad.
+
+    Parameters
+    ----------
+    pitch : sequence of float
+        Per brick: angle of its direction along the arch from the horizontal.
+    roll : sequence of float, optional
+        Per brick: rotation about that direction; positive lifts its left side.
+    yaw : sequence of float, optional
+        Per brick: rotation in the surface; positive turns a brick that lies along the arch to the
+        left, and the left side of one that lies across it forward.
+    offset : sequence of float, optional
+        Per brick: its distance outward from the line between its joints.
+    pattern : str
+        A letter per brick, repeated: ``V`` lies along the arch, ``L`` and ``R`` lie across it and
+        stick out to the left or right of the building direction.
+    gap : float
+        Width of a joint.
+    overhang : float
+        Distance from the arch line to the centroid of a brick that lies across.
+    stub : float
+        Length of the rigid stub behind the joint at each ground end.
+    translational_stiffness, rotational_stiffness : Vector
+        Of every joint: along it and across it twice, N/m and N m/rad.
+    dimensions : Vector
+        Length, width and thickness of a brick.
+    density : float
+        kg/m³.
+    closed : bool
+        Whether the last brick stands on a second ground end.
+    """
+
+    pitch: Sequence[float]
+    roll: Sequence[float] | None = None
+    yaw: Sequence[float] | None = None
+    offset: Sequence[float] | None = None
+    pattern: str = LETTERS
+    gap: float = 0.0145
+    overhang: float = 0.0615
+    stub: float = 0.093
+    translational_stiffness: Vector = (3.07e8, 3.07e8, 3.07e8)
+    rotational_stiffness: Vector = (2.5e6, 2.5e6, 2.5e6)
+    dimensions: Vector = (0.246, 0.116, 0.053)
+    density: float = 2420.0
+    closed: bool = True
+
+    def __post_init__(self) -> None:
+        count = len(self.pitch)
+        if not count:
+            raise SceneError("arch: pitch is empty; give one angle per brick")
+        for name in ("roll", "yaw", "offset"):
+            values = getattr(self, name)
+            if values is not None and len(values) != count:
+                raise SceneError(
+                    f"arch: {len(values)} {name} and {count} pitch values; give as many"
+                )
+        if not self.pattern or set(self.pattern) - set(LETTERS):
+            raise SceneError(f"arch: pattern is {self.pattern!r}; give letters of {LETTERS}")
+
+
+def arch_scene(
+    shape: ArchShape,
+    name: str = "arch",
+    *,
+    robots: Sequence[Robot] | None = None,
+    line_nodes: Mapping[int, int] | None = None,
+    provenance: str = "",
+) -> Scene:
+    """Return the scene of an arch that is built from its first brick to its last.
+
+    The chain starts at the origin and runs towards +x; z is up, left is +y. Brick ``b`` has the
+    nodes 2b-2 and 2b-1, the upper or outer one last; node 0 is blocked, as in the study.
+
+    Parameters
+    ----------
+    shape : ArchShape
+    name, provenance : str
+    robots : sequence of Robot, optional
+        By default `robots_beside` the arch.
+    line_nodes : mapping of int to int, optional
+        Per brick that lies across: which of its nodes is on the arch line; 2b-2 by default.
+    """
+    tangent, left, ends = _axes(shape)
+    pattern = _pattern(shape)
+    offset = np.zeros(len(pattern)) if shape.offset is None else np.asarray(shape.offset, float)
+    middle = 0.5 * (ends[:-1] + ends[1:]) + offset[:, None] * np.cross(tangent, left)
+    bricks = [
+        _brick(shape, b, (tangent[i], left[i], middle[i]), (line_nodes or {}).get(b, 2 * b - 2))
+        for i, b in enumerate(range(1, len(pattern) + 1))
+    ]
+    bisector = tangent[:-1] + tangent[1:]
+    joints = [_joint(shape, b, ends[b], bisector[b - 1]) for b in range(1, len(pattern))]
+    grounds = [_ground(shape, 1, ends[0], tangent[0], -1.0)]
+    if shape.closed:
+        grounds.append(_ground(shape, len(pattern), ends[-1], tangent[-1], 1.0))
+    return Scene(
+        name=name,
+        provenance=provenance,
+        bricks=tuple(bricks),
+        joints=tuple(joints),
+        grounds=tuple(grounds),
+        build_order=tuple(range(1, len(pattern) + 1)),
+        robots=robots_beside(shape) if robots is None else tuple(robots),
+        blocked_nodes=(0,),
+    )
+
+
+def robots_beside(shape: ArchShape) -> tuple[Robot, ...]:
+    """Return three robots for an arch: one on either side, and a mobile one that reaches all.
+
+    Those beside it reach its line, but not the far ends of bricks that stick out to the other side.
+    Each can bear the weight of the whole arch: give robots of your own to have payloads that bind.
+
+    Parameters
+    ----------
+    shape : ArchShape
+    """
+    beyond = shape.overhang + 0.25 * shape.dimensions[1]
+    weight = math.prod(shape.dimensions) * shape.density * STANDARD_GRAVITY * len(shape.pitch)
+    reaches: tuple[Reach, ...] = (
+        Side(toward=(0.0, 1.0, 0.0), point=(0.0, -beyond, 0.0)),
+        Side(toward=(0.0, -1.0, 0.0), point=(0.0, beyond, 0.0)),
+        Anywhere(),
+    )
+    return tuple(
+        Robot(name=f"rob{i}", payload=weight, reach=reach)
+        for i, reach in enumerate(reaches, start=1)
+    )
+
+
+def _pattern(shape: ArchShape) -> str:
+    return (shape.pattern * len(shape.pitch))[: len(shape.pitch)]
+
+
+def _axes(shape: ArchShape) -> tuple[Floats, Floats, Floats]:
+    """Return the bricks' directions along the arch, to the left, and the points between them."""
+    pitch = np.asarray(shape.pitch, dtype=float)
+    zero = np.zeros_like(pitch)
+    roll, yaw = (zero if a is None else np.asarray(a, float) for a in (shape.roll, shape.yaw))
+    forward = np.stack([np.cos(pitch), zero, np.sin(pitch)], axis=1)
+    normal = np.stack([-np.sin(pitch), zero, np.cos(pitch)], axis=1)
+    rolled = np.cos(roll)[:, None] * LEFT + np.sin(roll)[:, None] * normal
+    lies_along = np.array([letter == "V" for letter in _pattern(shape)])
+    cos, sin = np.cos(yaw)[:, None], np.sin(yaw)[:, None]
+    tangent = np.where(lies_along[:, None], cos * forward + sin * rolled, forward)
+    left = np.where(lies_along[:, None], cos * rolled - sin * forward, cos * rolled + sin * forward)
+    length = np.where(lies_along, shape.dimensions[0], shape.dimensions[1]) + shape.gap
+    ends = np.vstack([np.zeros(3), np.cumsum(length[:, None] * tangent, axis=0)])
+    return tangent, left, ends
+
+
+def _brick(shape: ArchShape, b: int, place: tuple[Floats, Floats, Floats], line_node: int) -> Brick:
+    """Return brick ``b`` from its direction along the arch, its left, and its middle."""
+    tangent, left, position = place
+    letter = _pattern(shape)[b - 1]
+    nodes = (2 * b - 2, 2 * b - 1)
+    if letter == "V":
+        length_axis, width_axis, placing = tangent, left, nodes[1]
+    else:
+        length_axis = left if letter == "L" else -left
+        width_axis = np.cross(np.cross(length_axis, tangent), length_axis)
+        width_axis /= np.linalg.norm(width_axis)
+        position = position + shape.overhang * length_axis
+        if line_node == nodes[1]:
+            nodes = nodes[::-1]
+        placing = nodes[int((letter == "L") == (b % 2 == 1))]  # robots on either side take turns
+    return Brick(
+        name=b,
+        position=_vector(position),
+        length_axis=_vector(length_axis),
+        width_axis=_vector(width_axis),
+        dimensions=shape.dimensions,
+        density=shape.density,
+        nodes=nodes,
+        placing_node=placing,
+    )
+
+
+def _joint(shape: ArchShape, brick: int, position: Floats, direction: Floats) -> Joint:
+    """Return the joint between a brick and the next one."""
+    return Joint(
+        bricks=(brick, brick + 1),
+        position=_vector(position),
+        along=_vector(direction / np.linalg.norm(direction)),
+        across=_across(direction),
+        translational_stiffness=shape.translational_stiffness,
+        rotational_stiffness=shape.rotational_stiffness,
+    )
+
+
+def _ground(shape: ArchShape, brick: int, end: Floats, tangent: Floats, sign: float) -> Ground:
+    return Ground(
+        brick=brick,
+        position=_vector(end),
+        along=_vector(tangent),
+        across=_across(tangent),
+        translational_stiffness=shape.translational_stiffness,
+        rotational_stiffness=shape.rotational_stiffness,
+        anchor=_vector(end + sign * shape.stub * tangent),
+    )
+
+
+def _across(direction: Floats) -> Vector:
+    """Return the unit vector to the left at right angles to a direction."""
+    rest = LEFT - direction * (direction @ LEFT) / (direction @ direction)
+    return _vector(rest / np.linalg.norm(rest))
+
+
+def _vector(values: Floats) -> Vector:
+    x, y, z = values.tolist()
+    return x, y, z

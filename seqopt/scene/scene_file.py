@@ -1,0 +1,123 @@
+"""Scenes as versioned JSON, checked against the published schema ``data/scene.schema.json``."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+
+from seqopt.errors import SceneError
+from seqopt.files import read_text, write_text
+from seqopt.scene.reach import Anywhere, Reach, Side, Sphere
+from seqopt.scene.scene import Brick, Ground, Joint, Robot, Scene
+
+VERSION = 1
+REACHES: dict[str, type[Anywhere] | type[Side] | type[Sphere]] = {
+    "anywhere": Anywhere,
+    "side": Side,
+    "sphere": Sphere,
+}
+
+
+def schema() -> dict[str, Any]:
+    """Return the JSON Schema of a scene file."""
+    text = resources.files("seqopt").joinpath("data/scene.schema.json").read_text(encoding="utf-8")
+    document: dict[str, Any] = json.loads(text)
+    return document
+
+
+def builtin_scenes() -> tuple[str, ...]:
+    """Return the names of the scenes that ship with the package."""
+    folder = resources.files("seqopt").joinpath("data/scenes")
+    return tuple(sorted(item.name.removesuffix(".json") for item in folder.iterdir()))
+
+
+def load_scene(name: str) -> Scene:
+    """Return a built-in scene by name, or the scene of a JSON file.
+
+    Raises
+    ------
+    SceneError
+        If there is no such scene or the file does not describe one.
+    FileError
+        If the file cannot be read.
+    """
+    if name in builtin_scenes():
+        source = resources.files("seqopt").joinpath(f"data/scenes/{name}.json")
+        return parse_scene(source.read_text(encoding="utf-8"), name)
+    path = Path(name)
+    if not path.suffix and not path.exists():
+        known = ", ".join(builtin_scenes())
+        raise SceneError(f"scene {name}: no such built-in scene or file; built in: {known}")
+    return parse_scene(read_text(path), name)
+
+
+def parse_scene(text: str, source: str = "text") -> Scene:
+    """Return the scene that a JSON document describes."""
+    try:
+        document = json.loads(text)
+    except json.JSONDecodeError as error:
+        raise SceneError(f"scene {source}: not JSON, line {error.lineno}: {error.msg}") from error
+    _check_schema(document, source)
+    return scene_from_dict(document)
+
+
+def scene_from_dict(document: dict[str, Any]) -> Scene:
+    """Return the scene of a document that obeys the schema."""
+    content = {key: value for key, value in document.items() if key not in ("format", "version")}
+    content["bricks"] = [Brick(**brick) for brick in content["bricks"]]
+    content["joints"] = [Joint(**joint) for joint in content["joints"]]
+    content["grounds"] = [Ground(**ground) for ground in content["grounds"]]
+    content["robots"] = [
+        Robot(**{**robot, "reach": _reach(robot.get("reach", {"kind": "anywhere"}))})
+        for robot in content["robots"]
+    ]
+    return Scene(**content)
+
+
+def scene_to_dict(scene: Scene) -> dict[str, Any]:
+    """Return the scene as a document that obeys the schema."""
+    document = {"format": "seqopt-scene", "version": VERSION, **asdict(scene)}
+    names = {cls: kind for kind, cls in REACHES.items()}
+    for entry, robot in zip(document["robots"], scene.robots, strict=True):
+        entry["reach"] = {"kind": names[type(robot.reach)], **entry["reach"]}
+    return document
+
+
+def dump_scene(scene: Scene) -> str:
+    """Return the scene as JSON text, one brick, joint or robot a line."""
+    document = scene_to_dict(scene)
+    lines = []
+    for key, value in document.items():
+        if isinstance(value, tuple) and value and isinstance(value[0], dict):
+            rows = ",\n    ".join(json.dumps(item, ensure_ascii=False) for item in value)
+            lines.append(f"  {json.dumps(key)}: [\n    {rows}\n  ]")
+        else:
+            lines.append(f"  {json.dumps(key)}: {json.dumps(value, ensure_ascii=False)}")
+    return "{\n" + ",\n".join(lines) + "\n}\n"
+
+
+def save_scene(scene: Scene, path: Path) -> None:
+    """Write the scene as a JSON file."""
+    write_text(path, dump_scene(scene))
+
+
+def _reach(entry: dict[str, Any]) -> Reach:
+    return REACHES[entry["kind"]](**{key: value for key, value in entry.items() if key != "kind"})
+
+
+def _check_schema(document: object, source: str) -> None:
+    """Raise a `SceneError` that names the first place where a document breaks the schema."""
+    validator = jsonschema.Draft202012Validator(schema())
+    error = jsonschema.exceptions.best_match(validator.iter_errors(document))
+    if error is not None:
+        place = error.json_path.removeprefix("$").removeprefix(".") or "document"
+        raise SceneError(f"scene {source}: {place}: {_short(error.message)}")
+
+
+def _short(text: str, limit: int = 160) -> str:
+    return text if len(text) <= limit else f"{text[: limit - 1]}…"

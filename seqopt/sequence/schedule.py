@@ -1,0 +1,115 @@
+"""Schedules: sequences in which some grips are still to be chosen."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from seqopt.errors import StepError
+from seqopt.scene.scene import Scene
+from seqopt.sequence.steps import Step, StepKind, check_sequence
+
+
+@dataclass(frozen=True)
+class OpenGrip:
+    """A grip to be chosen: that of a move, by its place in the schedule's moves."""
+
+    move: int
+
+
+ScheduledGrips = tuple[int | OpenGrip | None, ...]
+
+
+@dataclass(frozen=True)
+class OpenStep:
+    """A step whose grips are nodes, open moves, or none.
+
+    Parameters
+    ----------
+    number : int
+        From 1.
+    kind : StepKind
+    bricks : int
+    grips : tuple of (int, Open or None)
+        What each of the scene's robots holds.
+    """
+
+    number: int
+    kind: StepKind
+    bricks: int
+    grips: ScheduledGrips
+
+    @property
+    def moves(self) -> tuple[int, ...]:
+        """The moves that are open in this step, in order."""
+        return tuple(sorted({grip.move for grip in self.grips if isinstance(grip, OpenGrip)}))
+
+
+@dataclass(frozen=True)
+class Move:
+    """One repositioning to be decided.
+
+    Parameters
+    ----------
+    robot : str
+        Name of the robot that moves.
+    step : int
+        Number of the step in which it takes its grip.
+    bricks : int
+        Bricks placed at that step.
+    candidates : tuple of int
+        Nodes open to it: within reach, and held by no other robot while it stays.
+    """
+
+    robot: str
+    step: int
+    bricks: int
+    candidates: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """A sequence with open moves; at most two neighboring moves are open in one step.
+
+    Parameters
+    ----------
+    method : str
+        What made it.
+    scene : Scene
+    steps : tuple of OpenStep
+    moves : tuple of Move
+    """
+
+    method: str
+    scene: Scene
+    steps: tuple[OpenStep, ...]
+    moves: tuple[Move, ...]
+
+    def __post_init__(self) -> None:
+        for step in self.steps:
+            if len(step.moves) > 2 or (len(step.moves) == 2 and step.moves[1] != step.moves[0] + 1):
+                raise StepError(
+                    f"step {step.number}: moves {[m + 1 for m in step.moves]} are open at once; "
+                    "at most two neighboring ones can be"
+                )
+
+    def fill(self, nodes: Sequence[int]) -> tuple[Step, ...]:
+        """Return the checked sequence in which every move takes the node chosen for it.
+
+        Raises
+        ------
+        StepError
+            If there is not one node per move, or a step is impossible with them.
+        """
+        if len(nodes) != len(self.moves):
+            raise StepError(f"{len(nodes)} nodes for {len(self.moves)} moves; give one each")
+        steps = [
+            Step(
+                step.number,
+                step.kind,
+                step.bricks,
+                tuple(nodes[g.move] if isinstance(g, OpenGrip) else g for g in step.grips),
+            )
+            for step in self.steps
+        ]
+        return check_sequence(self.scene, steps)

@@ -1,0 +1,155 @@
+"""Steps of a build, and the check that a sequence of them is possible in its scene."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from enum import Enum
+
+from seqopt.errors import StepError
+from seqopt.scene.scene import Robot, Scene
+
+Grips = tuple[int | None, ...]
+
+
+class StepKind(Enum):
+    """What a step does."""
+
+    PLACE = "place"  # one more brick, held by the robot that places it
+    RELEASE = "release"  # one grip fewer, or several; same bricks
+    REPOSITION = "reposition"  # one grip more; same bricks
+
+
+@dataclass(frozen=True)
+class Step:
+    """One static state of the build.
+
+    Parameters
+    ----------
+    number : int
+        From 1.
+    kind : StepKind
+    bricks : int
+        How many bricks stand, in build order.
+    grips : tuple of (int or None)
+        Node that each of the scene's robots holds.
+    """
+
+    number: int
+    kind: StepKind
+    bricks: int
+    grips: Grips
+
+    @property
+    def held(self) -> tuple[int, ...]:
+        """The nodes held, in the order of the robots."""
+        return tuple(node for node in self.grips if node is not None)
+
+
+def reachable(scene: Scene, robot: Robot, bricks: int) -> tuple[int, ...]:
+    """Return the nodes of the first bricks that a robot may hold, in build order."""
+    return tuple(
+        node
+        for brick in scene.placed[:bricks]
+        for node in brick.nodes
+        if node not in scene.blocked_nodes and robot.reach.covers(brick.node_position(node))
+    )
+
+
+def check_sequence(scene: Scene, steps: Sequence[Step]) -> tuple[Step, ...]:
+    """Return the steps if each is possible after the one before.
+
+    Raises
+    ------
+    StepError
+        Naming the step, the robot or brick at fault, and what would be possible.
+    """
+    if not steps:
+        raise StepError("the sequence has no steps; give at least one")
+    before = Step(0, StepKind.RELEASE, 0, (None,) * len(scene.robots))
+    for step in steps:
+        _check_state(scene, step)
+        _check_change(scene, before, step)
+        before = step
+    return tuple(steps)
+
+
+def _check_state(scene: Scene, step: Step) -> None:
+    """Require grips that are possible whatever came before."""
+    where = f"step {step.number}"
+    if len(step.grips) != len(scene.robots):
+        raise StepError(
+            f"{where}: {len(step.grips)} grips for {len(scene.robots)} robots; give one each"
+        )
+    if not 1 <= step.bricks <= len(scene.bricks):
+        raise StepError(f"{where}: {step.bricks} bricks; the scene has 1 to {len(scene.bricks)}")
+    holder: dict[int, str] = {}
+    for robot, node in zip(scene.robots, step.grips, strict=True):
+        if node is None:
+            continue
+        if node in holder:
+            raise StepError(
+                f"{where}: {robot.name} at node {node}: {holder[node]} holds it; hold another"
+            )
+        _check_grip(scene, step, robot, node)
+        holder[node] = robot.name
+
+
+def _check_grip(scene: Scene, step: Step, robot: Robot, node: int) -> None:
+    """Require a node that exists, is free and stands within reach."""
+    placed = {n for brick in scene.placed[: step.bricks] for n in brick.nodes}
+    possible = reachable(scene, robot, step.bricks)
+    if node not in scene.brick_of_node:
+        reason = "there is no such node"
+    elif node in scene.blocked_nodes:
+        reason = "the node is blocked"
+    elif node not in placed:
+        reason = f"brick {scene.brick_of_node[node].name} is not placed yet"
+    elif node not in possible:
+        reason = "the node is out of its reach"
+    else:
+        return
+    raise StepError(
+        f"step {step.number}: {robot.name} at node {node}: {reason}; it can hold {_list(possible)}"
+    )
+
+
+def _check_change(scene: Scene, before: Step, step: Step) -> None:
+    """Require that a step does what its kind says, and nothing else."""
+    where = f"step {step.number} ({step.kind.value})"
+    expected = before.bricks + (step.kind is StepKind.PLACE)
+    if step.bricks != expected:
+        raise StepError(
+            f"{where}: {step.bricks} bricks after {before.bricks}; give {expected} or another kind"
+        )
+    for robot, old, new in zip(scene.robots, before.grips, step.grips, strict=True):
+        if None not in (old, new) and old != new:
+            raise StepError(
+                f"{where}: {robot.name} goes from node {old} to {new}; let it release first"
+            )
+    taken = [
+        n for o, n in zip(before.grips, step.grips, strict=True) if o is None and n is not None
+    ]
+    dropped = [
+        o for o, n in zip(before.grips, step.grips, strict=True) if n is None and o is not None
+    ]
+    wanted = (
+        "takes none and drops some" if step.kind is StepKind.RELEASE else "takes one, drops none"
+    )
+    if (len(taken), not dropped) != ((0, False) if step.kind is StepKind.RELEASE else (1, True)):
+        raise StepError(
+            f"{where}: it takes grips {taken} and drops {dropped}; such a step {wanted}"
+        )
+    brick = scene.placed[step.bricks - 1]
+    if step.kind is StepKind.PLACE and taken[0] not in brick.nodes:
+        raise StepError(
+            f"{where}: its new grip is on node {taken[0]}; "
+            f"hold brick {brick.name} at one of {list(brick.nodes)}"
+        )
+
+
+def _list(nodes: Iterable[int]) -> str:
+    numbers = list(nodes)
+    if len(numbers) > 12:
+        return f"{len(numbers)} nodes from {numbers[0]} to {numbers[-1]}"
+    return ", ".join(map(str, numbers)) or "no node"

@@ -1,0 +1,227 @@
+"""Does an assembly stand, with what margins, and what goes first where it does not."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from enum import Enum
+
+import numpy as np
+
+from seqopt.arrays import Floats, Vector
+from seqopt.contact.assembly import Assembly
+from seqopt.contact.mortar import Mortar
+from seqopt.stability.limit_analysis import (
+    CAP,
+    EXACT,
+    Case,
+    Claim,
+    Compile,
+    Sense,
+    compile_equilibrium,
+)
+from seqopt.stability.prover import Proven, Prover
+
+DIRECTIONS = 8  # in which an assembly is pulled sideways, evenly spread
+ROUGHEST = 10.0  # largest coefficient of friction that is tried
+FRICTION_STEP = 1e-4  # to which the least one is found
+STILL = 1e-6  # motion slower than this, beside the fastest, is none
+
+
+class Verdict(Enum):
+    """What is proven about an assembly; a solver that fails proves nothing."""
+
+    STANDS = "stands"
+    FALLS = "does not stand"
+    UNDECIDED = "undecided"
+
+
+@dataclass(frozen=True)
+class Stability:
+    """Verdict and margins of one assembly; a margin of which nothing is proven is NaN.
+
+    Attributes
+    ----------
+    verdict : Verdict
+        With the mortar and the payloads given.
+    bond : float
+        Least strength, in tension and at the same time in shear, of a bond in every contact with
+        which it stands at the mortar's friction, Pa; inf if none is enough.
+    friction : float
+        Least coefficient of friction with which it stands at the mortar's bond; inf if none is.
+    pull : (8,) float
+        Largest sideways acceleration that it survives in each direction, over that of gravity;
+        NaN where it does not stand.
+    grip : float
+        The largest grip force, made as small as equilibrium with the mortar allows, N; inf if no
+        payload is enough, 0 if nothing grips.
+    motion : (B, 6) float
+        How it fails: if it does not stand by itself, else when pulled to the limit in the worst
+        direction. Translation (m) and rotation (rad) of the blocks, the largest translation or
+        rotation times lever being 1 m; zero if unknown.
+    first_block, first_contact : str
+        The fastest block and the contact that parts fastest in that motion; empty if unknown.
+    claims : mapping of Claim to int
+        How the solver said it ended, over all cases that were solved.
+    unproven : int
+        Cases whose answers proved nothing.
+    """
+
+    verdict: Verdict
+    bond: float
+    friction: float
+    pull: Floats
+    grip: float
+    motion: Floats
+    first_block: str
+    first_contact: str
+    claims: Mapping[Claim, int]
+    unproven: int
+
+    @property
+    def tilt(self) -> float:
+        """Tilt survived in whichever of the directions is worst, rad; NaN if it does not stand.
+
+        From the sideways acceleration a over gravity's: gravity turned by atan(a) mixes no load
+        with gravity and a, both survived. Exact for dry blocks whose grips stay below payload.
+        """
+        return float(np.arctan(self.pull.min()))
+
+
+def assess(
+    assembly: Assembly,
+    mortar: Mortar,
+    up: Vector = (0.0, 0.0, 1.0),
+    compiled: Compile = compile_equilibrium,
+) -> Stability:
+    """Return verdict and margins of an assembly.
+
+    Parameters
+    ----------
+    assembly : Assembly
+    mortar : Mortar
+    up : Vector
+        Unit vector against gravity; it is pulled at right angles.
+    compiled : callable
+        Makes the program to solve; the registered one by default.
+    """
+    prove = Prover(assembly, compiled)
+    growing = bonded(assembly, mortar)
+    stand = prove(growing)
+    verdict = verdict_of(stand)
+    bare = bonded(assembly, Mortar(friction=mortar.friction))
+    bond = stand if bare == growing else prove(bare)
+    fixed = replace(growing, tension=(growing.tension[0], 0.0), cohesion=(growing.cohesion[0], 0.0))
+    stands = verdict is Verdict.STANDS
+    pulls = [prove(case) for case in sideways(fixed, up)] if stands else []
+    failure = min(pulls, key=lambda pull: np.nan_to_num(pull.value, nan=CAP), default=stand)
+    known = failure.value < CAP if stands else verdict is Verdict.FALLS
+    motion = failure.answer.motion if known else np.zeros((len(assembly.centroid), 6))
+    motion = motion / (np.abs(motion).max(initial=0.0) or 1.0)
+    block, contact = first_to_fail(assembly, motion)
+    force, lever = assembly.scales
+    return Stability(
+        verdict=verdict,
+        bond=_amount(bond.value) * assembly.stress_scale,
+        friction=least_friction(prove, mortar),
+        pull=np.array([pull.value for pull in pulls] or [np.nan] * DIRECTIONS),
+        grip=_amount(_grip(prove, fixed)) * force,
+        motion=motion / np.repeat([1.0, lever], 3),
+        first_block=block,
+        first_contact=contact,
+        claims=prove.claims,
+        unproven=prove.unproven,
+    )
+
+
+def bonded(assembly: Assembly, mortar: Mortar) -> Case:
+    """Return the case of the least bond that a mortar lacks.
+
+    A bond of strength s carries a tension s and, at the same time, a shear stress s; in the terms
+    of Mohr and Coulomb its cohesion is s (1 + friction).
+    """
+    stress = assembly.stress_scale
+    return Case(
+        sense=Sense.SMALLEST,
+        friction=mortar.friction,
+        tension=(mortar.tensile_strength / stress, 1.0),
+        cohesion=(mortar.cohesion / stress, 1.0 + mortar.friction),
+    )
+
+
+def verdict_of(stand: Proven) -> Verdict:
+    """Return the verdict where a number is proven that must be zero."""
+    if np.isnan(stand.value):
+        return Verdict.UNDECIDED
+    return Verdict.STANDS if stand.value <= EXACT else Verdict.FALLS
+
+
+def sideways(fixed: Case, up: Vector) -> list[Case]:
+    """Return the cases of the largest sideways acceleration, one per direction."""
+    axis = np.array(up)
+    first = np.eye(3)[np.abs(axis).argmin()]
+    first = first - axis * (axis @ first)
+    first /= np.linalg.norm(first)
+    second = np.cross(axis, first)
+    angles = 2 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
+    pulls = np.outer(np.cos(angles), first) + np.outer(np.sin(angles), second)
+    return [replace(fixed, sense=Sense.LARGEST, pull=(x, y, z)) for x, y, z in pulls.tolist()]
+
+
+def least_friction(prove: Prover, mortar: Mortar) -> float:
+    """Return the least coefficient of friction with which no bond is lacking, to `FRICTION_STEP`.
+
+    The lacking bond falls with the friction. A line through two points where some is lacking aims
+    at where none is; where that does not help, the middle is tried.
+    """
+
+    def lacking(friction: float) -> float:
+        return prove(bonded(prove.assembly, replace(mortar, friction=friction))).value
+
+    low = (0.0, lacking(0.0))
+    if not low[1] > EXACT:
+        return max(low[1], 0.0) * 0.0
+    enough = [f for f in (mortar.friction, ROUGHEST) if lacking(f) <= EXACT]
+    if not enough:
+        return np.inf
+    high = enough[0]
+    before: tuple[float, float] | None = None
+    step = FRICTION_STEP
+    while high - low[0] > step:
+        middle = 0.5 * (low[0] + high)
+        if before is not None and before[1] > low[1] < np.inf:
+            slope = (before[1] - low[1]) / (low[0] - before[0])
+            middle = min(middle, low[0] + low[1] / slope + 0.4 * step)
+        value = lacking(middle)
+        if np.isnan(value):
+            return np.nan
+        if value <= EXACT:
+            high = middle
+        else:
+            before, low = low, (middle, value)
+    return high
+
+
+def _amount(value: float) -> float:
+    """Return a proven z, zero where it is no more than what proofs leave open."""
+    return 0.0 if value <= EXACT else value
+
+
+def _grip(prove: Prover, fixed: Case) -> float:
+    """Return the least largest grip force over the force scale."""
+    if not len(prove.assembly.payload):
+        return 0.0
+    return prove(replace(fixed, sense=Sense.SMALLEST, payload=(0.0, 1.0))).value
+
+
+def first_to_fail(assembly: Assembly, motion: Floats) -> tuple[str, str]:
+    """Return the fastest block and the contact that parts fastest; empty where nothing moves."""
+    speed = np.linalg.norm(motion, axis=1)
+    if not speed.max(initial=0.0) > 0:
+        return "", ""
+    block = str(assembly.block_name[int(speed.argmax())])
+    parting = (assembly.contact_map.T @ motion.ravel()).reshape(-1, 3)
+    apart = np.linalg.norm(parting, axis=1)
+    if not apart.max(initial=0.0) > STILL:
+        return block, ""
+    return block, assembly.contact_name[int(assembly.contact[int(apart.argmax())])]

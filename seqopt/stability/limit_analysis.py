@@ -1,0 +1,184 @@
+"""Equilibrium with contact: what is asked of a solver, and the check of what it answers.
+
+A case asks for the smallest or largest number z for which forces exist with::
+
+    E f + G g + w + z w' = 0                          every block in equilibrium
+    f_n + a (s + z s') >= 0                           tension cut-off at every corner
+    |f_t| <= m f_n + a (c + z c')                     Coulomb with cohesion
+    |g| <= p + z p'                                   robots' payloads
+
+Forces that satisfy this prove one side. A motion of the blocks proves the other: where no contact
+closes or slides without opening m times as fast, the load must not do more work than the contacts
+and robots can take up (the kinematic theorem of limit analysis). Both are evaluated here, from
+the assembly's own data; a solver's status is never the verdict.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+from importlib.metadata import entry_points
+
+import numpy as np
+
+from seqopt.arrays import Floats, Vector
+from seqopt.contact.assembly import Assembly
+
+EXACT = 1e-6  # largest violation of an accepted proof, over the force scale and max(1, z)
+GAP = 1e-3  # largest difference between the two proofs, relative to max(1, z)
+LARGEST_FORCE = 10.0  # of a corner, over total weight and payloads: prices motions that violate
+CAP = 1e5  # z is sought between 0 and this
+
+
+class Sense(Enum):
+    """Whether the smallest or the largest z is sought."""
+
+    SMALLEST = 1.0
+    LARGEST = -1.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Case:
+    """The numbers of one question; strengths over the stress scale, forces over the force scale.
+
+    Parameters
+    ----------
+    sense : Sense
+    friction : float
+    tension, cohesion, payload : tuple of 2 float
+        Value at z = 0 and growth with z. A payload is a multiple of every grip's own and an
+        amount that all have in common.
+    pull : Vector
+        Acceleration that grows with z, over that of gravity.
+    """
+
+    sense: Sense
+    friction: float
+    tension: tuple[float, float]
+    cohesion: tuple[float, float]
+    payload: tuple[float, float] = (1.0, 0.0)
+    pull: Vector = (0.0, 0.0, 0.0)
+
+
+class Claim(Enum):
+    """How a solver says that it ended."""
+
+    SOLVED = "solved"
+    ALMOST = "almost solved"
+    INFEASIBLE = "infeasible"
+    STALLED = "stalled"
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a solver returns for a case.
+
+    Attributes
+    ----------
+    claim : Claim
+    value : float
+        z; NaN if there is none.
+    contact_force : (K, 3) float
+        Normal part, compression positive, and tangential parts, over the force scale.
+    grip_force : (G, 3) float
+        Over the force scale.
+    motion : (B, 6) float
+        Of the blocks: translation and rotation times the length scale, of any size.
+    """
+
+    claim: Claim
+    value: float
+    contact_force: Floats
+    grip_force: Floats
+    motion: Floats
+
+
+ATTEMPTS = 2  # of a case, with other settings of the solver each time, until one is proven
+
+Program = Callable[[Case, int], Answer]
+"""The cases of one assembly, solved one by one; the number of the attempt counts from 0."""
+
+Compile = Callable[[Assembly], Program]
+"""Makes the program of an assembly."""
+
+
+def compile_equilibrium(assembly: Assembly) -> Program:
+    """Return the registered program of an assembly (entry points ``seqopt.limit_analysis``)."""
+    (entry,) = entry_points(group="seqopt.limit_analysis", name="socp")
+    compiled: Compile = entry.load()
+    return compiled(assembly)
+
+
+def limits(assembly: Assembly, case: Case, z: float) -> tuple[Floats, Floats, Floats]:
+    """Return tension and cohesion (K,) of the corners and payload (G,) at a z, over the force."""
+    share = assembly.corner_area * assembly.stress_scale / assembly.scales[0]
+    payload = case.payload[0] * assembly.payload / assembly.scales[0] + z * case.payload[1]
+    tension, cohesion = case.tension, case.cohesion
+    return (
+        share * (tension[0] + z * tension[1]),
+        share * (cohesion[0] + z * cohesion[1]),
+        payload,
+    )
+
+
+def violation(assembly: Assembly, case: Case, answer: Answer) -> float:
+    """Return the largest violation of the case by the answer's forces, over the force scale."""
+    z, force, grip = answer.value, answer.contact_force, answer.grip_force
+    residual = assembly.contact_map @ force.ravel() + assembly.grip_map @ grip.ravel()
+    residual += assembly.load() + z * assembly.load(case.pull)
+    tension, cohesion, payload = limits(assembly, case, z)
+    excess = (
+        np.abs(residual),
+        -force[:, 0] - tension,
+        np.linalg.norm(force[:, 1:], axis=1) - case.friction * force[:, 0] - cohesion,
+        np.linalg.norm(grip, axis=1) - payload,
+    )
+    worst = max(part.max(initial=0.0) for part in excess)
+    return float(worst) if np.isfinite(worst) else np.inf
+
+
+def bound(assembly: Assembly, case: Case, answer: Answer) -> float:
+    """Return what the answer's motion proves: no z below (smallest) or above (largest) exists.
+
+    A motion proves nothing, 0 or `CAP`, if the load does less work in it than is taken up. Where
+    a contact closes by more than a motion may, the violation is charged with a corner force of
+    `LARGEST_FORCE` times the sum of weights and payloads.
+    """
+    nothing = 0.0 if case.sense is Sense.SMALLEST else CAP
+    motion = answer.motion.ravel()
+    if not np.isfinite(motion).all() or not np.isfinite(answer.value):
+        return nothing
+    taken = _taken(assembly, case, answer.motion, (answer.value, 0.0, 1.0))
+    start = float(assembly.load() @ motion) - taken[1]
+    growth = float(assembly.load(case.pull) @ motion) - (taken[2] - taken[1])
+    if case.sense is Sense.SMALLEST:
+        if not start > 0:
+            return nothing
+        return min(start / -growth, CAP) if growth < 0 else CAP
+    return min(max(-start / growth, 0.0), CAP) if growth > 0 else nothing
+
+
+def _taken(
+    assembly: Assembly, case: Case, motion: Floats, levels: tuple[float, ...]
+) -> list[float]:
+    """Return the most work that contacts and grips take up in a motion, for several z.
+
+    The share of the tension cut-off and of the cone's tip is the one that is best for the first.
+    """
+    parting = (assembly.contact_map.T @ motion.ravel()).reshape(-1, 3)
+    at_grip = np.linalg.norm((assembly.grip_map.T @ motion.ravel()).reshape(-1, 3), axis=1)
+    sliding = np.linalg.norm(parting[:, 1:], axis=1)
+    opening = parting[:, 0] - case.friction * sliding
+    total = np.linalg.norm(assembly.weight, axis=1).sum() + assembly.payload.sum()
+    closing = LARGEST_FORCE * total / assembly.scales[0] * np.maximum(-opening, 0).sum()
+    taken = []
+    tip = None
+    for z in levels:
+        tension, cohesion, payload = limits(assembly, case, z)
+        if tip is None:
+            tip = case.friction * tension > cohesion
+        cut = np.where(tip, cohesion / (case.friction or 1.0), tension)
+        contact = cohesion @ sliding + cut @ np.maximum(opening, 0)
+        taken.append(float(contact + payload @ at_grip + closing))
+    return taken

@@ -1,0 +1,116 @@
+"""Cases of one assembly, solved and proven: a solver's word counts for nothing here."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from seqopt.contact.assembly import Assembly
+from seqopt.stability.limit_analysis import (
+    ATTEMPTS,
+    CAP,
+    EXACT,
+    GAP,
+    Answer,
+    Case,
+    Claim,
+    Compile,
+    Sense,
+    bound,
+    limits,
+    violation,
+)
+
+HANDS = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [-1.0, -1.0, -1.0]])
+
+
+@dataclass(frozen=True)
+class Proven:
+    """A number with its two proofs.
+
+    Attributes
+    ----------
+    value : float
+        z of the case; inf if it is proven that none up to `seqopt.stability.limit_analysis.CAP` will do, NaN
+        if nothing is proven.
+    answer : Answer
+        What it rests on: forces and motion.
+    """
+
+    value: float
+    answer: Answer
+
+
+class Prover:
+    """Solves cases of one assembly and proves the answers; counts what the solver claims.
+
+    Parameters
+    ----------
+    assembly : Assembly
+    compiled : callable
+        Makes the program to solve.
+
+    Attributes
+    ----------
+    claims : collections.Counter of Claim
+        How the solver said it ended, over all cases.
+    unproven : int
+        Cases of which nothing was proven.
+    """
+
+    def __init__(self, assembly: Assembly, compiled: Compile) -> None:
+        self.assembly = assembly
+        self.claims: Counter[Claim] = Counter()
+        self.unproven = 0
+        self._compile = compiled
+        self._program = compiled(assembly)
+
+    def __call__(self, case: Case) -> Proven:
+        """Return the proven answer of a case."""
+        for attempt in range(ATTEMPTS):
+            answer = self._program(case, attempt)
+            self.claims[answer.claim] += 1
+            value = proven_value(self.assembly, case, answer)
+            if answer.claim is Claim.INFEASIBLE or not np.isnan(value):
+                break
+        if np.isnan(value) and case.sense is Sense.SMALLEST and answer.claim is Claim.INFEASIBLE:
+            answer = self._refuted(case)
+            value = np.inf if answer.value > EXACT else np.nan
+        self.unproven += bool(np.isnan(value))
+        return Proven(value, answer)
+
+    def _refuted(self, case: Case) -> Answer:
+        """Return the answer with hands at every block, as weak as possible, at the largest z.
+
+        If hands are needed there, no z will do. The value is what the motion proves they must bear.
+        """
+        assembly = self.assembly
+        blocks = len(assembly.centroid)
+        payload = limits(assembly, case, CAP)[2] * assembly.scales[0]
+        reach = assembly.centroid[:, None] + assembly.scales[1] * HANDS
+        helped = replace(
+            assembly,
+            grip_block=np.concatenate([assembly.grip_block, np.repeat(np.arange(blocks), 4)]),
+            grip_position=np.concatenate([assembly.grip_position, reach.reshape(-1, 3)]),
+            payload=np.concatenate([payload, np.zeros(4 * blocks)]),
+        )
+        strongest = replace(
+            case,
+            tension=(case.tension[0] + CAP * case.tension[1], 0.0),
+            cohesion=(case.cohesion[0] + CAP * case.cohesion[1], 0.0),
+            payload=(1.0, 1.0),
+        )
+        answer = self._compile(helped)(strongest, 0)
+        self.claims[answer.claim] += 1
+        return replace(answer, value=bound(helped, strongest, answer))
+
+
+def proven_value(assembly: Assembly, case: Case, answer: Answer) -> float:
+    """Return the answer's z if its forces and its motion prove it, NaN if not."""
+    scale = max(1.0, abs(answer.value))
+    if not violation(assembly, case, answer) <= EXACT * scale:
+        return np.nan
+    gap = abs(answer.value - bound(assembly, case, answer))
+    return max(answer.value, 0.0) if gap <= GAP * scale else np.nan

@@ -1,0 +1,89 @@
+"""The stability of every step of a build, as a table."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import pandas as pd
+
+from seqopt.contact.faces import step_assembly
+from seqopt.contact.mortar import Mortar
+from seqopt.network.network import Network
+from seqopt.sequence.steps import Step
+from seqopt.stability.assessment import Stability, Verdict, assess
+from seqopt.stability.limit_analysis import Claim
+
+Progress = Callable[[str], None]
+
+
+def assess_steps(
+    network: Network,
+    steps: Sequence[Step],
+    mortar: Mortar,
+    progress: Progress = lambda _: None,
+) -> tuple[Stability, ...]:
+    """Return verdict and margins of every step, all joints being of one mortar.
+
+    Raises
+    ------
+    SceneError
+        If bricks that share a joint do not touch.
+    """
+    out = []
+    for step in steps:
+        progress(f"step {step.number} of {len(steps)}")
+        out.append(
+            assess(step_assembly(network, step.bricks, step.grips), mortar, network.scene.up)
+        )
+    return tuple(out)
+
+
+def stability_table(steps: Sequence[Step], results: Sequence[Stability]) -> pd.DataFrame:
+    """Return a row per step; an empty cell is a number that is not proven.
+
+    Columns: ``step``, ``type``, ``bricks``, ``verdict``, ``bond_needed_Pa``, ``friction_needed``,
+    ``tilt_survived_deg``, ``largest_grip_force_N``, ``first_brick``, ``first_joint``, as in
+    `seqopt.stability.assessment.Stability`; ``almost_solved``, ``stalled`` and ``unproven`` count cases.
+    """
+    rows = []
+    for step, result in zip(steps, results, strict=True):
+        rows.append(
+            {
+                "step": step.number,
+                "type": step.kind.value,
+                "bricks": step.bricks,
+                "verdict": result.verdict.value,
+                "bond_needed_Pa": result.bond,
+                "friction_needed": result.friction,
+                "tilt_survived_deg": np.degrees(result.tilt),
+                "largest_grip_force_N": result.grip,
+                "first_brick": result.first_block,
+                "first_joint": result.first_contact,
+                "almost_solved": result.claims.get(Claim.ALMOST, 0),
+                "stalled": result.claims.get(Claim.STALLED, 0),
+                "unproven": result.unproven,
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def format_verdicts(results: Sequence[Stability]) -> str:
+    """Return how many steps stand, do not stand and are undecided, and how the solver ended."""
+    words = {
+        Verdict.STANDS: "stand",
+        Verdict.FALLS: "do not stand",
+        Verdict.UNDECIDED: "are undecided",
+    }
+    verdicts = ", ".join(
+        f"{sum(result.verdict is verdict for result in results)} {word}"
+        for verdict, word in words.items()
+    )
+    claims = {
+        claim: sum(result.claims.get(claim, 0) for result in results)
+        for claim in (Claim.ALMOST, Claim.STALLED)
+    }
+    cases = sum(sum(result.claims.values()) for result in results)
+    ends = ", ".join(f"{count} {claim.value}" for claim, count in claims.items())
+    unproven = sum(result.unproven for result in results)
+    return f"{len(results)} steps: {verdicts}; {cases} cases: {ends}, {unproven} unproven"
