@@ -18,27 +18,26 @@ from __future__ import annotations
 import numpy as np
 
 from seqopt.errors import ProblemError
-from seqopt.placement.costs import PlacementProblem, without_budgets
-from seqopt.placement.formulation import Aim, Formulation, FormulationKind, Selection
+from seqopt.placement.costs import Aim, PlacementProblem
+from seqopt.placement.formulation import Formulation, FormulationKind, Selection
 
 
 def solve(problem: PlacementProblem, *, width: int = 5) -> Selection:
     """Return the best choice found with a beam of ``width`` partial choices."""
-    without_budgets(problem, "beam")
     if width < 1:
         raise ProblemError(f"beam: width is {width}; give a whole number from 1")
-    placement = problem.sums
+    costs = problem.sums
     found = [_beam(problem, width), _greedy(problem)]
-    choice = min(found, key=placement.cost)
-    return Selection(choice, placement.cost(choice))
+    choice = min(found, key=costs.cost)
+    return Selection(choice, costs.cost(choice))
 
 
 def _beam(problem: PlacementProblem, width: int) -> tuple[int, ...]:
-    placement = problem.sums
-    good = placement.continuable()
+    costs = problem.sums
+    good = costs.continuable()
     paths: list[tuple[int, ...]] = [()]
     spent = np.zeros(1)
-    for k, (single, shared) in enumerate(zip(placement.single, placement.shared, strict=True)):
+    for k, (single, shared) in enumerate(zip(costs.single, costs.shared, strict=True)):
         ends = [path[-1] if path else 0 for path in paths]
         through = spent[:, None] + shared[ends]
         best = through.argmin(axis=0)
@@ -54,12 +53,12 @@ def _beam(problem: PlacementProblem, width: int) -> tuple[int, ...]:
 
 def _greedy(problem: PlacementProblem) -> tuple[int, ...]:
     """Return the choice that takes, move by move, the candidate that is cheapest now."""
-    placement = problem.sums
-    good = placement.continuable()
+    costs = problem.sums
+    good = costs.continuable()
     choice: list[int] = []
-    for k, single in enumerate(placement.single):
-        row = problem.row(k, choice[-1]) if choice else placement.shared[0][0]
-        possible = good[k] & np.isfinite(placement.shared[k][choice[-1] if choice else 0])
+    for k, single in enumerate(costs.single):
+        row = problem.conditional(k, choice[-1]) if choice else costs.shared[0][0]
+        possible = good[k] & np.isfinite(costs.shared[k][choice[-1] if choice else 0])
         choice.append(int(np.argmin(np.where(possible, single + row, np.inf))))
     return tuple(choice)
 

@@ -26,32 +26,31 @@ import numpy as np
 
 from seqopt.arrays import Floats
 from seqopt.errors import ProblemError
-from seqopt.placement.costs import PlacementProblem, without_budgets
-from seqopt.placement.formulation import Aim, Formulation, FormulationKind, Reads, Selection
+from seqopt.placement.costs import Aim, PlacementProblem
+from seqopt.placement.formulation import Formulation, FormulationKind, Reads, Selection
 
 CHARGES = ("later", "earlier")
 
 
 def solve(problem: PlacementProblem, *, charge: str = "later") -> Selection:
     """Return the choices of the cascade; ``charge`` says which move answers for a shared state."""
-    without_budgets(problem, "cascade")
     if charge not in CHARGES:
         raise ProblemError(f"cascade: charge is {charge!r}; give one of {', '.join(CHARGES)}")
-    placement = problem.sums
-    good = placement.continuable()
+    layered = problem.sums
+    good = layered.continuable()
     choice: list[int] = []
-    for k, single in enumerate(placement.single):
-        possible = good[k] & np.isfinite(placement.shared[k][choice[-1] if choice else 0])
+    for k, single in enumerate(layered.single):
+        possible = good[k] & np.isfinite(layered.shared[k][choice[-1] if choice else 0])
         costs = single + _charged(problem, k, choice, charge)
         choice.append(int(np.argmin(np.where(possible, costs, np.inf))))
-    return Selection(tuple(choice), placement.cost(choice))
+    return Selection(tuple(choice), layered.cost(choice))
 
 
 def _charged(problem: PlacementProblem, k: int, choice: list[int], charge: str) -> Floats:
     """Return what move ``k`` answers for beside its own states, (C_k,)."""
     shared = problem.sums.shared
     if charge == "later":
-        return problem.row(k, choice[-1]) if choice else shared[0][0]
+        return problem.conditional(k, choice[-1]) if choice else shared[0][0]
     return shared[k + 1].min(axis=1) if k + 1 < len(shared) else np.zeros(shared[k].shape[1])
 
 

@@ -15,37 +15,36 @@ from __future__ import annotations
 
 import numpy as np
 
-from seqopt.placement.costs import LayeredCosts, PlacementProblem, without_budgets
-from seqopt.placement.formulation import Aim, Formulation, FormulationKind, Selection
+from seqopt.placement.costs import Aim, LayeredCosts, PlacementProblem
+from seqopt.placement.formulation import Formulation, FormulationKind, Selection
 
 
 def solve(problem: PlacementProblem) -> Selection:
     """Return a choice whose worst cost is least."""
-    without_budgets(problem, "minimax")
-    placement = problem.peaks
-    placement.continuable()
-    peak = _least_peak(placement)
+    costs = problem.peaks
+    costs.continuable()
+    peak = _least_peak(costs)
     allowed = LayeredCosts(
-        tuple(np.where(single <= peak, single, np.inf) for single in placement.single),
-        tuple(np.where(shared <= peak, shared, np.inf) for shared in placement.shared),
+        tuple(np.where(single <= peak, single, np.inf) for single in costs.single),
+        tuple(np.where(shared <= peak, shared, np.inf) for shared in costs.shared),
     )
     choice = _least_sum(allowed)
-    return Selection(choice, placement.worst(choice), bound=peak)
+    return Selection(choice, costs.worst(choice), bound=peak)
 
 
-def _least_peak(placement: LayeredCosts) -> float:
+def _least_peak(costs: LayeredCosts) -> float:
     """Return the smallest worst cost."""
     reached = np.full(1, -np.inf)
-    for single, shared in zip(placement.single, placement.shared, strict=True):
+    for single, shared in zip(costs.single, costs.shared, strict=True):
         reached = np.maximum(single, np.maximum(reached[:, None], shared).min(axis=0))
     return float(reached.min())
 
 
-def _least_sum(placement: LayeredCosts) -> tuple[int, ...]:
+def _least_sum(costs: LayeredCosts) -> tuple[int, ...]:
     """Return the choice of least sum."""
     total = np.zeros(1)
     back = []
-    for single, shared in zip(placement.single, placement.shared, strict=True):
+    for single, shared in zip(costs.single, costs.shared, strict=True):
         through = total[:, None] + shared
         back.append(through.argmin(axis=0))
         total = through.min(axis=0) + single

@@ -18,22 +18,21 @@ from __future__ import annotations
 
 import numpy as np
 
-from seqopt.placement.costs import PlacementProblem, without_budgets
-from seqopt.placement.formulation import Aim, Formulation, FormulationKind, Selection
+from seqopt.placement.costs import Aim, PlacementProblem
+from seqopt.placement.formulation import Formulation, FormulationKind, Selection
 
 
 def solve(problem: PlacementProblem) -> Selection:
     """Return the exact optimum of the sum over the build."""
-    without_budgets(problem, "overlap_dp")
-    placement = problem.sums
-    placement.continuable()
-    to_go = [placement.single[-1]]
-    for single, shared in zip(placement.single[-2::-1], placement.shared[:0:-1], strict=True):
+    costs = problem.sums
+    costs.continuable()
+    to_go = [costs.single[-1]]
+    for single, shared in zip(costs.single[-2::-1], costs.shared[:0:-1], strict=True):
         to_go.insert(0, single + (shared + to_go[0]).min(axis=1))
     choice: list[int] = []
-    for shared, rest in zip(placement.shared, to_go, strict=True):
+    for shared, rest in zip(costs.shared, to_go, strict=True):
         choice.append(int(np.argmin(shared[choice[-1] if choice else 0] + rest)))
-    value = placement.cost(choice)
+    value = costs.cost(choice)
     return Selection(tuple(choice), value, bound=value)
 
 

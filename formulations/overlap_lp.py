@@ -15,17 +15,30 @@ need not be the best: use ``overlap_mip``.
 
 from __future__ import annotations
 
-from formulations.solvers import Program, follow, solve_flow
-from seqopt.placement.costs import PlacementProblem
-from seqopt.placement.formulation import Aim, Formulation, FormulationKind, Selection
+import cvxpy as cp
+import numpy as np
+
+from formulations.solvers import minimize
+from seqopt.placement.costs import Aim, PlacementProblem
+from seqopt.placement.flow import layered_flow
+from seqopt.placement.formulation import Formulation, FormulationKind, Selection
 
 
 def solve(problem: PlacementProblem) -> Selection:
     """Return the choice that the largest flow follows."""
-    flow = solve_flow(problem, Program.LINEAR)
-    choice = follow(flow.arcs)
+    flow = layered_flow(problem)
+    arcs = cp.Variable(len(flow.cost), nonneg=True)
+    conserve = cp.Zero(flow.balance @ arcs - flow.source)
+    caps = [
+        cp.NonNeg(cap - amount @ arcs) for cap, amount in zip(flow.caps, flow.amounts, strict=True)
+    ]
+    program = cp.Problem(cp.Minimize(flow.cost @ arcs), [conserve, *caps])
+    optimum = minimize(program, cp.CLARABEL, feasible=flow.feasible)
+    choice = flow.choice(np.asarray(arcs.value))
+    prices = flow.prices([float(cap.dual_value) for cap in caps])
     objective = problem.sums.cost(choice)
-    return Selection(choice, objective, flow.bound, flow.prices, flow.compile_seconds)
+    bound = flow.bound(optimum.value)
+    return Selection(choice, objective, bound, prices, optimum.compile_seconds)
 
 
 FORMULATION = Formulation(

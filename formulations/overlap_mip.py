@@ -13,17 +13,29 @@ the same answer hundreds of times faster.
 
 from __future__ import annotations
 
-from formulations.solvers import Program, follow, solve_flow
-from seqopt.placement.costs import PlacementProblem
-from seqopt.placement.formulation import Aim, Formulation, FormulationKind, Selection
+import cvxpy as cp
+import numpy as np
+
+from formulations.solvers import minimize
+from seqopt.placement.costs import Aim, PlacementProblem
+from seqopt.placement.flow import layered_flow
+from seqopt.placement.formulation import Formulation, FormulationKind, Selection
 
 
 def solve(problem: PlacementProblem) -> Selection:
     """Return the exact optimum within the budgets."""
-    flow = solve_flow(problem, Program.INTEGER)
-    choice = follow(flow.arcs)
+    flow = layered_flow(problem)
+    arcs = cp.Variable(len(flow.cost), boolean=True)
+    conserve = cp.Zero(flow.balance @ arcs - flow.source)
+    caps = [
+        cp.NonNeg(cap - amount @ arcs) for cap, amount in zip(flow.caps, flow.amounts, strict=True)
+    ]
+    program = cp.Problem(cp.Minimize(flow.cost @ arcs), [conserve, *caps])
+    optimum = minimize(program, cp.HIGHS, feasible=flow.feasible)
+    choice = flow.choice(np.asarray(arcs.value))
     objective = problem.sums.cost(choice)
-    return Selection(choice, objective, flow.bound, compile_seconds=flow.compile_seconds)
+    bound = flow.bound(optimum.value)
+    return Selection(choice, objective, bound, compile_seconds=optimum.compile_seconds)
 
 
 FORMULATION = Formulation(

@@ -23,20 +23,19 @@ import numpy as np
 
 from seqopt.arrays import Floats
 from seqopt.errors import ProblemError
-from seqopt.placement.costs import LayeredCosts, PlacementProblem, without_budgets
-from seqopt.placement.formulation import Aim, Formulation, FormulationKind, Reads, Selection
+from seqopt.placement.costs import Aim, LayeredCosts, PlacementProblem
+from seqopt.placement.formulation import Formulation, FormulationKind, Reads, Selection
 
 MOST = 20_000_000  # combinations in one enumeration: 160 MB
 
 
 def solve(problem: PlacementProblem, *, horizon: int = 1) -> Selection:
     """Return the committed choices; ``horizon`` is the number of moves enumerated at once."""
-    without_budgets(problem, "rank_search")
-    placement = problem.sums
-    sizes = placement.sizes
+    costs = problem.sums
+    sizes = costs.sizes
     if horizon < 1:
         raise ProblemError(f"rank_search: horizon is {horizon}; give a whole number from 1")
-    good = placement.continuable()
+    good = costs.continuable()
     choice: list[int] = []
     while len(choice) < len(sizes):
         k = len(choice)
@@ -46,22 +45,22 @@ def solve(problem: PlacementProblem, *, horizon: int = 1) -> Selection:
                 f"rank_search: {count:.2g} combinations of {min(horizon, len(sizes) - k)} moves; "
                 f"lower the horizon (at most {MOST:.0e} are enumerated)"
             )
-        row = problem.row(k, choice[-1]) if choice else placement.shared[0][0]
-        blocked = ~np.isfinite(placement.shared[k][choice[-1] if choice else 0])
-        total = _enumerate(placement, np.where(blocked, np.inf, row), k, horizon, good)
+        row = problem.conditional(k, choice[-1]) if choice else costs.shared[0][0]
+        blocked = ~np.isfinite(costs.shared[k][choice[-1] if choice else 0])
+        total = _enumerate(costs, np.where(blocked, np.inf, row), k, horizon, good)
         best = np.unravel_index(int(np.argmin(total)), total.shape)
         whole = k + horizon >= len(sizes)  # nothing is left to be decided after these
         choice += [int(c) for c in (best if whole else best[:1])]
-    return Selection(tuple(choice), placement.cost(choice))
+    return Selection(tuple(choice), costs.cost(choice))
 
 
 def _enumerate(
-    placement: LayeredCosts, row: Floats, k: int, horizon: int, good: tuple[np.ndarray, ...]
+    costs: LayeredCosts, row: Floats, k: int, horizon: int, good: tuple[np.ndarray, ...]
 ) -> Floats:
     """Return the cost of every combination of the moves from ``k`` on, one axis each."""
-    total = np.where(good[k], row + placement.single[k], np.inf)
-    for move in range(k + 1, min(k + horizon, len(placement.single))):
-        step = placement.shared[move] + np.where(good[move], placement.single[move], np.inf)
+    total = np.where(good[k], row + costs.single[k], np.inf)
+    for move in range(k + 1, min(k + horizon, len(costs.single))):
+        step = costs.shared[move] + np.where(good[move], costs.single[move], np.inf)
         total = total[..., None] + step
     return total
 

@@ -1,6 +1,127 @@
 """Find where each robot should hold a half-built structure, over the whole build.
 
-``seqopt.scene.scene`` says what is built, ``seqopt.engines.rigid.compliance`` how every partial structure answers any
-grips, ``seqopt.sequence.two_robots`` how a build goes, ``seqopt.responses.table`` and ``seqopt.report.comparison`` what it
-costs. Names are imported from the module that defines them.
+A scene says what is built, in which order and by which robots. From it follow the network of bars
+and springs, an engine that computes how every partial structure responds to its grips, and a
+schedule: the steps of the build, some of whose grips are open. Choosing them is the problem; a
+formulation solves it; the plan is its answer, checked.
+
+>>> import seqopt
+>>> scene = seqopt.load_scene("arch25")
+>>> network = seqopt.build_network(scene)
+>>> engine = seqopt.make_engine("compliance", network)
+>>> schedule = seqopt.three_robot_loop(network)
+>>> problem = seqopt.pose(engine, schedule, seqopt.CRITERIA["equations-2-3"])
+>>> plan = seqopt.solve(problem, "overlap_dp")
+>>> plan.certificate.gap
+0.0
+
+`seqopt.optimize` does all of this in one call. Names are loaded when they are first used.
 """
+
+from __future__ import annotations
+
+from importlib import import_module
+from importlib.metadata import version
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from seqopt.contact.mortar import DRY, EPOXY
+    from seqopt.engines.interface import Engine
+    from seqopt.engines.registry import make_engine
+    from seqopt.errors import SeqoptError
+    from seqopt.network.build import build_network
+    from seqopt.network.network import Network
+    from seqopt.placement.certificate import Certificate
+    from seqopt.placement.formulation import Formulation, formulations
+    from seqopt.placement.plan import Plan, solve
+    from seqopt.placement.problem import Limit, pose
+    from seqopt.responses.table import analyze
+    from seqopt.scene.arch import ArchShape, arch_scene
+    from seqopt.scene.scene import Scene
+    from seqopt.scene.scene_file import load_scene, save_scene
+    from seqopt.sequence.plan_file import read_plan
+    from seqopt.sequence.schedule import Schedule
+    from seqopt.sequence.steps import Step
+    from seqopt.sequence.three_robots import modified_sequential, three_robot_loop
+    from seqopt.sequence.two_robots import cantilever, sequential
+    from seqopt.stability.assessment import Stability
+    from seqopt.stability.steps import assess_steps
+    from seqopt.study.presets import CRITERIA
+    from seqopt.workflow import optimize
+
+_HOMES = {
+    "contact.mortar": ("DRY", "EPOXY"),
+    "engines.interface": ("Engine",),
+    "engines.registry": ("make_engine",),
+    "errors": ("SeqoptError",),
+    "network.build": ("build_network",),
+    "network.network": ("Network",),
+    "placement.certificate": ("Certificate",),
+    "placement.formulation": ("Formulation", "formulations"),
+    "placement.plan": ("Plan", "solve"),
+    "placement.problem": ("Limit", "pose"),
+    "responses.table": ("analyze",),
+    "scene.arch": ("ArchShape", "arch_scene"),
+    "scene.scene": ("Scene",),
+    "scene.scene_file": ("load_scene", "save_scene"),
+    "sequence.plan_file": ("read_plan",),
+    "sequence.schedule": ("Schedule",),
+    "sequence.steps": ("Step",),
+    "sequence.three_robots": ("modified_sequential", "three_robot_loop"),
+    "sequence.two_robots": ("cantilever", "sequential"),
+    "stability.assessment": ("Stability",),
+    "stability.steps": ("assess_steps",),
+    "study.presets": ("CRITERIA",),
+    "workflow": ("optimize",),
+}
+_HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
+
+__all__ = [  # noqa: RUF022  # in the order in which they are met
+    "Scene",
+    "load_scene",
+    "save_scene",
+    "ArchShape",
+    "arch_scene",
+    "Network",
+    "build_network",
+    "Step",
+    "Schedule",
+    "sequential",
+    "cantilever",
+    "three_robot_loop",
+    "modified_sequential",
+    "read_plan",
+    "Engine",
+    "make_engine",
+    "analyze",
+    "CRITERIA",
+    "Limit",
+    "pose",
+    "Formulation",
+    "formulations",
+    "solve",
+    "optimize",
+    "Plan",
+    "Certificate",
+    "DRY",
+    "EPOXY",
+    "assess_steps",
+    "Stability",
+    "SeqoptError",
+    "__version__",
+]
+
+
+def __getattr__(name: str) -> object:
+    """Load a name of the door when it is first used (PEP 562)."""
+    if name == "__version__":
+        return version("seqopt")
+    if name not in _HOME_OF:
+        raise AttributeError(f"module 'seqopt' has no attribute {name!r}")
+    found: object = getattr(import_module(f"seqopt.{_HOME_OF[name]}"), name)
+    globals()[name] = found
+    return found
+
+
+def __dir__() -> list[str]:
+    return [*__all__]

@@ -6,6 +6,8 @@ import os
 import tempfile
 from pathlib import Path
 
+import pandas as pd
+
 from seqopt.errors import FileError
 
 
@@ -21,6 +23,16 @@ def read_text(path: Path) -> str:
 def write_text(path: Path, text: str) -> None:
     """Write a UTF-8 file whole: it is put in place only once complete."""
     write_bytes(path, text.encode())
+
+
+def csv_text(table: pd.DataFrame) -> str:
+    """Return a table as CSV, its index aside, numbers with six digits."""
+    return str(table.to_csv(index=False, float_format="%.6g", lineterminator="\n"))
+
+
+def write_csv(path: Path, table: pd.DataFrame) -> None:
+    """Write a table as a CSV file, whole; see `csv_text`."""
+    write_text(path, csv_text(table))
 
 
 def write_bytes(path: Path, content: bytes) -> None:

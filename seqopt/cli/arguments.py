@@ -13,18 +13,18 @@ from seqopt.contact.mortar import MORTARS, Mortar
 from seqopt.engines.registry import ENGINES
 from seqopt.errors import ProblemError
 from seqopt.placement.criteria import Criterion, RankSum
-from seqopt.placement.formulation import Formulation, formulations
+from seqopt.placement.formulation import Formulation, formulation_names
 from seqopt.placement.problem import Limit, payload_limits
-from seqopt.responses.choices import SCALARS
+from seqopt.responses.choices import CHOICE_RESPONSES
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import builtin_scenes
 from seqopt.sequence.three_robots import SCHEDULES
 from seqopt.sequence.two_robots import METHODS
 from seqopt.study.presets import CRITERIA, EQUATIONS
+from seqopt.study.published import PUBLISHED
 
-PLANNED = "three-robot"
 USAGE = 2  # exit status where the user must act
-RESPONSES = (*SCALARS, "F_each")
+RESPONSES = (*CHOICE_RESPONSES, "F_each")
 
 
 def parse_criterion(text: str) -> Criterion:
@@ -50,11 +50,11 @@ def parse_limits(texts: Sequence[str], scene: Scene) -> tuple[Limit, ...]:
     return tuple(out)
 
 
-def parse_options(which: Formulation, texts: Sequence[str]) -> dict[str, int | str]:
+def parse_options(formulation: Formulation, texts: Sequence[str]) -> dict[str, int | str]:
     """Return the options of a formulation from ``NAME=VALUE`` words."""
     known = {
         name: type(parameter.default)
-        for name, parameter in inspect.signature(which.solve).parameters.items()
+        for name, parameter in inspect.signature(formulation.solve).parameters.items()
         if parameter.kind is inspect.Parameter.KEYWORD_ONLY
     }
     out: dict[str, int | str] = {}
@@ -62,7 +62,7 @@ def parse_options(which: Formulation, texts: Sequence[str]) -> dict[str, int | s
         name, _, value = text.partition("=")
         if name not in known:
             raise ProblemError(
-                f"--option {text}: {which.name} has {', '.join(known) or 'no options'}"
+                f"--option {text}: {formulation.name} has {', '.join(known) or 'no options'}"
             )
         try:
             out[name] = known[name](value)
@@ -122,7 +122,7 @@ def parser() -> argparse.ArgumentParser:
         parents=[scene, engine],
         help="all methods side by side",
         description="Analyze every method on a scene; show the largest responses side by side, for "
-        "the reference arch beside those the study printed, and name what does not add up.",
+        "the reference arch beside the printed ones, and list the inconsistencies in print.",
     )
     _criterion_argument(command)
     command.add_argument("--out", type=Path, metavar="DIR", help="write tables and figures there")
@@ -131,7 +131,7 @@ def parser() -> argparse.ArgumentParser:
         parents=[scene, engine],
         help="responses of every step of one method",
         description="Analyze every step of a method and write a table with the columns of Table "
-        "A.1 of the study: forces in N, moments in N m, displacements in 1e-3 mm.",
+        "A.1 of Bruun et al.: forces in N, moments in N m, displacements in 1e-3 mm.",
         epilog="example: seqopt analyze arch25 --method cantilever --out cantilever.csv",
     )
     _analyze_arguments(command)
@@ -145,7 +145,16 @@ def parser() -> argparse.ArgumentParser:
         epilog="example: seqopt optimize arch25 --formulation overlap_dp --out best",
     )
     _optimize_arguments(command)
-    _add_certify(commands, scene)
+    command = commands.add_parser(
+        "assess",
+        parents=[scene],
+        help="does every step stand, and with what margins",
+        description="Assess every step of a build as rigid blocks that touch: does it stand, the "
+        "least bond and friction with which it does, the tilt it survives, the force robots must "
+        "have, and what fails first. A verdict is proven by forces or by a motion.",
+        epilog="example: seqopt assess arch25 --method cantilever --mortar dry --out dry.csv",
+    )
+    _assess_arguments(command)
     command = commands.add_parser(
         "scene",
         parents=[scene],
@@ -178,19 +187,14 @@ def _shared_arguments() -> tuple[_Parser, _Parser]:
     engine.add_argument(
         "--mortar",
         choices=tuple(MORTARS),
-        help="what holds the joints of the engines auto and discrete: the study's epoxy or nothing "
+        help="what holds the joints of the engines auto and discrete: the epoxy of Bruun et al. or nothing "
         "(default: epoxy)",
     )
     return scene, engine
 
 
 def _analyze_arguments(command: argparse.ArgumentParser) -> None:
-    command.add_argument(
-        "--method", choices=(*METHODS, PLANNED), required=True, help="how the build goes"
-    )
-    command.add_argument(
-        "--plan", type=Path, metavar="FILE", help=f"CSV of the steps, with --method {PLANNED}"
-    )
+    _steps_arguments(command)
     command.add_argument(
         "--out", type=Path, metavar="FILE", help="CSV to write; standard output if not given"
     )
@@ -202,24 +206,24 @@ def _analyze_arguments(command: argparse.ArgumentParser) -> None:
     )
 
 
-def _add_certify(commands: argparse._SubParsersAction[_Parser], scene: _Parser) -> None:
-    command = commands.add_parser(
-        "certify",
-        parents=[scene],
-        help="does every step stand, and with what margins",
-        description="Certify every step of a build as rigid blocks that touch: does it stand, the "
-        "least bond and friction with which it does, the tilt it survives, the force robots must "
-        "have, and what goes first. A verdict is proven by forces or by a motion.",
-        epilog="example: seqopt certify arch25 --method cantilever --mortar dry --out dry.csv",
-    )
+def _steps_arguments(command: argparse.ArgumentParser) -> None:
+    """Add the arguments that name a closed sequence of steps."""
     steps = command.add_mutually_exclusive_group(required=True)
-    steps.add_argument("--method", choices=(*METHODS, PLANNED), help="how the build goes")
+    steps.add_argument(
+        "--method",
+        choices=(*METHODS, PUBLISHED),
+        help=f"how the build goes; {PUBLISHED} is the printed three-robot plan of arch25",
+    )
     steps.add_argument("--plan", type=Path, metavar="FILE", help="CSV of the steps")
+
+
+def _assess_arguments(command: argparse.ArgumentParser) -> None:
+    _steps_arguments(command)
     command.add_argument(
         "--mortar",
         choices=tuple(MORTARS),
         default="epoxy",
-        help="what is in the joints: the study's epoxy (25°, 3 MPa, 2 MPa) or nothing "
+        help="what is in the joints: the epoxy of Bruun et al. (25°, 3 MPa, 2 MPa) or nothing "
         "(default: %(default)s)",
     )
     for name, metavar, text in (
@@ -238,8 +242,8 @@ def _criterion_argument(command: argparse.ArgumentParser) -> None:
         "--criteria",
         default=EQUATIONS.name,
         metavar="NAME",
-        help=f"what a state costs: {', '.join(CRITERIA)}, or responses to rank with weights, as "
-        "T_max,M_sup=2,F_move; the study's equations by default",
+        help=f"what a step costs: {', '.join(CRITERIA)}, or responses to rank with weights, as "
+        "T_max,M_sup=2,F_move; equations (2) and (3) of Bruun et al. by default",
     )
 
 
@@ -248,12 +252,12 @@ def _optimize_arguments(command: argparse.ArgumentParser) -> None:
         "--formulation",
         required=True,
         metavar="NAME",
-        help=f"one of {', '.join(f.name for f in formulations().values())}",
+        help=f"one of {', '.join(formulation_names())}",
     )
     command.add_argument(
-        "--method",
+        "--schedule",
         choices=tuple(SCHEDULES),
-        default=PLANNED,
+        default=next(iter(SCHEDULES)),
         help="which build has the open grips (default: %(default)s)",
     )
     _criterion_argument(command)

@@ -1,4 +1,4 @@
-"""The command line: ``seqopt compare | analyze | optimize | certify | scene``."""
+"""The command line: ``seqopt compare | optimize | analyze | assess | scene``."""
 
 from __future__ import annotations
 
@@ -15,7 +15,6 @@ from pathlib import Path
 import numpy as np
 
 from seqopt.cli.arguments import (
-    PLANNED,
     USAGE,
     parse_criterion,
     parse_limits,
@@ -27,38 +26,25 @@ from seqopt.contact.mortar import MORTARS
 from seqopt.engines.auto import AutoEngine
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import make_engine
-from seqopt.errors import FileError, ProblemError, SceneError, SeqoptError, SolverError, StepError
-from seqopt.files import make_folder, write_bytes, write_text
+from seqopt.errors import FileError, SceneError, SeqoptError, SolverError
+from seqopt.files import csv_text, make_folder, write_bytes, write_csv, write_text
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.placement.formulation import find_formulation
-from seqopt.placement.plan import (
-    optimize,
-    plan_table,
-    prepare,
-    responses_table,
-    selection_table,
-    summary,
-)
-from seqopt.placement.window_search import (
-    require_search,
-    search_responses,
-    search_summary,
-    search_table,
-    search_windows,
-)
-from seqopt.report.comparison import compare_methods, format_comparison
-from seqopt.report.contest import Contest, contest, format_contest
+from seqopt.placement.plan import Plan, solve
+from seqopt.placement.problem import pose
+from seqopt.report.comparison import Comparison, compare
+from seqopt.report.text import format_comparison
 from seqopt.responses.table import analyze, fields_archive
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import dump_scene, load_scene
 from seqopt.sequence.plan_file import read_plan
 from seqopt.sequence.steps import Step
-from seqopt.sequence.three_robots import SCHEDULES
+from seqopt.sequence.three_robots import make_schedule
 from seqopt.sequence.two_robots import METHODS
 from seqopt.stability.assessment import Verdict
 from seqopt.stability.steps import assess_steps, format_verdicts, stability_table
-from seqopt.study.published import is_reference_arch, published_plan
+from seqopt.study.published import PUBLISHED, is_reference_arch, paper_models, published_plan
 
 FAILED = 3  # exit status where a solver failed; USAGE where the user must act
 
@@ -86,23 +72,19 @@ def _compare(options: argparse.Namespace) -> None:
     if options.out is not None:
         _require_matplotlib(options.out)
         make_folder(options.out)
-    methods = compare_methods(engine)
-    print(format_comparison(methods, scene), end="\n\n")
-    try:
-        result = contest(engine, methods, criterion, _progress)
-    except (StepError, ProblemError) as error:
-        print(f"Three-robot loop: not possible here; {error}")
-        return
-    finally:
-        _say_levels(engine)
-    print(format_contest(result, criterion))
-    if options.out is not None:
-        _write_contest(options.out, result)
+    result = compare(engine, criterion, _progress)
+    _say_levels(engine)
+    print(format_comparison(result, scene, criterion))
+    if options.out is not None and not result.refusal:
+        _write_comparison(options.out, result)
 
 
-def _engine(options: argparse.Namespace, net: Network) -> Engine:
+def _engine(options: argparse.Namespace, network: Network) -> Engine:
     mortar = None if options.mortar is None else MORTARS[options.mortar]
-    return make_engine(options.engine, net, mortar)
+    try:
+        return make_engine(options.engine, network, mortar)
+    except SceneError as error:
+        raise SceneError(f"--engine {options.engine}: {error}") from error
 
 
 def _say_levels(engine: Engine) -> None:
@@ -128,16 +110,15 @@ def _require_matplotlib(folder: Path) -> None:
         raise FileError(f"figures for {folder} need matplotlib: pip install matplotlib")
 
 
-def _write_contest(folder: Path, result: Contest) -> None:
-    from seqopt.report.charts import contest_figures  # noqa: PLC0415  # matplotlib is an extra
+def _write_comparison(folder: Path, result: Comparison) -> None:
+    from seqopt.report.charts import comparison_figures  # noqa: PLC0415  # matplotlib is an extra
 
-    write_text(folder / "contest.csv", result.table.to_csv(float_format="%.6g"))
+    write_text(folder / "comparison.csv", result.table.to_csv(float_format="%.6g"))
     if result.ranks is not None:
         write_text(folder / "published_ranks.csv", result.ranks.to_csv(index=False))
     for name, table in result.tables.items():
-        text = table.to_csv(index=False, float_format="%.6g", lineterminator="\n")
-        write_text(folder / f"steps_{name.replace(' ', '_')}.csv", text)
-    for name, figure in contest_figures(result).items():
+        write_csv(folder / f"steps_{name}.csv", table)
+    for name, figure in comparison_figures(result).items():
         buffer = io.BytesIO()
         figure.savefig(buffer, dpi=130)
         write_bytes(folder / name, buffer.getvalue())
@@ -145,43 +126,38 @@ def _write_contest(folder: Path, result: Contest) -> None:
 
 
 def _optimize(options: argparse.Namespace) -> None:
-    which = find_formulation(options.formulation)
-    chosen = parse_options(which, options.option)
-    if options.no_proof:
-        require_search(which, chosen)
+    formulation = find_formulation(options.formulation)
+    chosen = parse_options(formulation, options.option)
     criterion = parse_criterion(options.criteria)
     scene = load_scene(options.scene)
     limits = parse_limits(options.limit, scene)
     make_folder(options.out)
     start = time.perf_counter()
-    net = build_network(scene)
-    engine = _engine(options, net)
-    schedule = SCHEDULES[options.method](net)
+    network = build_network(scene)
+    engine, schedule = _engine(options, network), make_schedule(options.schedule, network)
     assemble = time.perf_counter() - start
-    if options.no_proof:
-        found = search_windows(engine, schedule, criterion, limits)
-        report, plan, seconds = search_summary(found, which), found.plan, found.seconds
-        files = {"selection.csv": search_table(found), "responses.csv": search_responses(found)}
-        worth = "not compared with the optimum"
-    else:
-        outcome = optimize(prepare(engine, schedule, criterion, limits), which, **chosen)
-        report, plan, seconds = summary(outcome), outcome.plan, outcome.seconds
-        files = {
-            "selection.csv": selection_table(outcome),
-            "responses.csv": responses_table(outcome.problem),
-        }
-        gap = 100 * outcome.certificate.gap
-        worth = f"objective {report['objective']:.6g}, gap {gap:.3g} %"
+    problem = pose(engine, schedule, criterion, limits)
+    plan = solve(problem, formulation, proof=not options.no_proof, **chosen)
     _say_levels(engine)
-    report["seconds"] = {"assemble": assemble, **seconds}
-    for name, table in {"plan.csv": plan_table(engine, schedule, plan), **files}.items():
-        text = table.to_csv(index=False, float_format="%.6g", lineterminator="\n")
-        write_text(options.out / name, text)
+    cascading, overlap = paper_models(schedule)
+    report = plan.summary() | {
+        "models_paper_count": {"cascading": cascading, "overlap": overlap},
+        "seconds": {"assemble": assemble, **plan.seconds},
+    }
+    write_csv(options.out / "plan.csv", plan.responses())
+    write_csv(options.out / "selection.csv", plan.table())
+    write_csv(options.out / "responses.csv", plan.alternatives())
     write_text(options.out / "summary.json", json.dumps(report, indent=2) + "\n")
     print(
-        f"{which.name} ({which.kind.value}): {worth}, "
-        f"{report['models_evaluated']} models; written to {options.out}"
+        f"{formulation.name} ({formulation.kind.value}): {_worth(plan)}, "
+        f"{plan.models} models; written to {options.out}"
     )
+
+
+def _worth(plan: Plan) -> str:
+    if plan.certificate is None:
+        return "not compared with the optimum"
+    return f"objective {plan.certificate.objective:.6g}, gap {100 * plan.certificate.gap:.3g} %"
 
 
 def _analyze(options: argparse.Namespace) -> None:
@@ -190,29 +166,26 @@ def _analyze(options: argparse.Namespace) -> None:
     steps = _steps(scene, options)
     table = analyze(engine, steps)
     _say_levels(engine)
-    text = table.to_csv(index=False, float_format="%.6g", lineterminator="\n")
     if options.fields is not None:
         write_bytes(options.fields, fields_archive(engine, steps))
     if options.out is None:
-        sys.stdout.write(text)
+        sys.stdout.write(csv_text(table))
     else:
-        write_text(options.out, text)
+        write_csv(options.out, table)
         print(f"{len(table)} steps written to {options.out}")
 
 
-def _certify(options: argparse.Namespace) -> None:
+def _assess(options: argparse.Namespace) -> None:
     scene = load_scene(options.scene)
     mortar = parse_mortar(options)
-    net = build_network(scene)
+    network = build_network(scene)
     steps = _steps(scene, options)
-    results = assess_steps(net, steps, mortar, _progress)
-    text = stability_table(steps, results).to_csv(
-        index=False, float_format="%.6g", lineterminator="\n"
-    )
+    results = assess_steps(network, steps, mortar, _progress)
+    table = stability_table(steps, results)
     if options.out is None:
-        sys.stdout.write(text)
+        sys.stdout.write(csv_text(table))
     else:
-        write_text(options.out, text)
+        write_csv(options.out, table)
         print(f"{format_verdicts(results)}; written to {options.out}")
     undecided = [
         s.number for s, r in zip(steps, results, strict=True) if r.verdict is Verdict.UNDECIDED
@@ -224,21 +197,15 @@ def _certify(options: argparse.Namespace) -> None:
 
 
 def _steps(scene: Scene, options: argparse.Namespace) -> tuple[Step, ...]:
-    if options.method is None:
-        return read_plan(scene, options.plan)
-    if options.method != PLANNED:
-        if options.plan is not None:
-            raise StepError(
-                f"--plan {options.plan}: --method {options.method} makes its own steps; "
-                f"use --method {PLANNED}"
-            )
-        return METHODS[options.method](build_network(scene))
+    """Return the closed sequence that the options name."""
     if options.plan is not None:
         return read_plan(scene, options.plan)
+    if options.method != PUBLISHED:
+        return METHODS[options.method](build_network(scene))
     if not is_reference_arch(scene):
         raise SceneError(
-            f"scene {scene.name}: --method {PLANNED} needs --plan FILE; "
-            "the published plan is for arch25"
+            f"scene {scene.name}: --method {PUBLISHED} is the printed plan for arch25; "
+            "give --plan FILE for another scene"
         )
     return published_plan(scene)
 
@@ -266,6 +233,6 @@ COMMANDS: dict[str, Callable[[argparse.Namespace], None]] = {
     "compare": _compare,
     "analyze": _analyze,
     "optimize": _optimize,
-    "certify": _certify,
+    "assess": _assess,
     "scene": _scene,
 }

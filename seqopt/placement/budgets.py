@@ -14,29 +14,59 @@ from seqopt.sequence.schedule import OpenGrip
 
 
 def steps_over(problem: Problem, response: str, level: float, bound: float) -> Budget:
-    """Return a cap on the number of open steps in which a response exceeds a level (SI units).
+    """Return a cap on the number of open steps in which a response exceeds a level.
 
-    The response must be among those the problem has evaluated (``also`` of `seqopt.placement.problem.pose`).
+    Parameters
+    ----------
+    problem : Problem
+    response : str
+        Among those that the problem evaluates (``also`` of `seqopt.pose`).
+    level : float
+        SI units.
+    bound : float
+        How many steps may exceed it.
+
+    Raises
+    ------
+    ProblemError
+        If the problem does not evaluate the response.
     """
     single, shared = _empty(problem)
-    for state in problem.evaluation.states:
-        if response not in state.responses:
+    for choices in problem.evaluation.steps:
+        if response not in choices.responses:
             raise ProblemError(
-                f"budget on {response}: step {state.step.number} has only "
-                f"{', '.join(state.responses)}; name it in `also` when the problem is posed"
+                f"budget on {response}: step {choices.step.number} has only "
+                f"{', '.join(choices.responses)}; name it in `also` when the problem is posed"
             )
-        target = single if len(state.moves) == 1 else shared
-        target[state.moves[-1]] += state.responses[response] > level
+        target = single if len(choices.moves) == 1 else shared
+        target[choices.moves[-1]] += choices.responses[response] > level
     return Budget(f"steps with {response} over {level:g}", tuple(single), tuple(shared), bound)
 
 
 def robot_use(problem: Problem, robot: str, force: float, bound: float) -> Budget:
-    """Return a cap on how often a robot is used: open steps in which it carries over a force, N."""
+    """Return a cap on how often a robot is used: open steps in which it carries more than a force.
+
+    Parameters
+    ----------
+    problem : Problem
+    robot : str
+    force : float
+        N.
+    bound : float
+        How many steps there may be.
+    """
     return steps_over(problem, f"F_{robot}", force, bound)
 
 
 def travel(problem: Problem, bound: float) -> Budget:
-    """Return a cap on the way, m, that robots go to chosen grips and on to their next ones."""
+    """Return a cap on the way that robots go to chosen grips and on to their next ones.
+
+    Parameters
+    ----------
+    problem : Problem
+    bound : float
+        m.
+    """
     single, shared = _empty(problem)
     schedule = problem.schedule
     for k, move in enumerate(schedule.moves):

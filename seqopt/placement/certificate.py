@@ -1,4 +1,4 @@
-"""What a formulation returns, and the check of what it claims."""
+"""Certificates of optimality: a selection checked from the problem's data alone."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from seqopt.arrays import FrozenValue
 from seqopt.errors import SolverError
-from seqopt.placement.costs import TINY, LayeredCosts, PlacementProblem
+from seqopt.placement.costs import TINY, Aim, LayeredCosts, PlacementProblem
 from seqopt.placement.formulation import (
-    Aim,
     Formulation,
     FormulationKind,
     Selection,
@@ -19,8 +19,8 @@ from seqopt.placement.formulation import (
 TOLERANCE = 1e-6  # of the costs that a choice meets: how far a claim may be from what the data say
 
 
-@dataclass(frozen=True)
-class Certificate:
+@dataclass(frozen=True, eq=False, repr=False)
+class Certificate(FrozenValue):
     """A selection checked from the problem's data alone.
 
     Attributes
@@ -56,9 +56,9 @@ def certify(problem: PlacementProblem, selection: Selection, aim: Aim) -> Certif
         If the choice is not one candidate per move, is not allowed, exceeds a budget, or is not
         worth what was claimed.
     """
-    placement = problem.sums if aim is Aim.SUM else problem.peaks
-    value = _value(placement, selection.choice, aim)
-    sizes = [abs(part) for part in placement.parts(selection.choice)]
+    costs = aim.costs(problem)
+    value = _value(costs, selection.choice, aim)
+    sizes = [abs(part) for part in costs.parts(selection.choice)]
     scale = max(sum(sizes) if aim is Aim.SUM else max(sizes), TINY)
     if not abs(value - selection.objective) <= TOLERANCE * scale:
         raise SolverError(f"the objective is {value:.9g}, not {selection.objective:.9g} as claimed")
@@ -67,9 +67,10 @@ def certify(problem: PlacementProblem, selection: Selection, aim: Aim) -> Certif
         if budget.slack(selection.choice) < -TOLERANCE:
             raise SolverError(
                 f"the choice takes {spent[budget.name]:.6g} of {budget.name}, more than "
-                f"{budget.bound:.6g}; use overlap_mip (the claimed bound is {selection.bound:.9g})"
+                f"{budget.bound:.6g}; use a formulation that keeps budgets exactly "
+                f"(the claimed bound is {selection.bound:.9g})"
             )
-    bound = least_sum(placement) if aim is Aim.SUM else least_peak(placement)
+    bound = least(costs, aim)
     highest = value if problem.budgets else bound
     if not selection.bound <= highest + TOLERANCE * scale:  # NaN is no bound
         raise SolverError(f"the claimed bound {selection.bound:.9g} exceeds {highest:.9g}")
@@ -77,56 +78,66 @@ def certify(problem: PlacementProblem, selection: Selection, aim: Aim) -> Certif
     return Certificate(value, bound, gap, claimed, spent)
 
 
-def _value(placement: LayeredCosts, choice: tuple[int, ...], aim: Aim) -> float:
+def _value(costs: LayeredCosts, choice: tuple[int, ...], aim: Aim) -> float:
     """Return what a choice is worth, or raise a `SolverError` if it is none."""
-    sizes = placement.sizes
+    sizes = costs.sizes
     if len(choice) != len(sizes):
         raise SolverError(f"the answer names {len(choice)} candidates for {len(sizes)} moves")
     for k, (place, size) in enumerate(zip(choice, sizes, strict=True), start=1):
         if not 0 <= place < size:
             raise SolverError(f"the answer names candidate {place} of {size} for move {k}")
-    value = placement.cost(choice) if aim is Aim.SUM else placement.worst(choice)
+    value = aim.worth(costs, choice)
     if not np.isfinite(value):
         raise SolverError("the choice is not allowed by the problem; the solver's answer is wrong")
     return value
 
 
-def least_sum(placement: LayeredCosts) -> float:
+def least(costs: LayeredCosts, aim: Aim) -> float:
+    """Return the least that any choice is worth, budgets aside; see `least_sum`, `least_peak`."""
+    return least_sum(costs) if aim is Aim.SUM else least_peak(costs)
+
+
+def least_sum(costs: LayeredCosts) -> float:
     """Return the least sum that any choice reaches, budgets aside: forward, layer by layer."""
     reached = np.zeros(1)
-    for single, shared in zip(placement.single, placement.shared, strict=True):
+    for single, shared in zip(costs.single, costs.shared, strict=True):
         reached = (reached[:, None] + shared).min(axis=0) + single
     return float(reached.min())
 
 
-def least_peak(placement: LayeredCosts) -> float:
+def least_peak(costs: LayeredCosts) -> float:
     """Return the least worst cost of any choice, by bisection over all costs that occur.
 
     A value is reached if the choices whose costs do not exceed it connect the first move to the
     last.
     """
-    levels = np.unique(np.concatenate([a.ravel() for a in (*placement.single, *placement.shared)]))
+    levels = np.unique(np.concatenate([a.ravel() for a in (*costs.single, *costs.shared)]))
     low, high = 0, len(levels) - 1
     while low < high:
         middle = (low + high) // 2
-        if _connected(placement, float(levels[middle])):
+        if _connected(costs, float(levels[middle])):
             high = middle
         else:
             low = middle + 1
     return float(levels[low])
 
 
-def _connected(placement: LayeredCosts, level: float) -> bool:
+def _connected(costs: LayeredCosts, level: float) -> bool:
     reached = np.ones(1, dtype=bool)
-    for single, shared in zip(placement.single, placement.shared, strict=True):
+    for single, shared in zip(costs.single, costs.shared, strict=True):
         reached = (single <= level) & ((shared <= level) & reached[:, None]).any(axis=0)
     return bool(reached.any())
 
 
-def check_selection(
-    problem: PlacementProblem, selection: Selection, which: Formulation
-) -> Certificate:
+def judge(problem: PlacementProblem, selection: Selection, formulation: Formulation) -> Certificate:
     """Certify a selection, and hold its formulation to what it promises.
+
+    Parameters
+    ----------
+    problem : PlacementProblem
+    selection : Selection
+    formulation : Formulation
+        What made the selection.
 
     Raises
     ------
@@ -134,11 +145,11 @@ def check_selection(
         If the certificate fails, or without budgets a formulation that is no heuristic misses the
         optimum.
     """
-    certificate = certify(problem, selection, which.aim)
-    exact = which.kind is not FormulationKind.HEURISTIC and not problem.budgets
+    certificate = certify(problem, selection, formulation.aim)
+    exact = formulation.kind is not FormulationKind.HEURISTIC and not problem.budgets
     if exact and certificate.gap > TOLERANCE:
         raise SolverError(
-            f"{which.name} promises the optimum {certificate.bound:.9g}, "
+            f"{formulation.name} promises the optimum {certificate.bound:.9g}, "
             f"but its choice is worth {certificate.objective:.9g}"
         )
     return certificate

@@ -1,21 +1,39 @@
-"""Costs of choices: what every formulation solves, whatever they stand for."""
+"""Costs of choices: what every formulation is given, whatever the choices stand for."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from enum import Enum
 from typing import Protocol
 
 import numpy as np
 
-from seqopt.arrays import Floats
+from seqopt.arrays import Bools, Floats, FrozenValue
 from seqopt.errors import InfeasibleError, ProblemError
+from seqopt.sequence.steps import Step
 
 TINY = float(np.finfo(float).tiny)
 
 
-@dataclass(frozen=True)
-class LayeredCosts:
+class Aim(Enum):
+    """What is to be least over the build."""
+
+    SUM = "sum"
+    PEAK = "peak"
+
+    @property
+    def worth(self) -> Callable[[LayeredCosts, Sequence[int]], float]:
+        """What a choice is worth: its total, or its largest cost."""
+        return LayeredCosts.cost if self is Aim.SUM else LayeredCosts.worst
+
+    def costs(self, problem: PlacementProblem) -> LayeredCosts:
+        """Return the costs of a problem that this aim is about."""
+        return problem.sums if self is Aim.SUM else problem.peaks
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class LayeredCosts(FrozenValue):
     """Costs of single choices and of neighboring pairs.
 
     One candidate per move is to be chosen; choices ``o`` cost
@@ -24,10 +42,10 @@ class LayeredCosts:
     Parameters
     ----------
     single : tuple of (C_k,) float
-        Cost of each candidate in the states in which its move alone is open; infinite where it is
+        Cost of each candidate in the steps in which its move alone is open; infinite where it is
         not allowed.
     shared : tuple of (C_{k-1}, C_k) float
-        Cost of each pair in the states that the move shares with the one before. The first move has
+        Cost of each pair in the steps that the move shares with the one before. The first move has
         none before it: an array of shape (1, C_0).
 
     Raises
@@ -42,7 +60,8 @@ class LayeredCosts:
 
     def __post_init__(self) -> None:
         for name in ("single", "shared"):
-            object.__setattr__(self, name, tuple(_frozen(costs) for costs in getattr(self, name)))
+            copied = tuple(np.array(costs, dtype=float) for costs in getattr(self, name))
+            object.__setattr__(self, name, copied)
         if not self.single:
             raise ProblemError("the problem has no moves; give at least one")
         if len(self.shared) != len(self.single):
@@ -53,6 +72,7 @@ class LayeredCosts:
             self._check_move(k, shape)
         if sum(_largest(costs) for costs in (*self.single, *self.shared)) == np.inf:
             raise ProblemError("the costs are so large that their sum overflows; rescale them")
+        super().__post_init__()
 
     def _check_move(self, k: int, shape: tuple[int, int]) -> None:
         if not shape[1]:
@@ -88,7 +108,7 @@ class LayeredCosts:
         """Return the largest single or shared cost that the choices meet."""
         return max(self.parts(choice))
 
-    def continuable(self) -> tuple[np.ndarray, ...]:
+    def continuable(self) -> tuple[Bools, ...]:
         """Return, per move, which candidates are allowed and can be continued to the last move.
 
         Raises
@@ -115,15 +135,8 @@ def _largest(costs: Floats) -> float:
     return float(np.abs(costs[np.isfinite(costs)]).max(initial=0.0))
 
 
-def _frozen(costs: Floats) -> Floats:
-    """Return a copy that cannot be written to."""
-    out = np.array(costs, dtype=float)
-    out.flags.writeable = False
-    return out
-
-
-@dataclass(frozen=True)
-class Budget:
+@dataclass(frozen=True, eq=False, repr=False)
+class Budget(FrozenValue):
     """A cap on a total over the build.
 
     Parameters
@@ -156,6 +169,7 @@ class Budget:
             raise ProblemError(f"budget {self.name!r}: an amount is infinite; limit the choice")
         if not self.bound > -np.inf:
             raise ProblemError(f"budget {self.name!r}: the bound is {self.bound}; give a number")
+        super().__post_init__()
 
     def spent(self, choice: Sequence[int]) -> float:
         """Return what the choices take."""
@@ -172,7 +186,7 @@ class Budget:
 
 
 class PlacementProblem(Protocol):
-    """What a formulation is given."""
+    """What a formulation is given: costs, and what the choices stand for."""
 
     @property
     def sums(self) -> LayeredCosts:
@@ -186,12 +200,27 @@ class PlacementProblem(Protocol):
     def budgets(self) -> tuple[Budget, ...]:
         """Caps on totals over the build."""
 
-    def row(self, move: int, before: int) -> Floats:
-        """Return the cost (C_k,) of what a move shares with the one before, that being chosen."""
+    def conditional(self, move: int, before: int) -> Floats:
+        """Return the cost (C_k,) of what a move shares with the one before, that being chosen.
+
+        Parameters
+        ----------
+        move, before : int
+            A move, and the candidate chosen for the move before it.
+        """
+
+    def nodes(self, choice: Sequence[int]) -> tuple[int, ...]:
+        """Return the nodes that one candidate per move stands for."""
+
+    def steps(self, choice: Sequence[int]) -> tuple[Step, ...]:
+        """Return the checked steps with one candidate per move; none where costs are all."""
+
+    def seconds(self, aim: Aim) -> Mapping[str, float]:
+        """Return what computing the costs of an aim took, by stage."""
 
 
-@dataclass(frozen=True)
-class CostProblem:
+@dataclass(frozen=True, eq=False, repr=False)
+class CostProblem(FrozenValue):
     """A problem given by its costs alone."""
 
     sums: LayeredCosts
@@ -202,15 +231,18 @@ class CostProblem:
         """The same costs."""
         return self.sums
 
-    def row(self, move: int, before: int) -> Floats:
+    def conditional(self, move: int, before: int) -> Floats:
         """Return the shared costs of the candidates, the choice before being fixed."""
         return np.asarray(self.sums.shared[move][before])
 
+    def nodes(self, choice: Sequence[int]) -> tuple[int, ...]:
+        """Return the choice: candidates are their own names."""
+        return tuple(choice)
 
-def without_budgets(problem: PlacementProblem, formulation: str) -> None:
-    """Raise a `ProblemError` if a problem has budgets, which break the structure of a path."""
-    if problem.budgets:
-        raise ProblemError(
-            f"{formulation}: the budget {problem.budgets[0].name!r} couples all moves; "
-            "use overlap_mip, or overlap_lp for a bound"
-        )
+    def steps(self, choice: Sequence[int]) -> tuple[Step, ...]:
+        """Return no steps."""
+        return ()
+
+    def seconds(self, aim: Aim) -> Mapping[str, float]:
+        """Return nothing: the costs are given."""
+        return {}

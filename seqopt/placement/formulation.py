@@ -9,7 +9,11 @@ from importlib.metadata import entry_points
 
 import numpy as np
 
+from seqopt.arrays import FrozenValue
 from seqopt.errors import ProblemError
+from seqopt.placement.costs import Aim
+
+GROUP = "seqopt.formulations"
 
 
 class FormulationKind(Enum):
@@ -21,21 +25,14 @@ class FormulationKind(Enum):
 
 
 class Reads(Enum):
-    """Which states a formulation looks at."""
+    """Which steps a formulation looks at."""
 
-    ALL = "all"  # every pair of every shared state
-    WINDOW = "window"  # by default, shared states only for choices already made
-
-
-class Aim(Enum):
-    """What is to be least over the build."""
-
-    SUM = "sum"
-    PEAK = "peak"
+    ALL = "all"  # every pair in every shared step
+    WINDOW = "window"  # by default, shared steps only for choices already made
 
 
-@dataclass(frozen=True)
-class Selection:
+@dataclass(frozen=True, eq=False, repr=False)
+class Selection(FrozenValue):
     """A candidate per move, and what its formulation claims of it.
 
     Attributes
@@ -71,7 +68,16 @@ class Formulation:
     solve : callable
         Takes the problem and named options, returns a `Selection`.
     reads : Reads
-        Which states it looks at with its default options.
+        Which steps it looks at with its default options.
+    takes_budgets : bool
+        Whether it can keep totals over the build within budgets.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> best = seqopt.formulations()["overlap_dp"]
+    >>> best.kind.value, best.aim.value
+    ('exact', 'sum')
     """
 
     name: str
@@ -80,19 +86,36 @@ class Formulation:
     aim: Aim
     solve: Callable[..., Selection]
     reads: Reads = Reads.ALL
+    takes_budgets: bool = False
+
+
+def formulation_names() -> tuple[str, ...]:
+    """Return the names of all registered formulations, without loading any."""
+    return tuple(sorted(entry.name for entry in entry_points(group=GROUP)))
 
 
 def formulations() -> dict[str, Formulation]:
-    """Return all registered formulations (entry points of the group ``seqopt.formulations``)."""
-    found = {entry.name: entry.load() for entry in entry_points(group="seqopt.formulations")}
+    """Return all registered formulations by name (entry points of `GROUP`).
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> [name for name, f in seqopt.formulations().items() if f.takes_budgets]
+    ['overlap_lp', 'overlap_mip']
+    """
+    found = {entry.name: entry.load() for entry in entry_points(group=GROUP)}
     return dict(sorted(found.items()))
 
 
 def find_formulation(name: str) -> Formulation:
-    """Return a formulation by name, or raise a `ProblemError` that lists those there are."""
-    known = formulations()
-    if name not in known:
-        raise ProblemError(
-            f"formulation {name!r}: there is no such; give one of {', '.join(known)}"
-        )
-    return known[name]
+    """Return a formulation by name.
+
+    Raises
+    ------
+    ProblemError
+        If there is none of that name; the message lists those there are.
+    """
+    if name not in formulation_names():
+        known = ", ".join(formulation_names())
+        raise ProblemError(f"formulation {name!r}: there is no such; give one of {known}")
+    return formulations()[name]

@@ -1,180 +1,286 @@
-"""One placement problem from scene to checked plan, with the time of every stage."""
+"""Solve a placement problem by any formulation, and the plan that comes of it."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, TypeVar
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import Any
 
+import numpy as np
 import pandas as pd
 
-from seqopt.engines.interface import Engine
-from seqopt.placement.certificate import Certificate, check_selection
+from seqopt.errors import ProblemError
+from seqopt.placement.certificate import TOLERANCE, Certificate, judge
 from seqopt.placement.costs import PlacementProblem
-from seqopt.placement.criteria import Criterion
-from seqopt.placement.formulation import Aim, Formulation, Selection
-from seqopt.placement.problem import Limit, Problem, pose
+from seqopt.placement.formulation import (
+    Formulation,
+    Reads,
+    Selection,
+    find_formulation,
+    formulations,
+)
+from seqopt.placement.problem import Problem
 from seqopt.placement.ranking import move_costs, rank_of
+from seqopt.placement.window_search import WindowSearch, search_windows
+from seqopt.responses.choices import window_models
 from seqopt.responses.table import analyze
-from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import Step
 
-Result = TypeVar("Result")
 
-
-@dataclass(frozen=True)
-class Posed:
-    """A problem with its costs computed, and the seconds that took by stage."""
-
-    problem: Problem
-    seconds: Mapping[str, float]
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """A problem solved and checked.
+@dataclass(frozen=True, repr=False)
+class Plan:
+    """A problem solved: where every robot holds over the whole build, and what that is worth.
 
     Attributes
     ----------
-    problem : Problem
-    which : Formulation
+    problem : PlacementProblem
+    formulation : Formulation
     selection : Selection
-    certificate : Certificate
-    plan : tuple of Step
-        The schedule with every move at its chosen node.
+    certificate : Certificate or None
+        None where no proof was asked for.
+    steps : tuple of Step
+        The schedule with every move at its chosen node, checked.
     seconds : mapping of str to float
         By stage: respond, rank, compile (writing a program down for a solver), solve, verify.
+    search : WindowSearch or None
+        What was looked at where no proof was asked for.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> plan = seqopt.optimize(seqopt.load_scene("arch25"))
+    >>> plan
+    Plan('arch25', 'three-robot', by overlap_dp: 90 steps, 22 moves, objective 657.465, gap 0 %)
+    >>> plan.nodes[:5]
+    (4, 7, 8, 9, 12)
     """
 
-    problem: Problem
-    which: Formulation
+    problem: PlacementProblem
+    formulation: Formulation
     selection: Selection
-    certificate: Certificate
-    plan: tuple[Step, ...]
-    seconds: Mapping[str, float]
+    certificate: Certificate | None
+    steps: tuple[Step, ...]
+    seconds: Mapping[str, float] = field(compare=False, hash=False)
+    search: WindowSearch | None = None
+
+    def __repr__(self) -> str:
+        counts = f"{len(self.steps)} steps, {len(self.selection.choice)} moves"
+        proof = "without proof"
+        if self.certificate is not None:
+            gap = 100 * self.certificate.gap
+            proof = f"objective {self.certificate.objective:.6g}, gap {gap:.3g} %"
+        what = ""
+        if isinstance(self.problem, Problem):
+            schedule = self.problem.schedule
+            what = f"{schedule.scene.name!r}, {schedule.method!r}, "
+        return f"Plan({what}by {self.formulation.name}: {counts}, {proof})"
+
+    @property
+    def nodes(self) -> tuple[int, ...]:
+        """The node chosen for every move."""
+        return self.problem.nodes(self.selection.choice)
+
+    @property
+    def explored(self) -> tuple[Problem, ...]:
+        """The problems of which responses were computed: the whole, or what a search met."""
+        return (self._posed,) if self.search is None else self.search.explored
+
+    @property
+    def models(self) -> int:
+        """How many different models were solved for it."""
+        return sum(problem.evaluation.models for problem in self.explored)
+
+    @property
+    def models_needed(self) -> int:
+        """How many different models the formulation looks at: fewer where it asks for windows."""
+        if self.formulation.reads is Reads.WINDOW:
+            return window_models(self._posed.schedule, self.selection.choice)
+        return self.models
+
+    @property
+    def _posed(self) -> Problem:
+        if not isinstance(self.problem, Problem):
+            raise ProblemError(
+                "the problem is given by its costs alone and has no steps; pose it with a schedule"
+            )
+        return self.problem
+
+    def responses(self) -> pd.DataFrame:
+        """Return the responses of every step and the robots whose grips were chosen in it.
+
+        The columns are those of `seqopt.responses.analyze` and ``optimized_robot``.
+        """
+        schedule = self._posed.schedule
+        table = analyze(self._posed.engine, self.steps)
+        open_at = {step.number: step.moves for step in schedule.steps}
+        table["optimized_robot"] = [
+            ";".join(schedule.moves[m].robot for m in open_at[number]) for number in table["step"]
+        ]
+        return table
+
+    def table(self) -> pd.DataFrame:
+        """Return a row per move: where, which robot, which node, what it costs, how it ranks.
+
+        Columns: ``move``, ``step``, ``bricks``, ``robot``, ``brick``, ``node``, ``candidates``;
+        then ``single_cost``, ``shared_cost`` and ``rank_in_window``, or without proof ``cost`` and
+        the ``margin`` to the next candidate.
+        """
+        rows, before = [], 0
+        for k, now in enumerate(self.selection.choice):
+            move = self._posed.schedule.moves[k]
+            node = move.candidates[now]
+            chosen = {
+                "move": k + 1,
+                "step": move.step,
+                "bricks": move.bricks,
+                "robot": move.robot,
+                "brick": self._posed.schedule.scene.brick_of_node[node].name,
+                "node": node,
+                "candidates": len(move.candidates),
+            }
+            rows.append(chosen | self._worth(k, before, now))
+            before = now
+        return pd.DataFrame(rows)
+
+    def _worth(self, move: int, before: int, now: int) -> dict[str, float]:
+        """Return the cells of the table that say what a choice is worth."""
+        if self.search is not None:
+            costs = self.search.costs(move)
+            margin = np.delete(costs, now).min(initial=np.inf) - costs[now]
+            return {"cost": costs[now], "margin": margin}
+        layered = self.formulation.aim.costs(self.problem)
+        return {
+            "single_cost": layered.single[move][now],
+            "shared_cost": layered.shared[move][before, now],
+            "rank_in_window": rank_of(move_costs(self._posed, move, before), now),
+        }
+
+    def alternatives(self) -> pd.DataFrame:
+        """Return raw responses and cost of every choice that was looked at, a row each."""
+        parts = []
+        for problem in self.explored:
+            for choices in problem.evaluation.steps:
+                table = problem.table(choices)
+                columns = ["node", "second_node"][: len(choices.moves)]
+                nodes = pd.DataFrame(table.index.to_frame(index=False).to_numpy(), columns=columns)
+                nodes.insert(0, "step", choices.step.number)
+                parts.append(pd.concat([nodes, table.reset_index(drop=True)], axis=1))
+        return pd.concat(parts).sort_values("step", kind="stable", ignore_index=True)
+
+    def summary(self) -> dict[str, object]:
+        """Return what there is to say about the plan, ready for JSON."""
+        schedule, proof = self._posed.schedule, self.certificate
+        status = "unproven"
+        if proof is not None:
+            status = "optimal" if proof.gap <= TOLERANCE else "feasible"
+        return {
+            "scene": schedule.scene.name,
+            "schedule": schedule.method,
+            "formulation": self.formulation.name,
+            "kind": self.formulation.kind.value,
+            "aim": self.formulation.aim.value,
+            "criterion": self._posed.criterion.name,
+            "status": status,
+            "objective": None if proof is None else proof.objective,
+            "bound": None if proof is None else proof.bound,
+            "gap": None if proof is None else proof.gap,
+            "models_evaluated": self.models,
+            "seconds": dict(self.seconds),
+        }
 
 
-def prepare(
-    engine: Engine, schedule: Schedule, criterion: Criterion, limits: Sequence[Limit] = ()
-) -> Posed:
-    """Pose a problem and compute its costs."""
+def solve(
+    problem: PlacementProblem, formulation: Formulation | str, *, proof: bool = True, **options: Any
+) -> Plan:
+    """Solve a problem by a formulation and check the answer from the problem's own data.
+
+    Parameters
+    ----------
+    problem : PlacementProblem
+        From `seqopt.pose`, or a `seqopt.placement.CostProblem`.
+    formulation : Formulation or str
+        One of `seqopt.formulations`, or its name.
+    proof : bool, optional
+        False lets a formulation that looks at one window after the other solve only the models that
+        it meets; how far its choice is from the optimum then stays unknown.
+    **options
+        Of the formulation.
+
+    Returns
+    -------
+    Plan
+
+    Raises
+    ------
+    InfeasibleError
+        If no choice is allowed.
+    ProblemError
+        If the formulation is not for such a problem, or does not know an option.
+    SolverError
+        If a solver fails, or the answer is not what its formulation claims.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> network = seqopt.build_network(seqopt.load_scene("arch25"))
+    >>> engine = seqopt.make_engine("compliance", network)
+    >>> schedule = seqopt.three_robot_loop(network)
+    >>> problem = seqopt.pose(engine, schedule, seqopt.CRITERIA["equations-2-3"])
+    >>> seqopt.solve(problem, "cascade").certificate.gap > 0.01
+    True
+    """
+    if isinstance(formulation, str):
+        formulation = find_formulation(formulation)
+    if problem.budgets and not formulation.takes_budgets:
+        able = [name for name, other in formulations().items() if other.takes_budgets]
+        raise ProblemError(
+            f"{formulation.name}: the budget {problem.budgets[0].name!r} couples all moves; "
+            f"use {' or '.join(able)}"
+        )
+    if not proof:
+        return _solve_windows(problem, formulation, options)
     seconds: dict[str, float] = {}
-    problem = _timed(seconds, "respond", lambda: pose(engine, schedule, criterion, limits))
-    _timed(seconds, "rank", lambda: (problem.sums, problem.peaks))
-    return Posed(problem, seconds)
-
-
-def optimize(posed: Posed, which: Formulation, **options: Any) -> Outcome:
-    """Solve a posed problem by one formulation, check the answer and fill in the plan."""
-    seconds = dict(posed.seconds)
-    problem = posed.problem
-    selection = _timed(seconds, "solve", lambda: which.solve(problem, **options))
+    stages = problem.seconds(formulation.aim)  # computes the costs: solving is timed alone
+    with _timed(seconds, "solve"):
+        selection = formulation.solve(problem, **options)
     seconds["compile"] = selection.compile_seconds
     seconds["solve"] -= selection.compile_seconds
-
-    def verify() -> tuple[Certificate, tuple[Step, ...]]:
-        plan = problem.schedule.fill(problem.nodes(selection.choice))
-        return check_selection(problem, selection, which), plan
-
-    certificate, plan = _timed(seconds, "verify", verify)
-    return Outcome(problem, which, selection, certificate, plan, seconds)
+    with _timed(seconds, "verify"):
+        certificate = judge(problem, selection, formulation)
+        steps = problem.steps(selection.choice)
+    order = {stage: seconds[stage] for stage in ("compile", "solve", "verify")}
+    return Plan(problem, formulation, selection, certificate, steps, {**stages, **order})
 
 
-def summary(outcome: Outcome) -> dict[str, object]:
-    """Return what there is to say about an outcome, but times, ready for JSON."""
-    certificate = outcome.certificate
-    return {
-        **header(outcome.problem, outcome.which),
-        "status": "optimal" if certificate.gap <= 1e-6 else "feasible",
-        "objective": certificate.objective,
-        "bound": certificate.bound,
-        "gap": certificate.gap,
-        "models_evaluated": outcome.problem.evaluation.models,
-    }
-
-
-def header(problem: Problem, which: Formulation) -> dict[str, object]:
-    """Return what was asked, ready for JSON."""
-    cascading, overlap = problem.paper_models
-    return {
-        "scene": problem.schedule.scene.name,
-        "method": problem.schedule.method,
-        "formulation": which.name,
-        "kind": which.kind.value,
-        "aim": which.aim.value,
-        "criterion": problem.criterion.name,
-        "models_paper_count": {"cascading": cascading, "overlap": overlap},
-    }
-
-
-def chosen(schedule: Schedule, move: int, place: int) -> dict[str, object]:
-    """Return a move and the node that a candidate stands for, a row."""
-    asked = schedule.moves[move]
-    node = asked.candidates[place]
-    return {
-        "move": move + 1,
-        "step": asked.step,
-        "bricks": asked.bricks,
-        "robot": asked.robot,
-        "brick": schedule.scene.brick_of_node[node].name,
-        "node": node,
-        "candidates": len(asked.candidates),
-    }
-
-
-def selection_table(outcome: Outcome) -> pd.DataFrame:
-    """Return a row per move: where, which robot, which node, what it costs, how it ranks."""
-    rows, before = [], 0
-    placement = outcome.problem.sums if outcome.which.aim is Aim.SUM else outcome.problem.peaks
-    for k, now in enumerate(outcome.selection.choice):
-        rows.append(
-            chosen(outcome.problem.schedule, k, now)
-            | {
-                "single_cost": placement.single[k][now],
-                "shared_cost": placement.shared[k][before, now],
-                "rank_in_window": rank_of(move_costs(outcome.problem, k, before), now),
-            }
+def _solve_windows(
+    problem: PlacementProblem, formulation: Formulation, options: Mapping[str, object]
+) -> Plan:
+    """Return the plan of a search that solves only the models it meets."""
+    if formulation.reads is not Reads.WINDOW or options:
+        able = [name for name, other in formulations().items() if other.reads is Reads.WINDOW]
+        asked = " ".join(
+            [formulation.name, *(f"{name}={value}" for name, value in options.items())]
         )
-        before = now
-    return pd.DataFrame(rows)
-
-
-def plan_table(engine: Engine, schedule: Schedule, plan: Sequence[Step]) -> pd.DataFrame:
-    """Return a plan with the columns of Table A.1 and the robot that each move optimizes."""
-    table = analyze(engine, plan)
-    open_at = {step.number: step.moves for step in schedule.steps}
-    moves = schedule.moves
-    table["optimized_robot"] = [
-        ";".join(moves[m].robot for m in open_at[number]) for number in table["step"]
-    ]
-    return table
-
-
-def responses_table(problem: Problem) -> pd.DataFrame:
-    """Return raw responses and cost of every choice in every open state, a row each."""
-    parts = []
-    for state in problem.evaluation.states:
-        table = problem.table(state)
-        nodes = pd.DataFrame(
-            table.index.to_frame(index=False).to_numpy(),
-            columns=["node", "second_node"][: len(state.moves)],
+        raise ProblemError(
+            f"{asked} looks beyond the window of a move and needs all models: "
+            f"use {' or '.join(able)} without options, or ask for the proof"
         )
-        step = pd.Series(state.step.number, index=nodes.index, name="step")
-        parts.append(pd.concat([step, nodes, table.reset_index(drop=True)], axis=1))
-    return pd.concat(parts, ignore_index=True)
+    if not isinstance(problem, Problem):
+        raise ProblemError("the costs of all choices are given; ask for the proof, it is free")
+    seconds: dict[str, float] = {}
+    with _timed(seconds, "search"):
+        found = search_windows(problem)
+    respond = sum(part.evaluation.seconds for part in (found.alone, *found.shared))
+    with _timed(seconds, "verify"):
+        steps = problem.steps(found.choice)
+    stages = {"respond": respond, "rank": seconds["search"] - respond, "verify": seconds["verify"]}
+    return Plan(problem, formulation, Selection(found.choice, np.nan), None, steps, stages, found)
 
 
-def _timed(seconds: dict[str, float], stage: str, call: Callable[[], Result]) -> Result:
+@contextmanager
+def _timed(seconds: dict[str, float], stage: str) -> Iterator[None]:
     start = time.perf_counter()
-    result = call()
+    yield
     seconds[stage] = time.perf_counter() - start
-    return result
-
-
-def run(
-    problem: PlacementProblem, which: Formulation, **options: Any
-) -> tuple[Selection, Certificate]:
-    """Solve a problem and check the answer; see `check`."""
-    selection = which.solve(problem, **options)
-    return selection, check_selection(problem, selection, which)

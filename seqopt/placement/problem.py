@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -12,18 +13,30 @@ import pandas as pd
 from seqopt.arrays import Floats
 from seqopt.engines.interface import Engine
 from seqopt.errors import ProblemError
-from seqopt.placement.costs import Budget, LayeredCosts
+from seqopt.placement.costs import Aim, Budget, LayeredCosts
 from seqopt.placement.criteria import Criterion
-from seqopt.responses.choices import SCALARS, Evaluation, StepChoices, evaluate_choices
+from seqopt.responses.choices import CHOICE_RESPONSES, Evaluation, StepChoices
 from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import Schedule
+from seqopt.sequence.steps import Step
 
 
 @dataclass(frozen=True)
 class Limit:
-    """No state with an open grip may exceed a value: response and bound, SI units.
+    """No step with an open grip may exceed a value.
 
-    Responses are named as in `seqopt.placement.criteria`.
+    Parameters
+    ----------
+    response : str
+        Named as in `seqopt.placement.criteria`.
+    bound : float
+        SI units.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> seqopt.Limit("F_largest", 300.0)
+    Limit(response='F_largest', bound=300.0)
     """
 
     response: str
@@ -31,75 +44,139 @@ class Limit:
 
 
 def payload_limits(scene: Scene) -> tuple[Limit, ...]:
-    """Return limits that keep every robot within its payload."""
+    """Return limits that keep every robot of a scene within its payload."""
     return tuple(Limit(f"F_{robot.name}", robot.payload) for robot in scene.robots)
 
 
 @dataclass(frozen=True)
+class ResponsesAsked:
+    """The responses that criterion, limits and further wishes ask for."""
+
+    criterion: Criterion
+    limits: tuple[Limit, ...]
+    also: tuple[str, ...]
+
+    def __call__(self, bricks: int) -> frozenset[str]:
+        """Return their names for a move that is made with so many bricks placed."""
+        named = {*self.criterion.wanted(bricks), *(limit.response for limit in self.limits)}
+        return frozenset(named | {*self.also})
+
+
+@dataclass(frozen=True, repr=False)
 class Problem:
     """Support placement over a whole build.
 
+    Nothing is computed before it is asked for: responses, sums and peaks each on first use.
+
     Attributes
     ----------
-    schedule : Schedule
-        The steps and moves.
     criterion : Criterion
-        What a state costs.
+        What a step costs.
     limits : tuple of Limit
-        What no state may exceed.
+        What no open step may exceed.
     evaluation : Evaluation
-        Raw responses of every open state.
+        Raw responses of every open step.
     budgets : tuple of Budget
         Caps on totals over the build.
     """
 
-    schedule: Schedule
     criterion: Criterion
     limits: tuple[Limit, ...]
-    evaluation: Evaluation = field(repr=False)
+    evaluation: Evaluation
     budgets: tuple[Budget, ...] = ()
 
-    @cached_property
+    def __repr__(self) -> str:
+        schedule = self.schedule
+        counts = f"{len(schedule.steps)} steps, {len(schedule.moves)} moves"
+        extras = f"{len(self.limits)} limits, {len(self.budgets)} budgets"
+        what = f"{schedule.scene.name!r}, {schedule.method!r}: {counts}"
+        return f"Problem({what}, criterion {self.criterion.name!r}, {extras})"
+
+    @property
+    def engine(self) -> Engine:
+        """What computes the responses."""
+        return self.evaluation.engine
+
+    @property
+    def schedule(self) -> Schedule:
+        """The steps and moves."""
+        return self.evaluation.schedule
+
+    @property
     def sums(self) -> LayeredCosts:
         """The costs whose sum over the build is to be least."""
-        return self._placement(np.add)
+        return self._sums[0]
 
-    @cached_property
+    @property
     def peaks(self) -> LayeredCosts:
         """The costs whose largest over the build is to be least."""
-        return self._placement(np.maximum)
+        return self._peaks[0]
 
-    def _placement(self, join: np.ufunc) -> LayeredCosts:
-        costs = [(state.moves, self.state_costs(state)) for state in self.evaluation.states]
+    @cached_property
+    def _sums(self) -> tuple[LayeredCosts, float]:
+        return self._layered(np.add)
+
+    @cached_property
+    def _peaks(self) -> tuple[LayeredCosts, float]:
+        return self._layered(np.maximum)
+
+    def _layered(self, join: np.ufunc) -> tuple[LayeredCosts, float]:
+        """Return the costs of all choices, steps of the same moves joined, and the seconds."""
+        steps = self.evaluation.steps
+        start = time.perf_counter()
+        costs = [(choices.moves, self.step_costs(choices)) for choices in steps]
         known = [c[np.isfinite(c)].min() for _, c in costs if np.isfinite(c).any()]
-        least = 0.0 if join is np.add else min(known, default=0.0)  # where no state is open
+        least = 0.0 if join is np.add else min(known, default=0.0)  # where no step is open
         sizes = [len(move.candidates) for move in self.schedule.moves]
         single = [np.full(size, least) for size in sizes]
         shared = [np.full(pair, least) for pair in zip([1, *sizes[:-1]], sizes, strict=True)]
         for moves, cost in costs:
             target = single if len(moves) == 1 else shared
             target[moves[-1]] = join(target[moves[-1]], cost)
-        return LayeredCosts(tuple(single), tuple(shared))
+        layered = LayeredCosts(tuple(single), tuple(shared))
+        return layered, time.perf_counter() - start
 
-    def row(self, move: int, before: int) -> Floats:
-        """Return the cost of a move's candidates in the shared states, given the move before.
+    def seconds(self, aim: Aim) -> Mapping[str, float]:
+        """Return what computing the costs of an aim took: respond (responses), rank (costs)."""
+        ranked = self._sums[1] if aim is Aim.SUM else self._peaks[1]
+        return {"respond": self.evaluation.seconds, "rank": ranked}
+
+    def conditional(self, move: int, before: int) -> Floats:
+        """Return the cost of a move's candidates in the shared steps, given the move before.
 
         Ranks are those among the candidates of this move alone.
+
+        Parameters
+        ----------
+        move, before : int
+            A move, and the candidate chosen for the move before it.
+
+        Returns
+        -------
+        (C_k,) float
         """
         out = np.zeros(len(self.schedule.moves[move].candidates))
-        for state in self.evaluation.states:
-            if len(state.moves) == 2 and state.moves[1] == move:
-                out = out + self.state_costs(state, before)
+        for choices in self.evaluation.steps:
+            if len(choices.moves) == 2 and choices.moves[1] == move:
+                out = out + self.step_costs(choices, before)
         return out
 
-    def state_costs(self, state: StepChoices, rows: slice | int = slice(None)) -> Floats:
-        """Return the costs of a state's choices, infinite where they are not allowed.
+    def step_costs(self, choices: StepChoices, rows: slice | int = slice(None)) -> Floats:
+        """Return the costs of a step's choices, infinite where they are not allowed.
 
-        ``rows`` fixes the earlier move of a shared state to one candidate: costs, ranks included,
-        are then those among the candidates of the later move alone.
+        Parameters
+        ----------
+        choices : StepChoices
+        rows : int, optional
+            Fixes the earlier move of a shared step to one candidate: costs, ranks included, are
+            then those among the candidates of the later move alone.
+
+        Returns
+        -------
+        (C,) or (C, D) float
         """
-        responses = {name: values[rows] for name, values in state.responses.items()}
-        move = self.schedule.moves[state.moves[-1]]
+        responses = {name: values[rows] for name, values in choices.responses.items()}
+        move = self.schedule.moves[choices.moves[-1]]
         costs = self.criterion.costs(responses, move.bricks, len(move.candidates))
         costs = np.where(np.isfinite(costs), costs, np.inf)
         for limit in self.limits:
@@ -107,28 +184,21 @@ class Problem:
             costs[over] = np.inf
         return costs
 
-    def table(self, state: StepChoices) -> pd.DataFrame:
-        """Return raw responses and cost of a state, a row per choice, labeled by nodes."""
-        moves = [self.schedule.moves[m] for m in state.moves]
+    def table(self, choices: StepChoices) -> pd.DataFrame:
+        """Return raw responses and cost of a step, a row per choice, labeled by nodes."""
+        moves = [self.schedule.moves[m] for m in choices.moves]
         names = [f"{move.robot}_node" for move in moves]
         index = pd.MultiIndex.from_product([move.candidates for move in moves], names=names)
-        columns: Mapping[str, Floats] = {**state.responses, "cost": self.state_costs(state)}
+        columns: Mapping[str, Floats] = {**choices.responses, "cost": self.step_costs(choices)}
         return pd.DataFrame({name: values.ravel() for name, values in columns.items()}, index=index)
 
     def nodes(self, choice: Sequence[int]) -> tuple[int, ...]:
-        """Return the nodes that candidates stand for."""
+        """Return the nodes that one candidate per move stands for."""
         return tuple(m.candidates[c] for m, c in zip(self.schedule.moves, choice, strict=True))
 
-    @property
-    def paper_models(self) -> tuple[int, int]:
-        """How many models the study counts: cascading, and with the shared step over all pairs.
-
-        It counts 2n candidates for every brick count n from 3 to the last, four states each, and
-        2n times 2(n-1) pairs for the shared one.
-        """
-        counts = range(3, len(self.schedule.scene.bricks) + 1)
-        cascading = sum(4 * 2 * n for n in counts)
-        return cascading, sum(3 * 2 * n + 2 * n * 2 * (n - 1) for n in counts)
+    def steps(self, choice: Sequence[int]) -> tuple[Step, ...]:
+        """Return the checked steps of the schedule with one candidate per move."""
+        return self.schedule.fill(self.nodes(choice))
 
 
 def pose(
@@ -138,17 +208,38 @@ def pose(
     limits: Sequence[Limit] = (),
     also: Sequence[str] = (),
 ) -> Problem:
-    """Return the problem; only responses that criterion, limits and ``also`` name are evaluated."""
+    """Return the problem of filling a schedule's open grips.
+
+    Parameters
+    ----------
+    engine : Engine
+    schedule : Schedule
+    criterion : Criterion
+    limits : sequence of Limit
+    also : sequence of str
+        Responses to evaluate beside those that criterion and limits name; no others are.
+
+    Raises
+    ------
+    ProblemError
+        If a response is named that there is not.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> network = seqopt.build_network(seqopt.load_scene("arch25"))
+    >>> engine = seqopt.make_engine("compliance", network)
+    >>> schedule = seqopt.three_robot_loop(network)
+    >>> problem = seqopt.pose(engine, schedule, seqopt.CRITERIA["worst-ratio"])
+    >>> problem
+    Problem('arch25', 'three-robot': 90 steps, 22 moves, criterion 'worst-ratio', 0 limits, 0 budgets)
+    """
     robots = [robot.name for robot in schedule.scene.robots]
-    named = criterion.for_robots(robots)
-    known = {*SCALARS, *(f"F_{name}" for name in robots)}
-
-    def wanted(bricks: int) -> set[str]:
-        names = {*named.wanted(bricks), *(limit.response for limit in limits), *also}
-        if names - known:
-            raise ProblemError(
-                f"response {min(names - known)}: there is no such; give {', '.join(sorted(known))}"
-            )
-        return names
-
-    return Problem(schedule, named, tuple(limits), evaluate_choices(engine, schedule, wanted))
+    asked = ResponsesAsked(criterion.for_robots(robots), tuple(limits), tuple(also))
+    known = {*CHOICE_RESPONSES, *(f"F_{name}" for name in robots)}
+    for move in schedule.moves:
+        if asked(move.bricks) - known:
+            wrong = min(asked(move.bricks) - known)
+            listed = ", ".join(sorted(known))
+            raise ProblemError(f"response {wrong}: there is no such; give {listed}")
+    return Problem(asked.criterion, asked.limits, Evaluation(engine, schedule, asked))

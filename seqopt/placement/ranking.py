@@ -9,25 +9,38 @@ import numpy as np
 import pandas as pd
 
 from seqopt.arrays import Floats
+from seqopt.placement.costs import LayeredCosts
 from seqopt.placement.criteria import Criterion, RankSum, WeightedSum, WorstRatio
 from seqopt.placement.problem import Problem
 from seqopt.responses.choices import StepChoices
 
-TIE = 1e-9  # costs this close, relative to the largest, are equal
+TIED = 1e-9  # costs this close, relative to the largest, are equal
 
 
 def move_costs(problem: Problem, move: int, before: int, without: int | None = None) -> Floats:
-    """Return the costs (C_k,) of a move's candidates, the choice before it being fixed.
+    """Return the costs of a move's candidates, the choice before it being fixed.
 
-    The study's search of a single move: each state of the window is ranked over the candidates of
-    this move alone. ``without`` leaves one candidate out, which then costs infinity.
+    The search of a single move (equation 1 of Bruun et al.): each step of the window is ranked over
+    the candidates of this move alone.
+
+    Parameters
+    ----------
+    problem : Problem
+    move, before : int
+        A move, and the candidate chosen for the move before it.
+    without : int, optional
+        A candidate to leave out, which then costs infinity.
+
+    Returns
+    -------
+    (C_k,) float
     """
     total = np.zeros(len(problem.schedule.moves[move].candidates))
-    for state in problem.evaluation.states:
-        if state.moves[-1] != move:
+    for choices in problem.evaluation.steps:
+        if choices.moves[-1] != move:
             continue
-        rows = slice(None) if len(state.moves) == 1 else before
-        total += problem.state_costs(_without(state, without), rows)
+        rows = slice(None) if len(choices.moves) == 1 else before
+        total += problem.step_costs(_without(choices, without), rows)
     if without is not None:
         total[without] = np.inf
     return total
@@ -39,7 +52,7 @@ def rank_of(costs: Floats, chosen: int) -> int:
 
 
 def _tie(costs: Floats) -> float:
-    return TIE * float(np.abs(costs[np.isfinite(costs)]).max(initial=0.0))
+    return TIED * float(np.abs(costs[np.isfinite(costs)]).max(initial=0.0))
 
 
 def rank_moves(problem: Problem, choice: Sequence[int]) -> pd.DataFrame:
@@ -87,15 +100,15 @@ def rank_moves(problem: Problem, choice: Sequence[int]) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def _without(state: StepChoices, candidate: int | None) -> StepChoices:
-    """Return a state in which one candidate of its last move is impossible."""
+def _without(choices: StepChoices, candidate: int | None) -> StepChoices:
+    """Return a step in which one candidate of its last move is impossible."""
     if candidate is None:
-        return state
+        return choices
     responses = {}
-    for name, values in state.responses.items():
+    for name, values in choices.responses.items():
         responses[name] = values.copy()
         responses[name][..., candidate] = np.nan
-    return replace(state, responses=responses)
+    return replace(choices, responses=responses)
 
 
 def _without_one(criterion: Criterion, bricks: int) -> Iterator[tuple[str, Criterion]]:
@@ -115,3 +128,43 @@ def _without_one(criterion: Criterion, bricks: int) -> Iterator[tuple[str, Crite
                 name,
                 replace(criterion, limits=tuple(t for t in criterion.limits if t[0] != name)),
             )
+
+
+def rank_choice(problem: Problem, choice: Sequence[int]) -> pd.DataFrame:
+    """Return where chosen nodes rank, move by move, the choice before each being fixed.
+
+    Columns: ``move``, ``step``, ``bricks``, ``robot``, ``node``, ``candidates``,
+    ``first_in_window``, and three ranks: ``rank_in_window`` of the move alone, ``rank_overlap``
+    with the cost to go of the whole build, ``rank_peak`` with the worst cost to go.
+    """
+    sums = _to_go(problem.sums, np.add)
+    peaks = _to_go(problem.peaks, np.maximum)
+    rows = []
+    for k, move in enumerate(problem.schedule.moves):
+        before = choice[k - 1] if k else 0
+        window = move_costs(problem, k, before)
+        rows.append(
+            {
+                "move": k + 1,
+                "step": move.step,
+                "bricks": move.bricks,
+                "robot": move.robot,
+                "node": move.candidates[choice[k]],
+                "candidates": len(move.candidates),
+                "first_in_window": move.candidates[int(window.argmin())],
+                "rank_in_window": rank_of(window, choice[k]),
+                "rank_overlap": rank_of(problem.sums.shared[k][before] + sums[k], choice[k]),
+                "rank_peak": rank_of(
+                    np.maximum(problem.peaks.shared[k][before], peaks[k]), choice[k]
+                ),
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def _to_go(costs: LayeredCosts, join: np.ufunc) -> list[Floats]:
+    """Return the least cost from each candidate to the end, its own single cost included."""
+    out = [costs.single[-1]]
+    for single, shared in zip(costs.single[-2::-1], costs.shared[:0:-1], strict=True):
+        out.insert(0, join(single, join(shared, out[0]).min(axis=1)))
+    return out

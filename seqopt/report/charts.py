@@ -1,4 +1,4 @@
-"""Charts of a contest of methods and formulations (extra ``plot``)."""
+"""Charts of a comparison of methods and formulations (extra ``plot``)."""
 
 from __future__ import annotations
 
@@ -6,16 +6,17 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
-from seqopt.report.contest import PUBLISHED, Contest
+from seqopt.report.comparison import LARGEST, Comparison
 from seqopt.report.draw import draw_responses
+from seqopt.study.published import PUBLISHED
 
 MARKERS = "osv^D<>P*X"
 FLOOR = 1e-6  # where a gap of zero is drawn on a logarithmic axis
 COLUMNS = {"M_sup_Nm": "M_sup [N m]", "F_max_N": "T_max [N]", "D_max_1e-3mm": "D_max [1e-3 mm]"}
 
 
-def contest_figures(result: Contest) -> dict[str, Figure]:
-    """Return the figures of a contest by file name."""
+def comparison_figures(result: Comparison) -> dict[str, Figure]:
+    """Return the figures of a comparison by file name."""
     return {
         "maxima.png": _maxima(result),
         "responses.png": _responses(result),
@@ -23,12 +24,11 @@ def contest_figures(result: Contest) -> dict[str, Figure]:
     }
 
 
-def _maxima(result: Contest) -> Figure:
+def _maxima(result: Comparison) -> Figure:
     figure = Figure(figsize=(9, 6), layout="constrained")
     names = list(result.table.index)
     panels = figure.subplots(2, 2, sharey=True).ravel()
-    units = {"F_rob": "N", "M_sup": "N m", "T_max": "N", "D_max": "1e-3 mm"}
-    for panel, (column, unit) in zip(panels, units.items(), strict=True):
+    for panel, (column, unit) in zip(panels, LARGEST.items(), strict=True):
         colors = ["#b8643c" if name == PUBLISHED else "#5b7a8c" for name in names]
         panel.barh(names, result.table[column], color=colors)
         panel.set_title(f"largest {column} [{unit}]", fontsize=9)
@@ -37,7 +37,7 @@ def _maxima(result: Contest) -> Figure:
     return figure
 
 
-def _responses(result: Contest) -> Figure:
+def _responses(result: Comparison) -> Figure:
     figure = Figure(figsize=(9, 8), layout="constrained")
     axes = figure.subplots(len(COLUMNS), 1, sharex=True)
     draw_responses(axes, result.tables, COLUMNS)
@@ -46,7 +46,7 @@ def _responses(result: Contest) -> Figure:
     return figure
 
 
-def _gaps(result: Contest) -> Figure:
+def _gaps(result: Comparison) -> Figure:
     figure = Figure(figsize=(9, 4), layout="constrained")
     left, right = figure.subplots(1, 2, sharey=True)
     solved = result.table.dropna(subset=["seconds", "gap"])

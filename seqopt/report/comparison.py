@@ -1,46 +1,90 @@
-"""Every method on one scene, side by side, beside what the study printed."""
+"""Every method and formulation on one scene, side by side, beside what was published."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
 
 from seqopt.engines.interface import Engine
-from seqopt.errors import StepError
-from seqopt.responses.table import analyze
+from seqopt.errors import ProblemError, StepError
+from seqopt.placement.certificate import least_sum
+from seqopt.placement.costs import TINY
+from seqopt.placement.criteria import Criterion
+from seqopt.placement.formulation import formulations
+from seqopt.placement.plan import Plan, solve
+from seqopt.placement.problem import Problem, pose
+from seqopt.placement.ranking import rank_choice
+from seqopt.responses.quantities import RESPONSES
+from seqopt.responses.table import analyze, force_column
 from seqopt.scene.scene import Scene
+from seqopt.sequence.three_robots import modified_sequential, three_robot_loop
 from seqopt.sequence.two_robots import METHODS
-from seqopt.study.published import IRREGULARITIES, PAPER_COLUMN, is_reference_arch, published_plan
-from seqopt.study.tables import printed
+from seqopt.study.published import (
+    IRREGULARITIES,
+    PUBLISHED,
+    is_reference_arch,
+    paper_models,
+    printed_maxima,
+    published_choice,
+    published_plan,
+)
+
+LARGEST = {"F_rob": "N", "M_sup": "N m", "T_max": "N", "D_max": "1e-3 mm"}
+COLUMNS = ["objective", "gap", *LARGEST, "models", "seconds", "solve_seconds"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Comparison:
-    """Methods side by side.
+    """Methods and formulations side by side.
 
     Attributes
     ----------
     maxima : pandas.DataFrame
-        A row per quantity (with its unit), a column per method: the largest value of any step.
+        A row per quantity (with its unit), a column per method without a choice, and the published
+        plan: the largest value of any step.
     printed : pandas.DataFrame or None
-        The same as the study prints it (its improvement table), for its own arch only.
+        The same as the paper prints it, for its own arch only.
+    table : pandas.DataFrame
+        A row per method or formulation: ``objective`` and ``gap`` to the exact optimum of its aim,
+        the largest ``F_rob`` [N], ``M_sup`` [N m], ``T_max`` [N] and ``D_max`` [1e-3 mm] of any
+        step, the distinct ``models`` it looks at, and ``seconds`` with all of them evaluated.
     tables : mapping of str to pandas.DataFrame
-        Responses of every step, by method.
+        Responses of every step, by row of ``table``.
+    ranks : pandas.DataFrame or None
+        Where the published plan's nodes rank, move by move; see `rank_choice`.
+    paper_models : tuple of int or None
+        Models that Bruun et al. count: cascading, full overlap.
     notes : tuple of str
-        Payloads exceeded, and what does not add up in the study's own numbers.
+        Payloads exceeded, and inconsistencies in the paper's own numbers.
+    refusal : str
+        Why the scene has no three-robot loop; empty if it has.
     """
 
     maxima: pd.DataFrame
     printed: pd.DataFrame | None
+    table: pd.DataFrame
     tables: Mapping[str, pd.DataFrame]
+    ranks: pd.DataFrame | None
+    paper_models: tuple[int, int] | None
     notes: tuple[str, ...]
+    refusal: str
 
 
-def compare_methods(engine: Engine) -> Comparison:
-    """Analyze every method that exists for the engine's scene.
+def compare(
+    engine: Engine, criterion: Criterion, progress: Callable[[str], None] = lambda _: None
+) -> Comparison:
+    """Analyze every method on an engine's scene and solve its loop by every formulation.
+
+    Parameters
+    ----------
+    engine : Engine
+    criterion : Criterion
+        What a step costs.
+    progress : callable
+        Told what is done next.
 
     Raises
     ------
@@ -48,42 +92,106 @@ def compare_methods(engine: Engine) -> Comparison:
         If no method can build the scene.
     """
     scene = engine.network.scene
-    tables, notes, refused = {}, [], []
+    tables, notes = method_tables(engine)
+    maxima = pd.DataFrame({name: _quantities(scene, table) for name, table in tables.items()})
+    printed = printed_maxima().set_axis(maxima.index) if PUBLISHED in tables else None
+    notes += _overloads(scene, tables)
+    notes += [f"In the paper: {text}" for text in IRREGULARITIES if printed is not None]
+    rows = {name: largest(scene, table) for name, table in tables.items()}
+    ranks, counted, refusal = None, None, ""
+    try:
+        plans, problem = _plans(engine, criterion, progress)
+    except (StepError, ProblemError) as error:
+        refusal = str(error)
+    else:
+        for name, plan in plans.items():
+            tables[name] = analyze(engine, plan.steps)
+            rows[name] = _row(plan) | largest(scene, tables[name])
+        counted = paper_models(problem.schedule)
+        if PUBLISHED in tables:
+            ranks = rank_choice(problem, published_choice(problem))
+            rows[PUBLISHED] |= _worth(problem, published_choice(problem))
+    table = pd.DataFrame.from_dict(rows, orient="index").reindex(columns=COLUMNS)
+    return Comparison(maxima, printed, table, tables, ranks, counted, tuple(notes), refusal)
+
+
+def method_tables(engine: Engine) -> tuple[dict[str, pd.DataFrame], list[str]]:
+    """Return the responses of every method's steps, and why others cannot build the scene.
+
+    Raises
+    ------
+    StepError
+        If none can.
+    """
+    scene = engine.network.scene
+    tables: dict[str, pd.DataFrame] = {}
+    refused: dict[str, StepError] = {}
     for name, method in METHODS.items():
         try:
             tables[name] = analyze(engine, method(engine.network))
         except StepError as error:
-            refused.append(error)
-            notes.append(f"{name}: not possible here; {error}")
+            refused[name] = error
     if not tables:
-        raise refused[0]
+        raise next(iter(refused.values()))
     if is_reference_arch(scene):
-        tables["three-robot"] = analyze(engine, published_plan(scene))
-    maxima = pd.DataFrame({name: _maxima(scene, table) for name, table in tables.items()})
-    notes += _overloads(scene, tables)
-    reference = None
-    if is_reference_arch(scene):
-        notes += [f"In the study: {text}" for text in IRREGULARITIES]
-        printed_maxima = printed("improvement_3robot").drop(columns=["quantity", "unit"])
-        columns = [PAPER_COLUMN[name] for name in tables]
-        reference = printed_maxima.set_axis(maxima.index)[columns].set_axis(list(tables), axis=1)
-    return Comparison(maxima, reference, tables, tuple(notes))
+        tables[PUBLISHED] = analyze(engine, published_plan(scene))
+    return tables, [f"{name}: not possible here; {error}" for name, error in refused.items()]
 
 
-def _maxima(scene: Scene, table: pd.DataFrame) -> pd.Series[float]:
-    values = {
-        f"F_{robot.name} [N]": table[f"F_{robot.name}_N"].abs().max() for robot in scene.robots
+def _plans(
+    engine: Engine, criterion: Criterion, progress: Callable[[str], None]
+) -> tuple[dict[str, Plan], Problem]:
+    """Return the plan of the modified sequential method and of every formulation on the loop."""
+    progress("modified sequential method")
+    modified = pose(engine, modified_sequential(engine.network), criterion)
+    plans = {"modified-sequential": solve(modified, "rank_search")}
+    problem = pose(engine, three_robot_loop(engine.network), criterion)
+    for name, formulation in formulations().items():
+        progress(f"three-robot loop by {name}")
+        plans[name] = solve(problem, formulation)
+    return plans, problem
+
+
+def largest(scene: Scene, table: pd.DataFrame) -> dict[str, float]:
+    """Return the largest responses of any step of a table, by the names of `LARGEST`."""
+    forces = table[[force_column(robot) for robot in scene.robots]].abs()
+    out = {"F_rob": float(np.nanmax(forces.to_numpy(float)))}
+    for name in ("M_sup", "T_max", "D_max"):
+        out[name] = float(table[RESPONSES[name].column].max())
+    return out
+
+
+def _quantities(scene: Scene, table: pd.DataFrame) -> pd.Series[float]:
+    """Return the largest responses of any step, the force of every robot for itself."""
+    values = {f"F_{r.name} [N]": table[force_column(r)].abs().max() for r in scene.robots}
+    rest = largest(scene, table)
+    return pd.Series(
+        values | {f"{name} [{LARGEST[name]}]": rest[name] for name in rest if name != "F_rob"}
+    )
+
+
+def _row(plan: Plan) -> dict[str, float]:
+    assert plan.certificate is not None  # asked for
+    return {
+        "objective": plan.certificate.objective,
+        "gap": plan.certificate.gap,
+        "models": plan.models_needed,
+        "seconds": sum(plan.seconds.values()),
+        "solve_seconds": plan.seconds["solve"],
     }
-    values["M_sup [N m]"] = table["M_sup_Nm"].max()
-    values["T_max [N]"] = table["F_max_N"].max()
-    values["D_max [1e-3 mm]"] = table["D_max_1e-3mm"].max()
-    return pd.Series(values)
+
+
+def _worth(problem: Problem, choice: tuple[int, ...]) -> dict[str, float]:
+    """Return the value of a choice, and how far it lies above the optimum."""
+    value = problem.sums.cost(choice)
+    gap = (value - least_sum(problem.sums)) / max(abs(value), TINY)
+    return {"objective": value, "gap": gap}
 
 
 def _overloads(scene: Scene, tables: Mapping[str, pd.DataFrame]) -> Iterator[str]:
     for name, table in tables.items():
         for robot in scene.robots:
-            force = table[f"F_{robot.name}_N"].abs()
+            force = table[force_column(robot)].abs()
             over = table["step"][force > robot.payload]
             if len(over):
                 steps = ", ".join(map(str, over))
@@ -91,29 +199,3 @@ def _overloads(scene: Scene, tables: Mapping[str, pd.DataFrame]) -> Iterator[str
                     f"{name}: {robot.name} holds up to {force.max():.1f} N, more than its payload "
                     f"of {robot.payload:g} N (step {steps})."
                 )
-
-
-def format_comparison(comparison: Comparison, scene: Scene) -> str:
-    """Return the comparison as text: under each method our value and, if any, the study's."""
-    maxima, study = comparison.maxima, comparison.printed
-    width = 12 if study is None else 22
-    lines = [f"{scene.name}: {len(scene.bricks)} bricks; largest response of any step", ""]
-    lines.append(f"{'':16}" + "".join(f"{name:>{width}}" for name in maxima))
-    if study is not None:
-        lines.append(f"{'':16}" + f"{'seqopt':>14}{'study':>8}" * maxima.shape[1])
-    for row, quantity in enumerate(maxima.index):
-        cells = ""
-        for column in range(maxima.shape[1]):
-            own = _number(maxima.iloc[row, column])
-            cells += (
-                f"{own:>12}" if study is None else f"{own:>14}{_number(study.iloc[row, column]):>8}"
-            )
-        lines.append(f"{quantity:16}{cells}")
-    lines += ["", "Notes"]
-    lines += [f"- {note}" for note in comparison.notes] or ["- none"]
-    return "\n".join(lines)
-
-
-def _number(value: object) -> str:
-    number = float(str(value))
-    return "-" if np.isnan(number) else f"{number:.1f}"

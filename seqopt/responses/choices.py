@@ -1,24 +1,33 @@
-"""Responses of every state of a schedule over the choices that are open in it."""
+"""Responses of every open step of a schedule, over the choices that are open in it.
+
+Beside the responses of `seqopt.responses.quantities` there are those that belong to robots: the
+force of each (``F_`` and its name), of the one that takes its grip (``F_move``) and the largest
+(``F_largest``), sizes without sign.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+import time
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass
+from functools import cached_property, reduce
+from operator import or_
+from typing import Protocol
 
 import numpy as np
 
-from seqopt.arrays import Floats, Ints
-from seqopt.engines.interface import Engine, Fields, Want
+from seqopt.arrays import Bools, Floats, FrozenValue, Ints
+from seqopt.engines.interface import Engine, Want
+from seqopt.responses.quantities import RESPONSES, lengths
 from seqopt.sequence.schedule import OpenGrip, OpenStep, Schedule
 
 BLOCK = 2048  # grip sets whose fields are held at once: few enough to stay in the cache
-SCALARS = ("T_max", "M_sup", "D_max", "F_move", "F_largest")  # beside the force of every robot
-SOURCES = {"T_max": Want.EDGES, "M_sup": Want.SUPPORT, "D_max": Want.DISPLACEMENTS}
+CHOICE_RESPONSES = ("T_max", "M_sup", "D_max", "F_move", "F_largest")  # and one per robot
 
 
-@dataclass(frozen=True)
-class StepChoices:
-    """One step of a schedule and what every choice in it leads to.
+@dataclass(frozen=True, eq=False, repr=False)
+class StepChoices(FrozenValue):
+    """One open step of a schedule and what every choice in it leads to.
 
     Attributes
     ----------
@@ -35,51 +44,116 @@ class StepChoices:
     responses: Mapping[str, Floats]
 
 
+class Wanted(Protocol):
+    """Which responses a move needs."""
+
+    def __call__(self, bricks: int) -> Set[str]:
+        """Return the names for a move that is made with so many bricks placed."""
+
+
 @dataclass(frozen=True)
 class Evaluation:
-    """All open states of a schedule, and how many models were solved for them."""
-
-    states: tuple[StepChoices, ...]
-    models: int
-
-
-def evaluate_choices(
-    engine: Engine, schedule: Schedule, wanted: Callable[[int], Iterable[str]]
-) -> Evaluation:
-    """Solve every distinct model that the open states of a schedule contain, once.
+    """The responses of all choices of a schedule, computed when they are first asked for.
 
     Parameters
     ----------
     engine : Engine
     schedule : Schedule
-    wanted : callable
-        The names of the responses that a move needs when it is made with so many bricks placed.
+    wanted : Wanted
     """
-    shapes: dict[tuple[int, int], list[OpenStep]] = {}
+
+    engine: Engine
+    schedule: Schedule
+    wanted: Wanted
+
+    @cached_property
+    def _found(self) -> tuple[tuple[StepChoices, ...], int, float]:
+        start = time.perf_counter()
+        steps, models = evaluate_choices(self.engine, self.schedule, self.wanted)
+        return steps, models, time.perf_counter() - start
+
+    @property
+    def steps(self) -> tuple[StepChoices, ...]:
+        """All open steps, in order."""
+        return self._found[0]
+
+    @property
+    def models(self) -> int:
+        """How many different models were solved for them."""
+        return self._found[1]
+
+    @property
+    def seconds(self) -> float:
+        """How long that took."""
+        return self._found[2]
+
+
+def evaluate_choices(
+    engine: Engine, schedule: Schedule, wanted: Wanted
+) -> tuple[tuple[StepChoices, ...], int]:
+    """Solve every distinct model that the open steps of a schedule contain, once.
+
+    Parameters
+    ----------
+    engine : Engine
+    schedule : Schedule
+    wanted : Wanted
+
+    Returns
+    -------
+    steps : tuple of StepChoices
+    models : int
+        How many different models there were.
+
+    Raises
+    ------
+    MechanismError, SolverError
+        As the engine does.
+    """
+    alike: dict[tuple[int, int], list[OpenStep]] = {}
     for step in schedule.steps:
         if step.moves:
-            shapes.setdefault((step.bricks, len(_held(step))), []).append(step)
-    states: dict[int, StepChoices] = {}
+            alike.setdefault((step.bricks, len(_robots_holding(step))), []).append(step)
+    out: list[StepChoices] = []
     models = 0
-    for (bricks, _), steps in sorted(shapes.items()):
-        names = [set(wanted(schedule.moves[step.moves[-1]].bricks)) for step in steps]
-        combos = [_combinations(schedule, step) for step in steps]
-        valid = [_valid(rows) for rows in combos]
-        rows = np.concatenate([rows[ok] for rows, ok in zip(combos, valid, strict=True)])
-        distinct, back = _distinct(np.sort(rows, axis=1))
-        models += len(distinct)
-        union = set().union(*names)
-        answers = _answers(engine, bricks, distinct, union)
-        starts = np.cumsum([0, *(ok.sum() for ok in valid)])
-        for i, step in enumerate(steps):
-            part = slice(starts[i], starts[i + 1])
-            order = np.argsort(np.argsort(rows[part], axis=1), axis=1)
-            index = back[part]
-            found = {name: values[index] for name, values in answers.items() if values.ndim == 1}
-            forces = np.take_along_axis(answers["F"][index], order, axis=1)
-            found |= _robot_forces(schedule, step, forces)
-            states[step.number] = _step_choices(schedule, step, found, valid[i], names[i])
-    return Evaluation(tuple(states[n] for n in sorted(states)), models)
+    for _, steps in sorted(alike.items()):
+        found, count = _evaluate_alike(engine, schedule, steps, wanted)
+        out += found
+        models += count
+    return tuple(sorted(out, key=lambda choices: choices.step.number)), models
+
+
+def _evaluate_alike(
+    engine: Engine, schedule: Schedule, steps: Sequence[OpenStep], wanted: Wanted
+) -> tuple[list[StepChoices], int]:
+    """Evaluate open steps with as many bricks and as many grips; count their distinct models."""
+    names = [wanted(schedule.moves[step.moves[-1]].bricks) for step in steps]
+    combinations = [_combinations(schedule, step) for step in steps]
+    possible = [_no_node_twice(rows) for rows in combinations]
+    rows = np.concatenate([rows[ok] for rows, ok in zip(combinations, possible, strict=True)])
+    distinct, back = _distinct(np.sort(rows, axis=1))
+    answers, forces = _answers(engine, steps[0].bricks, distinct, set().union(*names))
+    ends = np.cumsum([ok.sum() for ok in possible])
+    out = []
+    for step, mine, ok, end in zip(steps, names, possible, ends, strict=True):
+        part = slice(end - ok.sum(), end)
+        index = back[part]
+        by_robot = np.argsort(np.argsort(rows[part], axis=1), axis=1)
+        found = {name: values[index] for name, values in answers.items()}
+        found |= _robot_forces(schedule, step, np.take_along_axis(forces[index], by_robot, axis=1))
+        spread = {name: _spread(found.get(name), ok) for name in sorted(mine)}
+        shape = tuple(len(schedule.moves[m].candidates) for m in step.moves)
+        shaped = {name: values.reshape(shape) for name, values in spread.items()}
+        out.append(StepChoices(step, step.moves, shaped))
+    return out, len(distinct)
+
+
+def _spread(values: Floats | None, possible: Bools) -> Floats:
+    """Return values over all choices, NaN for impossible ones and for a robot that holds none."""
+    out = np.full(possible.shape, np.nan)
+    if values is not None:
+        out[possible] = values
+    return out
 
 
 def _distinct(rows: Ints) -> tuple[Ints, Ints]:
@@ -110,15 +184,15 @@ def window_models(schedule: Schedule, choice: Sequence[int]) -> int:
         if len(step.moves) == 2:
             first = step.moves[0]
             node = schedule.moves[first].candidates[choice[first]]
-            at = _held(step).index(step.grips.index(OpenGrip(first)))
+            at = _robots_holding(step).index(step.grips.index(OpenGrip(first)))
             rows = rows[rows[:, at] == node]
-        rows = np.sort(rows[_valid(rows)], axis=1)
+        rows = np.sort(rows[_no_node_twice(rows)], axis=1)
         seen |= {(step.bricks, *row) for row in rows.tolist()}
     return len(seen)
 
 
-def _held(step: OpenStep) -> list[int]:
-    """Return the places of the robots that grip."""
+def _robots_holding(step: OpenStep) -> list[int]:
+    """Return which of the scene's robots grip."""
     return [i for i, grip in enumerate(step.grips) if grip is not None]
 
 
@@ -127,7 +201,7 @@ def _combinations(schedule: Schedule, step: OpenStep) -> Ints:
     candidates = [np.array(schedule.moves[m].candidates, dtype=np.int64) for m in step.moves]
     grid = np.meshgrid(*candidates, indexing="ij")
     columns = []
-    for robot in _held(step):
+    for robot in _robots_holding(step):
         grip = step.grips[robot]
         if isinstance(grip, OpenGrip):
             columns.append(grid[step.moves.index(grip.move)].ravel())
@@ -136,66 +210,30 @@ def _combinations(schedule: Schedule, step: OpenStep) -> Ints:
     return np.stack(columns, axis=1).astype(np.int64)
 
 
-def _valid(rows: Ints) -> np.ndarray:
-    """Return which rows name no node twice."""
+def _no_node_twice(rows: Ints) -> Bools:
     return np.asarray((np.diff(np.sort(rows, axis=1), axis=1) > 0).all(axis=1))
 
 
-def _want(names: set[str]) -> Want:
-    want = Want(0)
-    for name in names & SOURCES.keys():
-        want |= SOURCES[name]
-    return want
-
-
-def _answers(engine: Engine, bricks: int, grips: Ints, names: set[str]) -> dict[str, Floats]:
-    """Return the wanted responses of grip sets (S, r); see `_selected`."""
-    starts = range(0, max(len(grips), 1), BLOCK)
-    want = _want(names)
-    parts = [_selected(engine.solve(bricks, grips[i : i + BLOCK], want), names) for i in starts]
-    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-
-
-def _selected(fields: Fields, names: set[str]) -> dict[str, Floats]:
-    """Return the wanted scalar responses and, as ``F``, the size of every grip force."""
-    out = {"F": np.sqrt(_squared(fields.grip_force))}
-    if "T_max" in names:
-        out["T_max"] = fields.edge_force.max(axis=1)
-    if "M_sup" in names:
-        out["M_sup"] = np.sqrt(_squared(fields.support[:, 3:]))
-    if "D_max" in names:
-        out["D_max"] = np.sqrt(_squared(fields.displacement).max(axis=1))
-    return out
-
-
-def _squared(vectors: Floats) -> Floats:
-    """Return the squared lengths of vectors (..., 3)."""
-    x, y, z = np.moveaxis(vectors, -1, 0)  # adding whole arrays outruns sums of three
-    return np.asarray(x * x + y * y + z * z)
+def _answers(
+    engine: Engine, bricks: int, grips: Ints, names: Set[str]
+) -> tuple[dict[str, Floats], Floats]:
+    """Return the wanted responses of grip sets (S, r) and the sizes (S, r) of their forces."""
+    asked = [RESPONSES[name] for name in sorted(names & RESPONSES.keys())]
+    want = reduce(or_, (response.needs for response in asked), Want(0))
+    found: dict[str, list[Floats]] = {response.name: [] for response in asked}
+    forces = []
+    for start in range(0, max(len(grips), 1), BLOCK):
+        fields = engine.solve(bricks, grips[start : start + BLOCK], want)
+        forces.append(lengths(fields.grip_force))
+        for response in asked:
+            found[response.name].append(response.of(engine.network, fields))
+    return {name: np.concatenate(parts) for name, parts in found.items()}, np.concatenate(forces)
 
 
 def _robot_forces(schedule: Schedule, step: OpenStep, forces: Floats) -> dict[str, Floats]:
-    """Return the forces by robot, of the robot whose move decides the state, and the largest."""
-    robots = [schedule.scene.robots[i].name for i in _held(step)]
+    """Return the forces by robot, of the robot whose move decides the step, and the largest."""
+    robots = [schedule.scene.robots[i].name for i in _robots_holding(step)]
     out = {f"F_{name}": forces[:, i] for i, name in enumerate(robots)}
     out["F_move"] = out[f"F_{schedule.moves[step.moves[-1]].robot}"]
     out["F_largest"] = forces.max(axis=1)
     return out
-
-
-def _step_choices(
-    schedule: Schedule,
-    step: OpenStep,
-    found: Mapping[str, Floats],
-    valid: np.ndarray,
-    names: set[str],
-) -> StepChoices:
-    shape = tuple(len(schedule.moves[m].candidates) for m in step.moves)
-    spread = {}
-    for name in sorted(names):
-        values = np.full(valid.shape, np.nan)
-        if name in found:
-            values[valid] = found[name]
-        values.flags.writeable = False
-        spread[name] = values.reshape(shape)
-    return StepChoices(step, step.moves, spread)

@@ -1,68 +1,141 @@
-"""Each response, defined once: from the fields of grip sets to scalars."""
+"""Each response, defined once: from the fields of grip sets to scalars.
+
+A response has the name that criteria and limits use, the column it has in tables, and the fields it
+needs. Sizes of grip forces are functions of their own, since there is one per robot.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from seqopt.arrays import Floats
-from seqopt.engines.interface import Engine, Fields
+from seqopt.engines.interface import Fields, Want
+from seqopt.network.network import Network
 
 SLACK = 1e-6  # an edge is in tension above this share of the mean weight of a brick
+TO_1E_3MM = 1e6  # from m to the tables' unit of length, 1e-3 mm
 
 
 @dataclass(frozen=True)
-class Responses:
-    """Scalar responses of S grip sets on one partial structure, SI units.
+class Response:
+    """A scalar response of a partial structure to its weight and its grips.
 
     Attributes
     ----------
-    F_rob : (S, r) float
-        Size of every grip force with the sign of its part against gravity, N.
-    F_sup, M_sup : (S,) float
-        Size of the support's force, signed like F_rob, N, and of its moment, N m.
-    F_min, F_max, F_avg : (S,) float
-        Over the axial forces of all edges, tension positive, N; the study's T_max is F_max.
-    T_pct : (S,) float
-        Share of edges in tension, percent.
-    D_max, D_avg, D_std : (S,) float
-        Over the displacements of all nodes, m.
+    name : str
+        As Bruun et al. write it.
+    column : str
+        In tables, with the unit there.
+    scale : float
+        From SI units to the column's.
+    needs : Want
+        The fields it is evaluated from.
+    of : callable
+        Takes the network and the fields of S grip sets, returns (S,) float in SI units.
     """
 
-    F_rob: Floats
-    F_sup: Floats
-    M_sup: Floats
-    F_min: Floats
-    F_max: Floats
-    F_avg: Floats
-    T_pct: Floats
-    D_max: Floats
-    D_avg: Floats
-    D_std: Floats
+    name: str
+    column: str
+    scale: float
+    needs: Want
+    of: Callable[[Network, Fields], Floats]
 
 
-def step_responses(engine: Engine, fields: Fields) -> Responses:
-    """Return the scalar responses of full fields."""
-    network = engine.network
-    up = np.array(network.scene.up)
+def lengths(vectors: Floats) -> Floats:
+    """Return the lengths of vectors (..., 3)."""
+    return np.asarray(np.sqrt(_squared(vectors)))
+
+
+def grip_forces(network: Network, fields: Fields) -> Floats:
+    """Return the size of every grip force, negative where it points down.
+
+    Parameters
+    ----------
+    network : Network
+    fields : Fields
+        Of S grip sets with r grips each.
+
+    Returns
+    -------
+    (S, r) float
+        N; F_rob of Bruun et al.
+    """
+    return _signed(network, fields.grip_force)
+
+
+def _squared(vectors: Floats) -> Floats:
+    """Return the squared lengths of vectors (..., 3)."""
+    x, y, z = np.moveaxis(vectors, -1, 0)  # adding whole arrays outruns sums of three
+    return np.asarray(x * x + y * y + z * z)
+
+
+def _signed(network: Network, vectors: Floats) -> Floats:
+    return np.asarray(np.copysign(lengths(vectors), vectors @ np.array(network.scene.up)))
+
+
+def _in_tension(network: Network, fields: Fields) -> Floats:
     weight = float(np.linalg.norm(network.weight, axis=1).mean())
-    force = fields.edge_force
-    size = np.linalg.norm(fields.displacement, axis=2)
-    return Responses(
-        F_rob=_signed(fields.grip_force, up),
-        F_sup=_signed(fields.support[:, :3], up),
-        M_sup=np.linalg.norm(fields.support[:, 3:], axis=1),
-        F_min=force.min(axis=1),
-        F_max=force.max(axis=1),
-        F_avg=force.mean(axis=1),
-        T_pct=100 * (force > SLACK * weight).mean(axis=1),
-        D_max=size.max(axis=1),
-        D_avg=size.mean(axis=1),
-        D_std=size.std(axis=1),
+    return np.asarray(100 * (fields.edge_force > SLACK * weight).mean(axis=1))
+
+
+_EDGES, _MOTION, _SUPPORT = Want.EDGES, Want.DISPLACEMENTS, Want.SUPPORT
+RESPONSES: dict[str, Response] = {
+    response.name: response
+    for response in (
+        Response("F_sup", "F_sup_N", 1.0, _SUPPORT, lambda n, f: _signed(n, f.support[:, :3])),
+        Response("M_sup", "M_sup_Nm", 1.0, _SUPPORT, lambda _, f: lengths(f.support[:, 3:])),
+        Response("F_min", "F_min_N", 1.0, _EDGES, lambda _, f: f.edge_force.min(axis=1)),
+        Response("T_max", "F_max_N", 1.0, _EDGES, lambda _, f: f.edge_force.max(axis=1)),
+        Response("F_avg", "F_avg_N", 1.0, _EDGES, lambda _, f: f.edge_force.mean(axis=1)),
+        Response("T_pct", "T_pct", 1.0, _EDGES, _in_tension),
+        Response(
+            "D_max",
+            "D_max_1e-3mm",
+            TO_1E_3MM,
+            _MOTION,
+            lambda _, f: np.sqrt(_squared(f.displacement).max(axis=1)),
+        ),
+        Response(
+            "D_avg",
+            "D_avg_1e-3mm",
+            TO_1E_3MM,
+            _MOTION,
+            lambda _, f: lengths(f.displacement).mean(axis=1),
+        ),
+        Response(
+            "D_std",
+            "D_std_1e-3mm",
+            TO_1E_3MM,
+            _MOTION,
+            lambda _, f: lengths(f.displacement).std(axis=1),
+        ),
     )
+}
+"""By name, in the order of the columns of Table A.1.
+
+``F_sup`` and ``M_sup`` are the force at the first ground end, signed like a grip's, and its moment;
+``F_min``, ``T_max`` and ``F_avg`` run over the axial forces of all edges, tension positive;
+``T_pct`` is the share of edges in tension, percent; ``D_max``, ``D_avg`` and ``D_std`` run over the
+displacements of all nodes.
+"""
 
 
-def _signed(vectors: Floats, up: Floats) -> Floats:
-    """Return the lengths of vectors (..., 3), negative where they point down."""
-    return np.asarray(np.copysign(np.linalg.norm(vectors, axis=-1), vectors @ up))
+def responses_of(network: Network, fields: Fields) -> dict[str, Floats]:
+    """Return all responses of S grip sets with r grips each, SI units.
+
+    Parameters
+    ----------
+    network : Network
+    fields : Fields
+        With edge forces, displacements and the support (`Want.RESPONSES`).
+
+    Returns
+    -------
+    dict of str to (S,) float
+        As in `RESPONSES`, and the signed grip forces (S, r) as ``F_rob``.
+    """
+    found = {name: response.of(network, fields) for name, response in RESPONSES.items()}
+    return {"F_rob": grip_forces(network, fields), **found}

@@ -1,4 +1,4 @@
-"""Responses of steps: the columns of the study's Tables A.1 and A.2, from the full fields."""
+"""Responses of steps as a table: the columns of Tables A.1 and A.2 of Bruun et al."""
 
 from __future__ import annotations
 
@@ -10,19 +10,45 @@ import pandas as pd
 
 from seqopt.engines.interface import Engine, Fields
 from seqopt.errors import MechanismError, SolverError
-from seqopt.responses.quantities import step_responses
+from seqopt.responses.quantities import RESPONSES, grip_forces
+from seqopt.scene.scene import Robot
 from seqopt.sequence.steps import Step
-
-TO_1E_3MM = 1e6  # from m to the tables' unit of length, 1e-3 mm
 
 
 def analyze(engine: Engine, steps: Sequence[Step]) -> pd.DataFrame:
     """Return the responses of every step, a row each, with the columns of Table A.1.
 
-    Forces in N, moments in N m, displacements in 1e-3 mm; an empty cell is a robot that does not
-    grip.
+    Parameters
+    ----------
+    engine : Engine
+    steps : sequence of Step
+
+    Returns
+    -------
+    pandas.DataFrame
+        Forces in N, moments in N m, displacements in 1e-3 mm, as the columns' names say; an empty
+        cell is a robot that does not grip.
+
+    Raises
+    ------
+    MechanismError, SolverError
+        As the engine does, the step named.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> network = seqopt.build_network(seqopt.load_scene("arch25"))
+    >>> engine = seqopt.make_engine("compliance", network)
+    >>> table = seqopt.analyze(engine, seqopt.sequential(network))
+    >>> table.loc[46, ["bricks", "F_max_N", "D_max_1e-3mm"]].round(1).tolist()
+    [24, 20.5, 4.0]
     """
     return pd.DataFrame([_row(engine, step) for step in steps])
+
+
+def force_column(robot: Robot) -> str:
+    """Return the column of a table that holds the force of a robot's grip, N."""
+    return f"F_{robot.name}_N"
 
 
 def step_fields(engine: Engine, step: Step) -> Fields:
@@ -64,23 +90,15 @@ def fields_archive(engine: Engine, steps: Sequence[Step]) -> bytes:
 
 
 def _row(engine: Engine, step: Step) -> dict[str, object]:
-    scene = engine.network.scene
-    answer = step_responses(engine, step_fields(engine, step))
-    forces = iter(answer.F_rob[0])
+    network = engine.network
+    scene, fields = network.scene, step_fields(engine, step)
+    forces = iter(grip_forces(network, fields)[0])
     row: dict[str, object] = {"step": step.number, "type": step.kind.value, "bricks": step.bricks}
     for robot, node in zip(scene.robots, step.grips, strict=True):
         row[f"{robot.name}_brick"] = pd.NA if node is None else scene.brick_of_node[node].name
         row[f"{robot.name}_node"] = pd.NA if node is None else node
     for robot, node in zip(scene.robots, step.grips, strict=True):
-        row[f"F_{robot.name}_N"] = np.nan if node is None else next(forces)
-    return row | {
-        "F_sup_N": answer.F_sup[0],
-        "M_sup_Nm": answer.M_sup[0],
-        "F_min_N": answer.F_min[0],
-        "F_max_N": answer.F_max[0],
-        "F_avg_N": answer.F_avg[0],
-        "T_pct": answer.T_pct[0],
-        "D_max_1e-3mm": answer.D_max[0] * TO_1E_3MM,
-        "D_avg_1e-3mm": answer.D_avg[0] * TO_1E_3MM,
-        "D_std_1e-3mm": answer.D_std[0] * TO_1E_3MM,
-    }
+        row[force_column(robot)] = np.nan if node is None else next(forces)
+    for response in RESPONSES.values():
+        row[response.column] = response.of(network, fields)[0] * response.scale
+    return row

@@ -106,3 +106,16 @@ SCHEDULES: dict[str, ScheduleMethod] = {
     "three-robot": three_robot_loop,
     "modified-sequential": modified_sequential,
 }
+
+
+def make_schedule(name: str, network: Network) -> Schedule:
+    """Return a schedule by name.
+
+    Raises
+    ------
+    StepError
+        If there is none of that name, or the scene cannot be built by it.
+    """
+    if name not in SCHEDULES:
+        raise StepError(f"schedule {name!r}: there is no such; give one of {', '.join(SCHEDULES)}")
+    return SCHEDULES[name](network)

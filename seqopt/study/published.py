@@ -1,20 +1,18 @@
-"""The published three-robot plan, what it is compared with, and what does not add up in print."""
+"""The published three-robot plan, the paper's counts, and the inconsistencies in its numbers."""
 
 from __future__ import annotations
 
 from importlib import resources
 
-import numpy as np
 import pandas as pd
 
-from seqopt.arrays import Floats
-from seqopt.placement.costs import LayeredCosts
 from seqopt.placement.problem import Problem
-from seqopt.placement.ranking import move_costs, rank_of
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.plan_file import parse_plan
+from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import Step
+from seqopt.study.tables import printed
 
 IRREGULARITIES = (
     "Table A.2 leaves the brick count of step 9 blank (it is 5) and F_sup of step 49 "
@@ -32,26 +30,27 @@ IRREGULARITIES = (
 )
 
 
-PAPER_COLUMN = {
+PUBLISHED = "published"  # the name of the printed three-robot plan, where methods are listed
+PRINTED_COLUMN = {
     "sequential": "sequential",
     "cantilever": "cantilever",
-    "three-robot": "three_robot",
+    PUBLISHED: "three_robot",
 }
 
 
 def is_reference_arch(scene: Scene) -> bool:
-    """Return whether a scene is the study's arch as it ships with the package."""
+    """Return whether a scene is the arch of Bruun et al. as it ships with the package."""
     return scene == load_scene("arch25")
 
 
 def published_plan(scene: Scene) -> tuple[Step, ...]:
-    """Return the 90 steps of the study's three-robot plan (Table B.1), checked in a scene."""
+    """Return the 90 steps of the published three-robot plan (Table B.1), checked in a scene."""
     source = resources.files("seqopt").joinpath("data/paper/three_robot_plan.csv")
     return parse_plan(scene, source.read_text(encoding="utf-8"), "published three-robot plan")
 
 
 def published_choice(problem: Problem) -> tuple[int, ...]:
-    """Return the published plan's nodes as places among the candidates of the loop's moves."""
+    """Return the published plan's nodes as candidates of the loop's moves."""
     scene = problem.schedule.scene
     plan = published_plan(scene)
     names = [robot.name for robot in scene.robots]
@@ -62,36 +61,21 @@ def published_choice(problem: Problem) -> tuple[int, ...]:
     )
 
 
-def published_ranks(problem: Problem, choice: tuple[int, ...]) -> pd.DataFrame:
-    """Return where chosen nodes rank, move by move, the choice before each being fixed."""
-    sums = _to_go(problem.sums, np.add)
-    peaks = _to_go(problem.peaks, np.maximum)
-    rows = []
-    for k, move in enumerate(problem.schedule.moves):
-        before = choice[k - 1] if k else 0
-        window = move_costs(problem, k, before)
-        rows.append(
-            {
-                "move": k + 1,
-                "step": move.step,
-                "bricks": move.bricks,
-                "robot": move.robot,
-                "node": move.candidates[choice[k]],
-                "candidates": len(move.candidates),
-                "first_in_window": move.candidates[int(window.argmin())],
-                "rank_in_window": rank_of(window, choice[k]),
-                "rank_overlap": rank_of(problem.sums.shared[k][before] + sums[k], choice[k]),
-                "rank_peak": rank_of(
-                    np.maximum(problem.peaks.shared[k][before], peaks[k]), choice[k]
-                ),
-            }
-        )
-    return pd.DataFrame(rows)
+def paper_models(schedule: Schedule) -> tuple[int, int]:
+    """Return how many models Bruun et al. count: cascading, and with shared steps over all pairs.
+
+    They count 2n candidates for every brick count n from 3 to the last, four steps each, and 2n
+    times 2(n-1) pairs for the shared one.
+    """
+    counts = range(3, len(schedule.scene.bricks) + 1)
+    cascading = sum(4 * 2 * n for n in counts)
+    return cascading, sum(3 * 2 * n + 2 * n * 2 * (n - 1) for n in counts)
 
 
-def _to_go(placement: LayeredCosts, join: np.ufunc) -> list[Floats]:
-    """Return the least cost from each candidate to the end, its own single cost included."""
-    out = [placement.single[-1]]
-    for single, shared in zip(placement.single[-2::-1], placement.shared[:0:-1], strict=True):
-        out.insert(0, join(single, join(shared, out[0]).min(axis=1)))
-    return out
+def printed_maxima() -> pd.DataFrame:
+    """Return the largest responses that the paper prints (its improvement table), by method.
+
+    Rows in its order: the force of each robot, M_sup, T_max, D_max (N, N m, 1e-3 mm).
+    """
+    table = printed("improvement_3robot").drop(columns=["quantity", "unit"])
+    return table[[*PRINTED_COLUMN.values()]].set_axis([*PRINTED_COLUMN], axis=1)

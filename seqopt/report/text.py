@@ -1,0 +1,111 @@
+"""A comparison as text for a terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pandas as pd
+
+from seqopt.placement.criteria import Criterion
+from seqopt.report.comparison import LARGEST, Comparison
+from seqopt.scene.scene import Scene
+
+
+def format_comparison(comparison: Comparison, scene: Scene, criterion: Criterion) -> str:
+    """Return methods, notes and formulations, one after the other.
+
+    Parameters
+    ----------
+    comparison : Comparison
+    scene : Scene
+    criterion : Criterion
+        With which the formulations were compared.
+    """
+    blocks = [_methods(comparison, scene), _notes(comparison)]
+    if comparison.refusal:
+        blocks.append(f"Three-robot loop: not possible here; {comparison.refusal}")
+    else:
+        blocks.append(_formulations(comparison, criterion))
+    if comparison.ranks is not None:
+        blocks.append(_ranks(comparison.ranks))
+    return "\n\n".join(blocks)
+
+
+def _methods(comparison: Comparison, scene: Scene) -> str:
+    """Return the largest responses of methods: under each our value and, if any, the paper's."""
+    maxima, paper = comparison.maxima, comparison.printed
+    width = 12 if paper is None else 22
+    lines = [f"{scene.name}: {len(scene.bricks)} bricks; largest response of any step", ""]
+    lines.append(f"{'':16}" + "".join(f"{name:>{width}}" for name in maxima))
+    if paper is not None:
+        lines.append(f"{'':16}" + f"{'seqopt':>14}{'paper':>8}" * maxima.shape[1])
+    for row, quantity in enumerate(maxima.index):
+        cells = ""
+        for column in range(maxima.shape[1]):
+            own = _number(maxima.iloc[row, column])
+            cells += (
+                f"{own:>12}" if paper is None else f"{own:>14}{_number(paper.iloc[row, column]):>8}"
+            )
+        lines.append(f"{quantity:16}{cells}")
+    return "\n".join(lines)
+
+
+def _notes(comparison: Comparison) -> str:
+    return "\n".join(["Notes", *(f"- {note}" for note in comparison.notes or ["none"])])
+
+
+def _formulations(comparison: Comparison, criterion: Criterion) -> str:
+    """Return a line for every method and formulation."""
+    cascading, overlap = comparison.paper_models or (0, 0)
+    lines = [
+        f"Three-robot loop, criterion {criterion.name}; models counted as in the paper: "
+        f"{cascading:,} cascading,",
+        f"{overlap:,} with the full overlap; below, the different ones that each looks at",
+        "",
+        f"{'':20}{'objective':>11}{'gap':>8}"
+        + "".join(f"{name:>8}" for name in LARGEST)
+        + f"{'models':>8}{'seconds':>9}",
+        *(_line(str(name), row) for name, row in comparison.table.iterrows()),
+        "(N, N m, N, 1e-3 mm; gap to the exact optimum of the same aim; minimax has its own)",
+    ]
+    return "\n".join(lines)
+
+
+def _line(name: str, row: pd.Series[float]) -> str:
+    def cell(value: float, width: int, text: str) -> str:
+        return f"{text if np.isfinite(value) else '-':>{width}}"
+
+    return (
+        f"{name:20}"
+        + cell(row["objective"], 11, f"{row['objective']:.2f}")
+        + cell(row["gap"], 8, f"{100 * row['gap']:.2f}%")
+        + "".join(f"{row[column]:8.1f}" for column in LARGEST)
+        + cell(row["models"], 8, f"{row['models']:.0f}")
+        + cell(row["seconds"], 9, f"{row['seconds']:.4f}")
+    )
+
+
+def _ranks(table: pd.DataFrame) -> str:
+    """Return where the published plan's nodes rank, a line for each way to rank them."""
+    return "\n".join(
+        ["Where the published plan's nodes rank, optimization by optimization", *_rank_lines(table)]
+    )
+
+
+def _rank_lines(table: pd.DataFrame) -> Iterator[str]:
+    for column, label in (
+        ("rank_in_window", "rank_search, cascade"),
+        ("rank_overlap", "overlap"),
+        ("rank_peak", "minimax"),
+    ):
+        ranks = table[column]
+        yield (
+            f"  {label:21}first in {(ranks == 1).sum()} of {len(ranks)}, "
+            f"among three in {(ranks <= 3).sum()}: {' '.join(map(str, ranks))}"
+        )
+
+
+def _number(value: object) -> str:
+    number = float(str(value))
+    return "-" if np.isnan(number) else f"{number:.1f}"

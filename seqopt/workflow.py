@@ -1,0 +1,92 @@
+"""The short cut: from a scene to a plan in one call."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+from seqopt.engines.registry import make_engine
+from seqopt.errors import ProblemError
+from seqopt.network.build import build_network
+from seqopt.placement.criteria import Criterion
+from seqopt.placement.plan import Plan, solve
+from seqopt.placement.problem import Limit, pose
+from seqopt.scene.scene import Scene
+from seqopt.scene.scene_file import load_scene
+from seqopt.sequence.three_robots import make_schedule
+from seqopt.study.presets import CRITERIA, EQUATIONS
+
+
+def optimize(
+    scene: Scene | str,
+    schedule: str = "three-robot",
+    criterion: Criterion | str = EQUATIONS,
+    formulation: str = "overlap_dp",
+    engine: str = "auto",
+    *,
+    limits: Sequence[Limit] = (),
+    **options: Any,
+) -> Plan:
+    """Choose where robots hold over a whole build.
+
+    Parameters
+    ----------
+    scene : Scene or str
+        Or the name of a built-in scene, or a scene file.
+    schedule : str
+        ``"three-robot"`` or ``"modified-sequential"``.
+    criterion : Criterion or str
+        What a step costs; or a name of `seqopt.CRITERIA`.
+    formulation : str
+        One of `seqopt.formulations`.
+    engine : str
+        What computes responses; ``"auto"`` models no more than the scene needs.
+    limits : sequence of Limit
+        What no open step may exceed.
+    **options
+        Of `seqopt.solve` and of the formulation.
+
+    Returns
+    -------
+    Plan
+
+    Raises
+    ------
+    SeqoptError
+        One line that says who must act: see `seqopt.errors`.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> plan = seqopt.optimize("arch25", criterion="worst-ratio", formulation="minimax")
+    >>> round(plan.certificate.objective, 3)
+    1.185
+    """
+    start = time.perf_counter()
+    if isinstance(scene, str):
+        scene = load_scene(scene)
+    network = build_network(scene)
+    solver, opened = make_engine(engine, network), make_schedule(schedule, network)
+    assemble = time.perf_counter() - start
+    problem = pose(solver, opened, find_criterion(criterion), limits)
+    plan = solve(problem, formulation, **options)
+    return replace(plan, seconds={"assemble": assemble, **plan.seconds})
+
+
+def find_criterion(criterion: Criterion | str) -> Criterion:
+    """Return a criterion, by name or itself.
+
+    Raises
+    ------
+    ProblemError
+        If there is none of that name.
+    """
+    if not isinstance(criterion, str):
+        return criterion
+    if criterion not in CRITERIA:
+        raise ProblemError(
+            f"criterion {criterion!r}: there is no such; give one of {', '.join(CRITERIA)}"
+        )
+    return CRITERIA[criterion]
