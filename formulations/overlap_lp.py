@@ -42,5 +42,10 @@ def solve(problem: PlacementProblem) -> Selection:
 
 
 FORMULATION = Formulation(
-    "overlap_lp", "full overlap, linear program", FormulationKind.BOUND, Aim.SUM, solve
+    "overlap_lp",
+    "full overlap, linear program",
+    FormulationKind.BOUND,
+    Aim.SUM,
+    solve,
+    takes_budgets=True,
 )

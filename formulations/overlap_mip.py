@@ -44,4 +44,5 @@ FORMULATION = Formulation(
     FormulationKind.EXACT,
     Aim.SUM,
     solve,
+    takes_budgets=True,
 )
