@@ -10,7 +10,7 @@ from hypothesis import given
 from experiments.walls import running_bond
 from seqopt.network.build import build_network
 from seqopt.network.network import PartKind
-from tests.scenes import arches
+from tests.strategies import arches
 
 
 def test_edge_counts_of_the_study(engine25):

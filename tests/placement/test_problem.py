@@ -31,8 +31,8 @@ from seqopt.sequence.two_robots import sequential
 from seqopt.study.presets import CLOSEST, CRITERIA, EQUATIONS, WEIGHTED, WORST_RATIO
 from seqopt.study.published import published_choice, published_plan, published_ranks
 from seqopt.study.tables import printed
-from tests.scenes import arches
-from tests.test_methods import far_reaching
+from tests.sequence.test_methods import far_reaching
+from tests.strategies import arches
 
 
 @pytest.fixture(scope="module")

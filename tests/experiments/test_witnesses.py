@@ -24,7 +24,7 @@ from experiments.witnesses import (
 )
 from seqopt.network.network import GROUND
 from seqopt.stability.assessment import Verdict
-from tests.test_experiments import run
+from tests.experiments.test_claims import run
 
 
 @pytest.fixture(scope="module")

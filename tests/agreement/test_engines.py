@@ -22,8 +22,8 @@ from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.sequence.two_robots import METHODS
 from seqopt.study.published import published_plan
-from tests.scenes import arches, states, walls
-from tests.test_laws import scaled
+from tests.laws.test_mechanics import scaled
+from tests.strategies import arches, states, walls
 
 FIELDS = ("edge_force", "displacement", "grip_force", "support", "joint_wrench", "brick_twist")
 

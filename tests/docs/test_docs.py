@@ -12,7 +12,7 @@ import pytest
 from seqopt.cli.main import main
 from seqopt.placement.formulation import formulations
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[2]
 
 
 def build(source, target):

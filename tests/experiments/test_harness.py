@@ -20,7 +20,7 @@ from experiments.speed_charts import headline, profile_charts
 from seqopt.placement.formulation import formulations
 from seqopt.study.presets import CRITERIA
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[2]
 STAGES = ["assemble", "respond", "rank", "compile", "solve", "verify"]
 
 

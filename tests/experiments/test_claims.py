@@ -21,7 +21,7 @@ from experiments.identify_arch25 import (
 from experiments.plotting import RESULTS
 from seqopt.study.tables import printed_steps
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[2]
 
 
 TIMED = {

@@ -36,7 +36,7 @@ from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.two_robots import sequential
 from seqopt.study.presets import STUDY_BED
 from seqopt.study.tables import printed
-from tests.test_fidelity import HERE, block
+from tests.agreement.test_levels import HERE, block
 
 NORMAL, TANGENTIAL = STUDY_BED.normal, STUDY_BED.tangential
 

@@ -15,7 +15,7 @@ from experiments.counterpart_rows import COUNTERPARTS, cell, tabulate
 from experiments.paper_counterparts import KNOWN, faults
 from experiments.paper_items import ITEMS
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[2]
 STORED = pd.read_csv(ROOT / "experiments" / "results" / "paper_counterparts.csv")
 PAGE = (ROOT / "docs" / "counterparts.md").read_text(encoding="utf-8")
 WITH_NUMBERS = [item for item in ITEMS if item.has_numbers]

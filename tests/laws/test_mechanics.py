@@ -16,7 +16,7 @@ from seqopt.engines.rigid.operator import OperatorBuilder
 from seqopt.engines.rigid.spanning_tree import grow_tree
 from seqopt.network.build import build_network
 from seqopt.responses.quantities import step_responses
-from tests.scenes import arches, moved, solve, states, walls
+from tests.strategies import arches, moved, solve, states, walls
 
 any_scene = st.one_of(arches(), walls())
 NAMES = [f"F_{k}" for k in ("rob", "sup", "min", "max", "avg")] + [

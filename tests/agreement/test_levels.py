@@ -30,7 +30,7 @@ from seqopt.sequence.two_robots import METHODS
 from seqopt.stability.assessment import Verdict
 from seqopt.stability.steps import assess_steps
 from seqopt.study.presets import STUDY_BED
-from tests.scenes import arches, moved, states, walls
+from tests.strategies import arches, moved, states, walls
 
 HERE = np.zeros((1, 0), dtype=int)  # one set of no grips
 

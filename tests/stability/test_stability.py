@@ -23,7 +23,7 @@ from seqopt.sequence.two_robots import METHODS
 from seqopt.stability.assessment import Verdict, assess, bonded, sideways
 from seqopt.stability.limit_analysis import CAP, EXACT, Answer, Case, Claim, Sense, bound, violation
 from seqopt.stability.prover import Prover, proven_value
-from tests.scenes import arches, moved
+from tests.strategies import arches, moved
 
 ROUGH = Mortar(friction=5.0)
 STRONG = Mortar(friction=0.5, tensile_strength=1e9, cohesion=1e9)

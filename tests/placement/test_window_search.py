@@ -16,8 +16,8 @@ from seqopt.placement.window_search import require_search, search_table, search_
 from seqopt.responses.choices import window_models
 from seqopt.sequence.three_robots import SCHEDULES, three_robot_loop
 from seqopt.study.presets import CRITERIA, EQUATIONS, WEIGHTED
-from tests.scenes import arches
-from tests.test_methods import far_reaching
+from tests.sequence.test_methods import far_reaching
+from tests.strategies import arches
 
 
 class Counting:

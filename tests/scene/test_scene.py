@@ -22,7 +22,7 @@ from seqopt.scene.scene_file import (
     scene_to_dict,
     schema,
 )
-from tests.scenes import arches, walls
+from tests.strategies import arches, walls
 
 
 @given(scene=st.one_of(arches(), walls()))

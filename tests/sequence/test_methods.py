@@ -18,7 +18,7 @@ from seqopt.sequence.steps import Step, StepKind, check_sequence
 from seqopt.sequence.two_robots import METHODS, cantilever, lies_along, sequential
 from seqopt.study.published import published_plan
 from seqopt.study.tables import printed_steps
-from tests.scenes import arches
+from tests.strategies import arches
 
 GRIPS = [f"rob{i}_node" for i in (1, 2, 3)]
 
