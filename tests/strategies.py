@@ -1,16 +1,15 @@
-"""Scenes and grip sets for property tests."""
+"""What property tests draw: scenes, grip sets, placement problems."""
 
 from __future__ import annotations
-
-from dataclasses import replace
 
 import numpy as np
 from hypothesis import strategies as st
 
 from experiments.walls import running_bond
-from seqopt.network.build import build_network
+from seqopt.placement.costs import CostProblem, LayeredCosts
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.study.presets import ROBOTS
+from tests.builders import about_vertical, moved
 
 angles = st.floats(-0.3, 0.3)
 
@@ -55,36 +54,33 @@ def states(draw, scenes=None, max_grips=3):
     return scene, bricks, np.array([grips], dtype=np.int64).reshape(1, -1)
 
 
-def moved(scene, change):
-    """Return the scene with positions passed through a function, axes through its linear part."""
-
-    def axis(v):
-        a, o = np.array(change(np.array(v))), np.array(change(np.zeros(3)))
-        d = a - o
-        return tuple((d / np.linalg.norm(d)).tolist())
-
-    def point(v):
-        return tuple(np.array(change(np.array(v))).tolist())
-
-    def spring(s):
-        out = replace(s, position=point(s.position), along=axis(s.along), across=axis(s.across))
-        return replace(out, anchor=point(s.anchor)) if hasattr(s, "anchor") else out
-
-    return replace(
-        scene,
-        bricks=tuple(
-            replace(
-                b,
-                position=point(b.position),
-                length_axis=axis(b.length_axis),
-                width_axis=axis(b.width_axis),
-            )
-            for b in scene.bricks
-        ),
-        joints=tuple(map(spring, scene.joints)),
-        grounds=tuple(map(spring, scene.grounds)),
+@st.composite
+def flat_arches(draw):
+    """An arch whose bricks all lie along it, in one plane that is turned about the vertical."""
+    count = draw(st.integers(2, 7))
+    bend = draw(st.floats(-0.5, 0.2))
+    shape = ArchShape(
+        pitch=[1.2 + bend * i for i in range(count)],
+        pattern="V",
+        offset=draw(st.lists(st.floats(-0.01, 0.01), min_size=count, max_size=count)),
+        translational_stiffness=draw(st.tuples(*[st.floats(1e7, 1e9)] * 3)),
+        rotational_stiffness=draw(st.tuples(*[st.floats(1e5, 1e7)] * 3)),
+        closed=draw(st.booleans()),
     )
+    turn = about_vertical(draw(st.floats(0, 3)))
+    return moved(arch_scene(shape), lambda x: turn @ x)
 
 
-def solve(engine_type, scene, bricks, grips, want):
-    return engine_type(build_network(scene)).solve(bricks, grips, want)
+@st.composite
+def problems(draw, most_moves=5, most_candidates=4):
+    """Costs with many ties and some choices not allowed."""
+    sizes = draw(st.lists(st.integers(1, most_candidates), min_size=1, max_size=most_moves))
+    cost = st.one_of(st.integers(0, 3).map(float), st.just(np.inf))
+
+    def array(*shape):
+        count = int(np.prod(shape))
+        return np.array(draw(st.lists(cost, min_size=count, max_size=count))).reshape(shape)
+
+    single = tuple(array(size) for size in sizes)
+    shared = tuple(array(a, b) for a, b in zip([1, *sizes[:-1]], sizes, strict=True))
+    return CostProblem(LayeredCosts(single, shared))

@@ -15,14 +15,13 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.engines.rigid.dense import solve_dense
 from seqopt.errors import MechanismError, SolverError
 from seqopt.network.build import build_network
-from seqopt.responses import choices as evaluation
-from seqopt.responses.choices import SCALARS, evaluate_choices
+from seqopt.placement.problem import pose
 from seqopt.responses.table import step_fields
-from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.sequence.two_robots import METHODS
+from seqopt.study.presets import WEIGHTED
 from seqopt.study.published import published_plan
-from tests.laws.test_mechanics import scaled
+from tests.builders import hinged, scaled, six_bricks, small_arch
 from tests.strategies import arches, states, walls
 
 FIELDS = ("edge_force", "displacement", "grip_force", "support", "joint_wrench", "brick_twist")
@@ -110,7 +109,7 @@ def test_a_batch_equals_its_sets_one_by_one(state, data):
 
 def test_two_bricks_held_at_both_nodes():
     """Each inner edge carries nothing, whatever the order of the grips."""
-    net = build_network(arch_scene(ArchShape(pitch=[1.2, 0.7, 0.2, -0.3, -0.8, -1.2])))
+    net = build_network(six_bricks())
     sets = np.array([[4, 5, 8, 9], [9, 4, 8, 5], [4, 8, 1, 11], [10, 11, 4, 7]])
     fast = ComplianceEngine(net).solve(6, sets, Want.ALL)
     direct = solve_dense(net, 6, grip_columns(net, 6, sets))
@@ -120,39 +119,20 @@ def test_two_bricks_held_at_both_nodes():
     assert np.abs(fast.edge_force[:2][:, held]).max() <= 1e-12 * largest
 
 
-def test_fields_are_asked_for_in_blocks(engine25, monkeypatch):
-    schedule = three_robot_loop(engine25.network)
-    monkeypatch.setattr(evaluation, "BLOCK", 10**9)
-    whole = evaluate_choices(engine25, schedule, lambda _: SCALARS)
-    monkeypatch.setattr(evaluation, "BLOCK", 100)
-    parts = evaluate_choices(engine25, schedule, lambda _: SCALARS)
-    assert parts.models == whole.models
-    for a, b in zip(parts.states, whole.states, strict=True):
-        for name in SCALARS:
-            assert a.responses[name] == pytest.approx(b.responses[name], rel=1e-12, nan_ok=True)
-
-
-def hinge(scene, joint):
-    """The scene with one joint without rotational stiffness."""
-    joints = list(scene.joints)
-    joints[joint] = replace(joints[joint], rotational_stiffness=(0.0, 0.0, 0.0))
-    return replace(scene, joints=tuple(joints))
-
-
 @pytest.mark.parametrize("engine_type", [ComplianceEngine, FrameEngine])
 @pytest.mark.parametrize("factor", [1e-3, 1.0, 1e3])
 def test_mechanisms_are_told_from_sound_structures(arch25, engine_type, factor):
     """A hinge below one grip is a mechanism, below two it is not; in any unit of length."""
-    hinged = engine_type(build_network(scaled(hinge(arch25, 3), length=factor)))
+    engine = engine_type(build_network(scaled(hinged(arch25, 3), length=factor)))
     for grips in ([[]], [[47]]):
         with pytest.raises(MechanismError) as caught:
-            hinged.solve(24, np.array(grips, dtype=int).reshape(1, -1))
+            engine.solve(24, np.array(grips, dtype=int).reshape(1, -1))
         names = [name for name, _ in caught.value.mode]
         shape = np.array([row for _, row in caught.value.mode])
         assert names == list(range(1, 25))
         assert np.abs(shape).max() == pytest.approx(1)
         assert np.abs(shape[:4]).max() < 1e-6  # what stands below the hinge does not move
-    fields = hinged.solve(24, [[47, 43]])
+    fields = engine.solve(24, [[47, 43]])
     assert np.isfinite(fields.displacement).all()
 
 
@@ -169,7 +149,7 @@ def test_a_loose_brick_needs_grips(arch25, engine_type):
 
 
 def test_engines_agree_where_grips_hold_a_hinged_chain(arch25):
-    net = build_network(hinge(arch25, 3))
+    net = build_network(hinged(arch25, 3))
     grips = [[47, 43], [44, 20]]
     a, b = (engine(net).solve(24, grips) for engine in (ComplianceEngine, FrameEngine))
     for name in FIELDS[:4]:
@@ -180,3 +160,10 @@ def test_the_frame_says_when_it_fails(engine25):
     """Beyond any use of double precision the answer is a solver's failure, not a verdict."""
     with pytest.raises(SolverError, match="contrast"):
         FrameEngine(engine25.network, contrast=1e14).solve(25, [[1, 25, 49]])
+
+
+def test_the_frame_poses_the_same_problem():
+    net = build_network(small_arch(6))
+    a, b = (pose(e(net), three_robot_loop(net), WEIGHTED) for e in (ComplianceEngine, FrameEngine))
+    for x, y in zip(a.sums.single, b.sums.single, strict=True):
+        assert x == pytest.approx(y, rel=1e-4)

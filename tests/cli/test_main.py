@@ -215,6 +215,7 @@ CERTIFIED = [
 ]
 
 
+@pytest.mark.slow
 def test_certify(capsys, tmp_path):
     out = tmp_path / "dry.csv"
     words = ("certify", "arch25", "--method", "cantilever", "--mortar", "dry", "--out", str(out))
@@ -350,3 +351,17 @@ def test_a_closed_pipe_is_no_error():
         check=True,
     )
     assert done.stderr == ""
+
+
+@pytest.mark.slow
+def test_the_command_line_says_why(capsys):
+    assert main(["analyze", "--method", "sequential", "--engine", "auto"]) == 0
+    said = capsys.readouterr().err
+    assert "engine: compliance for 49 grip sets: brick 11: its centroid lies 65.2 mm" in said
+    dry = ["analyze", "--method", "sequential", "--engine", "auto", "--mortar", "dry"]
+    assert main(dry) == 2
+    assert "step 9: 5 bricks: joints part or slip and brick" in capsys.readouterr().err
+    assert main(["analyze", "--method", "sequential", "--engine", "planar"]) == 2
+    assert "use the compliance engine" in capsys.readouterr().err
+    assert main(["analyze", "--method", "sequential", "--mortar", "dry"]) == 2
+    assert "engine compliance: its joints hold anything" in capsys.readouterr().err

@@ -5,14 +5,12 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
 from seqopt.cli.main import main
 from seqopt.placement.formulation import formulations
-
-ROOT = Path(__file__).parents[2]
+from tests.builders import ROOT
 
 
 def build(source, target):
@@ -21,6 +19,7 @@ def build(source, target):
     return subprocess.run([*command, source, target], capture_output=True, text=True, check=False)
 
 
+@pytest.mark.slow
 def test_the_site_builds_strictly(tmp_path):
     done = build(ROOT / "docs", tmp_path / "html")
     assert done.returncode == 0, done.stderr
@@ -28,6 +27,7 @@ def test_the_site_builds_strictly(tmp_path):
     assert "306.5" in page  # a number that only the executed tutorial prints
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("flaw", ["[lost](nowhere.md)", "```{code-cell}\nassert 1 == 2\n```"])
 def test_a_flaw_fails_the_build(tmp_path, flaw):
     source = tmp_path / "docs"
@@ -43,7 +43,7 @@ def test_readme_shows_two_commands_that_exist(capsys):
     commands = re.findall(r"```sh\n(.*?)\n```", text, flags=re.DOTALL)
     assert len(commands) >= 2
     assert commands[0].endswith("seqopt compare")
-    assert commands[1].endswith("-m pytest")
+    assert commands[1].endswith("-m pytest -n auto")
     assert main(["compare"]) == 0
     assert "three-robot" in capsys.readouterr().out
 

@@ -1,4 +1,4 @@
-"""What every engine does with what it is asked: conformance to the interface."""
+"""Exactly rigid bricks where joints are loose, chains long and systems small or not positive."""
 
 from __future__ import annotations
 
@@ -10,106 +10,14 @@ import pytest
 from experiments.limit_scenes import HELD, LOOSE_AT, chain, loosened
 from experiments.reference_chain import solve_exactly
 from seqopt.engines.interface import Want, grip_columns
-from seqopt.engines.registry import ENGINES
 from seqopt.engines.rigid import compliance
 from seqopt.engines.rigid.compliance import ComplianceEngine, solve_batch
 from seqopt.engines.rigid.ldlt import solve_positive
 from seqopt.engines.rigid.operator import OperatorBuilder
 from seqopt.engines.rigid.spanning_tree import grow_tree
-from seqopt.errors import GripError, MechanismError, SolverError
+from seqopt.errors import MechanismError, SolverError
 from seqopt.network.build import build_network
-from seqopt.scene.arch import ArchShape, arch_scene
-
-
-def pattern(name):
-    """Bricks that the engine accepts: along the arch where all must lie in one plane."""
-    return "V" if name == "planar" else "VLR"
-
-
-@pytest.fixture(params=ENGINES)
-def engine(request):
-    shape = ArchShape(pitch=[1.2, 0.7, 0.2, -0.3, -0.8, -1.2], pattern=pattern(request.param))
-    return ENGINES[request.param](build_network(arch_scene(shape)))
-
-
-def test_shapes(engine):
-    net = engine.network
-    fields = engine.solve(4, [[3, 7], [7, 1], [4, 5]], Want.ALL)
-    assert fields.edge_force.shape == (3, net.count_edges(4))
-    assert fields.displacement.shape == (3, net.count_nodes(4), 3)
-    assert fields.grip_force.shape == (3, 2, 3)
-    assert fields.support.shape == (3, 6)
-    assert fields.joint_wrench.shape == (3, len(net.springs.since), 6)
-    assert fields.brick_twist.shape == (3, 4, 6)
-    for name in ("edge_force", "displacement", "grip_force", "support", "joint_wrench"):
-        assert np.isfinite(getattr(fields, name)).all()
-
-
-def test_no_sets_and_no_grips(engine):
-    assert engine.solve(3, np.zeros((0, 2), dtype=int)).edge_force.shape[0] == 0
-    assert engine.solve(3, np.zeros((1, 0), dtype=int)).grip_force.shape == (1, 0, 3)
-
-
-def test_it_is_repeatable(engine):
-    first, second = (engine.solve(6, [[3, 8, 11]]) for _ in range(2))
-    assert (first.edge_force == second.edge_force).all()
-    assert (first.displacement == second.displacement).all()
-
-
-def test_the_order_of_grips_does_not_matter(engine):
-    a, b = engine.solve(6, [[3, 8, 11]]), engine.solve(6, [[11, 3, 8]])
-    assert a.grip_force[0] == pytest.approx(b.grip_force[0][[1, 2, 0]], rel=1e-6, abs=1e-6)
-
-
-@pytest.mark.parametrize(
-    ("bricks", "grips", "named"),
-    [
-        (0, [[1]], "brick count 0: the scene has 1 to 6"),
-        (7, [[1]], "brick count 7"),
-        (3, [[0]], r"grip on node 0: with 3 bricks the free nodes are \[1, 2, 3, 4, 5\]"),
-        (3, [[6]], "grip on node 6"),
-        (3, [[-1]], "grip on node -1"),
-        (3, [[4, 4]], r"grip set \[4, 4\]: a node is held twice"),
-        (3, [[1, 2], [5, 5]], r"grip set \[5, 5\]"),
-        (3, [1, 2], r"grips have shape \(2,\)"),
-        (3, [[1.0]], "integer node numbers"),
-        (3, [[float("nan")]], "integer node numbers"),
-    ],
-)
-def test_bad_grips_are_refused(engine, bricks, grips, named):
-    with pytest.raises(GripError, match=named):
-        engine.solve(bricks, grips)
-
-
-@pytest.mark.parametrize("name", ENGINES)
-def test_a_brick_held_by_robots_alone(name):
-    """One grip leaves it turning, two leave it turning about their line, whatever the engine."""
-    scene = arch_scene(ArchShape(pitch=[1.2, 0.7], pattern=pattern(name), closed=False))
-    alone = replace(scene, joints=())
-    engine = ENGINES[name](build_network(alone))
-    engine.solve(1, [[1]])
-    for grips in ([[2]], [[2, 3]]):
-        with pytest.raises(MechanismError, match="motion of brick 2"):
-            engine.solve(2, grips)
-
-
-@pytest.mark.parametrize("name", ENGINES)
-def test_an_end_that_closes_late(name):
-    """A ground end with ``closes_with`` carries nothing before that brick is placed."""
-    scene = arch_scene(ArchShape(pitch=[1.0, 0.3, -0.3, -1.0], pattern=pattern(name)))
-    near, far = scene.grounds
-    early = replace(far, brick=3, position=scene.joints[2].position, anchor=far.anchor)
-    late = replace(scene, grounds=(near, replace(early, closes_with=4)))
-    at_once = replace(scene, grounds=(near, early))
-    free = replace(scene, grounds=(near,))
-    forces = [
-        ENGINES[name](build_network(s)).solve(3, [[3]]).support[0, :3]
-        for s in (late, at_once, free)
-    ]
-    assert forces[0] == pytest.approx(forces[2], rel=1e-5)
-    assert np.abs(forces[0] - forces[1]).max() > 1
-    closed = ENGINES[name](build_network(late)).solve(4, [[3]]).support[0, :3]
-    assert np.abs(closed - forces[0]).max() > 1
+from tests.builders import hinged, six_bricks
 
 
 def error(net, fields, row, grips):
@@ -181,7 +89,7 @@ def test_a_batch_of_many_passes(monkeypatch):
 
 def test_loads_in_two_directions():
     """Held and loaded in its plane, a plane arch knows no third direction."""
-    net = build_network(arch_scene(ArchShape(pitch=[1.2, 0.7, 0.2, -0.3, -0.8, -1.2], pattern="V")))
+    net = build_network(six_bricks("V"))
     assert not np.ptp(net.node_position[:, 1])
     space = OperatorBuilder(net, grow_tree(net)).operator(6)
     kept = np.flatnonzero(np.arange(36) % 3 != 1)
@@ -226,10 +134,7 @@ def test_grips_close_together_on_a_long_chain():
 
 def test_a_hundred_bricks_with_a_hinge():
     """A spring without stiffness leaves no operator."""
-    scene = chain(100)
-    joints = list(scene.joints)
-    joints[50] = replace(joints[50], rotational_stiffness=(0.0, 0.0, 0.0))
-    net = build_network(replace(scene, joints=tuple(joints)))
+    net = build_network(hinged(chain(100), 50))
     fields = ComplianceEngine(net).solve(100, [(150, 199)], Want.ALL)
     assert error(net, fields, 0, (150, 199)) <= 1e-12
 

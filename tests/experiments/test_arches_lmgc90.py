@@ -34,10 +34,7 @@ from experiments.arches_lmgc90 import (
 )
 from experiments.witness_lmgc90 import python_with_lmgc90
 from seqopt.engines.discrete.system import Across, BedStiffness, Pinch
-from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.network.build import build_network
 from seqopt.network.network import GROUND
-from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.two_robots import sequential
 from seqopt.study.presets import STUDY_BED
 
@@ -50,24 +47,19 @@ BOTH = pytest.mark.parametrize("pinch", [ACROSS, THROUGH], ids=["width", "thickn
 
 
 @pytest.fixture(scope="module")
-def engine():
-    return ComplianceEngine(build_network(load_scene("arch25")))
-
-
-@pytest.fixture(scope="module")
-def step(engine):
-    return sequential(engine.network)[32]
+def step(engine25):
+    return sequential(engine25.network)[32]
 
 
 @BOTH
 @pytest.mark.parametrize("flush", [True, False])
-def test_pads_are_on_either_side_of_the_held_node(engine, step, pinch, flush):
-    held = padded(engine.network, step, pinch, flush=flush)
+def test_pads_are_on_either_side_of_the_held_node(engine25, step, pinch, flush):
+    held = padded(engine25.network, step, pinch, flush=flush)
     faces = held.corner[held.contact >= step.bricks].reshape(2, STIFFER, 4, 3)
     assert (faces == faces[:, :1]).all()
     np.testing.assert_allclose(held.area[step.bricks :], PAD**2)
-    brick = engine.network.scene.brick_of_node[step.held[0]]
-    node = np.array(engine.network.scene.node_position(step.held[0]))
+    brick = engine25.network.scene.brick_of_node[step.held[0]]
+    node = np.array(engine25.network.scene.node_position(step.held[0]))
     middles = faces[:, 0].mean(axis=1)
     np.testing.assert_allclose(middles.mean(axis=0), node)
     apart = middles[1] - middles[0]
@@ -79,15 +71,15 @@ def test_pads_are_on_either_side_of_the_held_node(engine, step, pinch, flush):
     assert lean.max() < (1e-5 if flush else 9)
 
 
-def test_ground_and_pads_carry_the_weight(engine, step):
-    held = padded(engine.network, step, ACROSS)
+def test_ground_and_pads_carry_the_weight(engine25, step):
+    held = padded(engine25.network, step, ACROSS)
     _, force = bed_at_corners(held, STUDY_BED)
     total = ground_forces(held, force).sum(axis=0)
     np.testing.assert_allclose(total, -held.weight.sum(axis=0), atol=1e-6)
 
 
-def test_stiffer_joints_move_less_in_proportion(engine, step):
-    held = padded(engine.network, step, THROUGH)
+def test_stiffer_joints_move_less_in_proportion(engine25, step):
+    held = padded(engine25.network, step, THROUGH)
     once, _ = bed_at_corners(held, STUDY_BED)
     double = BedStiffness(2 * STUDY_BED.normal, 2 * STUDY_BED.tangential)
     twice, _ = bed_at_corners(held, double)
@@ -97,9 +89,9 @@ def test_stiffer_joints_move_less_in_proportion(engine, step):
 @BOTH
 @pytest.mark.parametrize("spread", SPREADS)
 @pytest.mark.parametrize("number", [32, 46])
-def test_what_lmgc90_is_shown_is_the_engine_but_for_the_lean(engine, number, pinch, spread):
+def test_what_lmgc90_is_shown_is_the_engine_but_for_the_lean(engine25, number, pinch, spread):
     """Flush pads give the engine's answer; leaning ones move it by a few percent at most."""
-    net, step = engine.network, sequential(engine.network)[number]
+    net, step = engine25.network, sequential(engine25.network)[number]
     wanted = moved(spread_engine(net, pinch, spread), step)
     for flush, near in ((True, 1e-3), (False, 0.08)):
         twist, _ = bed_at_corners(*posed(padded(net, step, pinch, spread, flush=flush), spread))
@@ -107,9 +99,9 @@ def test_what_lmgc90_is_shown_is_the_engine_but_for_the_lean(engine, number, pin
         assert np.abs(off).max() < near * wanted.max()
 
 
-def test_faces_drawn_in_bend_as_an_even_bed(engine, step):
+def test_faces_drawn_in_bend_as_an_even_bed(engine25, step):
     """A rectangle's four corners, drawn in by √3, have its second moments of area."""
-    held = padded(engine.network, step, ACROSS)
+    held = padded(engine25.network, step, ACROSS)
     small = drawn_in(held)
     np.testing.assert_allclose(3 * small.area, held.area)
     pad = small.corner[-4:] - small.corner[-4:].mean(axis=0)
@@ -119,10 +111,10 @@ def test_faces_drawn_in_bend_as_an_even_bed(engine, step):
 @pytest.mark.parametrize("number", [32, 34, 44, 46])
 @BOTH
 @pytest.mark.parametrize("spread", SPREADS)
-def test_lmgc90_is_shown_every_face_and_weight(engine, number, pinch, spread):
+def test_lmgc90_is_shown_every_face_and_weight(engine25, number, pinch, spread):
     """A pad's face is a facet of its blocks; a joint's too, but for millimeters beside a pad."""
-    step = sequential(engine.network)[number]
-    held, bed = posed(padded(engine.network, step, pinch, spread), spread)
+    step = sequential(engine25.network)[number]
+    held, bed = posed(padded(engine25.network, step, pinch, spread), spread)
     scene = scene_for(held, bed)
     blocks, free = scene["blocks"], step.bricks
     assert [block["fixed"] for block in blocks] == [False] * free + [True] * (1 + 2 * STIFFER)
@@ -141,17 +133,17 @@ def test_lmgc90_is_shown_every_face_and_weight(engine, number, pinch, spread):
     assert json.loads(json.dumps(scene)) == scene
 
 
-def test_a_larger_pad_moves_less(engine, step):
+def test_a_larger_pad_moves_less(engine25, step):
     engines = [
-        spread_engine(engine.network, Pinch(Across.WIDTH, side=side), "even")
+        spread_engine(engine25.network, Pinch(Across.WIDTH, side=side), "even")
         for side in (0.01, 0.02, 0.04)
     ]
-    errors = [error(moved(engine, step), moved(discrete, step)) for discrete in engines]
+    errors = [error(moved(engine25, step), moved(discrete, step)) for discrete in engines]
     assert errors == sorted(errors)
 
 
-def test_blocks_are_closed_and_look_outward(engine, step):
-    for block in scene_for(padded(engine.network, step, THROUGH), STUDY_BED)["blocks"]:
+def test_blocks_are_closed_and_look_outward(engine25, step):
+    for block in scene_for(padded(engine25.network, step, THROUGH), STUDY_BED)["blocks"]:
         assert springs_lmgc90.volume(block) > 0
         edges = {(f[i - 1], f[i]) for f in block["faces"] for i in range(3)}
         assert edges == {(b, a) for a, b in edges}
@@ -180,8 +172,8 @@ def test_forces_on_the_ground_are_turned_to_forces_on_the_blocks():
     np.testing.assert_allclose(on_ground(result, 1), [[0, 0, 3.0], [0, 0, -4.0]])
 
 
-def test_a_missing_or_failing_lmgc90_is_none(engine, step, monkeypatch):
-    assert witness(engine, step, "no such python") is None
+def test_a_missing_or_failing_lmgc90_is_none(engine25, step, monkeypatch):
+    assert witness(engine25, step, "no such python") is None
     assert asked(sys.executable, {"blocks": []}) is None
 
     def late(*args, **kwargs):
@@ -191,9 +183,9 @@ def test_a_missing_or_failing_lmgc90_is_none(engine, step, monkeypatch):
     assert asked(sys.executable, {"blocks": []}) is None
 
 
-def test_a_program_of_the_same_answers_agrees(engine, step, monkeypatch):
+def test_a_program_of_the_same_answers_agrees(engine25, step, monkeypatch):
     """A stand-in for LMGC90 that answers with our own bed shows no difference."""
-    held = padded(engine.network, step, ACROSS, "corners")
+    held = padded(engine25.network, step, ACROSS, "corners")
     twist, force = bed_at_corners(held, STUDY_BED)
     world = np.einsum("ki,kij->kj", force, held.axes[held.contact])
     ground = np.flatnonzero(held.bodies[:, 0] == GROUND)
@@ -208,7 +200,7 @@ def test_a_program_of_the_same_answers_agrees(engine, step, monkeypatch):
         "sway": 0.0,
     }
     monkeypatch.setattr(arches_lmgc90, "asked", lambda python, scene: answer)
-    row = arches_lmgc90.compared(engine, step, "", Across.WIDTH, "corners")
+    row = arches_lmgc90.compared(engine25, step, "", Across.WIDTH, "corners")
     assert row["same_pads_off_pct"] == pytest.approx(0.0)
     assert row["lmgc90_error_pct"] == row["same_pads_error_pct"]
     assert 0 < row["engine_off_pct"] < 8  # its pads do not lean
@@ -218,7 +210,7 @@ def test_a_program_of_the_same_answers_agrees(engine, step, monkeypatch):
     assert 0 < row["shear_used"] < 1
     lost = {**answer, "pair": answer["pair"][1:]}
     monkeypatch.setattr(arches_lmgc90, "asked", lambda python, scene: lost)
-    assert arches_lmgc90.compared(engine, step, "", Across.WIDTH, "corners") is None
+    assert arches_lmgc90.compared(engine25, step, "", Across.WIDTH, "corners") is None
 
 
 @with_lmgc90
@@ -229,8 +221,8 @@ def test_one_brick_settles_by_its_weight_over_the_stiffness(upright):
 
 
 @with_lmgc90
-def test_lmgc90_and_our_bed_agree(engine, step):
-    row = witness(engine, step, PYTHON, ((Across.THICKNESS, "even"),)).iloc[0]
+def test_lmgc90_and_our_bed_agree(engine25, step):
+    row = witness(engine25, step, PYTHON, ((Across.THICKNESS, "even"),)).iloc[0]
     assert abs(row["same_pads_off_pct"]) < 1.0
     assert row["same_pads_farthest_pct"] < 2.0
     assert abs(row["engine_off_pct"]) < 1.0  # across the thickness pads need not lean

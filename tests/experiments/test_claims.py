@@ -1,28 +1,11 @@
-"""Claims: every experiment at reduced size ends with its verdict, and its parts can fail."""
+"""Claims: every experiment at reduced size ends with its verdict."""
 
 from __future__ import annotations
 
-import subprocess
-import sys
-from pathlib import Path
-
-import numpy as np
-import pandas as pd
 import pytest
 
-from experiments.arch_numbers import OFFSETS, SHAPE, VARIANTS, report, scene_of, start_of
-from experiments.identify_arch25 import (
-    beside_shipped,
-    fit,
-    holds,
-    residuals,
-    target,
-)
-from experiments.plotting import RESULTS
-from seqopt.study.tables import printed_steps
-
-ROOT = Path(__file__).parents[2]
-
+from tests.builders import ROOT
+from tests.commands import run
 
 TIMED = {
     "engine_speed",
@@ -47,18 +30,7 @@ QUICK = [
 ]
 
 
-def run(name, *arguments):
-    done = subprocess.run(
-        [sys.executable, "-W", "error", "-m", f"experiments.{name}", *arguments],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    return done.stdout
-
-
+@pytest.mark.slow
 @pytest.mark.parametrize("name", QUICK)
 def test_a_quick_run_ends_with_a_verdict(name):
     before = sorted((ROOT / "experiments" / "results").glob("*"))
@@ -68,33 +40,3 @@ def test_a_quick_run_ends_with_a_verdict(name):
     if name not in TIMED:
         assert "the claim holds" in verdict
     assert [path.stat().st_mtime_ns for path in before] == times  # a quick run writes nothing
-
-
-@pytest.mark.parametrize("name", VARIANTS)
-def test_variants_of_the_identification_start_from_one_scene(name):
-    """Other sets of numbers describe the same starting arch, but for the yaw none has yet."""
-    wanted = target([printed_steps("sequential")])
-    start = residuals(scene_of(start_of(VARIANTS[name]), VARIANTS[name]), wanted)
-    first = residuals(scene_of(start_of(VARIANTS["first stage"]), VARIANTS["first stage"]), wanted)
-    assert start == pytest.approx(first, abs=1e-9)
-
-
-def test_a_few_iterations_improve_the_start():
-    groups = VARIANTS["line in a plane"]
-    wanted = target([printed_steps("sequential")])
-    before = np.abs(residuals(scene_of(start_of(groups), groups), wanted))
-    numbers, _ = fit(start_of(groups), groups, wanted, 6)
-    after = np.abs(residuals(scene_of(numbers, groups), wanted))
-    assert np.minimum(after, 0.1).sum() < 0.8 * np.minimum(before, 0.1).sum()
-
-
-def test_the_stored_numbers_describe_the_shipped_scene_and_worse_ones_fail():
-    numbers = pd.read_csv(RESULTS / "identify_arch25.csv")["value"].to_numpy()
-    groups = (*SHAPE, OFFSETS)
-    same = beside_shipped(report(numbers, groups), scene_of(numbers, groups))
-    assert same["difference"].abs().max() <= 0.01
-    assert holds(same, quick=False)
-    off = numbers * np.where(np.arange(len(numbers)) == 35, 1.1, 1.0)  # the gap
-    worse = beside_shipped(report(off, groups), scene_of(off, groups))
-    assert not holds(worse, quick=False)
-    assert holds(worse, quick=True)  # a quick fit is not judged, the shipped one is

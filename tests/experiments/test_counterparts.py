@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -14,8 +13,8 @@ from experiments.counterpart_page import AGREES, DISAGREES, PARTLY, TITLES, page
 from experiments.counterpart_rows import COUNTERPARTS, cell, tabulate
 from experiments.paper_counterparts import KNOWN, faults
 from experiments.paper_items import ITEMS
+from tests.builders import ROOT
 
-ROOT = Path(__file__).parents[2]
 STORED = pd.read_csv(ROOT / "experiments" / "results" / "paper_counterparts.csv")
 PAGE = (ROOT / "docs" / "counterparts.md").read_text(encoding="utf-8")
 WITH_NUMBERS = [item for item in ITEMS if item.has_numbers]

@@ -6,7 +6,6 @@ import subprocess
 import sys
 import threading
 import time
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -19,8 +18,8 @@ from experiments.speed_accuracy import KEY, collect, holds, measure, specs, summ
 from experiments.speed_charts import headline, profile_charts
 from seqopt.placement.formulation import formulations
 from seqopt.study.presets import CRITERIA
+from tests.builders import ROOT
 
-ROOT = Path(__file__).parents[2]
 STAGES = ["assemble", "respond", "rank", "compile", "solve", "verify"]
 
 
@@ -33,6 +32,8 @@ def smoke():
     return table.reset_index(drop=True)
 
 
+@pytest.mark.slow
+@pytest.mark.xdist_group("smoke")
 def test_everything_runs_and_is_a_row(smoke):
     assert len(smoke) == len(ENGINES) * len(CRITERIA) * (len(formulations()) + 1)
     assert smoke[[*STAGES, "gap", "error", "objective", "models"]].notna().all(axis=None)
@@ -52,6 +53,8 @@ def test_everything_runs_and_is_a_row(smoke):
     assert (compiled["compile"] > 0).all()
 
 
+@pytest.mark.slow
+@pytest.mark.xdist_group("smoke")
 def test_stored_runs_are_not_repeated(smoke, monkeypatch):
     calls = []
     monkeypatch.setattr(
@@ -81,6 +84,8 @@ def test_a_run_out_of_time_is_charged_its_limit():
     assert (failed["status"] == "failed").all()
 
 
+@pytest.mark.slow
+@pytest.mark.xdist_group("smoke")
 def test_the_claim_can_fail(smoke):
     assert holds(smoke)["dynamic programming has no gap"]
     corner = (smoke["formulation"] == "overlap_dp") & (smoke["engine"] == REFERENCE)
@@ -95,6 +100,8 @@ def test_the_claim_can_fail(smoke):
     assert holds(arch.assign(total=arch["total"].where(~without, 9.0)))[text]
 
 
+@pytest.mark.slow
+@pytest.mark.xdist_group("smoke")
 def test_charts_and_table_come_from_rows(smoke, monkeypatch):
     saved = []
     for name in ("headline", "profile_charts"):

@@ -16,7 +16,7 @@ from experiments.peers import Case, difference, workload
 from seqopt.engines.interface import Want, grip_columns
 from seqopt.placement.costs import CostProblem, LayeredCosts
 from seqopt.placement.formulation import find_formulation
-from tests.experiments.test_claims import run
+from tests.commands import run
 
 STATES = [(4, (1, 5, 7)), (17, (1, 20, 33)), (17, (1, 20, 21)), (25, (4, 47)), (25, (12, 13, 46))]
 

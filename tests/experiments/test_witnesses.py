@@ -24,7 +24,7 @@ from experiments.witnesses import (
 )
 from seqopt.network.network import GROUND
 from seqopt.stability.assessment import Verdict
-from tests.experiments.test_claims import run
+from tests.commands import run
 
 
 @pytest.fixture(scope="module")
@@ -45,6 +45,7 @@ def changed(table, case, **values):
     return out
 
 
+@pytest.mark.slow
 def test_a_quick_run_holds_by_one_witness():
     verdict = run("witnesses", "--quick").splitlines()[-1]
     assert verdict.startswith("verdict: the claim holds, by one witness")

@@ -11,23 +11,22 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.errors import InfeasibleError, ProblemError, SolverError
+from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.network.build import build_network
 from seqopt.placement.budgets import robot_use, steps_over, travel
-from seqopt.placement.certificate import certify
 from seqopt.placement.costs import Budget, CostProblem, LayeredCosts
 from seqopt.placement.formulation import (
     Aim,
     FormulationKind,
-    Selection,
     find_formulation,
     formulations,
 )
 from seqopt.placement.plan import run
 from seqopt.placement.problem import Limit, pose
-from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.sequence.three_robots import SCHEDULES, three_robot_loop
 from seqopt.study.presets import CRITERIA, EQUATIONS, WORST_RATIO
+from tests.builders import small_arch
+from tests.strategies import problems
 
 ALL = formulations()
 EXACT_SUMS = [
@@ -37,37 +36,12 @@ HEURISTICS = [n for n, f in ALL.items() if f.kind is FormulationKind.HEURISTIC]
 every = pytest.mark.parametrize("name", ALL)
 
 
-@st.composite
-def problems(draw, most_moves=5, most_candidates=4):
-    """Costs with many ties and some choices not allowed."""
-    sizes = draw(st.lists(st.integers(1, most_candidates), min_size=1, max_size=most_moves))
-    cost = st.one_of(st.integers(0, 3).map(float), st.just(np.inf))
-
-    def array(*shape):
-        count = int(np.prod(shape))
-        return np.array(draw(st.lists(cost, min_size=count, max_size=count))).reshape(shape)
-
-    single = tuple(array(size) for size in sizes)
-    shared = tuple(array(a, b) for a, b in zip([1, *sizes[:-1]], sizes, strict=True))
-    return CostProblem(LayeredCosts(single, shared))
-
-
 def brute_force(problem, aim):
     """The best value over every combination, infinite if none is allowed."""
     worth = problem.sums.cost if aim is Aim.SUM else problem.peaks.worst
     choices = product(*(range(size) for size in problem.sums.sizes))
     within = (c for c in choices if all(b.spent(c) <= b.bound for b in problem.budgets))
     return min((worth(c) for c in within), default=np.inf)
-
-
-@pytest.fixture(scope="module")
-def problem25(engine25):
-    return pose(engine25, three_robot_loop(engine25.network), EQUATIONS, also=("F_largest",))
-
-
-def small_arch(count):
-    pitch = np.linspace(1.3, -1.3, count)
-    return ComplianceEngine(build_network(arch_scene(ArchShape(pitch=pitch.tolist()))))
 
 
 @every
@@ -202,7 +176,7 @@ def test_exact_ones_agree_on_the_reference_arch(engine25, criterion, method):
 @pytest.mark.parametrize("count", [5, 6, 7, 8])
 @pytest.mark.parametrize("criterion", CRITERIA.values(), ids=CRITERIA)
 def test_all_exact_ones_equal_brute_force_on_small_arches(count, criterion):
-    engine = small_arch(count)
+    engine = ComplianceEngine(build_network(small_arch(count)))
     problem = pose(engine, three_robot_loop(engine.network), criterion)
     best = run(problem, ALL["rank_search"], horizon=count)[1].objective
     assert best == pytest.approx(brute_force(problem, Aim.SUM))
@@ -268,45 +242,3 @@ def test_budgets_of_the_reference_arch(problem25):
         assert bound.prices[budget.name] > 0
     with pytest.raises(ProblemError, match="name it in `also`"):
         robot_use(problem25, "rob9", 100.0, 1.0)
-
-
-FAULTS = {
-    "zeros": lambda s: replace(s, choice=(0,) * len(s.choice)),
-    "too short": lambda s: replace(s, choice=s.choice[:-1]),
-    "out of range": lambda s: replace(s, choice=(99, *s.choice[1:])),
-    "negative": lambda s: replace(s, choice=(-1, *s.choice[1:])),
-    "false objective": lambda s: replace(s, objective=0.9 * s.objective),
-    "not a number": lambda s: replace(s, objective=float("nan")),
-    "false bound": lambda s: replace(s, bound=1.1 * s.objective),
-}
-
-
-@pytest.mark.parametrize("fault", FAULTS)
-def test_a_false_answer_is_caught(problem25, fault):
-    good = ALL["overlap_dp"].solve(problem25)
-    certify(problem25, good, Aim.SUM)
-    with pytest.raises(SolverError):
-        certify(problem25, FAULTS[fault](good), Aim.SUM)
-
-
-def test_promises_are_held(problem25):
-    """A heuristic that calls itself exact is refused, and so is a bound above the optimum."""
-    cascade = ALL["cascade"]
-    with pytest.raises(SolverError, match="promises the optimum"):
-        run(problem25, replace(cascade, kind=FormulationKind.EXACT))
-    poor = cascade.solve(problem25)
-    with pytest.raises(SolverError, match="claimed bound"):
-        certify(problem25, replace(poor, bound=poor.objective), Aim.SUM)
-
-
-def test_a_budget_keeps_its_claimed_bound(problem25):
-    capped = replace(problem25, budgets=(travel(problem25, 20.0),))
-    certificate = run(capped, ALL["overlap_mip"])[1]
-    assert certificate.gap > 0  # from the least value without the budget
-    assert certificate.claimed_gap <= 1e-6
-
-
-def test_a_choice_that_is_not_allowed_is_caught():
-    problem = CostProblem(LayeredCosts((np.array([0.0, np.inf]),), (np.zeros((1, 2)),)))
-    with pytest.raises(SolverError, match="not allowed"):
-        certify(problem, Selection((1,), 0.0), Aim.SUM)

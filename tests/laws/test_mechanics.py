@@ -16,7 +16,8 @@ from seqopt.engines.rigid.operator import OperatorBuilder
 from seqopt.engines.rigid.spanning_tree import grow_tree
 from seqopt.network.build import build_network
 from seqopt.responses.quantities import step_responses
-from tests.strategies import arches, moved, solve, states, walls
+from tests.builders import about_vertical, moved, scaled, solve
+from tests.strategies import arches, states, walls
 
 any_scene = st.one_of(arches(), walls())
 NAMES = [f"F_{k}" for k in ("rob", "sup", "min", "max", "avg")] + [
@@ -156,8 +157,7 @@ def test_mirroring_changes_nothing(state):
 @given(state=states(any_scene), angle=st.floats(-3, 3))
 def test_turning_about_the_vertical_changes_nothing(state, angle):
     scene, bricks, grips = state
-    c, s = np.cos(angle), np.sin(angle)
-    turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+    turn = about_vertical(angle)
     turned = moved(scene, lambda p: turn @ p + np.array([3.0, -2.0, 1.0]))
     assert_same(scalars(scene, bricks, grips), scalars(turned, bricks, grips))
 
@@ -191,32 +191,6 @@ def test_renumbering_changes_nothing(state, seed):
     )
     same = np.array([[new_node[int(n)] for n in grips[0]]], dtype=np.int64).reshape(1, -1)
     assert_same(scalars(scene, bricks, grips), scalars(other, bricks, same))
-
-
-def scaled(scene, length=1.0, density=1.0, stiffness=1.0):
-    """Scale lengths (rotational stiffness with their square), densities, stiffnesses."""
-    out = moved(scene, lambda p: length * p)
-
-    def spring(s):
-        return replace(
-            s,
-            translational_stiffness=tuple(stiffness * k for k in s.translational_stiffness),
-            rotational_stiffness=tuple(stiffness * length**2 * k for k in s.rotational_stiffness),
-        )
-
-    return replace(
-        out,
-        bricks=tuple(
-            replace(
-                b,
-                dimensions=tuple(length * d for d in b.dimensions),
-                density=density * b.density,
-            )
-            for b in out.bricks
-        ),
-        joints=tuple(map(spring, out.joints)),
-        grounds=tuple(map(spring, out.grounds)),
-    )
 
 
 @pytest.mark.parametrize("factor", [1e-3, 1e3])

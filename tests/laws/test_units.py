@@ -14,54 +14,11 @@ from seqopt.network.build import build_network
 from seqopt.placement.formulation import find_formulation
 from seqopt.placement.plan import run
 from seqopt.placement.problem import pose
-from seqopt.scene.reach import Side
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.sequence.two_robots import cantilever
 from seqopt.stability.assessment import assess
 from seqopt.study.presets import CLOSEST, EQUATIONS
-
-
-def times(vector, factor):
-    return tuple(factor * x for x in vector)
-
-
-def rescaled(scene, length, force, softness):
-    """The scene with lengths, weights and payloads, and joint flexibilities multiplied.
-
-    Forces grow with ``force``, moments with ``force * length``, and displacements with ``force *
-    softness`` where the softness of turning is that of shifting over the square of the length.
-    """
-
-    def spring(s):
-        out = replace(
-            s,
-            position=times(s.position, length),
-            translational_stiffness=times(s.translational_stiffness, 1 / softness),
-            rotational_stiffness=times(s.rotational_stiffness, length**2 / softness),
-        )
-        return replace(out, anchor=times(s.anchor, length)) if hasattr(s, "anchor") else out
-
-    def robot(r):
-        if isinstance(r.reach, Side):
-            r = replace(r, reach=replace(r.reach, point=times(r.reach.point, length)))
-        return replace(r, payload=force * r.payload)
-
-    return replace(
-        scene,
-        bricks=tuple(
-            replace(
-                b,
-                position=times(b.position, length),
-                dimensions=times(b.dimensions, length),
-                density=b.density * force / length**3,
-            )
-            for b in scene.bricks
-        ),
-        joints=tuple(map(spring, scene.joints)),
-        grounds=tuple(map(spring, scene.grounds)),
-        robots=tuple(map(robot, scene.robots)),
-    )
-
+from tests.builders import rescaled
 
 SCALES = [(1e3, 1, 1), (1e-3, 1, 1), (1, 1e3, 1), (1, 1e-3, 1), (1, 1, 1e3), (1, 1, 1e-3)]
 SCALES += [(1e3, 1e-3, 1e3), (1e-3, 1e3, 1e-3)]
@@ -75,9 +32,22 @@ def solved(scene, criterion):
     return problem, problem.nodes(selection.choice), certificate
 
 
+@pytest.fixture(scope="module")
+def plain(arch25):
+    return {criterion: solved(arch25, criterion) for criterion in (EQUATIONS, CLOSEST)}
+
+
+@pytest.fixture(scope="module")
+def verdicts(arch25):
+    """Five steps about the crown, each with its verdict."""
+    net = build_network(arch25)
+    steps = cantilever(net)[26:31]
+    return [(s, assess(step_assembly(net, s.bricks, s.grips), DRY)) for s in steps]
+
+
 @pytest.mark.parametrize("criterion", [EQUATIONS, CLOSEST], ids=lambda c: c.name)
 @pytest.mark.parametrize("scales", SCALES)
-def test_ranks_and_choices_do_not_know_units(arch25, criterion, scales):
+def test_ranks_and_choices_do_not_know_units(arch25, plain, criterion, scales):
     """Where responses are rounded for ranks, the resolution is given in the same units."""
     length, force, softness = scales
     shift = force * softness
@@ -85,20 +55,20 @@ def test_ranks_and_choices_do_not_know_units(arch25, criterion, scales):
     same = replace(
         criterion, resolution=tuple((n, units[n] * size) for n, size in criterion.resolution)
     )
-    plain, nodes, certificate = solved(arch25, criterion)
+    own, nodes, certificate = plain[criterion]
     other, others, certified = solved(rescaled(arch25, length, force, softness), same)
     assert others == nodes
     assert certified.objective == pytest.approx(certificate.objective, rel=1e-9)
-    for a, b in zip(plain.sums.shared, other.sums.shared, strict=True):
+    for a, b in zip(own.sums.shared, other.sums.shared, strict=True):
         np.testing.assert_allclose(b, a, rtol=1e-9)
 
 
 @pytest.mark.parametrize("scales", SCALES)
-def test_verdicts_do_not_know_units(arch25, scales):
+def test_verdicts_do_not_know_units(arch25, verdicts, scales):
     length, force, softness = scales
-    net, other = build_network(arch25), build_network(rescaled(arch25, length, force, softness))
-    for step in cantilever(net)[26:31]:
-        a, b = (assess(step_assembly(n, step.bricks, step.grips), DRY) for n in (net, other))
+    net = build_network(rescaled(arch25, length, force, softness))
+    for step, a in verdicts:
+        b = assess(step_assembly(net, step.bricks, step.grips), DRY)
         assert a.verdict is b.verdict
         assert b.bond == pytest.approx(a.bond * force / length**2, rel=1e-3)
         assert b.friction == pytest.approx(a.friction, abs=2e-4)
@@ -107,8 +77,8 @@ def test_verdicts_do_not_know_units(arch25, scales):
         assert (a.first_block, a.first_contact) == (b.first_block, b.first_contact)
 
 
-def test_a_resolution_in_other_units_is_another_criterion(arch25):
+def test_a_resolution_in_other_units_is_another_criterion(arch25, plain):
     """The control: forces in kN rounded to 1 kN decide nothing."""
-    _, nodes, _ = solved(arch25, EQUATIONS)
+    _, nodes, _ = plain[EQUATIONS]
     _, others, _ = solved(rescaled(arch25, 1, 1e-3, 1), EQUATIONS)
     assert others != nodes

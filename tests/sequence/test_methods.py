@@ -1,57 +1,22 @@
-"""Methods and plans: the published sequences, other arches, impossible steps."""
+"""Methods on other arches, impossible steps."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
-import pandas as pd
 import pytest
 from hypothesis import given
 
 from seqopt.errors import StepError
 from seqopt.network.build import build_network
 from seqopt.scene.arch import ArchShape, arch_scene
-from seqopt.scene.reach import Side, Sphere
+from seqopt.scene.reach import Sphere
 from seqopt.scene.scene import Robot
-from seqopt.sequence.plan_file import parse_plan, read_plan
-from seqopt.sequence.steps import Step, StepKind, check_sequence
+from seqopt.sequence.steps import StepKind, check_sequence
 from seqopt.sequence.two_robots import METHODS, cantilever, lies_along, sequential
 from seqopt.study.published import published_plan
-from seqopt.study.tables import printed_steps
+from tests.builders import far_reaching
 from tests.strategies import arches
-
-GRIPS = [f"rob{i}_node" for i in (1, 2, 3)]
-
-
-@pytest.mark.parametrize("method", METHODS)
-def test_the_published_sequences(engine25, method):
-    """Tables A.1 and A.2: type, brick count and grips of all 49 steps."""
-    steps = METHODS[method](engine25.network)
-    table = printed_steps(method)
-    assert [s.kind.value for s in steps] == table["type"].tolist()
-    assert [s.bricks for s in steps] == table["bricks"].tolist()
-    wanted = [tuple(None if pd.isna(n) else int(n) for n in row) for row in table[GRIPS].to_numpy()]
-    assert [s.grips for s in steps] == wanted
-
-
-def test_the_published_plan(arch25):
-    steps = published_plan(arch25)
-    assert len(steps) == 90
-    assert steps[-1].bricks == 25
-    assert all(len(s.held) >= 2 for s in steps[1:])  # criterion 1 of section 5: no twisting
-    newest = [arch25.placed[s.bricks - 1].nodes for s in steps]
-    assert all(set(s.held) & set(nodes) for s, nodes in zip(steps, newest, strict=True))
-
-
-def far_reaching(scene):
-    """The scene with robots on their sides that reach across whatever the arch does."""
-    robots = tuple(
-        replace(r, reach=replace(r.reach, point=tuple(-10 * c for c in r.reach.toward)))
-        if isinstance(r.reach, Side)
-        else r
-        for r in scene.robots
-    )
-    return replace(scene, robots=robots)
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -118,34 +83,3 @@ def test_impossible_steps(arch25, number, changes, named):
 def test_an_empty_sequence_is_refused(arch25):
     with pytest.raises(StepError, match="no steps"):
         check_sequence(arch25, [])
-
-
-HEADER = "step,type,bricks,rob1_brick,rob1_node,rob2_brick,rob2_node,rob3_brick,rob3_node\n"
-
-
-@pytest.mark.parametrize(
-    ("text", "named"),
-    [
-        ("", "column step is missing"),
-        ("step,type,bricks,rob1_node\n1,place,1,1\n", "column rob2_node is missing"),
-        (HEADER, "no steps"),
-        (HEADER + "1,put,1,1,1,,,,\n", "line 2: type is 'put'"),
-        (HEADER + "1,place,one,1,1,,,,\n", "line 2: bricks is 'one'"),
-        (HEADER + "1,place,1,1,a,,,,\n", "line 2: rob1_node is 'a'"),
-        (HEADER + "1,place,1,2,1,,,,\n", "rob1 holds node 1 of brick 2; it is on brick 1"),
-        (HEADER + "2,place,1,1,1,,,,\n", "step 2 stands where 1 should"),
-        (HEADER + "1,place\n", "line 2: bricks is ''"),
-    ],
-)
-def test_plan_files_are_checked(arch25, text, named):
-    with pytest.raises(StepError, match=named):
-        parse_plan(arch25, text, "p.csv")
-
-
-def test_a_plan_from_a_file(tmp_path, arch25):
-    path = tmp_path / "plan.csv"
-    path.write_text(HEADER + "1,place,1,1,1,,,,\n2,place,2,1,1,2,2,,\n", encoding="utf-8")
-    assert read_plan(arch25, path) == (
-        Step(1, StepKind.PLACE, 1, (1, None, None)),
-        Step(2, StepKind.PLACE, 2, (1, 2, None)),
-    )
