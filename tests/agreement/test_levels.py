@@ -43,7 +43,9 @@ def test_within_the_elastic_limits_discrete_elements_are_rigid_bricks(state):
     assert largest_difference(found, exact, net) <= 1e-7
 
 
-@pytest.mark.parametrize("number", [3, 7, 9, 20, 24])
+@pytest.mark.parametrize(
+    "number", [3, 9, *(pytest.param(n, marks=pytest.mark.slow) for n in (7, 20, 24))]
+)
 def test_what_comes_to_rest_is_proven_to_stand(number):
     """Forces within the limits are there: the certificate must find some too, without bonds."""
     net = build_network(load_scene("arch25"))

@@ -191,6 +191,7 @@ def test_optimize_without_proof(capsys, tmp_path):
     assert report["models_evaluated"] < len(responses) < 2 * report["models_evaluated"]
 
 
+@pytest.mark.slow
 def test_compare_writes_tables_and_figures(capsys, tmp_path):
     assert run(capsys, "compare", "--out", str(tmp_path), "--criteria", "weighted")[0] == 0
     names = {path.name for path in tmp_path.iterdir()}

@@ -144,6 +144,7 @@ def test_nearly_loose_is_solved_or_refused_never_wrong():
     assert seen == set(Finding)
 
 
+@pytest.mark.slow
 def test_a_long_chain_is_solved_well_though_the_plain_residual_says_no():
     told = diagnose(build_network(chain(1500)), 1500, [])
     assert told.finding is Finding.SOLVED_WELL

@@ -75,6 +75,7 @@ def measured(smoke, spec):
     return part.assign(version=version("seqopt")).to_dict("records")
 
 
+@pytest.mark.slow
 def test_a_run_out_of_time_is_charged_its_limit():
     charged = pd.DataFrame(measure(("chain7", REFERENCE, "weighted", 1), limit=0.01))
     assert (charged["status"] == "time limit").all()

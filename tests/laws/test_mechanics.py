@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from seqopt.engines.frame import FrameEngine
@@ -195,6 +195,7 @@ def test_renumbering_changes_nothing(state, seed):
 
 @pytest.mark.parametrize("factor", [1e-3, 1e3])
 @pytest.mark.parametrize("what", ["length", "density", "stiffness"])
+@settings(max_examples=20)
 @given(state=states(any_scene))
 def test_scaling(what, factor, state):
     """Forces follow the weight, moments weight times length, motions weight over stiffness."""

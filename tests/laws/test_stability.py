@@ -23,6 +23,7 @@ from tests.builders import about_vertical, held, moved
 from tests.strategies import arches
 
 
+@settings(max_examples=15)
 @given(
     length=st.floats(-3, 3),
     force=st.floats(-3, 3),
