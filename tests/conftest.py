@@ -1,13 +1,28 @@
 from __future__ import annotations
 
+import os
+
+# several threads per process fight over the cores; set before numpy is imported, for subprocesses
+os.environ["OPENBLAS_NUM_THREADS"] = "1"
+os.environ["OMP_NUM_THREADS"] = "1"
+
 import pytest
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network
+from seqopt.placement.problem import pose
 from seqopt.scene.scene_file import load_scene
+from seqopt.sequence.three_robots import three_robot_loop
+from seqopt.study.presets import EQUATIONS
 
-settings.register_profile("seqopt", derandomize=True, deadline=None, max_examples=40)
+settings.register_profile(
+    "seqopt",
+    derandomize=True,
+    deadline=None,
+    max_examples=40,
+    suppress_health_check=[HealthCheck.too_slow],  # on a busy machine everything is
+)
 settings.load_profile("seqopt")
 
 
@@ -19,3 +34,13 @@ def arch25():
 @pytest.fixture(scope="session")
 def engine25(arch25):
     return ComplianceEngine(build_network(arch25))
+
+
+@pytest.fixture(scope="session")
+def loop25(engine25):
+    return three_robot_loop(engine25.network)
+
+
+@pytest.fixture(scope="session")
+def problem25(engine25, loop25):
+    return pose(engine25, loop25, EQUATIONS, also=("F_largest",))

@@ -156,3 +156,52 @@ def test_modules_and_functions_stay_small(folder):
             if isinstance(node, ast.FunctionDef):
                 length = (node.end_lineno or 0) - node.lineno
                 assert length < LINES_OF_A_FUNCTION, f"{path}: {node.name}"
+
+
+def imported_tests(path: Path) -> set[str]:
+    """Return the test files that a file imports, or imports from."""
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom):
+            found |= {f"{node.module}.{alias.name}" for alias in node.names}
+    parts = (name.split(".") for name in found | imports(path))
+    return {part for name in parts for part in name if part.startswith("test_")}
+
+
+def test_no_test_imports_another_test():
+    """What tests share stands beside them: builders, strategies, commands and fixtures."""
+    for path in sources("tests"):
+        assert not imported_tests(path), path
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "from tests.laws.test_units import solved",
+        "from tests.laws import test_units",
+        "import tests.laws.test_units as other",
+    ],
+)
+def test_an_import_of_another_test_is_seen(tmp_path, line):
+    path = tmp_path / "test_any.py"
+    path.write_text(f"from tests.builders import ROOT\n\n\ndef test():\n    {line}\n", "utf-8")
+    assert imported_tests(path) == {"test_units"}
+
+
+def rooms() -> set[str]:
+    """Return the rooms of the package: its folders of modules."""
+    return {page.parent.name for page in (ROOT / "seqopt").glob("*/__init__.py")}
+
+
+def untested(names: set[str]) -> set[str]:
+    """Return the rooms that no folder of tests mirrors."""
+    return {name for name in names if not list((ROOT / "tests" / name).glob("test_*.py"))}
+
+
+def test_every_room_has_a_folder_of_tests():
+    assert len(rooms()) > 5
+    assert untested(rooms()) == set()
+
+
+def test_a_room_without_tests_is_seen():
+    assert untested(rooms() | {"attic"}) == {"attic"}

@@ -1,0 +1,66 @@
+"""The search that solves only the models it meets, against the one that is given all costs."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+
+from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.network.build import build_network
+from seqopt.placement.formulation import find_formulation
+from seqopt.placement.plan import run
+from seqopt.placement.problem import Limit, pose
+from seqopt.placement.window_search import search_windows
+from seqopt.responses.choices import window_models
+from seqopt.sequence.three_robots import SCHEDULES, three_robot_loop
+from seqopt.study.presets import CRITERIA, EQUATIONS, WEIGHTED
+from tests.builders import far_reaching
+from tests.strategies import arches
+
+
+class Counting:
+    """An engine that counts the grip sets it is asked for."""
+
+    def __init__(self, engine):
+        self.engine, self.sets = engine, 0
+
+    @property
+    def network(self):
+        return self.engine.network
+
+    def solve(self, bricks, grips, want):
+        self.sets += len(grips)
+        return self.engine.solve(bricks, grips, want)
+
+
+@pytest.mark.parametrize("criterion", CRITERIA)
+@pytest.mark.parametrize("method", SCHEDULES)
+def test_it_chooses_as_the_cascade_does(engine25, method, criterion):
+    schedule = SCHEDULES[method](engine25.network)
+    counting = Counting(engine25)
+    found = search_windows(counting, schedule, CRITERIA[criterion])
+    problem = pose(engine25, schedule, CRITERIA[criterion])
+    for name in ("cascade", "rank_search"):
+        assert found.choice == run(problem, find_formulation(name))[0].choice
+    assert found.plan == schedule.fill(problem.nodes(found.choice))
+    assert found.models == counting.sets
+    fewest = window_models(schedule, found.choice)
+    assert fewest <= found.models <= fewest + len(schedule.moves)
+    assert found.models <= problem.evaluation.models
+
+
+@pytest.mark.parametrize(("response", "bound"), [("F_largest", 300), ("M_sup", 12), ("T_max", 80)])
+def test_under_a_limit_that_binds_it_chooses_as_the_cascade_does(engine25, response, bound):
+    schedule, limits = three_robot_loop(engine25.network), [Limit(response, bound)]
+    found = search_windows(engine25, schedule, EQUATIONS, limits)
+    selection, _ = run(pose(engine25, schedule, EQUATIONS, limits), find_formulation("cascade"))
+    assert found.choice == selection.choice != search_windows(engine25, schedule, EQUATIONS).choice
+
+
+@given(scene=arches(min_bricks=4, max_bricks=7).map(far_reaching))
+def test_on_any_chain_it_chooses_as_the_cascade_does(scene):
+    engine = ComplianceEngine(build_network(scene))
+    schedule = three_robot_loop(engine.network)
+    problem = pose(engine, schedule, WEIGHTED)
+    found = search_windows(engine, schedule, WEIGHTED)
+    assert found.choice == run(problem, find_formulation("cascade"))[0].choice

@@ -1,0 +1,198 @@
+"""Scenes, engines and measures that several tests share."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from seqopt.network.build import build_network
+from seqopt.scene.arch import ArchShape, arch_scene
+from seqopt.scene.reach import Side
+from seqopt.scene.scene import Brick, Ground, Robot, Scene
+
+ROOT = Path(__file__).parents[1]
+HERE = np.zeros((1, 0), dtype=int)  # one set of no grips
+
+
+# scenes
+
+
+def six_bricks(pattern="VLR"):
+    """An arch of six bricks, closed at both ends."""
+    return arch_scene(ArchShape(pitch=[1.2, 0.7, 0.2, -0.3, -0.8, -1.2], pattern=pattern))
+
+
+def small_arch(count):
+    return arch_scene(ArchShape(pitch=np.linspace(1.3, -1.3, count).tolist()))
+
+
+def block(size=(0.4, 0.3, 0.1), lean=0.0, gravity=9.81, **stiffness):
+    """A brick on ground that leans by an angle about y; nobody holds it."""
+    height = size[2]
+    along, normal = (math.cos(lean), 0.0, -math.sin(lean)), (math.sin(lean), 0.0, math.cos(lean))
+    spring = {
+        "translational_stiffness": (1e9, 1e9, 1e9),
+        "rotational_stiffness": (1e7, 1e7, 1e7),
+    } | stiffness
+    return Scene(
+        name="block",
+        bricks=(
+            Brick(
+                name=1,
+                position=tuple(0.5 * height * x for x in normal),
+                length_axis=along,
+                width_axis=(0.0, 1.0, 0.0),
+                dimensions=size,
+                density=2000.0,
+                nodes=(1, 2),
+                placing_node=1,
+            ),
+        ),
+        joints=(),
+        grounds=(
+            Ground(
+                brick=1,
+                position=(0.0, 0.0, 0.0),
+                anchor=tuple(-0.05 * x for x in normal),
+                along=normal,
+                across=along,
+                **spring,
+            ),
+        ),
+        build_order=(1,),
+        robots=(Robot(name="rob1", payload=100.0),),
+        gravity=(0.0, 0.0, -gravity),
+    )
+
+
+def hinged(scene, joint):
+    """The scene with one joint without rotational stiffness."""
+    joints = list(scene.joints)
+    joints[joint] = replace(joints[joint], rotational_stiffness=(0.0, 0.0, 0.0))
+    return replace(scene, joints=tuple(joints))
+
+
+def far_reaching(scene):
+    """The scene with robots on their sides that reach across whatever the arch does."""
+    robots = tuple(
+        replace(r, reach=replace(r.reach, point=tuple(-10 * c for c in r.reach.toward)))
+        if isinstance(r.reach, Side)
+        else r
+        for r in scene.robots
+    )
+    return replace(scene, robots=robots)
+
+
+# the same scene elsewhere and in other units
+
+
+def about_vertical(angle):
+    c, s = math.cos(angle), math.sin(angle)
+    return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+
+
+def moved(scene, change):
+    """Return the scene with positions passed through a function, axes through its linear part."""
+
+    def axis(v):
+        a, o = np.array(change(np.array(v))), np.array(change(np.zeros(3)))
+        d = a - o
+        return tuple((d / np.linalg.norm(d)).tolist())
+
+    def point(v):
+        return tuple(np.array(change(np.array(v))).tolist())
+
+    def spring(s):
+        out = replace(s, position=point(s.position), along=axis(s.along), across=axis(s.across))
+        return replace(out, anchor=point(s.anchor)) if hasattr(s, "anchor") else out
+
+    return replace(
+        scene,
+        bricks=tuple(
+            replace(
+                b,
+                position=point(b.position),
+                length_axis=axis(b.length_axis),
+                width_axis=axis(b.width_axis),
+            )
+            for b in scene.bricks
+        ),
+        joints=tuple(map(spring, scene.joints)),
+        grounds=tuple(map(spring, scene.grounds)),
+    )
+
+
+def scaled(scene, length=1.0, density=1.0, stiffness=1.0):
+    """Scale lengths (rotational stiffness with their square), densities, stiffnesses, payloads."""
+    out = moved(scene, lambda p: length * p)
+
+    def spring(s):
+        return replace(
+            s,
+            translational_stiffness=tuple(stiffness * k for k in s.translational_stiffness),
+            rotational_stiffness=tuple(stiffness * length**2 * k for k in s.rotational_stiffness),
+        )
+
+    def robot(r):
+        if isinstance(r.reach, Side):
+            point = tuple(length * x for x in r.reach.point)
+            r = replace(r, reach=replace(r.reach, point=point))
+        return replace(r, payload=density * length**3 * r.payload)
+
+    return replace(
+        out,
+        bricks=tuple(
+            replace(
+                b,
+                dimensions=tuple(length * d for d in b.dimensions),
+                density=density * b.density,
+            )
+            for b in out.bricks
+        ),
+        joints=tuple(map(spring, out.joints)),
+        grounds=tuple(map(spring, out.grounds)),
+        robots=tuple(map(robot, out.robots)),
+    )
+
+
+def rescaled(scene, length, force, softness):
+    """The scene with lengths, weights and payloads, and joint flexibilities multiplied.
+
+    Forces grow with ``force``, moments with ``force * length``, and displacements with ``force *
+    softness`` where the softness of turning is that of shifting over the square of the length.
+    """
+    return scaled(scene, length, density=force / length**3, stiffness=1 / softness)
+
+
+# answers and programs
+
+
+def solve(engine_type, scene, bricks, grips, want):
+    return engine_type(build_network(scene)).solve(bricks, grips, want)
+
+
+def largest_difference(first, second, net):
+    """Over all fields, relative to the largest entry or to what a hundredth of a brick makes."""
+    weight = 0.01 * np.linalg.norm(net.weight, axis=1).mean()
+    soft = weight / net.springs.translational_stiffness.max()
+    floors = {"displacement": soft, "brick_twist": soft}
+    worst = 0.0
+    for name in first.__dataclass_fields__:
+        a, b = getattr(first, name), getattr(second, name)
+        scale = max(np.abs(b).max(initial=0.0), floors.get(name, weight))
+        worst = max(worst, np.abs(a - b).max(initial=0.0) / scale)
+    return worst
+
+
+def held(assembly, payload, *points):
+    """The assembly with its last block held at points."""
+    last = len(assembly.centroid) - 1
+    return replace(
+        assembly,
+        grip_block=np.full(len(points), last),
+        grip_position=np.array(points, float).reshape(-1, 3),
+        payload=np.full(len(points), payload),
+    )

@@ -1,0 +1,368 @@
+"""The command line as a user meets it."""
+
+from __future__ import annotations
+
+import io
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from seqopt.cli.main import main
+from seqopt.responses.table import analyze, step_fields
+from seqopt.sequence.two_robots import cantilever, sequential
+from seqopt.study.tables import printed_steps
+
+
+def run(capsys, *arguments):
+    """Exit status, standard output and standard error of one command."""
+    try:
+        status = main(list(arguments))
+    except SystemExit as stop:
+        status = int(stop.code or 0)
+    out, err = capsys.readouterr()
+    return status, out, err
+
+
+def test_compare(capsys):
+    status, out, _ = run(capsys, "compare")
+    assert status == 0
+    assert "three-robot" in out
+    assert "study" in out
+    assert "406.0" in out  # the study's F_rob2 of the sequential method
+    assert "step 47" in out
+    assert "22" in out
+
+
+def test_compare_of_another_scene_shows_no_study(capsys, tmp_path):
+    path = scene_file(capsys, tmp_path, lambda d: d.update(name="mine"))
+    status, out, _ = run(capsys, "compare", str(path))
+    assert status == 0
+    assert "mine" in out
+    assert "406.0" not in out  # the study's numbers belong to its own arch
+    assert "published" not in out
+    assert "overlap_dp" in out
+
+
+def test_compare_says_what_is_not_possible(capsys, tmp_path):
+    path = scene_file(capsys, tmp_path, lambda d: d["robots"].pop())
+    status, out, _ = run(capsys, "compare", str(path))
+    assert status == 0
+    assert "cantilever" in out
+    assert "Three-robot loop: not possible here; " in out
+    path = scene_file(capsys, tmp_path, lambda d: d.update(robots=d["robots"][:1]))
+    status, _, err = run(capsys, "compare", str(path))
+    assert (status, err.count("\n")) == (2, 1)
+    assert "needs two" in err
+
+
+def scene_file(capsys, tmp_path, change):
+    path = tmp_path / "scene.json"
+    assert run(capsys, "scene", "--export", str(path))[0] == 0
+    document = json.loads(path.read_text(encoding="utf-8"))
+    change(document)
+    path.write_text(json.dumps(document), encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize("engine", ["compliance", "frame"])
+def test_analyze_writes_the_columns_of_table_a1(capsys, tmp_path, engine, engine25):
+    path = tmp_path / "out.csv"
+    arguments = ("analyze", "--method", "sequential", "--engine", engine, "--out", str(path))
+    status, out, _ = run(capsys, *arguments)
+    assert (status, out.count("\n")) == (0, 1)
+    table = pd.read_csv(path)
+    study = printed_steps("sequential").columns[: table.shape[1]]
+    assert list(table.columns) == list(study)
+    values = analyze(engine25, sequential(engine25.network))
+    for column in ("F_rob1_N", "M_sup_Nm", "D_max_1e-3mm"):
+        close = 1e-5 * values[column].abs().max()
+        assert (table[column] - values[column]).abs().max() <= close
+
+
+def test_analyze_prints_without_out(capsys):
+    status, out, _ = run(capsys, "analyze", "--method", "three-robot")
+    assert status == 0
+    assert out.startswith("step,type,bricks,rob1_brick")
+    assert out.count("\n") == 91
+
+
+def test_full_fields_on_request(capsys, tmp_path, engine25):
+    path = tmp_path / "fields.npz"
+    assert run(capsys, "analyze", "--method", "cantilever", "--fields", str(path))[0] == 0
+    step = cantilever(engine25.network)[34]
+    want = step_fields(engine25, step)
+    with np.load(path) as archive:
+        for name in ("edge_force", "displacement", "grip_force", "support"):
+            assert (archive[f"step35_{name}"] == getattr(want, name)[0]).all()
+        assert len(archive["edge_nodes"]) == 77
+
+
+def test_a_plan_from_a_file(capsys, tmp_path):
+    plan = tmp_path / "plan.csv"
+    plan.write_text(
+        "step,type,bricks,rob1_node,rob2_node,rob3_node\n1,place,1,1,,\n2,place,2,1,2,\n",
+        encoding="utf-8",
+    )
+    status, out, _ = run(capsys, "analyze", "--method", "three-robot", "--plan", str(plan))
+    assert status == 0
+    assert out.count("\n") == 3
+
+
+def test_optimize(capsys, tmp_path):
+    folder = tmp_path / "new" / "out"
+    arguments = ("optimize", "--formulation", "overlap_dp", "--out", str(folder))
+    status, out, _ = run(capsys, *arguments)
+    assert (status, out.count("\n")) == (0, 1)
+    report = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    assert report["status"] == "optimal"
+    assert report["gap"] == pytest.approx(0)
+    assert report["models_paper_count"] == {"cascading": 2576, "overlap": 22724}
+    assert set(report["seconds"]) == {
+        "assemble",
+        "respond",
+        "rank",
+        "compile",
+        "solve",
+        "verify",
+    }
+    plan = pd.read_csv(folder / "plan.csv")
+    study = list(printed_steps("sequential").columns[:21])
+    assert list(plan.columns[:21]) == study
+    selection = pd.read_csv(folder / "selection.csv")
+    total = selection["single_cost"].sum() + selection["shared_cost"].sum()
+    assert total == pytest.approx(report["objective"], rel=1e-5)
+    assert len(pd.read_csv(folder / "responses.csv")) > 10_000
+    again = ("analyze", "--method", "three-robot", "--plan", str(folder / "plan.csv"))
+    status, out, _ = run(capsys, *again)  # what it writes can be read as a plan
+    assert (status, out.count("\n")) == (0, 91)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        (("--formulation", "simplex"), "formulation 'simplex'"),
+        (("--formulation", "beam", "--option", "depth=3"), "--option depth=3: beam has width"),
+        (("--formulation", "beam", "--option", "width=wide"), "width is 'wide'; give an int"),
+        (("--formulation", "beam", "--option", "width=0"), "width is 0"),
+        (("--formulation", "overlap_dp", "--criteria", "beauty"), "--criteria beauty"),
+        (("--formulation", "overlap_dp", "--criteria", "T_max=heavy"), "'heavy' is not a positive"),
+        (("--formulation", "overlap_dp", "--limit", "T_max"), "--limit T_max"),
+        (("--formulation", "overlap_dp", "--limit", "F_largest=9"), "relax a limit"),
+        (("--formulation", "cascade", "--no-proof", "--limit", "F_largest=9"), "no allowed grip"),
+        (("--formulation", "minimax", "--no-proof"), "--no-proof: minimax looks beyond"),
+    ],
+)
+def test_optimize_refuses_in_one_line(capsys, tmp_path, arguments, named):
+    status, _, err = run(capsys, "optimize", *arguments, "--out", str(tmp_path / "out"))
+    assert status == 2
+    assert err.count("\n") == 1
+    assert named in err
+    assert not list(tmp_path.rglob("*.*"))  # no half-written folder of results
+
+
+def test_optimize_with_words_of_ones_own(capsys, tmp_path):
+    arguments = ("--criteria", "T_max,M_sup=2,F_move", "--limit", "payload")
+    chosen = ("--formulation", "beam", "--option", "width=10", "--method", "modified-sequential")
+    status, _, err = run(capsys, "optimize", *arguments, *chosen, "--out", str(tmp_path))
+    assert (status, err) == (0, "")
+    report = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
+    assert report["criterion"] == "T_max,M_sup=2,F_move"
+    assert report["method"] == "modified-sequential"
+
+
+def test_optimize_without_proof(capsys, tmp_path):
+    chosen = ("--formulation", "rank_search", "--engine", "auto")
+    for folder, words in (("with", ()), ("without", ("--no-proof",))):
+        status, out, _ = run(capsys, "optimize", *chosen, *words, "--out", str(tmp_path / folder))
+        assert (status, out.count("\n")) == (0, 1)
+        assert ("not compared with the optimum" in out) == (folder == "without")
+    plans = [pd.read_csv(tmp_path / name / "plan.csv") for name in ("with", "without")]
+    pd.testing.assert_frame_equal(*plans)
+    report = json.loads((tmp_path / "without" / "summary.json").read_text(encoding="utf-8"))
+    assert report["status"] == "unproven"
+    assert report["gap"] is report["bound"] is report["objective"] is None
+    assert set(report["seconds"]) == {"assemble", "respond", "rank", "verify"}
+    responses = pd.read_csv(tmp_path / "without" / "responses.csv")
+    assert responses["step"].is_monotonic_increasing
+    assert report["models_evaluated"] < len(responses) < 2 * report["models_evaluated"]
+
+
+@pytest.mark.slow
+def test_compare_writes_tables_and_figures(capsys, tmp_path):
+    assert run(capsys, "compare", "--out", str(tmp_path), "--criteria", "weighted")[0] == 0
+    names = {path.name for path in tmp_path.iterdir()}
+    assert {"contest.csv", "published_ranks.csv", "steps_overlap_dp.csv"} <= names
+    for name in ("maxima.png", "responses.png", "gap_against_cost.png"):
+        assert (tmp_path / name).read_bytes().startswith(b"\x89PNG")
+    ranks = pd.read_csv(tmp_path / "published_ranks.csv")
+    assert len(ranks) == 22
+
+
+CERTIFIED = [
+    "step",
+    "type",
+    "bricks",
+    "verdict",
+    "bond_needed_Pa",
+    "friction_needed",
+    "tilt_survived_deg",
+    "largest_grip_force_N",
+    "first_brick",
+    "first_joint",
+]
+
+
+@pytest.mark.slow
+def test_certify(capsys, tmp_path):
+    out = tmp_path / "dry.csv"
+    words = ("certify", "arch25", "--method", "cantilever", "--mortar", "dry", "--out", str(out))
+    status, text, err = run(capsys, *words)
+    assert (status, err) == (0, "")
+    assert text.startswith("49 steps: 27 stand, 22 do not stand, 0 are undecided; ")
+    table = pd.read_csv(out)
+    assert table.columns[:10].tolist() == CERTIFIED
+    assert (table["unproven"] == 0).all()
+    falls = table["verdict"] == "does not stand"
+    assert (table["bond_needed_Pa"] > 0).tolist() == falls.tolist()
+    assert table["tilt_survived_deg"].isna().tolist() == falls.tolist()
+    assert table["first_joint"].notna().all()
+    hanging = table.set_index("step").loc[29]
+    assert hanging["first_joint"] == "13-14"
+
+
+def test_certify_a_plan_with_a_mortar_of_ones_own(capsys, tmp_path):
+    """The bond that a step needs is what makes it stand."""
+    plan = tmp_path / "plan.csv"
+    rows = ["step,type,bricks,rob1_node,rob2_node,rob3_node", "1,place,1,1,,", "2,place,2,1,2,"]
+    rows += ["3,release,2,1,,"]
+    plan.write_text("\n".join(rows) + "\n", encoding="utf-8")
+    for strength, verdict in (("600", "does not stand"), ("640", "stands")):
+        mortar = ("--mortar", "dry", "--tensile-strength", strength, "--cohesion", "1e4")
+        status, out, _ = run(capsys, "certify", "--plan", str(plan), *mortar)
+        assert status == 0
+        last = pd.read_csv(io.StringIO(out)).iloc[-1]
+        assert last["verdict"] == verdict
+        assert 600 < last["bond_needed_Pa"] < 640
+
+
+def test_certify_says_what_it_cannot_decide(capsys, tmp_path, monkeypatch):
+    """A solver out of time is neither 'stands' nor 'does not stand'; the table is still written."""
+    monkeypatch.setattr("formulations.solvers.SECONDS", 1e-9)
+    plan, out = tmp_path / "plan.csv", tmp_path / "out.csv"
+    plan.write_text(
+        "step,type,bricks,rob1_node,rob2_node,rob3_node\n1,place,1,1,,\n", encoding="utf-8"
+    )
+    status, text, err = run(capsys, "certify", "--plan", str(plan), "--out", str(out))
+    assert (status, err.count("\n")) == (3, 1)
+    assert "steps 1 are undecided" in err
+    assert "1 are undecided" in text
+    row = pd.read_csv(out).iloc[0]
+    assert row["verdict"] == "undecided"
+    assert row["stalled"] == 2 * row["unproven"] > 0
+    assert np.isnan(row["bond_needed_Pa"])
+
+
+def test_scene(capsys, tmp_path):
+    path = tmp_path / "copy.json"
+    status, out, _ = run(capsys, "scene", "--export", str(path))
+    assert status == 0
+    assert "77 edges" in out
+    again = tmp_path / "again.json"
+    run(capsys, "scene", str(path), "--export", str(again))
+    assert again.read_bytes() == path.read_bytes()
+
+
+@pytest.mark.parametrize("command", [(), ("compare",), ("analyze",), ("certify",), ("scene",)])
+def test_help_teaches(capsys, command):
+    status, out, _ = run(capsys, *command, "--help")
+    assert status == 0
+    assert len(out.splitlines()) > 8
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        ((), "COMMAND"),
+        (("optimise",), "'optimise'"),
+        (("analyze",), "--method"),
+        (("analyze", "--method", "seq"), "'seq' (choose from 'sequential', 'cantilever'"),
+        (("analyze", "--method", "sequential", "--engine", "fem"), "'fem'"),
+        (("analyze", "arch52", "--method", "sequential"), "scene arch52"),
+        (("analyze", "no/such.json", "--method", "sequential"), "no/such.json"),
+        (("analyze", "--method", "three-robot", "--plan", "no.csv"), "no.csv"),
+        (("analyze", "--method", "sequential", "--plan", "no.csv"), "--plan no.csv"),
+        (("analyze", "--method", "sequential", "--out", "no/dir/x.csv"), "no/dir/x.csv"),
+        (("scene", "--export", "no/dir/x.json"), "no/dir/x.json"),
+        (("certify",), "--method --plan is required"),
+        (("certify", "--method", "sequential", "--plan", "x.csv"), "not allowed with"),
+        (("certify", "--method", "sequential", "--mortar", "glue"), "'glue' (choose from 'epoxy'"),
+        (("certify", "--method", "sequential", "--friction", "-1"), "--friction: '-1' is not"),
+        (("certify", "--plan", "no.csv"), "no.csv"),
+    ],
+)
+def test_bad_arguments_get_one_line(capsys, arguments, named):
+    status, out, err = run(capsys, *arguments)
+    assert status == 2
+    assert err.count("\n") == 1
+    assert named in err
+    assert "Traceback" not in out + err
+
+
+@pytest.mark.parametrize(
+    ("change", "named"),
+    [
+        (lambda d: d["bricks"][4].update(density="heavy"), "bricks[4].density"),
+        (lambda d: d["joints"].pop(3), "nothing resists"),
+        (lambda d: d["robots"].pop(), "--plan FILE"),
+    ],
+)
+def test_bad_scenes_get_one_line(capsys, tmp_path, change, named):
+    path = scene_file(capsys, tmp_path, change)
+    target = tmp_path / "out.csv"
+    status, _, err = run(
+        capsys, "analyze", str(path), "--method", "three-robot", "--out", str(target)
+    )
+    status2, _, err2 = run(
+        capsys, "analyze", str(path), "--method", "sequential", "--out", str(target)
+    )
+    assert 2 in (status, status2)
+    assert named in err + err2
+    assert all(text.count("\n") <= 1 for text in (err, err2))
+    assert not target.exists() or status2 == 0
+
+
+def test_it_runs_as_a_program():
+    done = subprocess.run(
+        [sys.executable, "-m", "seqopt", "scene"], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.startswith("arch25: 25 bricks")
+    assert done.stderr == ""
+
+
+def test_a_closed_pipe_is_no_error():
+    done = subprocess.run(
+        f"{sys.executable} -m seqopt analyze --method three-robot | head -1",
+        shell=True,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stderr == ""
+
+
+@pytest.mark.slow
+def test_the_command_line_says_why(capsys):
+    assert main(["analyze", "--method", "sequential", "--engine", "auto"]) == 0
+    said = capsys.readouterr().err
+    assert "engine: compliance for 49 grip sets: brick 11: its centroid lies 65.2 mm" in said
+    dry = ["analyze", "--method", "sequential", "--engine", "auto", "--mortar", "dry"]
+    assert main(dry) == 2
+    assert "step 9: 5 bricks: joints part or slip and brick" in capsys.readouterr().err
+    assert main(["analyze", "--method", "sequential", "--engine", "planar"]) == 2
+    assert "use the compliance engine" in capsys.readouterr().err
+    assert main(["analyze", "--method", "sequential", "--mortar", "dry"]) == 2
+    assert "engine compliance: its joints hold anything" in capsys.readouterr().err

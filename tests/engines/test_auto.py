@@ -1,0 +1,46 @@
+"""The cheapest level that is enough is taken, and counted."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from seqopt.contact.elastic_limits import find_elastic_limits
+from seqopt.contact.mortar import EPOXY, Mortar
+from seqopt.engines.auto import BEYOND, IN_PLANE, AutoEngine, Level
+from seqopt.engines.interface import Want
+from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.network.build import build_network
+from seqopt.scene.arch import ArchShape, arch_scene
+from seqopt.scene.scene_file import load_scene
+from tests.builders import largest_difference
+
+
+def test_the_cheapest_level_is_taken_and_counted():
+    net = build_network(
+        arch_scene(ArchShape(pitch=[1.2, 0.8, 0.4, 0.0], pattern="VVLV", overhang=0.0))
+    )
+    engine = AutoEngine(net)
+    sets = np.array([[7], [4], [1]])  # node 4 sticks out
+    found = engine.solve(4, sets, Want.EDGES)
+    assert found.joint_wrench.shape == (3, 0, 6)
+    exact = ComplianceEngine(net).solve(4, sets, Want.EDGES)
+    assert largest_difference(found, exact, net) <= 1e-9
+    (flat, two), (space, one) = engine.tally.items()
+    assert (flat, two, space.level, one) == (IN_PLANE, 2, Level.RIGID, 1)
+
+
+@pytest.mark.parametrize("share", [0.999, 1.001])
+def test_contact_is_modeled_where_a_joint_would_leave_its_limits(share):
+    net = build_network(load_scene("arch25"))
+    weak = Mortar(friction=EPOXY.friction, tensile_strength=0.0, cohesion=1e9)
+    wrench = ComplianceEngine(net).solve(6, [[11]], Want.JOINTS).joint_wrench
+    tension = float(find_elastic_limits(net, weak).excess(wrench).max())
+    assert tension > 0
+    engine = AutoEngine(net, replace(weak, tensile_strength=share * tension))
+    engine.solve(6, [[11]])
+    (choice,) = engine.tally
+    assert choice.level is (Level.DISCRETE if share < 1 else Level.RIGID)
+    assert (choice == BEYOND) == (share < 1)

@@ -1,0 +1,189 @@
+"""What a diagnosis says of sound, ill-conditioned and loose structures, and of spoiled fields."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from experiments.limit_scenes import HELD, LOOSE_AT, chain, loosened, without_joint
+from experiments.reference_chain import solve_exactly
+from experiments.walls import running_bond
+from seqopt.engines.diagnosis import FLOOR, UNRESISTED, WELL, Finding, diagnose, residual, spectrum
+from seqopt.engines.frame import FrameEngine
+from seqopt.engines.interface import Want, grip_columns
+from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.engines.rigid.dense import solve_dense
+from seqopt.engines.rigid.mixed import mixed_system, ungripped
+from seqopt.network.build import build_network
+
+
+def places(net, bricks, grips):
+    return grip_columns(net, bricks, np.array(grips, dtype=int).reshape(1, -1))[0]
+
+
+class Spoiled:
+    """An engine whose answers are another engine's after a change."""
+
+    def __init__(self, engine, change):
+        self.engine, self.change, self.network = engine, change, engine.network
+
+    def solve(self, bricks, grips, want):
+        return self.change(self.engine.solve(bricks, grips, want))
+
+
+@pytest.mark.parametrize("grips", [(), (40,), (20, 48, 33)])
+def test_the_published_arch_is_solved_well(engine25, grips):
+    for source in (engine25, engine25.network):
+        told = diagnose(source, 25, grips)
+        assert told.finding is Finding.SOLVED_WELL
+        assert told.backward_error <= WELL
+        assert told.smallest_eigenvalue > 1e-6
+        assert np.abs(told.mode).max() == 1
+
+
+def test_a_partial_structure(engine25):
+    told = diagnose(engine25, 7, [9])
+    assert told.finding is Finding.SOLVED_WELL
+    assert told.mode.shape == (7, 6)
+
+
+@pytest.mark.parametrize("name", ["brick_twist", "joint_wrench", "grip_force"])
+@pytest.mark.parametrize("share", [1e-6, 1e-3])
+def test_spoiled_fields_are_seen(engine25, name, share):
+    """Negative control: one entry of one field off by a share of the largest."""
+
+    def change(fields):
+        values = getattr(fields, name).copy()
+        values.reshape(-1)[np.abs(values).argmax()] *= 1 + share
+        return replace(fields, **{name: values})
+
+    told = diagnose(Spoiled(engine25, change), 17, [20, 33])
+    assert told.finding is Finding.ILL_CONDITIONED
+    assert share / 100 < told.backward_error < 3 * share
+    assert "another problem" in told.reason
+
+
+def test_the_smallest_eigenvalue_is_that_of_the_dense_matrix():
+    net = build_network(running_bond(3, 3))
+    grips = places(net, 9, [13, 18])
+    parts = ungripped(net, 9)
+    system = mixed_system(parts, grips)
+    dense = parts.deformation.toarray()
+    matrix = dense.T * parts.stiffness @ dense
+    scale = np.sqrt(np.maximum(matrix.diagonal(), FLOOR * matrix.diagonal().max()))
+    null = np.linalg.svd(system.held.toarray() / scale)[2][6:].T
+    values, vectors = np.linalg.eigh(null.T @ (matrix / scale / scale[:, None]) @ null)
+    lowest, condition, mode = spectrum(net, 9, grips)
+    assert lowest == pytest.approx(values[0], rel=1e-6)
+    assert condition >= 0.99 * values[-1] / values[0]
+    want = null @ vectors[:, 0] / scale
+    want = want / want[np.abs(want).argmax()]
+    assert mode.ravel() == pytest.approx(want, abs=1e-4)
+    assert system.held @ mode.ravel() == pytest.approx(0, abs=1e-9)
+
+
+@pytest.mark.parametrize("grips", [(), (49,), (40, 49), (48, 49)])
+def test_a_missing_joint_is_a_mechanism_beyond_it(grips):
+    net = without_joint(chain(25))
+    for engine in (ComplianceEngine(net), FrameEngine(net)):
+        told = diagnose(engine, 25, grips)
+        assert told.finding is Finding.MECHANISM
+        assert told.residuals is None
+        assert told.backward_error == np.inf
+        assert np.abs(told.mode[: LOOSE_AT + 1]).max() < 1e-6
+        assert np.abs(told.mode[LOOSE_AT + 1 :]).max() == 1
+    assert told.smallest_eigenvalue < UNRESISTED
+
+
+def test_three_grips_hold_what_is_cut_off():
+    """Negative control: the same structure, held."""
+    assert (
+        diagnose(ComplianceEngine(without_joint(chain(25))), 25, HELD).finding
+        is Finding.SOLVED_WELL
+    )
+
+
+@pytest.mark.parametrize("only_turning", [True, False])
+def test_a_joint_without_stiffness_is_a_mechanism(only_turning):
+    net = build_network(loosened(chain(25), 0.0, only_turning=only_turning))
+    told = diagnose(ComplianceEngine(net), 25, [])
+    assert told.finding is Finding.MECHANISM
+    moving = np.abs(told.mode).max(axis=1)
+    assert moving[: LOOSE_AT + 1].max() < 1e-6
+    assert moving[-1] > 1e-3
+
+
+@pytest.mark.parametrize("power", [3, 6, 9])
+def test_the_smallest_eigenvalue_follows_a_loose_joint(power):
+    """Down to what double precision loses in the stiffness matrix itself."""
+    nothing = np.zeros(0, dtype=int)
+    base, less = (
+        spectrum(build_network(loosened(chain(25), 10.0**-p, only_turning=True)), 25, nothing)[0]
+        for p in (power, power + 3)
+    )
+    assert less == pytest.approx(1e-3 * base, rel=0.3)
+
+
+def test_nearly_loose_is_solved_or_refused_never_wrong():
+    seen = set()
+    for power in range(0, 18, 3):
+        for grips in ([], [49], [30, 49], HELD):
+            net = build_network(loosened(chain(25), 10.0**-power, only_turning=False))
+            told = diagnose(ComplianceEngine(net), 25, grips)
+            seen.add(told.finding)
+            if told.residuals is not None:
+                fields = ComplianceEngine(net).solve(25, [grips], Want.DISPLACEMENTS)
+                exact = solve_exactly(net, 25, places(net, 25, grips)).displacement
+                got = fields.displacement[0, net.inner.ravel()]
+                assert np.abs(got - exact).max() <= 1e-9 * np.abs(exact).max()
+            elif told.finding is Finding.ILL_CONDITIONED:
+                assert told.condition > 1e10
+                assert "refused" in told.reason
+    assert seen == set(Finding)
+
+
+@pytest.mark.slow
+def test_a_long_chain_is_solved_well_though_the_plain_residual_says_no():
+    told = diagnose(build_network(chain(1500)), 1500, [])
+    assert told.finding is Finding.SOLVED_WELL
+    assert told.backward_error < 1e-14
+    assert told.residuals.plain > 1e-5  # by this measure, hopeless
+    assert told.condition > 1e12
+    assert np.abs(told.mode).max(axis=1).argmax() == 1499
+    engine = ComplianceEngine(build_network(chain(338)))
+    assert diagnose(engine, 338, [675]).finding is Finding.SOLVED_WELL
+
+
+@pytest.mark.parametrize("contrast", [1e2, 1e4, 1e12])
+def test_a_frame_at_a_bad_contrast_is_seen(contrast):
+    told = diagnose(FrameEngine(build_network(chain(2)), contrast), 2, [3])
+    assert told.finding is Finding.ILL_CONDITIONED
+    assert told.backward_error > 1e-5
+    assert told.condition < 1e3  # it is the frame, not the structure
+
+
+def test_a_frame_at_its_best_is_told_from_rigid_bricks():
+    told = diagnose(FrameEngine(build_network(chain(10))), 10, [19])
+    assert WELL < told.backward_error < 1e-6
+
+
+def test_a_direct_solve_of_a_long_chain_is_not_solved_well():
+    net = build_network(chain(120))
+    columns = places(net, 120, [])
+    direct = residual(net, 120, columns, solve_dense(net, 120, columns[None]))
+    fast = residual(net, 120, columns, ComplianceEngine(net).solve(120, [[]], Want.ALL))
+    assert direct.backward_error > 1e3 * fast.backward_error
+
+
+def test_a_large_wall():
+    net = build_network(running_bond(20, 20))
+    told = diagnose(net, 400, [net.scene.placed[-1].nodes[0]])
+    assert told.finding is Finding.SOLVED_WELL
+    assert told.smallest_eigenvalue > 1e-6
+
+
+def test_errors_of_grips_are_not_swallowed(engine25):
+    with pytest.raises(ValueError, match="free nodes"):
+        diagnose(engine25, 3, [40])

@@ -1,0 +1,148 @@
+"""Exactly rigid bricks where joints are loose, chains long and systems small or not positive."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from experiments.limit_scenes import HELD, LOOSE_AT, chain, loosened
+from experiments.reference_chain import solve_exactly
+from seqopt.engines.interface import Want, grip_columns
+from seqopt.engines.rigid import compliance
+from seqopt.engines.rigid.compliance import ComplianceEngine, solve_batch
+from seqopt.engines.rigid.ldlt import solve_positive
+from seqopt.engines.rigid.operator import OperatorBuilder
+from seqopt.engines.rigid.spanning_tree import grow_tree
+from seqopt.errors import MechanismError, SolverError
+from seqopt.network.build import build_network
+from tests.builders import hinged, six_bricks
+
+
+def error(net, fields, row, grips):
+    """The largest relative error of displacements, joint forces and joint moments."""
+    bricks = len(net.inner)
+    columns = grip_columns(net, bricks, np.array([grips], dtype=int))[0]
+    exact = solve_exactly(net, bricks, columns)
+    wrench = fields.joint_wrench[row]
+    pairs = (
+        (fields.displacement[row, net.inner.ravel()], exact.displacement),
+        (wrench[:, :3], exact.joint_wrench[:, :3]),
+        (wrench[:, 3:], exact.joint_wrench[:, 3:]),
+    )
+    return max(np.abs(got - want).max() / np.abs(want).max() for got, want in pairs)
+
+
+@pytest.mark.parametrize("only_turning", [True, False])
+@pytest.mark.parametrize("factor", [1e-3, 1e-6, 1e-9, 1e-12, 1e-15])
+def test_grips_beyond_a_loose_joint(factor, only_turning):
+    """The force method alone loses every digit here and says nothing: the second assertion."""
+    net = build_network(loosened(chain(25), factor, only_turning=only_turning))
+    sets = [HELD, (30, 37, 49), (3, 8, 10)]
+    fields = ComplianceEngine(net).solve(25, sets, Want.ALL)
+    for row, grips in enumerate(sets):
+        assert error(net, fields, row, grips) <= 1e-9
+    operator = OperatorBuilder(net, grow_tree(net)).operator(25)
+    columns = grip_columns(net, 25, np.array(sets))
+    _, trusted = solve_batch(operator, columns)
+    assert trusted.tolist() == [factor > 1e-5, factor > 1e-5, True]
+
+
+@pytest.mark.parametrize("count", [1, 2, 6, 9])
+def test_many_small_systems(count):
+    rng = np.random.default_rng(count)
+    root = rng.standard_normal((7, count, count))
+    matrix, load = root @ root.transpose(0, 2, 1), rng.standard_normal((7, count))
+    system = np.concatenate([np.tril(matrix), load[:, None]], axis=1).transpose(1, 2, 0).copy()
+    answer, pivot = solve_positive(system)
+    expected = np.linalg.solve(matrix, load[..., None])[..., 0]
+    assert np.abs(answer.T - expected).max() <= 1e-9 * np.abs(expected).max()
+    diagonals = np.linalg.cholesky(matrix).diagonal(axis1=1, axis2=2) ** 2
+    scaled = diagonals / matrix.diagonal(axis1=1, axis2=2)
+    assert pivot == pytest.approx(scaled.min(axis=1), rel=1e-6)
+
+
+@pytest.mark.parametrize("last", [-1.0, 0.0, 0.5, 1.0, 1.0 + 1e-9])
+def test_a_system_that_is_not_positive_is_seen(last):
+    """Beside a sound one, whose answer stays."""
+    system = np.empty((4, 3, 2))
+    system[:3, :, 0] = [[2, 0, 0], [1, 1, 0], [1, 1, last]]  # positive definite beyond 1
+    system[:3, :, 1] = 2 * np.eye(3)
+    system[3] = 1.0
+    answer, pivot = solve_positive(system)
+    assert not pivot[0] >= 1e-8  # also where it is no number
+    assert pivot[1] == 1
+    assert answer[:, 1].tolist() == [0.5, 0.5, 0.5]
+
+
+def test_a_batch_of_many_passes(monkeypatch):
+    net = build_network(chain(8))
+    sets = [(1, 9, 14), (14, 15, 3), (4, 5, 2), (12, 10, 7), (8, 9, 15)]
+    whole = ComplianceEngine(net).solve(8, sets, Want.ALL)
+    monkeypatch.setattr(compliance, "CHUNK", 2)
+    parts = ComplianceEngine(net).solve(8, sets, Want.ALL)
+    for name in ("edge_force", "displacement", "grip_force", "support"):
+        gap = np.abs(getattr(parts, name) - getattr(whole, name)).max()
+        assert gap <= 1e-12 * np.abs(getattr(whole, name)).max()
+
+
+def test_loads_in_two_directions():
+    """Held and loaded in its plane, a plane arch knows no third direction."""
+    net = build_network(six_bricks("V"))
+    assert not np.ptp(net.node_position[:, 1])
+    space = OperatorBuilder(net, grow_tree(net)).operator(6)
+    kept = np.flatnonzero(np.arange(36) % 3 != 1)
+    rows = ("edge_force", "displacement", "support", "joint_wrench", "brick_twist")
+    plane = replace(
+        space,
+        flexibility=space.flexibility[np.ix_(kept, kept)],
+        dead_displacement=space.dead_displacement[kept],
+        axis=space.axis[:, [0, 2]],
+        **{name: getattr(space, name)[[*kept, 36]] for name in rows},
+    )
+    columns = np.array([(0, 7, 11), (6, 7, 2), (3, 9, 8), (4, 1, 10)])
+    (more, sound), (less, trusted) = (solve_batch(o, columns, Want.ALL) for o in (space, plane))
+    assert sound.all()
+    assert trusted.all()
+    for name in rows[:3]:
+        gap = np.abs(getattr(less, name) - getattr(more, name)).max()
+        assert gap <= 1e-12 * np.abs(getattr(more, name)).max()
+
+
+def test_what_is_solved_again_fits_what_was_asked():
+    net = build_network(loosened(chain(25), 1e-9, only_turning=True))
+    engine = ComplianceEngine(net)
+    whole = engine.solve(25, [HELD, (3, 8, 10), (48, 49, 30)], Want.ALL)
+    part = engine.solve(25, [HELD, (3, 8, 10), (48, 49, 30)], Want.SUPPORT)
+    assert (part.support == whole.support).all()
+    assert (part.grip_force == whole.grip_force).all()
+    assert part.edge_force.shape == (3, 0)
+    held = whole.displacement[2, [net.place_of_node[n] for n in (48, 49, 30)]]
+    assert np.abs(held).max() < 1e-12 * np.abs(whole.displacement[2]).max()
+    inner = np.flatnonzero((net.edge_brick == 24) & (net.edge_spring < 0))
+    assert whole.edge_force[2, inner] == 0  # nothing between two grips on one brick
+
+
+def test_grips_close_together_on_a_long_chain():
+    net = build_network(chain(150))
+    sets = [(296, 297, 299), (297, 298, 299), (297, 299, 295)]
+    fields = ComplianceEngine(net).solve(150, sets, Want.ALL)
+    for row, grips in enumerate(sets):
+        assert error(net, fields, row, grips) <= 1e-12
+
+
+def test_a_hundred_bricks_with_a_hinge():
+    """A spring without stiffness leaves no operator."""
+    net = build_network(hinged(chain(100), 50))
+    fields = ComplianceEngine(net).solve(100, [(150, 199)], Want.ALL)
+    assert error(net, fields, 0, (150, 199)) <= 1e-12
+
+
+def test_what_double_precision_cannot_tell_from_a_mechanism_is_refused():
+    net = build_network(loosened(chain(25), 1e-13, only_turning=False))
+    with pytest.raises((MechanismError, SolverError)) as caught:
+        ComplianceEngine(net).solve(25, [[30, 49]])
+    if isinstance(caught.value, MechanismError):
+        moving = np.array([np.abs(row).max() for _, row in caught.value.mode])
+        assert moving[: LOOSE_AT + 1].max() < 1e-6

@@ -1,0 +1,137 @@
+"""Counterparts of the study's figures and tables: none is missing, the page says what is stored."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from experiments.counterpart_models import ours
+from experiments.counterpart_page import AGREES, DISAGREES, PARTLY, TITLES, page, verdict
+from experiments.counterpart_rows import COUNTERPARTS, cell, tabulate
+from experiments.paper_counterparts import KNOWN, faults
+from experiments.paper_items import ITEMS
+from tests.builders import ROOT
+
+STORED = pd.read_csv(ROOT / "experiments" / "results" / "paper_counterparts.csv")
+PAGE = (ROOT / "docs" / "counterparts.md").read_text(encoding="utf-8")
+WITH_NUMBERS = [item for item in ITEMS if item.has_numbers]
+DEEP = {"table:validation_results"}  # takes longer than a second
+
+
+def agreement(label, text):
+    """Return what the page's table says about an item."""
+    (row,) = [line for line in text.splitlines() if line.startswith("|") and f"`{label}`" in line]
+    return row.rsplit("|", 2)[1].strip()
+
+
+def wrong_numbers(text, table):
+    """Return the labels of the items whose numbers on the page are not those of the table."""
+    out = []
+    for item in WITH_NUMBERS:
+        said, rows = agreement(item.label, text), table[table["id"] == item.label]
+        near, total = (int(n) for n in re.search(r"(\d+) of (\d+) ", said).groups())
+        right = total == len(rows) and near == (rows["error_pct"] <= 5).sum()
+        if median := re.search(r"median error ([\d.]+) %", said):
+            right &= float(median[1]) == float(f"{rows['error_pct'].median():.2g}")
+        pairs = re.findall(r"; ([^;]+): printed (\S+), here (\S+?)[.;]?(?= |$)", said)
+        right &= bool(pairs) or rows["error_pct"].max() == 0
+        for name, *numbers in pairs:
+            named = rows["quantity"] + ", " + rows["at"] == name.removeprefix("worst ")
+            wanted = rows.loc[named, ["printed", "ours"]].to_numpy()[0]
+            right &= [float(n) for n in numbers] == [float(f"{value:.4g}") for value in wanted]
+        if not right:
+            out.append(item.label)
+    return out
+
+
+def test_every_figure_and_table_is_listed_once():
+    """The source has 13 figures and 12 tables, and refers to one more in Appendix B."""
+    labels = [label for item in ITEMS for label in (item.label, *item.parts)]
+    assert len(labels) == len(set(labels)) == 33
+    assert sum(item.label.startswith("fig:") for item in ITEMS) == 13
+    assert [i.number for i in ITEMS if i.label.startswith("fig:")] == [
+        f"Figure {n}" for n in range(1, 14)
+    ]
+    assert [i.number for i in ITEMS if i.label.startswith("table:")] == [
+        *(f"Table {n}" for n in range(1, 11)), "Table A.1", "Table A.2", "Table B.1",
+    ]  # fmt: skip
+    assert all(item.why for item in ITEMS if not item.has_numbers)
+
+
+def test_whatever_has_numbers_has_a_counterpart():
+    labels = {item.label for item in WITH_NUMBERS}
+    assert labels == set(COUNTERPARTS) == set(STORED["id"])
+    assert {item.picture for item in WITH_NUMBERS} == set(TITLES)
+    assert STORED[["printed", "ours", "difference", "error_pct"]].notna().all(axis=None)
+    for item in ITEMS:
+        assert f"`{item.label}`" in PAGE
+        assert agreement(item.label, PAGE) != "" or not item.has_numbers
+    for item in WITH_NUMBERS:
+        assert f"](figures/counterpart_{item.picture}.png)" in PAGE
+        assert (ROOT / "docs" / "figures" / f"counterpart_{item.picture}.png").exists()
+
+
+def test_an_item_without_counterpart_is_found():
+    missing = WITH_NUMBERS[3].label
+    assert faults(WITH_NUMBERS, STORED) == []
+    assert faults(WITH_NUMBERS, STORED[STORED["id"] != missing]) == [
+        f"{missing} has no counterpart"
+    ]
+
+
+def test_a_fourth_disagreement_fails_the_claim_and_so_does_one_less():
+    item = next(item for item in WITH_NUMBERS if item.label == "table:2robot_forces")
+    bad = STORED.assign(error_pct=STORED["error_pct"].where(STORED["id"] != item.label, 50.0))
+    assert len(faults(WITH_NUMBERS, bad)) == 1
+    good = STORED.assign(error_pct=STORED["error_pct"].where(~STORED["id"].isin(KNOWN), 0.0))
+    assert len(faults(WITH_NUMBERS, good)) == len(KNOWN)
+
+
+@pytest.mark.parametrize(
+    ("errors", "word"), [([0, 5], AGREES), ([0, 5.1], PARTLY), ([0, 6, 7], DISAGREES)]
+)
+def test_words_of_agreement(errors, word):
+    assert verdict(pd.DataFrame({"error_pct": errors})) == word
+
+
+def test_the_page_is_what_is_stored():
+    assert page(STORED) == PAGE
+    assert wrong_numbers(PAGE, STORED) == []
+
+
+@pytest.mark.parametrize("column", ["printed", "ours", "error_pct"])
+def test_a_wrong_number_on_the_page_is_found(column):
+    """Negative control: any column a tenth off is seen, and so is a figure changed in the text."""
+    off = STORED.assign(**{column: 1.1 * STORED[column]})
+    assert len(wrong_numbers(PAGE, off)) > 10
+    assert wrong_numbers(PAGE.replace("here 1909", "here 1919"), STORED) == ["fig:arch_vault"]
+
+
+def test_differences_and_errors_follow_from_the_values():
+    gap = STORED["ours"] - STORED["printed"]
+    assert np.abs(gap - STORED["difference"]).max() <= 5e-3
+    size = STORED["printed"].abs().clip(lower=1)
+    assert (STORED["error_pct"] <= 100 * (gap.abs() + 1e-3) / size).all()
+
+
+@pytest.mark.parametrize("label", sorted(set(COUNTERPARTS) - DEEP))
+def test_stored_values_are_computed_anew(own, label):
+    now, then = tabulate(label, own), STORED[STORED["id"] == label]
+    assert now["quantity"].tolist() == then["quantity"].tolist()
+    assert now["at"].tolist() == then["at"].tolist()
+    assert now["ours"].to_numpy(float) == pytest.approx(then["ours"].to_numpy(), rel=1e-3, abs=1e-3)
+
+
+@pytest.fixture(scope="module")
+def own():
+    return ours()
+
+
+@pytest.mark.parametrize(
+    ("grip", "number"), [(None, -1), (7, 7), ("O3", 1003), (float("nan"), -1), ("8", 8)]
+)
+def test_grips_are_numbers(grip, number):
+    assert cell(grip) == number

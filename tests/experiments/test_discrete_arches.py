@@ -1,0 +1,134 @@
+"""Pads and springs of the discrete arches: readings, errors, stored rows of the witness."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from experiments import discrete_arches
+from experiments.arch_pads import AtCorners, pads_at_corners
+from experiments.arches_lmgc90 import error, moved
+from experiments.discrete_arches import (
+    CORNERS,
+    STEPS,
+    Reading,
+    best_sides,
+    largest_fall,
+    missing,
+    readings,
+    row_of,
+    stresses,
+    within_limits,
+    witness_rows,
+)
+from experiments.plotting import RESULTS
+from seqopt.engines.discrete.system import Across, Pinch, pads
+from seqopt.sequence.two_robots import sequential
+from seqopt.study.tables import printed
+
+
+@pytest.fixture(scope="module")
+def step(engine25):
+    return sequential(engine25.network)[STEPS[17] - 1]
+
+
+@pytest.mark.parametrize("across", list(Across))
+def test_even_pads_can_stand_for_pads_at_corners(engine25, across):
+    """They hold as stiffly against motion, and three times so against turning about themselves."""
+    pinch, brick = Pinch(across, side=0.02), engine25.network.scene.placed[16]
+    center, axis = np.array(brick.position), np.array(brick.width_axis)
+    if across == Across.THICKNESS:
+        axis = np.cross(brick.length_axis, axis)
+    even, corners = (pads(engine25.network, 16, center, p) for p in (pinch, pads_at_corners(pinch)))
+    np.testing.assert_allclose(corners[:3, :3], even[:3, :3], atol=1e-6)
+    turning = 2 * pinch.stiffness.tangential * pinch.side**4 / 6
+    assert axis @ even[3:, 3:] @ axis == pytest.approx(turning)
+    assert axis @ corners[3:, 3:] @ axis == pytest.approx(3 * turning)
+
+
+def test_the_pads_of_all_readings_are_named_and_found_again(engine25):
+    names = {(r.grip, 1e3 * r.pinch.side if r.pinch else 0.0, r.joint) for r in readings()}
+    assert len(names) == len(readings()) == 28
+    for name in names:
+        reading = Reading.of(*name)
+        assert (reading.grip, reading.joint) == (name[0], name[2])
+        assert isinstance(reading.engine(engine25.network), AtCorners) == (name[2] == CORNERS)
+
+
+def test_softer_joints_move_more_and_a_node_lets_the_brick_turn(engine25, step):
+    pinch = Pinch(Across.WIDTH, side=0.02)
+    whole, half, node = (
+        moved(reading.engine(engine25.network), step).max()
+        for reading in (Reading(pinch=pinch), Reading("halves in series", pinch), Reading())
+    )
+    assert node > half > whole
+
+
+def test_nothing_breaks_or_slips_and_a_bond_too_weak_would_tell(engine25, step):
+    tension, shear = stresses(Reading().engine(engine25.network), step)
+    assert 0 < tension < 3e6
+    assert 0 < shear < 1
+    table = pd.DataFrame([row_of(engine25, step, Reading())])
+    assert table["shear_used"][0] == shear
+    assert within_limits(table)
+    assert not within_limits(table.assign(shear_used=-0.1))  # tension beyond all shear
+    assert not within_limits(table.assign(tension_MPa=3.1))
+
+
+def test_errors_are_those_of_the_first_model():
+    assert error(np.array([2.0, 1.0]), np.array([1.0, 2.0])) == pytest.approx(25.0)
+
+
+def test_the_best_pads_are_the_least_far_from_print():
+    study = pd.Series({17: 20.0, 23: -10.0})
+    rows = [("pads, width", 10.0, "a", 20.0, 0.0), ("pads, width", 12.0, "a", 19.0, -5.0),
+            ("pads, width", 14.0, "b", 20.0, -9.0)]  # fmt: skip
+    table = pd.DataFrame(rows, columns=["grip", "side_mm", "joint", 17, 23])
+    best = best_sides(table.set_index(["grip", "side_mm", "joint"]), study)
+    assert list(best.index.get_level_values("side_mm")) == [14.0, 12.0]
+
+
+def test_the_largest_fall_is_between_the_arches_where_print_falls():
+    rows = [("pads, width", 10.0, "a", 9.0, 2.0), ("pads, width", 12.0, "b", 1.0, 8.0)]
+    table = pd.DataFrame(rows, columns=["grip", "side_mm", "joint", 17, 23])
+    text = largest_fall(table.set_index(["grip", "side_mm", "joint"]), pd.Series({17: 20, 23: -10}))
+    assert text.startswith("from 17 to 23 bricks print falls by 30.0 points, of 2 readings none by")
+    assert text.endswith("more than 7.0: pads, width, 10 mm, a")
+
+
+def test_stored_rows_are_called_stored_and_missing_ones_are_named(
+    monkeypatch, tmp_path, engine25, step
+):
+    monkeypatch.setattr(discrete_arches, "RESULTS", tmp_path)
+    empty, source = witness_rows(engine25, [step], None)
+    assert (len(empty), source) == (0, "no rows are stored")
+    assert len(missing(empty, [step])) == 4
+    row = {"bricks": 17, "pads": "width", "spread": "even"}
+    monkeypatch.setattr(discrete_arches, "witness", lambda *_: pd.DataFrame([row]))
+    assert witness_rows(engine25, [step], "some python")[1] == "asked now"
+    table, source = witness_rows(engine25, [step], None)
+    assert source.startswith("stored rows")
+    assert missing(table, [step]) == [
+        "17 bricks, pads width, corners",
+        "17 bricks, pads thickness, corners",
+        "17 bricks, pads thickness, even",
+    ]
+
+
+def test_the_stored_witness_rows_stand_beside_the_engine_as_it_is(engine25, step):
+    """Rows of LMGC90 that were stored with another engine would show here."""
+    rows = pd.read_csv(RESULTS / "arches_lmgc90.csv")
+    for row in rows[rows["bricks"] == 17].itertuples():
+        joint = CORNERS if row.spread == "corners" else "as printed"
+        reading = Reading(joint, Pinch(Across[row.pads.upper()], side=1e-3 * row.side_mm))
+        assert row_of(engine25, step, reading)["error_pct"] == pytest.approx(
+            row.engine_error_pct, rel=1e-3
+        )
+
+
+def test_the_study_compares_as_many_nodes(engine25):
+    study = printed("de_validation").set_index("bricks")["nodes"]
+    for bricks, number in STEPS.items():
+        step = sequential(engine25.network)[number - 1]
+        assert len(moved(engine25, step)) == study[bricks]

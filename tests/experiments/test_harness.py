@@ -1,0 +1,230 @@
+"""The comparison harness: what it stores, what it charges, and the profiles it draws."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import threading
+import time
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from experiments.__main__ import TOGETHER, claims, main, run, run_all, takes_time
+from experiments.profiles import data_profile, pareto, performance_profile, shifted_mean
+from experiments.runs import ENGINES, NO_PROOF, REFERENCE, rows
+from experiments.speed_accuracy import KEY, collect, holds, measure, specs, summarize
+from experiments.speed_charts import headline, profile_charts
+from seqopt.placement.formulation import formulations
+from seqopt.study.presets import CRITERIA
+from tests.builders import ROOT
+
+STAGES = ["assemble", "respond", "rank", "compile", "solve", "verify"]
+
+
+@pytest.fixture(scope="module")
+def smoke():
+    """Every engine with every formulation and criterion on the smallest arch."""
+    table = pd.concat(
+        [pd.DataFrame(rows("chain7", engine, c, repeats=1)) for engine in ENGINES for c in CRITERIA]
+    )
+    return table.reset_index(drop=True)
+
+
+@pytest.mark.slow
+@pytest.mark.xdist_group("smoke")
+def test_everything_runs_and_is_a_row(smoke):
+    assert len(smoke) == len(ENGINES) * len(CRITERIA) * (len(formulations()) + 1)
+    assert smoke[[*STAGES, "gap", "error", "objective", "models"]].notna().all(axis=None)
+    assert smoke["total"].to_numpy() == pytest.approx(smoke[STAGES].sum(axis=1).to_numpy())
+    exact = smoke[(smoke["engine"] == REFERENCE) & (smoke["formulation"] == "overlap_dp")]
+    assert (exact["gap"] <= 1e-12).all()
+    assert (exact["error"] == 0).all()
+    errors = smoke.groupby("engine")["error"].max()
+    assert errors["auto"] == 0 < errors["discrete"] < 1e-8
+    assert errors["discrete"] < errors["frame 1e7"] < 1e-5 < errors["frame 1e3"]
+    windows = smoke[smoke["formulation"].isin(["rank_search", "cascade"])]
+    assert windows["models"].max() < exact["models"].min()
+    alone = smoke[smoke["formulation"] == NO_PROOF].reset_index(drop=True)
+    proven = smoke[smoke["formulation"] == "rank_search"].reset_index(drop=True)
+    assert alone["objective"].equals(proven["objective"])
+    compiled = smoke[smoke["formulation"].isin(["overlap_lp", "overlap_mip"])]
+    assert (compiled["compile"] > 0).all()
+
+
+@pytest.mark.slow
+@pytest.mark.xdist_group("smoke")
+def test_stored_runs_are_not_repeated(smoke, monkeypatch):
+    calls = []
+    monkeypatch.setattr(
+        "experiments.speed_accuracy.measure",
+        lambda spec: calls.append(spec) or measured(smoke, spec),
+    )
+    wanted = [("chain7", REFERENCE, c, 1) for c in CRITERIA]
+    first = collect(wanted[:2], pd.DataFrame())
+    again = collect(wanted, first)
+    assert calls == [*wanted[:2], *wanted[2:]]
+    assert not again.duplicated([*KEY, "formulation"]).any()
+
+
+def measured(smoke, spec):
+    from importlib.metadata import version  # noqa: PLC0415
+
+    part = smoke[(smoke["engine"] == spec[1]) & (smoke["criterion"] == spec[2])]
+    return part.assign(version=version("seqopt")).to_dict("records")
+
+
+@pytest.mark.slow
+def test_a_run_out_of_time_is_charged_its_limit():
+    charged = pd.DataFrame(measure(("chain7", REFERENCE, "weighted", 1), limit=0.01))
+    assert (charged["status"] == "time limit").all()
+    assert (charged["total"] == 0.01).all()
+    assert (charged["gap"] == 1.0).all()
+    failed = pd.DataFrame(measure(("chain7", "no such engine", "weighted", 1)))
+    assert (failed["status"] == "failed").all()
+
+
+@pytest.mark.slow
+@pytest.mark.xdist_group("smoke")
+def test_the_claim_can_fail(smoke):
+    assert holds(smoke)["dynamic programming has no gap"]
+    corner = (smoke["formulation"] == "overlap_dp") & (smoke["engine"] == REFERENCE)
+    slow = smoke.assign(total=smoke["total"].where(~corner, 10 * smoke["total"]))
+    assert not holds(slow)["nothing proves its plan sooner by more than a tenth"]
+    worse = smoke.assign(gap=smoke["gap"].where(~corner, 0.1))
+    assert not holds(worse)["dynamic programming has no gap"]
+    arch = smoke.assign(scene="arch25")
+    text = "rigid bricks spend half of their time or less on the proof"
+    without = (arch["formulation"] == NO_PROOF) & (arch["engine"] == REFERENCE)
+    assert not holds(arch.assign(total=arch["total"].where(~without, 0.0)))[text]
+    assert holds(arch.assign(total=arch["total"].where(~without, 9.0)))[text]
+
+
+@pytest.mark.slow
+@pytest.mark.xdist_group("smoke")
+def test_charts_and_table_come_from_rows(smoke, monkeypatch):
+    saved = []
+    for name in ("headline", "profile_charts"):
+        assert name in globals()
+    monkeypatch.setattr(
+        "experiments.speed_charts.save_figure", lambda figure, name: saved.append((name, figure))
+    )
+    table = smoke.assign(scene="arch25")
+    headline(table)
+    profile_charts(table)
+    assert [name for name, _ in saved] == ["speed_accuracy.png", "profiles.png"]
+    for _, figure in saved:
+        figure.canvas.draw()
+    means = summarize(smoke).set_index("formulation")
+    assert means.loc["overlap_dp", "optimal"] == means.loc["overlap_dp", "runs"] == len(CRITERIA)
+    assert set(specs(quick=True)) < {(s, e, "weighted", 1) for s in ("chain7",) for e in ENGINES}
+
+
+def test_pareto_front():
+    cost, loss = np.array([1.0, 2.0, 3.0, 2.0, 4.0]), np.array([3.0, 1.0, 1.0, 2.0, 0.0])
+    assert pareto(cost, loss).tolist() == [True, True, False, False, True]
+    assert pareto(np.ones(2), np.ones(2)).all()  # equals do not beat each other
+
+
+def test_profiles():
+    costs = pd.DataFrame({"a": [1.0, 4.0, np.inf], "b": [2.0, 2.0, 3.0]})
+    profile = performance_profile(costs, np.array([1.0, 2.0]))
+    assert profile["a"].tolist() == pytest.approx([1 / 3, 2 / 3])
+    assert profile["b"].tolist() == pytest.approx([2 / 3, 1.0])
+    assert data_profile(costs, np.array([1.0, 3.0]))["b"].tolist() == [0.0, 1.0]
+
+
+def test_shifted_mean():
+    """Equal values keep their mean; a large shift makes it the arithmetic one."""
+    assert shifted_mean(np.full(3, 0.2), 0.01) == pytest.approx(0.2)
+    assert shifted_mean(np.array([1.0, 3.0]), 1e6) == pytest.approx(2.0, rel=1e-5)
+    assert shifted_mean(np.array([1.0, 4.0]), 0.0) == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize(
+    ("printed", "status", "verdict"),
+    [
+        ("verdict: the claim holds", 0, "holds"),
+        ("verdict: the claim holds: all pictures drawn", 0, "holds"),
+        ("verdict: the claim does not hold on this run", 0, "does not hold on this run"),
+        ("no verdict", 0, "failed: no verdict"),
+        ("verdict: the claim holds", 1, "failed: verdict: the claim holds"),
+        ("pip install extra", 2, "left out: pip install extra"),
+    ],
+)
+def test_a_verdict_is_the_last_line_of_a_run_that_ended_well(monkeypatch, printed, status, verdict):
+    done = subprocess.CompletedProcess([], status, f"table\n{printed}\n", "")
+    monkeypatch.setattr("experiments.__main__.subprocess.run", lambda *_, **__: done)
+    assert run("any")[0] == verdict
+
+
+def test_all_claims_are_listed():
+    listed = subprocess.run(
+        [sys.executable, "-m", "experiments"], cwd=ROOT, capture_output=True, text=True, check=True
+    ).stdout.splitlines()
+    assert [line.split()[0] for line in listed] == list(claims())
+    assert {"engine_speed", "failing_steps", "speed_accuracy"} <= set(claims())
+    assert "blocks" not in claims()
+
+
+TIMED = {
+    "engine_speed",
+    "fidelity_ladder",
+    "formulation_cost",
+    "peers",
+    "speed_accuracy",
+    "witnesses",
+}
+
+
+def test_what_takes_the_clock_is_known():
+    assert {name for name in claims() if takes_time(name)} == TIMED
+
+
+def test_timed_experiments_run_alone_the_others_two_at_a_time(monkeypatch, capsys):
+    running, seen, lock = set(), {}, threading.Lock()
+
+    def pretend(name, *arguments):
+        assert arguments == ("--quick",)
+        with lock:
+            running.add(name)
+            for other in running:
+                seen.setdefault(other, set()).update(running)
+            assert len(running) <= TOGETHER
+        time.sleep(0.02)
+        with lock:
+            running.remove(name)
+        return "holds", 1.0
+
+    monkeypatch.setattr("experiments.__main__.run", pretend)
+    table = run_all("--quick")
+    assert table["experiment"].tolist() == list(claims())
+    assert all(seen[name] == {name} for name in TIMED)
+    assert any(len(seen[name]) == TOGETHER for name in set(claims()) - TIMED)
+    assert len(capsys.readouterr().out.splitlines()) == len(claims())
+
+
+def test_the_longest_start_first(monkeypatch):
+    order = []
+    seconds = {name: float(place) for place, name in enumerate(claims()) if name != "figures"}
+    monkeypatch.setattr("experiments.__main__.stored", lambda _: seconds)
+    monkeypatch.setattr("experiments.__main__.TOGETHER", 1)
+    monkeypatch.setattr(
+        "experiments.__main__.run", lambda name, *_: (order.append(name), ("holds", 1.0))[1]
+    )
+    run_all()
+    others = [name for name in order if name not in TIMED]
+    assert others[0] == "figures"  # what never ran may take long
+    assert others[1:] == sorted(others[1:], reverse=True)
+    assert set(order[len(others) :]) == TIMED
+
+
+@pytest.mark.parametrize(
+    ("verdict", "status"),
+    [("holds", 0), ("holds, by one witness", 0), ("left out: pip", 0), ("does not hold", 1)],
+)
+def test_the_exit_status_says_whether_all_claims_hold(monkeypatch, verdict, status):
+    monkeypatch.setattr("experiments.__main__.run", lambda *_: (verdict, 1.0))
+    monkeypatch.setattr("sys.argv", ["experiments", "all", "--quick"])
+    assert main() == status

@@ -1,0 +1,188 @@
+"""Outside witnesses: what they are shown is what we judge, and a wrong verdict would be seen."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from experiments import witnesses
+from experiments.blocks import ring
+from experiments.witness_cra import SAMPLES, Word, force_only, sample_scene, without_tension
+from experiments.witness_lmgc90 import GRAVITY, STEP, STEPS, python_with_lmgc90, verdict
+from experiments.witness_scenes import incline, scene_of
+from experiments.witnesses import (
+    Trial,
+    built_trials,
+    differing,
+    faults,
+    ours,
+    row_of,
+    sample_trials,
+)
+from seqopt.network.network import GROUND
+from seqopt.stability.assessment import Verdict
+from tests.commands import run
+
+
+@pytest.fixture(scope="module")
+def table():
+    """What a few cases look like when all agree, with an LMGC90 that says what we say."""
+    shown = [t for t in built_trials() if t.group in ("incline", "stack")]
+    shown += [t for t in sample_trials(["A"]) if t.name == "A"]
+    table = pd.DataFrame([row_of(trial, None, aside=False) for trial in shown])
+    wedged = table["case"] == "A"
+    table["lmgc90"] = table["ours"].where(~wedged, Verdict.FALLS.value)
+    return table
+
+
+def changed(table, case, **values):
+    out = table.copy()
+    for column, value in values.items():
+        out.loc[out["case"] == case, column] = value
+    return out
+
+
+@pytest.mark.slow
+def test_a_quick_run_holds_by_one_witness():
+    verdict = run("witnesses", "--quick").splitlines()[-1]
+    assert verdict.startswith("verdict: the claim holds, by one witness")
+
+
+def test_the_largest_sample_is_read_as_published():
+    scene = sample_scene("armadillo_cra")
+    assert len(scene.solids) == 399
+    assert len(scene.touches) == 1014
+    assert scene.volume == pytest.approx(9.7364, abs=5e-5)
+    first, second = np.array([touch.pair for touch in scene.touches]).T
+    middle = np.array([solid.mass[1] for solid in scene.solids])
+    normal = np.array([touch.normal for touch in scene.touches])
+    assert (np.einsum("ci,ci->c", normal, middle[second] - middle[first]) > 0).all()
+
+
+def test_a_support_is_the_ground_and_comes_first():
+    scene = sample_scene("bridge")
+    assembly = scene.assembly()
+    assert len(assembly.centroid) == len(scene.solids) - len(scene.supports)
+    assert (assembly.bodies[:, 0] == GROUND).any()
+    assert -assembly.weight[:, 2].sum() == pytest.approx(scene.volume)
+
+
+def test_blocks_keep_volume_and_centroid_as_solids():
+    blocks = ring(9, 5.0, 1.0)
+    scene = scene_of(blocks, {0, 8})
+    plain, shown = blocks.assembly(1.0, 1.0), scene.assembly()
+    np.testing.assert_allclose(shown.weight, plain.weight[1:-1], rtol=1e-12)
+    np.testing.assert_allclose(shown.centroid, plain.centroid[1:-1], rtol=1e-12, atol=1e-12)
+    assert all(solid.convex for solid in scene.solids)
+
+
+@pytest.mark.parametrize("name", ["bridge", "curve-3-blocks"])
+def test_what_stands_and_what_does_not_is_seen_by_both(name):
+    """As published; without friction; and, for the bridge, with a support set free."""
+    trial = Trial("sample", name, sample_scene(name), SAMPLES[name].friction)
+    assert ours(trial)[0] is force_only(trial.scene, trial.friction).verdict is Verdict.STANDS
+    slippery = replace(trial, friction=0.0)
+    assert ours(slippery)[0] is force_only(trial.scene, 0.0).verdict is Verdict.FALLS
+    if name == "bridge":
+        freed = witnesses.without_a_support(name)
+        assert ours(freed)[0] is force_only(freed.scene, freed.friction).verdict is Verdict.FALLS
+
+
+def test_what_tension_leaves_open_is_decided_without_it():
+    scene = sample_scene("curve-3-blocks")
+    assert force_only(scene, 0.05).verdict is Verdict.UNDECIDED
+    assert without_tension(scene, 0.05) is Verdict.FALLS
+    assert without_tension(scene, 0.1) is Verdict.STANDS
+
+
+def test_density_changes_no_word_of_the_witness():
+    scene = scene_of(ring(25, 5.5, 1.0), {0, 24})
+    for density in (1e-3, 1.0, 2420.0):
+        assert force_only(scene, 0.84, density).verdict is not Verdict.FALLS
+        assert ours(Trial("density", "", scene, 0.84, density))[0] is Verdict.STANDS
+
+
+def test_the_octagon_is_wider_than_the_cone_in_its_corners_only():
+    friction = 0.555  # below tan 30°
+    for turn, said in ((0.0, Verdict.FALLS), (np.pi / 8, Verdict.STANDS)):
+        scene = incline(turn)
+        assert force_only(scene, friction).verdict is said
+        assert ours(Trial("incline", "", scene, friction))[0] is Verdict.FALLS
+
+
+@pytest.mark.parametrize(
+    ("tension", "said"),
+    [
+        (-1e-9, Verdict.STANDS),
+        (1e-4, Verdict.UNDECIDED),
+        (1e-2, Verdict.FALLS),
+        (np.inf, Verdict.FALLS),
+        (np.nan, Verdict.UNDECIDED),
+    ],
+)
+def test_words_of_the_first_witness(tension, said):
+    assert Word(tension, 0.0).verdict is said
+
+
+@pytest.mark.parametrize(
+    ("acceleration", "said"),
+    [(0.0, "stands"), (0.01, "does not stand"), (GRAVITY, "does not stand")],
+)
+def test_words_of_the_second_witness(acceleration, said):
+    time = STEP * np.arange(1, STEPS + 1)
+    moved = 1e-5 + 0.5 * acceleration * time**2
+    assert verdict(moved, acceleration * time[-1], size=1.0) == said
+
+
+def test_agreement_holds_and_known_differences_are_no_fault(table):
+    assert faults(table, ["rbe", "lmgc90"], 6.0) == []
+    assert differing(table, "rbe") | differing(table, "lmgc90") == {
+        (witnesses.TURNED, "rbe"),
+        ("A", "lmgc90"),
+    }
+
+
+def test_wrong_verdicts_and_slowness_are_faults(table):
+    both = ["rbe", "lmgc90"]
+    stood, lost = "stack 0, 0", Verdict.FALLS.value
+    assert faults(changed(table, stood, ours=lost), both, 6.0) == [
+        f"{stood}: rbe differs",
+        f"{stood}: lmgc90 differs",
+    ]
+    open_ = Verdict.UNDECIDED.value
+    assert len(faults(changed(table, stood, ours=open_), both, 6.0)) == 2
+    assert faults(changed(table, stood, rbe=open_, no_tension=lost), ["rbe"], 6.0)
+    assert faults(changed(table, stood, rbe=open_, no_tension=open_), ["rbe"], 6.0) == []
+    assert faults(changed(table, "A", lmgc90=Verdict.STANDS.value), both, 6.0)
+    assert faults(table, both, 4.9) == ["only 4.9 times sooner"]
+    assert len(faults(table[table["ours"] == lost], ["rbe"], 6.0)) == 1
+
+
+def test_a_verdict_that_depends_on_density_is_a_fault(table):
+    same = table.assign(group="density")
+    assert "our verdict depends on the density" in faults(same, ["rbe"], None)
+
+
+def test_a_wrong_verdict_ends_in_does_not_hold(monkeypatch, capsys):
+    few = [t for t in built_trials() if t.group == "stack"]
+    monkeypatch.setattr(witnesses, "trials", lambda *, quick: few)
+    monkeypatch.setattr(witnesses, "race", lambda trials, rounds: pd.DataFrame({"ratio": [9.0]}))
+    monkeypatch.setattr(witnesses, "ours", lambda trial: (Verdict.STANDS, 0.0))
+    monkeypatch.setattr("sys.argv", ["witnesses", "--quick"])
+    witnesses.main()
+    assert capsys.readouterr().out.splitlines()[-1].startswith("verdict: the claim does not hold")
+
+
+def test_a_missing_witness_is_named(monkeypatch, capsys):
+    monkeypatch.setattr(witnesses, "find_spec", lambda name: None)
+    monkeypatch.setattr("sys.argv", ["witnesses", "--quick"])
+    with pytest.raises(SystemExit) as ended:
+        witnesses.main()
+    assert ended.value.code == 2
+    assert capsys.readouterr().out == (
+        'compas_cra is not installed: pip install "seqopt[witness]"\n'
+    )
+    assert python_with_lmgc90("no such python") is None

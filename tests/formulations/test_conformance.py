@@ -1,0 +1,244 @@
+"""Conformance: what every registered formulation does, on random problems and on arches."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.errors import InfeasibleError, ProblemError
+from seqopt.network.build import build_network
+from seqopt.placement.budgets import robot_use, steps_over, travel
+from seqopt.placement.costs import Budget, CostProblem, LayeredCosts
+from seqopt.placement.formulation import (
+    Aim,
+    FormulationKind,
+    find_formulation,
+    formulations,
+)
+from seqopt.placement.plan import run
+from seqopt.placement.problem import Limit, pose
+from seqopt.sequence.three_robots import SCHEDULES, three_robot_loop
+from seqopt.study.presets import CRITERIA, EQUATIONS, WORST_RATIO
+from tests.builders import small_arch
+from tests.strategies import problems
+
+ALL = formulations()
+EXACT_SUMS = [
+    n for n, f in ALL.items() if f.aim is Aim.SUM and f.kind is not FormulationKind.HEURISTIC
+]
+HEURISTICS = [n for n, f in ALL.items() if f.kind is FormulationKind.HEURISTIC]
+every = pytest.mark.parametrize("name", ALL)
+
+
+def brute_force(problem, aim):
+    """The best value over every combination, infinite if none is allowed."""
+    worth = problem.sums.cost if aim is Aim.SUM else problem.peaks.worst
+    choices = product(*(range(size) for size in problem.sums.sizes))
+    within = (c for c in choices if all(b.spent(c) <= b.bound for b in problem.budgets))
+    return min((worth(c) for c in within), default=np.inf)
+
+
+@every
+@given(problem=problems())
+@settings(max_examples=25)
+def test_answers_are_certified_or_refused_as_infeasible(name, problem):
+    which = ALL[name]
+    best = brute_force(problem, which.aim)
+    if not np.isfinite(best):
+        with pytest.raises(InfeasibleError, match="move"):
+            which.solve(problem)
+        return
+    selection, certificate = run(problem, which)
+    assert certificate.objective >= best - 1e-9
+    assert certificate.bound == pytest.approx(best, abs=1e-9)
+    if which.kind is not FormulationKind.HEURISTIC:
+        assert certificate.objective == pytest.approx(best, abs=1e-6)
+        assert certificate.gap <= 1e-6
+    assert selection.bound <= best + 1e-6
+
+
+@given(problem=problems())
+def test_wide_searches_are_exact(problem):
+    best = brute_force(problem, Aim.SUM)
+    if not np.isfinite(best):
+        return
+    moves = len(problem.sums.sizes)
+    for name, options in (("beam", {"width": 4}), ("rank_search", {"horizon": moves})):
+        assert run(problem, ALL[name], **options)[1].objective == pytest.approx(best)
+
+
+@given(problem=problems(), width=st.integers(1, 4))
+def test_a_beam_never_does_worse_than_the_cascade(problem, width):
+    if not np.isfinite(brute_force(problem, Aim.SUM)):
+        return
+    beam = run(problem, ALL["beam"], width=width)[1].objective
+    assert beam <= run(problem, ALL["cascade"])[1].objective + 1e-9
+
+
+@every
+@given(problem=problems(), data=st.data())
+@settings(max_examples=15)
+def test_renumbering_candidates_keeps_the_value_of_exact_ones(name, problem, data):
+    which = ALL[name]
+    if which.kind is FormulationKind.HEURISTIC or not np.isfinite(brute_force(problem, which.aim)):
+        return
+    order = [data.draw(st.permutations(range(size))) for size in problem.sums.sizes]
+    before = [[0], *order[:-1]]
+    single = tuple(c[list(o)] for c, o in zip(problem.sums.single, order, strict=True))
+    shared = tuple(
+        c[np.ix_(list(b), list(o))]
+        for c, b, o in zip(problem.sums.shared, before, order, strict=True)
+    )
+    other = CostProblem(LayeredCosts(single, shared))
+    a, b = run(problem, which)[1].objective, run(other, which)[1].objective
+    assert a == pytest.approx(b, abs=1e-6)
+
+
+@every
+def test_it_is_repeatable(name, problem25):
+    assert ALL[name].solve(problem25).choice == ALL[name].solve(problem25).choice
+
+
+@every
+def test_malformed_problems_are_refused_before_any_formulation(name):
+    one, none = np.zeros(1), np.zeros((1, 0))
+    with pytest.raises(ProblemError, match="no moves"):
+        ALL[name].solve(CostProblem(LayeredCosts((), ())))
+    with pytest.raises(ProblemError, match="move 1 has no candidates"):
+        ALL[name].solve(CostProblem(LayeredCosts((np.zeros(0),), (none,))))
+    with pytest.raises(ProblemError, match="move 1: a single cost is NaN"):
+        ALL[name].solve(CostProblem(LayeredCosts((np.array([np.nan]),), (np.zeros((1, 1)),))))
+    with pytest.raises(ProblemError, match=r"move 2: shared costs \(1, 2\)"):
+        ALL[name].solve(CostProblem(LayeredCosts((one, one), (np.zeros((1, 1)), np.zeros((1, 2))))))
+
+
+@every
+def test_budgets_are_kept_or_refused(name):
+    """Taking the cheap candidate of every move costs too much of the budget."""
+    single = tuple(np.array([0.0, 1.0]) for _ in range(3))
+    shared = (np.zeros((1, 2)), np.zeros((2, 2)), np.zeros((2, 2)))
+    amounts = tuple(np.array([1.0, 0.0]) for _ in range(3))
+    capped = CostProblem(LayeredCosts(single, shared), (Budget("use", amounts, shared, 1.0),))
+    if name in ("overlap_mip", "overlap_lp"):
+        selection, certificate = run(capped, ALL[name])
+        assert certificate.spent["use"] <= 1
+        assert selection.bound == pytest.approx(2.0, abs=1e-6)
+        if name == "overlap_lp":  # three choices tie: the mixture need not be followed to one
+            assert certificate.objective >= 2.0 - 1e-6
+            assert selection.prices["use"] == pytest.approx(1.0, abs=1e-3)
+        else:
+            assert certificate.objective == pytest.approx(2.0)
+        impossible = replace(capped, budgets=(replace(capped.budgets[0], bound=-1.0),))
+        with pytest.raises(InfeasibleError, match="budgets"):
+            ALL[name].solve(impossible)
+    else:
+        with pytest.raises(ProblemError, match="budget 'use' couples all moves"):
+            ALL[name].solve(capped)
+
+
+@given(problem=problems(), data=st.data())
+@settings(max_examples=25)
+def test_the_integer_program_is_exact_with_budgets(problem, data):
+    sizes = problem.sums.sizes
+    amounts = tuple(
+        np.array(data.draw(st.lists(st.integers(0, 2), min_size=n, max_size=n)), float)
+        for n in sizes
+    )
+    none = tuple(np.zeros_like(s) for s in problem.sums.shared)
+    bound = float(data.draw(st.integers(0, 5)))
+    capped = replace(problem, budgets=(Budget("use", amounts, none, bound),))
+    best = brute_force(capped, Aim.SUM)
+    if np.isfinite(best):
+        assert run(capped, ALL["overlap_mip"])[1].objective == pytest.approx(best, abs=1e-6)
+    else:
+        with pytest.raises(InfeasibleError):
+            ALL["overlap_mip"].solve(capped)
+
+
+@pytest.mark.parametrize("criterion", CRITERIA.values(), ids=CRITERIA)
+@pytest.mark.parametrize("method", SCHEDULES)
+def test_exact_ones_agree_on_the_reference_arch(engine25, criterion, method):
+    problem = pose(engine25, SCHEDULES[method](engine25.network), criterion)
+    values = [run(problem, ALL[name])[1].objective for name in EXACT_SUMS]
+    assert len(values) == 3
+    assert np.ptp(values) <= 1e-6 * max(values)
+    for name in HEURISTICS:
+        assert run(problem, ALL[name])[1].objective >= min(values) * (1 - 1e-9)
+    assert run(problem, ALL["minimax"])[1].gap <= 1e-9
+
+
+@pytest.mark.parametrize("count", [5, 6, 7, 8])
+@pytest.mark.parametrize("criterion", CRITERIA.values(), ids=CRITERIA)
+def test_all_exact_ones_equal_brute_force_on_small_arches(count, criterion):
+    engine = ComplianceEngine(build_network(small_arch(count)))
+    problem = pose(engine, three_robot_loop(engine.network), criterion)
+    best = run(problem, ALL["rank_search"], horizon=count)[1].objective
+    assert best == pytest.approx(brute_force(problem, Aim.SUM))
+    for name in EXACT_SUMS:
+        assert run(problem, ALL[name])[1].objective == pytest.approx(best, rel=1e-6)
+    peak = run(problem, ALL["minimax"])[1].objective
+    assert peak == pytest.approx(brute_force(problem, Aim.PEAK))
+
+
+def test_options_are_checked(problem25):
+    for name, options, named in (
+        ("cascade", {"charge": "both"}, "charge is 'both'; give one of later, earlier"),
+        ("beam", {"width": 0}, "width is 0"),
+        ("rank_search", {"horizon": 0}, "horizon is 0"),
+        ("rank_search", {"horizon": 22}, "lower the horizon"),
+    ):
+        with pytest.raises(ProblemError, match=named):
+            ALL[name].solve(problem25, **options)
+    with pytest.raises(ProblemError, match="there is no such; give one of beam, cascade"):
+        find_formulation("simplex")
+
+
+def test_a_longer_horizon_and_a_wider_beam_serve(problem25):
+    one = run(problem25, ALL["rank_search"])[1].objective
+    three = run(problem25, ALL["rank_search"], horizon=3)[1].objective
+    best = run(problem25, ALL["overlap_dp"])[1].objective
+    assert best <= three <= one
+    assert run(problem25, ALL["beam"], width=46)[1].objective == pytest.approx(best)
+    earlier = run(problem25, ALL["cascade"], charge="earlier")[1].objective
+    assert earlier >= best
+
+
+def test_limits_hold_or_are_infeasible(engine25):
+    schedule = three_robot_loop(engine25.network)
+    best = run(pose(engine25, schedule, WORST_RATIO), ALL["minimax"])[1].objective
+    for factor in (1.001, 0.999):
+        limits = [Limit(name, factor * best * bound) for name, bound in WORST_RATIO.limits]
+        problem = pose(engine25, schedule, EQUATIONS, limits)
+        if factor > 1:
+            choice = run(problem, ALL["overlap_dp"])[0].choice
+            for state in problem.evaluation.states:
+                place = tuple(choice[m] for m in state.moves)
+                for limit in limits:
+                    assert state.responses[limit.response][place] <= limit.bound
+        else:
+            with pytest.raises(InfeasibleError, match="relax a limit"):
+                ALL["overlap_dp"].solve(problem)
+
+
+def test_budgets_of_the_reference_arch(problem25):
+    free = ALL["overlap_dp"].solve(problem25)
+    for budget in (
+        travel(problem25, 20.0),
+        steps_over(problem25, "F_largest", 300.0, 5.0),
+    ):
+        assert budget.spent(free.choice) > budget.bound
+        capped = replace(problem25, budgets=(budget,))
+        selection, certificate = run(capped, ALL["overlap_mip"])
+        assert certificate.spent[budget.name] <= budget.bound + 1e-6
+        assert certificate.objective > free.objective
+        bound = ALL["overlap_lp"].solve(capped)
+        assert bound.bound <= selection.objective + 1e-6
+        assert bound.prices[budget.name] > 0
+    with pytest.raises(ProblemError, match="name it in `also`"):
+        robot_use(problem25, "rob9", 100.0, 1.0)

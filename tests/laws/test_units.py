@@ -1,0 +1,85 @@
+"""Units and scale change no rank, no choice and no verdict."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from seqopt.contact.faces import step_assembly
+from seqopt.contact.mortar import DRY
+from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.network.build import build_network
+from seqopt.placement.formulation import find_formulation
+from seqopt.placement.plan import run
+from seqopt.placement.problem import pose
+from seqopt.sequence.three_robots import three_robot_loop
+from seqopt.sequence.two_robots import cantilever
+from seqopt.stability.assessment import assess
+from seqopt.study.presets import CLOSEST, EQUATIONS
+from tests.builders import rescaled
+
+SCALES = [(1e3, 1, 1), (1, 1e3, 1), (1, 1, 1e3), (1e3, 1e-3, 1e3)]
+INVERSE = [tuple(1 / scale for scale in scales) for scales in SCALES]
+SCALES += [pytest.param(scales, marks=pytest.mark.slow) for scales in INVERSE]
+
+
+def solved(scene, criterion):
+    problem = pose(
+        ComplianceEngine(build_network(scene)), three_robot_loop(build_network(scene)), criterion
+    )
+    selection, certificate = run(problem, find_formulation("overlap_dp"))
+    return problem, problem.nodes(selection.choice), certificate
+
+
+@pytest.fixture(scope="module")
+def plain(arch25):
+    return {criterion: solved(arch25, criterion) for criterion in (EQUATIONS, CLOSEST)}
+
+
+@pytest.fixture(scope="module")
+def verdicts(arch25):
+    """Five steps about the crown, each with its verdict."""
+    net = build_network(arch25)
+    steps = cantilever(net)[26:31]
+    return [(s, assess(step_assembly(net, s.bricks, s.grips), DRY)) for s in steps]
+
+
+@pytest.mark.parametrize("criterion", [EQUATIONS, CLOSEST], ids=lambda c: c.name)
+@pytest.mark.parametrize("scales", SCALES)
+def test_ranks_and_choices_do_not_know_units(arch25, plain, criterion, scales):
+    """Where responses are rounded for ranks, the resolution is given in the same units."""
+    length, force, softness = scales
+    shift = force * softness
+    units = {"F": force, "T": force, "M": force * length, "D": shift}
+    same = replace(
+        criterion, resolution=tuple((n, units[n] * size) for n, size in criterion.resolution)
+    )
+    own, nodes, certificate = plain[criterion]
+    other, others, certified = solved(rescaled(arch25, length, force, softness), same)
+    assert others == nodes
+    assert certified.objective == pytest.approx(certificate.objective, rel=1e-9)
+    for a, b in zip(own.sums.shared, other.sums.shared, strict=True):
+        np.testing.assert_allclose(b, a, rtol=1e-9)
+
+
+@pytest.mark.parametrize("scales", SCALES)
+def test_verdicts_do_not_know_units(arch25, verdicts, scales):
+    length, force, softness = scales
+    net = build_network(rescaled(arch25, length, force, softness))
+    for step, a in verdicts:
+        b = assess(step_assembly(net, step.bricks, step.grips), DRY)
+        assert a.verdict is b.verdict
+        assert b.bond == pytest.approx(a.bond * force / length**2, rel=1e-3)
+        assert b.friction == pytest.approx(a.friction, abs=2e-4)
+        np.testing.assert_allclose(b.pull, a.pull, rtol=2e-3)
+        assert b.grip == pytest.approx(a.grip * force, rel=1e-3)
+        assert (a.first_block, a.first_contact) == (b.first_block, b.first_contact)
+
+
+def test_a_resolution_in_other_units_is_another_criterion(arch25, plain):
+    """The control: forces in kN rounded to 1 kN decide nothing."""
+    _, nodes, _ = plain[EQUATIONS]
+    _, others, _ = solved(rescaled(arch25, 1, 1e-3, 1), EQUATIONS)
+    assert others != nodes

@@ -1,0 +1,77 @@
+"""The responses of all choices: those of the steps, and no more than is asked."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.errors import ProblemError
+from seqopt.network.build import build_network
+from seqopt.placement.criteria import RankSum, equal
+from seqopt.placement.problem import pose
+from seqopt.responses import choices as evaluation
+from seqopt.responses.choices import SCALARS, evaluate_choices
+from seqopt.responses.quantities import step_responses
+from seqopt.responses.table import step_fields
+from seqopt.sequence.three_robots import SCHEDULES, three_robot_loop
+from seqopt.study.presets import EQUATIONS
+
+
+@pytest.mark.parametrize("method", SCHEDULES)
+def test_states_hold_the_responses_of_their_steps(engine25, method):
+    """Every response of a random filled schedule is found again in the problem's states."""
+    schedule = SCHEDULES[method](engine25.network)
+    also = ("F_largest", "F_move", "F_rob1", "F_rob2", "F_rob3", "T_max", "M_sup", "D_max")
+    problem = pose(engine25, schedule, EQUATIONS, also=also)
+    rng = np.random.default_rng(1)
+    choice: list[int] = []
+    for k, move in enumerate(schedule.moves):
+        allowed = np.flatnonzero(np.isfinite(problem.sums.shared[k][choice[-1] if choice else 0]))
+        choice.append(int(rng.choice(allowed)))
+        assert len(move.candidates) > choice[-1]
+    steps = {s.number: s for s in schedule.fill(problem.nodes(choice))}
+    for state in problem.evaluation.states:
+        place = tuple(choice[m] for m in state.moves)
+        step = steps[state.step.number]
+        want = step_responses(engine25, step_fields(engine25, step))
+        assert state.responses["T_max"][place] == pytest.approx(want.F_max[0])
+        assert state.responses["M_sup"][place] == pytest.approx(want.M_sup[0])
+        assert state.responses["D_max"][place] == pytest.approx(want.D_max[0])
+        forces = iter(np.abs(want.F_rob[0]))
+        for i, node in enumerate(step.grips):
+            found = state.responses[f"F_rob{i + 1}"][place]
+            assert np.isnan(found) if node is None else found == pytest.approx(next(forces))
+
+
+def test_unknown_responses_are_refused(engine25, loop25):
+    with pytest.raises(ProblemError, match="response F_rob9: there is no such; give D_max"):
+        pose(engine25, loop25, RankSum("x", equal("F_rob9"), equal("F_rob9")))
+
+
+def test_each_robot_is_a_term_whatever_its_name(arch25):
+    """Equation 2 ranks the forces of all robots of a scene."""
+    robots = tuple(replace(r, name=n) for r, n in zip(arch25.robots, "abc", strict=True))
+    net = build_network(replace(arch25, robots=robots))
+    renamed = pose(ComplianceEngine(net), three_robot_loop(net), EQUATIONS)
+    first = renamed.evaluation.states[0].responses
+    assert {"F_a", "F_b", "F_c", "T_max", "M_sup"} == set(first)
+
+
+def test_only_what_is_asked_is_evaluated(engine25, loop25):
+    plain = pose(engine25, loop25, RankSum("tension", equal("T_max"), equal("T_max")))
+    assert {name for s in plain.evaluation.states for name in s.responses} == {"T_max"}
+
+
+def test_fields_are_asked_for_in_blocks(engine25, monkeypatch):
+    schedule = three_robot_loop(engine25.network)
+    monkeypatch.setattr(evaluation, "BLOCK", 10**9)
+    whole = evaluate_choices(engine25, schedule, lambda _: SCALARS)
+    monkeypatch.setattr(evaluation, "BLOCK", 100)
+    parts = evaluate_choices(engine25, schedule, lambda _: SCALARS)
+    assert parts.models == whole.models
+    for a, b in zip(parts.states, whole.states, strict=True):
+        for name in SCALARS:
+            assert a.responses[name] == pytest.approx(b.responses[name], rel=1e-12, nan_ok=True)

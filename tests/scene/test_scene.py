@@ -1,0 +1,168 @@
+"""Scenes: validation, the JSON file, its schema."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import jsonschema
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from seqopt.errors import FileError, SceneError, SeqoptError
+from seqopt.scene.arch import ArchShape, arch_scene
+from seqopt.scene.reach import Side, Sphere
+from seqopt.scene.scene import Robot
+from seqopt.scene.scene_file import (
+    dump_scene,
+    load_scene,
+    parse_scene,
+    save_scene,
+    scene_to_dict,
+    schema,
+)
+from tests.strategies import arches, walls
+
+
+@given(scene=st.one_of(arches(), walls()))
+def test_a_round_trip_changes_nothing(scene):
+    text = dump_scene(scene)
+    assert parse_scene(text) == scene
+    assert dump_scene(parse_scene(text)) == text
+    jsonschema.validate(json.loads(text), schema())
+
+
+def test_the_schema_is_a_schema():
+    jsonschema.Draft202012Validator.check_schema(schema())
+
+
+def test_every_reach_survives_a_round_trip(arch25):
+    robots = (
+        *arch25.robots,
+        Robot(name="rob4", payload=100.0, reach=Sphere(center=(0.0, 2.0, 0.5), radius=2.55)),
+    )
+    scene = replace(arch25, robots=robots)
+    assert parse_scene(dump_scene(scene)).robots == robots
+
+
+def test_the_reference_arch(arch25):
+    """Section 3.1 of the study: 25 bricks of 246 x 116 x 53 mm and 2420 kg/m3, 40 kg robots."""
+    assert [b.name for b in arch25.placed] == list(range(1, 26))
+    assert {b.dimensions for b in arch25.bricks} == {(0.246, 0.116, 0.053)}
+    assert {b.density for b in arch25.bricks} == {2420.0}
+    assert arch25.bricks[0].mass == pytest.approx(3.66, abs=0.005)
+    assert [(r.name, r.payload) for r in arch25.robots] == [(f"rob{i}", 392.4) for i in (1, 2, 3)]
+    assert "Bruun" in arch25.provenance
+
+
+def break_at(path, value):
+    """The document of arch25 with the entry at a path replaced, or removed if value is None."""
+    document = json.loads(dump_scene(load_scene("arch25")))
+    place = document
+    for key in path[:-1]:
+        place = place[key]
+    if value is None:
+        del place[path[-1]]
+    else:
+        place[path[-1]] = value
+    return json.dumps(document)
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "named"),
+    [
+        (("bricks",), [], r"bricks"),
+        (("bricks", 3, "density"), -5, r"bricks\[3\]\.density.*-5"),
+        (("bricks", 3, "density"), float("nan"), r"brick 4: density is nan"),
+        (("bricks", 3, "density"), None, r"bricks\[3\].*density"),
+        (("bricks", 3, "mass"), 1.0, r"bricks\[3\].*mass"),
+        (("bricks", 3, "position"), [0, float("inf"), 0], r"brick 4: position"),
+        (("bricks", 3, "length_axis"), [0, 0, 2], r"brick 4: length_axis.*unit"),
+        (("bricks", 3, "name"), 3, r"brick 3 occurs twice"),
+        (("bricks", 3, "nodes"), [5, 6], r"placing_node|node 5 occurs twice"),
+        (("bricks", 3, "placing_node"), 99, r"brick 4: placing_node is 99"),
+        (("joints", 0, "translational_stiffness"), [-1, 1, 1], r"joints\[0\].*-1"),
+        (("joints", 0, "rotational_stiffness"), [float("nan"), 1, 1], r"joint \(1, 2\)"),
+        (("joints", 0, "bricks"), [1, 77], r"joint \(1, 77\): there is no brick 77"),
+        (("grounds",), [], r"grounds"),
+        (("grounds", 0, "brick"), 77, r"there is no brick 77"),
+        (("grounds", 0, "closes_with"), 77, r"there is no brick 77"),
+        (("build_order",), [1, 2], r"build_order"),
+        (("blocked_nodes",), [500], r"there is no node 500"),
+        (("blocked_nodes",), [7], r"brick 4: placing_node 7 is blocked"),
+        (("robots", 0, "payload"), 0, r"robots\[0\]\.payload.*0"),
+        (("robots", 0, "reach"), {"kind": "arm"}, r"robots\[0\]\.reach"),
+        (("robots", 1, "name"), "rob1", r"robot rob1 occurs twice"),
+        (("gravity",), [0, 0], r"gravity"),
+        (("version",), 2, r"version"),
+        (("format",), "other", r"format"),
+    ],
+)
+def test_a_malformed_scene_gets_one_clear_line(path, value, named):
+    with pytest.raises(SceneError, match=named) as caught:
+        parse_scene(break_at(path, value), "broken.json")
+    assert "\n" not in str(caught.value)
+    assert len(str(caught.value)) < 400
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", "3", '"x"', "null"])
+def test_what_is_no_scene_is_refused(text):
+    with pytest.raises(SceneError, match=r"scene broken\.json"):
+        parse_scene(text, "broken.json")
+
+
+def test_scenes_in_code_are_checked_too(arch25):
+    with pytest.raises(SceneError, match="no bricks"):
+        replace(arch25, bricks=())
+    with pytest.raises(SceneError, match="toward"):
+        Side(toward=(0.0, 2.0, 0.0), point=(0.0, 0.0, 0.0))
+    with pytest.raises(SceneError, match="payload is nan"):
+        Robot(name="r", payload=float("nan"))
+    with pytest.raises(SceneError, match="radius is 'far'"):
+        Sphere(center=(0.0, 0.0, 0.0), radius="far")  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("shape", "named"),
+    [
+        ({"pitch": []}, "pitch is empty"),
+        ({"pitch": [1.0, 0.5], "roll": [0.0]}, "1 roll and 2 pitch values"),
+        ({"pitch": [1.0], "pattern": "VX"}, "pattern is 'VX'"),
+        ({"pitch": [1.0], "density": -1.0}, "density is -1"),
+        ({"pitch": [float("nan")]}, "nan"),
+    ],
+)
+def test_arch_shapes_are_checked(shape, named):
+    with pytest.raises(SceneError, match=named):
+        arch_scene(ArchShape(**shape))
+
+
+def test_values_are_frozen(arch25):
+    with pytest.raises(AttributeError):
+        arch25.name = "other"
+    with pytest.raises(AttributeError):
+        arch25.bricks[0].density = 1.0
+
+
+def test_files(tmp_path, arch25):
+    path = tmp_path / "arch.json"
+    save_scene(arch25, path)
+    assert load_scene(str(path)) == arch25
+    with pytest.raises(SceneError, match=r"built in: arch25"):
+        load_scene("arch52")
+    with pytest.raises(FileError, match=r"cannot read .*missing\.json"):
+        load_scene(str(tmp_path / "missing.json"))
+    with pytest.raises(FileError, match="cannot write"):
+        save_scene(arch25, tmp_path / "no" / "arch.json")
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["arch.json"]  # nothing half-written
+
+
+def test_errors_are_one_tree():
+    assert issubclass(SceneError, SeqoptError)
+    assert issubclass(FileError, SeqoptError)
+
+
+def test_documents_use_plain_words(arch25):
+    brick = scene_to_dict(arch25)["bricks"][0]
+    assert {"density", "dimensions", "position"} <= set(brick)

@@ -1,0 +1,39 @@
+"""Plans from files."""
+
+from __future__ import annotations
+
+import pytest
+
+from seqopt.errors import StepError
+from seqopt.sequence.plan_file import parse_plan, read_plan
+from seqopt.sequence.steps import Step, StepKind
+
+HEADER = "step,type,bricks,rob1_brick,rob1_node,rob2_brick,rob2_node,rob3_brick,rob3_node\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "named"),
+    [
+        ("", "column step is missing"),
+        ("step,type,bricks,rob1_node\n1,place,1,1\n", "column rob2_node is missing"),
+        (HEADER, "no steps"),
+        (HEADER + "1,put,1,1,1,,,,\n", "line 2: type is 'put'"),
+        (HEADER + "1,place,one,1,1,,,,\n", "line 2: bricks is 'one'"),
+        (HEADER + "1,place,1,1,a,,,,\n", "line 2: rob1_node is 'a'"),
+        (HEADER + "1,place,1,2,1,,,,\n", "rob1 holds node 1 of brick 2; it is on brick 1"),
+        (HEADER + "2,place,1,1,1,,,,\n", "step 2 stands where 1 should"),
+        (HEADER + "1,place\n", "line 2: bricks is ''"),
+    ],
+)
+def test_plan_files_are_checked(arch25, text, named):
+    with pytest.raises(StepError, match=named):
+        parse_plan(arch25, text, "p.csv")
+
+
+def test_a_plan_from_a_file(tmp_path, arch25):
+    path = tmp_path / "plan.csv"
+    path.write_text(HEADER + "1,place,1,1,1,,,,\n2,place,2,1,1,2,2,,\n", encoding="utf-8")
+    assert read_plan(arch25, path) == (
+        Step(1, StepKind.PLACE, 1, (1, None, None)),
+        Step(2, StepKind.PLACE, 2, (1, 2, None)),
+    )

@@ -1,0 +1,125 @@
+"""Verdicts and their proofs: solvers that lie or stall, every published step."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from experiments.blocks import Blocks, ring, stack
+from formulations.limit_analysis import compile_equilibrium
+from seqopt.contact.faces import step_assembly
+from seqopt.contact.mortar import DRY, EPOXY
+from seqopt.network.build import build_network
+from seqopt.sequence.two_robots import METHODS
+from seqopt.stability.assessment import Verdict, assess, bonded, sideways
+from seqopt.stability.limit_analysis import CAP, EXACT, Answer, Case, Claim, Sense, bound, violation
+from seqopt.stability.prover import proven_value
+
+
+def liar(change):
+    """A compiler whose programs change what the true one answers."""
+
+    def compiled(assembly):
+        program = compile_equilibrium(assembly)
+        return lambda case, attempt: change(program(case, attempt), assembly)
+
+    return compiled
+
+
+LIES = {
+    "zeros": lambda a, _: replace(
+        a,
+        value=0.0,
+        contact_force=0 * a.contact_force,
+        grip_force=0 * a.grip_force,
+        motion=0 * a.motion,
+    ),
+    "NaN": lambda a, _: replace(
+        a, value=np.nan, contact_force=np.nan * a.contact_force, motion=np.nan * a.motion
+    ),
+    "no forces, true motion": lambda a, _: replace(a, contact_force=0 * a.contact_force),
+    "NaN forces": lambda a, _: replace(a, contact_force=np.nan * a.contact_force),
+    "infinite motion": lambda a, _: replace(a, motion=np.inf * np.ones_like(a.motion)),
+    "a motion from elsewhere": lambda a, _: replace(a, motion=a.motion[::-1] + 1.0),
+    "a smaller value": lambda a, _: replace(a, value=0.5 * a.value),
+    "says infeasible": lambda a, _: replace(a, claim=Claim.INFEASIBLE, value=np.nan),
+    "stalls": lambda a, _: replace(a, claim=Claim.STALLED, value=np.nan),
+}
+
+
+@pytest.mark.parametrize("lie", LIES)
+@pytest.mark.parametrize("falls", [True, False])
+def test_a_lie_is_not_believed(lie, falls):
+    """It may leave the verdict open; it never turns it."""
+    leaning = stack([0.7 if falls else 0.2]).assembly(2000.0)
+    result = assess(leaning, DRY, compiled=liar(LIES[lie]))
+    truth = Verdict.FALLS if falls else Verdict.STANDS
+    assert result.verdict in (Verdict.UNDECIDED, truth)
+    if falls:
+        assert result.verdict is Verdict.UNDECIDED
+        assert result.unproven
+        assert not result.motion.any()
+
+
+def test_the_truth_is_believed():
+    leaning = stack([0.7]).assembly(2000.0)
+    assert assess(leaning, DRY, compiled=liar(lambda a, _: a)).verdict is Verdict.FALLS
+
+
+def test_almost_solved_is_counted_and_put_to_the_proof():
+    leaning = stack([0.7]).assembly(2000.0)
+    almost = liar(lambda a, _: replace(a, claim=Claim.ALMOST))
+    result = assess(leaning, DRY, compiled=almost)
+    assert result.verdict is Verdict.FALLS
+    assert set(result.claims) == {Claim.ALMOST}
+
+
+def test_a_time_limit_is_a_stall(monkeypatch):
+    """The solver itself reaches its limit; that is counted, and no verdict."""
+    monkeypatch.setattr("formulations.solvers.SECONDS", 1e-9)
+    result = assess(ring(20, 5.0, 0.6).assembly(2000.0), DRY)
+    assert result.verdict is Verdict.UNDECIDED
+    assert (
+        result.claims[Claim.STALLED] == sum(result.claims.values()) == 2 * result.unproven
+    )  # two attempts each
+
+
+def test_proofs_are_the_assemblys_own():
+    """Forces of another load, and a motion that closes a contact, prove nothing."""
+    light, heavy = stack([0.7]).assembly(1000.0), stack([0.6]).assembly(1000.0)
+    case = bonded(light, DRY)
+    answer = compile_equilibrium(light)(case)
+    assert violation(light, case, answer) < EXACT < 1e-2 < violation(heavy, case, answer)
+    assert bound(light, case, answer) == pytest.approx(answer.value, rel=1e-4)
+    closing = replace(answer, motion=-answer.motion)
+    assert bound(light, case, closing) == 0.0
+    assert np.isnan(proven_value(light, case, closing))
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_every_published_step_is_decided(arch25, method):
+    """Every seventh here; all of them in the experiment."""
+    net = build_network(arch25)
+    for step in METHODS[method](net)[::7]:
+        assembly = step_assembly(net, step.bricks, step.grips)
+        assert assess(assembly, EPOXY).verdict is Verdict.STANDS
+        assert assess(assembly, DRY).verdict is not Verdict.UNDECIDED
+
+
+def test_sideways_pulls_are_at_right_angles_to_gravity():
+    up = (0.6, 0.0, 0.8)
+    fixed = Case(sense=Sense.SMALLEST, friction=0.5, tension=(0.0, 0.0), cohesion=(0.0, 0.0))
+    pulls = np.array([case.pull for case in sideways(fixed, up)])
+    np.testing.assert_allclose(pulls @ up, 0, atol=1e-15)
+    np.testing.assert_allclose(np.linalg.norm(pulls, axis=1), 1, atol=1e-15)
+
+
+def test_a_ring_of_blocks_has_its_volume():
+    """The builder itself: a half ring of many blocks."""
+    weight = -ring(400, 5.0, 1.0).assembly(1.0, gravity=1.0).weight[:, 2].sum()
+    assert weight == pytest.approx(np.pi * 5.0, rel=1e-4)
+    assert isinstance(ring(3, 1.0, 0.1), Blocks)
+    assert CAP > 1
+    assert Answer  # the protocol's value is public

@@ -1,0 +1,86 @@
+"""What property tests draw: scenes, grip sets, placement problems."""
+
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import strategies as st
+
+from experiments.walls import running_bond
+from seqopt.placement.costs import CostProblem, LayeredCosts
+from seqopt.scene.arch import ArchShape, arch_scene
+from seqopt.study.presets import ROBOTS
+from tests.builders import about_vertical, moved
+
+angles = st.floats(-0.3, 0.3)
+
+
+@st.composite
+def arches(draw, max_bricks=7, min_bricks=1):
+    """An arch of a few bricks, bent, rolled and yawed at random, with unequal joint stiffnesses."""
+    count = draw(st.integers(min_bricks, max_bricks))
+    bend = draw(st.floats(-0.5, 0.2))
+    start = draw(st.floats(0.2, 1.5))
+    stiffness = st.tuples(*[st.floats(1e7, 1e9)] * 3)
+    turning = st.tuples(*[st.floats(1e5, 1e7)] * 3)
+    shape = ArchShape(
+        pitch=[start + bend * i for i in range(count)],
+        roll=draw(st.lists(angles, min_size=count, max_size=count)),
+        yaw=draw(st.lists(angles, min_size=count, max_size=count)),
+        pattern=draw(st.sampled_from(["VLR", "V", "LR", "VL"])),
+        gap=draw(st.floats(0.0, 0.03)),
+        translational_stiffness=draw(stiffness),
+        rotational_stiffness=draw(turning),
+        closed=draw(st.booleans()),
+    )
+    return arch_scene(shape, robots=ROBOTS)
+
+
+@st.composite
+def walls(draw):
+    """A small wall in running bond: bricks with several joints, loops from the start."""
+    return running_bond(draw(st.integers(2, 4)), draw(st.integers(2, 3)))
+
+
+@st.composite
+def states(draw, scenes=None, max_grips=3):
+    """A scene, a brick count and a set of different free nodes."""
+    scene = draw(arches() if scenes is None else scenes)
+    bricks = draw(st.integers(1, len(scene.bricks)))
+    free = [n for b in scene.placed[:bricks] for n in b.nodes if n not in scene.blocked_nodes]
+    size = st.integers(0, min(max_grips, len(free)))
+    grips = draw(
+        size.flatmap(lambda k: st.lists(st.sampled_from(free), min_size=k, max_size=k, unique=True))
+    )
+    return scene, bricks, np.array([grips], dtype=np.int64).reshape(1, -1)
+
+
+@st.composite
+def flat_arches(draw):
+    """An arch whose bricks all lie along it, in one plane that is turned about the vertical."""
+    count = draw(st.integers(2, 7))
+    bend = draw(st.floats(-0.5, 0.2))
+    shape = ArchShape(
+        pitch=[1.2 + bend * i for i in range(count)],
+        pattern="V",
+        offset=draw(st.lists(st.floats(-0.01, 0.01), min_size=count, max_size=count)),
+        translational_stiffness=draw(st.tuples(*[st.floats(1e7, 1e9)] * 3)),
+        rotational_stiffness=draw(st.tuples(*[st.floats(1e5, 1e7)] * 3)),
+        closed=draw(st.booleans()),
+    )
+    turn = about_vertical(draw(st.floats(0, 3)))
+    return moved(arch_scene(shape), lambda x: turn @ x)
+
+
+@st.composite
+def problems(draw, most_moves=5, most_candidates=4):
+    """Costs with many ties and some choices not allowed."""
+    sizes = draw(st.lists(st.integers(1, most_candidates), min_size=1, max_size=most_moves))
+    cost = st.one_of(st.integers(0, 3).map(float), st.just(np.inf))
+
+    def array(*shape):
+        count = int(np.prod(shape))
+        return np.array(draw(st.lists(cost, min_size=count, max_size=count))).reshape(shape)
+
+    single = tuple(array(size) for size in sizes)
+    shared = tuple(array(a, b) for a, b in zip([1, *sizes[:-1]], sizes, strict=True))
+    return CostProblem(LayeredCosts(single, shared))

@@ -1,0 +1,27 @@
+"""The published plan: what it holds, and how its choices rank."""
+
+from __future__ import annotations
+
+from seqopt.placement.formulation import formulations
+from seqopt.study.published import published_choice, published_plan, published_ranks
+
+
+def test_the_loop_with_the_published_nodes_is_the_published_plan(arch25, loop25, problem25):
+    assert loop25.fill(problem25.nodes(published_choice(problem25))) == published_plan(arch25)
+
+
+def test_the_window_rank_is_the_studys_search(problem25):
+    """The choice of rank_search is first in its own window, move by move."""
+    choice = formulations()["rank_search"].solve(problem25).choice
+    assert (published_ranks(problem25, choice)["rank_in_window"] == 1).all()
+    exact = formulations()["overlap_dp"].solve(problem25).choice
+    assert (published_ranks(problem25, exact)["rank_overlap"] == 1).all()
+
+
+def test_the_published_plan(arch25):
+    steps = published_plan(arch25)
+    assert len(steps) == 90
+    assert steps[-1].bricks == 25
+    assert all(len(s.held) >= 2 for s in steps[1:])  # criterion 1 of section 5: no twisting
+    newest = [arch25.placed[s.bricks - 1].nodes for s in steps]
+    assert all(set(s.held) & set(nodes) for s, nodes in zip(steps, newest, strict=True))

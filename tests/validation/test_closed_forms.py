@@ -1,0 +1,97 @@
+"""Level chains of bricks and single bricks, solved by hand."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.network.build import build_network
+from seqopt.scene.arch import ArchShape, arch_scene
+
+
+def horizontal(count, joint_t=1e8, joint_r=1e6):
+    shape = ArchShape(
+        pitch=[0.0] * count,
+        pattern="V",
+        gap=0.0,
+        translational_stiffness=(joint_t,) * 3,
+        rotational_stiffness=(joint_r,) * 3,
+        closed=False,
+        stub=0.05,
+    )
+    return arch_scene(shape)
+
+
+@pytest.mark.parametrize("count", [1, 5, 40])
+def test_cantilever_closed_form(count):
+    """A level cantilever of rigid bricks: moments and shears at the joints, summed by hand.
+
+    Joint j (at j L) carries (n-j) W and, about itself, W L (n-j)^2 / 2; the far inner node of the
+    last brick at x = (n - 1/4) L sinks by the sum of shear / k and moment (x - j L) / k_r.
+    """
+    scene = horizontal(count)
+    engine = ComplianceEngine(build_network(scene))
+    fields = engine.solve(count, np.zeros((1, 0), dtype=int))
+    length, weight = scene.bricks[0].dimensions[0], scene.bricks[0].mass * 9.81
+    beyond = count - np.arange(count)
+    moment = weight * length * beyond**2 / 2
+    tip = (count - 0.25) * length
+    sink = (weight * beyond / 1e8 + moment * (tip - np.arange(count) * length) / 1e6).sum()
+    node = engine.network.place_of_node[2 * count - 1]
+    assert fields.displacement[0, node, 2] == pytest.approx(-sink, rel=1e-12)
+    assert fields.support[0, 2] == pytest.approx(count * weight, rel=1e-12)
+    about_anchor = moment[0] + count * weight * 0.05
+    assert np.linalg.norm(fields.support[0, 3:]) == pytest.approx(about_anchor, rel=1e-12)
+
+
+def test_propped_cantilever_closed_form():
+    """A level cantilever propped at one node: reaction = free displacement / flexibility there."""
+    count = 6
+    scene = horizontal(count)
+    engine = ComplianceEngine(build_network(scene))
+    length, weight = scene.bricks[0].dimensions[0], scene.bricks[0].mass * 9.81
+    joints = np.arange(count) * length
+    arm = (count - 0.25) * length - joints
+    beyond = count - np.arange(count)
+    sink = (weight * beyond / 1e8 + weight * length * beyond**2 / 2 * arm / 1e6).sum()
+    give = (1 / 1e8 + arm**2 / 1e6).sum()
+    fields = engine.solve(count, [[2 * count - 1]])
+    assert fields.grip_force[0, 0, 2] == pytest.approx(sink / give, rel=1e-12)
+
+
+def test_a_brick_hanging_from_its_upper_half():
+    """A.1 step 1: half the weight hangs below the grip, W/2 cos(lean) along the inner edge."""
+    lean = np.radians(11.4)
+    scene = arch_scene(ArchShape(pitch=[np.pi / 2 - lean], closed=False))
+    fields = ComplianceEngine(build_network(scene)).solve(1, [[1]])
+    half = scene.bricks[0].mass * 9.81 / 2
+    assert half == pytest.approx(17.95, abs=0.01)
+    joint = np.abs(fields.support[0, :3]).max()
+    assert fields.edge_force.max() == pytest.approx(half * np.cos(lean), abs=0.1 * joint + 1e-9)
+    assert round(fields.edge_force.max(), 1) == pytest.approx(17.6)
+
+
+def test_two_grips_on_one_brick_leave_its_inner_edge_empty(engine25):
+    """The limit of a stiff bar with both ends held (plan steps 51 to 53 and 55)."""
+    net = engine25.network
+    fields = engine25.solve(15, [[28, 29], [28, 29]])
+    edge = np.flatnonzero((net.edge_brick == 14) & (net.edge_spring < 0))
+    assert np.abs(fields.edge_force[:, edge]).max() <= 1e-9 * np.abs(fields.edge_force).max()
+
+
+def test_robots_carry_a_level_beam_by_symmetry():
+    """Between a ground end and its mirror image, a lone middle grip takes no moment of either."""
+    count = 5
+    scene = horizontal(count)
+    last = scene.grounds[0]
+    far = (count * 0.246, 0.0, 0.0)
+    other = replace(last, brick=count, position=far, anchor=(far[0] + 0.05, 0.0, 0.0))
+    net = build_network(replace(scene, grounds=(last, other)))
+    fields = ComplianceEngine(net).solve(count, np.zeros((1, 0), dtype=int))
+    weight = count * scene.bricks[0].mass * 9.81
+    assert fields.support[0, 2] == pytest.approx(weight / 2, rel=1e-9)
+    motion = fields.displacement[0, net.inner.ravel(), 2]
+    assert motion == pytest.approx(motion[::-1], rel=1e-9)
