@@ -8,8 +8,8 @@ import cvxpy as cp
 import numpy as np
 import pytest
 
-from experiments.degenerate_cases import CASES, Size, capped, costs, opposed, whole
-from experiments.degenerate_placement import MALFORMED, judge, outcomes
+from experiments.placement.degenerate_placement import MALFORMED, judge, outcomes
+from experiments.placement.parts.degenerate_cases import CASES, Size, capped, costs, opposed, whole
 from formulations import overlap_lp, overlap_mip, solvers
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.placement.certificate import certify

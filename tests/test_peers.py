@@ -7,16 +7,17 @@ import sys
 import numpy as np
 import pytest
 
-from experiments import peers
-from experiments.peer_chain import chain_of
-from experiments.peer_frames import MODULES, PACKAGES, missing_packages
-from experiments.peer_loops import LOOPS, kept, loop
-from experiments.peer_paths import PATHS, by_linprog, by_networkx
-from experiments.peers import Case, difference, workload
+from experiments.peers import peers
+from experiments.peers.parts.chain import chain_of
+from experiments.peers.parts.frames import MODULES, PACKAGES, missing_packages
+from experiments.peers.parts.loops import LOOPS, kept, loop
+from experiments.peers.parts.paths import PATHS, by_linprog, by_networkx
+from experiments.peers.parts.workload import Case, workload
+from experiments.peers.peers import difference
 from seqopt.engines.interface import Want, grip_columns
 from seqopt.placement.costs import CostProblem, LayeredCosts
 from seqopt.placement.formulation import find_formulation
-from tests.test_experiments import run
+from tests.commands import run
 
 STATES = [(4, (1, 5, 7)), (17, (1, 20, 33)), (17, (1, 20, 21)), (25, (4, 47)), (25, (12, 13, 46))]
 

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import assume, given, reject
 from hypothesis import strategies as st
 
-from experiments.blocks import Blocks, Contact, ring, stack, touching
+from experiments.stability.parts.blocks import Blocks, Contact, ring, stack, touching
 from formulations.limit_analysis import compile_equilibrium
 from seqopt.contact.assembly import Assembly
 from seqopt.contact.faces import step_assembly

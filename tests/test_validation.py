@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from experiments.yardstick import errors, percentiles, tension_share
+from experiments.harness.yardstick import errors, percentiles, tension_share
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network
 from seqopt.report.comparison import compare_methods

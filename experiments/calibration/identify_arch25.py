@@ -27,28 +27,26 @@ shipped scene is worse than the bounds that the tests hold it to, or if the medi
 percentile of the new errors (in percent) is larger than the shipped one by more than the
 yardstick's rounding, 0.05.
 
-Inputs: the tables that ship with the package. Command: ``python -m experiments.identify_arch25
-[--quick] [--full] [--write] [--cross] [--variants]``. Writes
-``experiments/results/identify_arch25_refit.csv``; only ``--write`` puts the new scene in the place
-of ``seqopt/data/scenes/arch25.json`` and its numbers in ``identify_arch25.csv``. ``--cross`` fits
-one table, scores the states that only the other has, and writes ``identify_arch25_cross.csv``;
+Inputs: the tables that ship with the package. Command: ``python -m
+experiments.calibration.identify_arch25 [--quick] [--full] [--write] [--cross] [--variants]``.
+Writes ``experiments/results/identify_arch25_refit.csv``; only ``--write`` puts the new scene in the
+place of ``seqopt/data/scenes/arch25.json`` and its numbers in ``identify_arch25.csv``. ``--cross``
+fits one table, scores the states that only the other has, and writes ``identify_arch25_cross.csv``;
 ``--variants`` repeats the first stage with other sets of numbers and writes
 ``identify_arch25_variants.csv``.
 """
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
 from scipy.interpolate import CubicSpline
 from scipy.optimize import least_squares
 
-from experiments.arch_numbers import (
+from experiments.calibration.parts.arch_numbers import (
     BRICKS,
     OFFSETS,
     PLAN_ANGLES,
@@ -60,8 +58,9 @@ from experiments.arch_numbers import (
     start_of,
     starting_guess,
 )
-from experiments.plotting import RESULTS
-from experiments.yardstick import ROUNDING, VALUES, errors, percentiles, tension_share
+from experiments.harness.claim import Claim, Finding, Option, Options
+from experiments.harness.plotting import HOME, RESULTS
+from experiments.harness.yardstick import ROUNDING, VALUES, errors, percentiles, tension_share
 from seqopt.arrays import Floats
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network
@@ -72,7 +71,7 @@ from seqopt.scene.scene_file import load_scene, save_scene
 from seqopt.sequence.two_robots import METHODS
 from seqopt.study.tables import printed_steps
 
-SCENE = Path(__file__).parent.parent / "seqopt" / "data" / "scenes" / "arch25.json"
+SCENE = HOME.parent / "seqopt" / "data" / "scenes" / "arch25.json"
 NUMBERS = RESULTS / "identify_arch25.csv"
 PERCENTILES = ["median_pct", "p90_pct", "p95_pct"]
 LIMITS = [0.15, 1.9, 4.0]  # percent, as in the tests
@@ -236,7 +235,7 @@ def holds(table: pd.DataFrame, *, quick: bool) -> bool:
     return good and (quick or bool((part["difference"] <= ROUNDING).all()))
 
 
-def explore(options: argparse.Namespace) -> None:
+def explore(options: Options) -> None:
     """Fit one table alone, or other sets of numbers, and store how well."""
     if options.cross:
         table = cross(40)
@@ -247,17 +246,7 @@ def explore(options: argparse.Namespace) -> None:
         table.to_csv(RESULTS / "identify_arch25_variants.csv", index=False, float_format="%.4g")
 
 
-def arguments() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--quick", action="store_true", help="two evaluations, nothing written")
-    parser.add_argument("--full", action="store_true", help="two starts, 40 evaluations")
-    parser.add_argument("--write", action="store_true", help="put the result in the product")
-    parser.add_argument("--cross", action="store_true", help="cross-validation between the tables")
-    parser.add_argument("--variants", action="store_true", help="other sets of numbers")
-    return parser.parse_args()
-
-
-def repeat(options: argparse.Namespace) -> tuple[Floats, Sequence[Free]]:
+def repeat(options: Options) -> tuple[Floats, Sequence[Free]]:
     """Identify anew; what is worse than the shipped fit is fitted on, up to twice."""
     both = target([printed_steps(name) for name in METHODS])
     most = 2 if options.quick else 40 if options.full else 10
@@ -271,11 +260,10 @@ def repeat(options: argparse.Namespace) -> tuple[Floats, Sequence[Free]]:
     return numbers, groups
 
 
-def main() -> None:
-    options = arguments()
+def experiment(options: Options) -> Finding | None:
     if options.cross or options.variants:
         explore(options)
-        return
+        return None
     numbers, groups = repeat(options)
     scene, fitted = scene_of(numbers, groups), report(numbers, groups)
     table = beside_shipped(fitted, scene)
@@ -286,9 +274,19 @@ def main() -> None:
     if options.write and not options.quick:
         save_scene(scene, SCENE)
         fitted.to_csv(NUMBERS, index=False, float_format="%.6g", lineterminator="\n")
-    word = "holds" if holds(table, quick=options.quick) else "does not hold"
-    print(f"verdict: the claim {word}: {len(numbers)} numbers")
+    return Finding(holds(table, quick=options.quick), f": {len(numbers)} numbers")
 
+
+CLAIM = Claim(
+    experiment,
+    quick="two evaluations, nothing written",
+    options=(
+        Option("--full", "two starts, 40 evaluations"),
+        Option("--write", "put the result in the product"),
+        Option("--cross", "cross-validation between the tables"),
+        Option("--variants", "other sets of numbers"),
+    ),
+)
 
 if __name__ == "__main__":
-    main()
+    CLAIM.main()

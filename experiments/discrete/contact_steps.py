@@ -7,19 +7,19 @@ comes to rest shows such forces, so no step may rest that is proven to fall. The
 forces may exist that nothing brings about. The claim fails if a step rests that falls, or if every
 step that is proven to stand comes to rest.
 
-Inputs: the shipped scene. Command: ``python -m experiments.contact_steps [--quick]``. Writes
-``experiments/results/contact_steps.csv`` and ``docs/figures/contact_steps.png``.
+Inputs: the shipped scene. Command: ``python -m experiments.discrete.contact_steps [--quick]``.
+Writes ``experiments/results/contact_steps.csv`` and ``docs/figures/contact_steps.png``.
 """
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Sequence
 
 import numpy as np
 import pandas as pd
 
-from experiments.plotting import RESULTS, new_figure, save_figure
+from experiments.harness.claim import Claim, Finding, Options
+from experiments.harness.plotting import RESULTS, new_figure, save_figure
 from seqopt.contact.mortar import DRY
 from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.interface import Engine, Want
@@ -106,10 +106,8 @@ def chart(table: pd.DataFrame) -> None:
     save_figure(figure, "contact_steps.png")
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--quick", action="store_true", help="ten steps, nothing written")
-    quick = parser.parse_args().quick
+def experiment(options: Options) -> Finding:
+    quick: bool = options.quick
     net = build_network(load_scene("arch25"))
     methods = ("sequential",) if quick else ("sequential", "cantilever")
     table = pd.DataFrame(
@@ -131,8 +129,10 @@ def main() -> None:
         table.to_csv(RESULTS / "contact_steps.csv", index=False, float_format="%.4g")
         chart(table)
     holds = wrong.empty and bool((stands & ~rests).any())
-    print(f"verdict: the claim {'holds' if holds else 'does not hold'}")
+    return Finding(holds)
 
+
+CLAIM = Claim(experiment, quick="ten steps, nothing written")
 
 if __name__ == "__main__":
-    main()
+    CLAIM.main()

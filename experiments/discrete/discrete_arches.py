@@ -2,9 +2,9 @@
 
 Method: the study compares its model with discrete elements on four partial arches (17, 18, 23 and
 24 bricks, one robot holding the last) and prints the mean difference of the displacements of all
-inner nodes that no robot holds (section 3.2.3, table 3). Here `seqopt.engines.discrete.engine.DiscreteEngine`
-solves the same arches with rigid bricks on beds of 100e6 kN/m³ normal and 10e6 kN/m³ tangential.
-What print leaves open is read in several ways:
+inner nodes that no robot holds (section 3.2.3, table 3). Here
+`seqopt.engines.discrete.engine.DiscreteEngine` solves the same arches with rigid bricks on beds of
+100e6 kN/m³ normal and 10e6 kN/m³ tangential. What print leaves open is read in several ways:
 
 - the robot holds the node, or pinches the brick between two square pads, ten times as stiff as the
   joints, across its width or through its thickness; no size is printed, so pads have 12, 20, 30 mm;
@@ -14,88 +14,44 @@ What print leaves open is read in several ways:
 Tension and shear stay within the printed limits (3 MPa, 25 degrees, 2 MPa), hence nothing breaks or
 slips. A scan over pads of 4, 5, ... 50 mm finds the readings whose worst arch is least off. The
 claim fails if any reading is within 10 points on all four arches, or if a limit is exceeded. LMGC90
-is an outside witness for pads of 20 mm (`experiments.arches_lmgc90`); where it is not installed,
-its stored rows are shown.
+is an outside witness for pads of 20 mm (`experiments.discrete.parts.arches_lmgc90`); where it is
+not installed, its stored rows are shown.
 
 Inputs: the shipped scene; LMGC90 (compas_lmgc90) in this or another Python. Command: ``python -m
-experiments.discrete_arches [--quick] [--lmgc90 PYTHON]``. Writes ``discrete_arches.csv`` and
-``arches_lmgc90.csv`` to ``experiments/results`` and ``docs/figures/discrete_arches.png``.
+experiments.discrete.discrete_arches [--quick] [--lmgc90 PYTHON]``. Writes ``discrete_arches.csv``
+and ``arches_lmgc90.csv`` to ``experiments/results`` and ``docs/figures/discrete_arches.png``.
 """
 
 from __future__ import annotations
 
-import argparse
 import sys
-from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
 import pandas as pd
 
-from experiments.arch_pads import AtCorners, pads_at_corners
-from experiments.arches_lmgc90 import PAD, READINGS, error, moved, witness
-from experiments.discrete_chart import chart
-from experiments.plotting import RESULTS
-from experiments.witness_lmgc90 import python_with_lmgc90
+from experiments.discrete.parts.arches_lmgc90 import PAD, READINGS, error, moved, witness
+from experiments.discrete.parts.discrete_chart import chart
+from experiments.discrete.parts.pad_readings import JOINTS, STEPS, Reading, readings
+from experiments.harness.claim import Claim, Finding, Option, Options
+from experiments.harness.lmgc90 import python_with_lmgc90
+from experiments.harness.plotting import RESULTS
 from seqopt.arrays import Floats
 from seqopt.contact.elastic_limits import find_elastic_limits
 from seqopt.contact.mortar import EPOXY
 from seqopt.engines.discrete.engine import DiscreteEngine
-from seqopt.engines.discrete.system import Across, BedStiffness, Pinch
+from seqopt.engines.discrete.system import Across, Pinch
 from seqopt.engines.interface import Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network
-from seqopt.network.network import Network
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.steps import Step
 from seqopt.sequence.two_robots import sequential
-from seqopt.study.presets import STUDY_BED
 from seqopt.study.tables import printed
 
-STEPS = {17: 33, 18: 35, 23: 45, 24: 47}  # steps of the sequential method, by bricks
-PADS = (0.012, 0.02, 0.03)  # m
 SIDES = 1e-3 * np.arange(4.0, 51.0)  # m, of the scan
-CORNERS = "springs at corners"
-JOINTS = {
-    "as printed": STUDY_BED,
-    "tangential as normal": BedStiffness(STUDY_BED.normal, STUDY_BED.normal),
-    "halves in series": BedStiffness(STUDY_BED.normal / 2, STUDY_BED.tangential / 2),
-    CORNERS: STUDY_BED,
-}
 NEAR = 10.0  # points of percent within which an error counts as reproduced
 KEYS = ["grip", "side_mm", "joint"]
-
-
-@dataclass(frozen=True)
-class Reading:
-    """One way to read the study's model: how the robot holds, and what a joint is."""
-
-    joint: str = "as printed"
-    pinch: Pinch | None = None
-
-    @classmethod
-    def of(cls, grip: str, side: float, joint: str) -> Reading:
-        """Return the reading that the tables call so, from its pads' side in mm."""
-        across = [a for a in Across if grip.endswith(a.name.lower())]
-        return cls(joint, Pinch(across[0], side=1e-3 * side) if across else None)
-
-    @property
-    def grip(self) -> str:
-        """What the tables call it."""
-        return "node" if self.pinch is None else f"pads, {self.pinch.across.name.lower()}"
-
-    def engine(self, net: Network) -> DiscreteEngine:
-        """Return the discrete elements so read."""
-        if self.joint != CORNERS:
-            return DiscreteEngine(net, bed=JOINTS[self.joint], pinch=self.pinch)
-        pinch = None if self.pinch is None else pads_at_corners(self.pinch)
-        return AtCorners(net, bed=STUDY_BED, pinch=pinch)
-
-
-def readings() -> list[Reading]:
-    """Return all readings of the table."""
-    pinches = [Pinch(across, side=side) for across, side in product(Across, PADS)]
-    return [Reading(joint, pinch) for pinch, joint in product((None, *pinches), JOINTS)]
 
 
 def row_of(engine: ComplianceEngine, step: Step, reading: Reading) -> dict[str, object]:
@@ -234,11 +190,7 @@ def report_witness(table: pd.DataFrame, source: str, steps: list[Step]) -> None:
             print(f"largest {name}: {table[name].abs().max():.2g}")
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--quick", action="store_true", help="two arches, nothing written")
-    parser.add_argument("--lmgc90", default=sys.executable, help="a Python with compas_lmgc90")
-    options = parser.parse_args()
+def experiment(options: Options) -> Finding:
     engine = ComplianceEngine(build_network(load_scene("arch25")))
     steps = arches(engine, quick=options.quick)
     study = printed("de_validation").set_index("bricks")["error_percent"]
@@ -267,8 +219,14 @@ def main() -> None:
         table.to_csv(RESULTS / "discrete_arches.csv", index=False, float_format="%.4g")
         chart(errors, best, study, seen, NEAR)
     least = min(farthest(best, study).min(), farthest(errors, study).min())
-    print(f"verdict: the claim {'holds' if elastic and least > NEAR else 'does not hold'}")
+    return Finding(elastic and bool(least > NEAR))
 
+
+CLAIM = Claim(
+    experiment,
+    quick="two arches, nothing written",
+    options=(Option("--lmgc90", "a Python with compas_lmgc90", sys.executable),),
+)
 
 if __name__ == "__main__":
-    main()
+    CLAIM.main()

@@ -6,25 +6,24 @@ frame (over its contrast; else at its default), direct solve by the stiffness ma
 against sixty-digit arithmetic on the same rigid bricks. The error is the largest of displacements,
 joint forces and joint moments, each relative to its largest entry, over the grip sets of a point; a
 point counts as refused if any set is. Backward error and smallest scaled eigenvalue are those of
-`seqopt.engines.diagnosis`. The claim also asks that a mechanism is called one, with its mode, and that a
-frame that is wrong by more than 1e-3 is not found to be solved well.
+`seqopt.engines.diagnosis`. The claim also asks that a mechanism is called one, with its mode, and
+that a frame that is wrong by more than 1e-3 is not found to be solved well.
 
-Inputs: none. Command: ``python -m experiments.engine_limits [--quick]``. Writes
+Inputs: none. Command: ``python -m experiments.engines.engine_limits [--quick]``. Writes
 ``experiments/results/engine_limits.csv`` and ``docs/figures/engine_limits.png``; the longest chain
 needs 12 GB.
 """
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Callable, Iterable, Iterator
 from itertools import chain as joined
 
 import numpy as np
 import pandas as pd
 
-from experiments.limit_chart import chart
-from experiments.limit_scenes import (
+from experiments.engines.parts.limit_chart import chart
+from experiments.engines.parts.limit_scenes import (
     Case,
     chain,
     far_grips,
@@ -35,8 +34,9 @@ from experiments.limit_scenes import (
     slender,
     walls,
 )
-from experiments.plotting import RESULTS
-from experiments.reference_chain import Reference, solve_exactly
+from experiments.engines.parts.reference_chain import Reference, solve_exactly
+from experiments.harness.claim import Claim, Finding, Options
+from experiments.harness.plotting import RESULTS
 from seqopt.arrays import Floats, Ints
 from seqopt.engines.diagnosis import UNRESISTED, WELL, residual, spectrum
 from seqopt.engines.frame import FrameEngine
@@ -195,10 +195,8 @@ def judge(table: pd.DataFrame) -> dict[str, bool]:
     }
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--quick", action="store_true", help="small sizes, nothing written")
-    quick = parser.parse_args().quick
+def experiment(options: Options) -> Finding:
+    quick: bool = options.quick
     rows: list[dict[str, object]] = []
     for case in cases(quick=quick):
         rows += examine(case, engines(case.network))
@@ -215,8 +213,10 @@ def main() -> None:
         RESULTS.mkdir(exist_ok=True)
         table.to_csv(RESULTS / "engine_limits.csv", index=False, float_format="%.3g")
         chart(table)
-    print(f"verdict: the claim {'holds' if all(claims.values()) else 'does not hold'}")
+    return Finding(all(claims.values()))
 
+
+CLAIM = Claim(experiment, quick="small sizes, nothing written")
 
 if __name__ == "__main__":
-    main()
+    CLAIM.main()

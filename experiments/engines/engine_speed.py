@@ -7,22 +7,21 @@ a further set in a batch of hundreds; the time to prepare the operators of all 2
 the growth with brick count of a chain: operator, one set of grips solved once, and on average, as
 some sets are solved again.
 
-Inputs: the shipped scene; seed 0. Command: ``python -m experiments.engine_speed [--quick]``. Writes
-``experiments/results/engine_speed.csv`` and ``docs/figures/engine_growth.png``.
+Inputs: the shipped scene; seed 0. Command: ``python -m experiments.engines.engine_speed
+[--quick]``. Writes ``experiments/results/engine_speed.csv`` and ``docs/figures/engine_growth.png``.
 """
 
 from __future__ import annotations
 
-import argparse
-import time
-from collections.abc import Callable
 from functools import partial
 
 import numpy as np
 import pandas as pd
 
-from experiments.plotting import RESULTS, new_figure, save_figure
-from seqopt.arrays import Ints
+from experiments.engines.parts.grip_sets import grip_sets
+from experiments.harness.claim import Claim, Finding, Options, Times, on_this_run
+from experiments.harness.plotting import RESULTS, new_figure, save_figure
+from experiments.harness.timing import best
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import Want, grip_columns
 from seqopt.engines.rigid.compliance import ComplianceEngine, solve_batch
@@ -34,24 +33,6 @@ from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.scene_file import load_scene
 
 ASKED = Want.EDGES | Want.DISPLACEMENTS
-
-
-def best(call: Callable[[], object], rounds: int) -> float:
-    """Return the shortest of several runs, s."""
-    times = []
-    for _ in range(rounds):
-        start = time.perf_counter()
-        call()
-        times.append(time.perf_counter() - start)
-    return min(times)
-
-
-def grip_sets(net: Network, bricks: int, count: int) -> Ints:
-    """Return random sets of three different free nodes."""
-    blocked = net.scene.blocked_nodes
-    free = [n for b in net.scene.placed[:bricks] for n in b.nodes if n not in blocked]
-    rng = np.random.default_rng(0)
-    return np.array([rng.choice(free, 3, replace=False) for _ in range(count)])
 
 
 def chain(count: int) -> Network:
@@ -162,10 +143,8 @@ def chart(table: pd.DataFrame) -> None:
     save_figure(figure, "engine_growth.png")
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--quick", action="store_true", help="small sizes, nothing written")
-    quick = parser.parse_args().quick
+def experiment(options: Options) -> Finding:
+    quick: bool = options.quick
     size = (2000, 3, 2) if quick else (50_000, 100, 5)
     figures = engines_side_by_side(*size)
     figures |= calls(400, 800)
@@ -184,8 +163,10 @@ def main() -> None:
         chart(table)
     holds = 1 / figures["fast_s_per_set"] >= 3e5 and figures["ratio_median"] >= 1000
     holds = holds and figures["prepare_all_counts_s"] <= 0.05
-    print(f"verdict: {'the claim holds' if holds else 'the claim does not hold on this run'}")
+    return on_this_run(holds=holds)
 
+
+CLAIM = Claim(experiment, quick="small sizes, nothing written", times=Times.JUDGED)
 
 if __name__ == "__main__":
-    main()
+    CLAIM.main()

@@ -12,13 +12,12 @@ difference of the inner nodes' displacements over the largest displacement, in t
 are medians of rounds in one process on one core, ratios those within rounds.
 
 Inputs: the shipped scene; seed 0. Command: ``OPENBLAS_NUM_THREADS=1 python -m
-experiments.fidelity_ladder [--quick]``. Writes ``experiments/results/fidelity_ladder.csv`` and
-``docs/figures/fidelity_ladder.png``.
+experiments.engines.fidelity_ladder [--quick]``. Writes ``experiments/results/fidelity_ladder.csv``
+and ``docs/figures/fidelity_ladder.png``.
 """
 
 from __future__ import annotations
 
-import argparse
 import time
 from collections.abc import Iterator
 from statistics import median
@@ -27,9 +26,11 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from experiments.engine_speed import best, grip_sets
-from experiments.fidelity_scenes import flat_arch, flattened
-from experiments.plotting import RESULTS, new_figure, save_figure
+from experiments.engines.parts.fidelity_scenes import flat_arch, flattened
+from experiments.engines.parts.grip_sets import grip_sets
+from experiments.harness.claim import Claim, Finding, Options, Times
+from experiments.harness.plotting import RESULTS, new_figure, save_figure
+from experiments.harness.timing import best
 from seqopt.arrays import Floats, Ints
 from seqopt.contact.mortar import DRY
 from seqopt.engines.auto import AutoEngine
@@ -183,10 +184,8 @@ def chart(table: pd.DataFrame) -> None:
     save_figure(figure, "fidelity_ladder.png")
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--quick", action="store_true", help="few cases, nothing written")
-    quick = parser.parse_args().quick
+def experiment(options: Options) -> Finding:
+    quick: bool = options.quick
     rows = [compare(pair, 1 if quick else 3) for pair in pairs(quick=quick)]
     table = pd.DataFrame(rows)
     print(table.to_string(index=False, float_format="%.3g"))
@@ -194,8 +193,10 @@ def main() -> None:
         RESULTS.mkdir(exist_ok=True)
         table.to_csv(RESULTS / "fidelity_ladder.csv", index=False, float_format="%.3g")
         chart(table)
-    print(f"verdict: the claim {'holds' if judge(table) else 'does not hold'}")
+    return Finding(judge(table))
 
+
+CLAIM = Claim(experiment, quick="few cases, nothing written", times=Times.SHOWN)
 
 if __name__ == "__main__":
-    main()
+    CLAIM.main()

@@ -5,18 +5,17 @@ at bar-to-joint contrasts from 1e2 to 1e11; largest difference from the exactly 
 relative to the largest entry of the field in that state. The direct solve of the same rigid bricks
 is the check of the fast engine. A solver that refuses is counted.
 
-Inputs: the shipped scene. Command: ``python -m experiments.frame_contrast [--quick]``. Writes
-``experiments/results/frame_contrast.csv`` and ``docs/figures/frame_contrast.png``.
+Inputs: the shipped scene. Command: ``python -m experiments.engines.frame_contrast [--quick]``.
+Writes ``experiments/results/frame_contrast.csv`` and ``docs/figures/frame_contrast.png``.
 """
 
 from __future__ import annotations
 
-import argparse
-
 import numpy as np
 import pandas as pd
 
-from experiments.plotting import RESULTS, new_figure, save_figure
+from experiments.harness.claim import Claim, Finding, Options
+from experiments.harness.plotting import RESULTS, new_figure, save_figure
 from seqopt.engines.frame import CONTRAST, FrameEngine
 from seqopt.engines.interface import Engine, Fields, grip_columns
 from seqopt.engines.rigid.compliance import ComplianceEngine
@@ -89,10 +88,8 @@ def chart(table: pd.DataFrame) -> None:
     save_figure(figure, "frame_contrast.png")
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--quick", action="store_true", help="few states, nothing written")
-    quick = parser.parse_args().quick
+def experiment(options: Options) -> Finding:
+    quick: bool = options.quick
     fast = ComplianceEngine(build_network(load_scene("arch25")))
     steps = published_steps(fast)[:: 25 if quick else 1]
     powers = [2, 6, 10] if quick else np.arange(2, 11.5, 0.5).tolist()
@@ -106,8 +103,10 @@ def main() -> None:
         table.to_csv(RESULTS / "frame_contrast.csv", index=False, float_format="%.3g")
         chart(table)
     holds = default <= 5e-6 and gap <= 1e-9
-    print(f"verdict: {'the claim holds' if holds else 'the claim does not hold'}")
+    return Finding(holds)
 
+
+CLAIM = Claim(experiment, quick="few states, nothing written")
 
 if __name__ == "__main__":
-    main()
+    CLAIM.main()

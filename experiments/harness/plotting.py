@@ -7,8 +7,9 @@ from pathlib import Path
 import matplotlib as mpl
 from matplotlib.figure import Figure
 
-RESULTS = Path(__file__).parent / "results"
-FIGURES = Path(__file__).parent.parent / "docs" / "figures"
+HOME = Path(__file__).resolve().parent.parent
+RESULTS = HOME / "results"
+FIGURES = HOME.parent / "docs" / "figures"
 
 
 def new_figure(width: float, height: float) -> Figure:

@@ -8,7 +8,7 @@ there are several, one run before them does not count. Stages before the choice 
 formulations. One more row is the search that solves only the models it meets and proves nothing
 (`seqopt.placement.window_search`).
 
-Command: ``python -m experiments.runs SCENE ENGINE CRITERION REPEATS`` prints rows as JSON.
+Command: ``python -m experiments.harness.runs SCENE ENGINE CRITERION REPEATS`` prints rows as JSON.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from experiments.failing_steps import longer
+from experiments.harness.arches import longer
 from seqopt.engines.auto import AutoEngine
 from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.frame import FrameEngine

@@ -13,87 +13,42 @@ Medians of rounds. Bounds are the products alone, same shapes, dense in ready me
 Then one placement problem by general tools.
 
 Inputs: the shipped scene; seed 0; PyNiteFEA, openseespy and pyconmech if installed. Command:
-``OPENBLAS_NUM_THREADS=1 python -m experiments.peers [--quick]``. Writes
+``OPENBLAS_NUM_THREADS=1 python -m experiments.peers.peers [--quick]``. Writes
 ``experiments/results/peers.csv`` and ``docs/figures/peers.png`` if all are there.
 """
 
 from __future__ import annotations
 
-import argparse
 import time
-from collections.abc import Callable
 from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike
-from scipy import sparse
 
-from experiments.engine_speed import best
-from experiments.peer_chain import Answer, Peer, chain_of
-from experiments.peer_chart import BOUND, OURS, SPARSE, chart
-from experiments.peer_frames import PACKAGES, missing_packages
-from experiments.peer_loops import LOOPS, loop
-from experiments.peer_paths import PATHS, SLOW
-from experiments.plotting import RESULTS
-from seqopt.arrays import Floats, Ints
-from seqopt.engines.interface import Fields, Want, grip_columns
+from experiments.harness.claim import Claim, Finding, Options, Times
+from experiments.harness.plotting import RESULTS
+from experiments.harness.timing import best
+from experiments.peers.parts.bounds import products
+from experiments.peers.parts.chain import Answer, Peer, chain_of
+from experiments.peers.parts.chart import BOUND, OURS, SPARSE, chart
+from experiments.peers.parts.frames import PACKAGES, missing_packages
+from experiments.peers.parts.loops import LOOPS, loop
+from experiments.peers.parts.paths import PATHS, SLOW
+from experiments.peers.parts.workload import SETTINGS, Case, workload
+from seqopt.arrays import Floats
+from seqopt.engines.interface import Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
-from seqopt.placement.problem import Problem, pose
+from seqopt.placement.problem import Problem
 from seqopt.scene.scene_file import load_scene
-from seqopt.sequence.three_robots import three_robot_loop
-from seqopt.study.presets import EQUATIONS
 
 EXTRA = 'pip install "seqopt[peers]" openseespy'
-SETTINGS = ("reactions", "criterion", "all fields")
 PACKAGE, LOOP = 60.0, 20.0  # times the engine's time
 NEAR = 3.0  # times the dense products of the batch
 LIKE_RIGID, LIKE_BARS = 1e-9, 1e-4  # largest difference of peers with rigid bricks, stiff bars
 SLOWEST = ("PyNite", "pyconmech")  # answer one model of a kind in a round
-
-
-class Case(NamedTuple):
-    """The models of one brick count and number of grips: node numbers, places, what is asked."""
-
-    bricks: int
-    grips: Ints
-    columns: Ints
-    want: Want
-
-    def asked(self, setting: str) -> Want:
-        """Return what a setting asks of these models."""
-        return {"reactions": Want.SUPPORT, "criterion": self.want, "all fields": Want.TABLE}[
-            setting
-        ]
-
-
-class Recorder:
-    """An engine that remembers what it was asked."""
-
-    def __init__(self, net: Network) -> None:
-        self.engine = ComplianceEngine(net)
-        self.cases: list[Case] = []
-
-    @property
-    def network(self) -> Network:
-        """The engine's network."""
-        return self.engine.network
-
-    def solve(self, bricks: int, grips: ArrayLike, want: Want = Want.TABLE) -> Fields:
-        """Answer and remember."""
-        columns = grip_columns(self.network, bricks, grips)
-        self.cases.append(Case(bricks, np.asarray(grips), columns, want))
-        return self.engine.solve(bricks, grips, want)
-
-
-def workload(net: Network) -> tuple[Problem, list[Case]]:
-    """Return the posed problem and all models it takes."""
-    recorder = Recorder(net)
-    problem = pose(recorder, three_robot_loop(net), EQUATIONS)
-    return problem, recorder.cases
 
 
 def answer_all(engine: ComplianceEngine, cases: list[Case], setting: str) -> None:
@@ -107,54 +62,6 @@ def operators(net: Network, cases: list[Case]) -> ComplianceEngine:
     for case in cases:
         engine.solve(case.bricks, case.grips[:1], Want(0))
     return engine
-
-
-def products(
-    net: Network, cases: list[Case], setting: str, *, sparsely: bool = False
-) -> tuple[Callable[[], None], float]:
-    """Return a call that does only the products of a batch, and how many flops they are."""
-    rng = np.random.default_rng(0)
-    work: list[tuple[Floats | sparse.csr_array, Floats, Floats]] = []
-    flops = 0.0
-    for case in cases:
-        load = rng.standard_normal((len(case.grips), 6 * case.bricks + 1))
-        index = np.hstack([load_index(case), np.full((len(load), 1), load.shape[1] - 1)])
-        few = _spread(index, rng.standard_normal(index.shape), load.shape[1])
-        each = index.shape[1] if sparsely else load.shape[1]
-        for width in _widths(net, case, setting):
-            rows = rng.standard_normal((load.shape[1], width))
-            work.append((few if sparsely else load, rows, np.empty((len(load), width))))
-            flops += 2 * len(load) * each * width
-
-    def call() -> None:
-        for load, rows, out in work:
-            if isinstance(load, np.ndarray):
-                np.matmul(load, rows, out=out)
-            else:
-                load @ rows
-
-    call()
-    return call, flops
-
-
-def load_index(case: Case) -> Ints:
-    """Return the loads (S, 3r) that the grips of a case exert."""
-    return np.asarray(3 * case.columns[:, :, None] + np.arange(3)).reshape(len(case.columns), -1)
-
-
-def _spread(index: Ints, values: Floats, size: int) -> sparse.csr_array:
-    starts = np.arange(0, index.size + 1, index.shape[1])
-    return sparse.csr_array((values.ravel(), index.ravel(), starts), shape=(len(index), size))
-
-
-def _widths(net: Network, case: Case, setting: str) -> list[int]:
-    """Return the sizes of the fields that a setting asks of a case."""
-    sizes = (
-        (Want.EDGES, net.count_edges(case.bricks)),
-        (Want.DISPLACEMENTS, 3 * net.count_nodes(case.bricks)),
-        (Want.SUPPORT, 6),
-    )
-    return [size for flag, size in sizes if case.asked(setting) & flag]
 
 
 class Round(NamedTuple):
@@ -298,10 +205,8 @@ def judge(table: pd.DataFrame, ways: pd.DataFrame) -> bool:
     return all(holds)
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--quick", action="store_true", help="loops and paths, nothing written")
-    quick = parser.parse_args().quick
+def experiment(options: Options) -> Finding:
+    quick: bool = options.quick
     net = build_network(load_scene("arch25"))
     problem, cases = workload(net)
     print(
@@ -323,8 +228,10 @@ def main() -> None:
         both.to_csv(RESULTS / "peers.csv", index=False, float_format="%.4g")
         chart(table)
     without = f", without {', '.join(lacking)}; nothing stored" if lacking and not quick else ""
-    print(f"verdict: the claim {'holds' if judge(table, ways) else 'does not hold'}{without}")
+    return Finding(judge(table, ways), without)
 
+
+CLAIM = Claim(experiment, quick="loops and paths, nothing written", times=Times.JUDGED)
 
 if __name__ == "__main__":
-    main()
+    CLAIM.main()

@@ -17,20 +17,20 @@ or a refusal without ground, an exception that is none of these. Where several c
 a second table says which was taken.
 
 Inputs: random whole costs (20 draws), and the three-robot loop on an arch of seven bricks. Command:
-``python -m experiments.degenerate_placement [--quick]``. Writes
+``python -m experiments.placement.degenerate_placement [--quick]``. Writes
 ``experiments/results/degenerate_placement.csv``.
 """
 
 from __future__ import annotations
 
-import argparse
 from collections import Counter
 
 import numpy as np
 import pandas as pd
 
-from experiments.degenerate_cases import CASES, Case, Size, enumerated
-from experiments.plotting import RESULTS
+from experiments.harness.claim import Claim, Finding, Options
+from experiments.harness.plotting import RESULTS
+from experiments.placement.parts.degenerate_cases import CASES, Case, Size, enumerated
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.placement.certificate import check_selection
 from seqopt.placement.costs import PlacementProblem
@@ -120,10 +120,8 @@ def pivot(table: pd.DataFrame, column: str) -> str:
     return wide.reindex(columns=list(formulations())).to_string(na_rep="-")
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--quick", action="store_true", help="smaller problems, nothing written")
-    quick = parser.parse_args().quick
+def experiment(options: Options) -> Finding:
+    quick: bool = options.quick
     size, draws = (SMALL, 2) if quick else (FULL, DRAWS)
     table = pd.DataFrame([r for n, case in CASES.items() for r in outcomes(n, case, size, draws)])
     print(pivot(table, "status"))
@@ -135,8 +133,10 @@ def main() -> None:
     wrong = table[table["status"] == "wrong"]
     for row in wrong.itertuples():
         print(f"wrong: {row.case}, draw {row.seed}, {row.formulation}: {row.message}")
-    print(f"verdict: the claim {'does not hold' if len(wrong) else 'holds'}")
+    return Finding(wrong.empty)
 
+
+CLAIM = Claim(experiment, quick="smaller problems, nothing written")
 
 if __name__ == "__main__":
-    main()
+    CLAIM.main()

@@ -4,38 +4,30 @@ Method: the three-robot loop on chains of growing length, criterion `weighted`; 
 the sum solves the same posed problem in one process on one core, the best of several rounds counts,
 and the answers are certified. Posing the problem (all responses) is timed beside them.
 
-Inputs: chains on a half circle, and `arch25`. Command: ``python -m experiments.formulation_cost
-[--quick]``. Writes ``experiments/results/formulation_cost.csv`` and
-``docs/figures/formulation_cost.png``.
+Inputs: chains on a half circle, and `arch25`. Command: ``python -m
+experiments.placement.formulation_cost [--quick]``. Writes
+``experiments/results/formulation_cost.csv`` and ``docs/figures/formulation_cost.png``.
 """
 
 from __future__ import annotations
 
-import argparse
 from functools import partial
 
-import numpy as np
 import pandas as pd
 
-from experiments.engine_speed import best
-from experiments.plotting import RESULTS, new_figure, save_figure
+from experiments.harness.arches import half_circle
+from experiments.harness.claim import Claim, Finding, Options, Times, on_this_run
+from experiments.harness.plotting import RESULTS, new_figure, save_figure
+from experiments.harness.timing import best
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.placement.criteria import Criterion
 from seqopt.placement.formulation import Aim, formulations
 from seqopt.placement.plan import Posed, prepare, run
-from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.three_robots import three_robot_loop
-from seqopt.study.presets import EQUATIONS, ROBOTS, WEIGHTED
-
-
-def half_circle(count: int) -> Network:
-    """Return the network of an arch that turns from upright to upright."""
-    pitch = np.linspace(1.4, -1.4, count).tolist()
-    shape = ArchShape(pitch=pitch)
-    return build_network(arch_scene(shape, robots=ROBOTS))
+from seqopt.study.presets import EQUATIONS, WEIGHTED
 
 
 def problem_of(net: Network, criterion: Criterion) -> Posed:
@@ -77,10 +69,8 @@ def chart(table: pd.DataFrame) -> None:
     save_figure(figure, "formulation_cost.png")
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--quick", action="store_true", help="small chains, nothing written")
-    quick = parser.parse_args().quick
+def experiment(options: Options) -> Finding:
+    quick: bool = options.quick
     rounds = 1 if quick else 3
     counts = [6, 9] if quick else [6, 9, 13, 18, 25, 36, 50]
     table = pd.DataFrame([measure(half_circle(n), WEIGHTED, rounds) for n in counts])
@@ -98,8 +88,10 @@ def main() -> None:
         chart(table)
     exact = max(table["gap_overlap_dp"].max(), table["gap_overlap_mip"].max())
     holds = min(ratio.values()) >= 100 and exact <= 1e-6 and whole <= 0.5
-    print(f"verdict: the claim {'holds' if holds else 'does not hold on this run'}")
+    return on_this_run(holds=holds)
 
+
+CLAIM = Claim(experiment, quick="small chains, nothing written", times=Times.JUDGED)
 
 if __name__ == "__main__":
-    main()
+    CLAIM.main()

@@ -5,19 +5,18 @@ optimum, on any scene and criterion. On the reference arch a stiff-bar frame tak
 times as long; leaving the proof out, as the study's search does, saves at most half of the time
 with rigid bricks and at least two thirds with the frame.
 
-Method: scenes × engines × formulations × criteria, a row each (`experiments.runs`), every scene,
-engine and criterion in a process of its own on one core; what is repeated, after one run that does
-not count. Runs that are stored for this version are not repeated. A run that reaches its limit is
-charged the limit and a gap of one. There is no randomness.
+Method: scenes × engines × formulations × criteria, a row each (`experiments.harness.runs`), every
+scene, engine and criterion in a process of its own on one core; what is repeated, after one run
+that does not count. Runs that are stored for this version are not repeated. A run that reaches its
+limit is charged the limit and a gap of one. There is no randomness.
 
 Inputs: `arch25`, and arches of its shape with 7 to 49 bricks. Command: ``python -m
-experiments.speed_accuracy [--quick] [--fresh]``. Writes ``experiments/results/runs.csv``,
+experiments.placement.speed_accuracy [--quick] [--fresh]``. Writes ``experiments/results/runs.csv``,
 ``speed_accuracy.csv``, ``docs/figures/speed_accuracy.png`` and ``docs/figures/profiles.png``.
 """
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import platform
@@ -30,10 +29,11 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from experiments.plotting import RESULTS
-from experiments.profiles import shifted_mean
-from experiments.runs import NO_PROOF, REFERENCE, contenders
-from experiments.speed_charts import headline, profile_charts
+from experiments.harness.claim import Claim, Finding, Option, Options, Times, on_this_run
+from experiments.harness.plotting import RESULTS
+from experiments.harness.profiles import shifted_mean
+from experiments.harness.runs import NO_PROOF, REFERENCE, contenders
+from experiments.placement.parts.speed_charts import headline, profile_charts
 from seqopt.study.presets import CRITERIA
 
 STORE = RESULTS / "runs.csv"
@@ -69,7 +69,15 @@ def machine() -> str:
 def measure(spec: Spec, limit: float = LIMIT) -> list[dict[str, object]]:
     """Return the rows of one process, or rows that are charged its limit."""
     scene, engine, criterion, repeats = spec
-    command = [sys.executable, "-m", "experiments.runs", scene, engine, criterion, str(repeats)]
+    command = [
+        sys.executable,
+        "-m",
+        "experiments.harness.runs",
+        scene,
+        engine,
+        criterion,
+        str(repeats),
+    ]
     env = os.environ | {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
     try:
         done = subprocess.run(
@@ -163,11 +171,7 @@ def _arch25(ratios: pd.Series) -> float:
     return float(ratios["arch25", "equations-2-3"])
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--quick", action="store_true", help="one small arch, nothing written")
-    parser.add_argument("--fresh", action="store_true", help="repeat runs that are stored")
-    options = parser.parse_args()
+def experiment(options: Options) -> Finding:
     load = STORE.exists() and not options.quick and not options.fresh
     wanted = specs(quick=options.quick)
     RESULTS.mkdir(exist_ok=True)
@@ -182,9 +186,16 @@ def main() -> None:
         table.to_csv(RESULTS / "speed_accuracy.csv", index=False, float_format="%.4g")
         headline(runs)
         profile_charts(runs)
-    print(f"verdict: the claim {'holds' if all(parts.values()) else 'does not hold on this run'}")
+    return on_this_run(holds=all(parts.values()))
 
+
+CLAIM = Claim(
+    experiment,
+    quick="one small arch, nothing written",
+    times=Times.JUDGED,
+    options=(Option("--fresh", "repeat runs that are stored"),),
+)
 
 if __name__ == "__main__":
     np.seterr(all="raise", under="ignore")
-    main()
+    CLAIM.main()

@@ -32,27 +32,33 @@ CRA fails on the shelves too, and decides one and the same arch, like two of the
 density alone, which scales every force alike; it is a local search with absolute tolerances.
 
 Inputs: compas_cra, ``pip install "seqopt[witness]"``; LMGC90 (compas_lmgc90) in this or another
-Python. Command: ``python -m experiments.witnesses [--quick] [--lmgc90 PYTHON]``. Writes
+Python. Command: ``python -m experiments.stability.witnesses [--quick] [--lmgc90 PYTHON]``. Writes
 ``experiments/results/witnesses.csv`` and ``docs/figures/witnesses.png``.
 """
 
 from __future__ import annotations
 
-import argparse
 import sys
 import time
 from dataclasses import dataclass, replace
-from importlib.util import find_spec
 
 import numpy as np
 import pandas as pd
 
-from experiments.blocks import ring, stack
-from experiments.plotting import RESULTS
-from experiments.witness_chart import chart
-from experiments.witness_cra import SAMPLES, coupled, force_only, sample_scene, without_tension
-from experiments.witness_lmgc90 import moved_by, python_with_lmgc90
-from experiments.witness_scenes import Scene, arch, incline, scene_of
+from experiments.harness.claim import Claim, Extra, Finding, Option, Options, Times
+from experiments.harness.lmgc90 import python_with_lmgc90
+from experiments.harness.plotting import RESULTS
+from experiments.stability.parts.blocks import ring, stack
+from experiments.stability.parts.witness_chart import chart
+from experiments.stability.parts.witness_cra import (
+    SAMPLES,
+    coupled,
+    force_only,
+    sample_scene,
+    without_tension,
+)
+from experiments.stability.parts.witness_lmgc90 import moved_by
+from experiments.stability.parts.witness_scenes import Scene, arch, incline, scene_of
 from seqopt.contact.mortar import Mortar
 from seqopt.stability.assessment import Verdict, bonded, verdict_of
 from seqopt.stability.limit_analysis import compile_equilibrium
@@ -253,14 +259,7 @@ def trials(*, quick: bool) -> list[Trial]:
     return [*sample_trials(list(SAMPLES)), *freed, *built_trials(), *density_trials()]
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--quick", action="store_true", help="few cases, nothing written")
-    parser.add_argument("--lmgc90", default=sys.executable, help="a Python with compas_lmgc90")
-    options = parser.parse_args()
-    if find_spec("compas_cra") is None:
-        print('compas_cra is not installed: pip install "seqopt[witness]"')
-        sys.exit(2)
+def experiment(options: Options) -> Finding:
     python = None if options.quick else python_with_lmgc90(options.lmgc90)
     witnesses = ["rbe", "lmgc90"] if python else ["rbe"]
     all_trials = trials(quick=options.quick)
@@ -283,8 +282,16 @@ def main() -> None:
         if python
         else ", by one witness: LMGC90 was not asked or is not installed; nothing stored"
     )
-    print(f"verdict: the claim {'does not hold' if found else 'holds'}{alone}")
+    return Finding(not found, alone)
 
+
+CLAIM = Claim(
+    experiment,
+    quick="few cases, nothing written",
+    times=Times.SHOWN,
+    options=(Option("--lmgc90", "a Python with compas_lmgc90", sys.executable),),
+    needs=(Extra("compas_cra", 'pip install "seqopt[witness]"'),),
+)
 
 if __name__ == "__main__":
-    main()
+    CLAIM.main()

@@ -6,18 +6,19 @@ four states of the window) and count how often the published node comes first or
 three. Variants: which responses are ranked before and after the crown, up to which brick count the
 first set holds, and to what responses are rounded before they are ranked.
 
-Inputs: the shipped scene and plan. Command: ``python -m experiments.criteria_variants [--quick]``.
-Writes ``experiments/results/criteria_variants.csv`` and ``docs/figures/criteria_variants.png``.
+Inputs: the shipped scene and plan. Command: ``python -m experiments.study.criteria_variants
+[--quick]``. Writes ``experiments/results/criteria_variants.csv`` and
+``docs/figures/criteria_variants.png``.
 """
 
 from __future__ import annotations
 
-import argparse
 from dataclasses import replace
 
 import pandas as pd
 
-from experiments.plotting import RESULTS, new_figure, save_figure
+from experiments.harness.claim import Claim, Finding, Options
+from experiments.harness.plotting import RESULTS, new_figure, save_figure
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network
 from seqopt.placement.criteria import RESOLUTION, RankSum, equal
@@ -94,10 +95,8 @@ def chart(table: pd.DataFrame) -> None:
     save_figure(figure, "criteria_variants.png")
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--quick", action="store_true", help="few variants, nothing written")
-    quick = parser.parse_args().quick
+def experiment(options: Options) -> Finding:
+    quick: bool = options.quick
     engine = ComplianceEngine(build_network(load_scene("arch25")))
     also = ("T_max", "M_sup", "D_max", "F_move", "F_largest", "F_rob1", "F_rob2", "F_rob3")
     problem = pose(engine, three_robot_loop(engine.network), EQUATIONS, also=also)
@@ -116,8 +115,10 @@ def main() -> None:
     printed, best = table.iloc[0], ordered.iloc[0]
     holds = 10 <= printed["first"] < best["first"] and best["first"] >= 14
     holds = holds and printed["among_three"] >= 15 and best["among_three"] >= 20
-    print(f"verdict: the claim {'holds' if holds else 'does not hold'}")
+    return Finding(bool(holds))
 
+
+CLAIM = Claim(experiment, quick="few variants, nothing written")
 
 if __name__ == "__main__":
-    main()
+    CLAIM.main()

@@ -2,31 +2,32 @@
 
 These three are the secant stiffness of a vault test, the calibrated stiffness of all eight, and the
 errors against discrete elements. The others agree at least in part: half or more of their values
-are within 5 % of print beyond rounding (`experiments.yardstick`).
+are within 5 % of print beyond rounding (`experiments.harness.yardstick`).
 
-Method: `experiments.paper_items` lists the study's figures and tables in order with what has no
-numbers; `experiments.counterpart_rows` computes every printed value anew. Which three disagree was
-seen in the first run; the claim fails if a fourth does, if one of the three agrees, or if an item
-has no values. How far the calibration and the discrete elements are off, and why, is the subject
-of `experiments.calibration` and `experiments.discrete_arches`.
+Method: `experiments.study.parts.paper_items` lists the study's figures and tables in order with
+what has no numbers; `experiments.study.parts.counterpart_rows` computes every printed value anew.
+Which three disagree was seen in the first run; the claim fails if a fourth does, if one of the
+three agrees, or if an item has no values. How far the calibration and the discrete elements are
+off, and why, is the subject of `experiments.calibration.calibration` and
+`experiments.discrete.discrete_arches`.
 
-Inputs: the shipped scene, plan and tables. Command: ``python -m experiments.paper_counterparts
-[--quick]``. Writes ``experiments/results/paper_counterparts.csv``, ``docs/counterparts.md`` and
+Inputs: the shipped scene, plan and tables. Command: ``python -m
+experiments.study.paper_counterparts [--quick]``. Writes
+``experiments/results/paper_counterparts.csv``, ``docs/counterparts.md`` and
 ``docs/figures/counterpart_*.png``.
 """
 
 from __future__ import annotations
 
-import argparse
-
 import pandas as pd
 
-from experiments.counterpart_charts import draw_all
-from experiments.counterpart_models import ours
-from experiments.counterpart_page import DISAGREES, page, statement, verdict
-from experiments.counterpart_rows import tabulate
-from experiments.paper_items import ITEMS, Item
-from experiments.plotting import FIGURES, RESULTS
+from experiments.harness.claim import Claim, Finding, Options
+from experiments.harness.plotting import FIGURES, RESULTS
+from experiments.study.parts.counterpart_charts import draw_all
+from experiments.study.parts.counterpart_models import ours
+from experiments.study.parts.counterpart_page import DISAGREES, page, statement, verdict
+from experiments.study.parts.counterpart_rows import tabulate
+from experiments.study.parts.paper_items import ITEMS, Item
 
 KNOWN = {"fig:secant_stiff", "table:model_results", "table:validation_results"}
 QUICK = {"fig:arch_vault", "table:model_results", "table:2robot_tension", "table:optimization2"}
@@ -44,10 +45,8 @@ def faults(items: list[Item], table: pd.DataFrame) -> list[str]:
     return out
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--quick", action="store_true", help="a few items, nothing written")
-    quick = parser.parse_args().quick
+def experiment(options: Options) -> Finding:
+    quick: bool = options.quick
     items = [item for item in ITEMS if item.has_numbers and (not quick or item.label in QUICK)]
     own = ours()
     table = pd.concat([tabulate(item.label, own) for item in items], ignore_index=True)
@@ -63,8 +62,10 @@ def main() -> None:
     found = faults(items, table)
     for fault in found:
         print(f"against it: {fault}")
-    print(f"verdict: the claim {'does not hold' if found else 'holds'}")
+    return Finding(not found)
 
+
+CLAIM = Claim(experiment, quick="a few items, nothing written")
 
 if __name__ == "__main__":
-    main()
+    CLAIM.main()

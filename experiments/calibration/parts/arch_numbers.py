@@ -1,4 +1,4 @@
-"""The numbers that `experiments.identify_arch25` fits, and the scene that they describe."""
+"""What `experiments.calibration.identify_arch25` fits: the numbers, and the scene of them."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ LINE_NODES = {2: 2, 3: 4, 5: 9, 6: 10, 8: 15, 9: 16, 11: 21, 12: 22, 14: 26, 15:
 ALONG = [b for b in range(BRICKS) if b % 3 == 0]
 ACROSS = [b for b in range(BRICKS) if b % 3 != 0]
 PLAN_ANGLES = np.radians([-5.0, 5.0])
-PROVENANCE = (
+PROVENANCE = (  # word for word that of the shipped scene, which came from there
     "Geometry and joint stiffness identified from Tables A.1 and A.2 of Bruun et al., arXiv "
     "2104.04856, by experiments/identify_arch25.py; brick, density, payload and pattern as printed "
     "there (section 3.1)."

@@ -1,4 +1,4 @@
-"""The figure of `experiments.calibration`: errors, region, left-out fits and profiles."""
+"""The figure of `experiments.calibration.calibration`: errors, region, profiles."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 
-from experiments.plotting import new_figure, save_figure
+from experiments.harness.plotting import new_figure, save_figure
 from seqopt.arrays import Floats
 
 COLORS = {"b t": "tab:orange", "b t2": "tab:green", "b t3/12": "tab:blue"}

@@ -1,7 +1,7 @@
 """Which readings of the printed vault tests reproduce the study's stiffness column.
 
-Part of `experiments.calibration`. Every reading says what span and rise measure, where the load
-acts and over which width, how many bricks there are, how stiff joints are across, and what
+Part of `experiments.calibration.calibration`. Every reading says what span and rise measure, where
+the load acts and over which width, how many bricks there are, how stiff joints are across, and what
 multiplies the rotational stiffness. A reading is tried with the printed joint stiffnesses, each
 full or half, and with free ones: then the smallest possible largest deviation from the column is
 sought, over all tests and over some of them.
@@ -15,7 +15,7 @@ from itertools import product
 import numpy as np
 import pandas as pd
 
-from experiments.barrel_vaults import (
+from experiments.calibration.parts.barrel_vaults import (
     LINES,
     PLACES,
     Parts,

@@ -20,7 +20,7 @@ import numpy as np
 import pandas as pd
 from scipy.spatial import ConvexHull
 
-from experiments.arch_pads import (
+from experiments.discrete.parts.arch_pads import (
     SPREADS,
     AtCorners,
     bed_at_corners,
@@ -29,7 +29,7 @@ from experiments.arch_pads import (
     pads_at_corners,
     posed,
 )
-from experiments.witness_lmgc90 import python_with_lmgc90
+from experiments.harness.lmgc90 import python_with_lmgc90
 from seqopt.arrays import Floats
 from seqopt.contact.assembly import Assembly
 from seqopt.contact.mortar import EPOXY

@@ -1,4 +1,4 @@
-"""Picture of `experiments.discrete_arches`: how far apart the models are, beside print."""
+"""Picture of `experiments.discrete.discrete_arches`: how far apart the models are, beside print."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
-from experiments.plotting import new_figure, save_figure
+from experiments.harness.plotting import new_figure, save_figure
 
 PANELS = {"as printed": "even", "springs at corners": "corners"}  # joints, and as LMGC90 has them
 COLORS = {"node": "#2166ac", "pads, width": "#b2182b", "pads, thickness": "#e08214"}

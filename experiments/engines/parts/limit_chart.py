@@ -7,7 +7,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.ticker import NullLocator
 
-from experiments.plotting import new_figure, save_figure
+from experiments.harness.plotting import new_figure, save_figure
 
 REFUSED = 1e2  # where a refusal is drawn
 FLOOR = 1e-16

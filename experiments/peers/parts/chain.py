@@ -23,7 +23,7 @@ CONTRAST = 1e6  # bar over joint stiffness, where frames without corrections err
 
 
 class Answer(NamedTuple):
-    """Fields of one model as in `seqopt.engines.interface.Fields`; what was not asked for is empty."""
+    """Fields of one model, as in `seqopt.engines.interface.Fields`; what is not asked is empty."""
 
     edge_force: Floats
     displacement: Floats

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pandas as pd
 
-from experiments.plotting import new_figure, save_figure
+from experiments.harness.plotting import new_figure, save_figure
 
 OURS, BOUND, SPARSE = "seqopt", "dense products", "sparse products"
 LABELS = {

@@ -2,7 +2,7 @@
 
 Each model is kept for one brick count and only its pins are swapped. OpenSeesPy carries
 half-edges as rigid offsets of the joints' beams, which leaves it two nodes a brick; the two others
-need a bar for each half-edge. See `experiments.peer_chain` for how they show rigid bricks.
+need a bar for each half-edge. See `experiments.peers.parts.chain` for how they show rigid bricks.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from experiments.peer_chain import CONTRAST, Answer, Chain, Peer, about_anchor, beams
+from experiments.peers.parts.chain import CONTRAST, Answer, Chain, Peer, about_anchor, beams
 from seqopt.arrays import Floats, Ints
 from seqopt.engines.interface import Want
 from seqopt.network.network import GROUND

@@ -16,7 +16,7 @@ import numpy as np
 from scipy import linalg, sparse
 from scipy.sparse.linalg import splu
 
-from experiments.peer_chain import CONTRAST, Answer, Chain, chain_of
+from experiments.peers.parts.chain import CONTRAST, Answer, Chain, chain_of
 from seqopt.arrays import Floats, Ints, skew
 from seqopt.engines.interface import Want
 from seqopt.network.network import GROUND, Network

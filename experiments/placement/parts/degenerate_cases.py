@@ -8,7 +8,7 @@ from itertools import pairwise, product
 
 import numpy as np
 
-from experiments.formulation_cost import half_circle
+from experiments.harness.arches import half_circle
 from seqopt.arrays import Floats
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.placement.costs import Budget, CostProblem, LayeredCosts, PlacementProblem

@@ -8,9 +8,9 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from experiments.plotting import new_figure, save_figure
-from experiments.profiles import data_profile, pareto, performance_profile
-from experiments.runs import NO_PROOF, REFERENCE
+from experiments.harness.plotting import new_figure, save_figure
+from experiments.harness.profiles import data_profile, pareto, performance_profile
+from experiments.harness.runs import NO_PROOF, REFERENCE
 
 CLOSE = 0.01  # gap up to which an answer counts as close in profiles
 COLORS = {

@@ -7,8 +7,8 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.patches import Rectangle
 
-from experiments.plotting import new_figure, save_figure
-from experiments.witness_cra import SOUND, TORN
+from experiments.harness.plotting import new_figure, save_figure
+from experiments.stability.parts.witness_cra import SOUND, TORN
 from seqopt.stability.assessment import Verdict
 from seqopt.stability.limit_analysis import EXACT
 

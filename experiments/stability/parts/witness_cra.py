@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import linprog
 
-from experiments.witness_scenes import Scene, Solid, Touch
+from experiments.stability.parts.witness_scenes import Scene, Solid, Touch
 from seqopt.stability.assessment import Verdict
 
 SOUND = 3e-5  # tension up to this, over the mean weight of the free blocks, is none

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
 import subprocess
 import sys
 import tempfile
@@ -29,15 +28,6 @@ STEPS = 1000
 LIMIT = 300.0  # s
 FAR, VISIBLE, NEAR = 0.1, 1e-3, 0.02  # of the smallest block's diagonal
 SLOW = 0.05  # of the speed of a fall through that diagonal
-
-
-def python_with_lmgc90(python: str) -> str | None:
-    """Return the full path of a Python if it has LMGC90."""
-    found = shutil.which(python)
-    look = "import sys, importlib.util as u; sys.exit(u.find_spec('compas_lmgc90') is None)"
-    if found is None or subprocess.run([found, "-c", look], check=False).returncode:
-        return None
-    return str(Path(found).absolute())
 
 
 def moved_by(python: str, scene: Any, friction: float) -> str:

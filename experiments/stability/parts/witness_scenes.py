@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from experiments.blocks import BOX, Blocks, Contact, ring, stack, touching
+from experiments.stability.parts.blocks import BOX, Blocks, Contact, ring, stack, touching
 from seqopt.arrays import Floats
 from seqopt.contact.assembly import Assembly
 from seqopt.network.network import GROUND

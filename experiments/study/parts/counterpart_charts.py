@@ -10,42 +10,24 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from experiments.barrel_vaults import Vault, chain, vaults
-from experiments.counterpart_models import Ours, arch_corners, bed_of_springs, node_displacements
-from experiments.counterpart_page import NEAR, TITLES, caption
-from experiments.counterpart_rows import LOOP, RESPONSES, plan_rows
-from experiments.discrete_arches import STEPS
-from experiments.plotting import new_figure, save_figure
+from experiments.calibration.parts.barrel_vaults import Vault, chain, vaults
+from experiments.discrete.parts.pad_readings import STEPS
+from experiments.harness.plotting import new_figure, save_figure
+from experiments.study.parts.counterpart_axes import OFF, OURS, STUDY, number, of, pair, tidy
+from experiments.study.parts.counterpart_models import (
+    Ours,
+    arch_corners,
+    bed_of_springs,
+    node_displacements,
+)
+from experiments.study.parts.counterpart_page import NEAR, TITLES, caption
+from experiments.study.parts.counterpart_rows import LOOP, RESPONSES, plan_rows
 from seqopt.engines.interface import Want
 from seqopt.report.draw import ROBOT_COLORS, View, draw_bricks, draw_grips
 from seqopt.study.tables import printed
 
-OURS, STUDY, OFF = "#2166ac", "#222222", "#c8102e"
 VIEW = View(azimuth=35, elevation=22)
 Draw = Callable[[Figure, pd.DataFrame, Ours], None]
-
-
-def of(table: pd.DataFrame, label: str, quantity: str = "") -> pd.DataFrame:
-    """Return the rows of an item, or of one of its quantities."""
-    rows = table[table["id"] == label]
-    return rows[rows["quantity"] == quantity] if quantity else rows
-
-
-def number(rows: pd.DataFrame) -> pd.Series:
-    """Return the numbers at the end of where the rows are: steps, tests, bricks."""
-    return rows["at"].str.extract(r"(\d+)")[0].astype(int)
-
-
-def tidy(axes: Axes) -> None:
-    axes.grid(visible=True, lw=0.2)
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.tick_params(labelsize=7)
-
-
-def pair(axes: Axes, x: object, rows: pd.DataFrame, color: str = OURS, name: str = "") -> None:
-    """Draw our values filled and printed ones as rings."""
-    axes.plot(x, rows["ours"], ".", ms=5, color=color, label=f"{name}here")
-    axes.plot(x, rows["printed"], "o", ms=7, mfc="none", mew=0.8, color=color, label="printed")
 
 
 def geometry(figure: Figure, table: pd.DataFrame, own: Ours) -> None:

@@ -1,6 +1,6 @@
 """Printed and computed values of the study's arch, vault tests and discrete elements.
 
-The first half of `experiments.counterpart_rows`: what the model rests on.
+The first half of `experiments.study.parts.counterpart_rows`: what the model rests on.
 """
 
 from __future__ import annotations
@@ -12,18 +12,17 @@ from itertools import product
 import numpy as np
 import pandas as pd
 
-from experiments.arches_lmgc90 import error, inner_nodes, moved
-from experiments.barrel_vaults import chain, vaults
-from experiments.calibration import BED, fit, laws
-from experiments.discrete_arches import STEPS, Reading
-from experiments.yardstick import ROUNDING
+from experiments.calibration.parts.barrel_vaults import chain, vaults
+from experiments.calibration.parts.laws import BED, fit, laws
+from experiments.discrete.parts.arches_lmgc90 import error, inner_nodes, moved
+from experiments.discrete.parts.pad_readings import STEPS, Reading
+from experiments.harness.yardstick import ROUNDING
 from seqopt.arrays import Floats
 from seqopt.engines.interface import Engine
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network
 from seqopt.placement.problem import Problem, pose
-from seqopt.report.comparison import Comparison
-from seqopt.report.comparison import compare_methods
+from seqopt.report.comparison import Comparison, compare_methods
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.three_robots import three_robot_loop

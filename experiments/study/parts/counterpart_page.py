@@ -1,6 +1,6 @@
 """Captions of the counterparts, and the page of the documentation that lists them.
 
-Every number comes from the rows of `experiments.paper_counterparts`; a test compares them.
+Every number comes from the rows of `experiments.study.paper_counterparts`; a test compares them.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ import textwrap
 
 import pandas as pd
 
-from experiments.paper_items import ITEMS, Item
+from experiments.study.parts.paper_items import ITEMS, Item
 
 NEAR = 5.0  # percent beyond rounding, relative to the printed size or 1
 AGREES, PARTLY, DISAGREES = "agrees", "agrees in part", "disagrees"
@@ -28,10 +28,10 @@ INTRODUCTION = """\
 # Counterparts of the study's figures and tables
 
 Every figure and table of the [study](paper.md) that has numbers, and what seqopt gives in its
-place. `python -m experiments.paper_counterparts` computes all of it anew in a few seconds, draws
-the pictures and writes this page; `experiments/results/paper_counterparts.csv` holds every value.
-Photographs, sketches and definitions have no numbers. Where another experiment goes deeper, it is
-named too.
+place. `python -m experiments.study.paper_counterparts` computes all of it anew in a few seconds,
+draws the pictures and writes this page; `experiments/results/paper_counterparts.csv` holds every
+value. Photographs, sketches and definitions have no numbers. Where another experiment goes deeper,
+it is named too.
 
 The error is what exceeds the rounding of print, relative to the printed size or 1. An item *agrees*
 if every value is within 5 % of print, *agrees in part* if at least half are, and *disagrees*
@@ -86,7 +86,7 @@ def line(item: Item, table: pd.DataFrame) -> str:
     head = f"| {item.number}, section {item.section}: `{item.label}` | {item.shows} |"
     if not item.has_numbers:
         return f"{head} no: {item.why} | – | – | – |"
-    commands = ["paper_counterparts", *([item.also] if item.also else [])]
+    commands = ["study.paper_counterparts", *([item.also] if item.also else [])]
     named = ", ".join(f"`{name}`" for name in commands)
     picture = f"[picture](figures/counterpart_{item.picture}.png)"
     text = statement(item, table[table["id"] == item.label]).removeprefix(f"{item.number} ")

@@ -1,7 +1,7 @@
 """Printed and computed values, side by side, of every figure and table of the study.
 
-Every function yields the rows of one item of `experiments.paper_items`, named by its label in
-`COUNTERPARTS`.
+Every function yields the rows of one item of `experiments.study.parts.paper_items`, named by its
+label in `COUNTERPARTS`.
 """
 
 from __future__ import annotations
@@ -13,7 +13,8 @@ from itertools import product
 import numpy as np
 import pandas as pd
 
-from experiments.counterpart_models import (
+from experiments.harness.yardstick import ROUNDING, VALUES
+from experiments.study.parts.counterpart_models import (
     Ours,
     Row,
     Rows,
@@ -24,8 +25,7 @@ from experiments.counterpart_models import (
     stiffness,
     vault_dimensions,
 )
-from experiments.paper_items import CASCADE, COMPARED, MODIFIED, ROBOTS, TENSION
-from experiments.yardstick import ROUNDING, VALUES
+from experiments.study.parts.paper_items import CASCADE, COMPARED, MODIFIED, ROBOTS, TENSION
 from seqopt.sequence.schedule import OpenGrip, OpenStep
 from seqopt.sequence.steps import Step
 from seqopt.sequence.three_robots import modified_sequential, three_robot_loop

@@ -27,7 +27,7 @@ class Item:
     picture : str
         Name of the counterpart's picture; empty if it has no numbers.
     also : str
-        Other experiments that go deeper.
+        Another experiment that goes deeper, with its folder.
     parts : tuple of str
         Labels within it.
     why : str
@@ -58,36 +58,36 @@ class Item:
 ITEMS = (
     Item("fig:full_vault", "Figure 1", "3.1", "the finished vault", why="photograph"),
     Item("fig:arch_vault", "Figure 2", "3.1", "vault and central arch with dimensions", "geometry",
-         "identify_arch25",
+         "calibration.identify_arch25",
          why="Ours is what the bricks as identified from the responses take up."),
     Item("fig:2robot_traditional", "Figure 3", "3.1", "scaffolding on two sides", why="sketch"),
     Item("fig:doublecross", "Figure 4", "3.2.1", "the double-cross model",
          why="definition; drawn in `network.png`"),
     Item("table:exp_data", "Table 1", "3.2.2", "eight vault tests: dimensions", "vaults",
-         "calibration",
+         "calibration.calibration",
          why="These are inputs: ours are measured back from the modeled joints, r being the rise."),
     Item("fig:arch_test", "Figure 5", "3.2.2", "a vault test in general", why="sketch"),
     Item("fig:secant_stiff", "Figure 6", "3.2.2", "load and displacement of test 1, with secants",
-         "vaults", "calibration",
+         "vaults", "calibration.calibration",
          why="Ours is the bed of springs fitted to all eight tests, which meets the measured "
          "secant; the measured curve itself is in no table."),
     Item("table:model_results", "Table 2", "3.2.2", "measured and calibrated stiffness", "vaults",
-         "calibration",
+         "calibration.calibration",
          why="Ours is another law, with a smaller mean error; the study's law with its "
          "printed values does not give its column.", key="mean size of e_rel [%]"),
     Item("fig:3dec_image", "Figure 7", "3.2.3", "the discrete-element model", why="sketch"),
     Item("fig:3dec_image2", "Figure 8", "3.2.3", "displacements of blocks and of nodes", "discrete",
-         "discrete_arches",
+         "discrete.discrete_arches",
          why="The displacements that it draws are not printed, only how many nodes are compared.",
          counted="node counts (all that is printed)"),
     Item("table:validation_results", "Table 3", "3.2.3", "errors against discrete elements",
-         "discrete", "discrete_arches",
+         "discrete", "discrete.discrete_arches",
          why="No reading of the printed contacts comes near; ours is the printed stiffness with a "
          "robot that holds a node."),
     Item("fig:2rob_methods", "Figure 9", "4", "both two-robot sequences at bricks 17 to 19",
          "sequences", parts=("fig:two_robot_methods",)),
     Item("table:sequential_twist", "Table 4", "4.1", "the eight twisting steps", "twisting",
-         "failing_steps"),
+         "stability.failing_steps"),
     Item("fig:sequential_twist", "Figure 10", "4.1", "lever arm; displaced shape at step 35",
          "twisting", "figures", ("fig:sequential_twist_offcenter", "fig:sequential_twist_35"),
          why="The lever arm is support moment over robot force after the crown; the study's own "
@@ -106,7 +106,7 @@ ITEMS = (
          "sequences"),
     Item("fig:fab_loop", "Figure 12", "5.2.2", "the four-step loop", why="sketch"),
     Item("fig:3rob_sequence", "Figure 13", "5.2.2", "one loop, steps 59 to 62", "loop",
-         "criteria_variants", ("fig:3rob_58", "fig:3rob_59", "fig:3rob_60", "fig:3rob_61"),
+         "study.criteria_variants", ("fig:3rob_58", "fig:3rob_59", "fig:3rob_60", "fig:3rob_61"),
          why="The grips are the printed ones; as an optimum, O15 should take the first place."),
     Item("table:optimization_results", "Table 10", "5.3", "largest responses of three methods",
          "maxima", "figures",
@@ -121,7 +121,7 @@ ITEMS = (
          why="What is off is explained [there](paper.md#where-it-disagrees).",
          counted="values (T_pct to two edges)"),
     Item("table:experimental_data3", "Table B.1", "B", "the three-robot plan, step by step",
-         "sequences", "criteria_variants",
+         "sequences", "study.criteria_variants",
          why="The schedule is the loop's; its chosen nodes do not follow from the printed "
          "equations. Its responses are not at hand as data."),
 )  # fmt: skip

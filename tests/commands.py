@@ -1,0 +1,21 @@
+"""Experiments run as a user runs them, warnings being errors."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+from experiments.harness.catalog import HOME, modules
+
+
+def run(name, *arguments):
+    """Return what an experiment prints."""
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-m", modules()[name], *arguments],
+        cwd=HOME.parent,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
