@@ -1,1 +1,4 @@
-"""Experiments: one file per claim; each states claim, method, inputs and command."""
+"""Experiments: a folder per topic, a file per claim, beside it in ``parts`` what claims rest on.
+
+Each states claim, method, inputs and command; ``python -m experiments`` lists them.
+"""

@@ -2,68 +2,37 @@
 
 Command: ``python -m experiments`` lists; ``python -m experiments all [--quick]`` runs each one in
 a process of its own and, unless quick, stores verdicts and seconds in
-``experiments/results/verdicts.csv``. Experiments that take the clock run alone, the others two at a
-time, those first that took longest the last time. An experiment that an extra is missing for is
-named and left out. The exit status is 1 if a claim does not hold.
+``experiments/results/verdicts.csv``. Experiments whose times are a result run alone, the others two
+at a time, those first that took longest the last time. An experiment that an extra is missing for
+is named and left out. The exit status is 1 if a claim does not hold, or if none is found.
 """
 
 from __future__ import annotations
 
 import argparse
-import ast
 import os
 import subprocess
 import sys
 import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
-from pathlib import Path
 
 import pandas as pd
 
-from experiments.plotting import RESULTS
+from experiments.harness.catalog import claims, modules
+from experiments.harness.claim import MISSING, PREFIX, ClaimError
+from experiments.harness.plotting import HOME, RESULTS
 
-HOME = Path(__file__).parent
 STORE = RESULTS / "verdicts.csv"
-PREFIX = "verdict: the claim "
-MISSING = 2  # exit status of an experiment whose extra is not installed
 TOGETHER = 2  # experiments at a time, a core each, where no time is a result
 ONE_CORE = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
-
-
-def claims() -> dict[str, str]:
-    """Return the first sentence of every experiment that makes a claim, by its name."""
-    out = {}
-    for path in sorted(HOME.glob("*.py")):
-        text = ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or ""
-        if text.startswith("Claim: "):
-            out[path.stem] = text.split("\n\n")[0].removeprefix("Claim: ").replace("\n", " ")
-    return out
-
-
-def imports(name: str) -> set[str]:
-    """Return the modules that an experiment or one of its helpers imports."""
-    out = set()
-    for node in ast.walk(ast.parse((HOME / f"{name}.py").read_text(encoding="utf-8"))):
-        if isinstance(node, ast.Import):
-            out |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom) and node.module:
-            out.add(node.module)
-    return out
-
-
-def takes_time(name: str) -> bool:
-    """Return whether times are a result: the experiment or a direct helper imports the clock."""
-    own = imports(name)
-    helpers = [part.removeprefix("experiments.") for part in own if part.startswith("experiments.")]
-    return "time" in own or any("time" in imports(helper) for helper in helpers)
 
 
 def run(name: str, *arguments: str) -> tuple[str, float]:
     """Return how an experiment ended and the seconds it took."""
     start = time.perf_counter()
     done = subprocess.run(
-        [sys.executable, "-m", f"experiments.{name}", *arguments],
+        [sys.executable, "-m", modules()[name], *arguments],
         capture_output=True,
         text=True,
         check=False,
@@ -95,16 +64,23 @@ def ended(
 
 def run_all(*arguments: str) -> pd.DataFrame:
     """Run every experiment; return a row each."""
-    last, rows = stored("seconds"), []
-    names = sorted(claims(), key=lambda name: -float(str(last.get(name, "inf"))))
-    alone = [name for name in names if takes_time(name)]
+    every, last, rows = claims(), stored("seconds"), []
+    names = sorted(every, key=lambda name: -float(str(last.get(name, "inf"))))
+    alone = [name for name in names if every[name].takes_time]
     others = [name for name in names if name not in alone]
     for group, together in ((others, TOGETHER), (alone, 1)):
         for name, (verdict, seconds) in ended(group, together, *arguments):
             print(f"{name:22}{seconds:7.1f} s  {verdict}", flush=True)
             rows.append({"experiment": name, "verdict": verdict, "seconds": seconds})
     table = pd.DataFrame(rows).sort_values("experiment", ignore_index=True)
-    return table.assign(claim=table["experiment"].map(claims()))
+    return table.assign(claim=[every[name].text for name in table["experiment"]])
+
+
+def listed() -> Iterator[str]:
+    """Yield a line for every experiment: its name, last verdict and claim."""
+    verdicts = stored("verdict")
+    for name, claim in claims().items():
+        yield f"{name:22}{verdicts.get(name, 'not run')!s:22}{claim.text}"
 
 
 def main() -> int:
@@ -114,12 +90,14 @@ def main() -> int:
     parser.add_argument("what", nargs="?", choices=("list", "all"), default="list")
     parser.add_argument("--quick", action="store_true", help="reduced size, nothing stored")
     options = parser.parse_args()
-    if options.what == "list":
-        verdicts = stored("verdict")
-        for name, claim in claims().items():
-            print(f"{name:22}{verdicts.get(name, 'not run')!s:22}{claim}")
-        return 0
-    table = run_all(*(["--quick"] if options.quick else []))
+    try:
+        if options.what == "list":
+            print(*listed(), sep="\n")
+            return 0
+        table = run_all(*(["--quick"] if options.quick else []))
+    except ClaimError as error:
+        print(error, file=sys.stderr)
+        return 1
     if not options.quick:
         table.to_csv(STORE, index=False, float_format="%.1f", lineterminator="\n")
     return int(not table["verdict"].str.startswith(("holds", "left out")).all())

@@ -3,18 +3,23 @@
 Method: draw `arch25` with its network; the twisting step 35 of the sequential method beside the
 cantilever method at the same step; responses along all methods; printed against computed ones.
 
-Inputs: the shipped scene and tables. Command: ``python -m experiments.figures``. Writes
+Inputs: the shipped scene and tables. Command: ``python -m experiments.figures [--quick]``. Writes
 ``docs/figures/*.png``.
 """
 
 from __future__ import annotations
 
-from experiments.plotting import new_figure, save_figure
-from experiments.yardstick import VALUES
+from collections.abc import Callable
+
+from matplotlib.figure import Figure
+
+from experiments.harness.claim import Claim, Finding, Options
+from experiments.harness.plotting import new_figure, save_figure
+from experiments.harness.yardstick import VALUES
 from seqopt.engines.interface import Engine, Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network
-from seqopt.report.comparison import compare_methods
+from seqopt.report.comparison import method_tables
 from seqopt.report.draw import View, draw_bricks, draw_grips, draw_network, draw_responses
 from seqopt.scene.scene_file import load_scene
 from seqopt.study.tables import printed_steps
@@ -29,7 +34,7 @@ COLUMNS = {
 }
 
 
-def twisting_step(engine: Engine) -> None:
+def twisting_step(engine: Engine) -> Figure:
     """Draw the arch, 18 bricks held off their line, and the same held on a brick along it."""
     net = engine.network
     figure = new_figure(10, 4.2)
@@ -45,19 +50,19 @@ def twisting_step(engine: Engine) -> None:
         draw_bricks(axes, net, 18, VIEW, twist=fields.brick_twist[0], magnify=MAGNIFY)
         draw_grips(axes, net, (None, node, None), VIEW)
         axes.set_title(f"{name}, motion x {MAGNIFY:g}", fontsize=9)
-    save_figure(figure, "twisting_step.png")
+    return figure
 
 
-def network_picture(engine: Engine) -> None:
+def network_picture(engine: Engine) -> Figure:
     net = engine.network
     figure = new_figure(8, 6)
     axes = figure.subplots()
     draw_bricks(axes, net, 25, VIEW, alpha=0.15)
     draw_network(axes, net, 25, VIEW, numbers=True)
-    save_figure(figure, "network.png")
+    return figure
 
 
-def axial_forces(engine: Engine) -> None:
+def axial_forces(engine: Engine) -> Figure:
     """Draw the edges of two states, red in tension, blue in compression."""
     net = engine.network
     figure = new_figure(9, 4.2)
@@ -70,19 +75,19 @@ def axial_forces(engine: Engine) -> None:
         draw_network(panel, net, bricks, VIEW, edge_force=engine.solve(bricks, held).edge_force[0])
         draw_grips(panel, net, grips, VIEW)
         panel.set_title(f"{bricks} bricks", fontsize=9)
-    save_figure(figure, "axial_forces.png")
+    return figure
 
 
-def responses_along_the_build(engine: Engine) -> None:
+def responses_along_the_build(engine: Engine) -> Figure:
     figure = new_figure(8, 8)
     axes = figure.subplots(len(COLUMNS), 1, sharex=True)
-    draw_responses(axes, compare_methods(engine).tables, COLUMNS)
+    draw_responses(axes, method_tables(engine)[0], COLUMNS)
     axes[-1].set(yscale="log", ylim=(0.1, 500))
-    save_figure(figure, "responses.png")
+    return figure
 
 
-def printed_against_computed(engine: Engine) -> None:
-    tables = compare_methods(engine).tables
+def printed_against_computed(engine: Engine) -> Figure:
+    tables = method_tables(engine)[0]
     figure = new_figure(9, 6.5)
     panels = figure.subplots(3, 4).ravel()
     for panel, column in zip(panels, VALUES, strict=False):
@@ -100,22 +105,31 @@ def printed_against_computed(engine: Engine) -> None:
     panels[2].set_axis_off()  # rob3 takes no part in these methods
     figure.supxlabel("printed", fontsize=9)
     figure.supylabel("computed", fontsize=9)
-    save_figure(figure, "agreement.png")
+    return figure
 
 
-def main() -> None:
+PICTURES: dict[str, Callable[[Engine], Figure]] = {
+    "twisting_step.png": twisting_step,
+    "network.png": network_picture,
+    "axial_forces.png": axial_forces,
+    "responses.png": responses_along_the_build,
+    "agreement.png": printed_against_computed,
+}
+
+
+def experiment(options: Options) -> Finding:
     engine = ComplianceEngine(build_network(load_scene("arch25")))
-    for draw in (
-        twisting_step,
-        network_picture,
-        axial_forces,
-        responses_along_the_build,
-        printed_against_computed,
-    ):
-        draw(engine)
+    for name, draw in PICTURES.items():
+        figure = draw(engine)
+        if options.quick:
+            figure.canvas.draw()
+        else:
+            save_figure(figure, name)
         print(f"drawn: {draw.__name__}")
-    print("verdict: the claim holds: every picture was drawn from the shipped scene")
+    return Finding(holds=True, note=": every picture was drawn from the shipped scene")
 
+
+CLAIM = Claim(experiment, quick="all pictures, nothing written")
 
 if __name__ == "__main__":
-    main()
+    CLAIM.main()

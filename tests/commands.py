@@ -5,14 +5,14 @@ from __future__ import annotations
 import subprocess
 import sys
 
-from tests.builders import ROOT
+from experiments.harness.catalog import HOME, modules
 
 
 def run(name, *arguments):
     """Return what an experiment prints."""
     done = subprocess.run(
-        [sys.executable, "-W", "error", "-m", f"experiments.{name}", *arguments],
-        cwd=ROOT,
+        [sys.executable, "-W", "error", "-m", modules()[name], *arguments],
+        cwd=HOME.parent,
         capture_output=True,
         text=True,
         check=False,

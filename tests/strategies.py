@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from hypothesis import strategies as st
 
-from experiments.walls import running_bond
+from experiments.harness.walls import running_bond
 from seqopt.placement.costs import CostProblem, LayeredCosts
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.study.presets import ROBOTS

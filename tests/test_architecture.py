@@ -8,6 +8,8 @@ from pathlib import Path
 import networkx as nx
 import pytest
 
+from experiments.harness.catalog import claims
+
 ROOT = Path(__file__).resolve().parent.parent
 
 ROOMS = (
@@ -30,6 +32,8 @@ SOLVER_HOME = "formulations"
 TALKS_TO_SOLVERS = "formulations.solvers"  # the one formulations may import of each other
 MECHANICS = {"network.statics", "network.kinematics", "engines.rigid"}  # not for the frame
 LINES, LINES_OF_A_FUNCTION = 300, 50
+PARAMETERS = 6  # of an experiment's function
+DRAWS_ON_ALL = "study"  # the topic that sets every other one beside the paper
 MOST_ROOMS = 15
 
 
@@ -205,3 +209,58 @@ def test_every_room_has_a_folder_of_tests():
 
 def test_a_room_without_tests_is_seen():
     assert untested(rooms() | {"attic"}) == {"attic"}
+
+
+def topic(module: str) -> str:
+    """Return the folder of an experiment's module."""
+    return module.split(".")[1]
+
+
+def crossed(modules: nx.DiGraph, makers: set[str]) -> list[str]:
+    """Return imports of claims, and of parts and topics that are none of the importer's."""
+    out = []
+    for a, b in modules.edges:
+        shared = topic(b) in ("harness", topic(a))
+        open_to = a == "experiments.__main__" or (topic(a) == DRAWS_ON_ALL and ".parts." in b)
+        if b in makers or not (shared or open_to):
+            out.append(f"{a} imports {b}")
+    return out
+
+
+def test_claims_stand_apart_from_their_parts():
+    """Nothing imports a claim; parts serve their own topic; the harness knows no topic."""
+    modules, makers = graph("experiments"), {claim.module for claim in claims().values()}
+    assert crossed(modules, makers) == []
+    for path in sources("experiments"):
+        text = ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or ""
+        assert text.startswith("Claim: ") == (dotted(path) in makers), path
+
+
+@pytest.mark.parametrize(
+    ("a", "b"),
+    [
+        ("experiments.engines.engine_limits", "experiments.engines.engine_speed"),
+        ("experiments.engines.engine_limits", "experiments.peers.parts.chain"),
+        ("experiments.harness.runs", "experiments.engines.parts.grip_sets"),
+    ],
+)
+def test_an_experiment_that_reaches_across_is_seen(a, b):
+    modules, makers = graph("experiments"), {claim.module for claim in claims().values()}
+    modules.add_edge(a, b)
+    assert crossed(modules, makers) == [f"{a} imports {b}"]
+
+
+def test_claims_that_read_the_clock_declare_it():
+    modules = graph("experiments")
+    clocks = {dotted(path) for path in sources("experiments") if "time" in imports(path)}
+    for name, claim in claims().items():
+        reads = clocks & {claim.module, *nx.descendants(modules, claim.module)}
+        assert bool(reads) == claim.takes_time, name
+
+
+def test_experiments_take_few_parameters():
+    for path in sources("experiments"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.FunctionDef):
+                own = [*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs]
+                assert len(own) <= PARAMETERS, f"{path}: {node.name}"

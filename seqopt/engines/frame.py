@@ -24,7 +24,7 @@ from seqopt.engines.rigid.mechanism import require_resistance
 from seqopt.errors import SolverError
 from seqopt.network.network import Network, PartKind
 
-CONTRAST = 1e7  # bar over joint stiffness; see experiments/frame_contrast.py
+CONTRAST = 1e7  # bar over joint stiffness; see experiments/engines/frame_contrast.py
 REFINEMENTS = 3
 CONVERGED = 1e-6  # largest last correction of an accepted solution, relative to it
 SUSPICIOUS = 1e-9  # a smallest scaled eigenvalue below this, over the contrast, is looked into

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from experiments.blocks import ring, stack
+from experiments.stability.parts.blocks import ring, stack
 from formulations.limit_analysis import compile_equilibrium
 from seqopt.contact.mortar import Mortar
 from seqopt.stability.assessment import bonded

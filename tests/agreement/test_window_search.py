@@ -7,8 +7,7 @@ from hypothesis import given
 
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network
-from seqopt.placement.formulation import find_formulation
-from seqopt.placement.plan import run
+from seqopt.placement.plan import solve
 from seqopt.placement.problem import Limit, pose
 from seqopt.placement.window_search import search_windows
 from seqopt.responses.choices import window_models
@@ -38,13 +37,15 @@ class Counting:
 def test_it_chooses_as_the_cascade_does(engine25, method, criterion):
     schedule = SCHEDULES[method](engine25.network)
     counting = Counting(engine25)
-    found = search_windows(counting, schedule, CRITERIA[criterion])
+    found = solve(pose(counting, schedule, CRITERIA[criterion]), "cascade", proof=False)
     problem = pose(engine25, schedule, CRITERIA[criterion])
     for name in ("cascade", "rank_search"):
-        assert found.choice == run(problem, find_formulation(name))[0].choice
-    assert found.plan == schedule.fill(problem.nodes(found.choice))
+        plan = solve(problem, name)
+        assert found.nodes == plan.nodes
+        assert found.steps == plan.steps
     assert found.models == counting.sets
-    fewest = window_models(schedule, found.choice)
+    fewest = window_models(schedule, found.selection.choice)
+    assert fewest == found.models_needed == plan.models_needed
     assert fewest <= found.models <= fewest + len(schedule.moves)
     assert found.models <= problem.evaluation.models
 
@@ -52,9 +53,10 @@ def test_it_chooses_as_the_cascade_does(engine25, method, criterion):
 @pytest.mark.parametrize(("response", "bound"), [("F_largest", 300), ("M_sup", 12), ("T_max", 80)])
 def test_under_a_limit_that_binds_it_chooses_as_the_cascade_does(engine25, response, bound):
     schedule, limits = three_robot_loop(engine25.network), [Limit(response, bound)]
-    found = search_windows(engine25, schedule, EQUATIONS, limits)
-    selection, _ = run(pose(engine25, schedule, EQUATIONS, limits), find_formulation("cascade"))
-    assert found.choice == selection.choice != search_windows(engine25, schedule, EQUATIONS).choice
+    problem = pose(engine25, schedule, EQUATIONS, limits)
+    found = search_windows(problem)
+    assert found.choice == solve(problem, "cascade").selection.choice
+    assert found.choice != search_windows(pose(engine25, schedule, EQUATIONS)).choice
 
 
 @given(scene=arches(min_bricks=4, max_bricks=7).map(far_reaching))
@@ -62,5 +64,5 @@ def test_on_any_chain_it_chooses_as_the_cascade_does(scene):
     engine = ComplianceEngine(build_network(scene))
     schedule = three_robot_loop(engine.network)
     problem = pose(engine, schedule, WEIGHTED)
-    found = search_windows(engine, schedule, WEIGHTED)
-    assert found.choice == run(problem, find_formulation("cascade"))[0].choice
+    found = search_windows(problem)
+    assert found.choice == solve(problem, "cascade").selection.choice

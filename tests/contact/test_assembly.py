@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.blocks import stack
+from experiments.stability.parts.blocks import stack
 from seqopt.contact.mortar import Mortar
 from seqopt.errors import SceneError
 from seqopt.network.network import GROUND

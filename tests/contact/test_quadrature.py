@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from experiments.blocks import stack
+from experiments.stability.parts.blocks import stack
 from seqopt.contact.quadrature import face_quadrature
 
 

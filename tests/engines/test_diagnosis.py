@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.limit_scenes import HELD, LOOSE_AT, chain, loosened, without_joint
-from experiments.reference_chain import solve_exactly
-from experiments.walls import running_bond
+from experiments.engines.parts.limit_scenes import HELD, LOOSE_AT, chain, loosened, without_joint
+from experiments.engines.parts.reference_chain import solve_exactly
+from experiments.harness.walls import running_bond
 from seqopt.engines.diagnosis import FLOOR, UNRESISTED, WELL, Finding, diagnose, residual, spectrum
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import Want, grip_columns

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.limit_scenes import HELD, LOOSE_AT, chain, loosened
-from experiments.reference_chain import solve_exactly
+from experiments.engines.parts.limit_scenes import HELD, LOOSE_AT, chain, loosened
+from experiments.engines.parts.reference_chain import solve_exactly
 from seqopt.engines.interface import Want, grip_columns
 from seqopt.engines.rigid import compliance
 from seqopt.engines.rigid.compliance import ComplianceEngine, solve_batch

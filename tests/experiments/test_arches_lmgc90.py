@@ -10,8 +10,8 @@ import sys
 import numpy as np
 import pytest
 
-from experiments import arches_lmgc90, springs_lmgc90
-from experiments.arch_pads import (
+from experiments.discrete.parts import arches_lmgc90, springs_lmgc90
+from experiments.discrete.parts.arch_pads import (
     SPREADS,
     STIFFER,
     bed_at_corners,
@@ -20,7 +20,7 @@ from experiments.arch_pads import (
     padded,
     posed,
 )
-from experiments.arches_lmgc90 import (
+from experiments.discrete.parts.arches_lmgc90 import (
     PAD,
     asked,
     error,
@@ -32,7 +32,7 @@ from experiments.arches_lmgc90 import (
     spread_engine,
     witness,
 )
-from experiments.witness_lmgc90 import python_with_lmgc90
+from experiments.harness.lmgc90 import python_with_lmgc90
 from seqopt.engines.discrete.system import Across, BedStiffness, Pinch
 from seqopt.network.network import GROUND
 from seqopt.sequence.two_robots import sequential

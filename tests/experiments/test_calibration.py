@@ -7,7 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.barrel_vaults import (
+from experiments.calibration.calibration import (
+    chosen_anew,
+    intervals,
+    left_out,
+    squares,
+    turning_share,
+)
+from experiments.calibration.parts.barrel_vaults import (
     Chain,
     chain,
     load_stiffness,
@@ -16,20 +23,8 @@ from experiments.barrel_vaults import (
     scene,
     vaults,
 )
-from experiments.calibration import (
-    BED,
-    chosen_anew,
-    errors,
-    fit,
-    intervals,
-    laws,
-    left_out,
-    median_scale,
-    square_scale,
-    squares,
-    turning_share,
-)
-from experiments.calibration_readings import GROUPS, RATIO, against_study, closest
+from experiments.calibration.parts.calibration_readings import GROUPS, RATIO, against_study, closest
+from experiments.calibration.parts.laws import BED, errors, fit, laws, median_scale, square_scale
 from seqopt.network.build import build_network
 from seqopt.network.kinematics import spring_maps
 from seqopt.study.tables import printed

@@ -8,11 +8,18 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from experiments.counterpart_models import ours
-from experiments.counterpart_page import AGREES, DISAGREES, PARTLY, TITLES, page, verdict
-from experiments.counterpart_rows import COUNTERPARTS, cell, tabulate
-from experiments.paper_counterparts import KNOWN, faults
-from experiments.paper_items import ITEMS
+from experiments.study.paper_counterparts import KNOWN, faults
+from experiments.study.parts.counterpart_models import ours
+from experiments.study.parts.counterpart_page import (
+    AGREES,
+    DISAGREES,
+    PARTLY,
+    TITLES,
+    page,
+    verdict,
+)
+from experiments.study.parts.counterpart_rows import COUNTERPARTS, cell, tabulate
+from experiments.study.parts.paper_items import ITEMS
 from tests.builders import ROOT
 
 STORED = pd.read_csv(ROOT / "experiments" / "results" / "paper_counterparts.csv")

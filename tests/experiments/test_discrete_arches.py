@@ -6,23 +6,20 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from experiments import discrete_arches
-from experiments.arch_pads import AtCorners, pads_at_corners
-from experiments.arches_lmgc90 import error, moved
-from experiments.discrete_arches import (
-    CORNERS,
-    STEPS,
-    Reading,
+from experiments.discrete import discrete_arches
+from experiments.discrete.discrete_arches import (
     best_sides,
     largest_fall,
     missing,
-    readings,
     row_of,
     stresses,
     within_limits,
     witness_rows,
 )
-from experiments.plotting import RESULTS
+from experiments.discrete.parts.arch_pads import AtCorners, pads_at_corners
+from experiments.discrete.parts.arches_lmgc90 import error, moved
+from experiments.discrete.parts.pad_readings import CORNERS, STEPS, Reading, readings
+from experiments.harness.plotting import RESULTS
 from seqopt.engines.discrete.system import Across, Pinch, pads
 from seqopt.sequence.two_robots import sequential
 from seqopt.study.tables import printed

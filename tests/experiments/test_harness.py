@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 import threading
 import time
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from experiments.__main__ import TOGETHER, claims, main, run, run_all, takes_time
-from experiments.profiles import data_profile, pareto, performance_profile, shifted_mean
-from experiments.runs import ENGINES, NO_PROOF, REFERENCE, rows
-from experiments.speed_accuracy import KEY, collect, holds, measure, specs, summarize
-from experiments.speed_charts import headline, profile_charts
+from experiments.__main__ import TOGETHER, claims, main, run, run_all
+from experiments.harness.catalog import modules
+from experiments.harness.claim import Claim, ClaimError, Extra, Finding, Option, on_this_run
+from experiments.harness.profiles import data_profile, pareto, performance_profile, shifted_mean
+from experiments.harness.runs import ENGINES, NO_PROOF, REFERENCE, rows
+from experiments.placement.parts.speed_charts import headline, profile_charts
+from experiments.placement.speed_accuracy import KEY, collect, holds, measure, specs, summarize
 from seqopt.placement.formulation import formulations
 from seqopt.study.presets import CRITERIA
 from tests.builders import ROOT
@@ -58,7 +62,7 @@ def test_everything_runs_and_is_a_row(smoke):
 def test_stored_runs_are_not_repeated(smoke, monkeypatch):
     calls = []
     monkeypatch.setattr(
-        "experiments.speed_accuracy.measure",
+        "experiments.placement.speed_accuracy.measure",
         lambda spec: calls.append(spec) or measured(smoke, spec),
     )
     wanted = [("chain7", REFERENCE, c, 1) for c in CRITERIA]
@@ -108,7 +112,8 @@ def test_charts_and_table_come_from_rows(smoke, monkeypatch):
     for name in ("headline", "profile_charts"):
         assert name in globals()
     monkeypatch.setattr(
-        "experiments.speed_charts.save_figure", lambda figure, name: saved.append((name, figure))
+        "experiments.placement.parts.speed_charts.save_figure",
+        lambda figure, name: saved.append((name, figure)),
     )
     table = smoke.assign(scene="arch25")
     headline(table)
@@ -156,7 +161,7 @@ def test_shifted_mean():
 def test_a_verdict_is_the_last_line_of_a_run_that_ended_well(monkeypatch, printed, status, verdict):
     done = subprocess.CompletedProcess([], status, f"table\n{printed}\n", "")
     monkeypatch.setattr("experiments.__main__.subprocess.run", lambda *_, **__: done)
-    assert run("any")[0] == verdict
+    assert run("figures")[0] == verdict
 
 
 def test_all_claims_are_listed():
@@ -168,18 +173,98 @@ def test_all_claims_are_listed():
     assert "blocks" not in claims()
 
 
-TIMED = {
-    "engine_speed",
-    "fidelity_ladder",
-    "formulation_cost",
-    "peers",
-    "speed_accuracy",
-    "witnesses",
-}
+TIMED = {name for name, claim in claims().items() if claim.takes_time}
 
 
-def test_what_takes_the_clock_is_known():
-    assert {name for name in claims() if takes_time(name)} == TIMED
+def test_every_claim_is_found_by_its_plain_name_and_starts_its_module():
+    for name, claim in claims().items():
+        assert claim.module == modules()[name]
+        assert claim.module.split(".")[-1] == name
+        assert claim.text.endswith(".")
+
+
+def test_no_claims_are_an_error_and_not_an_empty_list(tmp_path, monkeypatch, capsys):
+    (tmp_path / "engines" / "parts").mkdir(parents=True)
+    (tmp_path / "engines" / "__init__.py").touch()
+    (tmp_path / "engines" / "parts" / "chart.py").touch()
+    with pytest.raises(ClaimError, match="no experiments found in"):
+        modules(tmp_path)
+    monkeypatch.setattr("experiments.harness.catalog.modules", lambda: modules(tmp_path))
+    for arguments in ([], ["all", "--quick"]):
+        monkeypatch.setattr("sys.argv", ["experiments", *arguments])
+        assert main() == 1
+        assert len(capsys.readouterr().err.splitlines()) == 1
+
+
+def test_two_experiments_of_one_name_are_an_error(tmp_path):
+    for folder in ("engines", "discrete"):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "speed.py").touch()
+    with pytest.raises(ClaimError, match="two experiments are named speed"):
+        modules(tmp_path)
+
+
+def test_a_module_among_the_claims_that_declares_none_is_an_error(monkeypatch):
+    helper = "experiments.engines.parts.grip_sets"
+    monkeypatch.setattr("experiments.harness.catalog.modules", lambda: {"grip_sets": helper})
+    with pytest.raises(ClaimError, match=f"{helper} declares no CLAIM"):
+        claims()
+
+
+@pytest.mark.parametrize(
+    ("finding", "line"),
+    [
+        (Finding(holds=True), "verdict: the claim holds"),
+        (Finding(holds=False, note=": 79 numbers"), "verdict: the claim does not hold: 79 numbers"),
+        (on_this_run(holds=True), "verdict: the claim holds"),
+        (on_this_run(holds=False), "verdict: the claim does not hold on this run"),
+        (None, ""),
+    ],
+)
+def test_the_verdict_line(capsys, finding, line):
+    Claim(stand_in(finding), quick="").main([])
+    assert capsys.readouterr().out == (f"{line}\n" if line else "")
+
+
+def test_options_are_switches_or_texts():
+    options = (Option("--fresh", ""), Option("--python", "", "python3"))
+    claim = Claim(stand_in(None), quick="", options=options)
+    assert vars(claim.parse([])) == {"quick": False, "fresh": False, "python": "python3"}
+    assert claim.parse(["--quick", "--fresh", "--python", "x"]).python == "x"
+
+
+def test_a_missing_extra_ends_with_its_own_status(capsys):
+    claim = Claim(stand_in(None), quick="", needs=(Extra("no_such_module", "pip install it"),))
+    with pytest.raises(SystemExit) as ended:
+        claim.main([])
+    assert ended.value.code == 2
+    assert capsys.readouterr().out == "no_such_module is not installed: pip install it\n"
+
+
+def test_a_claim_without_its_sentence_is_an_error():
+    with pytest.raises(ClaimError, match="starts with 'The comparison"):
+        _ = Claim(test_options_are_switches_or_texts, quick="").text
+
+
+def stand_in(finding):
+    """Return an experiment with a text of its own."""
+
+    def experiment(options):
+        return finding
+
+    experiment.__module__ = "experiments.figures"
+    return experiment
+
+
+def test_commands_that_are_written_down_exist():
+    """In the documentation and in the experiments' own texts."""
+    pages = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *(ROOT / "docs").rglob("*.md")]
+    pages += (ROOT / "experiments").rglob("*.py")
+    text = "\n".join(page.read_text(encoding="utf-8") for page in pages)
+    named = set(re.findall(r"-m\s+(experiments(?:\.\w+)+)", text))
+    assert set(modules().values()) <= named
+    for module in named:
+        assert (ROOT / Path(*module.split("."))).with_suffix(".py").exists(), module
 
 
 def test_timed_experiments_run_alone_the_others_two_at_a_time(monkeypatch, capsys):

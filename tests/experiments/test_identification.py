@@ -6,15 +6,22 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from experiments.arch_numbers import OFFSETS, SHAPE, VARIANTS, report, scene_of, start_of
-from experiments.identify_arch25 import (
+from experiments.calibration.identify_arch25 import (
     beside_shipped,
     fit,
     holds,
     residuals,
     target,
 )
-from experiments.plotting import RESULTS
+from experiments.calibration.parts.arch_numbers import (
+    OFFSETS,
+    SHAPE,
+    VARIANTS,
+    report,
+    scene_of,
+    start_of,
+)
+from experiments.harness.plotting import RESULTS
 from seqopt.study.tables import printed_steps
 
 

@@ -7,16 +7,16 @@ import sys
 import numpy as np
 import pytest
 
-from experiments import peers
-from experiments.peer_chain import chain_of
-from experiments.peer_frames import MODULES, PACKAGES, missing_packages
-from experiments.peer_loops import LOOPS, kept, loop
-from experiments.peer_paths import PATHS, by_linprog, by_networkx
-from experiments.peers import Case, difference, workload
+from experiments.peers import peers
+from experiments.peers.parts.chain import chain_of
+from experiments.peers.parts.frames import MODULES, PACKAGES, missing_packages
+from experiments.peers.parts.loops import LOOPS, kept, loop
+from experiments.peers.parts.paths import PATHS, by_linprog, by_networkx
+from experiments.peers.parts.workload import Case, workload
+from experiments.peers.peers import difference
 from seqopt.engines.interface import Want, grip_columns
 from seqopt.placement.costs import CostProblem, LayeredCosts
 from seqopt.placement.formulation import find_formulation
-from tests.commands import run
 
 STATES = [(4, (1, 5, 7)), (17, (1, 20, 33)), (17, (1, 20, 21)), (25, (4, 47)), (25, (12, 13, 46))]
 
@@ -30,10 +30,6 @@ def gap(engine, solve):
         case = Case(bricks, sets, columns, Want.TABLE)
         answers.append((case, 0, solve(bricks).solve(columns[0], Want.TABLE)))
     return difference(engine, answers)
-
-
-def test_a_quick_run_ends_with_a_verdict():
-    assert run("peers", "--quick").splitlines()[-1].startswith("verdict: the claim")
 
 
 @pytest.mark.parametrize("name", LOOPS)

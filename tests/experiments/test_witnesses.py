@@ -8,12 +8,24 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from experiments import witnesses
-from experiments.blocks import ring
-from experiments.witness_cra import SAMPLES, Word, force_only, sample_scene, without_tension
-from experiments.witness_lmgc90 import GRAVITY, STEP, STEPS, python_with_lmgc90, verdict
-from experiments.witness_scenes import incline, scene_of
-from experiments.witnesses import (
+from experiments.harness.lmgc90 import python_with_lmgc90
+from experiments.stability import witnesses
+from experiments.stability.parts.blocks import ring
+from experiments.stability.parts.witness_cra import (
+    SAMPLES,
+    Word,
+    force_only,
+    sample_scene,
+    without_tension,
+)
+from experiments.stability.parts.witness_lmgc90 import (
+    GRAVITY,
+    STEP,
+    STEPS,
+    verdict,
+)
+from experiments.stability.parts.witness_scenes import incline, scene_of
+from experiments.stability.witnesses import (
     Trial,
     built_trials,
     differing,
@@ -172,15 +184,15 @@ def test_a_wrong_verdict_ends_in_does_not_hold(monkeypatch, capsys):
     monkeypatch.setattr(witnesses, "race", lambda trials, rounds: pd.DataFrame({"ratio": [9.0]}))
     monkeypatch.setattr(witnesses, "ours", lambda trial: (Verdict.STANDS, 0.0))
     monkeypatch.setattr("sys.argv", ["witnesses", "--quick"])
-    witnesses.main()
+    witnesses.CLAIM.main()
     assert capsys.readouterr().out.splitlines()[-1].startswith("verdict: the claim does not hold")
 
 
 def test_a_missing_witness_is_named(monkeypatch, capsys):
-    monkeypatch.setattr(witnesses, "find_spec", lambda name: None)
+    monkeypatch.setattr("experiments.harness.claim.find_spec", lambda name: None)
     monkeypatch.setattr("sys.argv", ["witnesses", "--quick"])
     with pytest.raises(SystemExit) as ended:
-        witnesses.main()
+        witnesses.CLAIM.main()
     assert ended.value.code == 2
     assert capsys.readouterr().out == (
         'compas_cra is not installed: pip install "seqopt[witness]"\n'

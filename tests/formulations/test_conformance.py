@@ -21,7 +21,7 @@ from seqopt.placement.formulation import (
     find_formulation,
     formulations,
 )
-from seqopt.placement.plan import run
+from seqopt.placement.plan import solve
 from seqopt.placement.problem import Limit, pose
 from seqopt.sequence.three_robots import SCHEDULES, three_robot_loop
 from seqopt.study.presets import CRITERIA, EQUATIONS, WORST_RATIO
@@ -48,16 +48,16 @@ def brute_force(problem, aim):
 @given(problem=problems())
 @settings(max_examples=25)
 def test_answers_are_certified_or_refused_as_infeasible(name, problem):
-    which = ALL[name]
-    best = brute_force(problem, which.aim)
+    best = brute_force(problem, ALL[name].aim)
     if not np.isfinite(best):
         with pytest.raises(InfeasibleError, match="move"):
-            which.solve(problem)
+            ALL[name].solve(problem)
         return
-    selection, certificate = run(problem, which)
+    plan = solve(problem, name)
+    selection, certificate = plan.selection, plan.certificate
     assert certificate.objective >= best - 1e-9
     assert certificate.bound == pytest.approx(best, abs=1e-9)
-    if which.kind is not FormulationKind.HEURISTIC:
+    if ALL[name].kind is not FormulationKind.HEURISTIC:
         assert certificate.objective == pytest.approx(best, abs=1e-6)
         assert certificate.gap <= 1e-6
     assert selection.bound <= best + 1e-6
@@ -70,23 +70,24 @@ def test_wide_searches_are_exact(problem):
         return
     moves = len(problem.sums.sizes)
     for name, options in (("beam", {"width": 4}), ("rank_search", {"horizon": moves})):
-        assert run(problem, ALL[name], **options)[1].objective == pytest.approx(best)
+        assert solve(problem, ALL[name], **options).certificate.objective == pytest.approx(best)
 
 
 @given(problem=problems(), width=st.integers(1, 4))
 def test_a_beam_never_does_worse_than_the_cascade(problem, width):
     if not np.isfinite(brute_force(problem, Aim.SUM)):
         return
-    beam = run(problem, ALL["beam"], width=width)[1].objective
-    assert beam <= run(problem, ALL["cascade"])[1].objective + 1e-9
+    beam = solve(problem, ALL["beam"], width=width).certificate.objective
+    assert beam <= solve(problem, ALL["cascade"]).certificate.objective + 1e-9
 
 
 @every
 @given(problem=problems(), data=st.data())
 @settings(max_examples=15)
 def test_renumbering_candidates_keeps_the_value_of_exact_ones(name, problem, data):
-    which = ALL[name]
-    if which.kind is FormulationKind.HEURISTIC or not np.isfinite(brute_force(problem, which.aim)):
+    formulation = ALL[name]
+    heuristic = formulation.kind is FormulationKind.HEURISTIC
+    if heuristic or not np.isfinite(brute_force(problem, formulation.aim)):
         return
     order = [data.draw(st.permutations(range(size))) for size in problem.sums.sizes]
     before = [[0], *order[:-1]]
@@ -96,7 +97,7 @@ def test_renumbering_candidates_keeps_the_value_of_exact_ones(name, problem, dat
         for c, b, o in zip(problem.sums.shared, before, order, strict=True)
     )
     other = CostProblem(LayeredCosts(single, shared))
-    a, b = run(problem, which)[1].objective, run(other, which)[1].objective
+    a, b = (solve(p, formulation).certificate.objective for p in (problem, other))
     assert a == pytest.approx(b, abs=1e-6)
 
 
@@ -125,8 +126,9 @@ def test_budgets_are_kept_or_refused(name):
     shared = (np.zeros((1, 2)), np.zeros((2, 2)), np.zeros((2, 2)))
     amounts = tuple(np.array([1.0, 0.0]) for _ in range(3))
     capped = CostProblem(LayeredCosts(single, shared), (Budget("use", amounts, shared, 1.0),))
-    if name in ("overlap_mip", "overlap_lp"):
-        selection, certificate = run(capped, ALL[name])
+    if ALL[name].takes_budgets:
+        plan = solve(capped, ALL[name])
+        selection, certificate = plan.selection, plan.certificate
         assert certificate.spent["use"] <= 1
         assert selection.bound == pytest.approx(2.0, abs=1e-6)
         if name == "overlap_lp":  # three choices tie: the mixture need not be followed to one
@@ -155,7 +157,9 @@ def test_the_integer_program_is_exact_with_budgets(problem, data):
     capped = replace(problem, budgets=(Budget("use", amounts, none, bound),))
     best = brute_force(capped, Aim.SUM)
     if np.isfinite(best):
-        assert run(capped, ALL["overlap_mip"])[1].objective == pytest.approx(best, abs=1e-6)
+        assert solve(capped, ALL["overlap_mip"]).certificate.objective == pytest.approx(
+            best, abs=1e-6
+        )
     else:
         with pytest.raises(InfeasibleError):
             ALL["overlap_mip"].solve(capped)
@@ -165,12 +169,12 @@ def test_the_integer_program_is_exact_with_budgets(problem, data):
 @pytest.mark.parametrize("method", SCHEDULES)
 def test_exact_ones_agree_on_the_reference_arch(engine25, criterion, method):
     problem = pose(engine25, SCHEDULES[method](engine25.network), criterion)
-    values = [run(problem, ALL[name])[1].objective for name in EXACT_SUMS]
+    values = [solve(problem, ALL[name]).certificate.objective for name in EXACT_SUMS]
     assert len(values) == 3
     assert np.ptp(values) <= 1e-6 * max(values)
     for name in HEURISTICS:
-        assert run(problem, ALL[name])[1].objective >= min(values) * (1 - 1e-9)
-    assert run(problem, ALL["minimax"])[1].gap <= 1e-9
+        assert solve(problem, ALL[name]).certificate.objective >= min(values) * (1 - 1e-9)
+    assert solve(problem, ALL["minimax"]).certificate.gap <= 1e-9
 
 
 @pytest.mark.parametrize("count", [5, 6, 7, 8])
@@ -178,11 +182,11 @@ def test_exact_ones_agree_on_the_reference_arch(engine25, criterion, method):
 def test_all_exact_ones_equal_brute_force_on_small_arches(count, criterion):
     engine = ComplianceEngine(build_network(small_arch(count)))
     problem = pose(engine, three_robot_loop(engine.network), criterion)
-    best = run(problem, ALL["rank_search"], horizon=count)[1].objective
+    best = solve(problem, ALL["rank_search"], horizon=count).certificate.objective
     assert best == pytest.approx(brute_force(problem, Aim.SUM))
     for name in EXACT_SUMS:
-        assert run(problem, ALL[name])[1].objective == pytest.approx(best, rel=1e-6)
-    peak = run(problem, ALL["minimax"])[1].objective
+        assert solve(problem, ALL[name]).certificate.objective == pytest.approx(best, rel=1e-6)
+    peak = solve(problem, ALL["minimax"]).certificate.objective
     assert peak == pytest.approx(brute_force(problem, Aim.PEAK))
 
 
@@ -200,27 +204,27 @@ def test_options_are_checked(problem25):
 
 
 def test_a_longer_horizon_and_a_wider_beam_serve(problem25):
-    one = run(problem25, ALL["rank_search"])[1].objective
-    three = run(problem25, ALL["rank_search"], horizon=3)[1].objective
-    best = run(problem25, ALL["overlap_dp"])[1].objective
+    one = solve(problem25, ALL["rank_search"]).certificate.objective
+    three = solve(problem25, ALL["rank_search"], horizon=3).certificate.objective
+    best = solve(problem25, ALL["overlap_dp"]).certificate.objective
     assert best <= three <= one
-    assert run(problem25, ALL["beam"], width=46)[1].objective == pytest.approx(best)
-    earlier = run(problem25, ALL["cascade"], charge="earlier")[1].objective
+    assert solve(problem25, ALL["beam"], width=46).certificate.objective == pytest.approx(best)
+    earlier = solve(problem25, ALL["cascade"], charge="earlier").certificate.objective
     assert earlier >= best
 
 
 def test_limits_hold_or_are_infeasible(engine25):
     schedule = three_robot_loop(engine25.network)
-    best = run(pose(engine25, schedule, WORST_RATIO), ALL["minimax"])[1].objective
+    best = solve(pose(engine25, schedule, WORST_RATIO), ALL["minimax"]).certificate.objective
     for factor in (1.001, 0.999):
         limits = [Limit(name, factor * best * bound) for name, bound in WORST_RATIO.limits]
         problem = pose(engine25, schedule, EQUATIONS, limits)
         if factor > 1:
-            choice = run(problem, ALL["overlap_dp"])[0].choice
-            for state in problem.evaluation.states:
-                place = tuple(choice[m] for m in state.moves)
+            choice = solve(problem, ALL["overlap_dp"]).selection.choice
+            for choices in problem.evaluation.steps:
+                chosen = tuple(choice[m] for m in choices.moves)
                 for limit in limits:
-                    assert state.responses[limit.response][place] <= limit.bound
+                    assert choices.responses[limit.response][chosen] <= limit.bound
         else:
             with pytest.raises(InfeasibleError, match="relax a limit"):
                 ALL["overlap_dp"].solve(problem)
@@ -234,7 +238,8 @@ def test_budgets_of_the_reference_arch(problem25):
     ):
         assert budget.spent(free.choice) > budget.bound
         capped = replace(problem25, budgets=(budget,))
-        selection, certificate = run(capped, ALL["overlap_mip"])
+        plan = solve(capped, ALL["overlap_mip"])
+        selection, certificate = plan.selection, plan.certificate
         assert certificate.spent[budget.name] <= budget.bound + 1e-6
         assert certificate.objective > free.objective
         bound = ALL["overlap_lp"].solve(capped)

@@ -8,18 +8,18 @@ import cvxpy as cp
 import numpy as np
 import pytest
 
-from experiments.degenerate_cases import CASES, Size, capped, costs, opposed, whole
-from experiments.degenerate_placement import MALFORMED, judge, outcomes
-from formulations import overlap_lp, overlap_mip, solvers
+from experiments.placement.degenerate_placement import MALFORMED, judge, outcomes
+from experiments.placement.parts.degenerate_cases import CASES, Size, capped, costs, opposed, whole
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.placement.certificate import certify
 from seqopt.placement.costs import Budget, CostProblem, LayeredCosts
+from seqopt.placement.flow import LayeredFlow
 from seqopt.placement.formulation import Aim, Formulation, FormulationKind, Selection, formulations
-from seqopt.placement.plan import run
+from seqopt.placement.plan import solve
 
 ALL = formulations()
 SMALL = Size(3, 3, 6)
-FLOWS = {"overlap_lp": overlap_lp, "overlap_mip": overlap_mip}
+FLOWS = [name for name, formulation in formulations().items() if formulation.takes_budgets]
 EXACT = ("minimax", "overlap_dp", "overlap_lp", "overlap_mip")
 flows = pytest.mark.parametrize("name", FLOWS)
 NONE_ALLOWED = {
@@ -74,7 +74,7 @@ def test_equal_costs_go_to_the_first(name):
 @pytest.mark.parametrize("scale", [1e-9, 1e-3, 1e3, 1e9])
 @pytest.mark.parametrize("name", ALL)
 def test_units_change_no_value(name, scale):
-    value, same = (run(small(seed=1, scale=s), ALL[name])[1] for s in (1.0, scale))
+    value, same = (solve(small(seed=1, scale=s), ALL[name]).certificate for s in (1.0, scale))
     assert same.objective == pytest.approx(scale * value.objective, rel=1e-9)
     assert same.gap == pytest.approx(value.gap, abs=1e-9)
 
@@ -148,10 +148,12 @@ def test_budgets_are_measured_in_their_own_units(amount):
     free = ALL["overlap_dp"].solve(replace(problem, budgets=()))
     with pytest.raises(SolverError, match="more than"):
         certify(problem, free, Aim.SUM)
-    certificate = run(problem, ALL["overlap_mip"])[1]
+    certificate = solve(problem, ALL["overlap_mip"]).certificate
     assert certificate.spent["use"] <= problem.budgets[0].bound * (1 + 1e-9)
     plain = capped(SMALL, np.random.default_rng(0), 1.0, 0.6)
-    assert certificate.objective == pytest.approx(run(plain, ALL["overlap_mip"])[1].objective)
+    assert certificate.objective == pytest.approx(
+        solve(plain, ALL["overlap_mip"]).certificate.objective
+    )
     prices = [ALL["overlap_lp"].solve(p).prices["use"] for p in (problem, plain)]
     assert amount * prices[0] == pytest.approx(prices[1], abs=1e-4)
 
@@ -183,7 +185,7 @@ def test_budgets_of_another_problem_are_refused(name):
 def test_a_bound_of_infinity_is_no_cap(name):
     free = ALL[name].solve(small())
     budget = replace(capped(SMALL, np.random.default_rng(0), 1.0, 1.0).budgets[0], bound=np.inf)
-    capless = run(replace(small(), budgets=(budget,)), ALL[name])[1]
+    capless = solve(replace(small(), budgets=(budget,)), ALL[name]).certificate
     assert capless.objective == pytest.approx(free.objective)
 
 
@@ -231,12 +233,13 @@ def test_two_budgets_leave_the_proof_to_the_solver(name):
         ALL[name].solve(opposed(SMALL, np.random.default_rng(0), 0.9))
 
 
+CHOICE, BOUND = LayeredFlow.choice, LayeredFlow.bound
 FLAWS = {
-    "zeros": lambda f: replace(f, arcs=tuple(np.zeros_like(a) for a in f.arcs)),
-    "NaN": lambda f: replace(f, arcs=tuple(np.full_like(a, np.nan) for a in f.arcs)),
-    "bound too high": lambda f: replace(f, bound=1.1 * f.bound),
-    "NaN bound": lambda f: replace(f, bound=np.nan),
-    "another path": lambda f: replace(f, arcs=tuple(1 - a for a in f.arcs)),
+    "zeros": ("choice", lambda self, flow: CHOICE(self, np.zeros_like(flow))),
+    "NaN": ("choice", lambda self, flow: CHOICE(self, np.full_like(flow, np.nan))),
+    "bound too high": ("bound", lambda self, optimum: 1.1 * BOUND(self, optimum)),
+    "NaN bound": ("bound", lambda self, optimum: np.nan),
+    "another path": ("choice", lambda self, flow: CHOICE(self, 1 - flow)),
 }
 
 
@@ -246,8 +249,6 @@ FLAWS = {
 def test_a_flow_that_is_wrong_is_caught(monkeypatch, name, flaw, scale):
     problem = small(seed=1, scale=scale)
     assert ALL["overlap_dp"].solve(problem).choice != (0, 0, 0)
-    monkeypatch.setattr(
-        FLOWS[name], "solve_flow", lambda *given: FLAWS[flaw](solvers.solve_flow(*given))
-    )
+    monkeypatch.setattr(LayeredFlow, *FLAWS[flaw])
     with pytest.raises(SolverError, match=r"promises the optimum|claimed bound"):
-        run(problem, ALL[name])
+        solve(problem, ALL[name])

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import assume, given, reject, settings
 from hypothesis import strategies as st
 
-from experiments.blocks import ring, stack
+from experiments.stability.parts.blocks import ring, stack
 from formulations.limit_analysis import compile_equilibrium
 from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import DRY, Mortar

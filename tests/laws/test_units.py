@@ -12,7 +12,7 @@ from seqopt.contact.mortar import DRY
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network
 from seqopt.placement.formulation import find_formulation
-from seqopt.placement.plan import run
+from seqopt.placement.plan import solve
 from seqopt.placement.problem import pose
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.sequence.two_robots import cantilever
@@ -29,7 +29,8 @@ def solved(scene, criterion):
     problem = pose(
         ComplianceEngine(build_network(scene)), three_robot_loop(build_network(scene)), criterion
     )
-    selection, certificate = run(problem, find_formulation("overlap_dp"))
+    plan = solve(problem, find_formulation("overlap_dp"))
+    selection, certificate = plan.selection, plan.certificate
     return problem, problem.nodes(selection.choice), certificate
 
 

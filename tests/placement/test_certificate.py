@@ -17,7 +17,7 @@ from seqopt.placement.formulation import (
     Selection,
     formulations,
 )
-from seqopt.placement.plan import run
+from seqopt.placement.plan import solve
 
 ALL = formulations()
 
@@ -45,7 +45,7 @@ def test_promises_are_held(problem25):
     """A heuristic that calls itself exact is refused, and so is a bound above the optimum."""
     cascade = ALL["cascade"]
     with pytest.raises(SolverError, match="promises the optimum"):
-        run(problem25, replace(cascade, kind=FormulationKind.EXACT))
+        solve(problem25, replace(cascade, kind=FormulationKind.EXACT))
     poor = cascade.solve(problem25)
     with pytest.raises(SolverError, match="claimed bound"):
         certify(problem25, replace(poor, bound=poor.objective), Aim.SUM)
@@ -53,7 +53,7 @@ def test_promises_are_held(problem25):
 
 def test_a_budget_keeps_its_claimed_bound(problem25):
     capped = replace(problem25, budgets=(travel(problem25, 20.0),))
-    certificate = run(capped, ALL["overlap_mip"])[1]
+    certificate = solve(capped, ALL["overlap_mip"]).certificate
     assert certificate.gap > 0  # from the least value without the budget
     assert certificate.claimed_gap <= 1e-6
 

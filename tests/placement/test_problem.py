@@ -9,38 +9,33 @@ from hypothesis import strategies as st
 from scipy.stats import rankdata
 
 from seqopt.placement.criteria import mean_ranks, scaled_ranks
-from seqopt.placement.formulation import formulations
-from seqopt.placement.plan import run
+from seqopt.placement.plan import solve
 from seqopt.placement.problem import payload_limits, pose
 from seqopt.placement.ranking import move_costs, rank_moves
-from seqopt.responses.quantities import step_responses
-from seqopt.responses.table import analyze, step_fields
 from seqopt.sequence.three_robots import modified_sequential
 from seqopt.study.presets import CRITERIA, EQUATIONS, WEIGHTED, WORST_RATIO
-from seqopt.study.published import published_choice
+from seqopt.study.published import paper_models, published_choice
 
 
 def test_a_third_support_ends_twisting(engine25):
     schedule = modified_sequential(engine25.network)
     problem = pose(engine25, schedule, EQUATIONS)
-    selection, _ = run(problem, formulations()["rank_search"])
-    plan = schedule.fill(problem.nodes(selection.choice))
-    worst = max(step_responses(engine25, step_fields(engine25, s)).D_max[0] for s in plan)
+    table = solve(problem, "rank_search").responses()
+    worst = 1e-6 * table["D_max_1e-3mm"].max()
     assert worst < 20e-6  # the sequential method reaches 306e-6 m
 
 
 def test_models(problem25):
     """The study counts 2,576 and 22,724; reach, occupancy and equal models leave fewer."""
-    assert problem25.paper_models == (2576, 22724)
-    choices = sum(next(iter(s.responses.values())).size for s in problem25.evaluation.states)
+    assert paper_models(problem25.schedule) == (2576, 22724)
+    choices = sum(next(iter(s.responses.values())).size for s in problem25.evaluation.steps)
     assert problem25.evaluation.models < choices < 22724
 
 
 def test_payloads_can_be_kept(engine25, loop25):
     """The printed equations overload no robot once its payload is a limit."""
     problem = pose(engine25, loop25, EQUATIONS, payload_limits(loop25.scene))
-    selection, _ = run(problem, formulations()["overlap_dp"])
-    plan = analyze(engine25, loop25.fill(problem.nodes(selection.choice)))
+    plan = solve(problem, "overlap_dp").responses()
     forces = plan[["F_rob1_N", "F_rob2_N", "F_rob3_N"]].to_numpy(float)
     assert np.nanmax(np.abs(forces)) <= 392.4
 
@@ -105,7 +100,7 @@ def test_raw_values_do_not_reverse(engine25, loop25):
 
 
 def test_tables_are_labeled(problem25):
-    for state in (problem25.evaluation.states[0], problem25.evaluation.states[-4]):
+    for state in (problem25.evaluation.steps[0], problem25.evaluation.steps[-4]):
         table = problem25.table(state)
         moves = [problem25.schedule.moves[m] for m in state.moves]
         assert list(table.index.names) == [f"{m.robot}_node" for m in moves]

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from seqopt.errors import ProblemError
-from seqopt.placement.formulation import find_formulation
-from seqopt.placement.plan import run
+from seqopt.placement.plan import solve
 from seqopt.placement.problem import Limit, pose
-from seqopt.placement.window_search import require_search, search_table, search_windows, window
+from seqopt.placement.window_search import search_windows, window
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.study.presets import EQUATIONS, WEIGHTED
 
@@ -17,14 +16,14 @@ from seqopt.study.presets import EQUATIONS, WEIGHTED
 def test_a_dead_end_that_the_cascade_foresees(engine25):
     schedule, limits = three_robot_loop(engine25.network), [Limit("T_max", 64.0)]
     with pytest.raises(ProblemError, match="move 8, step 31: rob2 has no allowed grip after"):
-        search_windows(engine25, schedule, EQUATIONS, limits)
-    selection, _ = run(pose(engine25, schedule, EQUATIONS, limits), find_formulation("cascade"))
-    assert len(selection.choice) == len(schedule.moves)
+        search_windows(pose(engine25, schedule, EQUATIONS, limits))
+    plan = solve(pose(engine25, schedule, EQUATIONS, limits), "cascade")
+    assert len(plan.nodes) == len(schedule.moves)
 
 
 def test_a_window_depends_on_the_choices_before_it(engine25):
     schedule = three_robot_loop(engine25.network)
-    found = search_windows(engine25, schedule, EQUATIONS)
+    found = search_windows(pose(engine25, schedule, EQUATIONS))
     nodes = [m.candidates[c] for m, c in zip(schedule.moves, found.choice, strict=True)]
     own = pose(engine25, window(schedule, 9, nodes), EQUATIONS).sums.single[0]
     assert own.tolist() == found.shared[9].sums.single[0].tolist()
@@ -34,8 +33,9 @@ def test_a_window_depends_on_the_choices_before_it(engine25):
 
 
 def test_the_table_says_what_the_next_one_costs(engine25):
-    found = search_windows(engine25, three_robot_loop(engine25.network), WEIGHTED)
-    table = search_table(found)
+    problem = pose(engine25, three_robot_loop(engine25.network), WEIGHTED)
+    plan = solve(problem, "rank_search", proof=False)
+    found, table = plan.search, plan.table()
     assert len(table) == 22
     assert (table["margin"] >= 0).all()
     last = np.sort(found.costs(21))
@@ -46,7 +46,7 @@ def test_the_table_says_what_the_next_one_costs(engine25):
 def test_a_dead_end_is_named(engine25):
     schedule = three_robot_loop(engine25.network)
     with pytest.raises(ProblemError, match="move 1, step 3: rob3 has no allowed grip"):
-        search_windows(engine25, schedule, EQUATIONS, [Limit("F_largest", 9.0)])
+        search_windows(pose(engine25, schedule, EQUATIONS, [Limit("F_largest", 9.0)]))
 
 
 @pytest.mark.parametrize(
@@ -54,9 +54,9 @@ def test_a_dead_end_is_named(engine25):
     [
         ("overlap_dp", {}, "overlap_dp looks beyond"),
         ("beam", {}, "beam looks beyond"),
-        ("cascade", {"charge": "earlier"}, "cascade --option charge=earlier looks beyond"),
+        ("cascade", {"charge": "earlier"}, "cascade charge=earlier looks beyond"),
     ],
 )
-def test_what_looks_further_is_refused(name, options, said):
+def test_what_looks_further_is_refused(problem25, name, options, said):
     with pytest.raises(ProblemError, match=said):
-        require_search(find_formulation(name), options)
+        solve(problem25, name, proof=False, **options)

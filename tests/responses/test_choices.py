@@ -13,8 +13,8 @@ from seqopt.network.build import build_network
 from seqopt.placement.criteria import RankSum, equal
 from seqopt.placement.problem import pose
 from seqopt.responses import choices as evaluation
-from seqopt.responses.choices import SCALARS, evaluate_choices
-from seqopt.responses.quantities import step_responses
+from seqopt.responses.choices import CHOICE_RESPONSES, evaluate_choices
+from seqopt.responses.quantities import responses_of
 from seqopt.responses.table import step_fields
 from seqopt.sequence.three_robots import SCHEDULES, three_robot_loop
 from seqopt.study.presets import EQUATIONS
@@ -22,7 +22,7 @@ from seqopt.study.presets import EQUATIONS
 
 @pytest.mark.parametrize("method", SCHEDULES)
 def test_states_hold_the_responses_of_their_steps(engine25, method):
-    """Every response of a random filled schedule is found again in the problem's states."""
+    """Every response of a random filled schedule is found again in the problem's steps."""
     schedule = SCHEDULES[method](engine25.network)
     also = ("F_largest", "F_move", "F_rob1", "F_rob2", "F_rob3", "T_max", "M_sup", "D_max")
     problem = pose(engine25, schedule, EQUATIONS, also=also)
@@ -33,16 +33,15 @@ def test_states_hold_the_responses_of_their_steps(engine25, method):
         choice.append(int(rng.choice(allowed)))
         assert len(move.candidates) > choice[-1]
     steps = {s.number: s for s in schedule.fill(problem.nodes(choice))}
-    for state in problem.evaluation.states:
-        place = tuple(choice[m] for m in state.moves)
-        step = steps[state.step.number]
-        want = step_responses(engine25, step_fields(engine25, step))
-        assert state.responses["T_max"][place] == pytest.approx(want.F_max[0])
-        assert state.responses["M_sup"][place] == pytest.approx(want.M_sup[0])
-        assert state.responses["D_max"][place] == pytest.approx(want.D_max[0])
-        forces = iter(np.abs(want.F_rob[0]))
+    for choices in problem.evaluation.steps:
+        chosen = tuple(choice[m] for m in choices.moves)
+        step = steps[choices.step.number]
+        want = responses_of(engine25.network, step_fields(engine25, step))
+        for name in ("T_max", "M_sup", "D_max"):
+            assert choices.responses[name][chosen] == pytest.approx(want[name][0])
+        forces = iter(np.abs(want["F_rob"][0]))
         for i, node in enumerate(step.grips):
-            found = state.responses[f"F_rob{i + 1}"][place]
+            found = choices.responses[f"F_rob{i + 1}"][chosen]
             assert np.isnan(found) if node is None else found == pytest.approx(next(forces))
 
 
@@ -56,22 +55,22 @@ def test_each_robot_is_a_term_whatever_its_name(arch25):
     robots = tuple(replace(r, name=n) for r, n in zip(arch25.robots, "abc", strict=True))
     net = build_network(replace(arch25, robots=robots))
     renamed = pose(ComplianceEngine(net), three_robot_loop(net), EQUATIONS)
-    first = renamed.evaluation.states[0].responses
+    first = renamed.evaluation.steps[0].responses
     assert {"F_a", "F_b", "F_c", "T_max", "M_sup"} == set(first)
 
 
 def test_only_what_is_asked_is_evaluated(engine25, loop25):
     plain = pose(engine25, loop25, RankSum("tension", equal("T_max"), equal("T_max")))
-    assert {name for s in plain.evaluation.states for name in s.responses} == {"T_max"}
+    assert {name for s in plain.evaluation.steps for name in s.responses} == {"T_max"}
 
 
 def test_fields_are_asked_for_in_blocks(engine25, monkeypatch):
     schedule = three_robot_loop(engine25.network)
     monkeypatch.setattr(evaluation, "BLOCK", 10**9)
-    whole = evaluate_choices(engine25, schedule, lambda _: SCALARS)
+    whole, models = evaluate_choices(engine25, schedule, lambda _: {*CHOICE_RESPONSES})
     monkeypatch.setattr(evaluation, "BLOCK", 100)
-    parts = evaluate_choices(engine25, schedule, lambda _: SCALARS)
-    assert parts.models == whole.models
-    for a, b in zip(parts.states, whole.states, strict=True):
-        for name in SCALARS:
+    parts, again = evaluate_choices(engine25, schedule, lambda _: {*CHOICE_RESPONSES})
+    assert models == again
+    for a, b in zip(parts, whole, strict=True):
+        for name in CHOICE_RESPONSES:
             assert a.responses[name] == pytest.approx(b.responses[name], rel=1e-12, nan_ok=True)

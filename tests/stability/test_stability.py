@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.blocks import Blocks, ring, stack
+from experiments.stability.parts.blocks import Blocks, ring, stack
 from formulations.limit_analysis import compile_equilibrium
 from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import DRY, EPOXY

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from seqopt.placement.formulation import formulations
-from seqopt.study.published import published_choice, published_plan, published_ranks
+from seqopt.placement.ranking import rank_choice
+from seqopt.study.published import published_choice, published_plan
 
 
 def test_the_loop_with_the_published_nodes_is_the_published_plan(arch25, loop25, problem25):
@@ -13,9 +14,9 @@ def test_the_loop_with_the_published_nodes_is_the_published_plan(arch25, loop25,
 def test_the_window_rank_is_the_studys_search(problem25):
     """The choice of rank_search is first in its own window, move by move."""
     choice = formulations()["rank_search"].solve(problem25).choice
-    assert (published_ranks(problem25, choice)["rank_in_window"] == 1).all()
+    assert (rank_choice(problem25, choice)["rank_in_window"] == 1).all()
     exact = formulations()["overlap_dp"].solve(problem25).choice
-    assert (published_ranks(problem25, exact)["rank_overlap"] == 1).all()
+    assert (rank_choice(problem25, exact)["rank_overlap"] == 1).all()
 
 
 def test_the_published_plan(arch25):

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from experiments.arch_pads import AtCorners
+from experiments.discrete.parts.arch_pads import AtCorners
 from seqopt.contact.mortar import DRY, Mortar
 from seqopt.engines.discrete.engine import DiscreteEngine, held_nodes
 from seqopt.engines.discrete.equilibrium_path import settle

@@ -8,7 +8,7 @@ from math import atan, cos, radians, sin, sqrt, tan
 import numpy as np
 import pytest
 
-from experiments.blocks import Contact, ring, stack, touching
+from experiments.stability.parts.blocks import Contact, ring, stack, touching
 from seqopt.contact.assembly import Assembly
 from seqopt.contact.mortar import DRY, EPOXY, Mortar
 from seqopt.network.network import GROUND

@@ -6,9 +6,10 @@ import pandas as pd
 import pytest
 
 from seqopt.placement.problem import pose
+from seqopt.placement.ranking import rank_choice
 from seqopt.sequence.two_robots import METHODS
 from seqopt.study.presets import CLOSEST
-from seqopt.study.published import published_choice, published_ranks
+from seqopt.study.published import published_choice
 from seqopt.study.tables import printed_steps
 
 GRIPS = [f"rob{i}_node" for i in (1, 2, 3)]
@@ -16,7 +17,7 @@ GRIPS = [f"rob{i}_node" for i in (1, 2, 3)]
 
 def test_the_published_plan_under_the_printed_equations(problem25):
     """Equations (2) and (3): first in at least 10 of 22, among three in at least 15."""
-    ranks = published_ranks(problem25, published_choice(problem25))["rank_in_window"]
+    ranks = rank_choice(problem25, published_choice(problem25))["rank_in_window"]
     assert (ranks == 1).sum() >= 10
     assert (ranks <= 3).sum() >= 15
 
@@ -24,7 +25,7 @@ def test_the_published_plan_under_the_printed_equations(problem25):
 def test_the_published_plan_under_a_variant(engine25, loop25):
     """Tension and forces alone, the crown brick counted before the crown: 14 and 20 of 22."""
     problem = pose(engine25, loop25, CLOSEST)
-    ranks = published_ranks(problem, published_choice(problem))["rank_in_window"]
+    ranks = rank_choice(problem, published_choice(problem))["rank_in_window"]
     assert (ranks == 1).sum() >= 14
     assert (ranks <= 3).sum() >= 20
 

@@ -1,0 +1,1 @@
+"""Claims about stiffness: joints fitted to vault tests, and the arch to printed responses."""

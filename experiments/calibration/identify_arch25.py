@@ -1,0 +1,292 @@
+"""Claim: numbers with a meaning reproduce both printed tables of the 25-brick arch.
+
+The study prints span, height, brick and pattern of its arch but no coordinates, and joint
+stiffnesses per area. This experiment recovers the rest from Tables A.1 and A.2 alone. The responses
+of the three-robot plan take no part.
+
+Method: the shape is a chain of bricks (`seqopt.scene.arch`) with
+
+- a pitch per brick (25 numbers), at first a catenary over the stated span and height;
+- one angle by which the surface is turned in plan against the arch's plane, which tilts every
+  brick that lies across by that angle times the sine of its pitch (1);
+- a yaw of every brick that lies along the arch (9), so that the line may leave its plane;
+- gap, overhang, stub, one linear and one rotational joint stiffness (5);
+- in a second stage, a radial offset of every brick from the line between its joints (25), drawn
+  towards zero, while the pitch is drawn towards a cubic spline through 9 knots.
+
+Robust least squares (`scipy.optimize.least_squares`) on all responses but T_pct, relative to the
+printed size or 1 and forgiving the rounding of print, with equal states counted once. There are
+several local minima; the numbers differ between fits that are equally good.
+
+The default run repeats this in short form: from one plan angle, with at most 10 evaluations per
+degree of softening; a fit that ends worse than the shipped one goes on, up to twice. It shows that
+the tables alone lead from a catenary to a fit like the shipped one. ``--full`` starts from two plan
+angles with at most 40 evaluations, as the shipped scene did; the best of its first stages goes on.
+Either states how far its errors and numbers are from the shipped ones. The claim fails if the
+shipped scene is worse than the bounds that the tests hold it to, or if the median, 90th or 95th
+percentile of the new errors (in percent) is larger than the shipped one by more than the
+yardstick's rounding, 0.05.
+
+Inputs: the tables that ship with the package. Command: ``python -m
+experiments.calibration.identify_arch25 [--quick] [--full] [--write] [--cross] [--variants]``.
+Writes ``experiments/results/identify_arch25_refit.csv``; only ``--write`` puts the new scene in the
+place of ``seqopt/data/scenes/arch25.json`` and its numbers in ``identify_arch25.csv``. ``--cross``
+fits one table, scores the states that only the other has, and writes ``identify_arch25_cross.csv``;
+``--variants`` repeats the first stage with other sets of numbers and writes
+``identify_arch25_variants.csv``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from scipy.interpolate import CubicSpline
+from scipy.optimize import least_squares
+
+from experiments.calibration.parts.arch_numbers import (
+    BRICKS,
+    OFFSETS,
+    PLAN_ANGLES,
+    SHAPE,
+    VARIANTS,
+    Free,
+    report,
+    scene_of,
+    start_of,
+    starting_guess,
+)
+from experiments.harness.claim import Claim, Finding, Option, Options
+from experiments.harness.plotting import HOME, RESULTS
+from experiments.harness.yardstick import ROUNDING, VALUES, errors, percentiles, tension_share
+from seqopt.arrays import Floats
+from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.network.build import build_network
+from seqopt.responses.quantities import TO_1E_3MM, responses_of
+from seqopt.responses.table import analyze
+from seqopt.scene.scene import Scene
+from seqopt.scene.scene_file import load_scene, save_scene
+from seqopt.sequence.two_robots import METHODS
+from seqopt.study.tables import printed_steps
+
+SCENE = HOME.parent / "seqopt" / "data" / "scenes" / "arch25.json"
+NUMBERS = RESULTS / "identify_arch25.csv"
+PERCENTILES = ["median_pct", "p90_pct", "p95_pct"]
+LIMITS = [0.15, 1.9, 4.0]  # percent, as in the tests
+MORE = 2  # times that a fit worse than the shipped one is continued
+SOFTENING = (0.1, 0.03, 0.02, 0.01)  # residuals above this share count less and less
+OFFSET_PRIOR = 5.0  # residual per m: an offset of 1 mm weighs like an error of 0.5 %
+PITCH_PRIOR = 1.7  # residual per rad from a smooth pitch: 1 degree weighs like an error of 3 %
+
+
+@dataclass(frozen=True)
+class Target:
+    """Printed responses of different states, grouped so that each group is one batch."""
+
+    groups: tuple[tuple[int, np.ndarray, np.ndarray], ...]  # bricks, grips (S, r), columns (r,)
+    responses: Floats  # (states, columns of the yardstick)
+
+
+def target(tables: Sequence[pd.DataFrame]) -> Target:
+    """Return every different state of the tables once."""
+    rows = pd.concat(tables, ignore_index=True)
+    nodes = rows[[f"rob{i}_node" for i in (1, 2, 3)]].to_numpy(float)
+    keys = [(int(b), *np.nan_to_num(n, nan=-1)) for b, n in zip(rows["bricks"], nodes, strict=True)]
+    first = sorted({key: i for i, key in reversed(list(enumerate(keys)))}.values())
+    by_shape: dict[tuple[int, tuple[int, ...]], list[int]] = {}
+    for i in first:
+        held = tuple(np.flatnonzero(~np.isnan(nodes[i])).tolist())
+        by_shape.setdefault((keys[i][0], held), []).append(i)
+    groups = tuple(
+        (bricks, nodes[which][:, list(held)].astype(np.int64), np.array(held, dtype=np.int64))
+        for (bricks, held), which in by_shape.items()
+    )
+    order = [i for which in by_shape.values() for i in which]
+    return Target(groups, rows[list(VALUES)].to_numpy(float)[order])
+
+
+def produced(scene: Scene, wanted: Target) -> Floats:
+    """Return the responses of a scene in the steps of a target, in its order and columns."""
+    engine = ComplianceEngine(build_network(scene))
+    out = []
+    for bricks, grips, robots in wanted.groups:
+        answer = responses_of(engine.network, engine.solve(bricks, grips))
+        force = np.full((len(grips), 3), np.nan)
+        force[:, robots] = answer["F_rob"]
+        size = [TO_1E_3MM * answer[name] for name in ("D_max", "D_avg", "D_std")]
+        rest = [answer[name] for name in ("F_sup", "M_sup", "F_min", "T_max", "F_avg")]
+        out.append(np.column_stack([force, *rest, *size]))
+    return np.vstack(out)
+
+
+def residuals(scene: Scene, wanted: Target) -> Floats:
+    """Return relative differences, small ones within the rounding of print shrunk."""
+    got, want = produced(scene, wanted), wanted.responses.copy()
+    got[:, :4], want[:, :4] = np.abs(got[:, :4]), np.abs(want[:, :4])
+    gap = (got - want)[~np.isnan(want)]
+    size = np.maximum(np.abs(want[~np.isnan(want)]), 1.0)
+    beyond = np.where(np.abs(gap) < 0.04, 0.3 * gap, gap - 0.028 * np.sign(gap))
+    return np.asarray(beyond / size)
+
+
+def roughness() -> Floats:
+    """Return the map from pitch to its deviation from the nearest cubic spline of 9 knots."""
+    knots = np.linspace(0, BRICKS - 1, 9)
+    splines = CubicSpline(knots, np.eye(len(knots)))(np.arange(BRICKS))
+    return np.asarray(np.eye(BRICKS) - splines @ np.linalg.pinv(splines))
+
+
+def fit(numbers: Floats, groups: Sequence[Free], wanted: Target, most: int) -> tuple[Floats, float]:
+    """Return the fitted numbers and the robust cost that remains."""
+    step = np.concatenate([np.full(group.count, group.step) for group in groups])
+    rough = roughness()
+
+    def cost(scaled: Floats) -> Floats:
+        numbers = scaled * step
+        out = residuals(scene_of(numbers, groups), wanted)
+        if groups[-1] is not OFFSETS:
+            return out
+        prior = OFFSET_PRIOR * numbers[-BRICKS:], PITCH_PRIOR * rough @ numbers[:BRICKS]
+        return np.concatenate([out, *prior])
+
+    scaled, remaining = numbers / step, np.inf
+    for softening in SOFTENING:
+        answer = least_squares(cost, scaled, loss="soft_l1", f_scale=softening, max_nfev=most)
+        scaled, remaining = answer.x, float(answer.cost)
+    return scaled * step, remaining
+
+
+def identify(wanted: Target, angles: Sequence[float], most: int) -> tuple[Floats, Sequence[Free]]:
+    """Return the fitted numbers, and what they are, from the documented starting guess."""
+    fits = []
+    for angle in angles:
+        start = starting_guess()
+        start[BRICKS] = angle
+        fits.append(fit(start, SHAPE, wanted, most))
+        print(
+            f"plan angle from {np.degrees(angle):5.1f}°: robust cost {fits[-1][1]:.4f}", flush=True
+        )
+    best = min(fits, key=lambda entry: entry[1])[0]
+    groups = (*SHAPE, OFFSETS)
+    numbers, remaining = fit(np.concatenate([best, np.zeros(BRICKS)]), groups, wanted, most)
+    print(f"with offsets: robust cost {remaining:.4f}", flush=True)
+    return numbers, groups
+
+
+def scores(scene: Scene) -> pd.DataFrame:
+    """Return the yardstick of a scene on both tables."""
+    engine = ComplianceEngine(build_network(scene))
+    rows, all_errors = {}, []
+    for name, method in METHODS.items():
+        printed, table = printed_steps(name), analyze(engine, method(engine.network))
+        all_errors.append(errors(table, printed))
+        rows[name] = (*percentiles(all_errors[-1]), 100 * tension_share(table, printed))
+    rows["both"] = (*percentiles(pd.concat(all_errors)), np.nan)
+    columns = [*PERCENTILES, "T_pct_within_2_edges_pct"]
+    return pd.DataFrame.from_dict(rows, orient="index", columns=columns)
+
+
+def cross(most: int) -> pd.DataFrame:
+    """Fit one table, score the rows that only the other has."""
+    rows = []
+    for known, other in (("sequential", "cantilever"), ("cantilever", "sequential")):
+        numbers, groups = identify(target([printed_steps(known)]), PLAN_ANGLES, most)
+        engine = ComplianceEngine(build_network(scene_of(numbers, groups)))
+        table = errors(analyze(engine, METHODS[other](engine.network)), printed_steps(other))
+        unseen = printed_steps(other)["same_in_both"].to_numpy() == 0
+        rows.append((known, other, *percentiles(table[unseen])))
+    return pd.DataFrame(rows, columns=["fitted", "scored", *PERCENTILES])
+
+
+def compare_variants(wanted: Target, most: int) -> pd.DataFrame:
+    """Fit the first stage with every set of numbers, from the same start."""
+    rows = []
+    for name, groups in VARIANTS.items():
+        numbers, remaining = fit(start_of(groups), groups, wanted, most)
+        limits = scores(scene_of(numbers, groups)).loc["both"]
+        rows.append({"variant": name, "numbers": len(numbers), "cost": remaining, **limits})
+        print(pd.DataFrame(rows[-1:]).to_string(index=False, header=len(rows) == 1), flush=True)
+    return pd.DataFrame(rows).drop(columns="T_pct_within_2_edges_pct")
+
+
+def beside_shipped(fitted: pd.DataFrame, scene: Scene) -> pd.DataFrame:
+    """Return percentiles of a fit beside the shipped ones, and how far its numbers are off."""
+    new, old = (scores(one).loc["both", PERCENTILES] for one in (scene, load_scene("arch25")))
+    rows = [
+        {"what": name, "unit": "%", "shipped": old[name], "new": new[name]} for name in PERCENTILES
+    ]
+    table = pd.DataFrame(rows)
+    table["difference"] = table["new"] - table["shipped"]
+    both = fitted.merge(pd.read_csv(NUMBERS), on=["name", "index", "unit"])
+    gap = (both["value_x"] - both["value_y"]).abs().groupby([both["name"], both["unit"]]).max()
+    far = [
+        {"what": f"{name}, largest difference", "unit": unit, "difference": value}
+        for (name, unit), value in gap.items()
+    ]
+    return pd.concat([table, pd.DataFrame(far)], ignore_index=True)
+
+
+def holds(table: pd.DataFrame, *, quick: bool) -> bool:
+    """Return whether the shipped fit is within its limits, and the new one not worse than it."""
+    part = table[table["what"].isin(PERCENTILES)]
+    good = bool((part["shipped"].to_numpy(float) <= LIMITS).all())
+    return good and (quick or bool((part["difference"] <= ROUNDING).all()))
+
+
+def explore(options: Options) -> None:
+    """Fit one table alone, or other sets of numbers, and store how well."""
+    if options.cross:
+        table = cross(40)
+        print(table.to_string(index=False, float_format="%.2f"))
+        table.to_csv(RESULTS / "identify_arch25_cross.csv", index=False, float_format="%.3f")
+    if options.variants:
+        table = compare_variants(target([printed_steps(name) for name in METHODS]), 40)
+        table.to_csv(RESULTS / "identify_arch25_variants.csv", index=False, float_format="%.4g")
+
+
+def repeat(options: Options) -> tuple[Floats, Sequence[Free]]:
+    """Identify anew; what is worse than the shipped fit is fitted on, up to twice."""
+    both = target([printed_steps(name) for name in METHODS])
+    most = 2 if options.quick else 40 if options.full else 10
+    numbers, groups = identify(both, PLAN_ANGLES if options.full else PLAN_ANGLES[:1], most)
+    for _ in range(0 if options.quick else MORE):
+        scene = scene_of(numbers, groups)
+        if holds(beside_shipped(report(numbers, groups), scene), quick=False):
+            break
+        numbers, remaining = fit(numbers, groups, both, most)
+        print(f"worse than shipped, fitted on: robust cost {remaining:.4f}", flush=True)
+    return numbers, groups
+
+
+def experiment(options: Options) -> Finding | None:
+    if options.cross or options.variants:
+        explore(options)
+        return None
+    numbers, groups = repeat(options)
+    scene, fitted = scene_of(numbers, groups), report(numbers, groups)
+    table = beside_shipped(fitted, scene)
+    print(table.to_string(index=False, float_format="%.4g", na_rep=""))
+    if not options.quick:
+        path = RESULTS / "identify_arch25_refit.csv"
+        table.to_csv(path, index=False, float_format="%.4g", lineterminator="\n")
+    if options.write and not options.quick:
+        save_scene(scene, SCENE)
+        fitted.to_csv(NUMBERS, index=False, float_format="%.6g", lineterminator="\n")
+    return Finding(holds(table, quick=options.quick), f": {len(numbers)} numbers")
+
+
+CLAIM = Claim(
+    experiment,
+    quick="two evaluations, nothing written",
+    options=(
+        Option("--full", "two starts, 40 evaluations"),
+        Option("--write", "put the result in the product"),
+        Option("--cross", "cross-validation between the tables"),
+        Option("--variants", "other sets of numbers"),
+    ),
+)
+
+if __name__ == "__main__":
+    CLAIM.main()

@@ -1,0 +1,127 @@
+"""What `experiments.calibration.identify_arch25` fits: the numbers, and the scene of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from scipy.optimize import brentq
+
+from seqopt.arrays import Floats
+from seqopt.scene.arch import ArchShape, arch_scene
+from seqopt.scene.scene import Scene
+from seqopt.study.presets import ROBOTS
+
+SPAN, HEIGHT, BRICKS = 2.08, 1.93, 25  # m, section 3.1
+# Which node of a brick that lies across is on the arch line: the grips that twist in A.1 and A.2.
+LINE_NODES = {2: 2, 3: 4, 5: 9, 6: 10, 8: 15, 9: 16, 11: 21, 12: 22, 14: 26, 15: 28,
+              17: 32, 18: 34, 20: 39, 21: 40, 23: 45, 24: 46}  # fmt: skip
+ALONG = [b for b in range(BRICKS) if b % 3 == 0]
+ACROSS = [b for b in range(BRICKS) if b % 3 != 0]
+PLAN_ANGLES = np.radians([-5.0, 5.0])
+PROVENANCE = (  # word for word that of the shipped scene, which came from there
+    "Geometry and joint stiffness identified from Tables A.1 and A.2 of Bruun et al., arXiv "
+    "2104.04856, by experiments/identify_arch25.py; brick, density, payload and pattern as printed "
+    "there (section 3.1)."
+)
+
+
+@dataclass(frozen=True)
+class Free:
+    """A group of fitted numbers: name, unit, how many, and a typical change."""
+
+    name: str
+    unit: str
+    count: int
+    step: float
+
+
+SHAPE = (
+    Free("pitch", "rad", BRICKS, 0.05),
+    Free("plan_angle", "rad", 1, 0.03),
+    Free("yaw", "rad", len(ALONG), 0.02),
+    Free("gap", "m", 1, 1e-3),
+    Free("overhang", "m", 1, 1e-3),
+    Free("stub", "m", 1, 5e-3),
+    Free("log_translational_stiffness", "ln N/m", 1, 0.05),
+    Free("log_rotational_stiffness", "ln N m/rad", 1, 0.05),
+)
+OFFSETS = Free("offset", "m", BRICKS, 1e-3)
+TILTS = Free("tilt", "rad", BRICKS - len(ALONG), 0.03)  # in the place of the plan angle
+ALONG_AND_ACROSS = (
+    Free("log_translational_stiffness", "ln N/m", 2, 0.05),
+    Free("log_rotational_stiffness", "ln N m/rad", 2, 0.05),
+)
+NO_YAW = tuple(group for group in SHAPE if group.name != "yaw")
+VARIANTS = {
+    "first stage": SHAPE,
+    "line in a plane": NO_YAW,
+    "free tilts": tuple(TILTS if g.name == "plan_angle" else g for g in SHAPE),
+    "free tilts, line in a plane": tuple(TILTS if g.name == "plan_angle" else g for g in NO_YAW),
+    "joints along and across": (*SHAPE[:-2], *ALONG_AND_ACROSS),
+}
+
+
+def unpack(numbers: Floats, groups: Sequence[Free]) -> dict[str, Floats]:
+    """Return the numbers by the name of their group."""
+    ends = np.cumsum([group.count for group in groups])
+    return dict(zip((g.name for g in groups), np.split(numbers, ends[:-1]), strict=True))
+
+
+def scene_of(numbers: Floats, groups: Sequence[Free]) -> Scene:
+    """Return the scene that the numbers describe."""
+    part = unpack(numbers, groups)
+    pitch = part["pitch"]
+    yaw, roll = np.zeros(BRICKS), part.get("plan_angle", 0.0) * np.sin(pitch)
+    if "yaw" in part:
+        yaw[ALONG] = part["yaw"]
+    if "tilt" in part:
+        roll[ACROSS] = part["tilt"]
+    linear, angular = (
+        np.exp(part[f"log_{kind}_stiffness"]) for kind in ("translational", "rotational")
+    )
+    shape = ArchShape(
+        pitch=pitch.tolist(),
+        roll=roll.tolist(),
+        yaw=yaw.tolist(),
+        offset=part.get("offset", np.zeros(BRICKS)).tolist(),
+        gap=float(part["gap"][0]),
+        overhang=float(part["overhang"][0]),
+        stub=float(part["stub"][0]),
+        translational_stiffness=(float(linear[0]), float(linear[-1]), float(linear[-1])),
+        rotational_stiffness=(float(angular[0]), float(angular[-1]), float(angular[-1])),
+    )
+    return arch_scene(shape, "arch25", robots=ROBOTS, line_nodes=LINE_NODES, provenance=PROVENANCE)
+
+
+def starting_guess() -> Floats:
+    """Return a catenary over the stated span and height, nominal joints, no tilt and no yaw."""
+    half = SPAN / 2
+    a = brentq(lambda c: c * (np.cosh(half / c) - 1) - HEIGHT, 0.1, 5.0)
+    length = np.where(np.arange(BRICKS) % 3 == 0, 0.246, 0.116) + 0.014
+    middle = np.cumsum(length) - length / 2
+    along = (middle / length.sum() - 0.5) * 2 * a * np.sinh(half / a)
+    pitch = np.arctan(-along / a)
+    area = 0.116 * 0.053  # contact, m²; the study prints stiffness per area, two springs in series
+    stiffness = np.log([100e9 * area / 2, 0.9e9 * area / 2])
+    return np.concatenate([pitch, [0.0], np.zeros(len(ALONG)), [0.014, 0.0615, 0.09], stiffness])
+
+
+def start_of(groups: Sequence[Free]) -> Floats:
+    """Return the starting guess for a set of numbers, tilted by the first plan angle."""
+    begin = unpack(starting_guess(), SHAPE)
+    begin["plan_angle"] = PLAN_ANGLES[:1]
+    begin["tilt"] = (PLAN_ANGLES[0] * np.sin(begin["pitch"]))[ACROSS]
+    return np.concatenate([np.resize(begin[group.name], group.count) for group in groups])
+
+
+def report(numbers: Floats, groups: Sequence[Free]) -> pd.DataFrame:
+    """Return every fitted number with its name and unit."""
+    rows = [
+        {"name": group.name, "index": i, "unit": group.unit, "value": value}
+        for group in groups
+        for i, value in enumerate(unpack(numbers, groups)[group.name].tolist())
+    ]
+    return pd.DataFrame(rows)

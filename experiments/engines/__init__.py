@@ -1,0 +1,1 @@
+"""Claims about the engines: how exact, how fast, and where they end."""

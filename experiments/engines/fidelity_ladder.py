@@ -1,0 +1,202 @@
+"""Claim: where its condition is met a level of fidelity answers what the next one would, for less.
+
+That is, to 1e-8 between planar, rigid and discrete bricks and to 1e-5 from rigid bricks to the
+stiff-bar frame; and where its condition is not met a level is wrong by more than a tenth.
+
+Method: a level and the next answer the same grip sets. Planar bricks: arches of 10 to 200 bricks in
+one plane, three random grips (condition met), and `arch25` pressed flat into its middle plane,
+every step of the sequential method (not met). Rigid bricks: every such step against the frame, and
+against discrete elements with the study's epoxy (met: all joints stay within their limits) and
+without bonds (not met; some steps in which the bricks come to rest). The error is the largest
+difference of the inner nodes' displacements over the largest displacement, in the worst set. Times
+are medians of rounds in one process on one core, ratios those within rounds.
+
+Inputs: the shipped scene; seed 0. Command: ``OPENBLAS_NUM_THREADS=1 python -m
+experiments.engines.fidelity_ladder [--quick]``. Writes ``experiments/results/fidelity_ladder.csv``
+and ``docs/figures/fidelity_ladder.png``.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from statistics import median
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from experiments.engines.parts.fidelity_scenes import flat_arch, flattened
+from experiments.engines.parts.grip_sets import grip_sets
+from experiments.harness.claim import Claim, Finding, Options, Times
+from experiments.harness.plotting import RESULTS, new_figure, save_figure
+from experiments.harness.timing import best
+from seqopt.arrays import Floats, Ints
+from seqopt.contact.mortar import DRY
+from seqopt.engines.auto import AutoEngine
+from seqopt.engines.discrete.engine import DiscreteEngine
+from seqopt.engines.frame import FrameEngine
+from seqopt.engines.interface import Engine, Want
+from seqopt.engines.planar import PlanarEngine
+from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.network.build import build_network
+from seqopt.scene.scene import Scene
+from seqopt.scene.scene_file import load_scene
+from seqopt.sequence.two_robots import sequential
+
+EXACT, FRAME, WRONG = 1e-8, 1e-5, 0.1
+SIZES = (10, 25, 50, 100, 200)
+SETS = 200
+MET, NOT_MET = "met", "not met"
+RESTING = (3, 7, 13, 24, 40)  # steps of the sequential method that rest unbonded
+COLORS = {"planar": "#2166ac", "rigid": "#b2182b", "auto": "#e08214"}
+
+
+class Question(NamedTuple):
+    """Grip sets (S, r) of one partial structure."""
+
+    bricks: int
+    grips: Ints
+
+
+class Pair(NamedTuple):
+    """A level and what it is held against, and what both are asked."""
+
+    level: str
+    against: str
+    case: str
+    condition: str
+    first: Engine
+    second: Engine
+    questions: list[Question]
+
+
+def steps_of(scene: Scene, numbers: tuple[int, ...] | None = None) -> list[Question]:
+    """Return the steps of the sequential method, or some of them."""
+    return [
+        Question(step.bricks, np.array([step.held], dtype=np.int64).reshape(1, -1))
+        for step in sequential(build_network(scene))
+        if numbers is None or step.number in numbers
+    ]
+
+
+def pairs(*, quick: bool) -> Iterator[Pair]:
+    """Yield what is compared."""
+    for count in SIZES[: 1 if quick else None]:
+        net = build_network(flat_arch(count))
+        asked = [Question(count, grip_sets(net, count, SETS))]
+        case = f"flat arch, {count} bricks"
+        yield Pair("planar", "rigid", case, MET, PlanarEngine(net), ComplianceEngine(net), asked)
+    scene = load_scene("arch25")
+    net, all_steps = build_network(scene), steps_of(scene)[: 12 if quick else None]
+    rigid = ComplianceEngine(net)
+    flat = PlanarEngine(build_network(flattened(scene)))
+    yield Pair("planar", "rigid", "arch25 pressed flat", NOT_MET, flat, rigid, all_steps)
+    yield Pair("rigid", "frame", "arch25", MET, rigid, FrameEngine(net), all_steps)
+    bonded, dry = DiscreteEngine(net), DiscreteEngine(net, DRY)
+    yield Pair("rigid", "discrete", "arch25, epoxy", MET, rigid, bonded, all_steps)
+    yield Pair("auto", "discrete", "arch25, epoxy", MET, AutoEngine(net), bonded, all_steps)
+    resting = steps_of(scene, RESTING[: 2 if quick else None])
+    yield Pair("rigid", "discrete", "arch25, no bonds", NOT_MET, rigid, dry, resting)
+    yield Pair("auto", "discrete", "arch25, no bonds", MET, AutoEngine(net, DRY), dry, resting)
+
+
+def answer(engine: Engine, questions: list[Question]) -> list[Floats]:
+    """Return the displacements (S, N, 3) of the inner nodes, per question."""
+    return [
+        engine.solve(q.bricks, q.grips, Want.DISPLACEMENTS).displacement[
+            :, engine.network.inner[: q.bricks].ravel()
+        ]
+        for q in questions
+    ]
+
+
+def compare(pair: Pair, rounds: int) -> dict[str, object]:
+    """Return the error of a level and the times of both, a row."""
+    found, true = (answer(engine, pair.questions) for engine in (pair.first, pair.second))
+    errors = np.concatenate(
+        [
+            np.abs(a - b).max(axis=(1, 2)) / np.abs(b).max(axis=(1, 2))
+            for a, b in zip(found, true, strict=True)
+        ]
+    )
+    sets = sum(len(q.grips) for q in pair.questions)
+    times = []
+    for _ in range(rounds):
+        first = best(lambda: answer(pair.first, pair.questions), 3)
+        start = time.perf_counter()
+        answer(pair.second, pair.questions)
+        times.append((first / sets, (time.perf_counter() - start) / sets))
+    return {
+        "level": pair.level,
+        "against": pair.against,
+        "case": pair.case,
+        "condition": pair.condition,
+        "sets": sets,
+        "error": errors.max(),
+        "error_median": np.median(errors),
+        "set_us": 1e6 * median(a for a, _ in times),
+        "against_us": 1e6 * median(b for _, b in times),
+        "ratio": median(b / a for a, b in times),
+    }
+
+
+def judge(table: pd.DataFrame) -> bool:
+    """Return whether levels are right where they may be used and wrong where not."""
+    met = table[table["condition"] == MET]
+    limit = np.where(met["against"] == "frame", FRAME, EXACT)
+    other = table[table["condition"] == NOT_MET]
+    return bool((met["error"] <= limit).all() and (other["error"] > WRONG).all())
+
+
+def chart(table: pd.DataFrame) -> None:
+    figure = new_figure(8, 4.4)
+    left, right = figure.subplots(1, 2, sharey=True, width_ratios=(1, 1.2))
+    at = -np.arange(len(table))
+    for y, (_, row) in zip(at, table.iterrows(), strict=True):
+        color = COLORS[str(row["level"])]
+        fill = color if row["condition"] == MET else "white"
+        error = max(float(row["error"]), 1e-16)
+        left.plot(error, y, "o", ms=7, color=color, mfc=fill)
+        right.plot([row["set_us"], row["against_us"]], [y, y], color="#cccccc", lw=1, zorder=1)
+        right.plot(row["set_us"], y, "o", ms=7, color=color, mfc=fill)
+        right.plot(row["against_us"], y, "s", ms=5, color="#888888")
+        right.annotate(
+            f"{float(f'{row.ratio:.2g}'):,g} ×",
+            (max(row["set_us"], row["against_us"]), y),
+            xytext=(6, -3),
+            textcoords="offset points",
+            fontsize=7,
+        )
+    left.set_yticks(at, table["level"] + " for " + table["against"] + ", " + table["case"])
+    left.tick_params(axis="y", labelsize=8)
+    left.set(xscale="log", xlabel="error against the other")
+    right.set(xscale="log", xlabel="time per grip set [µs]")
+    right.margins(x=0.18)
+    for axes in (left, right):
+        axes.grid(visible=True, axis="x", lw=0.2)
+        axes.spines[["top", "right"]].set_visible(False)
+    figure.supxlabel(
+        "Filled: the condition of the level is met. Open: it is not, and auto does not take it. "
+        "Squares: the other.\nAt the left edge: no difference, auto takes the same engine.",
+        fontsize=8,
+    )
+    save_figure(figure, "fidelity_ladder.png")
+
+
+def experiment(options: Options) -> Finding:
+    quick: bool = options.quick
+    rows = [compare(pair, 1 if quick else 3) for pair in pairs(quick=quick)]
+    table = pd.DataFrame(rows)
+    print(table.to_string(index=False, float_format="%.3g"))
+    if not quick:
+        RESULTS.mkdir(exist_ok=True)
+        table.to_csv(RESULTS / "fidelity_ladder.csv", index=False, float_format="%.3g")
+        chart(table)
+    return Finding(judge(table))
+
+
+CLAIM = Claim(experiment, quick="few cases, nothing written", times=Times.SHOWN)
+
+if __name__ == "__main__":
+    CLAIM.main()

@@ -1,0 +1,112 @@
+"""Claim: a stiff-bar frame has one good stiffness contrast; exactly rigid bricks need none.
+
+Method: every published state (Tables A.1, A.2 and the three-robot plan) of `arch25`, by the frame
+at bar-to-joint contrasts from 1e2 to 1e11; largest difference from the exactly rigid bricks,
+relative to the largest entry of the field in that state. The direct solve of the same rigid bricks
+is the check of the fast engine. A solver that refuses is counted.
+
+Inputs: the shipped scene. Command: ``python -m experiments.engines.frame_contrast [--quick]``.
+Writes ``experiments/results/frame_contrast.csv`` and ``docs/figures/frame_contrast.png``.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from experiments.harness.claim import Claim, Finding, Options
+from experiments.harness.plotting import RESULTS, new_figure, save_figure
+from seqopt.engines.frame import CONTRAST, FrameEngine
+from seqopt.engines.interface import Engine, Fields, grip_columns
+from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.engines.rigid.dense import solve_dense
+from seqopt.errors import SolverError
+from seqopt.network.build import build_network
+from seqopt.responses.table import step_fields
+from seqopt.scene.scene_file import load_scene
+from seqopt.sequence.steps import Step
+from seqopt.sequence.two_robots import METHODS
+from seqopt.study.published import published_plan
+
+FIELDS = ("edge_force", "displacement", "grip_force", "support")
+
+
+def published_steps(engine: Engine) -> list[Step]:
+    """Return one step for every different state that the study analyzes."""
+    steps = [step for method in METHODS.values() for step in method(engine.network)]
+    steps += published_plan(engine.network.scene)
+    return list({(step.bricks, frozenset(step.held)): step for step in steps}.values())
+
+
+def difference(fields: Fields, reference: Fields) -> dict[str, float]:
+    """Return the largest difference of every field, relative to its largest entry."""
+    out = {}
+    for name in FIELDS:
+        want = getattr(reference, name)
+        gap = np.abs(getattr(fields, name) - want).max(initial=0)
+        out[name] = float(gap / max(np.abs(want).max(initial=0), np.finfo(float).tiny))
+    return out
+
+
+def sweep(steps: list[Step], fast: Engine, contrasts: list[float]) -> pd.DataFrame:
+    """Return the worst difference of the frame over all steps, a row per contrast."""
+    exact = [step_fields(fast, step) for step in steps]
+    rows = []
+    for contrast in contrasts:
+        frame = FrameEngine(fast.network, contrast)
+        gaps, refused = [], 0
+        for step, reference in zip(steps, exact, strict=True):
+            try:
+                gaps.append(difference(step_fields(frame, step), reference))
+            except SolverError:
+                refused += 1
+        worst = pd.DataFrame(gaps, columns=list(FIELDS)).max()
+        rows.append({"contrast": contrast, **worst, "refused": refused, "states": len(steps)})
+    return pd.DataFrame(rows)
+
+
+def direct_gap(steps: list[Step], fast: Engine) -> float:
+    """Return the worst difference of the direct rigid solve over all steps and fields."""
+    worst = 0.0
+    for step in steps:
+        grips = np.array([step.held], dtype=np.int64).reshape(1, -1)
+        columns = grip_columns(fast.network, step.bricks, grips)
+        direct = solve_dense(fast.network, step.bricks, columns)
+        worst = max(worst, *difference(direct, step_fields(fast, step)).values())
+    return worst
+
+
+def chart(table: pd.DataFrame) -> None:
+    figure = new_figure(6, 3.6)
+    axes = figure.subplots()
+    for name in FIELDS:
+        axes.loglog(table["contrast"], table[name], "o-", ms=3, label=name.replace("_", " "))
+    axes.axvline(CONTRAST, color="k", lw=0.8, ls=":")
+    axes.set(xlabel="bar over joint stiffness", ylabel="largest relative difference")
+    axes.grid(visible=True, which="both", lw=0.2)
+    axes.legend(frameon=False, fontsize=8)
+    save_figure(figure, "frame_contrast.png")
+
+
+def experiment(options: Options) -> Finding:
+    quick: bool = options.quick
+    fast = ComplianceEngine(build_network(load_scene("arch25")))
+    steps = published_steps(fast)[:: 25 if quick else 1]
+    powers = [2, 6, 10] if quick else np.arange(2, 11.5, 0.5).tolist()
+    table = sweep(steps, fast, sorted({CONTRAST, *(10.0**p for p in powers)}))
+    print(table.to_string(index=False, float_format="%.2g"))
+    gap = direct_gap(steps, fast)
+    print(f"direct solve of the same rigid bricks: {gap:.2g}")
+    default = table.loc[table["contrast"] == CONTRAST, list(FIELDS)].to_numpy().max()
+    if not quick:
+        RESULTS.mkdir(exist_ok=True)
+        table.to_csv(RESULTS / "frame_contrast.csv", index=False, float_format="%.3g")
+        chart(table)
+    holds = default <= 5e-6 and gap <= 1e-9
+    return Finding(holds)
+
+
+CLAIM = Claim(experiment, quick="few states, nothing written")
+
+if __name__ == "__main__":
+    CLAIM.main()

@@ -1,0 +1,1 @@
+"""What several experiments share: how a claim is declared, found and run; scenes; figures."""

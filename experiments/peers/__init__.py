@@ -1,0 +1,1 @@
+"""Claims about the tools that one would take instead."""

@@ -1,0 +1,214 @@
+"""One partial structure as bars and joints: what the peers are shown, and what they answer.
+
+Frame packages know no rigid bricks, so bricks are stiff bars. Joints of one isotropic stiffness
+``k`` in translation and ``c`` in rotation are elastic beams, exactly: an Euler-Bernoulli beam of
+length ``sqrt(12 c / k)`` about the joint, with ``EA/L = k`` and ``EI/L = GJ/L = c``, has just
+these.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from scipy import sparse
+
+from seqopt.arrays import Floats, Ints, skew
+from seqopt.engines.interface import Want
+from seqopt.network.network import GROUND, Network, PartKind
+
+CONTRAST = 1e6  # bar over joint stiffness, where frames without corrections err least: bending and
+# rounding are each some 2e-5 of the fields here, at 1e5 and 1e7 ten and four times as much
+
+
+class Answer(NamedTuple):
+    """Fields of one model, as in `seqopt.engines.interface.Fields`; what is not asked is empty."""
+
+    edge_force: Floats
+    displacement: Floats
+    grip_force: Floats
+    support: Floats
+
+
+class Peer(Protocol):
+    """A model of one brick count that is asked for one grip set after the other."""
+
+    def solve(self, grips: Ints, want: Want) -> Answer:
+        """Return what is wanted with these places of ``network.inner.ravel()`` held."""
+
+
+@dataclass(frozen=True)
+class Chain:
+    """A partial structure as bars and joints between the inner nodes of its bricks.
+
+    Attributes
+    ----------
+    bricks : int
+    position, load : (2b, 3) float
+        Inner nodes, m, and the weight they carry, N.
+    springs : (s,) int
+        Springs that act.
+    joints : (s, 2) int
+        Inner nodes they join, `GROUND` first for a ground end.
+    point, anchor, across : (s, 3) float
+        Of the joints: position; fixed point of a ground end; a direction off the arch's plane.
+    stiffness : (2,) float
+        Of every joint, in translation and in rotation.
+    motion : (3N, 12b) sparse
+        Displacements of the network's nodes for those of the inner nodes.
+    half : (E, 3s) sparse
+        Forces of half-edges for the joints' forces on their second bodies.
+    inner : (b,) int
+        Edges along the bricks.
+    support : int
+        Joint at the first ground end.
+    """
+
+    bricks: int
+    position: Floats
+    load: Floats
+    springs: Ints
+    joints: Ints
+    point: Floats
+    anchor: Floats
+    across: Floats
+    stiffness: Floats
+    motion: sparse.csr_array
+    half: sparse.csr_array
+    inner: Ints
+    support: int
+
+    @property
+    def length(self) -> float:
+        """Length of the beam that stands for a joint, m."""
+        return float(np.sqrt(12 * self.stiffness[1] / self.stiffness[0]))
+
+    @property
+    def ends(self) -> Floats:
+        """Ends of the joints' beams, (s, 2, 3), m."""
+        reach = 0.5 * self.length * self.across
+        return np.stack([self.point - reach, self.point + reach], axis=1)
+
+    def answer(
+        self, state: Floats, force: Floats, bars: Floats, held: Floats, base: Floats
+    ) -> Answer:
+        """Return the answer from displacements (2b, 6), forces of joints and bars, reactions."""
+        edge = self.half @ force.ravel() if force.size else np.zeros(0)
+        edge[self.inner[: len(bars)]] = bars
+        moved = (self.motion @ state.ravel()).reshape(-1, 3) if state.size else np.zeros((0, 3))
+        return Answer(edge, moved, held, base)
+
+
+def chain_of(network: Network, bricks: int) -> Chain:
+    """Return a partial structure whose joints are all of one isotropic stiffness."""
+    springs = network.springs
+    acting = np.flatnonzero(springs.since <= bricks)
+    kinds = np.stack([springs.translational_stiffness, springs.rotational_stiffness], axis=1)
+    if np.ptp(kinds, axis=(0, 2)).any():
+        raise ValueError("joints differ in stiffness: a single beam does not stand for one")
+    place = {int(node): i for i, node in enumerate(network.inner.ravel())}
+    joints = np.full((len(acting), 2), GROUND)
+    row = {int(s): i for i, s in enumerate(acting)}
+    sides: list[tuple[int, int, float]] = []
+    for edge in range(network.count_edges(bricks)):
+        spring = int(network.edge_spring[edge])
+        if network.edge_kind[edge] == PartKind.INNER or spring not in row:
+            continue
+        first = network.edge_brick[edge] == springs.bodies[spring, 0]
+        if network.edge_kind[edge] == PartKind.JOINT:
+            joints[row[spring], 0 if first else 1] = place[int(network.edge_nodes[edge, 0])]
+        first = first and network.edge_kind[edge] == PartKind.JOINT
+        sides.append((edge, row[spring], -1.0 if first else 1.0))
+    return Chain(
+        bricks=bricks,
+        position=network.node_position[network.inner[:bricks].ravel()],
+        load=np.repeat(0.5 * network.weight[:bricks], 2, axis=0),
+        springs=acting,
+        joints=joints,
+        point=springs.position[acting],
+        anchor=springs.anchor[acting],
+        across=springs.axes[acting, 1],
+        stiffness=kinds[0, :, 0],
+        motion=_motion(network, bricks),
+        half=_half(network, bricks, sides, len(acting)),
+        inner=np.flatnonzero(network.edge_spring[: network.count_edges(bricks)] < 0),
+        support=row[springs.support],
+    )
+
+
+def _half(
+    network: Network, bricks: int, sides: list[tuple[int, int, float]], joints: int
+) -> sparse.csr_array:
+    out = np.zeros((network.count_edges(bricks), 3 * joints))
+    for edge, joint, sign in sides:
+        out[edge, 3 * joint : 3 * joint + 3] = sign * network.edge_axis[edge]
+    return sparse.csr_array(out)
+
+
+def _motion(network: Network, bricks: int) -> sparse.csr_array:
+    """Return the displacements of all nodes; a joint node moves by the mean of its two sides."""
+    out = np.zeros((3 * network.count_nodes(bricks), 12 * bricks))
+    place = {int(node): i for i, node in enumerate(network.inner.ravel())}
+    for node, i in place.items():
+        if i < 2 * bricks:
+            out[3 * node : 3 * node + 3, 6 * i : 6 * i + 3] = np.eye(3)
+    for edge in range(network.count_edges(bricks)):
+        if network.edge_kind[edge] != PartKind.JOINT:
+            continue
+        near, far = (int(n) for n in network.edge_nodes[edge])
+        spring = network.edge_spring[edge]
+        acts = network.springs.since[spring] <= bricks
+        share = 0.5 if acts else 1.0
+        arm = network.node_position[far] - network.node_position[near]
+        block = out[3 * far : 3 * far + 3, 6 * place[near] : 6 * place[near] + 6]
+        block += share * np.hstack([np.eye(3), -skew(arm)])
+    return sparse.csr_array(out)
+
+
+class Beams(NamedTuple):
+    """The structure as beams alone: inner nodes first, then two ends for every joint.
+
+    Bars along the bricks come first, then the joints' beams, then bars between the two.
+    """
+
+    position: Floats
+    pairs: Ints
+    factor: Floats
+    fixed: Ints
+    support: int
+
+    def sections(self, chain: Chain) -> Floats:
+        """Return EA and EI = GJ of every beam, (B, 2)."""
+        length = np.linalg.norm(np.diff(self.position[self.pairs], axis=1)[:, 0], axis=1)
+        return np.asarray((self.factor * length)[:, None] * chain.stiffness)
+
+    def joint_beams(self, chain: Chain) -> Ints:
+        """Return which beams stand for joints."""
+        return np.arange(chain.bricks, chain.bricks + len(chain.joints))
+
+
+def beams(chain: Chain) -> Beams:
+    """Return the structure as beams alone."""
+    count, joints = len(chain.position), len(chain.joints)
+    ends = count + np.arange(2 * joints).reshape(-1, 2)
+    real = chain.joints != GROUND
+    along, half = (
+        np.arange(count).reshape(-1, 2),
+        np.stack([chain.joints[real], ends[real]], axis=1),
+    )
+    factor = np.full(chain.bricks + joints + len(half), CONTRAST)
+    factor[chain.bricks : chain.bricks + joints] = 1.0
+    return Beams(
+        position=np.vstack([chain.position, chain.ends.reshape(-1, 3)]),
+        pairs=np.vstack([along, ends, half]),
+        factor=factor,
+        fixed=ends[~real],
+        support=int(ends[chain.support, 0]),
+    )
+
+
+def about_anchor(chain: Chain, reaction: Floats) -> Floats:
+    """Return force and moment about the fixed point from those about the beam's end."""
+    arm = chain.ends[chain.support, 0] - chain.anchor[chain.support]
+    return np.concatenate([reaction[:3], reaction[3:] + np.cross(arm, reaction[:3])])

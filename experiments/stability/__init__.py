@@ -1,0 +1,1 @@
+"""Claims about which steps stand, beside what other programs say."""

@@ -1,0 +1,1 @@
+"""What the claims about stability rest on: scenes, models, charts. None is run on its own."""

@@ -1,0 +1,1 @@
+"""Claims about what Bruun et al. printed."""

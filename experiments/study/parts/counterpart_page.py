@@ -1,0 +1,120 @@
+"""Captions of the counterparts, and the page of the documentation that lists them.
+
+Every number comes from the rows of `experiments.study.paper_counterparts`; a test compares them.
+"""
+
+from __future__ import annotations
+
+import textwrap
+
+import pandas as pd
+
+from experiments.study.parts.paper_items import ITEMS, Item
+
+NEAR = 5.0  # percent beyond rounding, relative to the printed size or 1
+AGREES, PARTLY, DISAGREES = "agrees", "agrees in part", "disagrees"
+TITLES = {
+    "geometry": "The arch, with its span and height",
+    "vaults": "Vault tests: outlines, secants of test 1, stiffness",
+    "discrete": "Displacements of the double-cross model and of discrete elements",
+    "sequences": "Grips of the methods, step by step",
+    "twisting": "The twisting steps",
+    "maxima": "Largest and average responses",
+    "loop": "Steps 59 to 62 of the three-robot plan",
+    "sequential": "Responses of the sequential method",
+    "cantilever": "Responses of the cantilever method",
+}
+INTRODUCTION = """\
+# Counterparts of the study's figures and tables
+
+Every figure and table of the [study](paper.md) that has numbers, and what seqopt gives in its
+place. `python -m experiments.study.paper_counterparts` computes all of it anew in a few seconds,
+draws the pictures and writes this page; `experiments/results/paper_counterparts.csv` holds every
+value. Photographs, sketches and definitions have no numbers. Where another experiment goes deeper,
+it is named too.
+
+The error is what exceeds the rounding of print, relative to the printed size or 1. An item *agrees*
+if every value is within 5 % of print, *agrees in part* if at least half are, and *disagrees*
+otherwise.
+
+"""
+CONVENTIONS = """\
+In the CSV a grip is its node, no grip is -1, and an optimized grip O3 is 1003. Forces of robots and
+of the support are compared by size, `T_pct` to within two edges. Figures and tables are numbered in
+the order of the study's source.
+
+"""
+
+
+def verdict(rows: pd.DataFrame) -> str:
+    """Return whether the rows of an item agree with print."""
+    share = float((rows["error_pct"] <= NEAR).mean())
+    return AGREES if share == 1 else PARTLY if share >= 0.5 else DISAGREES
+
+
+def short(value: float) -> str:
+    """Return a number to four digits, without an exponent."""
+    return f"{float(f'{value:.4g}'):.10g}"
+
+
+def beside(row: pd.Series) -> str:
+    pair = f"printed {short(row['printed'])}, here {short(row['ours'])}"
+    return f"{row['quantity']}, {row['at']}: {pair}"
+
+
+def statement(item: Item, rows: pd.DataFrame) -> str:
+    """Return in one sentence how an item agrees."""
+    word, error = verdict(rows), rows["error_pct"]
+    count = f"{item.number} {word}: {int((error <= NEAR).sum())} of {len(rows)} {item.counted}"
+    if error.max() == 0:
+        return f"{count} within rounding."
+    median = f", median error {float(f'{error.median():.2g}'):.10g} %" if len(rows) > 2 else ""
+    text = f"{count} within 5 %{median}; worst {beside(rows.loc[error.idxmax()])}"
+    if item.key:
+        text += f"; {beside(rows[rows['quantity'] == item.key].iloc[0])}"
+    return f"{text}."
+
+
+def caption(picture: str, table: pd.DataFrame) -> str:
+    """Return how every item of a picture agrees."""
+    items = [item for item in ITEMS if item.picture == picture]
+    return " ".join(statement(item, table[table["id"] == item.label]) for item in items)
+
+
+def line(item: Item, table: pd.DataFrame) -> str:
+    """Return the row of the page's table for an item."""
+    head = f"| {item.number}, section {item.section}: `{item.label}` | {item.shows} |"
+    if not item.has_numbers:
+        return f"{head} no: {item.why} | – | – | – |"
+    commands = ["study.paper_counterparts", *([item.also] if item.also else [])]
+    named = ", ".join(f"`{name}`" for name in commands)
+    picture = f"[picture](figures/counterpart_{item.picture}.png)"
+    text = statement(item, table[table["id"] == item.label]).removeprefix(f"{item.number} ")
+    return f"{head} yes | {named} | {picture} | {text} |"
+
+
+def page(table: pd.DataFrame) -> str:
+    """Return the page of the documentation."""
+    words = [verdict(table[table["id"] == item.label]) for item in ITEMS if item.has_numbers]
+    total = (
+        f"{len(words)} of {len(ITEMS)} have numbers: {words.count(AGREES)} agree, "
+        f"{words.count(PARTLY)} agree in part, {words.count(DISAGREES)} disagree.\n"
+    )
+    head = (
+        "| in the study | shows | numbers | command (`python -m experiments.`) | picture "
+        "| agreement |\n|---|---|---|---|---|---|"
+    )
+    lines = [line(item, table) for item in ITEMS]
+    parts = [INTRODUCTION + total, "\n".join([head, *lines]) + "\n", CONVENTIONS + "## Pictures\n"]
+    return "\n".join([*parts, *(section(picture, table) for picture in TITLES)])
+
+
+def section(picture: str, table: pd.DataFrame) -> str:
+    """Return a picture with its caption and the reasons for what disagrees."""
+    items = [item for item in ITEMS if item.picture == picture]
+    text = " ".join(
+        f"{statement(item, table[table['id'] == item.label])} {item.why}".strip() for item in items
+    )
+    image = f"![{TITLES[picture]}](figures/counterpart_{picture}.png)"
+    body = textwrap.fill(f"*{TITLES[picture]}.* {text}", 120, break_on_hyphens=False)
+    return f"{image}\n\n{body}\n"

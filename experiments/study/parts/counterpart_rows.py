@@ -1,0 +1,248 @@
+"""Printed and computed values, side by side, of every figure and table of the study.
+
+Every function yields the rows of one item of `experiments.study.parts.paper_items`, named by its
+label in `COUNTERPARTS`.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable
+from itertools import product
+
+import numpy as np
+import pandas as pd
+
+from experiments.harness.yardstick import ROUNDING, VALUES
+from experiments.study.parts.counterpart_models import (
+    Ours,
+    Row,
+    Rows,
+    discrete_elements,
+    geometry,
+    nodes_compared,
+    secant,
+    stiffness,
+    vault_dimensions,
+)
+from experiments.study.parts.paper_items import CASCADE, COMPARED, MODIFIED, ROBOTS, TENSION
+from seqopt.placement.ranking import rank_choice
+from seqopt.sequence.schedule import OpenGrip, OpenStep
+from seqopt.sequence.steps import Step
+from seqopt.sequence.three_robots import modified_sequential, three_robot_loop
+from seqopt.sequence.two_robots import METHODS
+from seqopt.study.published import published_choice
+from seqopt.study.tables import printed, printed_steps
+
+TWISTING = (9, 11, 21, 23, 33, 35, 45, 47)
+CROWN = 25  # last step of the two-robot methods up to the crown brick, 13
+LOOP = (59, 60, 61, 62)
+RESPONSES = {
+    "F_rob1_N": "F_rob1 [N]",
+    "F_rob2_N": "F_rob2 [N]",
+    "F_sup_N": "F_sup [N]",
+    "M_sup_Nm": "M_sup [N m]",
+    "F_min_N": "F_min [N]",
+    "F_max_N": "T_max [N]",
+    "F_avg_N": "F_avg [N]",
+    "T_pct": "T_pct [%]",
+    "D_max_1e-3mm": "D_max [1e-3 mm]",
+    "D_avg_1e-3mm": "D_avg [1e-3 mm]",
+    "D_std_1e-3mm": "D_std [1e-3 mm]",
+}
+
+
+def read(text: str) -> pd.DataFrame:
+    return pd.read_csv(io.StringIO(text))
+
+
+def two_robots(own: Ours) -> Rows:
+    states = {}
+    for name, method in METHODS.items():
+        steps = method(own.engine.network)
+        states[name] = [(step.bricks, frozenset(step.held)) for step in steps]
+        study = printed_steps(name).set_index("step")
+        for number in range(32, 38):
+            for i in (0, 1):
+                grip = steps[number - 1].grips[i]
+                node = study.loc[number, f"rob{i + 1}_node"]
+                yield Row(f"node of rob{i + 1}", f"{name}, step {number}", cell(node), cell(grip))
+    shared = np.mean([state in states["sequential"] for state in states["cantilever"]])
+    yield Row("steps shared [%]", "both methods", 100 / 3, 100 * float(shared))
+
+
+def cell(grip: object, base: int = 0) -> float:
+    """Return a grip as a number: a node, an optimized grip O3 as 1003, none as -1."""
+    if isinstance(grip, OpenGrip):
+        return 1000.0 + grip.move + 1 - base
+    text = "" if grip is None else str(grip)
+    if text in ("", "nan", "<NA>"):
+        return -1.0
+    return 1000.0 + float(text[1:]) if text.startswith("O") else float(text)
+
+
+def twisting(own: Ours) -> Rows:
+    table, study = own.steps("sequential"), printed("sequential_offcenter").set_index("step")
+    calm = table.drop(list(TWISTING))
+    for step in TWISTING:
+        at, want, got = f"step {step}", study.loc[step], table.loc[step]
+        for column in ("F_rob1_N", "F_rob2_N", "F_sup_N", "M_sup_Nm", "D_max_1e-3mm"):
+            if not np.isnan(want[column]):
+                yield Row(RESPONSES[column], at, abs(want[column]), abs(got[column]))
+        for name, column in (("C1", "M_sup_Nm"), ("C2", "D_max_1e-3mm")):
+            yield Row(name, at, want[name], got[column] / calm[column].mean())
+
+
+def lever_arm(own: Ours) -> Rows:
+    table, study = own.steps("sequential"), printed_steps("sequential").set_index("step")
+    for column in ("M_sup_Nm", "D_max_1e-3mm"):
+        yield Row(RESPONSES[column], "step 35", study.loc[35, column], table.loc[35, column])
+    for step in TWISTING[4:]:
+        force = table.loc[step, ["F_rob1_N", "F_rob2_N"]].abs().max()
+        arm = 1e3 * float(table.loc[step, "M_sup_Nm"] / force)
+        yield Row("lever arm [mm]", f"step {step}", 135, arm, 15)
+
+
+def cantilever_over_sequential(own: Ours) -> Rows:
+    """Compare both methods; ratios are those of values rounded to print, as the study's are."""
+    sides = {"C": own.steps("cantilever"), "S": own.steps("sequential")}
+    columns = {"M": "M_sup_Nm", "D": "D_max_1e-3mm", "T": "F_max_N"}
+    for want in read(COMPARED).to_dict("records"):
+        step = int(want["step"])
+        for short, column in columns.items():
+            got = {side: float(table.loc[step, column]) for side, table in sides.items()}
+            for side, value in got.items():
+                yield Row(
+                    f"{RESPONSES[column]}, {side}", f"step {step}", want[f"{short}_{side}"], value
+                )
+            ratio = round(got["C"], 1) / round(got["S"], 1)
+            rounding = 0.0501 if short == "T" else 0.00501
+            title = f"{RESPONSES[column].split(' [')[0]}, C/S"
+            yield Row(title, f"step {step}", want[f"{short}_ratio"], ratio, rounding)
+
+
+def tension(own: Ours) -> Rows:
+    study = read(TENSION).set_index("what")
+    for method, start in (("sequential", 1), ("cantilever", 5)):
+        largest = own.steps(method)["F_max_N"]
+        values = (
+            largest.loc[start:].mean(),
+            largest.loc[start:CROWN].mean(),
+            largest.loc[CROWN + 1 :].mean(),
+            largest.max(),
+        )
+        for what, value in zip(study.index, values, strict=True):
+            yield Row(f"{what} T_max [N]", method, study.loc[what, method], float(value))
+
+
+def robot_forces(own: Ours) -> Rows:
+    study = read(ROBOTS).set_index("method")
+    for method, robot in product(study.index, study.columns):
+        force = own.methods.maxima.loc[f"F_{robot} [N]", method]
+        yield Row(f"largest F_{robot} [N]", method, study.loc[method, robot], force, 0.5)
+
+
+def improvement(own: Ours) -> Rows:
+    study = own.methods.printed
+    for quantity, method in product(own.methods.maxima.index, own.methods.maxima.columns):
+        want = np.nan if study is None else study.loc[quantity, method]
+        if not np.isnan(want):
+            rounding = 0.5 if quantity.startswith("F_") else ROUNDING
+            got = own.methods.maxima.loc[quantity, method]
+            yield Row(f"largest {quantity}", method, want, got, rounding)
+
+
+def scheme(study: pd.DataFrame, steps: list[OpenStep] | list[Step], base: int = 0) -> Rows:
+    """Compare brick counts and grips of a printed scheme with as many steps."""
+    for place, (row, step) in enumerate(zip(study.to_dict("records"), steps, strict=True), 1):
+        at = f"row {place}" if pd.isna(row["step"]) else f"step {row['step']:g}"
+        yield Row("bricks", at, row["bricks"], step.bricks)
+        for i, grip in enumerate(step.grips, start=1):
+            yield Row(f"node of rob{i}", at, cell(row[f"rob{i}"]), cell(grip, base))
+
+
+def modified(own: Ours) -> Rows:
+    """Start where five bricks stand, held by two robots as in the first row of the excerpt."""
+    steps = modified_sequential(own.engine.network).steps
+    start = next(i for i, step in enumerate(steps) if step.grips == (8, 7, None))
+    study = read(MODIFIED)
+    window = list(steps[start : start + len(study)])
+    yield from scheme(study, window, base=window[1].moves[0])
+
+
+def cascade(own: Ours) -> Rows:
+    study = read(CASCADE)
+    steps = three_robot_loop(own.engine.network).steps
+    yield from scheme(study, [steps[number - 1] for number in study["step"]])
+
+
+def plan_rows(own: Ours) -> tuple[pd.DataFrame, list[Step], pd.DataFrame]:
+    """Return the printed plan, the loop filled with its nodes, and where these rank."""
+    study = printed("three_robot_plan")
+    study = study.rename(columns={f"rob{i}_node": f"rob{i}" for i in (1, 2, 3)})
+    choice = published_choice(own.problem)
+    steps = own.problem.schedule.fill(own.problem.nodes(choice))
+    return study, list(steps), rank_choice(own.problem, choice)
+
+
+def loop(own: Ours) -> Rows:
+    study, steps, ranks = plan_rows(own)
+    part = study[study["step"].isin(LOOP)]
+    yield from scheme(part, [steps[number - 1] for number in LOOP])
+    place = ranks.set_index("step").loc[LOOP[0], "rank_in_window"]
+    yield Row("place of node O15 by the printed equations", "step 59", 1, place)
+
+
+def plan(own: Ours) -> Rows:
+    study, steps, ranks = plan_rows(own)
+    yield from scheme(study, steps)
+    first = int((ranks["rank_in_window"] == 1).sum())
+    yield Row("chosen nodes in first place by the printed equations", "plan", len(ranks), first)
+
+
+def steps_of(own: Ours, method: str) -> Rows:
+    """Compare a table of Appendix A; sizes of forces at robots and support, T_pct by two edges."""
+    study, table = printed_steps(method).set_index("step"), own.steps(method)
+    for step, column in product(study.index, (*VALUES, "T_pct")):
+        want, got = float(study.loc[step, column]), float(table.loc[step, column])
+        if np.isnan(want):
+            continue
+        if column.startswith("F_rob") or column == "F_sup_N":
+            want, got = abs(want), abs(got)
+        bricks = int(table.loc[step, "bricks"])
+        edges = 3 * bricks + (2 if bricks == len(own.scene.bricks) else 1)
+        rounding = ROUNDING + (200 / edges if column == "T_pct" else 0)
+        yield Row(RESPONSES[column], f"step {step}", want, got, rounding)
+
+
+COUNTERPARTS: dict[str, Callable[[Ours], Rows]] = {
+    "fig:arch_vault": geometry,
+    "table:exp_data": vault_dimensions,
+    "fig:secant_stiff": secant,
+    "table:model_results": stiffness,
+    "fig:3dec_image2": nodes_compared,
+    "table:validation_results": discrete_elements,
+    "fig:2rob_methods": two_robots,
+    "table:sequential_twist": twisting,
+    "fig:sequential_twist": lever_arm,
+    "table:cantilever_compare": cantilever_over_sequential,
+    "table:2robot_tension": tension,
+    "table:2robot_forces": robot_forces,
+    "table:optimization1": modified,
+    "table:optimization2": cascade,
+    "fig:3rob_sequence": loop,
+    "table:optimization_results": improvement,
+    "table:experimental_data1": lambda own: steps_of(own, "sequential"),
+    "table:experimental_data2": lambda own: steps_of(own, "cantilever"),
+    "table:experimental_data3": plan,
+}
+
+
+def tabulate(label: str, own: Ours) -> pd.DataFrame:
+    """Return the rows of one item, with the error beyond rounding as in the yardstick."""
+    table = pd.DataFrame([vars(row) for row in COUNTERPARTS[label](own)])
+    table.insert(0, "id", label)
+    table["difference"] = table["ours"] - table["printed"]
+    excess = (table["difference"].abs() - table.pop("rounding")).clip(lower=0)
+    table["error_pct"] = 100 * excess / table["printed"].abs().clip(lower=1)
+    return table

@@ -1,0 +1,188 @@
+"""The study's figures and tables in the order of its source, and what each shows.
+
+Data only, so that nothing else is needed to tell whether all have a counterpart. Photographs,
+sketches and definitions have no numbers; plots of data and drawings with dimensions do. Numbers
+count the environments of the LaTeX source on arXiv.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Item:
+    """A figure or table of the study.
+
+    Parameters
+    ----------
+    label : str
+        As in the source, ``fig:`` or ``table:``.
+    number : str
+        As a reader counts it.
+    section : str
+        Where it stands.
+    shows : str
+        In a few words.
+    picture : str
+        Name of the counterpart's picture; empty if it has no numbers.
+    also : str
+        Another experiment that goes deeper, with its folder.
+    parts : tuple of str
+        Labels within it.
+    why : str
+        Why the counterpart disagrees, or why there are no numbers.
+    key : str
+        A quantity that its caption names beside the worst one.
+    counted : str
+        What its values are.
+    """
+
+    label: str
+    number: str
+    section: str
+    shows: str
+    picture: str = ""
+    also: str = ""
+    parts: tuple[str, ...] = ()
+    why: str = ""
+    key: str = ""
+    counted: str = "values"
+
+    @property
+    def has_numbers(self) -> bool:
+        """Whether the item needs a counterpart."""
+        return bool(self.picture)
+
+
+ITEMS = (
+    Item("fig:full_vault", "Figure 1", "3.1", "the finished vault", why="photograph"),
+    Item("fig:arch_vault", "Figure 2", "3.1", "vault and central arch with dimensions", "geometry",
+         "calibration.identify_arch25",
+         why="Ours is what the bricks as identified from the responses take up."),
+    Item("fig:2robot_traditional", "Figure 3", "3.1", "scaffolding on two sides", why="sketch"),
+    Item("fig:doublecross", "Figure 4", "3.2.1", "the double-cross model",
+         why="definition; drawn in `network.png`"),
+    Item("table:exp_data", "Table 1", "3.2.2", "eight vault tests: dimensions", "vaults",
+         "calibration.calibration",
+         why="These are inputs: ours are measured back from the modeled joints, r being the rise."),
+    Item("fig:arch_test", "Figure 5", "3.2.2", "a vault test in general", why="sketch"),
+    Item("fig:secant_stiff", "Figure 6", "3.2.2", "load and displacement of test 1, with secants",
+         "vaults", "calibration.calibration",
+         why="Ours is the bed of springs fitted to all eight tests, which meets the measured "
+         "secant; the measured curve itself is in no table."),
+    Item("table:model_results", "Table 2", "3.2.2", "measured and calibrated stiffness", "vaults",
+         "calibration.calibration",
+         why="Ours is another law, with a smaller mean error; the study's law with its "
+         "printed values does not give its column.", key="mean size of e_rel [%]"),
+    Item("fig:3dec_image", "Figure 7", "3.2.3", "the discrete-element model", why="sketch"),
+    Item("fig:3dec_image2", "Figure 8", "3.2.3", "displacements of blocks and of nodes", "discrete",
+         "discrete.discrete_arches",
+         why="The displacements that it draws are not printed, only how many nodes are compared.",
+         counted="node counts (all that is printed)"),
+    Item("table:validation_results", "Table 3", "3.2.3", "errors against discrete elements",
+         "discrete", "discrete.discrete_arches",
+         why="No reading of the printed contacts comes near; ours is the printed stiffness with a "
+         "robot that holds a node."),
+    Item("fig:2rob_methods", "Figure 9", "4", "both two-robot sequences at bricks 17 to 19",
+         "sequences", parts=("fig:two_robot_methods",)),
+    Item("table:sequential_twist", "Table 4", "4.1", "the eight twisting steps", "twisting",
+         "stability.failing_steps"),
+    Item("fig:sequential_twist", "Figure 10", "4.1", "lever arm; displaced shape at step 35",
+         "twisting", "figures", ("fig:sequential_twist_offcenter", "fig:sequential_twist_35"),
+         why="The lever arm is support moment over robot force after the crown; the study's own "
+         "columns leave its 135 ± 15 mm too."),
+    Item("table:cantilever_compare", "Table 5", "4.2", "both methods at the twisting steps",
+         "twisting"),
+    Item("fig:2robot_sequence1", "Figure 11", "4.2", "the cantilever method", why="photographs"),
+    Item("table:2robot_tension", "Table 6", "4.2", "tension of the two-robot methods", "maxima",
+         why="Read as steps 1 to 25 before the crown; the cantilever method without steps 1 to 4."),
+    Item("table:2robot_forces", "Table 7", "4.3", "largest robot forces of the two-robot methods",
+         "maxima"),
+    Item("table:optimization1", "Table 8", "5.2.1", "the modified sequential method", "sequences",
+         why="The study's count of bricks is one short in every row, against its Table A.1; "
+         "all grips agree."),
+    Item("table:optimization2", "Table 9", "5.2.2", "the cascade of the three-robot method",
+         "sequences"),
+    Item("fig:fab_loop", "Figure 12", "5.2.2", "the four-step loop", why="sketch"),
+    Item("fig:3rob_sequence", "Figure 13", "5.2.2", "one loop, steps 59 to 62", "loop",
+         "study.criteria_variants", ("fig:3rob_58", "fig:3rob_59", "fig:3rob_60", "fig:3rob_61"),
+         why="The grips are the printed ones; as an optimum, O15 should take the first place."),
+    Item("table:optimization_results", "Table 10", "5.3", "largest responses of three methods",
+         "maxima", "figures",
+         why="The plan's displacement at step 86 is larger; without that step it is the printed "
+         "one."),
+    Item("table:experimental_data1", "Table A.1", "A", "the sequential method, step by step",
+         "sequential", "figures",
+         why="What is off is explained [there](paper.md#where-it-disagrees).",
+         counted="values (T_pct to two edges)"),
+    Item("table:experimental_data2", "Table A.2", "A", "the cantilever method, step by step",
+         "cantilever", "figures",
+         why="What is off is explained [there](paper.md#where-it-disagrees).",
+         counted="values (T_pct to two edges)"),
+    Item("table:experimental_data3", "Table B.1", "B", "the three-robot plan, step by step",
+         "sequences", "study.criteria_variants",
+         why="The schedule is the loop's; its chosen nodes do not follow from the printed "
+         "equations. Its responses are not at hand as data."),
+)  # fmt: skip
+
+# Tables that are small and used here only, as printed. Empty cells do not grip.
+COMPARED = """step,M_C,M_S,M_ratio,D_C,D_S,D_ratio,T_C,T_S,T_ratio
+9,2.9,6.8,0.43,0.4,1.3,0.31,68.6,36.9,1.9
+11,1.6,8.3,0.19,0.6,2.2,0.27,69.1,45.5,1.5
+21,20.7,21.5,0.96,8.5,12.8,0.66,78.4,23.7,3.3
+23,18.6,22.0,0.85,7.3,16.9,0.43,90.8,11.4,8.0
+33,4.6,21.3,0.22,11.2,70.8,0.16,29.6,0.8,37.0
+35,5.3,29.6,0.18,10.4,97.5,0.11,59.3,0.8,74.1
+45,3.7,56.4,0.07,15.9,264.4,0.06,34.8,0.8,43.5
+47,0.9,66.0,0.01,11.1,306.5,0.04,69.6,0.8,87.0
+"""
+TENSION = """what,sequential,cantilever
+average,38.0,53.7
+average before the crown,55.2,80.0
+average after the crown,17.4,30.6
+maximum,114.4,111.5
+"""
+ROBOTS = """method,rob1,rob2
+sequential,369,406
+cantilever,362,409
+"""
+MODIFIED = """step,bricks,rob1,rob2,rob3
+8,4,8,7,
+,4,8,7,O1
+9,4,8,,O1
+,5,8,11,O1
+10,5,8,11,
+,5,8,11,O2
+11,5,,11,O2
+,6,13,11,O2
+12,6,13,11,
+"""
+CASCADE = """step,bricks,rob1,rob2,rob3
+1,1,1,,
+2,2,1,2,
+3,3,1,2,O1
+4,3,,2,O1
+5,4,7,2,O1
+6,4,7,,O1
+7,4,7,O2,O1
+8,4,7,O2,
+9,5,7,O2,8
+10,5,,O2,8
+11,5,O3,O2,8
+12,5,O3,,8
+13,6,O3,11,8
+14,6,O3,11,
+15,6,O3,11,O4
+16,6,,11,O4
+17,7,13,11,O4
+18,7,13,,O4
+19,7,13,O5,O4
+20,7,13,O5,
+21,8,13,O5,15
+58,17,,O14,33
+59,17,O15,O14,33
+60,17,O15,,33
+61,18,O15,35,33
+62,18,O15,35,
+"""
