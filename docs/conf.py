@@ -15,7 +15,7 @@ extensions = [
 ]
 html_theme = "furo"
 html_title = "seqopt"
-exclude_patterns = ["_build"]
+exclude_patterns = ["_build", "jupyter_execute"]  # what a build leaves behind
 myst_enable_extensions = ["amsmath", "dollarmath", "deflist"]
 myst_heading_anchors = 3
 
