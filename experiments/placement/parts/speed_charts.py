@@ -132,7 +132,7 @@ def profile_charts(runs: pd.DataFrame) -> None:
         _steps(axes, performance_profile(costs, ratios))
         axes.set(xlabel="time to choose over the shortest", title=f"{text}")
     parts[0].set(ylabel="share of instances")
-    models = own["models"].where(own["gap"] <= CLOSE, np.inf)
+    models = own["models"].astype(float).where(own["gap"] <= CLOSE, np.inf)
     counts = own.assign(cost=models / own["moves"]).pivot_table(
         values="cost", index="instance", columns="formulation"
     )

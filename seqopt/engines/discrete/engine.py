@@ -116,7 +116,7 @@ def held_nodes(network: Network, system: System, columns: Ints, nodes: Floats) -
         arms = nodes[columns // 2 == body] - center[body]
         moved = np.vstack([np.hstack([np.eye(3), -skew(arm)]) for arm in arms])
         blocks[body] = linalg.null_space(moved * system.unit[:6])
-    free = sparse.csr_array(sparse.block_diag(blocks))
+    free = sparse.csr_array(sparse.block_diag([sparse.csr_array(block) for block in blocks]))
     return Held(system, free, sparse.csr_array(system.layers.shape))
 
 

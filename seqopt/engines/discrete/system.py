@@ -106,7 +106,7 @@ class System:
     def stiffness(self, slope: Floats) -> sparse.csr_array:
         """Return the stiffness (6n, 6n) of layers and beds whose points have slopes (P, 3, 3)."""
         each = self.maps.transpose(0, 2, 1) @ slope @ self.maps
-        joints = sparse.block_diag(np.add.reduceat(each, self._starts, axis=0), format="csr")
+        joints = _diagonal(np.add.reduceat(each, self._starts, axis=0))
         return sparse.csr_array(self.gap.T @ joints @ self.gap + self.layers)
 
     def openings(self, twist: Floats) -> Floats:
@@ -156,7 +156,7 @@ def build(network: Network, bricks: int, mortar: Mortar, bed: BedStiffness | Non
     total = sparse.csr_array((load.size, load.size))
     for pair, blocks in layers:
         across = _across(pair, where, center) @ sparse.diags_array(unit)
-        total = total + across.T @ sparse.block_diag(blocks, format="csr") @ across
+        total = total + across.T @ _diagonal(blocks) @ across
     return System(
         bricks=bricks,
         acting=acting,
@@ -214,6 +214,12 @@ def _without(stiffness: Floats, bed: Floats) -> Floats:
     share = np.eye(6) - np.linalg.solve(bed, stiffness)
     out = np.linalg.solve(share.transpose(0, 2, 1), stiffness.transpose(0, 2, 1))
     return np.asarray(0.5 * (out + out.transpose(0, 2, 1)))
+
+
+def _diagonal(blocks: Floats) -> sparse.csr_array:
+    """Return blocks (J, 6, 6) as one matrix; SciPy deprecates `block_diag` of dense blocks."""
+    place = np.arange(len(blocks) + 1)
+    return sparse.csr_array(sparse.bsr_array((blocks, place[:-1], place)))
 
 
 def _across(bodies: Ints, at: Floats, center: Floats) -> sparse.csr_array:
