@@ -51,6 +51,7 @@ def optimize(
     Returns
     -------
     Plan
+        Checked, with its problem, certificate and times.
 
     Raises
     ------
@@ -77,6 +78,15 @@ def optimize(
 
 def find_criterion(criterion: Criterion | str) -> Criterion:
     """Return a criterion, by name or itself.
+
+    Parameters
+    ----------
+    criterion : Criterion or str
+        A criterion, or a name of `seqopt.CRITERIA`.
+
+    Returns
+    -------
+    Criterion
 
     Raises
     ------
