@@ -26,8 +26,8 @@ import numpy as np
 
 from seqopt.arrays import Floats
 from seqopt.errors import ProblemError
-from seqopt.placement.costs import Aim, PlacementProblem
 from seqopt.placement.formulation import Formulation, FormulationKind, Reads, Selection
+from seqopt.placement.interface import Aim, PlacementProblem
 
 CHARGES = ("later", "earlier")
 

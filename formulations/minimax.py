@@ -15,8 +15,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from seqopt.placement.costs import Aim, LayeredCosts, PlacementProblem
+from seqopt.placement.costs import LayeredCosts
 from seqopt.placement.formulation import Formulation, FormulationKind, Selection
+from seqopt.placement.interface import Aim, PlacementProblem
 
 
 def solve(problem: PlacementProblem) -> Selection:

@@ -18,8 +18,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from seqopt.placement.costs import Aim, PlacementProblem
 from seqopt.placement.formulation import Formulation, FormulationKind, Selection
+from seqopt.placement.interface import Aim, PlacementProblem
 
 
 def solve(problem: PlacementProblem) -> Selection:

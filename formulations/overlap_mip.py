@@ -17,9 +17,9 @@ import cvxpy as cp
 import numpy as np
 
 from formulations.solvers import minimize
-from seqopt.placement.costs import Aim, PlacementProblem
 from seqopt.placement.flow import layered_flow
 from seqopt.placement.formulation import Formulation, FormulationKind, Selection
+from seqopt.placement.interface import Aim, PlacementProblem
 
 
 def solve(problem: PlacementProblem) -> Selection:

@@ -23,8 +23,9 @@ import numpy as np
 
 from seqopt.arrays import Floats
 from seqopt.errors import ProblemError
-from seqopt.placement.costs import Aim, LayeredCosts, PlacementProblem
+from seqopt.placement.costs import LayeredCosts
 from seqopt.placement.formulation import Formulation, FormulationKind, Reads, Selection
+from seqopt.placement.interface import Aim, PlacementProblem
 
 MOST = 20_000_000  # combinations in one enumeration: 160 MB
 

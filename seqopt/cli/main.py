@@ -31,8 +31,9 @@ from seqopt.files import csv_text, make_folder, write_bytes, write_csv, write_te
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.placement.formulation import find_formulation
-from seqopt.placement.plan import Plan, solve
+from seqopt.placement.plan import Plan
 from seqopt.placement.problem import pose
+from seqopt.placement.solving import solve
 from seqopt.report.comparison import Comparison, compare
 from seqopt.report.text import format_comparison
 from seqopt.responses.table import analyze, fields_archive

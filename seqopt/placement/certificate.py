@@ -9,12 +9,13 @@ import numpy as np
 
 from seqopt.arrays import FrozenValue
 from seqopt.errors import SolverError
-from seqopt.placement.costs import TINY, Aim, LayeredCosts, PlacementProblem
+from seqopt.placement.costs import TINY, LayeredCosts
 from seqopt.placement.formulation import (
     Formulation,
     FormulationKind,
     Selection,
 )
+from seqopt.placement.interface import Aim, PlacementProblem
 
 TOLERANCE = 1e-6  # of the costs that a choice meets: how far a claim may be from what the data say
 

@@ -17,7 +17,8 @@ from scipy import sparse
 from seqopt.arrays import Bools, Floats, FrozenValue
 from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.placement.certificate import TOLERANCE, least_sum
-from seqopt.placement.costs import TINY, Budget, LayeredCosts, PlacementProblem
+from seqopt.placement.costs import TINY, Budget, LayeredCosts
+from seqopt.placement.interface import PlacementProblem
 
 ACCURACY = 1e-7  # how far a reported optimum may lie above the true one, relative to the larger of
 # it and the largest cost

@@ -11,7 +11,7 @@ import numpy as np
 
 from seqopt.arrays import FrozenValue
 from seqopt.errors import ProblemError
-from seqopt.placement.costs import Aim
+from seqopt.placement.interface import Aim
 
 GROUP = "seqopt.formulations"
 

@@ -13,8 +13,9 @@ import pandas as pd
 from seqopt.arrays import Floats
 from seqopt.engines.interface import Engine
 from seqopt.errors import ProblemError
-from seqopt.placement.costs import Aim, Budget, LayeredCosts
+from seqopt.placement.costs import Budget, LayeredCosts
 from seqopt.placement.criteria import Criterion
+from seqopt.placement.interface import Aim
 from seqopt.responses.choices import CHOICE_RESPONSES, Evaluation, StepChoices
 from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import Schedule
