@@ -74,7 +74,18 @@ class LayeredCosts(FrozenValue):
         return tuple(len(single) for single in self.single)
 
     def parts(self, choice: Sequence[int]) -> list[float]:
-        """Return the single and shared costs that the choices meet, move by move."""
+        """Return the costs that a choice meets.
+
+        Parameters
+        ----------
+        choice : sequence of int
+            A candidate for every move.
+
+        Returns
+        -------
+        list of 2K float
+            Move by move, the single cost and the one shared with the move before.
+        """
         out, before = [], 0
         for single, shared, now in zip(self.single, self.shared, choice, strict=True):
             out += [float(single[now]), float(shared[before, now])]
@@ -82,15 +93,42 @@ class LayeredCosts(FrozenValue):
         return out
 
     def cost(self, choice: Sequence[int]) -> float:
-        """Return the total cost of one candidate per move; infinite if one is not allowed."""
+        """Return the total cost of a choice.
+
+        Parameters
+        ----------
+        choice : sequence of int
+            A candidate for every move.
+
+        Returns
+        -------
+        float
+            Infinite if the choice is not allowed.
+        """
         return sum(self.parts(choice))
 
     def worst(self, choice: Sequence[int]) -> float:
-        """Return the largest single or shared cost that the choices meet."""
+        """Return the largest cost that a choice meets.
+
+        Parameters
+        ----------
+        choice : sequence of int
+            A candidate for every move.
+
+        Returns
+        -------
+        float
+            Infinite if the choice is not allowed.
+        """
         return max(self.parts(choice))
 
     def continuable(self) -> tuple[Bools, ...]:
-        """Return, per move, which candidates are allowed and can be continued to the last move.
+        """Return which candidates are allowed and can be continued to the last move.
+
+        Returns
+        -------
+        tuple of (C_k,) bool
+            An array for every move.
 
         Raises
         ------
@@ -125,8 +163,9 @@ class Budget(FrozenValue):
     name : str
         What is capped, with its unit.
     single : tuple of (C_k,) float
+        What each choice takes of the budget: finite.
     shared : tuple of (C_{k-1}, C_k) float
-        What each choice, and each pair, takes of the budget: finite.
+        What each pair takes of it: finite.
     bound : float
         Infinite if there is no cap.
 
@@ -153,13 +192,34 @@ class Budget(FrozenValue):
         super().__post_init__()
 
     def spent(self, choice: Sequence[int]) -> float:
-        """Return what the choices take."""
+        """Return what a choice takes of the budget.
+
+        Parameters
+        ----------
+        choice : sequence of int
+            A candidate for every move.
+
+        Returns
+        -------
+        float
+            In the unit of the budget.
+        """
         return LayeredCosts(self.single, self.shared).cost(choice)
 
     def slack(self, choice: Sequence[int]) -> float:
-        """Return what the choices leave of the budget, over the size of what they take, or of it.
+        """Return what a choice leaves of the budget, as a share.
 
-        Signs aside: amounts that cancel count in full. Zero divided by zero is zero.
+        Parameters
+        ----------
+        choice : sequence of int
+            A candidate for every move.
+
+        Returns
+        -------
+        float
+            What is left over the larger of the bound and the amounts taken, all without sign, so
+            that amounts that cancel count in full. Negative beyond the bound; zero if nothing is
+            left.
         """
         taken = LayeredCosts(self.single, self.shared).parts(choice)
         left = self.bound - sum(taken)

@@ -26,12 +26,25 @@ class Aim(Enum):
         return LayeredCosts.cost if self is Aim.SUM else LayeredCosts.worst
 
     def costs(self, problem: PlacementProblem) -> LayeredCosts:
-        """Return the costs of a problem that this aim is about."""
+        """Return the costs of a problem that this aim is about.
+
+        Parameters
+        ----------
+        problem : PlacementProblem
+
+        Returns
+        -------
+        LayeredCosts
+            Its sums or its peaks.
+        """
         return problem.sums if self is Aim.SUM else problem.peaks
 
 
 class PlacementProblem(Protocol):
-    """What a formulation is given: costs, and what the choices stand for."""
+    """What a formulation is given: costs, and what the choices stand for.
+
+    A choice is one candidate per move, each an index from 0.
+    """
 
     @property
     def sums(self) -> LayeredCosts:
@@ -46,27 +59,73 @@ class PlacementProblem(Protocol):
         """Caps on totals over the build."""
 
     def conditional(self, move: int, before: int) -> Floats:
-        """Return the cost (C_k,) of what a move shares with the one before, that being chosen.
+        """Return the costs of the steps that a move shares with the one before.
 
         Parameters
         ----------
         move, before : int
             A move, and the candidate chosen for the move before it.
+
+        Returns
+        -------
+        (C_k,) float
+            Ranks, if any, among the candidates of this move alone.
         """
 
     def nodes(self, choice: Sequence[int]) -> tuple[int, ...]:
-        """Return the nodes that one candidate per move stands for."""
+        """Return the nodes that a choice stands for.
+
+        Parameters
+        ----------
+        choice : sequence of int
+            A candidate for every move.
+
+        Returns
+        -------
+        tuple of int
+            A node for every move.
+        """
 
     def steps(self, choice: Sequence[int]) -> tuple[Step, ...]:
-        """Return the checked steps with one candidate per move; none where costs are all."""
+        """Return the checked steps of the build.
+
+        Parameters
+        ----------
+        choice : sequence of int
+            A candidate for every move.
+
+        Returns
+        -------
+        tuple of Step
+            None where a problem is given by its costs alone.
+        """
 
     def seconds(self, aim: Aim) -> Mapping[str, float]:
-        """Return what computing the costs of an aim took, by stage."""
+        """Return what computing the costs of an aim took.
+
+        Parameters
+        ----------
+        aim : Aim
+            Sums or peaks.
+
+        Returns
+        -------
+        mapping of str to float
+            By stage, s.
+        """
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CostProblem(FrozenValue):
-    """A problem given by its costs alone."""
+    """A problem given by its costs alone.
+
+    Attributes
+    ----------
+    sums : LayeredCosts
+        The costs; both their sum and their largest may be asked for.
+    budgets : tuple of Budget
+        Caps on totals over the build.
+    """
 
     sums: LayeredCosts
     budgets: tuple[Budget, ...] = field(default=())
@@ -77,17 +136,59 @@ class CostProblem(FrozenValue):
         return self.sums
 
     def conditional(self, move: int, before: int) -> Floats:
-        """Return the shared costs of the candidates, the choice before being fixed."""
+        """Return the shared costs of a move's candidates, the choice before being made.
+
+        Parameters
+        ----------
+        move, before : int
+            A move, and the candidate chosen for the move before it.
+
+        Returns
+        -------
+        (C_k,) float
+        """
         return np.asarray(self.sums.shared[move][before])
 
     def nodes(self, choice: Sequence[int]) -> tuple[int, ...]:
-        """Return the choice: candidates are their own names."""
+        """Return the choice: candidates are their own names.
+
+        Parameters
+        ----------
+        choice : sequence of int
+            A candidate for every move.
+
+        Returns
+        -------
+        tuple of int
+        """
         return tuple(choice)
 
     def steps(self, choice: Sequence[int]) -> tuple[Step, ...]:
-        """Return no steps."""
+        """Return no steps.
+
+        Parameters
+        ----------
+        choice : sequence of int
+            A candidate for every move.
+
+        Returns
+        -------
+        tuple of Step
+            Empty.
+        """
         return ()
 
     def seconds(self, aim: Aim) -> Mapping[str, float]:
-        """Return nothing: the costs are given."""
+        """Return no times: the costs are given.
+
+        Parameters
+        ----------
+        aim : Aim
+            Sums or peaks.
+
+        Returns
+        -------
+        mapping of str to float
+            Empty.
+        """
         return {}

@@ -31,14 +31,17 @@ class Plan:
     Attributes
     ----------
     problem : PlacementProblem
+        What was solved.
     formulation : Formulation
+        What solved it.
     selection : Selection
+        The choice, and what the formulation claims of it.
     certificate : Certificate or None
-        None where no proof was asked for.
+        What the choice is worth, checked; None where no proof was asked for.
     steps : tuple of Step
         The schedule with every move at its chosen node, checked.
     seconds : mapping of str to float
-        By stage: respond, rank, compile (writing a program down for a solver), solve, verify.
+        By stage, s: respond, rank, compile (writing a program down for a solver), solve, verify.
     search : WindowSearch or None
         What was looked at where no proof was asked for.
 
@@ -49,7 +52,7 @@ class Plan:
     >>> plan
     Plan('arch25', 'three-robot', by overlap_dp: 90 steps, 22 moves, objective 657.465, gap 0 %)
     >>> plan.nodes[:5]
-    (4, 7, 8, 9, 12)
+    (4, 2, 6, 4, 6)
     """
 
     problem: PlacementProblem
@@ -105,7 +108,15 @@ class Plan:
     def responses(self) -> pd.DataFrame:
         """Return the responses of every step and the robots whose grips were chosen in it.
 
-        The columns are those of `seqopt.responses.analyze` and ``optimized_robot``.
+        Returns
+        -------
+        pandas.DataFrame
+            A row per step; the columns of `seqopt.analyze`, and ``optimized_robot``.
+
+        Raises
+        ------
+        ProblemError
+            If the problem is given by its costs alone; so do the tables below.
         """
         schedule = self._posed.schedule
         table = analyze(self._posed.engine, self.steps)
@@ -116,11 +127,14 @@ class Plan:
         return table
 
     def table(self) -> pd.DataFrame:
-        """Return a row per move: where, which robot, which node, what it costs, how it ranks.
+        """Return what was chosen for every move, what it costs and how it ranks.
 
-        Columns: ``move``, ``step``, ``bricks``, ``robot``, ``brick``, ``node``, ``candidates``;
-        then ``single_cost``, ``shared_cost`` and ``rank_in_window``, or without proof ``cost`` and
-        the ``margin`` to the next candidate.
+        Returns
+        -------
+        pandas.DataFrame
+            A row per move. Columns: ``move``, ``step``, ``bricks``, ``robot``, ``brick``, ``node``,
+            ``candidates`` (how many there were); then ``single_cost``, ``shared_cost`` and
+            ``rank_in_window``, or without proof ``cost`` and the ``margin`` to the next candidate.
         """
         rows, before = [], 0
         for k, now in enumerate(self.selection.choice):
@@ -153,7 +167,13 @@ class Plan:
         }
 
     def alternatives(self) -> pd.DataFrame:
-        """Return raw responses and cost of every choice that was looked at, a row each."""
+        """Return raw responses and cost of every choice that was looked at.
+
+        Returns
+        -------
+        pandas.DataFrame
+            A row per choice, by step; ``second_node`` where two moves are open. SI units.
+        """
         parts = []
         for problem in self.explored:
             for choices in problem.evaluation.steps:
@@ -165,7 +185,15 @@ class Plan:
         return pd.concat(parts).sort_values("step", kind="stable", ignore_index=True)
 
     def summary(self) -> dict[str, object]:
-        """Return what there is to say about the plan, ready for JSON."""
+        """Return what there is to say about the plan, ready for JSON.
+
+        Returns
+        -------
+        dict
+            Names of scene, schedule, formulation and criterion; ``status`` (``optimal``,
+            ``feasible`` or ``unproven``), ``objective``, ``bound``, ``gap``; ``models_evaluated``
+            and ``seconds``.
+        """
         schedule, proof = self._posed.schedule, self.certificate
         status = "unproven"
         if proof is not None:

@@ -26,6 +26,7 @@ def move_costs(problem: Problem, move: int, before: int, without: int | None = N
     Parameters
     ----------
     problem : Problem
+        Whose responses are evaluated if they are not yet.
     move, before : int
         A move, and the candidate chosen for the move before it.
     without : int, optional
@@ -47,7 +48,19 @@ def move_costs(problem: Problem, move: int, before: int, without: int | None = N
 
 
 def rank_of(costs: Floats, chosen: int) -> int:
-    """Return the rank of a candidate: 1 if none costs less."""
+    """Return the rank of a candidate: 1 if none costs less.
+
+    Parameters
+    ----------
+    costs : (C,) float
+        Equal if they differ by less than ``TIED`` of the largest.
+    chosen : int
+        Index of the candidate.
+
+    Returns
+    -------
+    int
+    """
     return int((costs < costs[chosen] - _tie(costs)).sum()) + 1
 
 
@@ -56,12 +69,22 @@ def _tie(costs: Floats) -> float:
 
 
 def rank_moves(problem: Problem, choice: Sequence[int]) -> pd.DataFrame:
-    """Return, move by move, where the chosen candidate ranks and how firm the first place is.
+    """Return where the chosen candidates rank, and how firm the first rank of each move is.
 
-    Columns: ``move``, ``step``, ``bricks``, ``robot``, ``node`` (chosen), ``rank`` (its place, 1 if
-    none is better), ``winner`` (the node in first place), ``margin`` (cost from first to second),
-    ``tied`` (candidates that share the first place), ``turned_by_candidates`` (others whose absence
-    changes the winner) and ``turned_by_criteria`` (responses whose absence does).
+    Parameters
+    ----------
+    problem : Problem
+    choice : sequence of int
+        A candidate for every move.
+
+    Returns
+    -------
+    pandas.DataFrame
+        A row per move. Columns: ``move``, ``step``, ``bricks``, ``robot``, ``node`` (chosen),
+        ``rank`` (1 if none is better), ``winner`` (the node that ranks first), ``margin`` (cost
+        from first to second), ``tied`` (candidates that share the first rank),
+        ``turned_by_candidates`` (others whose absence changes the winner) and
+        ``turned_by_criteria`` (responses whose absence does).
     """
     rows = []
     for k, move in enumerate(problem.schedule.moves):
@@ -133,9 +156,19 @@ def _without_one(criterion: Criterion, bricks: int) -> Iterator[tuple[str, Crite
 def rank_choice(problem: Problem, choice: Sequence[int]) -> pd.DataFrame:
     """Return where chosen nodes rank, move by move, the choice before each being fixed.
 
-    Columns: ``move``, ``step``, ``bricks``, ``robot``, ``node``, ``candidates``,
-    ``first_in_window``, and three ranks: ``rank_in_window`` of the move alone, ``rank_overlap``
-    with the cost to go of the whole build, ``rank_peak`` with the worst cost to go.
+    Parameters
+    ----------
+    problem : Problem
+    choice : sequence of int
+        A candidate for every move.
+
+    Returns
+    -------
+    pandas.DataFrame
+        A row per move. Columns: ``move``, ``step``, ``bricks``, ``robot``, ``node``,
+        ``candidates`` (how many there are), ``first_in_window`` (the node that ranks first), and
+        three ranks: ``rank_in_window`` of the move alone, ``rank_overlap`` with the least sum of
+        costs to the end of the build added, ``rank_peak`` with the least worst cost to the end.
     """
     sums = _to_go(problem.sums, np.add)
     peaks = _to_go(problem.peaks, np.maximum)

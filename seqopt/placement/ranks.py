@@ -8,9 +8,19 @@ from seqopt.arrays import Floats
 
 
 def scaled_ranks(values: Floats, choices: int) -> Floats:
-    """Return mean ranks of rounded values; ranks over pairs are scaled to as many as ``choices``.
+    """Return mean ranks of values rounded to whole numbers.
 
-    NaN stays NaN, but where all values are NaN all ranks are equal.
+    Parameters
+    ----------
+    values : (C,) or (C, D) float
+        In units of their resolution; NaN where a choice is impossible.
+    choices : int
+        Ranks over pairs are scaled so that they run from 1 to this.
+
+    Returns
+    -------
+    (C,) or (C, D) float
+        NaN stays NaN, except that all ranks are equal where all values are NaN.
     """
     flat = values.ravel()
     known = np.isfinite(flat)
@@ -23,11 +33,17 @@ def scaled_ranks(values: Floats, choices: int) -> Floats:
 
 
 def mean_ranks(values: Floats) -> Floats:
-    """Return ranks (n,) from 1; ties share the mean of theirs.
+    """Return ranks from 1; ties share the mean of theirs.
 
-    As `scipy.stats.rankdata`, in a third of its time for the few values of a state.
+    As `scipy.stats.rankdata`, in a third of its time for the few values of a step.
+
+    Parameters
+    ----------
+    values : (n,) float
+
+    Returns
+    -------
+    (n,) float
     """
-    _, place, count = np.unique(values, return_inverse=True, return_counts=True)
-    return np.asarray((np.cumsum(count) - 0.5 * (count - 1))[place])
-
-
+    _, index, count = np.unique(values, return_inverse=True, return_counts=True)
+    return np.asarray((np.cumsum(count) - 0.5 * (count - 1))[index])
