@@ -33,11 +33,11 @@ from experiments.plotting import RESULTS, new_figure, save_figure
 from seqopt.arrays import Vector
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network
-from seqopt.placement.criteria import Criterion
 from seqopt.placement.formulation import find_formulation
 from seqopt.placement.plan import run
 from seqopt.placement.problem import Problem, pose
 from seqopt.placement.ranking import move_costs, rank_of
+from seqopt.placement.requirements import Criterion
 from seqopt.scene.scene import Ground, Joint, Scene
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.schedule import Schedule

@@ -12,10 +12,11 @@ from experiments.formulation_cost import half_circle
 from seqopt.arrays import Floats
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.placement.costs import Budget, LayeredCosts
-from seqopt.placement.criteria import RESOLUTION, Criterion, WorstRatio
+from seqopt.placement.criteria import RESOLUTION, WorstRatio
 from seqopt.placement.formulation import Aim
 from seqopt.placement.interface import CostProblem, PlacementProblem
-from seqopt.placement.problem import Limit, Problem, pose
+from seqopt.placement.problem import Problem, pose
+from seqopt.placement.requirements import Criterion, Limit
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.study.presets import EQUATIONS
 

@@ -22,9 +22,9 @@ from experiments.plotting import RESULTS, new_figure, save_figure
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
-from seqopt.placement.criteria import Criterion
 from seqopt.placement.formulation import Aim, formulations
 from seqopt.placement.plan import Posed, prepare, run
+from seqopt.placement.requirements import Criterion
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.three_robots import three_robot_loop

@@ -34,7 +34,8 @@ if TYPE_CHECKING:
     from seqopt.placement.certificate import Certificate
     from seqopt.placement.formulation import Formulation, formulations
     from seqopt.placement.plan import Plan
-    from seqopt.placement.problem import Limit, pose
+    from seqopt.placement.problem import pose
+    from seqopt.placement.requirements import Limit
     from seqopt.placement.solving import solve
     from seqopt.responses.table import analyze
     from seqopt.scene.arch import ArchShape, arch_scene
@@ -60,7 +61,8 @@ _HOMES = {
     "placement.certificate": ("Certificate",),
     "placement.formulation": ("Formulation", "formulations"),
     "placement.plan": ("Plan",),
-    "placement.problem": ("Limit", "pose"),
+    "placement.problem": ("pose",),
+    "placement.requirements": ("Limit",),
     "placement.solving": ("solve",),
     "responses.table": ("analyze",),
     "scene.arch": ("ArchShape", "arch_scene"),

@@ -10,9 +10,9 @@ from typing import Any
 from seqopt.engines.registry import make_engine
 from seqopt.errors import ProblemError
 from seqopt.network.build import build_network
-from seqopt.placement.criteria import Criterion
 from seqopt.placement.plan import Plan
-from seqopt.placement.problem import Limit, pose
+from seqopt.placement.problem import pose
+from seqopt.placement.requirements import Criterion, Limit
 from seqopt.placement.solving import solve
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import load_scene

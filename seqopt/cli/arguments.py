@@ -12,9 +12,9 @@ from typing import NoReturn
 from seqopt.contact.mortar import MORTARS, Mortar
 from seqopt.engines.registry import ENGINES
 from seqopt.errors import ProblemError
-from seqopt.placement.criteria import Criterion, RankSum
+from seqopt.placement.criteria import RankSum
 from seqopt.placement.formulation import Formulation, formulation_names
-from seqopt.placement.problem import Limit, payload_limits
+from seqopt.placement.requirements import Criterion, Limit, payload_limits
 from seqopt.responses.choices import CHOICE_RESPONSES
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import builtin_scenes

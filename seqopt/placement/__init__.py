@@ -23,7 +23,8 @@ from seqopt.placement.certificate import Certificate
 from seqopt.placement.costs import LayeredCosts
 from seqopt.placement.interface import CostProblem
 from seqopt.placement.plan import Plan
-from seqopt.placement.problem import Limit, Problem, pose
+from seqopt.placement.problem import Problem, pose
+from seqopt.placement.requirements import Limit
 from seqopt.placement.solving import solve
 
 __all__ = [

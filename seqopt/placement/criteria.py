@@ -8,71 +8,18 @@ costs of the same shape. A name stands for a response: ``T_max``, ``M_sup``, ``D
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from seqopt.arrays import Floats
 from seqopt.placement.ranks import scaled_ranks
+from seqopt.placement.requirements import ChoiceResponses
 
-ChoiceResponses = Mapping[str, Floats]
 Term = tuple[Any, ...]  # a name and its numbers
 RESOLUTION = (("F", 1.0), ("T", 1.0), ("M", 1.0), ("D", 1e-6))  # N, N, N m, m
-
-
-class Criterion(Protocol):
-    """What a step costs."""
-
-    @property
-    def name(self) -> str:
-        """What the criterion is called."""
-
-    def wanted(self, bricks: int) -> tuple[str, ...]:
-        """Return the responses that it needs of a move.
-
-        Parameters
-        ----------
-        bricks : int
-            Bricks placed when the move is made.
-
-        Returns
-        -------
-        tuple of str
-            Names of responses.
-        """
-
-    def for_robots(self, robots: Sequence[str]) -> Criterion:
-        """Return the criterion with ``F_each`` spelled out for the robots of a scene.
-
-        Parameters
-        ----------
-        robots : sequence of str
-            Their names.
-
-        Returns
-        -------
-        Criterion
-        """
-
-    def costs(self, responses: ChoiceResponses, bricks: int, choices: int) -> Floats:
-        """Return the costs of all choices in one step.
-
-        Parameters
-        ----------
-        responses : mapping of str to (C,) or (C, D) float
-            SI units; NaN where a choice is impossible, all NaN where a robot does not grip.
-        bricks : int
-            Bricks placed at the move that decides the step: the later one of two.
-        choices : int
-            How many candidates that move has.
-
-        Returns
-        -------
-        (C,) or (C, D) float
-            NaN where a choice is impossible.
-        """
 
 
 @dataclass(frozen=True)

@@ -14,83 +14,11 @@ from seqopt.arrays import Floats
 from seqopt.engines.interface import Engine
 from seqopt.errors import ProblemError
 from seqopt.placement.costs import Budget, LayeredCosts
-from seqopt.placement.criteria import Criterion
 from seqopt.placement.interface import Aim
+from seqopt.placement.requirements import Criterion, Limit, ResponsesAsked
 from seqopt.responses.choices import CHOICE_RESPONSES, Evaluation, StepChoices
-from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import Step
-
-
-@dataclass(frozen=True)
-class Limit:
-    """No step with an open grip may exceed a value.
-
-    Parameters
-    ----------
-    response : str
-        Named as in `seqopt.placement.criteria`.
-    bound : float
-        SI units.
-
-    Examples
-    --------
-    >>> import seqopt
-    >>> seqopt.Limit("F_largest", 300.0)
-    Limit(response='F_largest', bound=300.0)
-    """
-
-    response: str
-    bound: float
-
-
-def payload_limits(scene: Scene) -> tuple[Limit, ...]:
-    """Return limits that keep every robot of a scene within its payload.
-
-    Parameters
-    ----------
-    scene : Scene
-
-    Returns
-    -------
-    tuple of Limit
-        One for every robot, N.
-    """
-    return tuple(Limit(f"F_{robot.name}", robot.payload) for robot in scene.robots)
-
-
-@dataclass(frozen=True)
-class ResponsesAsked:
-    """The responses that criterion, limits and further wishes ask for.
-
-    Attributes
-    ----------
-    criterion : Criterion
-        What a step costs.
-    limits : tuple of Limit
-        What no open step may exceed.
-    also : tuple of str
-        Responses that are asked for beside these.
-    """
-
-    criterion: Criterion
-    limits: tuple[Limit, ...]
-    also: tuple[str, ...]
-
-    def __call__(self, bricks: int) -> frozenset[str]:
-        """Return their names for a move.
-
-        Parameters
-        ----------
-        bricks : int
-            Bricks placed when the move is made.
-
-        Returns
-        -------
-        frozenset of str
-        """
-        named = {*self.criterion.wanted(bricks), *(limit.response for limit in self.limits)}
-        return frozenset(named | {*self.also})
 
 
 @dataclass(frozen=True, repr=False)

@@ -10,8 +10,9 @@ import pandas as pd
 
 from seqopt.arrays import Floats
 from seqopt.placement.costs import LayeredCosts
-from seqopt.placement.criteria import Criterion, RankSum, WeightedSum, WorstRatio
+from seqopt.placement.criteria import RankSum, WeightedSum, WorstRatio
 from seqopt.placement.problem import Problem
+from seqopt.placement.requirements import Criterion
 from seqopt.responses.choices import StepChoices
 
 TIED = 1e-9  # costs this close, relative to the largest, are equal

@@ -12,11 +12,11 @@ from seqopt.engines.interface import Engine
 from seqopt.errors import ProblemError, StepError
 from seqopt.placement.certificate import least_sum
 from seqopt.placement.costs import TINY
-from seqopt.placement.criteria import Criterion
 from seqopt.placement.formulation import formulations
 from seqopt.placement.plan import Plan
 from seqopt.placement.problem import Problem, pose
 from seqopt.placement.ranking import rank_choice
+from seqopt.placement.requirements import Criterion
 from seqopt.placement.solving import solve
 from seqopt.responses.quantities import RESPONSES
 from seqopt.responses.table import analyze, force_column

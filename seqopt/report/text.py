@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 import pandas as pd
 
-from seqopt.placement.criteria import Criterion
+from seqopt.placement.requirements import Criterion
 from seqopt.report.comparison import LARGEST, Comparison
 from seqopt.scene.scene import Scene
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from seqopt.engines.discrete.system import BedStiffness
-from seqopt.placement.criteria import Criterion, RankSum, WeightedSum, WorstRatio, equal
+from seqopt.placement.criteria import RankSum, WeightedSum, WorstRatio, equal
+from seqopt.placement.requirements import Criterion
 from seqopt.scene.reach import Anywhere, Side
 from seqopt.scene.scene import Robot
 
