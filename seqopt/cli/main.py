@@ -14,14 +14,8 @@ from pathlib import Path
 
 import numpy as np
 
-from seqopt.cli.arguments import (
-    USAGE,
-    parse_criterion,
-    parse_limits,
-    parse_mortar,
-    parse_options,
-    parser,
-)
+from seqopt.cli.arguments import USAGE, parser
+from seqopt.cli.values import parse_criterion, parse_limits, parse_mortar, parse_options
 from seqopt.contact.mortar import MORTARS
 from seqopt.engines.auto import AutoEngine
 from seqopt.engines.interface import Engine

@@ -243,8 +243,7 @@ def pose(
     --------
     >>> import seqopt
     >>> network = seqopt.build_network(seqopt.load_scene("arch25"))
-    >>> engine = seqopt.make_engine("compliance", network)
-    >>> schedule = seqopt.three_robot_loop(network)
+    >>> engine, schedule = seqopt.make_engine("auto", network), seqopt.three_robot_loop(network)
     >>> problem = seqopt.pose(engine, schedule, seqopt.CRITERIA["worst-ratio"])
     >>> len(problem.schedule.moves), problem.criterion.name, problem.limits
     (22, 'worst-ratio', ())

@@ -93,19 +93,7 @@ def rank_moves(problem: Problem, choice: Sequence[int]) -> pd.DataFrame:
         costs = move_costs(problem, k, before)
         winner = int(np.argmin(costs))
         others = np.delete(costs, winner)
-        turned = [
-            j
-            for j in range(len(costs))
-            if j != winner
-            and np.isfinite(costs[j])
-            and int(np.argmin(move_costs(problem, k, before, without=j))) != winner
-        ]
-        dropped = [
-            name
-            for name, criterion in _without_one(problem.criterion, move.bricks)
-            if int(np.argmin(move_costs(replace(problem, criterion=criterion), k, before)))
-            != winner
-        ]
+        turned, dropped = _turning(problem, k, before, costs)
         rows.append(
             {
                 "move": k + 1,
@@ -122,6 +110,27 @@ def rank_moves(problem: Problem, choice: Sequence[int]) -> pd.DataFrame:
             }
         )
     return pd.DataFrame(rows)
+
+
+def _turning(
+    problem: Problem, move: int, before: int, costs: Floats
+) -> tuple[list[int], list[str]]:
+    """Return the candidates and the responses without which another candidate would win."""
+    winner = int(np.argmin(costs))
+    candidates = [
+        j
+        for j in range(len(costs))
+        if j != winner
+        and np.isfinite(costs[j])
+        and int(np.argmin(move_costs(problem, move, before, without=j))) != winner
+    ]
+    bricks = problem.schedule.moves[move].bricks
+    responses = [
+        name
+        for name, criterion in _without_one(problem.criterion, bricks)
+        if int(np.argmin(move_costs(replace(problem, criterion=criterion), move, before))) != winner
+    ]
+    return candidates, responses
 
 
 def _without(choices: StepChoices, candidate: int | None) -> StepChoices:

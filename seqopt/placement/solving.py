@@ -72,8 +72,13 @@ def solve(
             f"{formulation.name}: the budget {problem.budgets[0].name!r} couples all moves; "
             f"use {' or '.join(able)}"
         )
-    if not proof:
-        return _solve_windows(problem, formulation, options)
+    return (_solve_all if proof else _solve_windows)(problem, formulation, options)
+
+
+def _solve_all(
+    problem: PlacementProblem, formulation: Formulation, options: Mapping[str, Any]
+) -> Plan:
+    """Return the certified plan of a formulation that is given the costs of all choices."""
     seconds: dict[str, float] = {}
     stages = problem.seconds(formulation.aim)  # computes the costs: solving is timed alone
     with _timed(seconds, "solve"):
@@ -88,7 +93,7 @@ def solve(
 
 
 def _solve_windows(
-    problem: PlacementProblem, formulation: Formulation, options: Mapping[str, object]
+    problem: PlacementProblem, formulation: Formulation, options: Mapping[str, Any]
 ) -> Plan:
     """Return the plan of a search that solves only the models it meets."""
     if formulation.reads is not Reads.WINDOW or options:

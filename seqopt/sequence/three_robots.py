@@ -52,6 +52,13 @@ def three_robot_loop(network: Network) -> Schedule:
             f"scene {scene.name}: {len(scene.robots)} robots and {total} bricks; "
             "this method needs three robots and four bricks"
         )
+    return _schedule("three-robot", network, *_loop(network))
+
+
+def _loop(network: Network) -> tuple[list[OpenStep], list[int]]:
+    """Return the steps of the loop, and which robot makes each move."""
+    scene = network.scene
+    total = len(scene.placed)
     grips: list[int | OpenGrip | None] = [None] * len(scene.robots)
     steps: list[OpenStep] = []
 
@@ -78,7 +85,7 @@ def three_robot_loop(network: Network) -> Schedule:
         grips[newest] = None
         add(StepKind.RELEASE, bricks + 1)
         moving, placer, newest = newest, moving, placer
-    return _schedule("three-robot", network, steps, robots)
+    return steps, robots
 
 
 def modified_sequential(network: Network) -> Schedule:
@@ -114,24 +121,28 @@ def modified_sequential(network: Network) -> Schedule:
     scene = network.scene
     if len(scene.robots) < 3:
         raise StepError(f"scene {scene.name}: {len(scene.robots)} robots; this method needs three")
+    return _schedule("modified-sequential", network, *_supported(network))
+
+
+def _supported(network: Network) -> tuple[list[OpenStep], list[int]]:
+    """Return the sequential method's steps with the third grip, and which robot makes each move."""
     steps: list[OpenStep] = []
     robots: list[int] = []
 
     def add(kind: StepKind, bricks: int, grips: Grips, support: OpenGrip | None) -> None:
         steps.append(OpenStep(len(steps) + 1, kind, bricks, (*grips[:2], support, *grips[3:])))
 
-    base = sequential(network)
-    for step in base:
+    for step in sequential(network):
         support = OpenGrip(len(robots) - 1) if robots and step.held else None
         add(step.kind, step.bricks, step.grips, support)
         if step.kind is StepKind.RELEASE:
             continue
         if support is not None:
             add(StepKind.RELEASE, step.bricks, step.grips, None)
-        if 1 < step.bricks < len(scene.placed):
+        if 1 < step.bricks < len(network.scene.placed):
             robots.append(2)
             add(StepKind.REPOSITION, step.bricks, step.grips, OpenGrip(len(robots) - 1))
-    return _schedule("modified-sequential", network, steps, robots)
+    return steps, robots
 
 
 def _schedule(method: str, network: Network, steps: list[OpenStep], robots: list[int]) -> Schedule:
