@@ -45,7 +45,19 @@ FAILED = 3  # exit status where a solver failed; USAGE where the user must act
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command; return its exit status."""
+    """Run one command.
+
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        The words after ``seqopt``; by default those of the shell.
+
+    Returns
+    -------
+    int
+        The exit status: 0, `USAGE` where the user must act, `FAILED` where a solver failed. An
+        error is one line on standard error.
+    """
     options = parser().parse_args(arguments)
     try:
         COMMANDS[options.command](options)

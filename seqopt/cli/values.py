@@ -20,7 +20,22 @@ RESPONSES = (*CHOICE_RESPONSES, "F_each")
 
 
 def parse_criterion(text: str) -> Criterion:
-    """Return a criterion by name, or a rank sum of named responses with weights."""
+    """Return a criterion by name, or a rank sum of named responses with weights.
+
+    Parameters
+    ----------
+    text : str
+        A name of `seqopt.CRITERIA`, or responses as ``T_max,M_sup=2``; a weight is 1 by default.
+
+    Returns
+    -------
+    Criterion
+
+    Raises
+    ------
+    ProblemError
+        If there is no such criterion or response, or a weight is not positive.
+    """
     if text in CRITERIA:
         return CRITERIA[text]
     terms = []
@@ -31,7 +46,24 @@ def parse_criterion(text: str) -> Criterion:
 
 
 def parse_limits(texts: Sequence[str], scene: Scene) -> tuple[Limit, ...]:
-    """Return limits from words ``payload`` or ``RESPONSE=VALUE``."""
+    """Return limits from words.
+
+    Parameters
+    ----------
+    texts : sequence of str
+        Each ``payload`` or ``RESPONSE=VALUE``, SI units.
+    scene : Scene
+        Whose robots have the payloads.
+
+    Returns
+    -------
+    tuple of Limit
+
+    Raises
+    ------
+    ProblemError
+        If there is no such response, or a value is not positive.
+    """
     out: list[Limit] = []
     for text in texts:
         name, _, value = text.partition("=")
@@ -43,7 +75,24 @@ def parse_limits(texts: Sequence[str], scene: Scene) -> tuple[Limit, ...]:
 
 
 def parse_options(formulation: Formulation, texts: Sequence[str]) -> dict[str, int | str]:
-    """Return the options of a formulation from ``NAME=VALUE`` words."""
+    """Return the options of a formulation from words.
+
+    Parameters
+    ----------
+    formulation : Formulation
+        Whose ``solve`` says which options there are and of which type.
+    texts : sequence of str
+        Each ``NAME=VALUE``.
+
+    Returns
+    -------
+    dict of str to (int or str)
+
+    Raises
+    ------
+    ProblemError
+        If there is no such option, or a value is not of its type.
+    """
     known = {
         name: type(parameter.default)
         for name, parameter in inspect.signature(formulation.solve).parameters.items()
@@ -65,7 +114,23 @@ def parse_options(formulation: Formulation, texts: Sequence[str]) -> dict[str, i
 
 
 def parse_mortar(options: argparse.Namespace) -> Mortar:
-    """Return the named mortar with the numbers that are given in place of its own."""
+    """Return the named mortar with the numbers that are given instead of its own.
+
+    Parameters
+    ----------
+    options : argparse.Namespace
+        With ``mortar``, and ``friction`` (no unit), ``tensile_strength`` and ``cohesion`` (Pa) as
+        text, or None.
+
+    Returns
+    -------
+    Mortar
+
+    Raises
+    ------
+    ProblemError
+        If a number is negative, or none.
+    """
     base = MORTARS[options.mortar]
     given = {
         name: _number(text, f"--{name.replace('_', '-')}", zero="allowed")

@@ -18,9 +18,16 @@ def format_comparison(comparison: Comparison, scene: Scene, criterion: Criterion
     Parameters
     ----------
     comparison : Comparison
+        What to tell.
     scene : Scene
+        Which was compared.
     criterion : Criterion
         With which the formulations were compared.
+
+    Returns
+    -------
+    str
+        Of many lines.
     """
     blocks = [_methods(comparison, scene), _notes(comparison)]
     if comparison.refusal:
