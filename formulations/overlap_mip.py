@@ -7,8 +7,8 @@ r"""The full overlap formulation as a mixed-integer program (cvxpy, HiGHS): exac
    & \sum_k \sum_{i,j} a_k(i, j)\, y_k(i, j) \le b \quad \text{for every budget.}
 
 It earns its price where budgets couple all moves: a cap on robot travel, on how often a robot is
-used, on the count of steps over a level (`seqopt.placement.budgets`). Without them dynamic programming gives
-the same answer hundreds of times faster.
+used, on the count of steps over a level (`seqopt.placement.budgets`). Without them dynamic
+programming gives the same answer hundreds of times faster.
 """
 
 from __future__ import annotations
@@ -23,7 +23,25 @@ from seqopt.placement.interface import Aim, PlacementProblem
 
 
 def solve(problem: PlacementProblem) -> Selection:
-    """Return the exact optimum within the budgets."""
+    """Return the exact optimum within the budgets.
+
+    Parameters
+    ----------
+    problem : PlacementProblem
+        Its sums and budgets are used.
+
+    Returns
+    -------
+    Selection
+        With a bound.
+
+    Raises
+    ------
+    InfeasibleError
+        If no choice is allowed, or none is within all budgets.
+    SolverError
+        If the solver ends without an optimum.
+    """
     flow = layered_flow(problem)
     arcs = cp.Variable(len(flow.cost), boolean=True)
     conserve = cp.Zero(flow.balance @ arcs - flow.source)
