@@ -9,7 +9,8 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network
 from seqopt.placement.formulation import find_formulation
 from seqopt.placement.plan import run
-from seqopt.placement.problem import Limit, pose
+from seqopt.placement.problem import pose
+from seqopt.placement.requirements import Limit
 from seqopt.placement.window_search import search_windows
 from seqopt.responses.choices import window_models
 from seqopt.sequence.three_robots import SCHEDULES, three_robot_loop

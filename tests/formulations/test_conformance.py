@@ -14,15 +14,17 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.network.build import build_network
 from seqopt.placement.budgets import robot_use, steps_over, travel
-from seqopt.placement.costs import Budget, CostProblem, LayeredCosts
+from seqopt.placement.costs import Budget, LayeredCosts
 from seqopt.placement.formulation import (
     Aim,
     FormulationKind,
     find_formulation,
     formulations,
 )
+from seqopt.placement.interface import CostProblem
 from seqopt.placement.plan import run
-from seqopt.placement.problem import Limit, pose
+from seqopt.placement.problem import pose
+from seqopt.placement.requirements import Limit
 from seqopt.sequence.three_robots import SCHEDULES, three_robot_loop
 from seqopt.study.presets import CRITERIA, EQUATIONS, WORST_RATIO
 from tests.builders import small_arch

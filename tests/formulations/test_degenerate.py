@@ -13,8 +13,9 @@ from experiments.degenerate_placement import MALFORMED, judge, outcomes
 from formulations import overlap_lp, overlap_mip, solvers
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.placement.certificate import certify
-from seqopt.placement.costs import Budget, CostProblem, LayeredCosts
-from seqopt.placement.formulation import Aim, Formulation, FormulationKind, Selection, formulations
+from seqopt.placement.costs import Budget, LayeredCosts
+from seqopt.placement.formulation import Formulation, FormulationKind, Selection, formulations
+from seqopt.placement.interface import Aim, CostProblem
 from seqopt.placement.plan import run
 
 ALL = formulations()

@@ -10,13 +10,14 @@ import pytest
 from seqopt.errors import SolverError
 from seqopt.placement.budgets import travel
 from seqopt.placement.certificate import certify
-from seqopt.placement.costs import CostProblem, LayeredCosts
+from seqopt.placement.costs import LayeredCosts
 from seqopt.placement.formulation import (
     Aim,
     FormulationKind,
     Selection,
     formulations,
 )
+from seqopt.placement.interface import CostProblem
 from seqopt.placement.plan import run
 
 ALL = formulations()

@@ -8,11 +8,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import rankdata
 
-from seqopt.placement.criteria import mean_ranks, scaled_ranks
 from seqopt.placement.formulation import formulations
 from seqopt.placement.plan import run
-from seqopt.placement.problem import payload_limits, pose
+from seqopt.placement.problem import pose
 from seqopt.placement.ranking import move_costs, rank_moves
+from seqopt.placement.ranks import mean_ranks, scaled_ranks
+from seqopt.placement.requirements import payload_limits
 from seqopt.responses.quantities import step_responses
 from seqopt.responses.table import analyze, step_fields
 from seqopt.sequence.three_robots import modified_sequential

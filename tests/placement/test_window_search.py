@@ -8,7 +8,8 @@ import pytest
 from seqopt.errors import ProblemError
 from seqopt.placement.formulation import find_formulation
 from seqopt.placement.plan import run
-from seqopt.placement.problem import Limit, pose
+from seqopt.placement.problem import pose
+from seqopt.placement.requirements import Limit
 from seqopt.placement.window_search import require_search, search_table, search_windows, window
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.study.presets import EQUATIONS, WEIGHTED
