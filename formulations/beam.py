@@ -9,8 +9,8 @@ candidate, keeps the cheapest way to it:
    s_k(j) = c_k(j) + \min_{i \in B_{k-1}} \left[ s_{k-1}(i) + d_k(i, j) \right] .
 
 With a width of all candidates it is dynamic programming and exact. The greedy choice that ranks
-the shared state among the candidates of one move, as the cascade does, is kept as incumbent: the
-beam never does worse.
+the shared step among the candidates of one move, as the cascade does, is kept beside it: the beam
+never does worse.
 """
 
 from __future__ import annotations
@@ -18,12 +18,32 @@ from __future__ import annotations
 import numpy as np
 
 from seqopt.errors import ProblemError
-from seqopt.placement.costs import Aim, PlacementProblem
 from seqopt.placement.formulation import Formulation, FormulationKind, Selection
+from seqopt.placement.interface import Aim, PlacementProblem
 
 
 def solve(problem: PlacementProblem, *, width: int = 5) -> Selection:
-    """Return the best choice found with a beam of ``width`` partial choices."""
+    """Return the best choice found with a beam.
+
+    Parameters
+    ----------
+    problem : PlacementProblem
+        Its sums are used.
+    width : int
+        How many partial choices are kept, from 1.
+
+    Returns
+    -------
+    Selection
+        Without a bound.
+
+    Raises
+    ------
+    InfeasibleError
+        If no choice is allowed.
+    ProblemError
+        If the width is below 1.
+    """
     if width < 1:
         raise ProblemError(f"beam: width is {width}; give a whole number from 1")
     costs = problem.sums
@@ -44,7 +64,7 @@ def _beam(problem: PlacementProblem, width: int) -> tuple[int, ...]:
         total = np.where(good[k], through.min(axis=0) + single, np.inf)
         order = np.argsort(total, kind="stable")
         kept = order[np.isfinite(total[order])][:width]
-        if not len(kept):  # no kept path leads on: the incumbent stands
+        if not len(kept):  # no kept choice can be continued
             return _greedy(problem)
         paths = [(*paths[best[j]], int(j)) for j in kept]
         spent = total[kept]

@@ -1,4 +1,4 @@
-r"""The study's simplified cascading scheme: move by move, a shared state charged to one of two.
+r"""The simplified cascading scheme of Bruun et al.: move by move, a shared step charged to one.
 
 With ``charge="later"`` move :math:`k` knows the choice before it and takes
 
@@ -7,17 +7,17 @@ With ``charge="later"`` move :math:`k` knows the choice before it and takes
    o_k = \arg\min_i \; c_k(i) + d_k(o_{k-1}, i)
 
 where :math:`d_k(o_{k-1}, \cdot)` is ranked among the candidates of move :math:`k` alone. With
-``charge="earlier"`` a move answers for the state it shares with the next one, at the next one's
+``charge="earlier"`` a move answers for the step it shares with the next one, at the next one's
 best:
 
 .. math::
 
    o_k = \arg\min_i \; c_k(i) + \min_j d_{k+1}(i, j) .
 
-The study's count, four states per optimization from the reposition to the last release, and the
-steps its printed plan optimizes over are those of ``later``, the default. Choices that lead
-nowhere are left out. It is a heuristic: what it leaves to the next move may cost more than it
-saved.
+Bruun et al. count four steps per optimization, from the reposition to the last release; these, and
+the steps that their printed plan optimizes over, are those of ``later``, the default. Choices that
+cannot be continued to the last move are left out. It is a heuristic: what it leaves to the next
+move may cost more than it saved.
 """
 
 from __future__ import annotations
@@ -26,14 +26,34 @@ import numpy as np
 
 from seqopt.arrays import Floats
 from seqopt.errors import ProblemError
-from seqopt.placement.costs import Aim, PlacementProblem
 from seqopt.placement.formulation import Formulation, FormulationKind, Reads, Selection
+from seqopt.placement.interface import Aim, PlacementProblem
 
 CHARGES = ("later", "earlier")
 
 
 def solve(problem: PlacementProblem, *, charge: str = "later") -> Selection:
-    """Return the choices of the cascade; ``charge`` says which move answers for a shared state."""
+    """Return the choices of the cascade.
+
+    Parameters
+    ----------
+    problem : PlacementProblem
+        Its sums are used.
+    charge : str
+        Which of two moves answers for the step that they share: ``later`` or ``earlier``.
+
+    Returns
+    -------
+    Selection
+        Without a bound.
+
+    Raises
+    ------
+    InfeasibleError
+        If no choice is allowed.
+    ProblemError
+        If the charge is neither.
+    """
     if charge not in CHARGES:
         raise ProblemError(f"cascade: charge is {charge!r}; give one of {', '.join(CHARGES)}")
     layered = problem.sums
@@ -47,7 +67,7 @@ def solve(problem: PlacementProblem, *, charge: str = "later") -> Selection:
 
 
 def _charged(problem: PlacementProblem, k: int, choice: list[int], charge: str) -> Floats:
-    """Return what move ``k`` answers for beside its own states, (C_k,)."""
+    """Return what move ``k`` answers for beside the steps in which it alone is open, (C_k,)."""
     shared = problem.sums.shared
     if charge == "later":
         return problem.conditional(k, choice[-1]) if choice else shared[0][0]
@@ -56,7 +76,7 @@ def _charged(problem: PlacementProblem, k: int, choice: list[int], charge: str) 
 
 FORMULATION = Formulation(
     "cascade",
-    "the study's cascading scheme over the whole build",
+    "the cascading scheme of Bruun et al. over the whole build",
     FormulationKind.HEURISTIC,
     Aim.SUM,
     solve,

@@ -10,9 +10,10 @@ grips; over the heaviest block's weight, lengths over the longest lever::
                 |g| <= p + z p'
                 0 <= z <= 100000
 
-with E and G from `seqopt.contact.assembly.Assembly`, a the share of a corner in the contact area, and the
-other letters from `seqopt.stability.limit_analysis.Case`. The multipliers of the first line are the motion in
-which the structure fails. One program per assembly: the cases differ in parameters only.
+with E and G from `seqopt.contact.assembly.Assembly`, a the share of a corner in the contact area,
+and the other letters from `seqopt.stability.limit_analysis.Case`. The multipliers of the first line
+are the motion in which the structure fails. One program per assembly: the cases differ in
+parameters only.
 
 Static theorem of limit analysis with corner forces: Livesley (1978), Int. J. Numer. Methods Eng.
 12; as a cone program: Portioli et al. (2014), Comput. Struct. 135.
@@ -36,6 +37,7 @@ class Equilibrium:
     Parameters
     ----------
     assembly : Assembly
+        Blocks, the faces at which they touch, and grips.
     """
 
     def __init__(self, assembly: Assembly) -> None:
@@ -83,7 +85,20 @@ class Equilibrium:
         return cp.Zero(balance), constraints
 
     def __call__(self, case: Case, attempt: int = 0) -> Answer:
-        """Return the solver's answer to a case, with the settings of an attempt."""
+        """Return the solver's answer to a case.
+
+        Parameters
+        ----------
+        case : Case
+            What is asked of the assembly.
+        attempt : int
+            Index of the solver's options to use, from 0.
+
+        Returns
+        -------
+        Answer
+            Claimed, not proven.
+        """
         blocks, corners, grips = self._shape
         self._sense.value = case.sense.value
         self._friction.value = case.friction
@@ -109,5 +124,16 @@ def _values(variable: cp.Variable, count: int) -> np.ndarray:
 
 
 def compile_equilibrium(assembly: Assembly) -> Program:
-    """Return the program of an assembly."""
+    """Return the program of an assembly.
+
+    Parameters
+    ----------
+    assembly : Assembly
+        Blocks, the faces at which they touch, and grips.
+
+    Returns
+    -------
+    Program
+        To be called with a case.
+    """
     return Equilibrium(assembly)

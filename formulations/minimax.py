@@ -4,10 +4,10 @@ r"""The smallest achievable worst cost over the build: exact.
 
    \min_{o_1, \dots, o_K} \; \max \left\{ \max_k c_k(o_k), \; \max_k d_k(o_{k-1}, o_k) \right\}
 
-where :math:`c_k(i)` is the worst of the states in which move :math:`k` alone is open, and
-:math:`d_k` that of the states it shares. It is a bottleneck path in a layered graph; dynamic
-programming solves it with the maximum in the place of the sum. Among the choices with the same
-worst cost the least sum of costs wins. The certificate proves the value anew: no choice stays
+where :math:`c_k(i)` is the worst of the steps in which move :math:`k` alone is open, and
+:math:`d_k` that of the steps it shares with the move before. It is a bottleneck path in a layered
+graph; dynamic programming solves it with the maximum instead of the sum. Among the choices with the
+same worst cost the least sum of costs wins. The certificate proves the value anew: no choice stays
 strictly below it.
 """
 
@@ -15,12 +15,29 @@ from __future__ import annotations
 
 import numpy as np
 
-from seqopt.placement.costs import Aim, LayeredCosts, PlacementProblem
+from seqopt.placement.costs import LayeredCosts
 from seqopt.placement.formulation import Formulation, FormulationKind, Selection
+from seqopt.placement.interface import Aim, PlacementProblem
 
 
 def solve(problem: PlacementProblem) -> Selection:
-    """Return a choice whose worst cost is least."""
+    """Return a choice whose worst cost is least.
+
+    Parameters
+    ----------
+    problem : PlacementProblem
+        Its peaks are used.
+
+    Returns
+    -------
+    Selection
+        Its bound is its value.
+
+    Raises
+    ------
+    InfeasibleError
+        If no choice is allowed.
+    """
     costs = problem.peaks
     costs.continuable()
     peak = _least_peak(costs)

@@ -4,7 +4,7 @@ r"""The full overlap formulation by dynamic programming: exact.
 
    \min_{o_1, \dots, o_K} \; \sum_{k=1}^{K} c_k(o_k) + \sum_{k=2}^{K} d_k(o_{k-1}, o_k)
 
-with the single costs :math:`c` and the costs :math:`d` of the state that neighboring moves share.
+with the single costs :math:`c` and the costs :math:`d` of the step that neighboring moves share.
 It is a shortest path in a layered graph; the cost to go
 
 .. math::
@@ -18,12 +18,28 @@ from __future__ import annotations
 
 import numpy as np
 
-from seqopt.placement.costs import Aim, PlacementProblem
 from seqopt.placement.formulation import Formulation, FormulationKind, Selection
+from seqopt.placement.interface import Aim, PlacementProblem
 
 
 def solve(problem: PlacementProblem) -> Selection:
-    """Return the exact optimum of the sum over the build."""
+    """Return the exact optimum of the sum over the build.
+
+    Parameters
+    ----------
+    problem : PlacementProblem
+        Its sums are used.
+
+    Returns
+    -------
+    Selection
+        Its bound is its value.
+
+    Raises
+    ------
+    InfeasibleError
+        If no choice is allowed.
+    """
     costs = problem.sums
     costs.continuable()
     to_go = [costs.single[-1]]

@@ -19,13 +19,31 @@ import cvxpy as cp
 import numpy as np
 
 from formulations.solvers import minimize
-from seqopt.placement.costs import Aim, PlacementProblem
 from seqopt.placement.flow import layered_flow
 from seqopt.placement.formulation import Formulation, FormulationKind, Selection
+from seqopt.placement.interface import Aim, PlacementProblem
 
 
 def solve(problem: PlacementProblem) -> Selection:
-    """Return the choice that the largest flow follows."""
+    """Return the choice that the largest flow follows.
+
+    Parameters
+    ----------
+    problem : PlacementProblem
+        Its sums and budgets are used.
+
+    Returns
+    -------
+    Selection
+        With a bound, and the price of every budget.
+
+    Raises
+    ------
+    InfeasibleError
+        If no choice is allowed, or no flow is within all budgets.
+    SolverError
+        If the solver ends without an optimum.
+    """
     flow = layered_flow(problem)
     arcs = cp.Variable(len(flow.cost), nonneg=True)
     conserve = cp.Zero(flow.balance @ arcs - flow.source)

@@ -7,8 +7,8 @@ r"""The full overlap formulation as a mixed-integer program (cvxpy, HiGHS): exac
    & \sum_k \sum_{i,j} a_k(i, j)\, y_k(i, j) \le b \quad \text{for every budget.}
 
 It earns its price where budgets couple all moves: a cap on robot travel, on how often a robot is
-used, on the count of steps over a level (`seqopt.placement.budgets`). Without them dynamic programming gives
-the same answer hundreds of times faster.
+used, on the count of steps over a level (`seqopt.placement.budgets`). Without them dynamic
+programming gives the same answer hundreds of times faster.
 """
 
 from __future__ import annotations
@@ -17,13 +17,31 @@ import cvxpy as cp
 import numpy as np
 
 from formulations.solvers import minimize
-from seqopt.placement.costs import Aim, PlacementProblem
 from seqopt.placement.flow import layered_flow
 from seqopt.placement.formulation import Formulation, FormulationKind, Selection
+from seqopt.placement.interface import Aim, PlacementProblem
 
 
 def solve(problem: PlacementProblem) -> Selection:
-    """Return the exact optimum within the budgets."""
+    """Return the exact optimum within the budgets.
+
+    Parameters
+    ----------
+    problem : PlacementProblem
+        Its sums and budgets are used.
+
+    Returns
+    -------
+    Selection
+        With a bound.
+
+    Raises
+    ------
+    InfeasibleError
+        If no choice is allowed, or none is within all budgets.
+    SolverError
+        If the solver ends without an optimum.
+    """
     flow = layered_flow(problem)
     arcs = cp.Variable(len(flow.cost), boolean=True)
     conserve = cp.Zero(flow.balance @ arcs - flow.source)

@@ -8,11 +8,11 @@ next :math:`h` moves,
    \min_{o_k, \dots, o_{k+h-1}} \; \sum_{l=k}^{k+h-1} c_l(o_l) + d_k(o_{k-1}, o_k)
    + \sum_{l=k+1}^{k+h-1} d_l(o_{l-1}, o_l),
 
-and commits :math:`o_k`. The state shared with the committed choice is ranked among the candidates
-of move :math:`k` alone. With ``horizon=1`` this is the study's search of a single move (equation
-1): every candidate analyzed in every step of its window, ranked per criterion, least sum wins.
-With the whole build as horizon it is brute force, exact, and the judge of all other formulations
-on small builds. The work grows with the product of the candidates' numbers.
+and commits :math:`o_k`. The step shared with the committed choice is ranked among the candidates
+of move :math:`k` alone. With ``horizon=1`` this is the search of a single move of Bruun et al.
+(equation 1): every candidate analyzed in every step of its window, ranked per criterion, least sum
+wins. With the whole build as horizon it is brute force and exact; tests hold the other formulations
+against it on small builds. The work grows with the product of the candidates' numbers.
 """
 
 from __future__ import annotations
@@ -23,14 +23,35 @@ import numpy as np
 
 from seqopt.arrays import Floats
 from seqopt.errors import ProblemError
-from seqopt.placement.costs import Aim, LayeredCosts, PlacementProblem
+from seqopt.placement.costs import LayeredCosts
 from seqopt.placement.formulation import Formulation, FormulationKind, Reads, Selection
+from seqopt.placement.interface import Aim, PlacementProblem
 
 MOST = 20_000_000  # combinations in one enumeration: 160 MB
 
 
 def solve(problem: PlacementProblem, *, horizon: int = 1) -> Selection:
-    """Return the committed choices; ``horizon`` is the number of moves enumerated at once."""
+    """Return the committed choices.
+
+    Parameters
+    ----------
+    problem : PlacementProblem
+        Its sums are used.
+    horizon : int
+        How many moves are enumerated at once, from 1.
+
+    Returns
+    -------
+    Selection
+        Without a bound.
+
+    Raises
+    ------
+    InfeasibleError
+        If no choice is allowed.
+    ProblemError
+        If the horizon is below 1, or there are more combinations than `MOST`.
+    """
     costs = problem.sums
     sizes = costs.sizes
     if horizon < 1:

@@ -33,7 +33,7 @@ class Optimum:
     value : float
         Of the objective.
     compile_seconds : float
-        What cvxpy took to write the program down for the solver.
+        What cvxpy took to write the program down for the solver, s.
     """
 
     value: float
@@ -46,10 +46,15 @@ def minimize(program: cp.Problem, solver: str, *, feasible: bool) -> Optimum:
     Parameters
     ----------
     program : cvxpy.Problem
+        Its variables take the values of the optimum.
     solver : str
         ``cvxpy.CLARABEL`` or ``cvxpy.HIGHS``.
     feasible : bool
         Whether the program is known to have a solution.
+
+    Returns
+    -------
+    Optimum
 
     Raises
     ------
@@ -74,7 +79,20 @@ def minimize(program: cp.Problem, solver: str, *, feasible: bool) -> Optimum:
 
 
 def end_of(program: cp.Problem, attempt: int) -> Claim:
-    """Solve a cone program by Clarabel, with the options of an attempt; return how that ended."""
+    """Solve a cone program by Clarabel.
+
+    Parameters
+    ----------
+    program : cvxpy.Problem
+        Its variables and multipliers take the values of the answer, if there is one.
+    attempt : int
+        Index into `CONE_OPTIONS`.
+
+    Returns
+    -------
+    Claim
+        How that ended; a solver that fails has stalled.
+    """
     with warnings.catch_warnings():  # an inaccurate end is claimed, counted and put to the proof
         warnings.filterwarnings("ignore", "Solution may be inaccurate", UserWarning)
         try:

@@ -33,8 +33,10 @@ if TYPE_CHECKING:
     from seqopt.network.network import Network
     from seqopt.placement.certificate import Certificate
     from seqopt.placement.formulation import Formulation, formulations
-    from seqopt.placement.plan import Plan, solve
-    from seqopt.placement.problem import Limit, pose
+    from seqopt.placement.plan import Plan
+    from seqopt.placement.problem import pose
+    from seqopt.placement.requirements import Limit
+    from seqopt.placement.solving import solve
     from seqopt.responses.table import analyze
     from seqopt.scene.arch import ArchShape, arch_scene
     from seqopt.scene.scene import Scene
@@ -58,8 +60,10 @@ _HOMES = {
     "network.network": ("Network",),
     "placement.certificate": ("Certificate",),
     "placement.formulation": ("Formulation", "formulations"),
-    "placement.plan": ("Plan", "solve"),
-    "placement.problem": ("Limit", "pose"),
+    "placement.plan": ("Plan",),
+    "placement.problem": ("pose",),
+    "placement.requirements": ("Limit",),
+    "placement.solving": ("solve",),
     "responses.table": ("analyze",),
     "scene.arch": ("ArchShape", "arch_scene"),
     "scene.scene": ("Scene",),

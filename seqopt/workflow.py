@@ -7,14 +7,17 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
+from seqopt.engines.interface import Engine
 from seqopt.engines.registry import make_engine
 from seqopt.errors import ProblemError
 from seqopt.network.build import build_network
-from seqopt.placement.criteria import Criterion
-from seqopt.placement.plan import Plan, solve
-from seqopt.placement.problem import Limit, pose
+from seqopt.placement.plan import Plan
+from seqopt.placement.problem import pose
+from seqopt.placement.requirements import Criterion, Limit
+from seqopt.placement.solving import solve
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import load_scene
+from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.three_robots import make_schedule
 from seqopt.study.presets import CRITERIA, EQUATIONS
 
@@ -42,7 +45,7 @@ def optimize(
     formulation : str
         One of `seqopt.formulations`.
     engine : str
-        What computes responses; ``"auto"`` models no more than the scene needs.
+        A key of `seqopt.engines.registry.ENGINES`; ``"auto"`` models no more than is needed.
     limits : sequence of Limit
         What no open step may exceed.
     **options
@@ -65,18 +68,29 @@ def optimize(
     1.185
     """
     start = time.perf_counter()
-    if isinstance(scene, str):
-        scene = load_scene(scene)
-    network = build_network(scene)
-    solver, opened = make_engine(engine, network), make_schedule(schedule, network)
+    solver, opened = _assemble(scene, schedule, engine)
     assemble = time.perf_counter() - start
-    problem = pose(solver, opened, find_criterion(criterion), limits)
-    plan = solve(problem, formulation, **options)
+    plan = solve(pose(solver, opened, find_criterion(criterion), limits), formulation, **options)
     return replace(plan, seconds={"assemble": assemble, **plan.seconds})
+
+
+def _assemble(scene: Scene | str, schedule: str, engine: str) -> tuple[Engine, Schedule]:
+    """Return the engine and the schedule of a scene, all by name."""
+    network = build_network(load_scene(scene) if isinstance(scene, str) else scene)
+    return make_engine(engine, network), make_schedule(schedule, network)
 
 
 def find_criterion(criterion: Criterion | str) -> Criterion:
     """Return a criterion, by name or itself.
+
+    Parameters
+    ----------
+    criterion : Criterion or str
+        A criterion, or a name of `seqopt.CRITERIA`.
+
+    Returns
+    -------
+    Criterion
 
     Raises
     ------

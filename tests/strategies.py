@@ -6,7 +6,8 @@ import numpy as np
 from hypothesis import strategies as st
 
 from experiments.harness.walls import running_bond
-from seqopt.placement.costs import CostProblem, LayeredCosts
+from seqopt.placement.costs import LayeredCosts
+from seqopt.placement.interface import CostProblem
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.study.presets import ROBOTS
 from tests.builders import about_vertical, moved

@@ -32,10 +32,11 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.placement.certificate import least
-from seqopt.placement.costs import Aim
 from seqopt.placement.formulation import Formulation, formulations
-from seqopt.placement.plan import Plan, solve
+from seqopt.placement.interface import Aim
+from seqopt.placement.plan import Plan
 from seqopt.placement.problem import Problem, pose
+from seqopt.placement.solving import solve
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.three_robots import three_robot_loop

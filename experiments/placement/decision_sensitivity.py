@@ -41,11 +41,11 @@ from experiments.placement.parts.scenarios import (
 from experiments.placement.parts.sensitivity_chart import chart
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network
-from seqopt.placement.criteria import Criterion
 from seqopt.placement.formulation import find_formulation
-from seqopt.placement.plan import solve
 from seqopt.placement.problem import Problem, pose
 from seqopt.placement.ranking import move_costs, rank_of
+from seqopt.placement.requirements import Criterion
+from seqopt.placement.solving import solve
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.schedule import Schedule

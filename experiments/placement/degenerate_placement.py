@@ -33,8 +33,8 @@ from experiments.harness.plotting import RESULTS
 from experiments.placement.parts.degenerate_cases import CASES, Case, Size, enumerated
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.placement.certificate import judge as certified
-from seqopt.placement.costs import PlacementProblem
 from seqopt.placement.formulation import Formulation, FormulationKind, formulations
+from seqopt.placement.interface import PlacementProblem
 
 FULL, SMALL = Size(5, 4, 7), Size(3, 3, 6)
 DRAWS = 20

@@ -22,11 +22,11 @@ from experiments.harness.timing import best
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
-from seqopt.placement.costs import Aim
-from seqopt.placement.criteria import Criterion
 from seqopt.placement.formulation import formulations
-from seqopt.placement.plan import solve
+from seqopt.placement.interface import Aim
 from seqopt.placement.problem import Problem, pose
+from seqopt.placement.requirements import Criterion
+from seqopt.placement.solving import solve
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.study.presets import EQUATIONS, WEIGHTED

@@ -28,8 +28,8 @@ from seqopt.contact.mortar import DRY, EPOXY
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network
 from seqopt.network.network import GROUND, Network
-from seqopt.placement.plan import solve
 from seqopt.placement.problem import pose
+from seqopt.placement.solving import solve
 from seqopt.responses.table import analyze
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.steps import Step

@@ -1,22 +1,14 @@
-"""The words of the command line: what they may be, and their values."""
+"""The words of the command line: commands, their arguments, and the help that they print."""
 
 from __future__ import annotations
 
 import argparse
-import inspect
-from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
-from typing import NoReturn
+from typing import NoReturn, TypeAlias
 
-from seqopt.contact.mortar import MORTARS, Mortar
+from seqopt.contact.mortar import MORTARS
 from seqopt.engines.registry import ENGINES
-from seqopt.errors import ProblemError
-from seqopt.placement.criteria import Criterion, RankSum
-from seqopt.placement.formulation import Formulation, formulation_names
-from seqopt.placement.problem import Limit, payload_limits
-from seqopt.responses.choices import CHOICE_RESPONSES
-from seqopt.scene.scene import Scene
+from seqopt.placement.formulation import formulation_names
 from seqopt.scene.scene_file import builtin_scenes
 from seqopt.sequence.three_robots import SCHEDULES
 from seqopt.sequence.two_robots import METHODS
@@ -24,82 +16,6 @@ from seqopt.study.presets import CRITERIA, EQUATIONS
 from seqopt.study.published import PUBLISHED
 
 USAGE = 2  # exit status where the user must act
-RESPONSES = (*CHOICE_RESPONSES, "F_each")
-
-
-def parse_criterion(text: str) -> Criterion:
-    """Return a criterion by name, or a rank sum of named responses with weights."""
-    if text in CRITERIA:
-        return CRITERIA[text]
-    terms = []
-    for part in text.split(","):
-        name, _, weight = part.partition("=")
-        terms.append((_response(name, "--criteria"), _number(weight or "1", f"--criteria {part}")))
-    return RankSum(text, tuple(terms), tuple(terms))
-
-
-def parse_limits(texts: Sequence[str], scene: Scene) -> tuple[Limit, ...]:
-    """Return limits from words ``payload`` or ``RESPONSE=VALUE``."""
-    out: list[Limit] = []
-    for text in texts:
-        name, _, value = text.partition("=")
-        if text == "payload":
-            out += payload_limits(scene)
-        else:
-            out.append(Limit(_response(name, "--limit"), _number(value, f"--limit {text}")))
-    return tuple(out)
-
-
-def parse_options(formulation: Formulation, texts: Sequence[str]) -> dict[str, int | str]:
-    """Return the options of a formulation from ``NAME=VALUE`` words."""
-    known = {
-        name: type(parameter.default)
-        for name, parameter in inspect.signature(formulation.solve).parameters.items()
-        if parameter.kind is inspect.Parameter.KEYWORD_ONLY
-    }
-    out: dict[str, int | str] = {}
-    for text in texts:
-        name, _, value = text.partition("=")
-        if name not in known:
-            raise ProblemError(
-                f"--option {text}: {formulation.name} has {', '.join(known) or 'no options'}"
-            )
-        try:
-            out[name] = known[name](value)
-        except ValueError as error:
-            kind = known[name].__name__
-            raise ProblemError(f"--option {text}: {name} is {value!r}; give an {kind}") from error
-    return out
-
-
-def parse_mortar(options: argparse.Namespace) -> Mortar:
-    """Return the named mortar with the numbers that are given in place of its own."""
-    base = MORTARS[options.mortar]
-    given = {
-        name: _number(text, f"--{name.replace('_', '-')}", zero="allowed")
-        for name in ("friction", "tensile_strength", "cohesion")
-        if (text := getattr(options, name)) is not None
-    }
-    return replace(base, **given)
-
-
-def _response(name: str, where: str) -> str:
-    if name not in RESPONSES and not name.startswith("F_"):
-        known = ", ".join((*CRITERIA, *RESPONSES, "F_ROBOT"))
-        raise ProblemError(f"{where} {name}: there is no such; give {known}")
-    return name
-
-
-def _number(text: str, where: str, zero: str = "") -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = -1.0
-    if not 0 < value < float("inf") and not (zero and value == 0):
-        raise ProblemError(
-            f"{where}: {text!r} is not a positive number" + (" or zero" if zero else "")
-        )
-    return value
 
 
 class _Parser(argparse.ArgumentParser):
@@ -109,64 +25,33 @@ class _Parser(argparse.ArgumentParser):
         self.exit(USAGE, f"{self.prog}: error: {message} (see {self.prog} --help)\n")
 
 
+Commands: TypeAlias = "argparse._SubParsersAction[_Parser]"
+
+
 def parser() -> argparse.ArgumentParser:
-    """Return the parser of the command line; ``command`` names what is to be run."""
+    """Return the parser of the command line.
+
+    Returns
+    -------
+    argparse.ArgumentParser
+        ``command`` names what is to be run. A wrong word ends the program with status `USAGE`.
+    """
     whole = _Parser(
         prog="seqopt",
         description="Where should each robot hold a half-built structure, over the whole build?",
     )
     commands = whole.add_subparsers(required=True, metavar="COMMAND", dest="command")
-    scene, engine = _shared_arguments()
-    command = commands.add_parser(
-        "compare",
-        parents=[scene, engine],
-        help="all methods side by side",
-        description="Analyze every method on a scene; show the largest responses side by side, for "
-        "the reference arch beside the printed ones, and list the inconsistencies in print.",
-    )
-    _criterion_argument(command)
-    command.add_argument("--out", type=Path, metavar="DIR", help="write tables and figures there")
-    command = commands.add_parser(
-        "analyze",
-        parents=[scene, engine],
-        help="responses of every step of one method",
-        description="Analyze every step of a method and write a table with the columns of Table "
-        "A.1 of Bruun et al.: forces in N, moments in N m, displacements in 1e-3 mm.",
-        epilog="example: seqopt analyze arch25 --method cantilever --out cantilever.csv",
-    )
-    _analyze_arguments(command)
-    command = commands.add_parser(
-        "optimize",
-        parents=[scene, engine],
-        help="choose every open grip of a build",
-        description="Choose where robots hold, over all steps of a method, by one formulation; "
-        "check the answer from the problem's own data, and write plan, selection, responses and "
-        "summary.",
-        epilog="example: seqopt optimize arch25 --formulation overlap_dp --out best",
-    )
-    _optimize_arguments(command)
-    command = commands.add_parser(
-        "assess",
-        parents=[scene],
-        help="does every step stand, and with what margins",
-        description="Assess every step of a build as rigid blocks that touch: does it stand, the "
-        "least bond and friction with which it does, the tilt it survives, the force robots must "
-        "have, and what fails first. A verdict is proven by forces or by a motion.",
-        epilog="example: seqopt assess arch25 --method cantilever --mortar dry --out dry.csv",
-    )
-    _assess_arguments(command)
-    command = commands.add_parser(
-        "scene",
-        parents=[scene],
-        help="check, describe and export a scene",
-        description="Check a scene, say what is in it, and write it as JSON if asked.",
-    )
-    command.add_argument("--export", type=Path, metavar="FILE", help="JSON file to write")
+    scene, engine = _scene_argument(), _engine_arguments()
+    _add_compare(commands, [scene, engine])
+    _add_analyze(commands, [scene, engine])
+    _add_optimize(commands, [scene, engine])
+    _add_assess(commands, [scene])
+    _add_scene(commands, [scene])
     return whole
 
 
-def _shared_arguments() -> tuple[_Parser, _Parser]:
-    """Return parsers of the arguments that commands share: the scene, the engine."""
+def _scene_argument() -> _Parser:
+    """Return a parser of the argument that all commands share."""
     scene = _Parser(add_help=False)
     scene.add_argument(
         "scene",
@@ -175,6 +60,11 @@ def _shared_arguments() -> tuple[_Parser, _Parser]:
         metavar="SCENE",
         help=f"a built-in scene ({', '.join(builtin_scenes())}) or a JSON file; arch25 by default",
     )
+    return scene
+
+
+def _engine_arguments() -> _Parser:
+    """Return a parser of the arguments that say what computes responses."""
     engine = _Parser(add_help=False)
     engine.add_argument(
         "--engine",
@@ -187,13 +77,33 @@ def _shared_arguments() -> tuple[_Parser, _Parser]:
     engine.add_argument(
         "--mortar",
         choices=tuple(MORTARS),
-        help="what holds the joints of the engines auto and discrete: the epoxy of Bruun et al. or nothing "
-        "(default: epoxy)",
+        help="what holds the joints of the engines auto and discrete: the epoxy of Bruun et al. or "
+        "nothing (default: epoxy)",
     )
-    return scene, engine
+    return engine
 
 
-def _analyze_arguments(command: argparse.ArgumentParser) -> None:
+def _add_compare(commands: Commands, parents: list[_Parser]) -> None:
+    command = commands.add_parser(
+        "compare",
+        parents=parents,
+        help="all methods side by side",
+        description="Analyze every method on a scene; show the largest responses side by side, for "
+        "the reference arch beside the printed ones, and list the inconsistencies in print.",
+    )
+    _criterion_argument(command)
+    command.add_argument("--out", type=Path, metavar="DIR", help="write tables and figures there")
+
+
+def _add_analyze(commands: Commands, parents: list[_Parser]) -> None:
+    command = commands.add_parser(
+        "analyze",
+        parents=parents,
+        help="responses of every step of one method",
+        description="Analyze every step of a method and write a table with the columns of Table "
+        "A.1 of Bruun et al.: forces in N, moments in N m, displacements in 1e-3 mm.",
+        epilog="example: seqopt analyze arch25 --method cantilever --out cantilever.csv",
+    )
     _steps_arguments(command)
     command.add_argument(
         "--out", type=Path, metavar="FILE", help="CSV to write; standard output if not given"
@@ -217,7 +127,16 @@ def _steps_arguments(command: argparse.ArgumentParser) -> None:
     steps.add_argument("--plan", type=Path, metavar="FILE", help="CSV of the steps")
 
 
-def _assess_arguments(command: argparse.ArgumentParser) -> None:
+def _add_assess(commands: Commands, parents: list[_Parser]) -> None:
+    command = commands.add_parser(
+        "assess",
+        parents=parents,
+        help="does every step stand, and with what margins",
+        description="Assess every step of a build as rigid blocks that touch: does it stand, the "
+        "least bond and friction with which it does, the tilt it survives, the force robots must "
+        "have, and what fails first. A verdict is proven by forces or by a motion.",
+        epilog="example: seqopt assess arch25 --method cantilever --mortar dry --out dry.csv",
+    )
     _steps_arguments(command)
     command.add_argument(
         "--mortar",
@@ -247,7 +166,16 @@ def _criterion_argument(command: argparse.ArgumentParser) -> None:
     )
 
 
-def _optimize_arguments(command: argparse.ArgumentParser) -> None:
+def _add_optimize(commands: Commands, parents: list[_Parser]) -> None:
+    command = commands.add_parser(
+        "optimize",
+        parents=parents,
+        help="choose every open grip of a build",
+        description="Choose where robots hold, over all steps of a method, by one formulation; "
+        "check the answer from the problem's own data, and write plan, selection, responses and "
+        "summary.",
+        epilog="example: seqopt optimize arch25 --formulation overlap_dp --out best",
+    )
     command.add_argument(
         "--formulation",
         required=True,
@@ -282,3 +210,13 @@ def _optimize_arguments(command: argparse.ArgumentParser) -> None:
         "or so; how far the choice is from the optimum stays unknown",
     )
     command.add_argument("--out", type=Path, metavar="DIR", required=True, help="folder to write")
+
+
+def _add_scene(commands: Commands, parents: list[_Parser]) -> None:
+    command = commands.add_parser(
+        "scene",
+        parents=parents,
+        help="check, describe and export a scene",
+        description="Check a scene, say what is in it, and write it as JSON if asked.",
+    )
+    command.add_argument("--export", type=Path, metavar="FILE", help="JSON file to write")

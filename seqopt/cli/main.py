@@ -14,14 +14,8 @@ from pathlib import Path
 
 import numpy as np
 
-from seqopt.cli.arguments import (
-    USAGE,
-    parse_criterion,
-    parse_limits,
-    parse_mortar,
-    parse_options,
-    parser,
-)
+from seqopt.cli.arguments import USAGE, parser
+from seqopt.cli.values import parse_criterion, parse_limits, parse_mortar, parse_options
 from seqopt.contact.mortar import MORTARS
 from seqopt.engines.auto import AutoEngine
 from seqopt.engines.interface import Engine
@@ -31,8 +25,9 @@ from seqopt.files import csv_text, make_folder, write_bytes, write_csv, write_te
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.placement.formulation import find_formulation
-from seqopt.placement.plan import Plan, solve
+from seqopt.placement.plan import Plan
 from seqopt.placement.problem import pose
+from seqopt.placement.solving import solve
 from seqopt.report.comparison import Comparison, compare
 from seqopt.report.text import format_comparison
 from seqopt.responses.table import analyze, fields_archive
@@ -50,7 +45,19 @@ FAILED = 3  # exit status where a solver failed; USAGE where the user must act
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command; return its exit status."""
+    """Run one command.
+
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        The words after ``seqopt``; by default those of the shell.
+
+    Returns
+    -------
+    int
+        The exit status: 0, `USAGE` where the user must act, `FAILED` where a solver failed. An
+        error is one line on standard error.
+    """
     options = parser().parse_args(arguments)
     try:
         COMMANDS[options.command](options)

@@ -1,1 +1,39 @@
-"""Room."""
+"""Placement: choose the open grips of a schedule, and prove how good the choice is.
+
+A problem says what a step costs (a criterion), which values are allowed (limits) and which choices
+there are (a schedule). A formulation solves it. The plan that comes back carries a certificate: its
+value and a lower bound, both computed anew from the problem's data.
+
+>>> from seqopt.engines.registry import make_engine
+>>> from seqopt.network.build import build_network
+>>> from seqopt.placement import Limit, pose, solve
+>>> from seqopt.placement.criteria import WorstRatio
+>>> from seqopt.scene.scene_file import load_scene
+>>> from seqopt.sequence.three_robots import three_robot_loop
+>>> network = build_network(load_scene("arch25"))
+>>> criterion = WorstRatio("my limits", (("T_max", 90.0), ("M_sup", 22.0)))  # N, N m
+>>> engine = make_engine("compliance", network)
+>>> problem = pose(engine, three_robot_loop(network), criterion, [Limit("F_largest", 300.0)])  # N
+>>> plan = solve(problem, "overlap_dp")
+>>> plan.nodes[:3], plan.certificate.gap
+((4, 2, 3), 0.0)
+"""
+
+from seqopt.placement.certificate import Certificate
+from seqopt.placement.costs import LayeredCosts
+from seqopt.placement.interface import CostProblem
+from seqopt.placement.plan import Plan
+from seqopt.placement.problem import Problem, pose
+from seqopt.placement.requirements import Limit
+from seqopt.placement.solving import solve
+
+__all__ = [
+    "Certificate",
+    "CostProblem",
+    "LayeredCosts",
+    "Limit",
+    "Plan",
+    "Problem",
+    "pose",
+    "solve",
+]

@@ -19,12 +19,18 @@ def steps_over(problem: Problem, response: str, level: float, bound: float) -> B
     Parameters
     ----------
     problem : Problem
+        Whose choices the budget is for.
     response : str
         Among those that the problem evaluates (``also`` of `seqopt.pose`).
     level : float
         SI units.
     bound : float
         How many steps may exceed it.
+
+    Returns
+    -------
+    Budget
+        Each choice, and each pair, takes the number of its steps that exceed the level.
 
     Raises
     ------
@@ -49,11 +55,23 @@ def robot_use(problem: Problem, robot: str, force: float, bound: float) -> Budge
     Parameters
     ----------
     problem : Problem
+        Whose choices the budget is for; it evaluates ``F_`` and the robot's name.
     robot : str
+        Name of the robot.
     force : float
         N.
     bound : float
         How many steps there may be.
+
+    Returns
+    -------
+    Budget
+        As of `steps_over`.
+
+    Raises
+    ------
+    ProblemError
+        If the problem does not evaluate the force of this robot.
     """
     return steps_over(problem, f"F_{robot}", force, bound)
 
@@ -64,8 +82,15 @@ def travel(problem: Problem, bound: float) -> Budget:
     Parameters
     ----------
     problem : Problem
+        Whose choices the budget is for.
     bound : float
         m.
+
+    Returns
+    -------
+    Budget
+        Each choice takes straight lines between its node and the given nodes that its robot holds
+        before and after, each pair the line between its two nodes; m.
     """
     single, shared = _empty(problem)
     schedule = problem.schedule

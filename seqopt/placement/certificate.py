@@ -9,24 +9,25 @@ import numpy as np
 
 from seqopt.arrays import FrozenValue
 from seqopt.errors import SolverError
-from seqopt.placement.costs import TINY, Aim, LayeredCosts, PlacementProblem
+from seqopt.placement.costs import TINY, LayeredCosts
 from seqopt.placement.formulation import (
     Formulation,
     FormulationKind,
     Selection,
 )
+from seqopt.placement.interface import Aim, PlacementProblem
 
 TOLERANCE = 1e-6  # of the costs that a choice meets: how far a claim may be from what the data say
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Certificate(FrozenValue):
-    """A selection checked from the problem's data alone.
+    """What a selection is worth, checked from the problem's data alone.
 
     Attributes
     ----------
     objective : float
-        Recomputed.
+        The value of the selection, recomputed; in the unit of the criterion.
     bound : float
         The least value of any choice, found anew from the data; where budgets forbid choices, the
         least without them.
@@ -38,6 +39,13 @@ class Certificate(FrozenValue):
         the budgets.
     spent : mapping of str to float
         What the selection takes of each budget.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> proof = seqopt.optimize("arch25", criterion="worst-ratio").certificate
+    >>> round(proof.objective, 3), round(proof.bound, 3), proof.gap
+    (57.538, 57.538, 0.0)
     """
 
     objective: float
@@ -49,6 +57,19 @@ class Certificate(FrozenValue):
 
 def certify(problem: PlacementProblem, selection: Selection, aim: Aim) -> Certificate:
     """Check a selection from the problem's data, without the solver.
+
+    Parameters
+    ----------
+    problem : PlacementProblem
+        What was solved.
+    selection : Selection
+        What a formulation claims.
+    aim : Aim
+        Whether the sum or the peak of the costs was to be least.
+
+    Returns
+    -------
+    Certificate
 
     Raises
     ------
@@ -83,9 +104,9 @@ def _value(costs: LayeredCosts, choice: tuple[int, ...], aim: Aim) -> float:
     sizes = costs.sizes
     if len(choice) != len(sizes):
         raise SolverError(f"the answer names {len(choice)} candidates for {len(sizes)} moves")
-    for k, (place, size) in enumerate(zip(choice, sizes, strict=True), start=1):
-        if not 0 <= place < size:
-            raise SolverError(f"the answer names candidate {place} of {size} for move {k}")
+    for k, (index, size) in enumerate(zip(choice, sizes, strict=True), start=1):
+        if not 0 <= index < size:
+            raise SolverError(f"the answer names candidate {index} of {size} for move {k}")
     value = aim.worth(costs, choice)
     if not np.isfinite(value):
         raise SolverError("the choice is not allowed by the problem; the solver's answer is wrong")
@@ -93,12 +114,34 @@ def _value(costs: LayeredCosts, choice: tuple[int, ...], aim: Aim) -> float:
 
 
 def least(costs: LayeredCosts, aim: Aim) -> float:
-    """Return the least that any choice is worth, budgets aside; see `least_sum`, `least_peak`."""
+    """Return the least that any choice is worth, budgets aside.
+
+    Parameters
+    ----------
+    costs : LayeredCosts
+    aim : Aim
+        Takes `least_sum` or `least_peak`.
+
+    Returns
+    -------
+    float
+        Infinite if no choice is allowed.
+    """
     return least_sum(costs) if aim is Aim.SUM else least_peak(costs)
 
 
 def least_sum(costs: LayeredCosts) -> float:
-    """Return the least sum that any choice reaches, budgets aside: forward, layer by layer."""
+    """Return the least sum that any choice reaches, budgets aside: forward, move by move.
+
+    Parameters
+    ----------
+    costs : LayeredCosts
+
+    Returns
+    -------
+    float
+        Infinite if no choice is allowed.
+    """
     reached = np.zeros(1)
     for single, shared in zip(costs.single, costs.shared, strict=True):
         reached = (reached[:, None] + shared).min(axis=0) + single
@@ -110,6 +153,15 @@ def least_peak(costs: LayeredCosts) -> float:
 
     A value is reached if the choices whose costs do not exceed it connect the first move to the
     last.
+
+    Parameters
+    ----------
+    costs : LayeredCosts
+
+    Returns
+    -------
+    float
+        Infinite if no choice is allowed.
     """
     levels = np.unique(np.concatenate([a.ravel() for a in (*costs.single, *costs.shared)]))
     low, high = 0, len(levels) - 1
@@ -135,9 +187,15 @@ def judge(problem: PlacementProblem, selection: Selection, formulation: Formulat
     Parameters
     ----------
     problem : PlacementProblem
+        What was solved.
     selection : Selection
+        What the formulation claims.
     formulation : Formulation
         What made the selection.
+
+    Returns
+    -------
+    Certificate
 
     Raises
     ------

@@ -1,35 +1,16 @@
-"""Costs of choices: what every formulation is given, whatever the choices stand for."""
+"""Costs and budgets of choices, as arrays, whatever the choices stand for."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
-from enum import Enum
-from typing import Protocol
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from seqopt.arrays import Bools, Floats, FrozenValue
 from seqopt.errors import InfeasibleError, ProblemError
-from seqopt.sequence.steps import Step
 
 TINY = float(np.finfo(float).tiny)
-
-
-class Aim(Enum):
-    """What is to be least over the build."""
-
-    SUM = "sum"
-    PEAK = "peak"
-
-    @property
-    def worth(self) -> Callable[[LayeredCosts, Sequence[int]], float]:
-        """What a choice is worth: its total, or its largest cost."""
-        return LayeredCosts.cost if self is Aim.SUM else LayeredCosts.worst
-
-    def costs(self, problem: PlacementProblem) -> LayeredCosts:
-        """Return the costs of a problem that this aim is about."""
-        return problem.sums if self is Aim.SUM else problem.peaks
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -93,7 +74,18 @@ class LayeredCosts(FrozenValue):
         return tuple(len(single) for single in self.single)
 
     def parts(self, choice: Sequence[int]) -> list[float]:
-        """Return the single and shared costs that the choices meet, move by move."""
+        """Return the costs that a choice meets.
+
+        Parameters
+        ----------
+        choice : sequence of int
+            A candidate for every move.
+
+        Returns
+        -------
+        list of 2K float
+            Move by move, the single cost and the one shared with the move before.
+        """
         out, before = [], 0
         for single, shared, now in zip(self.single, self.shared, choice, strict=True):
             out += [float(single[now]), float(shared[before, now])]
@@ -101,15 +93,42 @@ class LayeredCosts(FrozenValue):
         return out
 
     def cost(self, choice: Sequence[int]) -> float:
-        """Return the total cost of one candidate per move; infinite if one is not allowed."""
+        """Return the total cost of a choice.
+
+        Parameters
+        ----------
+        choice : sequence of int
+            A candidate for every move.
+
+        Returns
+        -------
+        float
+            Infinite if the choice is not allowed.
+        """
         return sum(self.parts(choice))
 
     def worst(self, choice: Sequence[int]) -> float:
-        """Return the largest single or shared cost that the choices meet."""
+        """Return the largest cost that a choice meets.
+
+        Parameters
+        ----------
+        choice : sequence of int
+            A candidate for every move.
+
+        Returns
+        -------
+        float
+            Infinite if the choice is not allowed.
+        """
         return max(self.parts(choice))
 
     def continuable(self) -> tuple[Bools, ...]:
-        """Return, per move, which candidates are allowed and can be continued to the last move.
+        """Return which candidates are allowed and can be continued to the last move.
+
+        Returns
+        -------
+        tuple of (C_k,) bool
+            An array for every move.
 
         Raises
         ------
@@ -144,8 +163,9 @@ class Budget(FrozenValue):
     name : str
         What is capped, with its unit.
     single : tuple of (C_k,) float
+        What each choice takes of the budget: finite.
     shared : tuple of (C_{k-1}, C_k) float
-        What each choice, and each pair, takes of the budget: finite.
+        What each pair takes of it: finite.
     bound : float
         Infinite if there is no cap.
 
@@ -172,77 +192,35 @@ class Budget(FrozenValue):
         super().__post_init__()
 
     def spent(self, choice: Sequence[int]) -> float:
-        """Return what the choices take."""
+        """Return what a choice takes of the budget.
+
+        Parameters
+        ----------
+        choice : sequence of int
+            A candidate for every move.
+
+        Returns
+        -------
+        float
+            In the unit of the budget.
+        """
         return LayeredCosts(self.single, self.shared).cost(choice)
 
     def slack(self, choice: Sequence[int]) -> float:
-        """Return what the choices leave of the budget, over the size of what they take, or of it.
+        """Return what a choice leaves of the budget, as a share.
 
-        Signs aside: amounts that cancel count in full. Zero divided by zero is zero.
+        Parameters
+        ----------
+        choice : sequence of int
+            A candidate for every move.
+
+        Returns
+        -------
+        float
+            What is left over the larger of the bound and the amounts taken, all without sign, so
+            that amounts that cancel count in full. Negative beyond the bound; zero if nothing is
+            left.
         """
         taken = LayeredCosts(self.single, self.shared).parts(choice)
         left = self.bound - sum(taken)
         return left / max(abs(self.bound), sum(map(abs, taken)), TINY) if left else 0.0
-
-
-class PlacementProblem(Protocol):
-    """What a formulation is given: costs, and what the choices stand for."""
-
-    @property
-    def sums(self) -> LayeredCosts:
-        """The costs whose sum over the build is to be least."""
-
-    @property
-    def peaks(self) -> LayeredCosts:
-        """The costs whose largest over the build is to be least."""
-
-    @property
-    def budgets(self) -> tuple[Budget, ...]:
-        """Caps on totals over the build."""
-
-    def conditional(self, move: int, before: int) -> Floats:
-        """Return the cost (C_k,) of what a move shares with the one before, that being chosen.
-
-        Parameters
-        ----------
-        move, before : int
-            A move, and the candidate chosen for the move before it.
-        """
-
-    def nodes(self, choice: Sequence[int]) -> tuple[int, ...]:
-        """Return the nodes that one candidate per move stands for."""
-
-    def steps(self, choice: Sequence[int]) -> tuple[Step, ...]:
-        """Return the checked steps with one candidate per move; none where costs are all."""
-
-    def seconds(self, aim: Aim) -> Mapping[str, float]:
-        """Return what computing the costs of an aim took, by stage."""
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class CostProblem(FrozenValue):
-    """A problem given by its costs alone."""
-
-    sums: LayeredCosts
-    budgets: tuple[Budget, ...] = field(default=())
-
-    @property
-    def peaks(self) -> LayeredCosts:
-        """The same costs."""
-        return self.sums
-
-    def conditional(self, move: int, before: int) -> Floats:
-        """Return the shared costs of the candidates, the choice before being fixed."""
-        return np.asarray(self.sums.shared[move][before])
-
-    def nodes(self, choice: Sequence[int]) -> tuple[int, ...]:
-        """Return the choice: candidates are their own names."""
-        return tuple(choice)
-
-    def steps(self, choice: Sequence[int]) -> tuple[Step, ...]:
-        """Return no steps."""
-        return ()
-
-    def seconds(self, aim: Aim) -> Mapping[str, float]:
-        """Return nothing: the costs are given."""
-        return {}

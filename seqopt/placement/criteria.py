@@ -1,4 +1,4 @@
-"""Criteria: what a state costs, from the responses of all choices that compete in it.
+"""Criteria: what a step costs, from the responses of all choices that compete in it.
 
 Every criterion turns responses over choices, ``(C,)`` for one open move or ``(C, D)`` for two, into
 costs of the same shape. A name stands for a response: ``T_max``, ``M_sup``, ``D_max``, ``F_move``
@@ -8,59 +8,34 @@ costs of the same shape. A name stands for a response: ``T_max``, ``M_sup``, ``D
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from seqopt.arrays import Floats
+from seqopt.placement.ranks import scaled_ranks
+from seqopt.placement.requirements import ChoiceResponses
 
-ChoiceResponses = Mapping[str, Floats]
 Term = tuple[Any, ...]  # a name and its numbers
 RESOLUTION = (("F", 1.0), ("T", 1.0), ("M", 1.0), ("D", 1e-6))  # N, N, N m, m
 
 
-class Criterion(Protocol):
-    """What a state costs."""
-
-    @property
-    def name(self) -> str:
-        """What the criterion is called."""
-
-    def wanted(self, bricks: int) -> tuple[str, ...]:
-        """Return the responses it needs of a move that is made with so many bricks placed."""
-
-    def for_robots(self, robots: Sequence[str]) -> Criterion:
-        """Return the criterion with ``F_each`` spelled out for the robots of a scene."""
-
-    def costs(self, responses: ChoiceResponses, bricks: int, choices: int) -> Floats:
-        """Return the costs of all choices in one state, NaN where they are impossible.
-
-        Parameters
-        ----------
-        responses : mapping of str to (C,) or (C, D) float
-            SI units; NaN where a choice is impossible, all NaN where a robot does not grip.
-        bricks : int
-            Bricks placed at the move that decides the state.
-        choices : int
-            How many candidates that move has.
-        """
-
-
 @dataclass(frozen=True)
 class RankSum:
-    """The study's criteria: ranks of responses, averaged, least is best (a Borda count).
+    """The criteria of Bruun et al.: ranks of responses, averaged, least is best (a Borda count).
 
     Ranks start at 1; ties share the mean of their ranks. Responses are rounded to a resolution
-    before they are ranked, so that differences without meaning decide nothing. In a state with two
-    open moves the ranks run over all pairs and are scaled down to as many as the deciding move has
-    candidates, so that it weighs as much as any other state. A robot that does not grip ranks all
-    choices equal. Source: equations (1) to (3) of the study.
+    before they are ranked, so that differences without meaning decide nothing. In a step with two
+    open moves the ranks run over all pairs and are scaled down to as many as the later move has
+    candidates, so that it weighs as much as any other step. A robot that does not grip ranks all
+    choices equal. Source: equations (1) to (3) of Bruun et al.
 
     Parameters
     ----------
     name : str
+        What the criterion is called.
     before, after : tuple of (str, float)
         Weight of every response in moves before the crown and from it on.
     crown : int, optional
@@ -76,15 +51,51 @@ class RankSum:
     resolution: tuple[tuple[str, float], ...] = RESOLUTION
 
     def wanted(self, bricks: int) -> tuple[str, ...]:
-        """Return the responses it needs of a move that is made with so many bricks placed."""
+        """Return the responses that it needs of a move.
+
+        Parameters
+        ----------
+        bricks : int
+            Bricks placed when the move is made; decides between ``before`` and ``after``.
+
+        Returns
+        -------
+        tuple of str
+            Names of responses.
+        """
         return tuple(name for name, _ in self._terms(bricks))
 
     def for_robots(self, robots: Sequence[str]) -> RankSum:
-        """Return the criterion with ``F_each`` spelled out for the robots of a scene."""
+        """Return the criterion with ``F_each`` spelled out for the robots of a scene.
+
+        Parameters
+        ----------
+        robots : sequence of str
+            Their names.
+
+        Returns
+        -------
+        RankSum
+        """
         return replace(self, before=_each(self.before, robots), after=_each(self.after, robots))
 
     def costs(self, responses: ChoiceResponses, bricks: int, choices: int) -> Floats:
-        """Return the weighted mean of the ranks; see `Criterion.costs`."""
+        """Return the weighted mean of the ranks.
+
+        Parameters
+        ----------
+        responses : mapping of str to (C,) or (C, D) float
+            As in `Criterion.costs`.
+        bricks : int
+            Bricks placed at the move that decides the step.
+        choices : int
+            How many candidates that move has; ranks run from 1 to it.
+
+        Returns
+        -------
+        (C,) or (C, D) float
+            NaN where a choice is impossible.
+        """
         terms = self._terms(bricks)
         total: Floats = np.zeros_like(responses[terms[0][0]])
         steps = dict(self.resolution)
@@ -96,30 +107,6 @@ class RankSum:
         return self.before if self.crown is None or bricks < self.crown else self.after
 
 
-def scaled_ranks(values: Floats, choices: int) -> Floats:
-    """Return mean ranks of rounded values; ranks over pairs are scaled to as many as ``choices``.
-
-    NaN stays NaN, but where all values are NaN all ranks are equal.
-    """
-    flat = values.ravel()
-    known = np.isfinite(flat)
-    out = np.full(flat.shape, np.nan)
-    if not known.any():
-        return np.full(values.shape, 0.5 * (choices + 1))
-    ranks = mean_ranks(np.round(flat[known]))
-    out[known] = ranks if values.ndim == 1 else (ranks - 0.5) * choices / known.sum() + 0.5
-    return out.reshape(values.shape)
-
-
-def mean_ranks(values: Floats) -> Floats:
-    """Return ranks (n,) from 1; ties share the mean of theirs.
-
-    As `scipy.stats.rankdata`, in a third of its time for the few values of a state.
-    """
-    _, place, count = np.unique(values, return_inverse=True, return_counts=True)
-    return np.asarray((np.cumsum(count) - 0.5 * (count - 1))[place])
-
-
 @dataclass(frozen=True)
 class WeightedSum:
     """A weighted sum of responses, each divided by a scale of its own.
@@ -127,6 +114,7 @@ class WeightedSum:
     Parameters
     ----------
     name : str
+        What the criterion is called.
     terms : tuple of (str, float, float)
         Response, weight, scale (N, N m or m).
     """
@@ -135,26 +123,61 @@ class WeightedSum:
     terms: tuple[tuple[str, float, float], ...]
 
     def wanted(self, bricks: int) -> tuple[str, ...]:
-        """Return the responses it needs; the same for every state."""
+        """Return the responses that it needs.
+
+        Parameters
+        ----------
+        bricks : int
+            Without effect: it needs the same for every move.
+
+        Returns
+        -------
+        tuple of str
+            Names of responses.
+        """
         return tuple(name for name, _, _ in self.terms)
 
     def for_robots(self, robots: Sequence[str]) -> WeightedSum:
-        """Return the criterion with ``F_each`` spelled out for the robots of a scene."""
+        """Return the criterion with ``F_each`` spelled out for the robots of a scene.
+
+        Parameters
+        ----------
+        robots : sequence of str
+            Their names.
+
+        Returns
+        -------
+        WeightedSum
+        """
         return replace(self, terms=_each(self.terms, robots))
 
     def costs(self, responses: ChoiceResponses, bricks: int, choices: int) -> Floats:
-        """Return the weighted sums; see `Criterion.costs`."""
+        """Return the weighted sums.
+
+        Parameters
+        ----------
+        responses : mapping of str to (C,) or (C, D) float
+            As in `Criterion.costs`.
+        bricks, choices : int
+            Without effect.
+
+        Returns
+        -------
+        (C,) or (C, D) float
+            NaN where a choice is impossible.
+        """
         parts = [w / scale * _present(responses[name]) for name, w, scale in self.terms]
         return np.asarray(sum(parts))
 
 
 @dataclass(frozen=True)
 class WorstRatio:
-    """The largest ratio of a response to its limit: a state is as bad as its worst response.
+    """The largest ratio of a response to its limit: a step is as bad as its worst response.
 
     Parameters
     ----------
     name : str
+        What the criterion is called.
     limits : tuple of (str, float)
         Response and limit (N, N m or m).
     """
@@ -163,15 +186,49 @@ class WorstRatio:
     limits: tuple[tuple[str, float], ...]
 
     def wanted(self, bricks: int) -> tuple[str, ...]:
-        """Return the responses it needs; the same for every state."""
+        """Return the responses that it needs.
+
+        Parameters
+        ----------
+        bricks : int
+            Without effect: it needs the same for every move.
+
+        Returns
+        -------
+        tuple of str
+            Names of responses.
+        """
         return tuple(name for name, _ in self.limits)
 
     def for_robots(self, robots: Sequence[str]) -> WorstRatio:
-        """Return the criterion with ``F_each`` spelled out for the robots of a scene."""
+        """Return the criterion with ``F_each`` spelled out for the robots of a scene.
+
+        Parameters
+        ----------
+        robots : sequence of str
+            Their names.
+
+        Returns
+        -------
+        WorstRatio
+        """
         return replace(self, limits=_each(self.limits, robots))
 
     def costs(self, responses: ChoiceResponses, bricks: int, choices: int) -> Floats:
-        """Return the largest ratios; see `Criterion.costs`."""
+        """Return the largest ratios.
+
+        Parameters
+        ----------
+        responses : mapping of str to (C,) or (C, D) float
+            As in `Criterion.costs`.
+        bricks, choices : int
+            Without effect.
+
+        Returns
+        -------
+        (C,) or (C, D) float
+            1 where a response is at its limit; NaN where a choice is impossible.
+        """
         parts = [_present(responses[name]) / limit for name, limit in self.limits]
         return np.asarray(np.max(np.stack(parts), axis=0))
 
@@ -191,5 +248,16 @@ def _each(terms: tuple[Term, ...], robots: Sequence[str]) -> tuple[Term, ...]:
 
 
 def equal(*names: str) -> tuple[tuple[str, float], ...]:
-    """Return equally weighted terms."""
+    """Return equally weighted terms of a `RankSum`.
+
+    Parameters
+    ----------
+    *names : str
+        Responses.
+
+    Returns
+    -------
+    tuple of (str, float)
+        Each with weight 1.
+    """
     return tuple((name, 1.0) for name in names)

@@ -17,7 +17,8 @@ from scipy import sparse
 from seqopt.arrays import Bools, Floats, FrozenValue
 from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.placement.certificate import TOLERANCE, least_sum
-from seqopt.placement.costs import TINY, Budget, LayeredCosts, PlacementProblem
+from seqopt.placement.costs import TINY, Budget, LayeredCosts
+from seqopt.placement.interface import PlacementProblem
 
 ACCURACY = 1e-7  # how far a reported optimum may lie above the true one, relative to the larger of
 # it and the largest cost
@@ -34,7 +35,7 @@ class LayeredFlow(FrozenValue):
     scale : float
         The largest cost.
     balance : (R, A) sparse
-        What leaves the source (row 0) and every candidate but those of the last move, less what
+        What leaves the source (row 0) and every candidate except those of the last move, less what
         arrives.
     source : (R,) float
         What must be left over: 1 at the source.
@@ -43,6 +44,7 @@ class LayeredFlow(FrozenValue):
     caps : tuple of float
         How much there is of each budget, in its unit.
     units : tuple of float
+        The power of ten by which the amounts of each budget are divided.
     names : tuple of str
         Of the budgets.
     allowed : tuple of (C_{k-1}, C_k) bool
@@ -63,10 +65,20 @@ class LayeredFlow(FrozenValue):
     feasible: bool
 
     def choice(self, flow: Floats) -> tuple[int, ...]:
-        """Return the choice that the largest part of a flow (A,) takes.
+        """Return the choice that the largest part of a flow takes.
 
         Where costs tie an interior-point flow is a mixture; every arc it uses lies on an optimal
         path.
+
+        Parameters
+        ----------
+        flow : (A,) float
+            Of every arc, from 0 to 1.
+
+        Returns
+        -------
+        tuple of int
+            A candidate for every move.
         """
         ends = np.cumsum([mask.sum() for mask in self.allowed])[:-1]
         now = 0
@@ -79,18 +91,49 @@ class LayeredFlow(FrozenValue):
         return tuple(out)
 
     def bound(self, optimum: float) -> float:
-        """Return a lower bound on the cost from a solver's optimum in scaled costs."""
+        """Return a lower bound on the cost of any choice.
+
+        Parameters
+        ----------
+        optimum : float
+            A solver's, in scaled costs.
+
+        Returns
+        -------
+        float
+            In the unit of the costs; lower by what the solver may be off.
+        """
         value = optimum * self.scale
         return value - ACCURACY * max(abs(value), self.scale)
 
     def prices(self, duals: Sequence[float]) -> dict[str, float]:
-        """Return what one more unit of each budget would save, from the duals of its scaled cap."""
+        """Return what one more unit of each budget would save.
+
+        Parameters
+        ----------
+        duals : sequence of float
+            Of the scaled caps.
+
+        Returns
+        -------
+        dict of str to float
+            By budget: cost per unit of the budget.
+        """
         pairs = zip(self.names, self.units, duals, strict=True)
         return {name: float(self.scale / unit * dual) for name, unit, dual in pairs}
 
 
 def layered_flow(problem: PlacementProblem) -> LayeredFlow:
     """Return the flow of a problem.
+
+    Parameters
+    ----------
+    problem : PlacementProblem
+        Its sums and budgets are used.
+
+    Returns
+    -------
+    LayeredFlow
 
     Raises
     ------

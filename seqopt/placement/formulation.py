@@ -11,7 +11,7 @@ import numpy as np
 
 from seqopt.arrays import FrozenValue
 from seqopt.errors import ProblemError
-from seqopt.placement.costs import Aim
+from seqopt.placement.interface import Aim
 
 GROUP = "seqopt.formulations"
 
@@ -38,15 +38,15 @@ class Selection(FrozenValue):
     Attributes
     ----------
     choice : tuple of int
-        Place of the chosen node among each move's candidates.
+        Index of the chosen node among each move's candidates, from 0.
     objective : float
-        Claimed value.
+        Claimed value, in the unit of the criterion.
     bound : float
         Claimed lower bound, budgets included; minus infinity if none.
     prices : mapping of str to float
         Dual value of each budget: the rate at which one more unit would lower the bound.
     compile_seconds : float
-        Part of the time to solve that went into writing the program down for a solver.
+        Part of the time to solve that went into writing the program down for a solver, s.
     """
 
     choice: tuple[int, ...]
@@ -63,8 +63,11 @@ class Formulation:
     Attributes
     ----------
     name, summary : str
-    kind : Kind
+        What it is called, and what it does in a few words.
+    kind : FormulationKind
+        What it promises.
     aim : Aim
+        What it makes least: the sum of the costs, or the largest.
     solve : callable
         Takes the problem and named options, returns a `Selection`.
     reads : Reads
@@ -90,12 +93,23 @@ class Formulation:
 
 
 def formulation_names() -> tuple[str, ...]:
-    """Return the names of all registered formulations, without loading any."""
+    """Return the names of all registered formulations, without loading any.
+
+    Returns
+    -------
+    tuple of str
+        In alphabetical order.
+    """
     return tuple(sorted(entry.name for entry in entry_points(group=GROUP)))
 
 
 def formulations() -> dict[str, Formulation]:
-    """Return all registered formulations by name (entry points of `GROUP`).
+    """Return all registered formulations: entry points of the group ``seqopt.formulations``.
+
+    Returns
+    -------
+    dict of str to Formulation
+        By name, in alphabetical order.
 
     Examples
     --------
@@ -109,6 +123,15 @@ def formulations() -> dict[str, Formulation]:
 
 def find_formulation(name: str) -> Formulation:
     """Return a formulation by name.
+
+    Parameters
+    ----------
+    name : str
+        One of `formulation_names`.
+
+    Returns
+    -------
+    Formulation
 
     Raises
     ------

@@ -1,29 +1,24 @@
-"""Solve a placement problem by any formulation, and the plan that comes of it."""
+"""The plan: a problem solved, with what its answer is worth and what finding it took."""
 
 from __future__ import annotations
 
-import time
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from seqopt.errors import ProblemError
-from seqopt.placement.certificate import TOLERANCE, Certificate, judge
-from seqopt.placement.costs import PlacementProblem
+from seqopt.placement.certificate import TOLERANCE, Certificate
 from seqopt.placement.formulation import (
     Formulation,
     Reads,
     Selection,
-    find_formulation,
-    formulations,
 )
+from seqopt.placement.interface import PlacementProblem
 from seqopt.placement.problem import Problem
 from seqopt.placement.ranking import move_costs, rank_of
-from seqopt.placement.window_search import WindowSearch, search_windows
+from seqopt.placement.window_search import WindowSearch
 from seqopt.responses.choices import window_models
 from seqopt.responses.table import analyze
 from seqopt.sequence.steps import Step
@@ -36,14 +31,17 @@ class Plan:
     Attributes
     ----------
     problem : PlacementProblem
+        What was solved.
     formulation : Formulation
+        What solved it.
     selection : Selection
+        The choice, and what the formulation claims of it.
     certificate : Certificate or None
-        None where no proof was asked for.
+        What the choice is worth, checked; None where no proof was asked for.
     steps : tuple of Step
         The schedule with every move at its chosen node, checked.
     seconds : mapping of str to float
-        By stage: respond, rank, compile (writing a program down for a solver), solve, verify.
+        By stage, s: respond, rank, compile (writing a program down for a solver), solve, verify.
     search : WindowSearch or None
         What was looked at where no proof was asked for.
 
@@ -54,7 +52,7 @@ class Plan:
     >>> plan
     Plan('arch25', 'three-robot', by overlap_dp: 90 steps, 22 moves, objective 657.465, gap 0 %)
     >>> plan.nodes[:5]
-    (4, 7, 8, 9, 12)
+    (4, 2, 6, 4, 6)
     """
 
     problem: PlacementProblem
@@ -110,7 +108,15 @@ class Plan:
     def responses(self) -> pd.DataFrame:
         """Return the responses of every step and the robots whose grips were chosen in it.
 
-        The columns are those of `seqopt.responses.analyze` and ``optimized_robot``.
+        Returns
+        -------
+        pandas.DataFrame
+            A row per step; the columns of `seqopt.analyze`, and ``optimized_robot``.
+
+        Raises
+        ------
+        ProblemError
+            If the problem is given by its costs alone; so do the tables below.
         """
         schedule = self._posed.schedule
         table = analyze(self._posed.engine, self.steps)
@@ -121,11 +127,14 @@ class Plan:
         return table
 
     def table(self) -> pd.DataFrame:
-        """Return a row per move: where, which robot, which node, what it costs, how it ranks.
+        """Return what was chosen for every move, what it costs and how it ranks.
 
-        Columns: ``move``, ``step``, ``bricks``, ``robot``, ``brick``, ``node``, ``candidates``;
-        then ``single_cost``, ``shared_cost`` and ``rank_in_window``, or without proof ``cost`` and
-        the ``margin`` to the next candidate.
+        Returns
+        -------
+        pandas.DataFrame
+            A row per move. Columns: ``move``, ``step``, ``bricks``, ``robot``, ``brick``, ``node``,
+            ``candidates`` (how many there were); then ``single_cost``, ``shared_cost`` and
+            ``rank_in_window``, or without proof ``cost`` and the ``margin`` to the next candidate.
         """
         rows, before = [], 0
         for k, now in enumerate(self.selection.choice):
@@ -158,7 +167,13 @@ class Plan:
         }
 
     def alternatives(self) -> pd.DataFrame:
-        """Return raw responses and cost of every choice that was looked at, a row each."""
+        """Return raw responses and cost of every choice that was looked at.
+
+        Returns
+        -------
+        pandas.DataFrame
+            A row per choice, by step; ``second_node`` where two moves are open. SI units.
+        """
         parts = []
         for problem in self.explored:
             for choices in problem.evaluation.steps:
@@ -170,7 +185,15 @@ class Plan:
         return pd.concat(parts).sort_values("step", kind="stable", ignore_index=True)
 
     def summary(self) -> dict[str, object]:
-        """Return what there is to say about the plan, ready for JSON."""
+        """Return what there is to say about the plan, ready for JSON.
+
+        Returns
+        -------
+        dict
+            Names of scene, schedule, formulation and criterion; ``status`` (``optimal``,
+            ``feasible`` or ``unproven``), ``objective``, ``bound``, ``gap``; ``models_evaluated``
+            and ``seconds``.
+        """
         schedule, proof = self._posed.schedule, self.certificate
         status = "unproven"
         if proof is not None:
@@ -189,98 +212,3 @@ class Plan:
             "models_evaluated": self.models,
             "seconds": dict(self.seconds),
         }
-
-
-def solve(
-    problem: PlacementProblem, formulation: Formulation | str, *, proof: bool = True, **options: Any
-) -> Plan:
-    """Solve a problem by a formulation and check the answer from the problem's own data.
-
-    Parameters
-    ----------
-    problem : PlacementProblem
-        From `seqopt.pose`, or a `seqopt.placement.CostProblem`.
-    formulation : Formulation or str
-        One of `seqopt.formulations`, or its name.
-    proof : bool, optional
-        False lets a formulation that looks at one window after the other solve only the models that
-        it meets; how far its choice is from the optimum then stays unknown.
-    **options
-        Of the formulation.
-
-    Returns
-    -------
-    Plan
-
-    Raises
-    ------
-    InfeasibleError
-        If no choice is allowed.
-    ProblemError
-        If the formulation is not for such a problem, or does not know an option.
-    SolverError
-        If a solver fails, or the answer is not what its formulation claims.
-
-    Examples
-    --------
-    >>> import seqopt
-    >>> network = seqopt.build_network(seqopt.load_scene("arch25"))
-    >>> engine = seqopt.make_engine("compliance", network)
-    >>> schedule = seqopt.three_robot_loop(network)
-    >>> problem = seqopt.pose(engine, schedule, seqopt.CRITERIA["equations-2-3"])
-    >>> seqopt.solve(problem, "cascade").certificate.gap > 0.01
-    True
-    """
-    if isinstance(formulation, str):
-        formulation = find_formulation(formulation)
-    if problem.budgets and not formulation.takes_budgets:
-        able = [name for name, other in formulations().items() if other.takes_budgets]
-        raise ProblemError(
-            f"{formulation.name}: the budget {problem.budgets[0].name!r} couples all moves; "
-            f"use {' or '.join(able)}"
-        )
-    if not proof:
-        return _solve_windows(problem, formulation, options)
-    seconds: dict[str, float] = {}
-    stages = problem.seconds(formulation.aim)  # computes the costs: solving is timed alone
-    with _timed(seconds, "solve"):
-        selection = formulation.solve(problem, **options)
-    seconds["compile"] = selection.compile_seconds
-    seconds["solve"] -= selection.compile_seconds
-    with _timed(seconds, "verify"):
-        certificate = judge(problem, selection, formulation)
-        steps = problem.steps(selection.choice)
-    order = {stage: seconds[stage] for stage in ("compile", "solve", "verify")}
-    return Plan(problem, formulation, selection, certificate, steps, {**stages, **order})
-
-
-def _solve_windows(
-    problem: PlacementProblem, formulation: Formulation, options: Mapping[str, object]
-) -> Plan:
-    """Return the plan of a search that solves only the models it meets."""
-    if formulation.reads is not Reads.WINDOW or options:
-        able = [name for name, other in formulations().items() if other.reads is Reads.WINDOW]
-        asked = " ".join(
-            [formulation.name, *(f"{name}={value}" for name, value in options.items())]
-        )
-        raise ProblemError(
-            f"{asked} looks beyond the window of a move and needs all models: "
-            f"use {' or '.join(able)} without options, or ask for the proof"
-        )
-    if not isinstance(problem, Problem):
-        raise ProblemError("the costs of all choices are given; ask for the proof, it is free")
-    seconds: dict[str, float] = {}
-    with _timed(seconds, "search"):
-        found = search_windows(problem)
-    respond = sum(part.evaluation.seconds for part in (found.alone, *found.shared))
-    with _timed(seconds, "verify"):
-        steps = problem.steps(found.choice)
-    stages = {"respond": respond, "rank": seconds["search"] - respond, "verify": seconds["verify"]}
-    return Plan(problem, formulation, Selection(found.choice, np.nan), None, steps, stages, found)
-
-
-@contextmanager
-def _timed(seconds: dict[str, float], stage: str) -> Iterator[None]:
-    start = time.perf_counter()
-    yield
-    seconds[stage] = time.perf_counter() - start

@@ -13,53 +13,12 @@ import pandas as pd
 from seqopt.arrays import Floats
 from seqopt.engines.interface import Engine
 from seqopt.errors import ProblemError
-from seqopt.placement.costs import Aim, Budget, LayeredCosts
-from seqopt.placement.criteria import Criterion
+from seqopt.placement.costs import Budget, LayeredCosts
+from seqopt.placement.interface import Aim
+from seqopt.placement.requirements import Criterion, Limit, ResponsesAsked
 from seqopt.responses.choices import CHOICE_RESPONSES, Evaluation, StepChoices
-from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import Step
-
-
-@dataclass(frozen=True)
-class Limit:
-    """No step with an open grip may exceed a value.
-
-    Parameters
-    ----------
-    response : str
-        Named as in `seqopt.placement.criteria`.
-    bound : float
-        SI units.
-
-    Examples
-    --------
-    >>> import seqopt
-    >>> seqopt.Limit("F_largest", 300.0)
-    Limit(response='F_largest', bound=300.0)
-    """
-
-    response: str
-    bound: float
-
-
-def payload_limits(scene: Scene) -> tuple[Limit, ...]:
-    """Return limits that keep every robot of a scene within its payload."""
-    return tuple(Limit(f"F_{robot.name}", robot.payload) for robot in scene.robots)
-
-
-@dataclass(frozen=True)
-class ResponsesAsked:
-    """The responses that criterion, limits and further wishes ask for."""
-
-    criterion: Criterion
-    limits: tuple[Limit, ...]
-    also: tuple[str, ...]
-
-    def __call__(self, bricks: int) -> frozenset[str]:
-        """Return their names for a move that is made with so many bricks placed."""
-        named = {*self.criterion.wanted(bricks), *(limit.response for limit in self.limits)}
-        return frozenset(named | {*self.also})
 
 
 @dataclass(frozen=True, repr=False)
@@ -137,7 +96,18 @@ class Problem:
         return layered, time.perf_counter() - start
 
     def seconds(self, aim: Aim) -> Mapping[str, float]:
-        """Return what computing the costs of an aim took: respond (responses), rank (costs)."""
+        """Return what computing the costs of an aim took.
+
+        Parameters
+        ----------
+        aim : Aim
+            Sums or peaks.
+
+        Returns
+        -------
+        mapping of str to float
+            ``respond`` (responses) and ``rank`` (costs), s.
+        """
         ranked = self._sums[1] if aim is Aim.SUM else self._peaks[1]
         return {"respond": self.evaluation.seconds, "rank": ranked}
 
@@ -185,7 +155,18 @@ class Problem:
         return costs
 
     def table(self, choices: StepChoices) -> pd.DataFrame:
-        """Return raw responses and cost of a step, a row per choice, labeled by nodes."""
+        """Return raw responses and cost of every choice in a step.
+
+        Parameters
+        ----------
+        choices : StepChoices
+            One of ``evaluation.steps``.
+
+        Returns
+        -------
+        pandas.DataFrame
+            A row per choice, labeled by its nodes; SI units.
+        """
         moves = [self.schedule.moves[m] for m in choices.moves]
         names = [f"{move.robot}_node" for move in moves]
         index = pd.MultiIndex.from_product([move.candidates for move in moves], names=names)
@@ -193,11 +174,36 @@ class Problem:
         return pd.DataFrame({name: values.ravel() for name, values in columns.items()}, index=index)
 
     def nodes(self, choice: Sequence[int]) -> tuple[int, ...]:
-        """Return the nodes that one candidate per move stands for."""
+        """Return the nodes that a choice stands for.
+
+        Parameters
+        ----------
+        choice : sequence of int
+            A candidate for every move.
+
+        Returns
+        -------
+        tuple of int
+        """
         return tuple(m.candidates[c] for m, c in zip(self.schedule.moves, choice, strict=True))
 
     def steps(self, choice: Sequence[int]) -> tuple[Step, ...]:
-        """Return the checked steps of the schedule with one candidate per move."""
+        """Return the checked steps of the schedule with a choice.
+
+        Parameters
+        ----------
+        choice : sequence of int
+            A candidate for every move.
+
+        Returns
+        -------
+        tuple of Step
+
+        Raises
+        ------
+        StepError
+            If a step is impossible.
+        """
         return self.schedule.fill(self.nodes(choice))
 
 
@@ -213,11 +219,20 @@ def pose(
     Parameters
     ----------
     engine : Engine
+        What computes responses.
     schedule : Schedule
+        Whose open grips are to be chosen.
     criterion : Criterion
+        What a step costs.
     limits : sequence of Limit
+        What no open step may exceed.
     also : sequence of str
         Responses to evaluate beside those that criterion and limits name; no others are.
+
+    Returns
+    -------
+    Problem
+        Nothing is computed yet.
 
     Raises
     ------
@@ -228,11 +243,10 @@ def pose(
     --------
     >>> import seqopt
     >>> network = seqopt.build_network(seqopt.load_scene("arch25"))
-    >>> engine = seqopt.make_engine("compliance", network)
-    >>> schedule = seqopt.three_robot_loop(network)
+    >>> engine, schedule = seqopt.make_engine("auto", network), seqopt.three_robot_loop(network)
     >>> problem = seqopt.pose(engine, schedule, seqopt.CRITERIA["worst-ratio"])
-    >>> problem
-    Problem('arch25', 'three-robot': 90 steps, 22 moves, criterion 'worst-ratio', 0 limits, 0 budgets)
+    >>> len(problem.schedule.moves), problem.criterion.name, problem.limits
+    (22, 'worst-ratio', ())
     """
     robots = [robot.name for robot in schedule.scene.robots]
     asked = ResponsesAsked(criterion.for_robots(robots), tuple(limits), tuple(also))

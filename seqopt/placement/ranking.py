@@ -10,8 +10,9 @@ import pandas as pd
 
 from seqopt.arrays import Floats
 from seqopt.placement.costs import LayeredCosts
-from seqopt.placement.criteria import Criterion, RankSum, WeightedSum, WorstRatio
+from seqopt.placement.criteria import RankSum, WeightedSum, WorstRatio
 from seqopt.placement.problem import Problem
+from seqopt.placement.requirements import Criterion
 from seqopt.responses.choices import StepChoices
 
 TIED = 1e-9  # costs this close, relative to the largest, are equal
@@ -26,6 +27,7 @@ def move_costs(problem: Problem, move: int, before: int, without: int | None = N
     Parameters
     ----------
     problem : Problem
+        Whose responses are evaluated if they are not yet.
     move, before : int
         A move, and the candidate chosen for the move before it.
     without : int, optional
@@ -47,7 +49,19 @@ def move_costs(problem: Problem, move: int, before: int, without: int | None = N
 
 
 def rank_of(costs: Floats, chosen: int) -> int:
-    """Return the rank of a candidate: 1 if none costs less."""
+    """Return the rank of a candidate: 1 if none costs less.
+
+    Parameters
+    ----------
+    costs : (C,) float
+        Equal if they differ by less than ``TIED`` of the largest.
+    chosen : int
+        Index of the candidate.
+
+    Returns
+    -------
+    int
+    """
     return int((costs < costs[chosen] - _tie(costs)).sum()) + 1
 
 
@@ -56,12 +70,22 @@ def _tie(costs: Floats) -> float:
 
 
 def rank_moves(problem: Problem, choice: Sequence[int]) -> pd.DataFrame:
-    """Return, move by move, where the chosen candidate ranks and how firm the first place is.
+    """Return where the chosen candidates rank, and how firm the first rank of each move is.
 
-    Columns: ``move``, ``step``, ``bricks``, ``robot``, ``node`` (chosen), ``rank`` (its place, 1 if
-    none is better), ``winner`` (the node in first place), ``margin`` (cost from first to second),
-    ``tied`` (candidates that share the first place), ``turned_by_candidates`` (others whose absence
-    changes the winner) and ``turned_by_criteria`` (responses whose absence does).
+    Parameters
+    ----------
+    problem : Problem
+    choice : sequence of int
+        A candidate for every move.
+
+    Returns
+    -------
+    pandas.DataFrame
+        A row per move. Columns: ``move``, ``step``, ``bricks``, ``robot``, ``node`` (chosen),
+        ``rank`` (1 if none is better), ``winner`` (the node that ranks first), ``margin`` (cost
+        from first to second), ``tied`` (candidates that share the first rank),
+        ``turned_by_candidates`` (others whose absence changes the winner) and
+        ``turned_by_criteria`` (responses whose absence does).
     """
     rows = []
     for k, move in enumerate(problem.schedule.moves):
@@ -69,19 +93,7 @@ def rank_moves(problem: Problem, choice: Sequence[int]) -> pd.DataFrame:
         costs = move_costs(problem, k, before)
         winner = int(np.argmin(costs))
         others = np.delete(costs, winner)
-        turned = [
-            j
-            for j in range(len(costs))
-            if j != winner
-            and np.isfinite(costs[j])
-            and int(np.argmin(move_costs(problem, k, before, without=j))) != winner
-        ]
-        dropped = [
-            name
-            for name, criterion in _without_one(problem.criterion, move.bricks)
-            if int(np.argmin(move_costs(replace(problem, criterion=criterion), k, before)))
-            != winner
-        ]
+        turned, dropped = _turning(problem, k, before, costs)
         rows.append(
             {
                 "move": k + 1,
@@ -98,6 +110,27 @@ def rank_moves(problem: Problem, choice: Sequence[int]) -> pd.DataFrame:
             }
         )
     return pd.DataFrame(rows)
+
+
+def _turning(
+    problem: Problem, move: int, before: int, costs: Floats
+) -> tuple[list[int], list[str]]:
+    """Return the candidates and the responses without which another candidate would win."""
+    winner = int(np.argmin(costs))
+    candidates = [
+        j
+        for j in range(len(costs))
+        if j != winner
+        and np.isfinite(costs[j])
+        and int(np.argmin(move_costs(problem, move, before, without=j))) != winner
+    ]
+    bricks = problem.schedule.moves[move].bricks
+    responses = [
+        name
+        for name, criterion in _without_one(problem.criterion, bricks)
+        if int(np.argmin(move_costs(replace(problem, criterion=criterion), move, before))) != winner
+    ]
+    return candidates, responses
 
 
 def _without(choices: StepChoices, candidate: int | None) -> StepChoices:
@@ -133,9 +166,19 @@ def _without_one(criterion: Criterion, bricks: int) -> Iterator[tuple[str, Crite
 def rank_choice(problem: Problem, choice: Sequence[int]) -> pd.DataFrame:
     """Return where chosen nodes rank, move by move, the choice before each being fixed.
 
-    Columns: ``move``, ``step``, ``bricks``, ``robot``, ``node``, ``candidates``,
-    ``first_in_window``, and three ranks: ``rank_in_window`` of the move alone, ``rank_overlap``
-    with the cost to go of the whole build, ``rank_peak`` with the worst cost to go.
+    Parameters
+    ----------
+    problem : Problem
+    choice : sequence of int
+        A candidate for every move.
+
+    Returns
+    -------
+    pandas.DataFrame
+        A row per move. Columns: ``move``, ``step``, ``bricks``, ``robot``, ``node``,
+        ``candidates`` (how many there are), ``first_in_window`` (the node that ranks first), and
+        three ranks: ``rank_in_window`` of the move alone, ``rank_overlap`` with the least sum of
+        costs to the end of the build added, ``rank_peak`` with the least worst cost to the end.
     """
     sums = _to_go(problem.sums, np.add)
     peaks = _to_go(problem.peaks, np.maximum)

@@ -45,7 +45,17 @@ class WindowSearch:
         return (self.alone, *(problem for problem in self.shared if problem.evaluation.steps))
 
     def costs(self, move: int) -> Floats:
-        """Return what the candidates of a move cost after the choices before it, (C_k,)."""
+        """Return what the candidates of a move cost after the choices before it.
+
+        Parameters
+        ----------
+        move : int
+            Index of a move that was chosen.
+
+        Returns
+        -------
+        (C_k,) float
+        """
         return np.asarray(self.alone.sums.single[move] + self.shared[move].sums.single[0])
 
 
@@ -56,6 +66,11 @@ def search_windows(problem: Problem) -> WindowSearch:
     ----------
     problem : Problem
         Its own responses are not computed.
+
+    Returns
+    -------
+    WindowSearch
+        With a choice for every move.
 
     Raises
     ------
@@ -86,9 +101,16 @@ def window(schedule: Schedule, move: int, nodes: Sequence[int]) -> Schedule:
     Parameters
     ----------
     schedule : Schedule
+        With all moves open.
     move : int
+        Index of a move.
     nodes : sequence of int
-        Chosen by the moves before.
+        Chosen for the moves before.
+
+    Returns
+    -------
+    Schedule
+        Of one move; without steps if it shares none.
     """
 
     def grip(held: int | OpenGrip | None) -> int | OpenGrip | None:

@@ -1,1 +1,22 @@
-"""Room."""
+"""Reports: every method and formulation on one scene, side by side, as tables and as text.
+
+Pictures need the extra ``plot`` and stay in `seqopt.report.draw` and `seqopt.report.charts`, which
+this page does not import.
+
+>>> from seqopt.engines.registry import make_engine
+>>> from seqopt.network.build import build_network
+>>> from seqopt.report import compare, format_comparison
+>>> from seqopt.scene.scene_file import load_scene
+>>> from seqopt.study.presets import CRITERIA
+>>> scene, criterion = load_scene("arch25"), CRITERIA["worst-ratio"]
+>>> comparison = compare(make_engine("compliance", build_network(scene)), criterion)
+>>> comparison.table.loc[["cascade", "overlap_dp"], "gap"].astype(float).round(3).tolist()
+[0.008, 0.0]
+>>> print(format_comparison(comparison, scene, criterion).splitlines()[0])
+arch25: 25 bricks; largest response of any step
+"""
+
+from seqopt.report.comparison import Comparison, compare, largest, method_tables
+from seqopt.report.text import format_comparison
+
+__all__ = ["Comparison", "compare", "format_comparison", "largest", "method_tables"]

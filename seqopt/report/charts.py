@@ -16,7 +16,18 @@ COLUMNS = {"M_sup_Nm": "M_sup [N m]", "F_max_N": "T_max [N]", "D_max_1e-3mm": "D
 
 
 def comparison_figures(result: Comparison) -> dict[str, Figure]:
-    """Return the figures of a comparison by file name."""
+    """Return the figures of a comparison.
+
+    Parameters
+    ----------
+    result : Comparison
+        Of a scene that has the three-robot loop.
+
+    Returns
+    -------
+    dict of str to matplotlib.figure.Figure
+        By file name.
+    """
     return {
         "maxima.png": _maxima(result),
         "responses.png": _responses(result),
@@ -56,11 +67,9 @@ def _gaps(result: Comparison) -> Figure:
         (right, "models", "models looked at"),
     ):
         values = solved[column].to_numpy(float)
-        for place, name in enumerate(solved.index):
-            marker = MARKERS[place % len(MARKERS)]
-            panel.loglog(
-                values[place], gap[place], marker, ms=9, mfc="none", mew=1.5, label=str(name)
-            )
+        for i, name in enumerate(solved.index):
+            marker = MARKERS[i % len(MARKERS)]
+            panel.loglog(values[i], gap[i], marker, ms=9, mfc="none", mew=1.5, label=str(name))
         panel.set_xlabel(label)
         panel.xaxis.set_minor_formatter(NullFormatter())
         panel.grid(visible=True, which="both", lw=0.2)

@@ -12,11 +12,12 @@ from seqopt.engines.interface import Engine
 from seqopt.errors import ProblemError, StepError
 from seqopt.placement.certificate import least_sum
 from seqopt.placement.costs import TINY
-from seqopt.placement.criteria import Criterion
 from seqopt.placement.formulation import formulations
-from seqopt.placement.plan import Plan, solve
+from seqopt.placement.plan import Plan
 from seqopt.placement.problem import Problem, pose
 from seqopt.placement.ranking import rank_choice
+from seqopt.placement.requirements import Criterion
+from seqopt.placement.solving import solve
 from seqopt.responses.quantities import RESPONSES
 from seqopt.responses.table import analyze, force_column
 from seqopt.scene.scene import Scene
@@ -81,10 +82,15 @@ def compare(
     Parameters
     ----------
     engine : Engine
+        What computes responses; it has the scene.
     criterion : Criterion
         What a step costs.
-    progress : callable
-        Told what is done next.
+    progress : callable, optional
+        Told in a few words what is done next.
+
+    Returns
+    -------
+    Comparison
 
     Raises
     ------
@@ -116,12 +122,24 @@ def compare(
 
 
 def method_tables(engine: Engine) -> tuple[dict[str, pd.DataFrame], list[str]]:
-    """Return the responses of every method's steps, and why others cannot build the scene.
+    """Return the responses of every method without open grips, and of the published plan.
+
+    Parameters
+    ----------
+    engine : Engine
+        What computes responses; it has the scene.
+
+    Returns
+    -------
+    tables : dict of str to pandas.DataFrame
+        By method, as `seqopt.analyze` makes them; the published plan for its own arch only.
+    notes : list of str
+        Why other methods cannot build the scene.
 
     Raises
     ------
     StepError
-        If none can.
+        If no method can build it.
     """
     scene = engine.network.scene
     tables: dict[str, pd.DataFrame] = {}
@@ -153,7 +171,20 @@ def _plans(
 
 
 def largest(scene: Scene, table: pd.DataFrame) -> dict[str, float]:
-    """Return the largest responses of any step of a table, by the names of `LARGEST`."""
+    """Return the largest responses of any step of a table.
+
+    Parameters
+    ----------
+    scene : Scene
+        Whose robots the table is about.
+    table : pandas.DataFrame
+        From `seqopt.analyze`.
+
+    Returns
+    -------
+    dict of str to float
+        By the names of `LARGEST`, in its units; ``F_rob`` is the largest force of any grip.
+    """
     forces = table[[force_column(robot) for robot in scene.robots]].abs()
     out = {"F_rob": float(np.nanmax(forces.to_numpy(float)))}
     for name in ("M_sup", "T_max", "D_max"):

@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.patheffects import withStroke
 
-from seqopt.arrays import Floats
+from seqopt.arrays import Floats, Ints
 from seqopt.network.network import Network, PartKind
 
 FACES = ((0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (1, 3, 7, 5))
@@ -37,7 +37,13 @@ class View:
     elevation: float = 15.0
 
     def axes(self) -> Floats:
-        """Return the unit vectors to the right, up and towards the viewer, (3, 3)."""
+        """Return the unit vectors to the right, up and towards the viewer.
+
+        Returns
+        -------
+        (3, 3) float
+            A row for each.
+        """
         a, e = np.radians([self.azimuth, self.elevation])
         right = np.array([np.cos(a), np.sin(a), 0.0])
         toward = np.array([np.sin(a) * np.cos(e), -np.cos(a) * np.cos(e), np.sin(e)])
@@ -54,23 +60,36 @@ def draw_bricks(
     magnify: float = 1.0,
     alpha: float = 1.0,
 ) -> None:
-    """Draw the first bricks as shaded boxes, moved by their twists (b, 6) times ``magnify``."""
+    """Draw the first bricks as shaded boxes, in place or moved.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+        To draw on.
+    network : Network
+        Of the scene.
+    bricks : int
+        How many, in build order.
+    view : View
+        From where.
+    twist : (b, 6) float, optional
+        Translation and rotation of every brick, m and rad.
+    magnify : float
+        How many times larger the motion is drawn.
+    alpha : float
+        Opacity, from 0 to 1.
+    """
     polygons, depths, colors = [], [], []
     for b in range(bricks):
         corners = _corners(network, b)
         if twist is not None:
-            center = corners.mean(axis=0)
-            turn = np.cross(twist[b, 3:], corners - center)
+            turn = np.cross(twist[b, 3:], corners - corners.mean(axis=0))
             corners = corners + magnify * (twist[b, :3] + turn)
         seen = corners @ view.axes().T
         for face in FACES:
-            normal = np.cross(
-                corners[face[1]] - corners[face[0]], corners[face[2]] - corners[face[0]]
-            )
-            light = 0.55 + 0.45 * abs(normal @ [0.3, -0.5, 0.8]) / np.linalg.norm(normal)
             polygons.append(seen[list(face), :2])
             depths.append(seen[list(face), 2].mean())
-            colors.append((*(light * CLAY), alpha))
+            colors.append((*(_light(corners, face) * CLAY), alpha))
     order = np.argsort(depths)
     axes.add_collection(
         PolyCollection(
@@ -94,23 +113,55 @@ def draw_network(
     edge_force: Floats | None = None,
     numbers: bool = False,
 ) -> None:
-    """Draw nodes and edges, moved by displacements (N, 3), colored by axial force if given."""
+    """Draw nodes and edges of the first bricks, in place or moved.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+        To draw on.
+    network : Network
+        Of the scene.
+    bricks : int
+        How many, in build order.
+    view : View
+        From where.
+    displacement : (N, 3) float, optional
+        Of every node, m.
+    magnify : float
+        How many times larger the motion is drawn.
+    edge_force : (E,) float, optional
+        Axial force, tension positive, N: colors the edges and sets their widths.
+    numbers : bool
+        Whether to write the numbers of the nodes that robots may hold.
+    """
     nodes, edges = network.count_nodes(bricks), network.count_edges(bricks)
     points = network.node_position[:nodes].copy()
     if displacement is not None:
         points += magnify * displacement
     seen = points @ view.axes()[:2].T
-    segments = list(seen[network.edge_nodes[:edges]])
+    axes.add_collection(_lines(list(seen[network.edge_nodes[:edges]]), edge_force))
+    _draw_nodes(axes, network.node_kind[:nodes], seen)
+    if numbers:
+        for i in np.flatnonzero(network.node_kind[:nodes] == PartKind.INNER):
+            axes.annotate(
+                str(network.node_name[i]), seen[i], (3, 2), textcoords="offset points", fontsize=6
+            )
+    _frame(axes)
+
+
+def _lines(segments: list[Floats], edge_force: Floats | None) -> LineCollection:
+    """Return edges (E) of (2, 2), colored by their forces (E,) if given."""
     if edge_force is None:
-        lines = LineCollection(segments, colors=INK, linewidths=1.2)
-    else:
-        size = np.abs(edge_force).max() or 1.0
-        colors = [TENSION if force > 0 else COMPRESSION for force in edge_force]
-        widths = 0.6 + 3.4 * np.abs(edge_force) / size
-        lines = LineCollection(segments, colors=colors, linewidths=widths.tolist())
-    axes.add_collection(lines)
-    kind = network.node_kind[:nodes]
-    for which, marker, size_, face in (
+        return LineCollection(segments, colors=INK, linewidths=1.2)
+    size = np.abs(edge_force).max() or 1.0
+    colors = [TENSION if force > 0 else COMPRESSION for force in edge_force]
+    widths = 0.6 + 3.4 * np.abs(edge_force) / size
+    return LineCollection(segments, colors=colors, linewidths=widths.tolist())
+
+
+def _draw_nodes(axes: Axes, kind: Ints, seen: Floats) -> None:
+    """Draw nodes of given kinds (N,) where they are seen (N, 2)."""
+    for which, marker, size, face in (
         (PartKind.INNER, "o", 9, INK),
         (PartKind.JOINT, "o", 12, "white"),
         (PartKind.BASE, "s", 36, INK),
@@ -119,23 +170,29 @@ def draw_network(
         axes.scatter(
             at[:, 0],
             at[:, 1],
-            s=size_,
+            s=size,
             marker=marker,
             c=face,
             edgecolors=INK,
             zorder=3,
             linewidths=0.7,
         )
-    if numbers:
-        for i in np.flatnonzero(kind == PartKind.INNER):
-            axes.annotate(
-                str(network.node_name[i]), seen[i], (3, 2), textcoords="offset points", fontsize=6
-            )
-    _frame(axes)
 
 
 def draw_grips(axes: Axes, network: Network, grips: Sequence[int | None], view: View) -> None:
-    """Mark the nodes that robots hold."""
+    """Mark the nodes that robots hold.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+        To draw on.
+    network : Network
+        Of the scene.
+    grips : sequence of (int or None)
+        Node that each of the scene's robots holds.
+    view : View
+        From where.
+    """
     for i, (robot, node) in enumerate(zip(network.scene.robots, grips, strict=True)):
         if node is None:
             continue
@@ -159,7 +216,16 @@ def draw_responses(
 ) -> None:
     """Draw responses along the build, one column of the tables on each axes.
 
-    Steps are placed at the share of the build they end, so that methods of different length align.
+    A step stands at the share of the build that it ends, so that methods of different length align.
+
+    Parameters
+    ----------
+    axes : sequence of matplotlib.axes.Axes
+        One for every column.
+    tables : mapping of str to pandas.DataFrame
+        By method, as `seqopt.analyze` makes them.
+    columns : mapping of str to str
+        Label of every column, with its unit.
     """
     for axis, (column, label) in zip(axes, columns.items(), strict=True):
         for name, table in tables.items():
@@ -179,6 +245,12 @@ def _corners(network: Network, b: int) -> Floats:
     frame = np.stack([first, second, np.cross(first, second)]) * np.array(brick.dimensions)[:, None]
     signs = np.array(list(product((-0.5, 0.5), repeat=3)))
     return np.asarray(np.array(brick.position) + signs @ frame)
+
+
+def _light(corners: Floats, face: tuple[int, ...]) -> float:
+    """Return how bright a face of corners (8, 3) is, from 0.55 to 1."""
+    normal = np.cross(corners[face[1]] - corners[face[0]], corners[face[2]] - corners[face[0]])
+    return float(0.55 + 0.45 * abs(normal @ [0.3, -0.5, 0.8]) / np.linalg.norm(normal))
 
 
 def _frame(axes: Axes) -> None:

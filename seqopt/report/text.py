@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 import pandas as pd
 
-from seqopt.placement.criteria import Criterion
+from seqopt.placement.requirements import Criterion
 from seqopt.report.comparison import LARGEST, Comparison
 from seqopt.scene.scene import Scene
 
@@ -18,9 +18,16 @@ def format_comparison(comparison: Comparison, scene: Scene, criterion: Criterion
     Parameters
     ----------
     comparison : Comparison
+        What to tell.
     scene : Scene
+        Which was compared.
     criterion : Criterion
         With which the formulations were compared.
+
+    Returns
+    -------
+    str
+        Of many lines.
     """
     blocks = [_methods(comparison, scene), _notes(comparison)]
     if comparison.refusal:

@@ -32,8 +32,9 @@ class StepChoices(FrozenValue):
     Attributes
     ----------
     step : OpenStep
+        Which step of the schedule it is.
     moves : tuple of int
-        The open moves: one, or two neighboring ones.
+        Index of every open move: one, or two neighboring ones.
     responses : mapping of str to (C,) or (C, D) float
         Over the candidates of the moves; SI units, sizes without sign; NaN where two robots would
         hold one node, all NaN for a robot that does not grip.
@@ -48,7 +49,17 @@ class Wanted(Protocol):
     """Which responses a move needs."""
 
     def __call__(self, bricks: int) -> Set[str]:
-        """Return the names for a move that is made with so many bricks placed."""
+        """Return the names of the responses that a move needs.
+
+        Parameters
+        ----------
+        bricks : int
+            Bricks placed when the move is made.
+
+        Returns
+        -------
+        set of str
+        """
 
 
 @dataclass(frozen=True)
@@ -58,8 +69,11 @@ class Evaluation:
     Parameters
     ----------
     engine : Engine
+        What computes them.
     schedule : Schedule
+        Whose open steps are evaluated.
     wanted : Wanted
+        Which responses every move needs; no others are computed.
     """
 
     engine: Engine
@@ -84,7 +98,7 @@ class Evaluation:
 
     @property
     def seconds(self) -> float:
-        """How long that took."""
+        """How long that took, s."""
         return self._found[2]
 
 
@@ -96,14 +110,18 @@ def evaluate_choices(
     Parameters
     ----------
     engine : Engine
+        What solves them.
     schedule : Schedule
+        Whose open steps are evaluated.
     wanted : Wanted
+        Which responses every move needs.
 
     Returns
     -------
     steps : tuple of StepChoices
+        All open steps, in order.
     models : int
-        How many different models there were.
+        How many different models there were: a model is a brick count and the nodes held.
 
     Raises
     ------
@@ -173,8 +191,18 @@ def _distinct(rows: Ints) -> tuple[Ints, Ints]:
 def window_models(schedule: Schedule, choice: Sequence[int]) -> int:
     """Return how many distinct models a search of one move after the other looks at.
 
-    A state that two moves share is then solved for the later one's candidates only, the earlier
+    A step that two moves share is then solved for the later one's candidates only, the earlier
     choice being made.
+
+    Parameters
+    ----------
+    schedule : Schedule
+    choice : sequence of int
+        The chosen candidate of every move.
+
+    Returns
+    -------
+    int
     """
     seen: set[tuple[int, ...]] = set()
     for step in schedule.steps:

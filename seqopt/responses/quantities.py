@@ -45,7 +45,17 @@ class Response:
 
 
 def lengths(vectors: Floats) -> Floats:
-    """Return the lengths of vectors (..., 3)."""
+    """Return the lengths of vectors.
+
+    Parameters
+    ----------
+    vectors : (..., 3) float
+
+    Returns
+    -------
+    (...) float
+        In the unit of the vectors.
+    """
     return np.asarray(np.sqrt(_squared(vectors)))
 
 
@@ -55,6 +65,7 @@ def grip_forces(network: Network, fields: Fields) -> Floats:
     Parameters
     ----------
     network : Network
+        Of a scene that says where up is.
     fields : Fields
         Of S grip sets with r grips each.
 
@@ -129,8 +140,9 @@ def responses_of(network: Network, fields: Fields) -> dict[str, Floats]:
     Parameters
     ----------
     network : Network
+        The network that the fields run over.
     fields : Fields
-        With edge forces, displacements and the support (`Want.RESPONSES`).
+        With edge forces, displacements and the support (`Want.TABLE`).
 
     Returns
     -------

@@ -21,7 +21,9 @@ def analyze(engine: Engine, steps: Sequence[Step]) -> pd.DataFrame:
     Parameters
     ----------
     engine : Engine
+        What computes them.
     steps : sequence of Step
+        With every grip given.
 
     Returns
     -------
@@ -40,19 +42,38 @@ def analyze(engine: Engine, steps: Sequence[Step]) -> pd.DataFrame:
     >>> network = seqopt.build_network(seqopt.load_scene("arch25"))
     >>> engine = seqopt.make_engine("compliance", network)
     >>> table = seqopt.analyze(engine, seqopt.sequential(network))
-    >>> table.loc[46, ["bricks", "F_max_N", "D_max_1e-3mm"]].round(1).tolist()
-    [24, 20.5, 4.0]
+    >>> table.loc[46, ["step", "bricks", "M_sup_Nm", "D_max_1e-3mm"]].round(1).tolist()
+    [47.0, 24.0, 66.3, 305.9]
     """
     return pd.DataFrame([_row(engine, step) for step in steps])
 
 
 def force_column(robot: Robot) -> str:
-    """Return the column of a table that holds the force of a robot's grip, N."""
+    """Return the column of a table that holds the force of a robot's grip, N.
+
+    Parameters
+    ----------
+    robot : Robot
+
+    Returns
+    -------
+    str
+    """
     return f"F_{robot.name}_N"
 
 
 def step_fields(engine: Engine, step: Step) -> Fields:
     """Return the full fields of one step.
+
+    Parameters
+    ----------
+    engine : Engine
+    step : Step
+
+    Returns
+    -------
+    Fields
+        Of one grip set, S = 1.
 
     Raises
     ------
@@ -73,6 +94,21 @@ def fields_archive(engine: Engine, steps: Sequence[Step]) -> bytes:
     Arrays are named ``step1_edge_force``, ``step1_displacement``, ``step1_grip_force``,
     ``step1_support`` and so on, as in `Fields` without its first axis; ``edge_nodes`` (E, 2),
     ``node_position`` (N, 3) and ``node_name`` (N,) say what they run over.
+
+    Parameters
+    ----------
+    engine : Engine
+    steps : sequence of Step
+
+    Returns
+    -------
+    bytes
+        The content of the archive; SI units.
+
+    Raises
+    ------
+    MechanismError, SolverError
+        As the engine does, the step named.
     """
     network = engine.network
     arrays: dict[str, np.ndarray] = {

@@ -1,1 +1,34 @@
-"""Room."""
+"""Steps of a build: what a sequence is, and the methods that make one from a network.
+
+A step places a brick, releases grips or takes a new one. A sequence lists them in order and is
+checked in its scene. A schedule is a sequence some of whose grips are still to be chosen.
+
+>>> from seqopt.network.build import build_network
+>>> from seqopt.scene.scene_file import load_scene
+>>> from seqopt.sequence import sequential, three_robot_loop
+>>> network = build_network(load_scene("arch25"))
+>>> steps = sequential(network)  # no grip is open
+>>> len(steps), steps[-1].bricks
+(49, 25)
+>>> schedule = three_robot_loop(network)  # some are: its moves
+>>> move = schedule.moves[0]
+>>> move.robot, move.step, move.candidates
+('rob3', 3, (4, 5))
+"""
+
+from seqopt.sequence.plan_file import read_plan
+from seqopt.sequence.schedule import Move, Schedule
+from seqopt.sequence.steps import Step
+from seqopt.sequence.three_robots import modified_sequential, three_robot_loop
+from seqopt.sequence.two_robots import cantilever, sequential
+
+__all__ = [
+    "Move",
+    "Schedule",
+    "Step",
+    "cantilever",
+    "modified_sequential",
+    "read_plan",
+    "sequential",
+    "three_robot_loop",
+]

@@ -15,7 +15,40 @@ Row = dict[str, str]
 
 
 def read_plan(scene: Scene, path: Path) -> tuple[Step, ...]:
-    """Return the checked steps of a plan file; see `parse_plan`."""
+    r"""Return the checked steps of a plan file.
+
+    Parameters
+    ----------
+    scene : Scene
+        In which every step must be possible.
+    path : pathlib.Path
+        CSV; see `parse_plan` for its columns.
+
+    Returns
+    -------
+    tuple of Step
+        Numbered from 1.
+
+    Raises
+    ------
+    FileError
+        If the file cannot be read.
+    StepError
+        If it is no such table or a step is impossible.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> import seqopt
+    >>> text = "step,type,bricks,rob1_node,rob2_node,rob3_node\n1,place,1,1,,\n"
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = Path(folder) / "plan.csv"
+    ...     _ = path.write_text(text)
+    ...     steps = seqopt.read_plan(seqopt.load_scene("arch25"), path)
+    >>> steps[0].bricks, steps[0].held
+    (1, (1,))
+    """
     return parse_plan(scene, read_text(path), str(path))
 
 
@@ -25,12 +58,18 @@ def parse_plan(scene: Scene, text: str, source: str) -> tuple[Step, ...]:
     Parameters
     ----------
     scene : Scene
+        In which every step must be possible.
     text : str
         CSV with the columns ``step``, ``type``, ``bricks`` and, for every robot, ``NAME_node`` and,
         if present, ``NAME_brick``; an empty cell means that the robot does not grip. Other columns
         are ignored.
     source : str
         What to call the plan in messages.
+
+    Returns
+    -------
+    tuple of Step
+        Numbered from 1.
 
     Raises
     ------

@@ -12,7 +12,13 @@ from seqopt.sequence.steps import Step, StepKind, check_sequence
 
 @dataclass(frozen=True)
 class OpenGrip:
-    """A grip to be chosen: that of a move, by its place in the schedule's moves."""
+    """A grip to be chosen.
+
+    Parameters
+    ----------
+    move : int
+        Index of its move among the moves of the schedule, from 0.
+    """
 
     move: int
 
@@ -29,9 +35,11 @@ class OpenStep:
     number : int
         From 1.
     kind : StepKind
+        What the step does.
     bricks : int
-    grips : tuple of (int, Open or None)
-        What each of the scene's robots holds.
+        How many bricks stand, in build order.
+    grips : tuple of (int, OpenGrip or None)
+        What each of the scene's robots holds: a node, a grip to be chosen, or nothing.
     """
 
     number: int
@@ -74,10 +82,28 @@ class Schedule:
     Parameters
     ----------
     method : str
-        What made it.
+        Name of the method that made it.
     scene : Scene
+        What is built, and by which robots.
     steps : tuple of OpenStep
+        Numbered from 1.
     moves : tuple of Move
+        In the order in which they are made.
+
+    Raises
+    ------
+    StepError
+        If more than two moves are open in one step, or two that are not neighbors.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> network = seqopt.build_network(seqopt.load_scene("arch25"))
+    >>> schedule = seqopt.three_robot_loop(network)
+    >>> len(schedule.steps), len(schedule.moves)
+    (90, 22)
+    >>> schedule.steps[3].moves
+    (0,)
     """
 
     method: str
@@ -95,6 +121,16 @@ class Schedule:
 
     def fill(self, nodes: Sequence[int]) -> tuple[Step, ...]:
         """Return the checked sequence in which every move takes the node chosen for it.
+
+        Parameters
+        ----------
+        nodes : sequence of int
+            A node for every move.
+
+        Returns
+        -------
+        tuple of Step
+            As many as the schedule has.
 
         Raises
         ------

@@ -22,17 +22,28 @@ class StepKind(Enum):
 
 @dataclass(frozen=True)
 class Step:
-    """One static state of the build.
+    """One step of the build: what stands, and which node every robot holds.
 
     Parameters
     ----------
     number : int
         From 1.
     kind : StepKind
+        What the step does.
     bricks : int
         How many bricks stand, in build order.
     grips : tuple of (int or None)
-        Node that each of the scene's robots holds.
+        Node that each of the scene's robots holds; None for a robot that holds nothing.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> network = seqopt.build_network(seqopt.load_scene("arch25"))
+    >>> step = seqopt.sequential(network)[1]
+    >>> step.kind.value, step.bricks, step.grips
+    ('place', 2, (1, 2, None))
+    >>> step.held
+    (1, 2)
     """
 
     number: int
@@ -47,7 +58,22 @@ class Step:
 
 
 def reachable(scene: Scene, robot: Robot, bricks: int) -> tuple[int, ...]:
-    """Return the nodes of the first bricks that a robot may hold, in build order."""
+    """Return the nodes of the first bricks that a robot may hold.
+
+    Parameters
+    ----------
+    scene : Scene
+        With the bricks, and the nodes that are blocked.
+    robot : Robot
+        Whose reach counts.
+    bricks : int
+        How many bricks stand.
+
+    Returns
+    -------
+    tuple of int
+        In build order; neither blocked nor out of reach.
+    """
     return tuple(
         node
         for brick in scene.placed[:bricks]
@@ -58,6 +84,18 @@ def reachable(scene: Scene, robot: Robot, bricks: int) -> tuple[int, ...]:
 
 def check_sequence(scene: Scene, steps: Sequence[Step]) -> tuple[Step, ...]:
     """Return the steps if each is possible after the one before.
+
+    Parameters
+    ----------
+    scene : Scene
+        What is built, and by which robots.
+    steps : sequence of Step
+        From the first brick on.
+
+    Returns
+    -------
+    tuple of Step
+        The same.
 
     Raises
     ------

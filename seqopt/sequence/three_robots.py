@@ -19,7 +19,31 @@ def three_robot_loop(network: Network) -> Schedule:
     The first three robots place a brick each. Then, once per brick: the robot whose grip was chosen
     before last releases and places the next brick, the one that placed the brick before releases,
     and takes a new grip, which is to be chosen. At least two robots grip, and the newest brick is
-    held, at every step after the first. Source: section 5.2.2 and figure 12 of the study.
+    held, at every step after the first. Source: section 5.2.2 and figure 12 of Bruun et al.
+
+    Parameters
+    ----------
+    network : Network
+        Of a scene with at least three robots and four bricks.
+
+    Returns
+    -------
+    Schedule
+        With one move for every brick except the last three.
+
+    Raises
+    ------
+    StepError
+        If there are fewer robots or bricks, or a robot does not reach the brick that it is to
+        place.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> network = seqopt.build_network(seqopt.load_scene("arch25"))
+    >>> schedule = seqopt.three_robot_loop(network)
+    >>> [(step.kind.value, step.moves) for step in schedule.steps[5:8]]
+    [('release', (0,)), ('reposition', (0, 1)), ('release', (1,))]
     """
     scene = network.scene
     total = len(scene.placed)
@@ -28,6 +52,13 @@ def three_robot_loop(network: Network) -> Schedule:
             f"scene {scene.name}: {len(scene.robots)} robots and {total} bricks; "
             "this method needs three robots and four bricks"
         )
+    return _schedule("three-robot", network, *_loop(network))
+
+
+def _loop(network: Network) -> tuple[list[OpenStep], list[int]]:
+    """Return the steps of the loop, and which robot makes each move."""
+    scene = network.scene
+    total = len(scene.placed)
     grips: list[int | OpenGrip | None] = [None] * len(scene.robots)
     steps: list[OpenStep] = []
 
@@ -54,7 +85,7 @@ def three_robot_loop(network: Network) -> Schedule:
         grips[newest] = None
         add(StepKind.RELEASE, bricks + 1)
         moving, placer, newest = newest, moving, placer
-    return _schedule("three-robot", network, steps, robots)
+    return steps, robots
 
 
 def modified_sequential(network: Network) -> Schedule:
@@ -62,29 +93,56 @@ def modified_sequential(network: Network) -> Schedule:
 
     Once two robots hold the arch, the third takes a grip for three steps: its own reposition, the
     release that follows and the next placing; then it releases. Source: section 5.2.1 and table 8
-    of the study.
+    of Bruun et al.
+
+    Parameters
+    ----------
+    network : Network
+        Of a scene with at least three robots.
+
+    Returns
+    -------
+    Schedule
+        With one move for every brick except the first and the last; no two are open in one step.
+
+    Raises
+    ------
+    StepError
+        If there are fewer robots, or one does not reach the brick that it is to place.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> network = seqopt.build_network(seqopt.load_scene("arch25"))
+    >>> schedule = seqopt.modified_sequential(network)
+    >>> len(schedule.steps), len(schedule.moves), schedule.moves[0].robot
+    (95, 23, 'rob3')
     """
     scene = network.scene
     if len(scene.robots) < 3:
         raise StepError(f"scene {scene.name}: {len(scene.robots)} robots; this method needs three")
+    return _schedule("modified-sequential", network, *_supported(network))
+
+
+def _supported(network: Network) -> tuple[list[OpenStep], list[int]]:
+    """Return the sequential method's steps with the third grip, and which robot makes each move."""
     steps: list[OpenStep] = []
     robots: list[int] = []
 
     def add(kind: StepKind, bricks: int, grips: Grips, support: OpenGrip | None) -> None:
         steps.append(OpenStep(len(steps) + 1, kind, bricks, (*grips[:2], support, *grips[3:])))
 
-    base = sequential(network)
-    for step in base:
+    for step in sequential(network):
         support = OpenGrip(len(robots) - 1) if robots and step.held else None
         add(step.kind, step.bricks, step.grips, support)
         if step.kind is StepKind.RELEASE:
             continue
         if support is not None:
             add(StepKind.RELEASE, step.bricks, step.grips, None)
-        if 1 < step.bricks < len(scene.placed):
+        if 1 < step.bricks < len(network.scene.placed):
             robots.append(2)
             add(StepKind.REPOSITION, step.bricks, step.grips, OpenGrip(len(robots) - 1))
-    return _schedule("modified-sequential", network, steps, robots)
+    return steps, robots
 
 
 def _schedule(method: str, network: Network, steps: list[OpenStep], robots: list[int]) -> Schedule:
@@ -110,6 +168,16 @@ SCHEDULES: dict[str, ScheduleMethod] = {
 
 def make_schedule(name: str, network: Network) -> Schedule:
     """Return a schedule by name.
+
+    Parameters
+    ----------
+    name : str
+        A key of `SCHEDULES`.
+    network : Network
+
+    Returns
+    -------
+    Schedule
 
     Raises
     ------

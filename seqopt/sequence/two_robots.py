@@ -16,7 +16,17 @@ Method = Callable[[Network], tuple[Step, ...]]
 
 
 def lies_along(network: Network) -> frozenset[int]:
-    """Return the bricks that lie along the structure: joints meet both of their inner nodes."""
+    """Return the bricks that lie along the structure: joints meet both of their inner nodes.
+
+    Parameters
+    ----------
+    network : Network
+
+    Returns
+    -------
+    frozenset of int
+        Names of the bricks.
+    """
     half = network.edge_kind == PartKind.JOINT
     touched = set(network.edge_nodes[half, 0].tolist())
     return frozenset(
@@ -31,6 +41,19 @@ def placing_node(network: Network, robot: Robot, brick: Brick) -> int:
 
     A robot on one side takes the node nearer to its side of a brick that lies across; any other
     case takes the brick's own placing node where it is within reach.
+
+    Parameters
+    ----------
+    network : Network
+    robot : Robot
+        One of the scene's.
+    brick : Brick
+        The one to be placed.
+
+    Returns
+    -------
+    int
+        One of the brick's two nodes.
 
     Raises
     ------
@@ -53,7 +76,29 @@ def placing_node(network: Network, robot: Robot, brick: Brick) -> int:
 def sequential(network: Network) -> tuple[Step, ...]:
     """Two robots take turns: one places the next brick while the other holds the last one.
 
-    Source: section 4.1 of the study.
+    Source: section 4.1 of Bruun et al.
+
+    Parameters
+    ----------
+    network : Network
+        Of a scene with at least two robots; the first two build.
+
+    Returns
+    -------
+    tuple of Step
+        Checked; every grip is given.
+
+    Raises
+    ------
+    StepError
+        If there are fewer robots, or one does not reach the brick that it is to place.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> network = seqopt.build_network(seqopt.load_scene("arch25"))
+    >>> [(step.kind.value, step.held) for step in seqopt.sequential(network)[:3]]
+    [('place', (1,)), ('place', (1, 2)), ('release', (2,))]
     """
     return _two_robots(network, swap_after={brick.name for brick in network.scene.bricks})
 
@@ -61,7 +106,30 @@ def sequential(network: Network) -> tuple[Step, ...]:
 def cantilever(network: Network) -> tuple[Step, ...]:
     """One robot holds while the other places bricks, up to one that lies along; then they swap.
 
-    Source: section 4.2 of the study.
+    A brick lies along the structure if joints meet both of its inner nodes. Source: section 4.2 of
+    Bruun et al.
+
+    Parameters
+    ----------
+    network : Network
+        Of a scene with at least two robots; the first two build.
+
+    Returns
+    -------
+    tuple of Step
+        Checked; every grip is given.
+
+    Raises
+    ------
+    StepError
+        If there are fewer robots, or one does not reach the brick that it is to place.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> network = seqopt.build_network(seqopt.load_scene("arch25"))
+    >>> [(step.kind.value, step.held) for step in seqopt.cantilever(network)[5:8]]
+    [('place', (1, 7)), ('release', (7,)), ('place', (8, 7))]
     """
     return _two_robots(network, swap_after=lies_along(network))
 

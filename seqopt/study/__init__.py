@@ -1,1 +1,39 @@
-"""Room."""
+"""What Bruun et al. printed: their robots, criteria, tables and three-robot plan.
+
+The paper is arXiv 2104.04856. No other room knows a number of theirs.
+
+>>> from seqopt.engines.registry import make_engine
+>>> from seqopt.network.build import build_network
+>>> from seqopt.responses.table import analyze
+>>> from seqopt.scene.scene_file import load_scene
+>>> from seqopt.study import CRITERIA, printed_maxima, published_plan
+>>> list(CRITERIA)
+['equations-2-3', 'closest-to-plan', 'weighted', 'worst-ratio']
+>>> scene = load_scene("arch25")
+>>> plan = published_plan(scene)
+>>> table = analyze(make_engine("compliance", build_network(scene)), plan)
+>>> len(plan), float(table["M_sup_Nm"].max().round(1))  # N m
+(90, 21.4)
+>>> float(printed_maxima().loc[3, "published"])  # the same as printed
+21.5
+"""
+
+from seqopt.study.presets import CRITERIA, ROBOTS
+from seqopt.study.published import (
+    IRREGULARITIES,
+    is_reference_arch,
+    printed_maxima,
+    published_plan,
+)
+from seqopt.study.tables import printed, printed_steps
+
+__all__ = [
+    "CRITERIA",
+    "IRREGULARITIES",
+    "ROBOTS",
+    "is_reference_arch",
+    "printed",
+    "printed_maxima",
+    "printed_steps",
+    "published_plan",
+]

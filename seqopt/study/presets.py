@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from seqopt.engines.discrete.system import BedStiffness
-from seqopt.placement.criteria import Criterion, RankSum, WeightedSum, WorstRatio, equal
+from seqopt.placement.criteria import RankSum, WeightedSum, WorstRatio, equal
+from seqopt.placement.requirements import Criterion
 from seqopt.scene.reach import Anywhere, Side
 from seqopt.scene.scene import Robot
 
@@ -14,10 +15,9 @@ ROBOTS = (
 )  # section 3.1: 40 kg; section 5: two beside the arch reach its line, the third is mobile
 
 STUDY_BED = BedStiffness(normal=100e9, tangential=10e9)
-"""jKn and jKs of the study's discrete-element models (section 3.2.3)."""
+"""Stiffnesses jKn and jKs of the discrete-element models of Bruun et al., N/m³ (section 3.2.3)."""
 
 CROWN = 13  # bricks of the reference arch up to its crown
-
 
 EQUATIONS = RankSum(
     "equations-2-3",
@@ -36,3 +36,16 @@ WEIGHTED = WeightedSum("weighted", tuple((name, 1.0, limit) for name, limit in P
 WORST_RATIO = WorstRatio("worst-ratio", PUBLISHED_BEST)
 
 CRITERIA: dict[str, Criterion] = {c.name: c for c in (EQUATIONS, CLOSEST, WEIGHTED, WORST_RATIO)}
+"""What a step may cost, by name.
+
+``equations-2-3`` ranks responses as equations (2) and (3) of Bruun et al. say; ``closest-to-plan``
+is the variant of it that chooses the nodes of the published plan most often. ``weighted`` adds
+the responses, each over its best published value of 270 N (grip force), 21.5 N m (``M_sup``),
+87.7 N (``T_max``) and 15.9e-6 m (``D_max``); ``worst-ratio`` takes the largest of these ratios.
+
+Examples
+--------
+>>> import seqopt
+>>> seqopt.CRITERIA["worst-ratio"].wanted(bricks=10)
+('F_largest', 'M_sup', 'T_max', 'D_max')
+"""

@@ -16,7 +16,7 @@ from seqopt.study.tables import printed
 
 IRREGULARITIES = (
     "Table A.2 leaves the brick count of step 9 blank (it is 5) and F_sup of step 49 "
-    "(472.3 N, the state of A.1 step 49).",
+    "(472.3 N, as in step 49 of A.1, which is the same).",
     "The payload is 40 kg (392.4 N); step 47 exceeds it in both two-robot methods.",
     "The text counts 23 optimizations; the printed three-robot plan contains 22.",
     "The printed D_max of the three-robot plan, 21.9e-3 mm, is that of step 88; the grips printed "
@@ -28,7 +28,7 @@ IRREGULARITIES = (
     "The average T_max of the sequential method is printed as 38.0 N; all 49 rows give 36.7 N. "
     "Those of the cantilever method leave out steps 1 to 4.",
 )
-
+"""What does not add up in the paper's own numbers, a sentence each."""
 
 PUBLISHED = "published"  # the name of the printed three-robot plan, where methods are listed
 PRINTED_COLUMN = {
@@ -39,18 +39,59 @@ PRINTED_COLUMN = {
 
 
 def is_reference_arch(scene: Scene) -> bool:
-    """Return whether a scene is the arch of Bruun et al. as it ships with the package."""
+    """Return whether a scene is the arch of Bruun et al. as it ships with the package.
+
+    Parameters
+    ----------
+    scene : Scene
+
+    Returns
+    -------
+    bool
+    """
     return scene == load_scene("arch25")
 
 
 def published_plan(scene: Scene) -> tuple[Step, ...]:
-    """Return the 90 steps of the published three-robot plan (Table B.1), checked in a scene."""
+    """Return the published three-robot plan (Table B.1), checked in a scene.
+
+    Parameters
+    ----------
+    scene : Scene
+        The arch of Bruun et al., or one like it.
+
+    Returns
+    -------
+    tuple of Step
+        90 steps.
+
+    Raises
+    ------
+    StepError
+        If a step is impossible in the scene.
+    """
     source = resources.files("seqopt").joinpath("data/paper/three_robot_plan.csv")
     return parse_plan(scene, source.read_text(encoding="utf-8"), "published three-robot plan")
 
 
 def published_choice(problem: Problem) -> tuple[int, ...]:
-    """Return the published plan's nodes as candidates of the loop's moves."""
+    """Return what the published plan chooses for the moves of the three-robot loop.
+
+    Parameters
+    ----------
+    problem : Problem
+        The loop on the arch of Bruun et al.
+
+    Returns
+    -------
+    tuple of int
+        Index of the published node among the candidates of every move.
+
+    Raises
+    ------
+    ValueError
+        If a published node is no candidate of its move.
+    """
     scene = problem.schedule.scene
     plan = published_plan(scene)
     names = [robot.name for robot in scene.robots]
@@ -66,6 +107,16 @@ def paper_models(schedule: Schedule) -> tuple[int, int]:
 
     They count 2n candidates for every brick count n from 3 to the last, four steps each, and 2n
     times 2(n-1) pairs for the shared one.
+
+    Parameters
+    ----------
+    schedule : Schedule
+        Of whose scene the bricks are counted.
+
+    Returns
+    -------
+    cascading, overlap : int
+        Models without and with all pairs in the shared steps.
     """
     counts = range(3, len(schedule.scene.bricks) + 1)
     cascading = sum(4 * 2 * n for n in counts)
@@ -73,9 +124,13 @@ def paper_models(schedule: Schedule) -> tuple[int, int]:
 
 
 def printed_maxima() -> pd.DataFrame:
-    """Return the largest responses that the paper prints (its improvement table), by method.
+    """Return the largest responses that the paper prints (its improvement table).
 
-    Rows in its order: the force of each robot, M_sup, T_max, D_max (N, N m, 1e-3 mm).
+    Returns
+    -------
+    pandas.DataFrame
+        A column per method; rows in the paper's order: the force of each robot [N], M_sup [N m],
+        T_max [N], D_max [1e-3 mm].
     """
     table = printed("improvement_3robot").drop(columns=["quantity", "unit"])
     return table[[*PRINTED_COLUMN.values()]].set_axis([*PRINTED_COLUMN], axis=1)

@@ -1,4 +1,4 @@
-"""What the study printed: its tables as data, and what does not add up in them."""
+"""The tables that Bruun et al. printed, as data."""
 
 from __future__ import annotations
 
@@ -10,14 +10,46 @@ SOURCE = "Bruun et al., Three Cooperative Robotic Fabrication Methods, arXiv 210
 
 
 def printed(name: str) -> pd.DataFrame:
-    """Return a table of the study by its file name in ``data/paper``, without the suffix."""
+    """Return a printed table.
+
+    Parameters
+    ----------
+    name : str
+        Of its file in ``seqopt/data/paper``, without the suffix.
+
+    Returns
+    -------
+    pandas.DataFrame
+        As printed; the names of the columns say the units.
+
+    Raises
+    ------
+    FileNotFoundError
+        If there is none of that name.
+    """
     source = resources.files("seqopt").joinpath(f"data/paper/{name}.csv")
     with source.open(encoding="utf-8") as stream:
         return pd.read_csv(stream)
 
 
 def printed_steps(method: str) -> pd.DataFrame:
-    """Return Table A.1 (``sequential``) or A.2 (``cantilever``), blank cells filled."""
+    """Return Table A.1 or A.2, a row per step, with the brick count that A.2 leaves blank.
+
+    Parameters
+    ----------
+    method : str
+        ``sequential`` (A.1) or ``cantilever`` (A.2).
+
+    Returns
+    -------
+    pandas.DataFrame
+        As printed; the names of the columns say the units.
+
+    Raises
+    ------
+    KeyError
+        If the method is neither.
+    """
     table = printed(
         {"sequential": "table_A1_sequential", "cantilever": "table_A2_cantilever"}[method]
     )

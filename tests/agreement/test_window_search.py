@@ -7,8 +7,9 @@ from hypothesis import given
 
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network
-from seqopt.placement.plan import solve
-from seqopt.placement.problem import Limit, pose
+from seqopt.placement.problem import pose
+from seqopt.placement.requirements import Limit
+from seqopt.placement.solving import solve
 from seqopt.placement.window_search import search_windows
 from seqopt.responses.choices import window_models
 from seqopt.sequence.three_robots import SCHEDULES, three_robot_loop

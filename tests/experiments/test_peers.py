@@ -15,8 +15,9 @@ from experiments.peers.parts.paths import PATHS, by_linprog, by_networkx
 from experiments.peers.parts.workload import Case, workload
 from experiments.peers.peers import difference
 from seqopt.engines.interface import Want, grip_columns
-from seqopt.placement.costs import CostProblem, LayeredCosts
+from seqopt.placement.costs import LayeredCosts
 from seqopt.placement.formulation import find_formulation
+from seqopt.placement.interface import CostProblem
 
 STATES = [(4, (1, 5, 7)), (17, (1, 20, 33)), (17, (1, 20, 21)), (25, (4, 47)), (25, (12, 13, 46))]
 

@@ -14,15 +14,12 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.network.build import build_network
 from seqopt.placement.budgets import robot_use, steps_over, travel
-from seqopt.placement.costs import Budget, CostProblem, LayeredCosts
-from seqopt.placement.formulation import (
-    Aim,
-    FormulationKind,
-    find_formulation,
-    formulations,
-)
-from seqopt.placement.plan import solve
-from seqopt.placement.problem import Limit, pose
+from seqopt.placement.costs import Budget, LayeredCosts
+from seqopt.placement.formulation import FormulationKind, find_formulation, formulations
+from seqopt.placement.interface import Aim, CostProblem
+from seqopt.placement.problem import pose
+from seqopt.placement.requirements import Limit
+from seqopt.placement.solving import solve
 from seqopt.sequence.three_robots import SCHEDULES, three_robot_loop
 from seqopt.study.presets import CRITERIA, EQUATIONS, WORST_RATIO
 from tests.builders import small_arch

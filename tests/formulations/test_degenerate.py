@@ -12,10 +12,11 @@ from experiments.placement.degenerate_placement import MALFORMED, judge, outcome
 from experiments.placement.parts.degenerate_cases import CASES, Size, capped, costs, opposed, whole
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.placement.certificate import certify
-from seqopt.placement.costs import Budget, CostProblem, LayeredCosts
+from seqopt.placement.costs import Budget, LayeredCosts
 from seqopt.placement.flow import LayeredFlow
-from seqopt.placement.formulation import Aim, Formulation, FormulationKind, Selection, formulations
-from seqopt.placement.plan import solve
+from seqopt.placement.formulation import Formulation, FormulationKind, Selection, formulations
+from seqopt.placement.interface import Aim, CostProblem
+from seqopt.placement.solving import solve
 
 ALL = formulations()
 SMALL = Size(3, 3, 6)

@@ -12,8 +12,8 @@ from seqopt.contact.mortar import DRY
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network
 from seqopt.placement.formulation import find_formulation
-from seqopt.placement.plan import solve
 from seqopt.placement.problem import pose
+from seqopt.placement.solving import solve
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.sequence.two_robots import cantilever
 from seqopt.stability.assessment import assess

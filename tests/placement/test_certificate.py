@@ -10,14 +10,10 @@ import pytest
 from seqopt.errors import SolverError
 from seqopt.placement.budgets import travel
 from seqopt.placement.certificate import certify
-from seqopt.placement.costs import CostProblem, LayeredCosts
-from seqopt.placement.formulation import (
-    Aim,
-    FormulationKind,
-    Selection,
-    formulations,
-)
-from seqopt.placement.plan import solve
+from seqopt.placement.costs import LayeredCosts
+from seqopt.placement.formulation import FormulationKind, Selection, formulations
+from seqopt.placement.interface import Aim
+from seqopt.placement.solving import solve
 
 ALL = formulations()
 

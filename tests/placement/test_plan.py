@@ -11,8 +11,9 @@ import pytest
 import seqopt
 from seqopt.errors import ProblemError, StepError
 from seqopt.placement.budgets import travel
-from seqopt.placement.costs import CostProblem, LayeredCosts
+from seqopt.placement.costs import LayeredCosts
 from seqopt.placement.formulation import FormulationKind, Reads
+from seqopt.placement.interface import CostProblem
 from seqopt.placement.problem import Problem
 from seqopt.workflow import find_criterion
 

@@ -8,10 +8,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import rankdata
 
-from seqopt.placement.criteria import mean_ranks, scaled_ranks
-from seqopt.placement.plan import solve
-from seqopt.placement.problem import payload_limits, pose
+from seqopt.placement.problem import pose
 from seqopt.placement.ranking import move_costs, rank_moves
+from seqopt.placement.ranks import mean_ranks, scaled_ranks
+from seqopt.placement.requirements import payload_limits
+from seqopt.placement.solving import solve
 from seqopt.sequence.three_robots import modified_sequential
 from seqopt.study.presets import CRITERIA, EQUATIONS, WEIGHTED, WORST_RATIO
 from seqopt.study.published import paper_models, published_choice

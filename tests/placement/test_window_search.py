@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from seqopt.errors import ProblemError
-from seqopt.placement.plan import solve
-from seqopt.placement.problem import Limit, pose
+from seqopt.placement.problem import pose
+from seqopt.placement.requirements import Limit
+from seqopt.placement.solving import solve
 from seqopt.placement.window_search import search_windows, window
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.study.presets import EQUATIONS, WEIGHTED

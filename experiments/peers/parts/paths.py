@@ -10,8 +10,9 @@ import numpy as np
 from scipy import sparse
 from scipy.optimize import linprog
 
-from seqopt.placement.costs import LayeredCosts, PlacementProblem
+from seqopt.placement.costs import LayeredCosts
 from seqopt.placement.formulation import find_formulation
+from seqopt.placement.interface import PlacementProblem
 
 GOAL = "goal"
 Node = tuple[int, int] | str

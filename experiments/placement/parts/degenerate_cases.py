@@ -11,10 +11,11 @@ import numpy as np
 from experiments.harness.arches import half_circle
 from seqopt.arrays import Floats
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.placement.costs import Budget, CostProblem, LayeredCosts, PlacementProblem
-from seqopt.placement.criteria import RESOLUTION, Criterion, WorstRatio
-from seqopt.placement.formulation import Aim
-from seqopt.placement.problem import Limit, Problem, pose
+from seqopt.placement.costs import Budget, LayeredCosts
+from seqopt.placement.criteria import RESOLUTION, WorstRatio
+from seqopt.placement.interface import Aim, CostProblem, PlacementProblem
+from seqopt.placement.problem import Problem, pose
+from seqopt.placement.requirements import Criterion, Limit
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.study.presets import EQUATIONS
 

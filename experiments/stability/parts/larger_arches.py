@@ -15,8 +15,8 @@ from seqopt.contact.mortar import DRY
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
-from seqopt.placement.plan import solve
 from seqopt.placement.problem import pose
+from seqopt.placement.solving import solve
 from seqopt.responses.table import analyze
 from seqopt.scene.scene import Scene, Spring
 from seqopt.sequence.steps import Step

@@ -1,0 +1,159 @@
+"""What the words of the command line stand for: criteria, limits, options, mortars."""
+
+from __future__ import annotations
+
+import argparse
+import inspect
+from collections.abc import Sequence
+from dataclasses import replace
+
+from seqopt.contact.mortar import MORTARS, Mortar
+from seqopt.errors import ProblemError
+from seqopt.placement.criteria import RankSum
+from seqopt.placement.formulation import Formulation
+from seqopt.placement.requirements import Criterion, Limit, payload_limits
+from seqopt.responses.choices import CHOICE_RESPONSES
+from seqopt.scene.scene import Scene
+from seqopt.study.presets import CRITERIA
+
+RESPONSES = (*CHOICE_RESPONSES, "F_each")
+
+
+def parse_criterion(text: str) -> Criterion:
+    """Return a criterion by name, or a rank sum of named responses with weights.
+
+    Parameters
+    ----------
+    text : str
+        A name of `seqopt.CRITERIA`, or responses as ``T_max,M_sup=2``; a weight is 1 by default.
+
+    Returns
+    -------
+    Criterion
+
+    Raises
+    ------
+    ProblemError
+        If there is no such criterion or response, or a weight is not positive.
+    """
+    if text in CRITERIA:
+        return CRITERIA[text]
+    terms = []
+    for part in text.split(","):
+        name, _, weight = part.partition("=")
+        terms.append((_response(name, "--criteria"), _number(weight or "1", f"--criteria {part}")))
+    return RankSum(text, tuple(terms), tuple(terms))
+
+
+def parse_limits(texts: Sequence[str], scene: Scene) -> tuple[Limit, ...]:
+    """Return limits from words.
+
+    Parameters
+    ----------
+    texts : sequence of str
+        Each ``payload`` or ``RESPONSE=VALUE``, SI units.
+    scene : Scene
+        Whose robots have the payloads.
+
+    Returns
+    -------
+    tuple of Limit
+
+    Raises
+    ------
+    ProblemError
+        If there is no such response, or a value is not positive.
+    """
+    out: list[Limit] = []
+    for text in texts:
+        name, _, value = text.partition("=")
+        if text == "payload":
+            out += payload_limits(scene)
+        else:
+            out.append(Limit(_response(name, "--limit"), _number(value, f"--limit {text}")))
+    return tuple(out)
+
+
+def parse_options(formulation: Formulation, texts: Sequence[str]) -> dict[str, int | str]:
+    """Return the options of a formulation from words.
+
+    Parameters
+    ----------
+    formulation : Formulation
+        Whose ``solve`` says which options there are and of which type.
+    texts : sequence of str
+        Each ``NAME=VALUE``.
+
+    Returns
+    -------
+    dict of str to (int or str)
+
+    Raises
+    ------
+    ProblemError
+        If there is no such option, or a value is not of its type.
+    """
+    known = {
+        name: type(parameter.default)
+        for name, parameter in inspect.signature(formulation.solve).parameters.items()
+        if parameter.kind is inspect.Parameter.KEYWORD_ONLY
+    }
+    out: dict[str, int | str] = {}
+    for text in texts:
+        name, _, value = text.partition("=")
+        if name not in known:
+            raise ProblemError(
+                f"--option {text}: {formulation.name} has {', '.join(known) or 'no options'}"
+            )
+        try:
+            out[name] = known[name](value)
+        except ValueError as error:
+            kind = known[name].__name__
+            raise ProblemError(f"--option {text}: {name} is {value!r}; give an {kind}") from error
+    return out
+
+
+def parse_mortar(options: argparse.Namespace) -> Mortar:
+    """Return the named mortar with the numbers that are given instead of its own.
+
+    Parameters
+    ----------
+    options : argparse.Namespace
+        With ``mortar``, and ``friction`` (no unit), ``tensile_strength`` and ``cohesion`` (Pa) as
+        text, or None.
+
+    Returns
+    -------
+    Mortar
+
+    Raises
+    ------
+    ProblemError
+        If a number is negative, or none.
+    """
+    base = MORTARS[options.mortar]
+    given = {
+        name: _number(text, f"--{name.replace('_', '-')}", zero="allowed")
+        for name in ("friction", "tensile_strength", "cohesion")
+        if (text := getattr(options, name)) is not None
+    }
+    return replace(base, **given)
+
+
+def _response(name: str, where: str) -> str:
+    if name not in RESPONSES and not name.startswith("F_"):
+        known = ", ".join((*CRITERIA, *RESPONSES, "F_ROBOT"))
+        raise ProblemError(f"{where} {name}: there is no such; give {known}")
+    return name
+
+
+def _number(text: str, where: str, zero: str = "") -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = -1.0
+    if not 0 < value < float("inf") and not (zero and value == 0):
+        raise ProblemError(
+            f"{where}: {text!r} is not a positive number" + (" or zero" if zero else "")
+        )
+    return value

@@ -1,0 +1,136 @@
+"""What is asked of a plan: a criterion, limits, and the responses that these need."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from seqopt.arrays import Floats
+from seqopt.scene.scene import Scene
+
+ChoiceResponses = Mapping[str, Floats]
+
+
+class Criterion(Protocol):
+    """What a step costs."""
+
+    @property
+    def name(self) -> str:
+        """What the criterion is called."""
+
+    def wanted(self, bricks: int) -> tuple[str, ...]:
+        """Return the responses that it needs of a move.
+
+        Parameters
+        ----------
+        bricks : int
+            Bricks placed when the move is made.
+
+        Returns
+        -------
+        tuple of str
+            Names of responses.
+        """
+
+    def for_robots(self, robots: Sequence[str]) -> Criterion:
+        """Return the criterion with ``F_each`` spelled out for the robots of a scene.
+
+        Parameters
+        ----------
+        robots : sequence of str
+            Their names.
+
+        Returns
+        -------
+        Criterion
+        """
+
+    def costs(self, responses: ChoiceResponses, bricks: int, choices: int) -> Floats:
+        """Return the costs of all choices in one step.
+
+        Parameters
+        ----------
+        responses : mapping of str to (C,) or (C, D) float
+            SI units; NaN where a choice is impossible, all NaN where a robot does not grip.
+        bricks : int
+            Bricks placed at the move that decides the step: the later one of two.
+        choices : int
+            How many candidates that move has.
+
+        Returns
+        -------
+        (C,) or (C, D) float
+            NaN where a choice is impossible.
+        """
+
+
+@dataclass(frozen=True)
+class Limit:
+    """No step with an open grip may exceed a value.
+
+    Parameters
+    ----------
+    response : str
+        Named as in `seqopt.placement.criteria`.
+    bound : float
+        SI units.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> seqopt.Limit("F_largest", 300.0)
+    Limit(response='F_largest', bound=300.0)
+    """
+
+    response: str
+    bound: float
+
+
+def payload_limits(scene: Scene) -> tuple[Limit, ...]:
+    """Return limits that keep every robot of a scene within its payload.
+
+    Parameters
+    ----------
+    scene : Scene
+
+    Returns
+    -------
+    tuple of Limit
+        One for every robot, N.
+    """
+    return tuple(Limit(f"F_{robot.name}", robot.payload) for robot in scene.robots)
+
+
+@dataclass(frozen=True)
+class ResponsesAsked:
+    """The responses that criterion, limits and further wishes ask for.
+
+    Attributes
+    ----------
+    criterion : Criterion
+        What a step costs.
+    limits : tuple of Limit
+        What no open step may exceed.
+    also : tuple of str
+        Responses that are asked for beside these.
+    """
+
+    criterion: Criterion
+    limits: tuple[Limit, ...]
+    also: tuple[str, ...]
+
+    def __call__(self, bricks: int) -> frozenset[str]:
+        """Return their names for a move.
+
+        Parameters
+        ----------
+        bricks : int
+            Bricks placed when the move is made.
+
+        Returns
+        -------
+        frozenset of str
+        """
+        named = {*self.criterion.wanted(bricks), *(limit.response for limit in self.limits)}
+        return frozenset(named | {*self.also})

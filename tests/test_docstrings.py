@@ -1,0 +1,121 @@
+"""Every public function, method and class says what it takes and gives, as numpydoc reads it."""
+
+from __future__ import annotations
+
+import inspect
+import pkgutil
+from dataclasses import dataclass
+from enum import Enum
+from importlib import import_module
+from pydoc import locate
+
+import pytest
+from numpydoc.docscrape import get_doc_object
+from numpydoc.validate import validate
+
+import formulations
+import seqopt
+
+UNFINISHED = ("scene", "network", "contact", "engines", "stability", "arrays", "errors")
+FAULTS = {
+    "GL08",  # there is no docstring
+    "PR01",  # a parameter is not documented
+    "PR02",  # one is documented that there is not
+    "PR03",  # they are in another order
+    "RT01",  # a value is returned and not documented
+}
+SECTIONS = ("Parameters", "Other Parameters", "Attributes")
+
+
+def modules():
+    """Return the names of all modules of both packages."""
+    return sorted(
+        module.name
+        for package in (seqopt, formulations)
+        for module in pkgutil.walk_packages(package.__path__, f"{package.__name__}.")
+        if not module.name.endswith("__main__")
+    )
+
+
+def room(module):
+    """Return the room of a module of seqopt, or the package of another one."""
+    package, _, rest = module.partition(".")
+    return rest.partition(".")[0] if package == "seqopt" else package
+
+
+def public_objects(module):
+    """Return the dotted names of the functions, classes and methods that a module defines."""
+    found = []
+    for name, thing in vars(import_module(module)).items():
+        if name.startswith("_") or getattr(thing, "__module__", None) != module:
+            continue
+        if inspect.isfunction(thing) or inspect.isclass(thing):
+            found.append(f"{module}.{name}")
+        if inspect.isclass(thing):
+            found += [
+                f"{module}.{name}.{method}"
+                for method, body in vars(thing).items()
+                if not method.startswith("_") and inspect.isroutine(body)
+            ]
+    return found
+
+
+def faults(name):
+    """Return what the docstring of an object lacks."""
+    found = [f"{code}: {text}" for code, text in validate(name)["errors"] if code in FAULTS]
+    thing = locate(name)
+    if inspect.isclass(thing):  # numpydoc does not look for fields among the attributes
+        found = [text for text in found if text.startswith("GL08")]
+        found += [f"PR01: field {field} is not documented" for field in undocumented(thing)]
+    return [f"{name}: {text}" for text in found]
+
+
+def undocumented(kind):
+    """Return the parameters of a class that no section names."""
+    if issubclass(kind, Enum) or getattr(kind, "_is_protocol", False):
+        return []
+    doc = get_doc_object(kind)
+    named = {name for part in SECTIONS for entry in doc[part] for name in entry.name.split(", ")}
+    return [str(p) for p in inspect.signature(kind).parameters if p not in named]
+
+
+@pytest.mark.parametrize("module", [m for m in modules() if room(m) not in UNFINISHED])
+def test_docstrings_say_what_goes_in_and_out(module):
+    assert [fault for name in public_objects(module) for fault in faults(name)] == []
+
+
+def test_many_objects_are_looked_at():
+    assert len([name for module in modules() for name in public_objects(module)]) > 150
+    assert {room(module) for module in modules()} > {*UNFINISHED}
+
+
+def half_said(known, unknown):
+    """Return the first.
+
+    Parameters
+    ----------
+    known : int
+    """
+    return known
+
+
+@dataclass(frozen=True)
+class HalfSaid:
+    """A value.
+
+    Attributes
+    ----------
+    known : int
+    """
+
+    known: int
+    unknown: int
+
+
+def test_what_is_not_said_is_seen():
+    seen = " ".join(faults(f"{__name__}.half_said"))
+    assert "PR01: Parameters {'unknown'} not documented" in seen
+    assert "RT01" in seen
+    assert faults(f"{__name__}.HalfSaid") == [
+        f"{__name__}.HalfSaid: PR01: field unknown is not documented"
+    ]

@@ -1,0 +1,75 @@
+"""The door: what ``import seqopt`` gives, and that it stays light."""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import subprocess
+import sys
+
+import pytest
+
+import seqopt
+
+HEAVY = ("matplotlib", "cvxpy")
+LOADED = f"import sys; print(*[name for name in {HEAVY} if name in sys.modules])"
+
+
+def loaded_by(code):
+    """Return which heavy packages a fresh interpreter has loaded after running some code."""
+    command = [sys.executable, "-c", f"{code}\n{LOADED}"]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    return done.stdout.splitlines()[-1].split()
+
+
+def type_checked():
+    """Return, by name, the modules that the door imports for type checkers alone."""
+    for node in ast.parse(inspect.getsource(seqopt)).body:
+        if isinstance(node, ast.If) and getattr(node.test, "id", "") == "TYPE_CHECKING":
+            return {alias.name: part.module for part in node.body for alias in part.names}
+    return {}
+
+
+def test_the_door_shows_its_names_and_no_others():
+    assert dir(seqopt) == sorted(seqopt.__all__)
+    assert 25 <= len(seqopt.__all__) <= 35
+    assert len({*seqopt.__all__}) == len(seqopt.__all__)
+    assert all(getattr(seqopt, name) is not None for name in seqopt.__all__)
+
+
+def test_both_tables_name_the_same_homes():
+    lazy = {name: f"seqopt.{home}" for name, home in seqopt._HOME_OF.items()}
+    assert type_checked() == lazy
+    assert {*lazy, "__version__"} == {*seqopt.__all__}
+
+
+def test_an_unknown_name_is_an_error():
+    with pytest.raises(AttributeError, match="module 'seqopt' has no attribute 'nothing'"):
+        seqopt.nothing  # noqa: B018
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        "import seqopt",
+        "import seqopt; [getattr(seqopt, name) for name in seqopt.__all__]",
+        "import seqopt.report",
+        "import runpy, sys; sys.argv[1:] = ['--help']\n"
+        "try: runpy.run_module('seqopt', run_name='__main__')\nexcept SystemExit: pass",
+    ],
+    ids=["import", "every name", "report", "help"],
+)
+def test_nothing_heavy_is_loaded(code):
+    assert loaded_by(code) == []
+
+
+def test_importing_the_door_loads_none_of_its_rooms():
+    code = "import sys, seqopt; print(*[m for m in sys.modules if m.startswith('seqopt.')])"
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert done.stdout.split() == []
+
+
+def test_a_heavy_import_is_seen():
+    assert loaded_by("import seqopt.report.charts") == ["matplotlib"]
+    assert "cvxpy" in loaded_by("import seqopt; seqopt.formulations()")
