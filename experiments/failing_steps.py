@@ -38,7 +38,8 @@ from seqopt.placement.formulation import find_formulation
 from seqopt.placement.plan import optimize, prepare
 from seqopt.responses.table import analyze
 from seqopt.scene.arch import ArchShape, arch_scene
-from seqopt.scene.scene import Scene, Spring
+from seqopt.scene.parts import Spring
+from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.steps import Step
 from seqopt.sequence.three_robots import modified_sequential, three_robot_loop
