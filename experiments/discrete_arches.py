@@ -49,7 +49,7 @@ from seqopt.network.network import Network
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.steps import Step
 from seqopt.sequence.two_robots import sequential
-from seqopt.study.presets import STUDY_BED
+from seqopt.study.presets import STUDY_BED, STUDY_PADS
 from seqopt.study.tables import printed
 
 STEPS = {17: 33, 18: 35, 23: 45, 24: 47}  # steps of the sequential method, by bricks
@@ -77,7 +77,7 @@ class Reading:
     def of(cls, grip: str, side: float, joint: str) -> Reading:
         """Return the reading that the tables call so, from its pads' side in mm."""
         across = [a for a in Across if grip.endswith(a.name.lower())]
-        return cls(joint, Pinch(across[0], side=1e-3 * side) if across else None)
+        return cls(joint, Pinch(across[0], STUDY_PADS, side=1e-3 * side) if across else None)
 
     @property
     def grip(self) -> str:
@@ -94,7 +94,7 @@ class Reading:
 
 def readings() -> list[Reading]:
     """Return all readings of the table."""
-    pinches = [Pinch(across, side=side) for across, side in product(Across, PADS)]
+    pinches = [Pinch(across, STUDY_PADS, side=side) for across, side in product(Across, PADS)]
     return [Reading(joint, pinch) for pinch, joint in product((None, *pinches), JOINTS)]
 
 
@@ -131,7 +131,7 @@ def scan(engine: ComplianceEngine, steps: list[Step], sides: Floats) -> pd.DataF
     own = {step.bricks: moved(engine, step) for step in steps}
     rows = []
     for across, joint, side in product(Across, JOINTS, sides):
-        reading = Reading(joint, Pinch(across, side=float(side)))
+        reading = Reading(joint, Pinch(across, STUDY_PADS, side=float(side)))
         discrete = reading.engine(engine.network)
         rows.append(
             {"grip": reading.grip, "side_mm": round(1e3 * float(side), 3), "joint": joint}

@@ -65,7 +65,7 @@ class Case(NamedTuple):
 
     def asked(self, setting: str) -> Want:
         """Return what a setting asks of these models."""
-        return {"reactions": Want.SUPPORT, "criterion": self.want, "all fields": Want.TABLE}[
+        return {"reactions": Want.SUPPORT, "criterion": self.want, "all fields": Want.RESPONSES}[
             setting
         ]
 
@@ -82,7 +82,7 @@ class Recorder:
         """The engine's network."""
         return self.engine.network
 
-    def solve(self, bricks: int, grips: ArrayLike, want: Want = Want.TABLE) -> Fields:
+    def solve(self, bricks: int, grips: ArrayLike, want: Want = Want.RESPONSES) -> Fields:
         """Answer and remember."""
         columns = grip_columns(self.network, bricks, grips)
         self.cases.append(Case(bricks, np.asarray(grips), columns, want))
@@ -181,7 +181,7 @@ def turn(net: Network, cases: list[Case], name: str, few: int, rng: np.random.Ge
         for case in (c for c in cases if c.bricks == bricks):
             size = len(case.columns)
             chosen = rng.choice(size, min(few, size), replace=False)
-            peer.solve(case.columns[chosen[0]], Want.TABLE)
+            peer.solve(case.columns[chosen[0]], Want.RESPONSES)
             for setting in SETTINGS:
                 asked = case.asked(setting)
                 start = time.perf_counter()

@@ -39,13 +39,13 @@ from seqopt.network.build import build_network
 from seqopt.network.network import GROUND
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.two_robots import sequential
-from seqopt.study.presets import STUDY_BED
+from seqopt.study.presets import STUDY_BED, STUDY_PADS
 
 PYTHON = python_with_lmgc90(os.environ.get("SEQOPT_LMGC90", sys.executable))
 with_lmgc90 = pytest.mark.skipif(PYTHON is None, reason="LMGC90 is not installed")
 
 
-ACROSS, THROUGH = (Pinch(across, side=PAD) for across in Across)
+ACROSS, THROUGH = (Pinch(across, STUDY_PADS, side=PAD) for across in Across)
 BOTH = pytest.mark.parametrize("pinch", [ACROSS, THROUGH], ids=["width", "thickness"])
 
 
@@ -143,7 +143,7 @@ def test_lmgc90_is_shown_every_face_and_weight(engine, number, pinch, spread):
 
 def test_a_larger_pad_moves_less(engine, step):
     engines = [
-        spread_engine(engine.network, Pinch(Across.WIDTH, side=side), "even")
+        spread_engine(engine.network, Pinch(Across.WIDTH, STUDY_PADS, side=side), "even")
         for side in (0.01, 0.02, 0.04)
     ]
     errors = [error(moved(engine, step), moved(discrete, step)) for discrete in engines]

@@ -28,13 +28,13 @@ from experiments.discrete_arches import (
 from experiments.plotting import RESULTS
 from seqopt.contact.quadrature import face_quadrature
 from seqopt.engines.discrete.engine import DiscreteEngine
-from seqopt.engines.discrete.system import Across, Pinch, pads
+from seqopt.engines.discrete.system import Across, Pinch, pad_stiffness
 from seqopt.engines.interface import Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.two_robots import sequential
-from seqopt.study.presets import STUDY_BED
+from seqopt.study.presets import STUDY_BED, STUDY_PADS
 from seqopt.study.tables import printed
 from tests.test_fidelity import HERE, block
 
@@ -91,11 +91,13 @@ def test_a_block_on_a_wall_hangs_and_leans_as_springs_say(kind, stiffer):
 @pytest.mark.parametrize("across", list(Across))
 def test_even_pads_can_stand_for_pads_at_corners(engine, across):
     """They hold as stiffly against motion, and three times so against turning about themselves."""
-    pinch, brick = Pinch(across, side=0.02), engine.network.scene.placed[16]
+    pinch, brick = Pinch(across, STUDY_PADS, side=0.02), engine.network.scene.placed[16]
     center, axis = np.array(brick.position), np.array(brick.width_axis)
     if across == Across.THICKNESS:
         axis = np.cross(brick.length_axis, axis)
-    even, corners = (pads(engine.network, 16, center, p) for p in (pinch, pads_at_corners(pinch)))
+    even, corners = (
+        pad_stiffness(engine.network, 16, center, p) for p in (pinch, pads_at_corners(pinch))
+    )
     np.testing.assert_allclose(corners[:3, :3], even[:3, :3], atol=1e-6)
     turning = 2 * pinch.stiffness.tangential * pinch.side**4 / 6
     assert axis @ even[3:, 3:] @ axis == pytest.approx(turning)
@@ -112,7 +114,7 @@ def test_the_pads_of_all_readings_are_named_and_found_again(engine):
 
 
 def test_softer_joints_move_more_and_a_node_lets_the_brick_turn(engine, step):
-    pinch = Pinch(Across.WIDTH, side=0.02)
+    pinch = Pinch(Across.WIDTH, STUDY_PADS, side=0.02)
     whole, half, node = (
         moved(reading.engine(engine.network), step).max()
         for reading in (Reading(pinch=pinch), Reading("halves in series", pinch), Reading())
@@ -176,7 +178,9 @@ def test_the_stored_witness_rows_stand_beside_the_engine_as_it_is(engine, step):
     rows = pd.read_csv(RESULTS / "arches_lmgc90.csv")
     for row in rows[rows["bricks"] == 17].itertuples():
         joint = CORNERS if row.spread == "corners" else "as printed"
-        reading = Reading(joint, Pinch(Across[row.pads.upper()], side=1e-3 * row.side_mm))
+        reading = Reading(
+            joint, Pinch(Across[row.pads.upper()], STUDY_PADS, side=1e-3 * row.side_mm)
+        )
         assert row_of(engine, step, reading)["error_pct"] == pytest.approx(
             row.engine_error_pct, rel=1e-3
         )

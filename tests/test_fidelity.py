@@ -16,7 +16,7 @@ from seqopt.contact.mortar import DRY, EPOXY, Mortar
 from seqopt.engines.auto import BEYOND, IN_PLANE, AutoEngine, Level
 from seqopt.engines.discrete.engine import DiscreteEngine, held_nodes
 from seqopt.engines.discrete.equilibrium_path import settle
-from seqopt.engines.discrete.system import Across, BedStiffness, Pinch, build
+from seqopt.engines.discrete.system import Across, BedStiffness, Pinch, build_system
 from seqopt.engines.interface import Want
 from seqopt.engines.planar import PlanarEngine
 from seqopt.engines.plane import find_plane
@@ -24,12 +24,13 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import GripError, MechanismError, SceneError, SolverError
 from seqopt.network.build import build_network
 from seqopt.scene.arch import ArchShape, arch_scene
-from seqopt.scene.scene import Brick, Ground, Robot, Scene
+from seqopt.scene.parts import Brick, Ground, Robot
+from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.two_robots import METHODS
 from seqopt.stability.assessment import Verdict
 from seqopt.stability.steps import assess_steps
-from seqopt.study.presets import STUDY_BED
+from seqopt.study.presets import STUDY_BED, STUDY_PADS
 from tests.scenes import arches, moved, states, walls
 
 HERE = np.zeros((1, 0), dtype=int)  # one set of no grips
@@ -187,7 +188,7 @@ def test_an_open_base_tilts_as_statics_says():
     """A resultant at e from the middle presses on c = 3 (b/2 - e) of a base without tension."""
     size, lean, stiffness = (0.4, 0.3, 0.5), math.radians(25), 1e9
     net = build_network(block(size, lean))
-    system = build(net, 1, Mortar(friction=1.0), BedStiffness(stiffness, stiffness))
+    system = build_system(net, 1, Mortar(friction=1.0), BedStiffness(stiffness, stiffness))
     found = settle(held_nodes(net, system, np.zeros(0, int), np.zeros((0, 3))))
     assert found.rests
     eccentric = size[2] / 2 * math.tan(lean)
@@ -252,7 +253,7 @@ def test_beds_alone_are_other_joints_and_pads_let_a_brick_turn():
     own, study = DiscreteEngine(net), DiscreteEngine(net, bed=STUDY_BED)
     first, second = (e.solve(10, [[19]], Want.ALL) for e in (own, study))
     assert largest_difference(first, second, net) > 0.5
-    pinch = Pinch(Across.WIDTH)
+    pinch = Pinch(Across.WIDTH, STUDY_PADS, side=0.03)
     third = DiscreteEngine(net, bed=STUDY_BED, pinch=pinch).solve(10, [[19]], Want.ALL)
     assert np.abs(third.brick_twist[0, 9]).max() > 0
     total = third.grip_force[0].sum(axis=0) + third.support[0, :3]

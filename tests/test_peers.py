@@ -27,8 +27,8 @@ def gap(engine, solve):
     for bricks, grips in STATES:
         sets = np.array([grips])
         columns = grip_columns(engine.network, bricks, sets)
-        case = Case(bricks, sets, columns, Want.TABLE)
-        answers.append((case, 0, solve(bricks).solve(columns[0], Want.TABLE)))
+        case = Case(bricks, sets, columns, Want.RESPONSES)
+        answers.append((case, 0, solve(bricks).solve(columns[0], Want.RESPONSES)))
     return difference(engine, answers)
 
 

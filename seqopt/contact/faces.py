@@ -10,7 +10,7 @@ from seqopt.arrays import Floats
 from seqopt.contact.assembly import Assembly
 from seqopt.errors import SceneError
 from seqopt.network.network import GROUND, Network
-from seqopt.scene.scene import Brick
+from seqopt.scene.parts import Brick
 
 SLIVER = 1e-6  # smallest overlap of two faces, as a share of the smaller one
 
@@ -29,6 +29,10 @@ def step_assembly(network: Network, bricks: int, grips: Sequence[int | None]) ->
     grips : sequence of (int or None)
         Node that each of the scene's robots holds.
 
+    Returns
+    -------
+    Assembly
+
     Raises
     ------
     SceneError
@@ -36,7 +40,7 @@ def step_assembly(network: Network, bricks: int, grips: Sequence[int | None]) ->
     """
     placed = network.scene.placed
     springs = network.springs
-    acting = np.flatnonzero(springs.since <= bricks)
+    acting = springs.acting(bricks)
     names, normals, faces = [], [], []
     for s in acting:
         first, second = springs.bodies[s]
@@ -51,6 +55,7 @@ def step_assembly(network: Network, bricks: int, grips: Sequence[int | None]) ->
     block = {node: i for i, brick in enumerate(placed) for node in brick.nodes}
     return Assembly(
         block_name=tuple(brick.name for brick in placed[:bricks]),
+        # of the boxes, as their faces: means of inner nodes differ from them by rounding
         centroid=np.array([brick.position for brick in placed[:bricks]]),
         weight=network.weight[:bricks],
         contact_name=tuple(names),
@@ -65,7 +70,23 @@ def step_assembly(network: Network, bricks: int, grips: Sequence[int | None]) ->
 
 
 def bare_assembly(network: Network, bricks: int) -> Assembly:
-    """Return the first bricks held by nobody; see `step_assembly`."""
+    """Return a partial structure that nobody holds.
+
+    Parameters
+    ----------
+    network : Network
+    bricks : int
+        How many bricks stand, in build order.
+
+    Returns
+    -------
+    Assembly
+
+    Raises
+    ------
+    SceneError
+        If the faces of a joint do not overlap.
+    """
     nobody = (None,) * len(network.scene.robots)
     return step_assembly(network, bricks, nobody)
 

@@ -1,1 +1,10 @@
-"""Room."""
+"""Discrete elements: rigid bricks on beds of points that part, slip and break.
+
+`DiscreteEngine` lays a bed over every joint's face (`BedStiffness` and `Mortar` say what it
+carries), holds nodes or pinches bricks between pads (`Pinch`), and follows the structure to rest.
+"""
+
+from seqopt.engines.discrete.engine import DiscreteEngine
+from seqopt.engines.discrete.system import Across, BedStiffness, Pinch
+
+__all__ = ["Across", "BedStiffness", "DiscreteEngine", "Pinch"]

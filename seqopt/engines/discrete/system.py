@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from scipy import linalg, sparse
 
-from seqopt.arrays import Floats, Ints, skew
+from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.contact.assembly import Assembly
 from seqopt.contact.faces import bare_assembly
 from seqopt.contact.mortar import Mortar
@@ -17,15 +17,26 @@ from seqopt.contact.quadrature import Quadrature, face_quadrature, first_points,
 from seqopt.contact.quadrature import quadrature_stiffness as bed_stiffness
 from seqopt.engines.discrete.friction_law import Points
 from seqopt.errors import SceneError
-from seqopt.network.kinematics import centroids, spring_maps
-from seqopt.network.network import GROUND, Network
+from seqopt.network.kinematics import deformation, point_motion, spring_stiffness
+from seqopt.network.network import Network
 
-SHARE = 10.0  # how much stiffer a bed is than its joint, whichever way it moves
+BED_OVER_JOINT = 10.0  # how much stiffer a bed is than its joint, whichever way it moves
 
 
 @dataclass(frozen=True)
 class BedStiffness:
-    """Stiffness of a joint per area, N/m³, in place of the joint's own springs."""
+    """Stiffness of a joint or pad per area.
+
+    Parameters
+    ----------
+    normal, tangential : float
+        N/m³.
+
+    Raises
+    ------
+    SceneError
+        If one is not a positive number.
+    """
 
     normal: float
     tangential: float
@@ -51,18 +62,18 @@ class Pinch:
     ----------
     across : Across
     stiffness : BedStiffness
-        Of the pads; by default ten times the study's bed ("an order of magnitude greater").
+        Of the pads.
     side : float
-        m; the study does not say how large its pads are.
+        Of a pad, m.
     """
 
     across: Across
-    stiffness: BedStiffness = BedStiffness(1e12, 1e11)
-    side: float = 0.03
+    stiffness: BedStiffness
+    side: float
 
 
-@dataclass(frozen=True)
-class System:
+@dataclass(frozen=True, eq=False, repr=False)
+class System(FrozenValue):
     """Bodies, what holds them together, and what pulls at them; the bricks are the first bodies.
 
     Twists are in m and rad over ``unit``, wrenches in N and N m times it.
@@ -99,18 +110,51 @@ class System:
     length: float
 
     def bed_wrenches(self, force: Floats) -> Floats:
-        """Return the wrenches (J, 6) of point forces (P, 3) on second bodies, about the springs."""
+        """Return the wrenches of point forces on second bodies, about the springs.
+
+        Parameters
+        ----------
+        force : (P, 3) float
+            N.
+
+        Returns
+        -------
+        (J, 6) float
+            N and N m.
+        """
         each = np.einsum("pij,pi->pj", self.maps, force)
         return np.asarray(np.add.reduceat(each, self._starts, axis=0))
 
     def stiffness(self, slope: Floats) -> sparse.csr_array:
-        """Return the stiffness (6n, 6n) of layers and beds whose points have slopes (P, 3, 3)."""
+        """Return the stiffness of layers and beds.
+
+        Parameters
+        ----------
+        slope : (P, 3, 3) float
+            How fast the forces of the points fall, from `Points.forces`, N/m.
+
+        Returns
+        -------
+        (6n, 6n) sparse
+            For twists over ``unit``.
+        """
         each = self.maps.transpose(0, 2, 1) @ slope @ self.maps
         joints = sparse.block_diag(np.add.reduceat(each, self._starts, axis=0), format="csr")
         return sparse.csr_array(self.gap.T @ joints @ self.gap + self.layers)
 
     def openings(self, twist: Floats) -> Floats:
-        """Return the openings (P, 3) of the points for twists (6n,) of the bodies."""
+        """Return the openings of the points for twists of the bodies.
+
+        Parameters
+        ----------
+        twist : (6n,) float
+            Over ``unit``.
+
+        Returns
+        -------
+        (P, 3) float
+            m.
+        """
         across = (self.gap @ twist).reshape(-1, 6)
         return np.asarray(np.einsum("pij,pj->pi", self.maps, across[self.face]))
 
@@ -124,8 +168,22 @@ class System:
         return first_points(self.face, len(self.acting))
 
 
-def build(network: Network, bricks: int, mortar: Mortar, bed: BedStiffness | None) -> System:
-    """Return the system of the first ``bricks`` bricks.
+def build_system(network: Network, bricks: int, mortar: Mortar, bed: BedStiffness | None) -> System:
+    """Return the system of a partial structure.
+
+    Parameters
+    ----------
+    network : Network
+    bricks : int
+        How many bricks stand.
+    mortar : Mortar
+        What the beds hold.
+    bed : BedStiffness or None
+        The joints themselves; by default beds in series with layers are as stiff as the scene says.
+
+    Returns
+    -------
+    System
 
     Raises
     ------
@@ -133,16 +191,19 @@ def build(network: Network, bricks: int, mortar: Mortar, bed: BedStiffness | Non
         If the faces of a joint do not overlap.
     """
     assembly = bare_assembly(network, bricks)
-    acting, _, stiffness = spring_maps(network, bricks)
     springs = network.springs
+    acting = springs.acting(bricks)
+    stiffness = spring_stiffness(network, acting)
     where = springs.position[acting]
     points = face_quadrature(assembly)
     maps = opening_maps(assembly, points.point, points.face, where)
     moduli = np.ones((len(acting), 2)) if bed is None else _given(bed, len(acting))
     if bed is None:
-        moduli *= SHARE * _relative_stiffness(stiffness, bed_stiffness(points, maps, moduli))
+        moduli *= BED_OVER_JOINT * _relative_stiffness(
+            stiffness, bed_stiffness(points, maps, moduli)
+        )
     bodies = springs.bodies[acting]
-    center = centroids(network)[:bricks]
+    center = network.centroid[:bricks]
     layers: list[tuple[Ints, Floats]] = []
     if bed is None:
         plates = bricks + np.arange(len(acting))
@@ -155,7 +216,7 @@ def build(network: Network, bricks: int, mortar: Mortar, bed: BedStiffness | Non
     load[:bricks, :3] = network.weight[:bricks]
     total = sparse.csr_array((load.size, load.size))
     for pair, blocks in layers:
-        across = _across(pair, where, center) @ sparse.diags_array(unit)
+        across = deformation(pair, where, center) @ sparse.diags_array(unit)
         total = total + across.T @ sparse.block_diag(blocks, format="csr") @ across
     return System(
         bricks=bricks,
@@ -163,7 +224,7 @@ def build(network: Network, bricks: int, mortar: Mortar, bed: BedStiffness | Non
         points=_points(points, moduli, mortar, assembly),
         face=points.face,
         maps=maps,
-        gap=sparse.csr_array(_across(bodies, where, center) @ sparse.diags_array(unit)),
+        gap=sparse.csr_array(deformation(bodies, where, center) @ sparse.diags_array(unit)),
         layers=sparse.csr_array(total),
         load=load.ravel() * unit,
         unit=unit,
@@ -171,10 +232,25 @@ def build(network: Network, bricks: int, mortar: Mortar, bed: BedStiffness | Non
     )
 
 
-def pads(network: Network, brick: int, node: Floats, pinch: Pinch) -> Floats:
-    """Return the stiffness (6, 6) with which two pads beside a node (3,) hold a brick's twists."""
-    held = network.scene.placed[brick]
-    length, width = np.array(held.length_axis), np.array(held.width_axis)
+def pad_stiffness(network: Network, index: int, node: Floats, pinch: Pinch) -> Floats:
+    """Return the stiffness with which two pads beside a node hold a brick's twists.
+
+    Parameters
+    ----------
+    network : Network
+    index : int
+        Of the brick in build order.
+    node : (3,) float
+        m.
+    pinch : Pinch
+
+    Returns
+    -------
+    (6, 6) float
+        N/m and N m/rad.
+    """
+    brick = network.scene.placed[index]
+    length, width = np.array(brick.length_axis), np.array(brick.width_axis)
     axes = np.stack([length, width, np.cross(length, width)])
     out = axes[pinch.across]
     sides = np.delete(axes, pinch.across, axis=0)
@@ -184,8 +260,8 @@ def pads(network: Network, brick: int, node: Floats, pinch: Pinch) -> Floats:
     reach = pinch.side / np.sqrt(12)  # four points here have a square's second moments
     for sign in (-0.5, 0.5):
         for a, b in ((-reach, -reach), (-reach, reach), (reach, -reach), (reach, reach)):
-            point = node + sign * held.dimensions[pinch.across] * out + a * sides[0] + b * sides[1]
-            moved = np.hstack([np.eye(3), -skew(point - centroids(network)[brick])])
+            point = node + sign * brick.dimensions[pinch.across] * out + a * sides[0] + b * sides[1]
+            moved = point_motion(point - network.centroid[index])
             total += pinch.side**2 / 4 * moved.T @ moduli @ moved
     return total
 
@@ -214,18 +290,3 @@ def _without(stiffness: Floats, bed: Floats) -> Floats:
     share = np.eye(6) - np.linalg.solve(bed, stiffness)
     out = np.linalg.solve(share.transpose(0, 2, 1), stiffness.transpose(0, 2, 1))
     return np.asarray(0.5 * (out + out.transpose(0, 2, 1)))
-
-
-def _across(bodies: Ints, at: Floats, center: Floats) -> sparse.csr_array:
-    """Return the twists (6J, 6n) of second bodies (J, 2) against first at points (J, 3)."""
-    rows, columns, values = [], [], []
-    for side, sign in ((0, -1.0), (1, 1.0)):
-        real = np.flatnonzero(bodies[:, side] != GROUND)
-        body = bodies[real, side]
-        block = np.tile(np.eye(6), (len(real), 1, 1))
-        block[:, :3, 3:] = -skew(at[real] - center[body])
-        rows.append((6 * real[:, None, None] + np.arange(6)[:, None] + np.zeros(6, int)).ravel())
-        columns.append((6 * body[:, None, None] + np.arange(6) + np.zeros((6, 1), int)).ravel())
-        values.append(sign * block.ravel())
-    entries = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
-    return sparse.csr_array(entries, shape=(6 * len(bodies), 6 * len(center)))
