@@ -38,8 +38,7 @@ from seqopt.placement.formulation import find_formulation
 from seqopt.placement.plan import run
 from seqopt.placement.problem import Problem, pose
 from seqopt.placement.ranking import move_costs, rank_of
-from seqopt.scene.parts import Ground, Joint
-from seqopt.scene.scene import Scene
+from seqopt.scene import Ground, Joint, Scene
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.three_robots import three_robot_loop

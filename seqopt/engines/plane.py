@@ -53,7 +53,13 @@ class Plane(FrozenValue):
 
 @dataclass(frozen=True)
 class NoPlane:
-    """That a structure lies in no plane, and what lies outside."""
+    """That a structure lies in no plane.
+
+    Attributes
+    ----------
+    reason : str
+        What lies outside, a clause that goes into a sentence.
+    """
 
     reason: str
 

@@ -191,42 +191,32 @@ def build_system(network: Network, bricks: int, mortar: Mortar, bed: BedStiffnes
         If the faces of a joint do not overlap.
     """
     assembly = bare_assembly(network, bricks)
-    springs = network.springs
-    acting = springs.acting(bricks)
+    acting = network.springs.acting(bricks)
+    bodies, where = network.springs.bodies[acting], network.springs.position[acting]
     stiffness = spring_stiffness(network, acting)
-    where = springs.position[acting]
     points = face_quadrature(assembly)
     maps = opening_maps(assembly, points.point, points.face, where)
-    moduli = np.ones((len(acting), 2)) if bed is None else _given(bed, len(acting))
-    if bed is None:
-        moduli *= BED_OVER_JOINT * _relative_stiffness(
-            stiffness, bed_stiffness(points, maps, moduli)
-        )
-    bodies = springs.bodies[acting]
+    moduli = _moduli(bed, stiffness, points, maps)
     center = network.centroid[:bricks]
-    layers: list[tuple[Ints, Floats]] = []
-    if bed is None:
-        plates = bricks + np.arange(len(acting))
-        own = bed_stiffness(points, maps, moduli)
-        layers = [(np.stack([bodies[:, 0], plates], axis=1), _without(stiffness, own))]
-        bodies = np.stack([plates, bodies[:, 1]], axis=1)
+    below, above = bodies, bodies
+    if bed is None:  # between a joint's layer and its bed there is one more body, a plate
         center = np.vstack([center, where])
+        below, above = _plates(bodies, bricks)
     unit = np.tile(np.repeat([1.0, 1.0 / _length(network)], 3), len(center))
-    load = np.zeros((len(center), 6))
-    load[:bricks, :3] = network.weight[:bricks]
-    total = sparse.csr_array((load.size, load.size))
-    for pair, blocks in layers:
-        across = deformation(pair, where, center) @ sparse.diags_array(unit)
-        total = total + across.T @ sparse.block_diag(blocks, format="csr") @ across
+    layers = sparse.csr_array((unit.size, unit.size))
+    if bed is None:
+        own = _without(stiffness, bed_stiffness(points, maps, moduli))
+        across = deformation(below, where, center) @ sparse.diags_array(unit)
+        layers = layers + across.T @ sparse.block_diag(own, format="csr") @ across
     return System(
         bricks=bricks,
         acting=acting,
         points=_points(points, moduli, mortar, assembly),
         face=points.face,
         maps=maps,
-        gap=sparse.csr_array(deformation(bodies, where, center) @ sparse.diags_array(unit)),
-        layers=sparse.csr_array(total),
-        load=load.ravel() * unit,
+        gap=sparse.csr_array(deformation(above, where, center) @ sparse.diags_array(unit)),
+        layers=sparse.csr_array(layers),
+        load=_load(network, bricks, unit),
         unit=unit,
         length=_length(network),
     )
@@ -270,8 +260,29 @@ def _length(network: Network) -> float:
     return max(network.scene.placed[0].dimensions)
 
 
-def _given(bed: BedStiffness, count: int) -> Floats:
-    return np.tile([bed.normal, bed.tangential], (count, 1))
+def _plates(bodies: Ints, bricks: int) -> tuple[Ints, Ints]:
+    """Return the bodies of layers, and of beds, (J, 2) each: a plate between each joint's two."""
+    plates = bricks + np.arange(len(bodies))
+    return np.stack([bodies[:, 0], plates], axis=1), np.stack([plates, bodies[:, 1]], axis=1)
+
+
+def _load(network: Network, bricks: int, unit: Floats) -> Floats:
+    """Return the weight of the bricks as wrenches (6n,) times their unit; plates weigh nothing."""
+    load = np.zeros((len(unit) // 6, 6))
+    load[:bricks, :3] = network.weight[:bricks]
+    return load.ravel() * unit
+
+
+def _moduli(
+    bed: BedStiffness | None, stiffness: Floats, points: Quadrature, maps: Floats
+) -> Floats:
+    """Return the moduli (J, 2) of given beds, or of some stiffer than their joints every way."""
+    if bed is not None:
+        return np.tile([bed.normal, bed.tangential], (len(stiffness), 1))
+    even = np.ones((len(stiffness), 2))
+    return even * (
+        BED_OVER_JOINT * _relative_stiffness(stiffness, bed_stiffness(points, maps, even))
+    )
 
 
 def _points(points: Quadrature, moduli: Floats, mortar: Mortar, assembly: Assembly) -> Points:
