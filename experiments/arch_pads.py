@@ -23,7 +23,8 @@ from seqopt.contact.faces import bare_assembly, step_assembly
 from seqopt.contact.mortar import EPOXY
 from seqopt.contact.quadrature import opening_maps
 from seqopt.engines.discrete.engine import DiscreteEngine
-from seqopt.engines.discrete.system import BedStiffness, Pinch, System, build_system
+from seqopt.engines.discrete.pads import Pinch
+from seqopt.engines.discrete.system import BedStiffness, System, build_system
 from seqopt.engines.interface import Fields, Want
 from seqopt.network.network import GROUND, Network
 from seqopt.sequence.steps import Step

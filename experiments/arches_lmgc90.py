@@ -34,7 +34,8 @@ from seqopt.arrays import Floats
 from seqopt.contact.assembly import Assembly
 from seqopt.contact.mortar import EPOXY
 from seqopt.engines.discrete.engine import DiscreteEngine
-from seqopt.engines.discrete.system import Across, BedStiffness, Pinch
+from seqopt.engines.discrete.pads import Across, Pinch
+from seqopt.engines.discrete.system import BedStiffness
 from seqopt.engines.interface import Engine, Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.kinematics import node_motion

@@ -41,7 +41,8 @@ from seqopt.arrays import Floats
 from seqopt.contact.elastic_limits import find_elastic_limits
 from seqopt.contact.mortar import EPOXY
 from seqopt.engines.discrete.engine import DiscreteEngine
-from seqopt.engines.discrete.system import Across, BedStiffness, Pinch
+from seqopt.engines.discrete.pads import Across, Pinch
+from seqopt.engines.discrete.system import BedStiffness
 from seqopt.engines.interface import Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network

@@ -33,7 +33,8 @@ from experiments.arches_lmgc90 import (
     witness,
 )
 from experiments.witness_lmgc90 import python_with_lmgc90
-from seqopt.engines.discrete.system import Across, BedStiffness, Pinch
+from seqopt.engines.discrete.pads import Across, Pinch
+from seqopt.engines.discrete.system import BedStiffness
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network
 from seqopt.network.network import GROUND

@@ -28,7 +28,7 @@ from experiments.discrete_arches import (
 from experiments.plotting import RESULTS
 from seqopt.contact.quadrature import face_quadrature
 from seqopt.engines.discrete.engine import DiscreteEngine
-from seqopt.engines.discrete.system import Across, Pinch, pad_stiffness
+from seqopt.engines.discrete.pads import Across, Pinch, pad_stiffness
 from seqopt.engines.interface import Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network

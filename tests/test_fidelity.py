@@ -16,7 +16,8 @@ from seqopt.contact.mortar import DRY, EPOXY, Mortar
 from seqopt.engines.auto import BEYOND, IN_PLANE, AutoEngine, Level
 from seqopt.engines.discrete.engine import DiscreteEngine, held_nodes
 from seqopt.engines.discrete.equilibrium_path import settle
-from seqopt.engines.discrete.system import Across, BedStiffness, Pinch, build_system
+from seqopt.engines.discrete.pads import Across, Pinch
+from seqopt.engines.discrete.system import BedStiffness, build_system
 from seqopt.engines.interface import Want
 from seqopt.engines.planar import PlanarEngine
 from seqopt.engines.plane import find_plane

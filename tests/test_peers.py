@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -70,7 +71,7 @@ def test_joints_that_differ_are_refused(engine25):
     springs = engine25.network.springs
     stiffness = springs.translational_stiffness.copy()
     stiffness[1] *= 2
-    changed = type(springs)(**{**vars(springs), "translational_stiffness": stiffness})
+    changed = replace(springs, translational_stiffness=stiffness)
     network = type(engine25.network)(
         **{
             name: getattr(engine25.network, name)

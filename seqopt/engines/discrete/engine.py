@@ -20,13 +20,8 @@ from scipy import linalg, sparse
 from seqopt.arrays import Floats, Ints
 from seqopt.contact.mortar import EPOXY, Mortar
 from seqopt.engines.discrete.equilibrium_path import Held, Settled, settle
-from seqopt.engines.discrete.system import (
-    BedStiffness,
-    Pinch,
-    System,
-    build_system,
-    pad_stiffness,
-)
+from seqopt.engines.discrete.pads import Pinch, pad_stiffness
+from seqopt.engines.discrete.system import BedStiffness, System, build_system
 from seqopt.engines.interface import Fields, Want, grip_columns, join_sets, no_sets
 from seqopt.engines.rigid.mechanism import mechanism_error, require_resistance
 from seqopt.engines.rigid.recovery import Solution, respond

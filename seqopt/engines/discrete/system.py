@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import IntEnum
 from functools import cached_property
 
 import numpy as np
@@ -17,7 +16,7 @@ from seqopt.contact.quadrature import Quadrature, face_quadrature, first_points,
 from seqopt.contact.quadrature import quadrature_stiffness as bed_stiffness
 from seqopt.engines.discrete.friction_law import Points
 from seqopt.errors import SceneError
-from seqopt.network.kinematics import deformation, point_motion, spring_stiffness
+from seqopt.network.kinematics import deformation, spring_stiffness
 from seqopt.network.network import Network
 
 BED_OVER_JOINT = 10.0  # how much stiffer a bed is than its joint, whichever way it moves
@@ -45,31 +44,6 @@ class BedStiffness:
         for name in ("normal", "tangential"):
             if not 0 < getattr(self, name) < np.inf:
                 raise SceneError(f"bed: {name} is {getattr(self, name)}; give a positive number")
-
-
-class Across(IntEnum):
-    """Which way two pads press on a brick: along its width or its thickness."""
-
-    WIDTH = 1
-    THICKNESS = 2
-
-
-@dataclass(frozen=True)
-class Pinch:
-    """Two square pads that hold a brick on either side of its node and do not slip.
-
-    Parameters
-    ----------
-    across : Across
-    stiffness : BedStiffness
-        Of the pads.
-    side : float
-        Of a pad, m.
-    """
-
-    across: Across
-    stiffness: BedStiffness
-    side: float
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -193,16 +167,16 @@ def build_system(network: Network, bricks: int, mortar: Mortar, bed: BedStiffnes
     assembly = bare_assembly(network, bricks)
     acting = network.springs.acting(bricks)
     bodies, where = network.springs.bodies[acting], network.springs.position[acting]
-    stiffness = spring_stiffness(network, acting)
-    points = face_quadrature(assembly)
+    stiffness, points = spring_stiffness(network, acting), face_quadrature(assembly)
     maps = opening_maps(assembly, points.point, points.face, where)
     moduli = _moduli(bed, stiffness, points, maps)
     center = network.centroid[:bricks]
-    below, above = bodies, bodies
+    below = above = bodies
     if bed is None:  # between a joint's layer and its bed there is one more body, a plate
         center = np.vstack([center, where])
         below, above = _plates(bodies, bricks)
-    unit = np.tile(np.repeat([1.0, 1.0 / _length(network)], 3), len(center))
+    length = max(network.scene.placed[0].dimensions)
+    unit = np.tile(np.repeat([1.0, 1.0 / length], 3), len(center))
     layers = sparse.csr_array((unit.size, unit.size))
     if bed is None:
         own = _without(stiffness, bed_stiffness(points, maps, moduli))
@@ -218,46 +192,8 @@ def build_system(network: Network, bricks: int, mortar: Mortar, bed: BedStiffnes
         layers=sparse.csr_array(layers),
         load=_load(network, bricks, unit),
         unit=unit,
-        length=_length(network),
+        length=length,
     )
-
-
-def pad_stiffness(network: Network, index: int, node: Floats, pinch: Pinch) -> Floats:
-    """Return the stiffness with which two pads beside a node hold a brick's twists.
-
-    Parameters
-    ----------
-    network : Network
-    index : int
-        Of the brick in build order.
-    node : (3,) float
-        m.
-    pinch : Pinch
-
-    Returns
-    -------
-    (6, 6) float
-        N/m and N m/rad.
-    """
-    brick = network.scene.placed[index]
-    length, width = np.array(brick.length_axis), np.array(brick.width_axis)
-    axes = np.stack([length, width, np.cross(length, width)])
-    out = axes[pinch.across]
-    sides = np.delete(axes, pinch.across, axis=0)
-    moduli = pinch.stiffness.tangential * np.eye(3)
-    moduli += (pinch.stiffness.normal - pinch.stiffness.tangential) * np.outer(out, out)
-    total = np.zeros((6, 6))
-    reach = pinch.side / np.sqrt(12)  # four points here have a square's second moments
-    for sign in (-0.5, 0.5):
-        for a, b in ((-reach, -reach), (-reach, reach), (reach, -reach), (reach, reach)):
-            point = node + sign * brick.dimensions[pinch.across] * out + a * sides[0] + b * sides[1]
-            moved = point_motion(point - network.centroid[index])
-            total += pinch.side**2 / 4 * moved.T @ moduli @ moved
-    return total
-
-
-def _length(network: Network) -> float:
-    return max(network.scene.placed[0].dimensions)
 
 
 def _plates(bodies: Ints, bricks: int) -> tuple[Ints, Ints]:
