@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import fields
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,9 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 Vector = tuple[float, float, float]
+Content = TypeVar("Content")
+
+_COMPRESSED = (sparse.csr_array, sparse.csc_array)
 
 
 def skew(vectors: Floats) -> Floats:
@@ -26,6 +29,11 @@ def skew(vectors: Floats) -> Floats:
     Returns
     -------
     (..., 3, 3) float
+
+    Examples
+    --------
+    >>> skew(np.array([1.0, 2.0, 3.0])) @ np.array([0.0, 0.0, 1.0])
+    array([ 2., -1.,  0.])
     """
     out = np.zeros((*vectors.shape, 3))
     out[..., [2, 0, 1], [1, 2, 0]] = vectors
@@ -36,48 +44,71 @@ def skew(vectors: Floats) -> Floats:
 class FrozenValue:
     """Base of frozen dataclasses that hold arrays.
 
-    Arrays become read-only when the value is made, and again after unpickling. Values are equal if
-    all their fields are, arrays element by element; equal values have equal hashes. Subclasses are
-    decorated with ``@dataclass(frozen=True, eq=False, repr=False)``.
+    A value takes over the arrays it is made of: they become read-only at once, and again after
+    unpickling; so do those of cached properties that end in `frozen`. Values of one class are equal
+    if all their fields are, arrays element by element and NaN like NaN; equal values have equal
+    hashes. Subclasses are decorated with ``@dataclass(frozen=True, eq=False, repr=False)``.
+
+    Examples
+    --------
+    >>> from dataclasses import dataclass
+    >>> @dataclass(frozen=True, eq=False, repr=False)
+    ... class Load(FrozenValue):
+    ...     force: Floats
+    >>> Load(np.ones(3)) == Load(np.ones(3)), Load(np.ones(3))
+    (True, Load(force=<3 float64>))
     """
 
     def __post_init__(self) -> None:
-        _freeze(vars(self))
+        frozen(vars(self))
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        vars(self).update(state)
-        _freeze(vars(self))
+        vars(self).update(frozen(state))
 
     def __eq__(self, other: object) -> bool:
         if type(other) is not type(self):
             return NotImplemented
-        return self is other or all(_same(*pair) for pair in zip(_parts(self), _parts(other)))  # noqa: B905  # one class, as many fields
+        return self is other or all(map(_same, _parts(self), _parts(other)))
 
     def __hash__(self) -> int:
         return hash((type(self), *map(_hashable, _parts(self))))
 
     def __repr__(self) -> str:
-        names = [field.name for field in fields(self) if field.repr]  # type: ignore[arg-type]
-        text = ", ".join(f"{name}={_short(getattr(self, name))}" for name in names)
+        shown = [field.name for field in fields(self) if field.repr]  # type: ignore[arg-type]
+        text = ", ".join(f"{name}={_short(getattr(self, name))}" for name in shown)
         return f"{type(self).__name__}({text})"
 
 
-def _parts(value: object) -> list[object]:
-    """Return the contents of the fields that count when values are compared."""
-    return [getattr(value, field.name) for field in fields(value) if field.compare]  # type: ignore[arg-type]
+def frozen(content: Content) -> Content:
+    """Return arrays, sparse arrays and what holds them in tuples or mappings, made read-only.
 
+    Parameters
+    ----------
+    content : object
+        Other contents are returned as they are.
 
-def _freeze(content: object) -> None:
-    """Make the arrays in a dictionary, tuple or array read-only."""
+    Returns
+    -------
+    object
+        The same object.
+    """
     if isinstance(content, np.ndarray):
         content.flags.writeable = False
-    elif isinstance(content, sparse.csr_array):
-        _freeze([content.data, content.indices, content.indptr])
-    elif isinstance(content, Mapping):
-        _freeze([*content.values()])
+    elif isinstance(content, _COMPRESSED):
+        for part in (content.data, content.indices, content.indptr):
+            part.flags.writeable = False
+    elif isinstance(content, dict):
+        for part in content.values():
+            frozen(part)
     elif isinstance(content, list | tuple):
         for part in content:
-            _freeze(part)
+            frozen(part)
+    return content
+
+
+def _parts(value: FrozenValue) -> list[object]:
+    """Return the contents of the fields that count when values are compared."""
+    return [getattr(value, field.name) for field in fields(value) if field.compare]  # type: ignore[arg-type]
 
 
 def _same(first: object, second: object) -> bool:
@@ -86,33 +117,41 @@ def _same(first: object, second: object) -> bool:
         return first.dtype == second.dtype and np.array_equal(
             first, second, equal_nan=first.dtype.kind == "f"
         )
-    if isinstance(first, sparse.csr_array) and isinstance(second, sparse.csr_array):
-        stored = ((m.shape, m.data, m.indices, m.indptr) for m in (first, second))
-        return _same(*stored)
+    if isinstance(first, _COMPRESSED) and isinstance(second, _COMPRESSED):
+        return first.format == second.format and _same(_stored(first), _stored(second))
     if isinstance(first, Mapping) and isinstance(second, Mapping):
         return first.keys() == second.keys() and all(_same(first[k], second[k]) for k in first)
     if isinstance(first, list | tuple) and type(first) is type(second):
         return len(first) == len(second) and all(map(_same, first, second))
-    return bool(first == second)
+    return bool(first == second) or (_is_nan(first) and _is_nan(second))
+
+
+def _stored(matrix: sparse.csr_array | sparse.csc_array) -> tuple[object, ...]:
+    return matrix.shape, matrix.data, matrix.indices, matrix.indptr
+
+
+def _is_nan(content: object) -> bool:
+    return isinstance(content, float) and content != content  # noqa: PLR0124  # NaN alone does
 
 
 def _hashable(content: object) -> object:
     """Return something with a hash that equal contents share."""
     if isinstance(content, np.ndarray):
-        plain = content + 0.0 if content.dtype.kind == "f" else content  # -0.0 equals 0.0
-        return content.shape, plain.tobytes()
-    if isinstance(content, sparse.csr_array):
+        if content.dtype.kind == "f":  # -0.0 equals 0.0, and one NaN another
+            content = np.where(np.isnan(content), np.nan, content + 0.0)
+        return content.shape, content.tobytes()
+    if isinstance(content, _COMPRESSED):
         return content.shape
     if isinstance(content, Mapping):
         return frozenset((key, _hashable(value)) for key, value in content.items())
     if isinstance(content, list | tuple):
         return tuple(map(_hashable, content))
-    return content
+    return "NaN" if _is_nan(content) else content
 
 
 def _short(content: object) -> str:
     """Return a representation of a few words: an array is its shape and type."""
-    if isinstance(content, np.ndarray | sparse.csr_array):
+    if isinstance(content, (np.ndarray, *_COMPRESSED)):
         return f"<{' x '.join(map(str, content.shape)) or 'one'} {content.dtype}>"
     if isinstance(content, Mapping):
         return "{" + ", ".join(f"{key!r}: {_short(content[key])}" for key in content) + "}"

@@ -10,8 +10,9 @@ import numpy as np
 
 from seqopt.network.build import build_network
 from seqopt.scene.arch import ArchShape, arch_scene
+from seqopt.scene.parts import Brick, Ground, Robot
 from seqopt.scene.reach import Side
-from seqopt.scene.scene import Brick, Ground, Robot, Scene
+from seqopt.scene.scene import Scene
 
 ROOT = Path(__file__).parents[1]
 HERE = np.zeros((1, 0), dtype=int)  # one set of no grips

@@ -40,13 +40,14 @@ from seqopt.arrays import Floats
 from seqopt.contact.elastic_limits import find_elastic_limits
 from seqopt.contact.mortar import EPOXY
 from seqopt.engines.discrete.engine import DiscreteEngine
-from seqopt.engines.discrete.system import Across, Pinch
+from seqopt.engines.discrete.pads import Across, Pinch
 from seqopt.engines.interface import Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.steps import Step
 from seqopt.sequence.two_robots import sequential
+from seqopt.study.presets import STUDY_PADS
 from seqopt.study.tables import printed
 
 SIDES = 1e-3 * np.arange(4.0, 51.0)  # m, of the scan
@@ -87,7 +88,7 @@ def scan(engine: ComplianceEngine, steps: list[Step], sides: Floats) -> pd.DataF
     own = {step.bricks: moved(engine, step) for step in steps}
     rows = []
     for across, joint, side in product(Across, JOINTS, sides):
-        reading = Reading(joint, Pinch(across, side=float(side)))
+        reading = Reading(joint, Pinch(across, STUDY_PADS, side=float(side)))
         discrete = reading.engine(engine.network)
         rows.append(
             {"grip": reading.grip, "side_mm": round(1e3 * float(side), 3), "joint": joint}

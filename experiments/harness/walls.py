@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from seqopt.scene.scene import Brick, Ground, Joint, Robot, Scene
+from seqopt.scene.parts import Brick, Ground, Joint, Robot
+from seqopt.scene.scene import Scene
 
 LENGTH, HEIGHT = 0.2, 0.06
 SPRING = {

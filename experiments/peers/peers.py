@@ -89,7 +89,7 @@ def turn(net: Network, cases: list[Case], name: str, few: int, rng: np.random.Ge
         for case in (c for c in cases if c.bricks == bricks):
             size = len(case.columns)
             chosen = rng.choice(size, min(few, size), replace=False)
-            peer.solve(case.columns[chosen[0]], Want.TABLE)
+            peer.solve(case.columns[chosen[0]], Want.RESPONSES)
             for setting in SETTINGS:
                 asked = case.asked(setting)
                 start = time.perf_counter()

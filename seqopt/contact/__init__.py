@@ -1,1 +1,36 @@
-"""Room."""
+"""Bricks that touch: the faces of joints, what their mortar holds, and when wrenches exceed it.
+
+A partial structure and its grips become rigid blocks with faces between them:
+
+>>> from seqopt.contact import DRY, EPOXY, find_elastic_limits, step_assembly
+>>> from seqopt.network import build_network
+>>> from seqopt.scene import load_scene
+>>> network = build_network(load_scene("arch25"))
+>>> assembly = step_assembly(network, 2, (2, None, None))
+>>> assembly.contact_name, assembly.area.round(4).tolist()
+(('ground-1', '1-2'), [0.0061, 0.0061])
+
+Joints stay elastic as long as stress on their faces stays below what the mortar holds:
+
+>>> import numpy as np
+>>> wrench = np.zeros((1, 26, 6))
+>>> wrench[0, 0, 0] = 1000.0  # N on the first brick
+>>> [bool(find_elastic_limits(network, m).exceeded(wrench)[0]) for m in (DRY, EPOXY)]
+[True, False]
+"""
+
+from seqopt.contact.assembly import Assembly
+from seqopt.contact.elastic_limits import ElasticLimits, find_elastic_limits
+from seqopt.contact.faces import bare_assembly, step_assembly
+from seqopt.contact.mortar import DRY, EPOXY, Mortar
+
+__all__ = [
+    "DRY",
+    "EPOXY",
+    "Assembly",
+    "ElasticLimits",
+    "Mortar",
+    "bare_assembly",
+    "find_elastic_limits",
+    "step_assembly",
+]

@@ -8,13 +8,13 @@ from functools import cached_property
 import numpy as np
 from scipy import sparse
 
-from seqopt.arrays import Floats, Ints, Vector, skew
+from seqopt.arrays import Floats, FrozenValue, Ints, Vector, frozen, skew
 from seqopt.errors import SceneError
 from seqopt.network.network import GROUND
 
 
-@dataclass(frozen=True, kw_only=True)
-class Assembly:
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Assembly(FrozenValue):
     """Rigid blocks, the faces where they touch, and the grips that hold them.
 
     Parameters
@@ -56,6 +56,7 @@ class Assembly:
     payload: Floats
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         for name in ("centroid", "weight", "normal", "corner", "grip_position", "payload"):
             if not np.isfinite(getattr(self, name)).all():
                 raise SceneError(f"assembly: {name} holds a number that is not finite")
@@ -88,7 +89,7 @@ class Assembly:
         _, follows, triangle = self._triangles(centroid)
         out = 0.5 * triangle
         np.add.at(out, follows, 0.5 * triangle)
-        return np.asarray(out)
+        return frozen(np.asarray(out))
 
     def _triangles(self, middle: Floats) -> tuple[Floats, Ints, Floats]:
         """Return spokes from points (C, 3) to the corners, the next corners, and areas between."""
@@ -108,7 +109,7 @@ class Assembly:
     @cached_property
     def area(self) -> Floats:
         """Area of every contact face, (C,) m²."""
-        return self._sums(self.corner_area[:, None])[:, 0]
+        return frozen(self._sums(self.corner_area[:, None])[:, 0])
 
     @cached_property
     def axes(self) -> Floats:
@@ -116,7 +117,7 @@ class Assembly:
         side = np.eye(3)[np.abs(self.normal).argmin(axis=1)]
         first = np.cross(self.normal, side)
         first /= np.linalg.norm(first, axis=1, keepdims=True)
-        return np.stack([self.normal, first, np.cross(self.normal, first)], axis=1)
+        return frozen(np.stack([self.normal, first, np.cross(self.normal, first)], axis=1))
 
     @cached_property
     def scales(self) -> tuple[float, float]:
@@ -152,13 +153,13 @@ class Assembly:
             self._wrenches(bodies[:, i], self.corner, sign * axes)
             for i, sign in ((0, -1.0), (1, 1.0))
         ]
-        return sparse.csr_array(parts[0] + parts[1])
+        return frozen(sparse.csr_array(parts[0] + parts[1]))
 
     @cached_property
     def grip_map(self) -> sparse.csr_array:
         """Wrenches on the blocks from grip forces, (6B, 3G); as `contact_map`."""
         axes = np.broadcast_to(np.eye(3), (len(self.payload), 3, 3))
-        return self._wrenches(self.grip_block, self.grip_position, axes)
+        return frozen(self._wrenches(self.grip_block, self.grip_position, axes))
 
     def _wrenches(self, block: Ints, point: Floats, axes: Floats) -> sparse.csr_array:
         """Return the wrenches (6B, 3M) of unit forces along the rows of axes (M, 3, 3)."""
@@ -172,9 +173,16 @@ class Assembly:
         return sparse.csr_array(entries, shape=(6 * len(self.centroid), 3 * len(block)))
 
     def load(self, direction: Vector | None = None) -> Floats:
-        """Return the weights as wrenches (6B,) over the force scale.
+        """Return the weights as wrenches over the force scale.
 
-        With a direction, every block is pulled that way as hard as it weighs.
+        Parameters
+        ----------
+        direction : Vector, optional
+            Every block is pulled this way as hard as it weighs; down by default.
+
+        Returns
+        -------
+        (6B,) float
         """
         pull = self.weight
         if direction is not None:

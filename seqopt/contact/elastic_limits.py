@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from seqopt.arrays import Floats
+from seqopt.arrays import Bools, Floats, FrozenValue
 from seqopt.contact.assembly import Assembly
 from seqopt.contact.faces import bare_assembly
 from seqopt.contact.mortar import Mortar
@@ -23,11 +23,11 @@ from seqopt.contact.quadrature import (
 )
 from seqopt.network.network import Network
 
-MARGIN = 1e-6  # stress above a limit that counts as none, over the stress scale
+STRESS_MARGIN = 1e-6  # stress above a limit that counts as none, over the stress scale
 
 
-@dataclass(frozen=True)
-class ElasticLimits:
+@dataclass(frozen=True, eq=False, repr=False)
+class ElasticLimits(FrozenValue):
     """The faces of a whole structure and what their mortar holds; joints in the network's order.
 
     Attributes
@@ -43,9 +43,17 @@ class ElasticLimits:
     stress: Floats
 
     def excess(self, wrench: Floats) -> Floats:
-        """Return by how much wrenches (S, J, 6) exceed the limits of the joints, (S, J), Pa.
+        """Return by how much wrenches exceed the limits of the joints.
 
-        Wrenches are those of `seqopt.engines.interface.Fields.joint_wrench`; negative is within.
+        Parameters
+        ----------
+        wrench : (S, J, 6) float
+            As of `seqopt.engines.interface.Fields`, N and N m.
+
+        Returns
+        -------
+        (S, J) float
+            Pa; negative is within.
         """
         face, mortar = self.assembly.contact, self.mortar
         stress = np.einsum("kij,skj->ski", self.stress, wrench[:, face])
@@ -57,9 +65,19 @@ class ElasticLimits:
         most = np.maximum.reduceat(beyond, first_points(face, wrench.shape[1]), axis=1)
         return np.asarray(np.where(np.any(wrench, axis=2), most, -np.inf))
 
-    def exceeded(self, wrench: Floats) -> np.ndarray:
-        """Return which sets (S,) leave the elastic limits anywhere, beyond rounding."""
-        margin = MARGIN * self.assembly.stress_scale
+    def exceeded(self, wrench: Floats) -> Bools:
+        """Return which grip sets leave the elastic limits anywhere, beyond rounding.
+
+        Parameters
+        ----------
+        wrench : (S, J, 6) float
+            As of `excess`.
+
+        Returns
+        -------
+        (S,) bool
+        """
+        margin = STRESS_MARGIN * self.assembly.stress_scale
         if self._bound(wrench) <= margin:  # as a rule, and a tenth of the work
             return np.zeros(len(wrench), dtype=bool)
         return np.asarray(self.excess(wrench).max(axis=1, initial=-np.inf) > margin)
@@ -75,6 +93,16 @@ class ElasticLimits:
 
 def find_elastic_limits(network: Network, mortar: Mortar) -> ElasticLimits:
     """Return the elastic limits of a structure's joints.
+
+    Parameters
+    ----------
+    network : Network
+    mortar : Mortar
+        Of all joints.
+
+    Returns
+    -------
+    ElasticLimits
 
     Raises
     ------

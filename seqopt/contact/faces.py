@@ -10,7 +10,7 @@ from seqopt.arrays import Floats
 from seqopt.contact.assembly import Assembly
 from seqopt.errors import SceneError
 from seqopt.network.network import GROUND, Network
-from seqopt.scene.scene import Brick
+from seqopt.scene.parts import Brick
 
 SLIVER = 1e-6  # smallest overlap of two faces, as a share of the smaller one
 
@@ -29,35 +29,31 @@ def step_assembly(network: Network, bricks: int, grips: Sequence[int | None]) ->
     grips : sequence of (int or None)
         Node that each of the scene's robots holds.
 
+    Returns
+    -------
+    Assembly
+
     Raises
     ------
     SceneError
         If the faces of a joint do not overlap.
     """
     placed = network.scene.placed
-    springs = network.springs
-    acting = np.flatnonzero(springs.since <= bricks)
-    names, normals, faces = [], [], []
-    for s in acting:
-        first, second = springs.bodies[s]
-        name = "ground" if first == GROUND else str(placed[first].name)
-        names.append(f"{name}-{placed[second].name}")
-        between = [placed[b] for b in (first, second) if b != GROUND]
-        axes = _oriented(springs.axes[s], springs.position[s], between)
-        normals.append(axes[0])
-        faces.append(_overlap(axes, springs.position[s], between, names[-1]))
+    acting = network.springs.acting(bricks)
+    contacts = [_contact(network, s) for s in acting]
     robots = network.scene.robots
     held = [(node, r) for node, r in zip(grips, robots, strict=True) if node is not None]
     block = {node: i for i, brick in enumerate(placed) for node in brick.nodes}
     return Assembly(
         block_name=tuple(brick.name for brick in placed[:bricks]),
+        # of the boxes, as their faces: means of inner nodes differ from them by rounding
         centroid=np.array([brick.position for brick in placed[:bricks]]),
         weight=network.weight[:bricks],
-        contact_name=tuple(names),
-        bodies=springs.bodies[acting].reshape(-1, 2),
-        normal=np.array(normals).reshape(-1, 3),
-        corner=np.concatenate([np.empty((0, 3)), *faces]),
-        contact=np.repeat(np.arange(len(faces)), [len(face) for face in faces]),
+        contact_name=tuple(name for name, _, _ in contacts),
+        bodies=network.springs.bodies[acting].reshape(-1, 2),
+        normal=np.array([normal for _, normal, _ in contacts]).reshape(-1, 3),
+        corner=np.concatenate([np.empty((0, 3)), *(face for _, _, face in contacts)]),
+        contact=np.repeat(np.arange(len(contacts)), [len(face) for _, _, face in contacts]),
         grip_block=np.array([block[node] for node, _ in held], dtype=np.int64),
         grip_position=np.array([network.scene.node_position(n) for n, _ in held]).reshape(-1, 3),
         payload=np.array([robot.payload for _, robot in held]),
@@ -65,9 +61,36 @@ def step_assembly(network: Network, bricks: int, grips: Sequence[int | None]) ->
 
 
 def bare_assembly(network: Network, bricks: int) -> Assembly:
-    """Return the first bricks held by nobody; see `step_assembly`."""
+    """Return a partial structure that nobody holds.
+
+    Parameters
+    ----------
+    network : Network
+    bricks : int
+        How many bricks stand, in build order.
+
+    Returns
+    -------
+    Assembly
+
+    Raises
+    ------
+    SceneError
+        If the faces of a joint do not overlap.
+    """
     nobody = (None,) * len(network.scene.robots)
     return step_assembly(network, bricks, nobody)
+
+
+def _contact(network: Network, spring: int) -> tuple[str, Floats, Floats]:
+    """Return a contact's name, its normal (3,) and the corners (m, 3) of its face."""
+    springs, placed = network.springs, network.scene.placed
+    first, second = springs.bodies[spring]
+    start = "ground" if first == GROUND else str(placed[first].name)
+    name = f"{start}-{placed[second].name}"
+    between = [placed[b] for b in (first, second) if b != GROUND]
+    axes = _oriented(springs.axes[spring], springs.position[spring], between)
+    return name, axes[0], _overlap(axes, springs.position[spring], between, name)
 
 
 def _oriented(axes: Floats, point: Floats, between: list[Brick]) -> Floats:

@@ -18,6 +18,18 @@ class Mortar:
         Coefficient of friction, the tangent of the friction angle.
     tensile_strength, cohesion : float
         Pa; zero for blocks laid dry.
+
+    Raises
+    ------
+    SceneError
+        If a number is negative or not finite.
+
+    Examples
+    --------
+    >>> DRY.tensile_strength, EPOXY.tensile_strength
+    (0.0, 3000000.0)
+    >>> Mortar(friction=0.6, cohesion=2e5)
+    Mortar(friction=0.6, tensile_strength=0.0, cohesion=200000.0)
     """
 
     friction: float
@@ -33,6 +45,7 @@ class Mortar:
 
 FRICTION = math.tan(math.radians(25.0))
 DRY = Mortar(friction=FRICTION)
+"""Blocks laid dry: compression and friction alone."""
 EPOXY = Mortar(friction=FRICTION, tensile_strength=3e6, cohesion=2e6)
-"""The study's epoxy putty (section 3.2.3: 25°, 3 MPa, and 2 MPa printed as "2 MPa/m")."""
+"""The epoxy putty of Bruun et al. (section 3.2.3: 25°, 3 MPa, and 2 MPa printed as "2 MPa/m")."""
 MORTARS = {"epoxy": EPOXY, "dry": DRY}

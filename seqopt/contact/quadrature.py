@@ -6,14 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from seqopt.arrays import Floats, Ints, skew
+from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.contact.assembly import Assembly
+from seqopt.network.kinematics import point_motion
 
 CUTS = 2  # times that each triangle of a face is cut into four
 
 
-@dataclass(frozen=True)
-class Quadrature:
+@dataclass(frozen=True, eq=False, repr=False)
+class Quadrature(FrozenValue):
     """Points that stand for faces; a face is a contact of an assembly.
 
     Attributes
@@ -35,6 +36,16 @@ def face_quadrature(assembly: Assembly, cuts: int = CUTS) -> Quadrature:
 
     Faces are cut into triangles, each into four ``cuts`` times; the middles of a triangle's edges
     with a third of its area each integrate squares exactly.
+
+    Parameters
+    ----------
+    assembly : Assembly
+    cuts : int, optional
+
+    Returns
+    -------
+    Quadrature
+        Faces in ascending order.
     """
     triangles, face = [], []
     for c in range(len(assembly.bodies)):
@@ -60,27 +71,43 @@ def _quarters(triangle: Floats) -> list[Floats]:
 
 
 def opening_maps(assembly: Assembly, points: Floats, face: Ints, center: Floats) -> Floats:
-    """Return the motions of points (P, 3) for unit twists of their faces' second bodies, (P, 3, 6).
-
-    Normal part first, then two tangential ones (`Assembly.axes`); twists are taken about the
-    faces' centers (C, 3) and in global axes, m and rad.
-    """
-    axes = assembly.axes[face]
-    turn = -axes @ skew(points - center[face])
-    return np.concatenate([axes, turn], axis=2)
-
-
-def quadrature_stiffness(bed: Quadrature, maps: Floats, moduli: Floats) -> Floats:
-    """Return the stiffness (C, 6, 6) of the beds of C faces at their centers.
+    """Return the motions of points for unit twists of their faces' second bodies.
 
     Parameters
     ----------
-    bed : Bed
+    assembly : Assembly
+    points : (P, 3) float
+        m.
+    face : (P,) int
+        The contact of every point.
+    center : (C, 3) float
+        Where the twists of the C faces are taken, m; their axes are the scene's.
+
+    Returns
+    -------
+    (P, 3, 6) float
+        Normal part first, then two tangential ones (`Assembly.axes`).
+    """
+    axes = assembly.axes[face]
+    return np.asarray(axes @ point_motion(points - center[face]))
+
+
+def quadrature_stiffness(bed: Quadrature, maps: Floats, moduli: Floats) -> Floats:
+    """Return the stiffness of the beds of C faces at their centers.
+
+    Parameters
+    ----------
+    bed : Quadrature
         Its faces in ascending order.
     maps : (P, 3, 6) float
         From `opening_maps`.
     moduli : (C, 2) float
         Normal and tangential, N/m³.
+
+    Returns
+    -------
+    (C, 6, 6) float
+        N/m and N m/rad.
     """
     slope = bed.area[:, None] * moduli[bed.face][:, [0, 1, 1]]
     each = np.einsum("pij,pi,pik->pjk", maps, slope, maps)
@@ -88,5 +115,17 @@ def quadrature_stiffness(bed: Quadrature, maps: Floats, moduli: Floats) -> Float
 
 
 def first_points(face: Ints, faces: int) -> Ints:
-    """Return the first point of every face, (faces,), from the ascending faces of points (P,)."""
+    """Return the first point of every face.
+
+    Parameters
+    ----------
+    face : (P,) int
+        The face of every point, ascending.
+    faces : int
+        How many there are.
+
+    Returns
+    -------
+    (faces,) int
+    """
     return np.searchsorted(face, np.arange(faces))

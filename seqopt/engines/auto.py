@@ -13,7 +13,7 @@ from enum import Enum
 import numpy as np
 from numpy.typing import ArrayLike
 
-from seqopt.arrays import Ints
+from seqopt.arrays import Bools, Ints
 from seqopt.contact.elastic_limits import ElasticLimits, find_elastic_limits
 from seqopt.contact.mortar import EPOXY, Mortar
 from seqopt.engines.discrete.engine import DiscreteEngine
@@ -26,7 +26,7 @@ from seqopt.engines.interface import (
     select_sets,
 )
 from seqopt.engines.planar import PlanarEngine
-from seqopt.engines.plane import off_plane
+from seqopt.engines.plane import NoPlane, find_plane, off_plane
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import SceneError
 from seqopt.network.network import Network
@@ -42,7 +42,14 @@ class Level(Enum):
 
 @dataclass(frozen=True)
 class LevelChoice:
-    """A level and why it was taken."""
+    """A level and why it was taken.
+
+    Attributes
+    ----------
+    level : Level
+    reason : str
+        A clause that goes into a sentence.
+    """
 
     level: Level
     reason: str
@@ -59,8 +66,15 @@ class AutoEngine:
     Parameters
     ----------
     network : Network
-    mortar : Mortar
-        What the joints hold; the study's epoxy by default.
+    mortar : Mortar, optional
+        What the joints hold; the epoxy of Bruun et al. by default.
+
+    Attributes
+    ----------
+    tally : dict of LevelChoice to int
+        How many grip sets of all calls were answered at which level, and why.
+    unchecked : str
+        Why elastic limits are not checked; empty if they are.
     """
 
     def __init__(self, network: Network, mortar: Mortar = EPOXY) -> None:
@@ -70,26 +84,42 @@ class AutoEngine:
         self._in_space = OFF_PLANE
         self._limits: ElasticLimits | None = None
         self.tally: dict[LevelChoice, int] = {}
-        try:
-            self._planar = PlanarEngine(network)
-        except SceneError as error:
-            self._in_space = LevelChoice(Level.RIGID, str(error).rsplit(";", 1)[0])
+        self.unchecked = ""
+        plane = find_plane(network)
+        if isinstance(plane, NoPlane):
+            self._in_space = LevelChoice(Level.RIGID, plane.reason)
+        else:
+            self._planar = PlanarEngine(network, plane)
         try:
             self._limits = find_elastic_limits(network, mortar)
         except SceneError as error:
             self.unchecked = f"elastic limits are not checked: {error}"
-        else:
-            self.unchecked = ""
 
     @property
     def network(self) -> Network:
         """The network whose nodes and edges the fields follow."""
         return self._rigid.network
 
-    def solve(self, bricks: int, grips: ArrayLike, want: Want = Want.TABLE) -> Fields:
-        """Return the fields of the first ``bricks`` bricks; see `seqopt.engines.interface.Engine`.
+    def solve(self, bricks: int, grips: ArrayLike, want: Want = Want.RESPONSES) -> Fields:
+        """Return the fields of a partial structure for many grip sets.
 
-        ``tally`` counts the grip sets of every choice that was made.
+        Parameters
+        ----------
+        bricks : int
+            How many bricks stand.
+        grips : (S, r) int
+            Node numbers.
+        want : Want, optional
+
+        Returns
+        -------
+        Fields
+
+        Raises
+        ------
+        GripError, MechanismError, SolverError
+            As of `seqopt.engines.interface.Engine` and, beyond elastic limits, of
+            `seqopt.engines.discrete.engine.DiscreteEngine`.
         """
         columns = grip_columns(self.network, bricks, grips)
         sets = np.asarray(grips).reshape(columns.shape)
@@ -109,12 +139,12 @@ class AutoEngine:
         self._count(BEYOND, beyond)
         return keep_wanted(fields, want)
 
-    def _flat(self, columns: Ints) -> np.ndarray:
+    def _flat(self, columns: Ints) -> Bools:
         """Return which grip sets (S, r) lie in the plane, (S,)."""
         if self._planar is None:
             return np.zeros(len(columns), dtype=bool)
         return np.asarray(~off_plane(self.network, self._planar.plane, columns).any(axis=1))
 
-    def _count(self, choice: LevelChoice, sets: np.ndarray) -> None:
+    def _count(self, choice: LevelChoice, sets: Bools) -> None:
         if sets.any():
             self.tally[choice] = self.tally.get(choice, 0) + int(sets.sum())

@@ -8,11 +8,11 @@ from functools import cached_property
 import numpy as np
 from scipy import linalg
 
-from seqopt.arrays import Floats
+from seqopt.arrays import Floats, FrozenValue, frozen
 
 
-@dataclass(frozen=True)
-class Basis:
+@dataclass(frozen=True, eq=False, repr=False)
+class Basis(FrozenValue):
     """The directions in which a structure is loaded and moves.
 
     Attributes
@@ -27,14 +27,34 @@ class Basis:
     @cached_property
     def wrench(self) -> Floats:
         """Both as rows, (k, 6) with k = d + m."""
-        return linalg.block_diag(self.force, self.moment)
+        return frozen(linalg.block_diag(self.force, self.moment))
 
     def embedded(self, rows: Floats) -> Floats:
-        """Return wrenches or twists (..., k, n) of the basis with all their parts, (..., 6, n)."""
+        """Return wrenches or twists of the basis with all their parts.
+
+        Parameters
+        ----------
+        rows : (..., k, n) float
+
+        Returns
+        -------
+        (..., 6, n) float
+        """
         return rows if self is SPACE else np.asarray(self.wrench.T @ rows)
 
     def levers(self, arms: Floats) -> Floats:
-        """Return the moments of unit forces at arms (..., 3), (..., m, d), m."""
+        """Return the moments of unit forces at the ends of arms.
+
+        Parameters
+        ----------
+        arms : (..., 3) float
+            m.
+
+        Returns
+        -------
+        (..., m, d) float
+            m.
+        """
         turns = np.cross(self.force[None], self.moment[:, None])  # (r × f) · n = r · (f × n)
         return np.asarray(
             (arms @ turns.reshape(-1, 3).T).reshape(*arms.shape[:-1], *turns.shape[:2])
@@ -42,3 +62,4 @@ class Basis:
 
 
 SPACE = Basis(np.eye(3), np.eye(3))
+"""All of space: d = m = 3."""

@@ -3,8 +3,8 @@ r"""The reference engine: the double-cross frame with stiff bars, one sparse sol
 Every edge of the network is an elastic beam, every joint two equal springs in series, one at the
 end of each half-edge. With the deformations :math:`B u` of beams and springs and their stiffnesses
 :math:`C`, the frame solves :math:`B^T C B u = f` and improves the answer by residuals taken
-through the deformations. It shares no mechanics with `seqopt.engines.rigid.compliance` and exists to check it
-and to show what that generality costs.
+through the deformations. It shares no mechanics with `seqopt.engines.rigid.compliance` and exists
+to check it and to show what that generality costs.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ from scipy import sparse
 from scipy.sparse.linalg import SuperLU, splu
 
 from seqopt.arrays import Floats, Ints
-from seqopt.engines.interface import Fields, Want, grip_columns
+from seqopt.engines.interface import Fields, Want, grip_columns, join_sets, no_sets
 from seqopt.engines.rigid.mechanism import require_resistance
 from seqopt.errors import SolverError
 from seqopt.network.network import Network, PartKind
 
 CONTRAST = 1e7  # bar over joint stiffness; see experiments/engines/frame_contrast.py
-REFINEMENTS = 3
-CONVERGED = 1e-6  # largest last correction of an accepted solution, relative to it
+FRAME_CORRECTIONS = 3  # after which a solution is judged
+LAST_FRAME_CORRECTION = 1e-6  # the largest of an accepted solution, relative to it
 SUSPICIOUS = 1e-9  # a smallest scaled eigenvalue below this, over the contrast, is looked into
-LOOSE = 1e-12  # stiffness of a spring that has none, over the stiffest: places its joint node
+LOOSE = 1e-12  # stiffness of a spring that has none, over the stiffest: holds its joint node
 
 
 class FrameEngine:
@@ -37,7 +37,7 @@ class FrameEngine:
     Parameters
     ----------
     network : Network
-    contrast : float
+    contrast : float, optional
         Stiffness of the bars over that of the stiffest joint, in stretching and in bending. Low
         values bend the bars, high ones spoil the conditioning.
     """
@@ -51,23 +51,34 @@ class FrameEngine:
         """The network whose nodes and edges the fields follow."""
         return self._network
 
-    def solve(self, bricks: int, grips: ArrayLike, want: Want = Want.TABLE) -> Fields:
-        """Return the fields of the first ``bricks`` bricks; see `seqopt.engines.interface.Engine`.
+    def solve(self, bricks: int, grips: ArrayLike, want: Want = Want.RESPONSES) -> Fields:
+        """Return the fields of a partial structure for many grip sets.
 
         All fields are evaluated whatever is asked: the factorization dominates the cost.
+
+        Parameters
+        ----------
+        bricks : int
+            How many bricks stand.
+        grips : (S, r) int
+            Node numbers.
+        want : Want, optional
+
+        Returns
+        -------
+        Fields
+
+        Raises
+        ------
+        GripError, MechanismError
+            As of `seqopt.engines.interface.Engine`.
+        SolverError
+            If corrections do not settle, which a lower contrast may help.
         """
         network = self._network
         columns = grip_columns(network, bricks, grips)
         answers = [_solve_one(network, bricks, row, self._contrast) for row in columns]
-        edges, nodes = network.count_edges(bricks), network.count_nodes(bricks)
-        joints = len(network.springs.since)
-        shapes = (edges,), (nodes, 3), (columns.shape[1], 3), (6,), (joints, 6), (bricks, 6)
-        return Fields(
-            *(
-                np.array([answer[i] for answer in answers]).reshape(len(answers), *shape)
-                for i, shape in enumerate(shapes)
-            )
-        )
+        return join_sets([no_sets(network, bricks, columns.shape[1]), *answers])
 
 
 class _Frame(NamedTuple):
@@ -83,17 +94,17 @@ class _Frame(NamedTuple):
     stiffness: Floats
 
 
-def _solve_one(network: Network, bricks: int, columns: Ints, contrast: float) -> tuple[Floats, ...]:
-    """Return the fields of one model, in the order of `Fields`."""
+def _solve_one(network: Network, bricks: int, columns: Ints, contrast: float) -> Fields:
+    """Return the fields of one model."""
     edges, nodes = network.count_edges(bricks), network.count_nodes(bricks)
     frame = _frame(network, bricks, contrast)
     load = np.zeros((frame.nodes, 6))
-    load[network.inner[:bricks], :3] = 0.5 * network.weight[:bricks, None]
-    gripped = network.inner.ravel()[columns]
+    load[network.inner[:bricks].ravel(), :3] = network.inner_weight[: 2 * bricks]
+    held = network.inner.ravel()[columns]
     base = np.flatnonzero(network.node_kind[:nodes] == PartKind.BASE)
     free = np.ones((frame.nodes, 6), dtype=bool)
     free[base] = False
-    free[gripped, :3] = False
+    free[held, :3] = False
     unknown = np.flatnonzero(free)
     motion = np.zeros(load.size)
     reduced = frame.deformation[:, unknown]
@@ -102,14 +113,14 @@ def _solve_one(network: Network, bricks: int, columns: Ints, contrast: float) ->
     stress = frame.stiffness * (frame.deformation @ motion)
     reaction = (frame.deformation.T @ stress).reshape(load.shape) - load
     support = base[network.node_spring[base] == network.springs.support]
-    twist = motion.reshape(load.shape)[network.inner[:bricks]].mean(axis=1)
-    return (
-        stress[:edges],
-        motion.reshape(load.shape)[:nodes, :3],
-        reaction[gripped, :3],
-        reaction[support].sum(axis=0),
-        _joint_wrenches(network, bricks, stress[-6 * frame.halves :]),
-        twist,
+    moved = motion.reshape(load.shape)
+    return Fields(
+        edge_force=stress[None, :edges],
+        displacement=moved[None, :nodes, :3],
+        grip_force=reaction[None, held, :3],
+        support=reaction[support].sum(axis=0)[None],
+        joint_wrench=_joint_wrenches(network, bricks, stress[-6 * frame.halves :])[None],
+        brick_twist=moved[network.inner[:bricks]].mean(axis=1)[None],
     )
 
 
@@ -216,11 +227,11 @@ def _solve(
     if _smallest_eigenvalue(factor, len(load)) < SUSPICIOUS / contrast:
         examine()
     answer = scale * factor.solve(scale * load)
-    for _ in range(REFINEMENTS):
+    for _ in range(FRAME_CORRECTIONS):
         residual = load - deformation.T @ (stiffness * (deformation @ answer))
         correction = scale * factor.solve(scale * residual)
         answer += correction
-    if not np.abs(correction / scale).max() <= CONVERGED * np.abs(answer / scale).max():
+    if not np.abs(correction / scale).max() <= LAST_FRAME_CORRECTION * np.abs(answer / scale).max():
         raise failure
     return np.asarray(answer)
 

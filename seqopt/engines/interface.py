@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
 from enum import Flag, auto
 from itertools import combinations
 from typing import Protocol
@@ -10,7 +11,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from seqopt.arrays import Floats, Ints
+from seqopt.arrays import Bools, Floats, FrozenValue, Ints
 from seqopt.errors import GripError
 from seqopt.network.network import Network
 
@@ -23,12 +24,12 @@ class Want(Flag):
     SUPPORT = auto()
     JOINTS = auto()
     BRICKS = auto()
-    TABLE = EDGES | DISPLACEMENTS | SUPPORT  # what the columns of Table A.1 need
-    ALL = TABLE | JOINTS | BRICKS
+    RESPONSES = EDGES | DISPLACEMENTS | SUPPORT  # what T_max, M_sup, F_rob, D_max and kin need
+    ALL = RESPONSES | JOINTS | BRICKS
 
 
-@dataclass(frozen=True)
-class Fields:
+@dataclass(frozen=True, eq=False, repr=False)
+class Fields(FrozenValue):
     """Full fields of S grip sets on one partial structure; arrays run over sets first.
 
     A field that was not asked for has no entries along its second axis.
@@ -60,14 +61,38 @@ class Fields:
 
 
 class Engine(Protocol):
-    """Solves partial structures of one scene: linear, from scratch, all weight at once."""
+    """Solves partial structures of one scene: linear, from scratch, all weight at once.
+
+    Examples
+    --------
+    >>> from seqopt.engines.registry import make_engine
+    >>> from seqopt.network.build import build_network
+    >>> from seqopt.scene.scene_file import load_scene
+    >>> engine: Engine = make_engine("compliance", build_network(load_scene("arch25")))
+    >>> fields = engine.solve(2, [[2], [3]], Want.SUPPORT)  # two bricks, node 2 or 3 held
+    >>> fields.grip_force.shape, fields.support.shape, fields.displacement.shape
+    ((2, 1, 3), (2, 6), (2, 0, 3))
+    """
 
     @property
     def network(self) -> Network:
         """The network whose nodes and edges the fields follow."""
 
-    def solve(self, bricks: int, grips: ArrayLike, want: Want = Want.TABLE) -> Fields:
-        """Return the fields of the first ``bricks`` bricks for grip sets (S, r) of node numbers.
+    def solve(self, bricks: int, grips: ArrayLike, want: Want = Want.RESPONSES) -> Fields:
+        """Return the fields of a partial structure for many grip sets.
+
+        Parameters
+        ----------
+        bricks : int
+            How many bricks stand, in build order.
+        grips : (S, r) int
+            Numbers of the nodes that each set holds.
+        want : Want, optional
+            Which fields are evaluated; an engine may evaluate others too.
+
+        Returns
+        -------
+        Fields
 
         Raises
         ------
@@ -80,6 +105,7 @@ class Engine(Protocol):
         """
 
 
+NAMES = tuple(field.name for field in fields(Fields))
 FLAGS = {
     "edge_force": Want.EDGES,
     "displacement": Want.DISPLACEMENTS,
@@ -89,30 +115,126 @@ FLAGS = {
 }
 
 
-def keep_wanted(fields: Fields, want: Want) -> Fields:
-    """Return fields without what is not asked for."""
+def keep_wanted(answer: Fields, want: Want) -> Fields:
+    """Return fields without what is not asked for.
+
+    Parameters
+    ----------
+    answer : Fields
+    want : Want
+
+    Returns
+    -------
+    Fields
+    """
     dropped = [name for name, flag in FLAGS.items() if not want & flag]
-    return replace(fields, **{name: getattr(fields, name)[:, :0] for name in dropped})
+    return replace(answer, **{name: getattr(answer, name)[:, :0] for name in dropped})
 
 
-def select_sets(fields: Fields, which: np.ndarray) -> Fields:
-    """Return the fields of some grip sets, (S,) bool or int."""
-    return Fields(*(getattr(fields, name)[which] for name in Fields.__dataclass_fields__))
+def no_sets(network: Network, bricks: int, held: int) -> Fields:
+    """Return the fields of no grip set at all: their shapes.
+
+    Parameters
+    ----------
+    network : Network
+    bricks : int
+        How many bricks stand.
+    held : int
+        How many nodes each set would hold.
+
+    Returns
+    -------
+    Fields
+        Arrays with a first axis of length zero.
+    """
+    return Fields(
+        edge_force=np.empty((0, network.count_edges(bricks))),
+        displacement=np.empty((0, network.count_nodes(bricks), 3)),
+        grip_force=np.empty((0, held, 3)),
+        support=np.empty((0, 6)),
+        joint_wrench=np.empty((0, len(network.springs.since), 6)),
+        brick_twist=np.empty((0, bricks, 6)),
+    )
 
 
-def merge_sets(which: np.ndarray, inside: Fields, outside: Fields) -> Fields:
-    """Return the fields of grip sets of which ``which`` (S,) come from the first, in order."""
-    out = []
-    for name in Fields.__dataclass_fields__:
-        first, second = getattr(inside, name), getattr(outside, name)
-        whole = np.empty((len(which), *first.shape[1:]))
-        whole[which], whole[~which] = first, second
-        out.append(whole)
-    return Fields(*out)
+def select_sets(answer: Fields, which: Bools | Ints) -> Fields:
+    """Return the fields of some grip sets.
+
+    Parameters
+    ----------
+    answer : Fields
+    which : (S,) bool or (s,) int
+
+    Returns
+    -------
+    Fields
+    """
+    return Fields(**{name: getattr(answer, name)[which] for name in NAMES})
+
+
+def join_sets(parts: Sequence[Fields], which: Sequence[Bools | slice] | None = None) -> Fields:
+    """Return the fields of the grip sets of several answers.
+
+    Parameters
+    ----------
+    parts : sequence of Fields
+        Alike in everything but the number of sets.
+    which : sequence of ((S,) bool or slice), optional
+        Which of all sets are those of each part, in their order; by default one part's come after
+        another's.
+
+    Returns
+    -------
+    Fields
+    """
+    after = np.cumsum([len(part.grip_force) for part in parts])
+    total = int(after[-1])
+    if which is None:
+        which = [slice(b - len(a.grip_force), b) for a, b in zip(parts, after, strict=True)]
+    whole = {name: np.empty((total, *getattr(parts[0], name).shape[1:])) for name in NAMES}
+    for part, mine in zip(parts, which, strict=True):
+        for name in NAMES:
+            whole[name][mine] = getattr(part, name)
+    return Fields(**whole)
+
+
+def merge_sets(which: Bools, inside: Fields, outside: Fields) -> Fields:
+    """Return the fields of grip sets, some from one answer and the rest from another.
+
+    Parameters
+    ----------
+    which : (S,) bool
+        The sets that the first answer is about, in their order.
+    inside, outside : Fields
+
+    Returns
+    -------
+    Fields
+    """
+    return join_sets([inside, outside], [which, ~which])
 
 
 def grip_columns(network: Network, bricks: int, grips: ArrayLike) -> Ints:
-    """Return the grips (S, r) as places in ``network.inner.ravel()``, checked."""
+    """Return grip sets as indices into ``network.inner.ravel()``, checked.
+
+    Parameters
+    ----------
+    network : Network
+    bricks : int
+        How many bricks stand.
+    grips : (S, r) int
+        Node numbers.
+
+    Returns
+    -------
+    (S, r) int
+
+    Raises
+    ------
+    GripError
+        If there are not so many bricks, the shape is another, or a set names an unknown, blocked,
+        unplaced or repeated node.
+    """
     total = len(network.inner)
     if not 1 <= bricks <= total:
         raise GripError(f"brick count {bricks}: the scene has 1 to {total} bricks")
@@ -121,14 +243,14 @@ def grip_columns(network: Network, bricks: int, grips: ArrayLike) -> Ints:
         raise GripError(
             f"grips have shape {numbers.shape}; give integer node numbers, (sets, grips)"
         )
-    known, place = network.place_of_grip
+    known, index = network.index_of_grip
     at = np.searchsorted(known, numbers).clip(max=len(known) - 1)
-    columns = place[at]
+    columns = index[at]
     wrong = (known[at] != numbers) | (columns >= 2 * bricks)
     if wrong.any():
         raise GripError(
             f"grip on node {numbers[wrong][0]}: with {bricks} bricks the free nodes are "
-            f"{known[place < 2 * bricks].tolist()}"
+            f"{known[index < 2 * bricks].tolist()}"
         )
     for i, j in combinations(range(columns.shape[1]), 2):
         twice = columns[:, i] == columns[:, j]

@@ -11,14 +11,22 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from seqopt.engines.interface import Fields, Want, grip_columns
-from seqopt.engines.plane import find_plane, off_plane
+from seqopt.engines.plane import NoPlane, Plane, find_plane, off_plane
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.errors import GripError
+from seqopt.errors import GripError, SceneError
 from seqopt.network.network import Network
+
+ELSE = "use the compliance engine"
 
 
 class PlanarEngine:
     """Answers any batch of grip sets on any partial structure of a planar scene.
+
+    Parameters
+    ----------
+    network : Network
+    plane : Plane, optional
+        The structure's, if it is known; by default it is found.
 
     Raises
     ------
@@ -26,28 +34,45 @@ class PlanarEngine:
         If bricks, springs or gravity leave the scene's plane.
     """
 
-    def __init__(self, network: Network) -> None:
-        self.plane = find_plane(network)
-        self._engine = ComplianceEngine(network, self.plane.basis)
+    def __init__(self, network: Network, plane: Plane | None = None) -> None:
+        found = find_plane(network) if plane is None else plane
+        if isinstance(found, NoPlane):
+            raise SceneError(f"{found.reason}; {ELSE}")
+        self.plane = found
+        self._engine = ComplianceEngine(network, found.basis)
 
     @property
     def network(self) -> Network:
         """The network whose nodes and edges the fields follow."""
         return self._engine.network
 
-    def solve(self, bricks: int, grips: ArrayLike, want: Want = Want.TABLE) -> Fields:
-        """Return the fields of the first ``bricks`` bricks; see `seqopt.engines.interface.Engine`.
+    def solve(self, bricks: int, grips: ArrayLike, want: Want = Want.RESPONSES) -> Fields:
+        """Return the fields of a partial structure for many grip sets.
+
+        Parameters
+        ----------
+        bricks : int
+            How many bricks stand.
+        grips : (S, r) int
+            Node numbers.
+        want : Want, optional
+
+        Returns
+        -------
+        Fields
 
         Raises
         ------
         GripError
-            Also if a grip lies outside the plane.
+            As of `seqopt.engines.interface.Engine`, and if a grip lies outside the plane.
+        MechanismError, SolverError
+            As of `seqopt.engines.interface.Engine`.
         """
         away = off_plane(self.network, self.plane, grip_columns(self.network, bricks, grips))
         if away.any():
             node = np.asarray(grips).ravel()[away.argmax()]
             raise GripError(
                 f"grip on node {node}: it lies {1e3 * away.max():.3g} mm outside the scene's "
-                "plane; use the compliance engine"
+                f"plane; {ELSE}"
             )
         return self._engine.solve(bricks, grips, want)

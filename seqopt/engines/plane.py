@@ -6,16 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from seqopt.arrays import Floats, Ints
+from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.engines.basis import Basis
-from seqopt.errors import SceneError
 from seqopt.network.network import GROUND, Network
 
 FLAT = 1e-9  # distance from the plane that counts as none, over the size of the structure
 
 
-@dataclass(frozen=True)
-class Plane:
+@dataclass(frozen=True, eq=False, repr=False)
+class Plane(FrozenValue):
     """A plane that mirrors a structure onto itself, as far as forces in it are concerned.
 
     Attributes
@@ -37,33 +36,69 @@ class Plane:
         return Basis(self.axes, self.normal[None])
 
     def distance(self, points: Floats) -> Floats:
-        """Return how far points (..., 3) lie from the plane, m."""
+        """Return how far points lie from the plane.
+
+        Parameters
+        ----------
+        points : (..., 3) float
+            m.
+
+        Returns
+        -------
+        (...) float
+            m.
+        """
         return np.asarray(np.abs((points - self.point) @ self.normal))
 
 
-def find_plane(network: Network) -> Plane:
+@dataclass(frozen=True)
+class NoPlane:
+    """That a structure lies in no plane.
+
+    Attributes
+    ----------
+    reason : str
+        What lies outside, a clause that goes into a sentence.
+    """
+
+    reason: str
+
+
+def find_plane(network: Network) -> Plane | NoPlane:
     """Return the plane of a structure: bricks, springs and gravity lie in it, springs along it.
 
     Bricks may be of any width: their nodes need not lie in the plane, their centroids must.
 
-    Raises
-    ------
-    SceneError
-        If there is no such plane; the message names what lies outside.
+    Parameters
+    ----------
+    network : Network
+
+    Returns
+    -------
+    Plane or NoPlane
     """
-    centroid = network.node_position[network.inner].mean(axis=1)
-    points = np.vstack([centroid, network.springs.position, network.springs.anchor])
+    springs = network.springs
+    points = np.vstack([network.centroid, springs.position, springs.anchor])
     normal = _normal(network, points - points.mean(axis=0))
     plane = Plane(points.mean(axis=0), normal, _spanned(normal))
-    _check_points(network, plane, centroid)
-    _check_springs(network, normal)
-    return plane
+    outside = _points_outside(network, plane) or _turned_springs(network, normal)
+    return NoPlane(outside) if outside else plane
 
 
 def off_plane(network: Network, plane: Plane, columns: Ints) -> Floats:
-    """Return how far each grip of sets (S, r), places in ``inner``, lies from the plane, m.
+    """Return how far grips lie from a plane.
 
-    Zero where it lies in it to within rounding.
+    Parameters
+    ----------
+    network : Network
+    plane : Plane
+    columns : (S, r) int
+        Grips as indices into ``network.inner.ravel()``.
+
+    Returns
+    -------
+    (S, r) float
+        m; zero where a grip lies in the plane to within rounding.
     """
     inner = network.node_position[network.inner.ravel()]
     away = plane.distance(inner)
@@ -93,38 +128,34 @@ def _spanned(normal: Floats) -> Floats:
     return np.array([first, np.cross(normal, first)])
 
 
-def _check_points(network: Network, plane: Plane, centroid: Floats) -> None:
-    """Require bricks, springs and their fixed points in the plane."""
+def _points_outside(network: Network, plane: Plane) -> str:
+    """Return which brick, spring or fixed point lies outside; empty if none does."""
     scene = network.scene
-    size = float(np.ptp(centroid, axis=0).max()) or max(scene.placed[0].dimensions)
-    away = plane.distance(centroid)
+    size = float(np.ptp(network.centroid, axis=0).max()) or max(scene.placed[0].dimensions)
+    away = plane.distance(network.centroid)
+    outside = "outside the scene's middle plane"
     if away.max() > FLAT * size:
         brick = scene.placed[int(away.argmax())].name
-        raise SceneError(
-            f"brick {brick}: its centroid lies {1e3 * away.max():.3g} mm outside the scene's "
-            "middle plane; use the compliance engine"
-        )
+        return f"brick {brick}: its centroid lies {1e3 * away.max():.3g} mm {outside}"
     springs = network.springs
     away = np.maximum(plane.distance(springs.position), plane.distance(springs.anchor))
     if away.max() > FLAT * size:
-        raise SceneError(
-            f"{_spring(network, int(away.argmax()))}: it lies {1e3 * away.max():.3g} mm outside "
-            "the scene's middle plane; use the compliance engine"
-        )
+        name = _spring(network, int(away.argmax()))
+        return f"{name}: it lies {1e3 * away.max():.3g} mm {outside}"
+    return ""
 
 
-def _check_springs(network: Network, normal: Floats) -> None:
-    """Require springs that answer motions in the plane by forces in the plane."""
+def _turned_springs(network: Network, normal: Floats) -> str:
+    """Return which spring answers a motion in the plane by a force across; empty if none does."""
     springs = network.springs
     for stiffness in (springs.translational_stiffness, springs.rotational_stiffness):
         pull = np.einsum("sij,si,si->sj", springs.axes, stiffness, springs.axes @ normal)
         across = pull - (pull @ normal)[:, None] * normal
-        skewed = np.linalg.norm(across, axis=1) > FLAT * stiffness.max(axis=1)
-        if skewed.any():
-            raise SceneError(
-                f"{_spring(network, int(skewed.argmax()))}: its axes are turned out of the scene's "
-                "plane; use the compliance engine"
-            )
+        turned = np.linalg.norm(across, axis=1) > FLAT * stiffness.max(axis=1)
+        if turned.any():
+            name = _spring(network, int(turned.argmax()))
+            return f"{name}: its axes are turned out of the scene's plane"
+    return ""
 
 
 def _spring(network: Network, index: int) -> str:

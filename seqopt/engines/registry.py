@@ -28,18 +28,41 @@ LIMITED: dict[str, Callable[[Network, Mortar], Engine]] = {
 
 
 def make_engine(name: str, network: Network, mortar: Mortar | None = None) -> Engine:
-    """Return an engine by name, with a mortar in place of the study's epoxy.
+    """Return an engine by name.
+
+    Parameters
+    ----------
+    name : str
+        One of `ENGINES`.
+    network : Network
+    mortar : Mortar, optional
+        What the joints hold; by default the engine's own choice.
+
+    Returns
+    -------
+    Engine
 
     Raises
     ------
     SceneError
-        If the engine's joints hold anything, or cannot be those of the scene.
+        If there is no such engine, a mortar would change nothing in it, or the engine cannot
+        model the scene.
+
+    Examples
+    --------
+    >>> from seqopt.network.build import build_network
+    >>> from seqopt.scene.scene_file import load_scene
+    >>> engine = make_engine("compliance", build_network(load_scene("arch25")))
+    >>> engine.solve(1, [[1]]).grip_force.shape
+    (1, 1, 3)
     """
+    if name not in ENGINES:
+        raise SceneError(f"engine {name}: there is none; known are {', '.join(ENGINES)}")
     if mortar is None:
         return ENGINES[name](network)
     if name not in LIMITED:
         raise SceneError(
             f"engine {name}: its joints hold anything, so that a mortar changes nothing; "
-            f"use --engine {' or '.join(LIMITED)}"
+            f"take the engine {' or '.join(LIMITED)}"
         )
     return LIMITED[name](network, mortar)

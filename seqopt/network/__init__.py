@@ -1,1 +1,35 @@
-"""Room."""
+"""The double-cross network: a scene as nodes, edges and springs, sorted by when they appear.
+
+>>> from seqopt.network import build_network
+>>> from seqopt.scene import load_scene
+>>> network = build_network(load_scene("arch25"))
+>>> network
+<Network arch25: 25 bricks, 26 springs, 78 nodes, 77 edges>
+
+What a partial structure has comes first in every array, so a brick count says it all:
+
+>>> network.count_nodes(3), network.count_edges(3), network.springs.acting(3)
+(11, 10, array([0, 1, 2]))
+
+Maps say how its nodes follow the bricks, and what its edges carry of the springs' forces:
+
+>>> from seqopt.network import build_statics, node_motion
+>>> node_motion(network, 3).shape, build_statics(network).edge_of_spring.shape
+((33, 18), (77, 78))
+"""
+
+from seqopt.network.build import build_network
+from seqopt.network.kinematics import node_motion
+from seqopt.network.network import GROUND, Network, PartKind, Springs
+from seqopt.network.statics import Statics, build_statics
+
+__all__ = [
+    "GROUND",
+    "Network",
+    "PartKind",
+    "Springs",
+    "Statics",
+    "build_network",
+    "build_statics",
+    "node_motion",
+]

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from seqopt.network.network import GROUND, Network, PartKind, Springs
-from seqopt.scene.scene import Brick, Ground, Joint, Scene
+from seqopt.scene.parts import Brick, Ground, Joint
+from seqopt.scene.scene import Scene
 
-TIE = 1e-6  # two inner nodes are equally far from a joint within this share of the distance
+EQUALLY_FAR = 1e-6  # inner nodes whose distances from a joint differ by no larger share
 
 
 @dataclass(frozen=True)
@@ -32,9 +33,24 @@ class _Edge:
 
 
 def build_network(scene: Scene) -> Network:
-    """Return the network of a whole scene."""
-    place = {brick.name: i for i, brick in enumerate(scene.placed)}
-    springs = _springs(scene, place)
+    """Return the network of a whole scene.
+
+    Parameters
+    ----------
+    scene : Scene
+
+    Returns
+    -------
+    Network
+
+    Examples
+    --------
+    >>> from seqopt.scene.scene_file import load_scene
+    >>> build_network(load_scene("arch25"))
+    <Network arch25: 25 bricks, 26 springs, 78 nodes, 77 edges>
+    """
+    index_of = {brick.name: i for i, brick in enumerate(scene.placed)}
+    springs = _springs(scene, index_of)
     names = _joint_names(springs)
     nodes, edges = [], []
     for i, brick in enumerate(scene.placed):
@@ -45,12 +61,14 @@ def build_network(scene: Scene) -> Network:
         ends = spring.bricks if isinstance(spring, Joint) else (spring.brick,)
         name = names[s]
         nodes.append(
-            _Node(name, PartKind.JOINT, min(place[b] for b in ends) + 1, spring.position, s)
+            _Node(name, PartKind.JOINT, min(index_of[b] for b in ends) + 1, spring.position, s)
         )
         for b in ends:
-            brick = scene.placed[place[b]]
+            brick = scene.placed[index_of[b]]
             edges.append(
-                _Edge((_nearest(brick, spring), name), PartKind.JOINT, place[b] + 1, place[b], s)
+                _Edge(
+                    (_nearest(brick, spring), name), PartKind.JOINT, index_of[b] + 1, index_of[b], s
+                )
             )
         if isinstance(spring, Ground):
             base = ("base", *name[1:])
@@ -58,17 +76,17 @@ def build_network(scene: Scene) -> Network:
             edges.append(_Edge((name, base), PartKind.BASE, since, spring=s))
     nodes.sort(key=lambda node: node.since)
     edges.sort(key=lambda edge: edge.since)
-    return _arrays(scene, place, springs, nodes, edges)
+    return _arrays(scene, index_of, springs, nodes, edges)
 
 
-def _springs(scene: Scene, place: dict[int, int]) -> list[tuple[Joint | Ground, int]]:
+def _springs(scene: Scene, index_of: dict[int, int]) -> list[tuple[Joint | Ground, int]]:
     """Return joints and ground ends with the brick count from which each acts, in that order."""
     springs: list[tuple[Joint | Ground, int]] = []
     for ground in scene.grounds:
         closes = ground.brick if ground.closes_with is None else ground.closes_with
-        springs.append((ground, max(place[ground.brick], place[closes]) + 1))
+        springs.append((ground, max(index_of[ground.brick], index_of[closes]) + 1))
     for joint in scene.joints:
-        springs.append((joint, max(place[b] for b in joint.bricks) + 1))
+        springs.append((joint, max(index_of[b] for b in joint.bricks) + 1))
     return sorted(springs, key=lambda entry: entry[1])
 
 
@@ -87,12 +105,12 @@ def _nearest(brick: Brick, spring: Joint | Ground) -> int:
     first, second = (
         np.linalg.norm(np.subtract(brick.node_position(n), spring.position)) for n in brick.nodes
     )
-    return brick.nodes[0] if first <= second * (1 + TIE) else brick.nodes[1]
+    return brick.nodes[0] if first <= second * (1 + EQUALLY_FAR) else brick.nodes[1]
 
 
 def _arrays(
     scene: Scene,
-    place: dict[int, int],
+    index_of: dict[int, int],
     springs: list[tuple[Joint | Ground, int]],
     nodes: list[_Node],
     edges: list[_Edge],
@@ -104,7 +122,7 @@ def _arrays(
     return Network(
         scene=scene,
         springs=Springs(
-            bodies=np.array([_bodies(spring, place) for spring, _ in springs]),
+            bodies=np.array([_bodies(spring, index_of) for spring, _ in springs]),
             since=np.array([since for _, since in springs]),
             node=np.array([index[name] for name in _joint_names(springs)]),
             position=np.array([spring.position for spring, _ in springs]),
@@ -130,11 +148,11 @@ def _arrays(
     )
 
 
-def _bodies(spring: Joint | Ground, place: dict[int, int]) -> tuple[int, int]:
+def _bodies(spring: Joint | Ground, index_of: dict[int, int]) -> tuple[int, int]:
     if isinstance(spring, Joint):
-        a, b = sorted(place[name] for name in spring.bricks)
+        a, b = sorted(index_of[name] for name in spring.bricks)
         return a, b
-    return GROUND, place[spring.brick]
+    return GROUND, index_of[spring.brick]
 
 
 def _anchor(spring: Joint | Ground) -> tuple[float, float, float]:

@@ -1,4 +1,8 @@
-"""Rigid-body kinematics of the network: how its nodes follow the bricks."""
+"""Rigid-body kinematics: how nodes follow bricks, and how bricks deform the springs between them.
+
+A twist is the translation of a body's reference point (a brick's centroid) and its rotation, m and
+rad. Under small twists every motion is linear in them, so each of these maps is a matrix.
+"""
 
 from __future__ import annotations
 
@@ -9,26 +13,45 @@ from seqopt.arrays import Floats, Ints, skew
 from seqopt.network.network import GROUND, Network, PartKind
 
 
-def node_motion(network: Network, bricks: int) -> sparse.csr_array:
-    """Return the displacements of the nodes for unit twists of the bricks, (3N, 6b).
+def point_motion(arm: Floats) -> Floats:
+    """Return the displacements of points of a body for its unit twists.
 
-    A twist is the translation of a brick's centroid and its rotation. An inner node follows its
-    brick. A joint node lies between two equal springs in series and moves by the mean of what it
-    would on either side; one whose spring does not act yet follows the brick that is there.
+    Parameters
+    ----------
+    arm : (..., 3) float
+        From the body's reference point to the point, m.
+
+    Returns
+    -------
+    (..., 3, 6) float
+        ``[I, -skew(arm)]``; its transpose takes forces at the points to wrenches.
+    """
+    shift = np.broadcast_to(np.eye(3), (*arm.shape, 3))
+    return np.concatenate([shift, -skew(arm)], axis=-1)
+
+
+def node_motion(network: Network, bricks: int) -> sparse.csr_array:
+    """Return the displacements of the nodes for unit twists of the bricks.
+
+    An inner node follows its brick. A joint node lies between two equal springs in series and moves
+    by the mean of what it would on either side; one whose spring does not act yet follows the brick
+    that is there.
+
+    Parameters
+    ----------
+    network : Network
+    bricks : int
+        How many bricks stand.
+
+    Returns
+    -------
+    (3n, 6b) sparse
+        Of the n nodes of the partial structure.
     """
     node, brick, share = _followers(network, bricks)
-    arm = network.node_position[node] - centroids(network)[brick]
-    block = np.concatenate([np.broadcast_to(np.eye(3), (len(node), 3, 3)), -skew(arm)], axis=2)
-    rows = np.broadcast_to(3 * node[:, None, None] + np.arange(3)[:, None], block.shape)
-    columns = np.broadcast_to(6 * brick[:, None, None] + np.arange(6), block.shape)
-    values = share[:, None, None] * block
-    shape = (3 * network.count_nodes(bricks), 6 * bricks)
-    return sparse.csr_array((values.ravel(), (rows.ravel(), columns.ravel())), shape=shape)
-
-
-def centroids(network: Network) -> Floats:
-    """Return the bricks' centroids in build order, (B, 3), m."""
-    return np.asarray(network.node_position[network.inner].mean(axis=1))
+    block = point_motion(network.node_position[node] - network.centroid[brick])
+    shape = (network.count_nodes(bricks), bricks)
+    return _spread(node, brick, share[:, None, None] * block, shape)
 
 
 def _followers(network: Network, bricks: int) -> tuple[Ints, Ints, Floats]:
@@ -47,23 +70,91 @@ def _followers(network: Network, bricks: int) -> tuple[Ints, Ints, Floats]:
     return node, brick, np.concatenate([np.ones(len(inner)), share[row, side]])
 
 
-def spring_maps(network: Network, bricks: int) -> tuple[Ints, Floats, Floats]:
-    """Return the acting springs, their deformations for unit twists and their stiffnesses.
+def deformation(
+    bodies: Ints, at: Floats, center: Floats, axes: Floats | None = None
+) -> sparse.csr_array:
+    """Return the twists of second bodies against first ones for unit twists of all bodies.
 
-    Shapes (s,), (s, 6, 6b), (s, 6, 6): global axes, second body relative to first.
+    Parameters
+    ----------
+    bodies : (s, 2) int
+        First and second body of every spring; `GROUND` does not move.
+    at : (s, 3) float
+        The point at which each twist is taken, m.
+    center : (n, 3) float
+        Reference points of the bodies, m.
+    axes : (s, 3, 3) float, optional
+        Rows are the axes in which each twist is given; by default those of the scene.
+
+    Returns
+    -------
+    (6s, 6n) sparse
+    """
+    spring, side = np.nonzero(bodies != GROUND)
+    body = bodies[spring, side]
+    block = np.tile(np.eye(6), (len(spring), 1, 1))
+    block[:, :3] = point_motion(at[spring] - center[body])
+    block *= np.where(side, 1.0, -1.0)[:, None, None]
+    if axes is not None:
+        turn = np.zeros((len(axes), 6, 6))
+        turn[:, :3, :3] = turn[:, 3:, 3:] = axes
+        block = turn[spring] @ block
+    return _spread(spring, body, block, (len(bodies), len(center)))
+
+
+def spring_stiffness(network: Network, which: Ints) -> Floats:
+    """Return the stiffness of springs in the scene's axes.
+
+    Parameters
+    ----------
+    network : Network
+    which : (s,) int
+        Springs of the network.
+
+    Returns
+    -------
+    (s, 6, 6) float
+        N/m and N m/rad.
     """
     springs = network.springs
-    acting = np.flatnonzero(springs.since <= bricks)
-    center = centroids(network)
-    gap = np.zeros((len(acting), 6, 6 * bricks))
-    stiffness = np.zeros((len(acting), 6, 6))
-    for row, s in enumerate(acting):
-        for body, sign in zip(springs.bodies[s], (-1.0, 1.0), strict=True):
-            if body != GROUND:
-                block = gap[row, :, 6 * body : 6 * body + 6]
-                block += sign * np.eye(6)
-                block[:3, 3:] -= sign * skew(springs.position[s] - center[body])
+    stiffness = np.zeros((len(which), 6, 6))
+    for row, s in enumerate(which):
         axes = springs.axes[s]
         stiffness[row, :3, :3] = axes.T * springs.translational_stiffness[s] @ axes
         stiffness[row, 3:, 3:] = axes.T * springs.rotational_stiffness[s] @ axes
-    return acting, gap, stiffness
+    return stiffness
+
+
+def spring_maps(network: Network, bricks: int) -> tuple[Ints, Floats, Floats]:
+    """Return what stiffness matrices are assembled from, dense and spring by spring.
+
+    Parameters
+    ----------
+    network : Network
+    bricks : int
+        How many bricks stand.
+
+    Returns
+    -------
+    acting : (s,) int
+        The springs that act.
+    gap : (s, 6, 6b) float
+        Their `deformation` for unit twists of the bricks, in the scene's axes.
+    stiffness : (s, 6, 6) float
+        N/m and N m/rad.
+    """
+    springs = network.springs
+    acting = springs.acting(bricks)
+    center = network.centroid[:bricks]
+    gap = deformation(springs.bodies[acting], springs.position[acting], center)
+    stiffness = spring_stiffness(network, acting)
+    return acting, gap.toarray().reshape(len(acting), 6, 6 * bricks), stiffness
+
+
+def _spread(row: Ints, column: Ints, block: Floats, shape: tuple[int, int]) -> sparse.csr_array:
+    """Return the sparse matrix of blocks (m, p, q) at block rows and columns (m,)."""
+    down, across = block.shape[1:]
+    rows = np.broadcast_to(down * row[:, None, None] + np.arange(down)[:, None], block.shape)
+    columns = np.broadcast_to(across * column[:, None, None] + np.arange(across), block.shape)
+    entries = (block.ravel(), (rows.ravel(), columns.ravel()))
+    return sparse.csr_array(entries, shape=(down * shape[0], across * shape[1]))

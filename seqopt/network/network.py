@@ -14,14 +14,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import cached_property
+from typing import TYPE_CHECKING
 
-import networkx as nx
 import numpy as np
 
-from seqopt.arrays import Floats, Ints
+from seqopt.arrays import Floats, FrozenValue, Ints, frozen
 from seqopt.scene.scene import Scene
 
-GROUND = -1  # stands for the ground where a brick's place in the build order is expected
+if TYPE_CHECKING:
+    import networkx as nx
+
+GROUND = -1  # stands for the ground where a brick's index in build order is expected
 
 
 class PartKind(IntEnum):
@@ -32,14 +35,14 @@ class PartKind(IntEnum):
     BASE = 2  # fixed node of a ground end; stub that leads to it
 
 
-@dataclass(frozen=True)
-class Springs:
+@dataclass(frozen=True, eq=False, repr=False)
+class Springs(FrozenValue):
     """The joints and ground ends of a network, as arrays over springs.
 
     Attributes
     ----------
     bodies : (S, 2) int
-        Places in the build order of the bricks they join; `GROUND` first for a ground end.
+        Indices in build order of the bricks they join; `GROUND` first for a ground end.
     since : (S,) int
         Brick count from which the spring acts.
     node : (S,) int
@@ -64,9 +67,29 @@ class Springs:
     rotational_stiffness: Floats
     support: int
 
+    def acting(self, bricks: int) -> Ints:
+        """Return the springs that act on a partial structure.
 
-@dataclass(frozen=True)
-class Network:
+        Parameters
+        ----------
+        bricks : int
+            How many bricks stand.
+
+        Returns
+        -------
+        (s,) int
+            Ascending.
+        """
+        return np.flatnonzero(self.since <= bricks)
+
+    @cached_property
+    def stiffness(self) -> Floats:
+        """Translational and rotational stiffness side by side, (S, 6), N/m and N m/rad."""
+        return frozen(np.hstack([self.translational_stiffness, self.rotational_stiffness]))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Network(FrozenValue):
     """The double-cross network of a scene as arrays; see the module's text for the order.
 
     Attributes
@@ -76,10 +99,11 @@ class Network:
     node_position : (N, 3) float
         m.
     node_kind, node_since : (N,) int
+        What a node is, `PartKind`, and the brick count that brings it.
     node_spring : (N,) int
         Spring of a joint or base node, -1 for an inner node.
     node_brick : (N,) int
-        Place in the build order of an inner node's brick, -1 for others.
+        Index in build order of an inner node's brick, -1 for others.
     node_name : (N,) object
         The scene's number for an inner node; for others ``("joint", a, b)``,
         ``("joint", "ground", a)`` or ``("base", "ground", a)`` with the names of the bricks, and a
@@ -89,8 +113,19 @@ class Network:
     edge_nodes : (E, 2) int
         From the brick outward for half-edges and stubs.
     edge_kind, edge_since, edge_brick, edge_spring : (E,) int
+        As for nodes.
     weight : (B, 3) float
         Weight of every brick as a force, N.
+
+    Examples
+    --------
+    >>> from seqopt.network.build import build_network
+    >>> from seqopt.scene.scene_file import load_scene
+    >>> network = build_network(load_scene("arch25"))
+    >>> network
+    <Network arch25: 25 bricks, 26 springs, 78 nodes, 77 edges>
+    >>> network.count_edges(3), network.springs.acting(3)
+    (10, array([0, 1, 2]))
     """
 
     scene: Scene
@@ -109,14 +144,31 @@ class Network:
     edge_spring: Ints
     weight: Floats
 
+    def __repr__(self) -> str:
+        counts = (
+            f"{len(self.inner)} bricks, {len(self.springs.since)} springs, "
+            f"{len(self.node_kind)} nodes, {len(self.edge_kind)} edges"
+        )
+        return f"<Network {self.scene.name}: {counts}>"
+
+    @cached_property
+    def centroid(self) -> Floats:
+        """Centroids of the bricks in build order, (B, 3), m."""
+        return frozen(np.asarray(self.node_position[self.inner].mean(axis=1)))
+
+    @cached_property
+    def inner_weight(self) -> Floats:
+        """Half of its brick's weight at every inner node, (2B, 3), N; order of ``inner``."""
+        return frozen(np.repeat(0.5 * self.weight, 2, axis=0))
+
     @cached_property
     def edge_axis(self) -> Floats:
         """Unit vectors along the edges, (E, 3)."""
         step = np.diff(self.node_position[self.edge_nodes], axis=1)[:, 0]
-        return np.asarray(step / np.linalg.norm(step, axis=1, keepdims=True))
+        return frozen(np.asarray(step / np.linalg.norm(step, axis=1, keepdims=True)))
 
     @cached_property
-    def place_of_node(self) -> dict[int, int]:
+    def index_of_node(self) -> dict[int, int]:
         """Index of every inner node by its number in the scene."""
         return {
             int(name): i  # type: ignore[call-overload]
@@ -125,30 +177,60 @@ class Network:
         }
 
     @cached_property
-    def place_of_grip(self) -> tuple[Ints, Ints]:
-        """Numbers of all inner nodes in the scene, ascending, and their places in ``inner``.
+    def index_of_grip(self) -> tuple[Ints, Ints]:
+        """Numbers of all inner nodes, (2B,) ascending, and their indices in ``inner.ravel()``.
 
-        A node that must not be held has a place after all others.
+        A node that must not be held has an index after all others.
         """
         numbers = np.array([self.node_name[i] for i in self.inner.ravel()], dtype=np.int64)
         order = np.argsort(numbers)
         blocked = np.isin(numbers[order], self.scene.blocked_nodes)
-        return numbers[order], np.where(blocked, len(numbers), order)
+        return frozen((numbers[order], np.where(blocked, len(numbers), order)))
 
     def count_nodes(self, bricks: int) -> int:
-        """Return how many nodes the structure of the first ``bricks`` bricks has."""
+        """Return how many nodes a partial structure has.
+
+        Parameters
+        ----------
+        bricks : int
+            How many bricks stand.
+
+        Returns
+        -------
+        int
+        """
         return int(np.searchsorted(self.node_since, bricks, side="right"))
 
     def count_edges(self, bricks: int) -> int:
-        """Return how many edges the structure of the first ``bricks`` bricks has."""
+        """Return how many edges a partial structure has.
+
+        Parameters
+        ----------
+        bricks : int
+            How many bricks stand.
+
+        Returns
+        -------
+        int
+        """
         return int(np.searchsorted(self.edge_since, bricks, side="right"))
 
     def graph(self, bricks: int) -> nx.Graph[object]:
-        """Return the partial structure as a graph.
+        """Return a partial structure as a graph.
 
-        Nodes carry ``kind`` and ``position`` (m), edges ``number`` (from 1), ``kind`` and
-        ``length`` (m).
+        Parameters
+        ----------
+        bricks : int
+            How many bricks stand.
+
+        Returns
+        -------
+        networkx.Graph
+            Nodes carry ``kind`` and ``position`` (m), edges ``number`` (from 1), ``kind`` and
+            ``length`` (m).
         """
+        import networkx as nx  # noqa: PLC0415  # slow to import, and needed nowhere else
+
         graph: nx.Graph[object] = nx.Graph(name=self.scene.name, bricks=bricks)
         for i in range(self.count_nodes(bricks)):
             graph.add_node(

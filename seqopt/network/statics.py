@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
-from seqopt.arrays import Floats, skew
+from seqopt.arrays import Floats, FrozenValue, skew
 from seqopt.network.network import Network, PartKind
 
 
-@dataclass(frozen=True)
-class Statics:
+@dataclass(frozen=True, eq=False, repr=False)
+class Statics(FrozenValue):
     """Linear maps from forces to what the edges and the support carry, for the whole scene.
 
     Attributes
@@ -36,6 +36,14 @@ def build_statics(network: Network) -> Statics:
 
     A half-edge or a stub carries its spring's force along its own axis. An inner edge carries
     along its axis what reaches its second node: the load there and the half-edges that end there.
+
+    Parameters
+    ----------
+    network : Network
+
+    Returns
+    -------
+    Statics
     """
     axis, kind, spring = network.edge_axis, network.edge_kind, network.edge_spring
     springs = network.springs

@@ -142,7 +142,7 @@ def responses_of(network: Network, fields: Fields) -> dict[str, Floats]:
     network : Network
         The network that the fields run over.
     fields : Fields
-        With edge forces, displacements and the support (`Want.TABLE`).
+        With edge forces, displacements and the support (`Want.RESPONSES`).
 
     Returns
     -------

@@ -11,7 +11,7 @@ import pandas as pd
 from seqopt.engines.interface import Engine, Fields
 from seqopt.errors import MechanismError, SolverError
 from seqopt.responses.quantities import RESPONSES, grip_forces
-from seqopt.scene.scene import Robot
+from seqopt.scene.parts import Robot
 from seqopt.sequence.steps import Step
 
 

@@ -10,8 +10,9 @@ import numpy as np
 
 from seqopt.arrays import Floats, Vector
 from seqopt.errors import SceneError
+from seqopt.scene.parts import Brick, Ground, Joint, Robot
 from seqopt.scene.reach import Anywhere, Reach, Side
-from seqopt.scene.scene import Brick, Ground, Joint, Robot, Scene
+from seqopt.scene.scene import Scene
 
 LEFT = np.array([0.0, 1.0, 0.0])
 LETTERS = "VLR"
@@ -50,6 +51,16 @@ class ArchShape:
         kg/m³.
     closed : bool
         Whether the last brick stands on a second ground end.
+
+    Raises
+    ------
+    SceneError
+        If there are no bricks, the lists differ in length or the pattern has other letters.
+
+    Examples
+    --------
+    >>> ArchShape(pitch=(1.2, 0.6, 0.0, -0.6, -1.2), pattern="V").dimensions
+    (0.246, 0.116, 0.053)
     """
 
     pitch: Sequence[float]
@@ -91,7 +102,7 @@ def arch_scene(
     """Return the scene of an arch that is built from its first brick to its last.
 
     The chain starts at the origin and runs towards +x; z is up, left is +y. Brick ``b`` has the
-    nodes 2b-2 and 2b-1, the upper or outer one last; node 0 is blocked, as in the study.
+    nodes 2b-2 and 2b-1, the upper or outer one last; node 0 is blocked, as in Bruun et al.
 
     Parameters
     ----------
@@ -101,6 +112,15 @@ def arch_scene(
         By default `robots_beside` the arch.
     line_nodes : mapping of int to int, optional
         Per brick that lies across: which of its nodes is on the arch line; 2b-2 by default.
+
+    Returns
+    -------
+    Scene
+
+    Examples
+    --------
+    >>> arch_scene(ArchShape(pitch=(1.2, 0.6, 0.0, -0.6, -1.2), pattern="V"), "small")
+    <Scene small: 5 bricks, 4 joints, 2 ground ends, 3 robots>
     """
     tangent, left, ends = _axes(shape)
     pattern = _pattern(shape)
@@ -136,6 +156,10 @@ def robots_beside(shape: ArchShape) -> tuple[Robot, ...]:
     Parameters
     ----------
     shape : ArchShape
+
+    Returns
+    -------
+    tuple of 3 Robot
     """
     beyond = shape.overhang + 0.25 * shape.dimensions[1]
     weight = math.prod(shape.dimensions) * shape.density * STANDARD_GRAVITY * len(shape.pitch)
@@ -171,9 +195,9 @@ def _axes(shape: ArchShape) -> tuple[Floats, Floats, Floats]:
     return tangent, left, ends
 
 
-def _brick(shape: ArchShape, b: int, place: tuple[Floats, Floats, Floats], line_node: int) -> Brick:
+def _brick(shape: ArchShape, b: int, pose: tuple[Floats, Floats, Floats], line_node: int) -> Brick:
     """Return brick ``b`` from its direction along the arch, its left, and its middle."""
-    tangent, left, position = place
+    tangent, left, position = pose
     letter = _pattern(shape)[b - 1]
     nodes = (2 * b - 2, 2 * b - 1)
     if letter == "V":

@@ -15,7 +15,17 @@ class Anywhere:
     """A mobile robot: every node is within reach."""
 
     def covers(self, point: Vector) -> bool:
-        """Return whether the point, m, is within reach."""
+        """Return whether a point is within reach.
+
+        Parameters
+        ----------
+        point : Vector
+            m.
+
+        Returns
+        -------
+        bool
+        """
         return True
 
 
@@ -29,6 +39,11 @@ class Side:
         Unit vector that points to the robot's side.
     point : Vector
         A point of the plane that bounds the reach, m.
+
+    Raises
+    ------
+    SceneError
+        If ``toward`` is not a unit vector or a number is not finite.
     """
 
     toward: Vector
@@ -41,13 +56,36 @@ class Side:
             raise SceneError(f"reach: toward is {list(self.toward)}; give a unit vector")
 
     def covers(self, point: Vector) -> bool:
-        """Return whether the point, m, is within reach."""
+        """Return whether a point is within reach.
+
+        Parameters
+        ----------
+        point : Vector
+            m.
+
+        Returns
+        -------
+        bool
+        """
         return dot(self.toward, point) >= dot(self.toward, self.point)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Sphere:
-    """A robot at a fixed base reaches every point within a radius, both in m."""
+    """A robot at a fixed base reaches every point within a radius.
+
+    Parameters
+    ----------
+    center : Vector
+        m.
+    radius : float
+        m.
+
+    Raises
+    ------
+    SceneError
+        If the radius is not a positive number or the center is not finite.
+    """
 
     center: Vector
     radius: float
@@ -57,7 +95,17 @@ class Sphere:
         object.__setattr__(self, "radius", positive("reach: radius", self.radius, "m"))
 
     def covers(self, point: Vector) -> bool:
-        """Return whether the point, m, is within reach."""
+        """Return whether a point is within reach.
+
+        Parameters
+        ----------
+        point : Vector
+            m.
+
+        Returns
+        -------
+        bool
+        """
         return math.dist(self.center, point) <= self.radius
 
 

@@ -1,175 +1,17 @@
-"""The scene: bricks, joints, ground ends, robots and the order in which the bricks are placed.
-
-Every value is frozen and checked when it is made. Positions and lengths are in m, densities in
-kg/m³, forces in N, stiffnesses in N/m and N m/rad, accelerations in m/s².
-"""
+"""The scene: what is built, in which order, and who holds it."""
 
 from __future__ import annotations
 
 import math
 from collections import Counter
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 from seqopt.arrays import Vector
 from seqopt.errors import SceneError
-from seqopt.scene.checks import axes, positive, vector
-from seqopt.scene.reach import Anywhere, Reach
-
-
-@dataclass(frozen=True, kw_only=True)
-class Brick:
-    """A rigid box with two inner nodes, the centroids of its halves.
-
-    Parameters
-    ----------
-    name : int
-        Number of the brick, unique in its scene.
-    position : Vector
-        Centroid, m.
-    length_axis, width_axis : Vector
-        Unit vectors along the length and the width, at right angles.
-    dimensions : Vector
-        Length, width and thickness, m.
-    density : float
-        kg/m³.
-    nodes : tuple of 2 int
-        Numbers of the inner nodes a quarter of the length behind and before the centroid.
-    placing_node : int
-        The node held while the brick is placed by a robot that is on no side of the structure.
-
-    Raises
-    ------
-    SceneError
-        If a value is not finite, not positive where it must be, or not consistent.
-    """
-
-    name: int
-    position: Vector
-    length_axis: Vector
-    width_axis: Vector
-    dimensions: Vector
-    density: float
-    nodes: tuple[int, int]
-    placing_node: int
-
-    def __post_init__(self) -> None:
-        where = f"brick {self.name}"
-        _set(self, "position", vector(f"{where}: position", self.position))
-        _set(self, "dimensions", vector(f"{where}: dimensions", self.dimensions))
-        for length in self.dimensions:
-            positive(f"{where}: dimensions", length, "m")
-        first, second = axes(
-            f"{where}: length_axis and width_axis", self.length_axis, self.width_axis
-        )
-        _set(self, "length_axis", first)
-        _set(self, "width_axis", second)
-        _set(self, "density", positive(f"{where}: density", self.density, "kg/m³"))
-        _set(self, "nodes", tuple(self.nodes))
-        if len(set(self.nodes)) != 2:
-            raise SceneError(f"{where}: nodes are {list(self.nodes)}; give two different numbers")
-        if self.placing_node not in self.nodes:
-            raise SceneError(
-                f"{where}: placing_node is {self.placing_node}; "
-                f"give one of its nodes {list(self.nodes)}"
-            )
-
-    @property
-    def mass(self) -> float:
-        """Mass, kg."""
-        return math.prod(self.dimensions) * self.density
-
-    def node_position(self, node: int) -> Vector:
-        """Return where one of the brick's inner nodes lies, m."""
-        sign = -0.25 if node == self.nodes[0] else 0.25
-        step = sign * self.dimensions[0]
-        x, y, z = (p + step * a for p, a in zip(self.position, self.length_axis, strict=True))
-        return x, y, z
-
-
-@dataclass(frozen=True, kw_only=True)
-class Spring:
-    """Where a joint acts and how stiff it is, in its own axes.
-
-    Parameters
-    ----------
-    position : Vector
-        The point where the springs act, m.
-    along, across : Vector
-        Unit vectors along the joint's normal and across it, at right angles; the third axis is
-        their cross product.
-    translational_stiffness : Vector
-        N/m along the three axes, zero allowed.
-    rotational_stiffness : Vector
-        N m/rad about the three axes, zero allowed.
-    """
-
-    position: Vector
-    along: Vector
-    across: Vector
-    translational_stiffness: Vector
-    rotational_stiffness: Vector
-
-    def _check(self, where: str) -> None:
-        _set(self, "position", vector(f"{where}: position", self.position))
-        first, second = axes(f"{where}: along and across", self.along, self.across)
-        _set(self, "along", first)
-        _set(self, "across", second)
-        for name in ("translational_stiffness", "rotational_stiffness"):
-            _set(self, name, vector(f"{where}: {name}", getattr(self, name), at_least=0.0))
-
-
-@dataclass(frozen=True, kw_only=True)
-class Joint(Spring):
-    """A spring between two bricks; ``bricks`` names them."""
-
-    bricks: tuple[int, int]
-
-    def __post_init__(self) -> None:
-        _set(self, "bricks", tuple(self.bricks))
-        where = f"joint {self.bricks}"
-        if len(set(self.bricks)) != 2:
-            raise SceneError(f"{where}: name two different bricks")
-        self._check(where)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Ground(Spring):
-    """A spring between a brick and a rigid stub that ends at a fixed point.
-
-    Parameters
-    ----------
-    brick : int
-        The brick that stands on this end.
-    anchor : Vector
-        The fixed point, m: reaction and moment are taken here.
-    closes_with : int, optional
-        The brick whose placing closes this end; ``brick`` by default.
-    """
-
-    brick: int
-    anchor: Vector
-    closes_with: int | None = None
-
-    def __post_init__(self) -> None:
-        where = f"ground end of brick {self.brick}"
-        self._check(where)
-        _set(self, "anchor", vector(f"{where}: anchor", self.anchor))
-        if self.anchor == self.position:
-            raise SceneError(f"{where}: anchor and position are one point; give the stub a length")
-
-
-@dataclass(frozen=True, kw_only=True)
-class Robot:
-    """A robot that can hold one node: its name, its payload in N, and where it reaches."""
-
-    name: str
-    payload: float
-    reach: Reach = field(default_factory=Anywhere)
-
-    def __post_init__(self) -> None:
-        _set(self, "payload", positive(f"robot {self.name}: payload", self.payload, "N"))
+from seqopt.scene.checks import vector
+from seqopt.scene.parts import Brick, Ground, Joint, Robot
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -196,6 +38,15 @@ class Scene:
     ------
     SceneError
         If the scene is empty or its parts do not fit together.
+
+    Examples
+    --------
+    >>> from seqopt.scene.scene_file import load_scene
+    >>> scene = load_scene("arch25")
+    >>> scene
+    <Scene arch25: 25 bricks, 24 joints, 2 ground ends, 3 robots>
+    >>> scene.placed[0].nodes, scene.blocked_nodes
+    ((0, 1), (0,))
     """
 
     name: str
@@ -220,6 +71,13 @@ class Scene:
         _unique(f"scene {self.name}: node", (n for brick in self.bricks for n in brick.nodes))
         _unique(f"scene {self.name}: robot", (robot.name for robot in self.robots))
         self._check_references()
+
+    def __repr__(self) -> str:
+        counts = (
+            f"{len(self.bricks)} bricks, {len(self.joints)} joints, "
+            f"{len(self.grounds)} ground ends, {len(self.robots)} robots"
+        )
+        return f"<Scene {self.name}: {counts}>"
 
     def _check_references(self) -> None:
         names = {brick.name for brick in self.bricks}
@@ -253,7 +111,18 @@ class Scene:
         return {node: brick for brick in self.bricks for node in brick.nodes}
 
     def node_position(self, node: int) -> Vector:
-        """Return where an inner node lies, m."""
+        """Return where an inner node lies.
+
+        Parameters
+        ----------
+        node : int
+            Its number.
+
+        Returns
+        -------
+        Vector
+            m.
+        """
         return self.brick_of_node[node].node_position(node)
 
     @cached_property

@@ -8,12 +8,11 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-import jsonschema
-
 from seqopt.errors import SceneError
 from seqopt.files import read_text, write_text
+from seqopt.scene.parts import Brick, Ground, Joint, Robot
 from seqopt.scene.reach import Anywhere, Reach, Side, Sphere
-from seqopt.scene.scene import Brick, Ground, Joint, Robot, Scene
+from seqopt.scene.scene import Scene
 
 VERSION = 1
 REACHES: dict[str, type[Anywhere] | type[Side] | type[Sphere]] = {
@@ -24,14 +23,25 @@ REACHES: dict[str, type[Anywhere] | type[Side] | type[Sphere]] = {
 
 
 def schema() -> dict[str, Any]:
-    """Return the JSON Schema of a scene file."""
+    """Return the JSON Schema of a scene file.
+
+    Returns
+    -------
+    dict
+    """
     text = resources.files("seqopt").joinpath("data/scene.schema.json").read_text(encoding="utf-8")
     document: dict[str, Any] = json.loads(text)
     return document
 
 
 def builtin_scenes() -> tuple[str, ...]:
-    """Return the names of the scenes that ship with the package."""
+    """Return the names of the scenes that ship with the package.
+
+    Returns
+    -------
+    tuple of str
+        In alphabetical order.
+    """
     folder = resources.files("seqopt").joinpath("data/scenes")
     return tuple(sorted(item.name.removesuffix(".json") for item in folder.iterdir()))
 
@@ -39,12 +49,26 @@ def builtin_scenes() -> tuple[str, ...]:
 def load_scene(name: str) -> Scene:
     """Return a built-in scene by name, or the scene of a JSON file.
 
+    Parameters
+    ----------
+    name : str
+        One of `builtin_scenes`, or the path of a file.
+
+    Returns
+    -------
+    Scene
+
     Raises
     ------
     SceneError
         If there is no such scene or the file does not describe one.
     FileError
         If the file cannot be read.
+
+    Examples
+    --------
+    >>> load_scene("arch25")
+    <Scene arch25: 25 bricks, 24 joints, 2 ground ends, 3 robots>
     """
     if name in builtin_scenes():
         source = resources.files("seqopt").joinpath(f"data/scenes/{name}.json")
@@ -57,7 +81,24 @@ def load_scene(name: str) -> Scene:
 
 
 def parse_scene(text: str, source: str = "text") -> Scene:
-    """Return the scene that a JSON document describes."""
+    """Return the scene that a JSON document describes.
+
+    Parameters
+    ----------
+    text : str
+        The document.
+    source : str, optional
+        Where it comes from, for messages.
+
+    Returns
+    -------
+    Scene
+
+    Raises
+    ------
+    SceneError
+        If the text is not JSON, breaks the schema or describes no scene that can be.
+    """
     try:
         document = json.loads(text)
     except json.JSONDecodeError as error:
@@ -67,7 +108,22 @@ def parse_scene(text: str, source: str = "text") -> Scene:
 
 
 def scene_from_dict(document: dict[str, Any]) -> Scene:
-    """Return the scene of a document that obeys the schema."""
+    """Return the scene of a document that obeys the schema.
+
+    Parameters
+    ----------
+    document : dict
+        As of `scene_to_dict`.
+
+    Returns
+    -------
+    Scene
+
+    Raises
+    ------
+    SceneError
+        If its parts do not fit together.
+    """
     content = {key: value for key, value in document.items() if key not in ("format", "version")}
     content["bricks"] = [Brick(**brick) for brick in content["bricks"]]
     content["joints"] = [Joint(**joint) for joint in content["joints"]]
@@ -80,7 +136,16 @@ def scene_from_dict(document: dict[str, Any]) -> Scene:
 
 
 def scene_to_dict(scene: Scene) -> dict[str, Any]:
-    """Return the scene as a document that obeys the schema."""
+    """Return a scene as a document that obeys the schema.
+
+    Parameters
+    ----------
+    scene : Scene
+
+    Returns
+    -------
+    dict
+    """
     document = {"format": "seqopt-scene", "version": VERSION, **asdict(scene)}
     names = {cls: kind for kind, cls in REACHES.items()}
     for entry, robot in zip(document["robots"], scene.robots, strict=True):
@@ -89,7 +154,16 @@ def scene_to_dict(scene: Scene) -> dict[str, Any]:
 
 
 def dump_scene(scene: Scene) -> str:
-    """Return the scene as JSON text, one brick, joint or robot a line."""
+    """Return a scene as JSON text, one brick, joint or robot a line.
+
+    Parameters
+    ----------
+    scene : Scene
+
+    Returns
+    -------
+    str
+    """
     document = scene_to_dict(scene)
     lines = []
     for key, value in document.items():
@@ -102,7 +176,27 @@ def dump_scene(scene: Scene) -> str:
 
 
 def save_scene(scene: Scene, path: Path) -> None:
-    """Write the scene as a JSON file."""
+    """Write a scene as a JSON file.
+
+    Parameters
+    ----------
+    scene : Scene
+    path : Path
+
+    Raises
+    ------
+    FileError
+        If the file cannot be written.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> scene = load_scene("arch25")
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     save_scene(scene, Path(folder, "own.json"))
+    ...     load_scene(f"{folder}/own.json") == scene
+    True
+    """
     write_text(path, dump_scene(scene))
 
 
@@ -111,12 +205,14 @@ def _reach(entry: dict[str, Any]) -> Reach:
 
 
 def _check_schema(document: object, source: str) -> None:
-    """Raise a `SceneError` that names the first place where a document breaks the schema."""
+    """Raise a `SceneError` that names the first entry where a document breaks the schema."""
+    import jsonschema  # noqa: PLC0415  # slow to import, and needed for files only
+
     validator = jsonschema.Draft202012Validator(schema())
     error = jsonschema.exceptions.best_match(validator.iter_errors(document))
     if error is not None:
-        place = error.json_path.removeprefix("$").removeprefix(".") or "document"
-        raise SceneError(f"scene {source}: {place}: {_short(error.message)}")
+        entry = error.json_path.removeprefix("$").removeprefix(".") or "document"
+        raise SceneError(f"scene {source}: {entry}: {_short(error.message)}")
 
 
 def _short(text: str, limit: int = 160) -> str:

@@ -8,7 +8,8 @@ from pathlib import Path
 
 from seqopt.errors import StepError
 from seqopt.files import read_text
-from seqopt.scene.scene import Robot, Scene
+from seqopt.scene.parts import Robot
+from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Step, StepKind, check_sequence
 
 Row = dict[str, str]

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from enum import Enum
 
 from seqopt.errors import StepError
-from seqopt.scene.scene import Robot, Scene
+from seqopt.scene.parts import Robot
+from seqopt.scene.scene import Scene
 
 Grips = tuple[int | None, ...]
 

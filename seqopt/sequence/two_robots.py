@@ -8,8 +8,8 @@ import numpy as np
 
 from seqopt.errors import StepError
 from seqopt.network.network import Network, PartKind
+from seqopt.scene.parts import Brick, Robot
 from seqopt.scene.reach import Side
-from seqopt.scene.scene import Brick, Robot
 from seqopt.sequence.steps import Step, StepKind, check_sequence, reachable
 
 Method = Callable[[Network], tuple[Step, ...]]

@@ -1,1 +1,20 @@
-"""Room."""
+"""Whether half-built structures stand: verdicts with proofs, margins, and what fails first.
+
+An assembly of blocks is assessed with the mortar in its joints; a solver's word is never enough:
+
+>>> from seqopt.contact import DRY, EPOXY, step_assembly
+>>> from seqopt.network import build_network
+>>> from seqopt.scene import load_scene
+>>> from seqopt.stability import assess
+>>> network = build_network(load_scene("arch25"))
+>>> assembly = step_assembly(network, 3, (None, None, None))
+>>> [assess(assembly, mortar).verdict.value for mortar in (DRY, EPOXY)]
+['does not stand', 'stands']
+
+`assess_steps` asks the same of every step of a build, and `stability_table` lays the answers out.
+"""
+
+from seqopt.stability.assessment import Stability, Verdict, assess
+from seqopt.stability.steps import assess_steps, stability_table
+
+__all__ = ["Stability", "Verdict", "assess", "assess_steps", "stability_table"]

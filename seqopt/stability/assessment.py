@@ -8,7 +8,7 @@ from enum import Enum
 
 import numpy as np
 
-from seqopt.arrays import Floats, Vector
+from seqopt.arrays import Floats, FrozenValue, Vector
 from seqopt.contact.assembly import Assembly
 from seqopt.contact.mortar import Mortar
 from seqopt.stability.limit_analysis import (
@@ -36,8 +36,8 @@ class Verdict(Enum):
     UNDECIDED = "undecided"
 
 
-@dataclass(frozen=True)
-class Stability:
+@dataclass(frozen=True, eq=False, repr=False)
+class Stability(FrozenValue):
     """Verdict and margins of one assembly; a margin of which nothing is proven is NaN.
 
     Attributes
@@ -65,6 +65,17 @@ class Stability:
         How the solver said it ended, over all cases that were solved.
     unproven : int
         Cases whose answers proved nothing.
+
+    Examples
+    --------
+    >>> from seqopt.contact.faces import step_assembly
+    >>> from seqopt.contact.mortar import DRY
+    >>> from seqopt.network.build import build_network
+    >>> from seqopt.scene.scene_file import load_scene
+    >>> network = build_network(load_scene("arch25"))
+    >>> stability = assess(step_assembly(network, 3, (None, None, None)), DRY)
+    >>> stability.verdict.value, stability.first_block, stability.grip
+    ('does not stand', '3', 0.0)
     """
 
     verdict: Verdict
@@ -100,10 +111,14 @@ def assess(
     ----------
     assembly : Assembly
     mortar : Mortar
-    up : Vector
+    up : Vector, optional
         Unit vector against gravity; it is pulled at right angles.
-    compiled : callable
+    compiled : callable, optional
         Makes the program to solve; the registered one by default.
+
+    Returns
+    -------
+    Stability
     """
     prove = Prover(assembly, compiled)
     growing = bonded(assembly, mortar)
@@ -129,7 +144,7 @@ def assess(
         motion=motion / np.repeat([1.0, lever], 3),
         first_block=block,
         first_contact=contact,
-        claims=prove.claims,
+        claims=dict(prove.claims),
         unproven=prove.unproven,
     )
 
@@ -139,6 +154,15 @@ def bonded(assembly: Assembly, mortar: Mortar) -> Case:
 
     A bond of strength s carries a tension s and, at the same time, a shear stress s; in the terms
     of Mohr and Coulomb its cohesion is s (1 + friction).
+
+    Parameters
+    ----------
+    assembly : Assembly
+    mortar : Mortar
+
+    Returns
+    -------
+    Case
     """
     stress = assembly.stress_scale
     return Case(
@@ -150,14 +174,36 @@ def bonded(assembly: Assembly, mortar: Mortar) -> Case:
 
 
 def verdict_of(stand: Proven) -> Verdict:
-    """Return the verdict where a number is proven that must be zero."""
+    """Return the verdict where a number is proven that must be zero.
+
+    Parameters
+    ----------
+    stand : Proven
+
+    Returns
+    -------
+    Verdict
+    """
     if np.isnan(stand.value):
         return Verdict.UNDECIDED
     return Verdict.STANDS if stand.value <= EXACT else Verdict.FALLS
 
 
 def sideways(fixed: Case, up: Vector) -> list[Case]:
-    """Return the cases of the largest sideways acceleration, one per direction."""
+    """Return the cases of the largest sideways acceleration.
+
+    Parameters
+    ----------
+    fixed : Case
+        Whose strengths do not grow with z.
+    up : Vector
+        Unit vector against gravity.
+
+    Returns
+    -------
+    list of Case
+        One per direction.
+    """
     axis = np.array(up)
     first = np.eye(3)[np.abs(axis).argmin()]
     first = first - axis * (axis @ first)
@@ -173,6 +219,16 @@ def least_friction(prove: Prover, mortar: Mortar) -> float:
 
     The lacking bond falls with the friction. A line through two points where some is lacking aims
     at where none is; where that does not help, the middle is tried.
+
+    Parameters
+    ----------
+    prove : Prover
+    mortar : Mortar
+
+    Returns
+    -------
+    float
+        Infinite if none up to `ROUGHEST` is enough, NaN if nothing is proven.
     """
 
     def lacking(friction: float) -> float:
@@ -215,7 +271,19 @@ def _grip(prove: Prover, fixed: Case) -> float:
 
 
 def first_to_fail(assembly: Assembly, motion: Floats) -> tuple[str, str]:
-    """Return the fastest block and the contact that parts fastest; empty where nothing moves."""
+    """Return what goes first in a motion.
+
+    Parameters
+    ----------
+    assembly : Assembly
+    motion : (B, 6) float
+        As of `seqopt.stability.limit_analysis.Answer`.
+
+    Returns
+    -------
+    block, contact : str
+        The fastest block and the contact that parts fastest; empty where nothing moves.
+    """
     speed = np.linalg.norm(motion, axis=1)
     if not speed.max(initial=0.0) > 0:
         return "", ""

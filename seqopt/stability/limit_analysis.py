@@ -22,7 +22,7 @@ from importlib.metadata import entry_points
 
 import numpy as np
 
-from seqopt.arrays import Floats, Vector
+from seqopt.arrays import Floats, FrozenValue, Vector
 from seqopt.contact.assembly import Assembly
 
 EXACT = 1e-6  # largest violation of an accepted proof, over the force scale and max(1, z)
@@ -70,8 +70,8 @@ class Claim(Enum):
     STALLED = "stalled"
 
 
-@dataclass(frozen=True)
-class Answer:
+@dataclass(frozen=True, eq=False, repr=False)
+class Answer(FrozenValue):
     """What a solver returns for a case.
 
     Attributes
@@ -104,14 +104,37 @@ Compile = Callable[[Assembly], Program]
 
 
 def compile_equilibrium(assembly: Assembly) -> Program:
-    """Return the registered program of an assembly (entry points ``seqopt.limit_analysis``)."""
+    """Return the registered program of an assembly (entry points ``seqopt.limit_analysis``).
+
+    Parameters
+    ----------
+    assembly : Assembly
+
+    Returns
+    -------
+    Program
+    """
     (entry,) = entry_points(group="seqopt.limit_analysis", name="socp")
     compiled: Compile = entry.load()
     return compiled(assembly)
 
 
 def limits(assembly: Assembly, case: Case, z: float) -> tuple[Floats, Floats, Floats]:
-    """Return tension and cohesion (K,) of the corners and payload (G,) at a z, over the force."""
+    """Return what corners and grips can bear at a z, over the force scale.
+
+    Parameters
+    ----------
+    assembly : Assembly
+    case : Case
+    z : float
+
+    Returns
+    -------
+    tension, cohesion : (K,) float
+        Of the corners.
+    payload : (G,) float
+        Of the grips.
+    """
     share = assembly.corner_area * assembly.stress_scale / assembly.scales[0]
     payload = case.payload[0] * assembly.payload / assembly.scales[0] + z * case.payload[1]
     tension, cohesion = case.tension, case.cohesion
@@ -123,7 +146,19 @@ def limits(assembly: Assembly, case: Case, z: float) -> tuple[Floats, Floats, Fl
 
 
 def violation(assembly: Assembly, case: Case, answer: Answer) -> float:
-    """Return the largest violation of the case by the answer's forces, over the force scale."""
+    """Return by how much the forces of an answer violate a case at most.
+
+    Parameters
+    ----------
+    assembly : Assembly
+    case : Case
+    answer : Answer
+
+    Returns
+    -------
+    float
+        Over the force scale; infinite where the answer is not finite.
+    """
     z, force, grip = answer.value, answer.contact_force, answer.grip_force
     residual = assembly.contact_map @ force.ravel() + assembly.grip_map @ grip.ravel()
     residual += assembly.load() + z * assembly.load(case.pull)
@@ -139,11 +174,21 @@ def violation(assembly: Assembly, case: Case, answer: Answer) -> float:
 
 
 def bound(assembly: Assembly, case: Case, answer: Answer) -> float:
-    """Return what the answer's motion proves: no z below (smallest) or above (largest) exists.
+    """Return the z that an answer's motion proves: none below (smallest) or above (largest) exists.
 
     A motion proves nothing, 0 or `CAP`, if the load does less work in it than is taken up. Where
     a contact closes by more than a motion may, the violation is charged with a corner force of
     `LARGEST_FORCE` times the sum of weights and payloads.
+
+    Parameters
+    ----------
+    assembly : Assembly
+    case : Case
+    answer : Answer
+
+    Returns
+    -------
+    float
     """
     nothing = 0.0 if case.sense is Sense.SMALLEST else CAP
     motion = answer.motion.ravel()

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from seqopt.arrays import FrozenValue, frozen
 from seqopt.contact.assembly import Assembly
 from seqopt.stability.limit_analysis import (
     ATTEMPTS,
@@ -23,18 +24,18 @@ from seqopt.stability.limit_analysis import (
     violation,
 )
 
-HANDS = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [-1.0, -1.0, -1.0]])
+HANDS = frozen(np.vstack([np.eye(3), -np.ones(3)]))
 
 
-@dataclass(frozen=True)
-class Proven:
+@dataclass(frozen=True, eq=False, repr=False)
+class Proven(FrozenValue):
     """A number with its two proofs.
 
     Attributes
     ----------
     value : float
-        z of the case; inf if it is proven that none up to `seqopt.stability.limit_analysis.CAP` will do, NaN
-        if nothing is proven.
+        z of the case; inf if it is proven that none up to
+        `seqopt.stability.limit_analysis.CAP` will do, NaN if nothing is proven.
     answer : Answer
         What it rests on: forces and motion.
     """
@@ -68,7 +69,16 @@ class Prover:
         self._program = compiled(assembly)
 
     def __call__(self, case: Case) -> Proven:
-        """Return the proven answer of a case."""
+        """Return the proven answer of a case.
+
+        Parameters
+        ----------
+        case : Case
+
+        Returns
+        -------
+        Proven
+        """
         for attempt in range(ATTEMPTS):
             answer = self._program(case, attempt)
             self.claims[answer.claim] += 1
@@ -108,7 +118,19 @@ class Prover:
 
 
 def proven_value(assembly: Assembly, case: Case, answer: Answer) -> float:
-    """Return the answer's z if its forces and its motion prove it, NaN if not."""
+    """Return the z of an answer if its forces and its motion prove it.
+
+    Parameters
+    ----------
+    assembly : Assembly
+    case : Case
+    answer : Answer
+
+    Returns
+    -------
+    float
+        NaN if they do not.
+    """
     scale = max(1.0, abs(answer.value))
     if not violation(assembly, case, answer) <= EXACT * scale:
         return np.nan

@@ -23,7 +23,20 @@ def assess_steps(
     mortar: Mortar,
     progress: Progress = lambda _: None,
 ) -> tuple[Stability, ...]:
-    """Return verdict and margins of every step, all joints being of one mortar.
+    """Return verdict and margins of every step.
+
+    Parameters
+    ----------
+    network : Network
+    steps : sequence of Step
+    mortar : Mortar
+        Of all joints.
+    progress : callable, optional
+        Told in words which step is next.
+
+    Returns
+    -------
+    tuple of Stability
 
     Raises
     ------
@@ -42,9 +55,19 @@ def assess_steps(
 def stability_table(steps: Sequence[Step], results: Sequence[Stability]) -> pd.DataFrame:
     """Return a row per step; an empty cell is a number that is not proven.
 
-    Columns: ``step``, ``type``, ``bricks``, ``verdict``, ``bond_needed_Pa``, ``friction_needed``,
-    ``tilt_survived_deg``, ``largest_grip_force_N``, ``first_brick``, ``first_joint``, as in
-    `seqopt.stability.assessment.Stability`; ``almost_solved``, ``stalled`` and ``unproven`` count cases.
+    Parameters
+    ----------
+    steps : sequence of Step
+    results : sequence of Stability
+        Of the steps.
+
+    Returns
+    -------
+    pandas.DataFrame
+        ``step``, ``type``, ``bricks``, ``verdict``, ``bond_needed_Pa``, ``friction_needed``,
+        ``tilt_survived_deg``, ``largest_grip_force_N``, ``first_brick`` and ``first_joint``, as in
+        `seqopt.stability.assessment.Stability`; ``almost_solved``, ``stalled`` and ``unproven``
+        count cases.
     """
     rows = []
     for step, result in zip(steps, results, strict=True):
@@ -69,7 +92,17 @@ def stability_table(steps: Sequence[Step], results: Sequence[Stability]) -> pd.D
 
 
 def format_verdicts(results: Sequence[Stability]) -> str:
-    """Return how many steps stand, do not stand and are undecided, and how the solver ended."""
+    """Return how many steps stand, do not stand and are undecided, and how the solver ended.
+
+    Parameters
+    ----------
+    results : sequence of Stability
+
+    Returns
+    -------
+    str
+        One line.
+    """
     words = {
         Verdict.STANDS: "stand",
         Verdict.FALLS: "do not stand",

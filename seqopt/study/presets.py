@@ -5,8 +5,8 @@ from __future__ import annotations
 from seqopt.engines.discrete.system import BedStiffness
 from seqopt.placement.criteria import RankSum, WeightedSum, WorstRatio, equal
 from seqopt.placement.requirements import Criterion
+from seqopt.scene.parts import Robot
 from seqopt.scene.reach import Anywhere, Side
-from seqopt.scene.scene import Robot
 
 ROBOTS = (
     Robot(name="rob1", payload=392.4, reach=Side(toward=(0.0, 1.0, 0.0), point=(0.0, -0.075, 0.0))),
@@ -16,6 +16,9 @@ ROBOTS = (
 
 STUDY_BED = BedStiffness(normal=100e9, tangential=10e9)
 """Stiffnesses jKn and jKs of the discrete-element models of Bruun et al., N/m³ (section 3.2.3)."""
+
+STUDY_PADS = BedStiffness(normal=1e12, tangential=1e11)
+"""Of a robot's grip: stiffer "by an order of magnitude"; how large its pads are is not printed."""
 
 CROWN = 13  # bricks of the reference arch up to its crown
 

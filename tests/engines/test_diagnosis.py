@@ -10,12 +10,14 @@ import pytest
 from experiments.engines.parts.limit_scenes import HELD, LOOSE_AT, chain, loosened, without_joint
 from experiments.engines.parts.reference_chain import solve_exactly
 from experiments.harness.walls import running_bond
-from seqopt.engines.diagnosis import FLOOR, UNRESISTED, WELL, Finding, diagnose, residual, spectrum
+from seqopt.engines.diagnosis import WELL, Finding, diagnose
+from seqopt.engines.eigenvalues import LEAST_DIAGONAL, UNRESISTED, spectrum
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import Want, grip_columns
+from seqopt.engines.residuals import residual
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.engines.rigid.dense import solve_dense
-from seqopt.engines.rigid.mixed import mixed_system, ungripped
+from seqopt.engines.rigid.mixed import mixed_system, ungripped_system
 from seqopt.network.build import build_network
 
 
@@ -68,12 +70,12 @@ def test_spoiled_fields_are_seen(engine25, name, share):
 def test_the_smallest_eigenvalue_is_that_of_the_dense_matrix():
     net = build_network(running_bond(3, 3))
     grips = places(net, 9, [13, 18])
-    parts = ungripped(net, 9)
+    parts = ungripped_system(net, 9)
     system = mixed_system(parts, grips)
     dense = parts.deformation.toarray()
     matrix = dense.T * parts.stiffness @ dense
-    scale = np.sqrt(np.maximum(matrix.diagonal(), FLOOR * matrix.diagonal().max()))
-    null = np.linalg.svd(system.held.toarray() / scale)[2][6:].T
+    scale = np.sqrt(np.maximum(matrix.diagonal(), LEAST_DIAGONAL * matrix.diagonal().max()))
+    null = np.linalg.svd(system.forbidden.toarray() / scale)[2][6:].T
     values, vectors = np.linalg.eigh(null.T @ (matrix / scale / scale[:, None]) @ null)
     lowest, condition, mode = spectrum(net, 9, grips)
     assert lowest == pytest.approx(values[0], rel=1e-6)
@@ -81,7 +83,7 @@ def test_the_smallest_eigenvalue_is_that_of_the_dense_matrix():
     want = null @ vectors[:, 0] / scale
     want = want / want[np.abs(want).argmax()]
     assert mode.ravel() == pytest.approx(want, abs=1e-4)
-    assert system.held @ mode.ravel() == pytest.approx(0, abs=1e-9)
+    assert system.forbidden @ mode.ravel() == pytest.approx(0, abs=1e-9)
 
 
 @pytest.mark.parametrize("grips", [(), (49,), (40, 49), (48, 49)])

@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 from seqopt.engines.discrete.engine import DiscreteEngine
-from seqopt.engines.discrete.system import Across, BedStiffness, Pinch
+from seqopt.engines.discrete.pads import Across, Pinch
+from seqopt.engines.discrete.system import BedStiffness
 from seqopt.engines.interface import Want
 from seqopt.errors import SceneError
 from seqopt.network.build import build_network
 from seqopt.scene.scene_file import load_scene
-from seqopt.study.presets import STUDY_BED
+from seqopt.study.presets import STUDY_BED, STUDY_PADS
 from tests.builders import largest_difference
 
 
@@ -20,7 +21,7 @@ def test_beds_alone_are_other_joints_and_pads_let_a_brick_turn():
     own, study = DiscreteEngine(net), DiscreteEngine(net, bed=STUDY_BED)
     first, second = (e.solve(10, [[19]], Want.ALL) for e in (own, study))
     assert largest_difference(first, second, net) > 0.5
-    pinch = Pinch(Across.WIDTH)
+    pinch = Pinch(Across.WIDTH, STUDY_PADS, side=0.03)
     third = DiscreteEngine(net, bed=STUDY_BED, pinch=pinch).solve(10, [[19]], Want.ALL)
     assert np.abs(third.brick_twist[0, 9]).max() > 0
     total = third.grip_force[0].sum(axis=0) + third.support[0, :3]

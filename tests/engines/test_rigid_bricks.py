@@ -118,7 +118,7 @@ def test_what_is_solved_again_fits_what_was_asked():
     assert (part.support == whole.support).all()
     assert (part.grip_force == whole.grip_force).all()
     assert part.edge_force.shape == (3, 0)
-    held = whole.displacement[2, [net.place_of_node[n] for n in (48, 49, 30)]]
+    held = whole.displacement[2, [net.index_of_node[n] for n in (48, 49, 30)]]
     assert np.abs(held).max() < 1e-12 * np.abs(whole.displacement[2]).max()
     inner = np.flatnonzero((net.edge_brick == 24) & (net.edge_spring < 0))
     assert whole.edge_force[2, inner] == 0  # nothing between two grips on one brick

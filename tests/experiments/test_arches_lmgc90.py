@@ -33,16 +33,17 @@ from experiments.discrete.parts.arches_lmgc90 import (
     witness,
 )
 from experiments.harness.lmgc90 import python_with_lmgc90
-from seqopt.engines.discrete.system import Across, BedStiffness, Pinch
+from seqopt.engines.discrete.pads import Across, Pinch
+from seqopt.engines.discrete.system import BedStiffness
 from seqopt.network.network import GROUND
 from seqopt.sequence.two_robots import sequential
-from seqopt.study.presets import STUDY_BED
+from seqopt.study.presets import STUDY_BED, STUDY_PADS
 
 PYTHON = python_with_lmgc90(os.environ.get("SEQOPT_LMGC90", sys.executable))
 with_lmgc90 = pytest.mark.skipif(PYTHON is None, reason="LMGC90 is not installed")
 
 
-ACROSS, THROUGH = (Pinch(across, side=PAD) for across in Across)
+ACROSS, THROUGH = (Pinch(across, STUDY_PADS, side=PAD) for across in Across)
 BOTH = pytest.mark.parametrize("pinch", [ACROSS, THROUGH], ids=["width", "thickness"])
 
 
@@ -135,7 +136,7 @@ def test_lmgc90_is_shown_every_face_and_weight(engine25, number, pinch, spread):
 
 def test_a_larger_pad_moves_less(engine25, step):
     engines = [
-        spread_engine(engine25.network, Pinch(Across.WIDTH, side=side), "even")
+        spread_engine(engine25.network, Pinch(Across.WIDTH, STUDY_PADS, side=side), "even")
         for side in (0.01, 0.02, 0.04)
     ]
     errors = [error(moved(engine25, step), moved(discrete, step)) for discrete in engines]

@@ -20,8 +20,10 @@ from experiments.discrete.parts.arch_pads import AtCorners, pads_at_corners
 from experiments.discrete.parts.arches_lmgc90 import error, moved
 from experiments.discrete.parts.pad_readings import CORNERS, STEPS, Reading, readings
 from experiments.harness.plotting import RESULTS
-from seqopt.engines.discrete.system import Across, Pinch, pads
+from seqopt.engines.discrete.pads import Across, Pinch
+from seqopt.engines.discrete.system import pads
 from seqopt.sequence.two_robots import sequential
+from seqopt.study.presets import STUDY_PADS
 from seqopt.study.tables import printed
 
 
@@ -33,7 +35,7 @@ def step(engine25):
 @pytest.mark.parametrize("across", list(Across))
 def test_even_pads_can_stand_for_pads_at_corners(engine25, across):
     """They hold as stiffly against motion, and three times so against turning about themselves."""
-    pinch, brick = Pinch(across, side=0.02), engine25.network.scene.placed[16]
+    pinch, brick = Pinch(across, STUDY_PADS, side=0.02), engine25.network.scene.placed[16]
     center, axis = np.array(brick.position), np.array(brick.width_axis)
     if across == Across.THICKNESS:
         axis = np.cross(brick.length_axis, axis)
@@ -54,7 +56,7 @@ def test_the_pads_of_all_readings_are_named_and_found_again(engine25):
 
 
 def test_softer_joints_move_more_and_a_node_lets_the_brick_turn(engine25, step):
-    pinch = Pinch(Across.WIDTH, side=0.02)
+    pinch = Pinch(Across.WIDTH, STUDY_PADS, side=0.02)
     whole, half, node = (
         moved(reading.engine(engine25.network), step).max()
         for reading in (Reading(pinch=pinch), Reading("halves in series", pinch), Reading())
@@ -118,7 +120,9 @@ def test_the_stored_witness_rows_stand_beside_the_engine_as_it_is(engine25, step
     rows = pd.read_csv(RESULTS / "arches_lmgc90.csv")
     for row in rows[rows["bricks"] == 17].itertuples():
         joint = CORNERS if row.spread == "corners" else "as printed"
-        reading = Reading(joint, Pinch(Across[row.pads.upper()], side=1e-3 * row.side_mm))
+        reading = Reading(
+            joint, Pinch(Across[row.pads.upper()], STUDY_PADS, side=1e-3 * row.side_mm)
+        )
         assert row_of(engine25, step, reading)["error_pct"] == pytest.approx(
             row.engine_error_pct, rel=1e-3
         )

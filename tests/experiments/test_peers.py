@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -28,8 +29,8 @@ def gap(engine, solve):
     for bricks, grips in STATES:
         sets = np.array([grips])
         columns = grip_columns(engine.network, bricks, sets)
-        case = Case(bricks, sets, columns, Want.TABLE)
-        answers.append((case, 0, solve(bricks).solve(columns[0], Want.TABLE)))
+        case = Case(bricks, sets, columns, Want.RESPONSES)
+        answers.append((case, 0, solve(bricks).solve(columns[0], Want.RESPONSES)))
     return difference(engine, answers)
 
 
@@ -67,7 +68,7 @@ def test_joints_that_differ_are_refused(engine25):
     springs = engine25.network.springs
     stiffness = springs.translational_stiffness.copy()
     stiffness[1] *= 2
-    changed = type(springs)(**{**vars(springs), "translational_stiffness": stiffness})
+    changed = replace(springs, translational_stiffness=stiffness)
     network = type(engine25.network)(
         **{
             name: getattr(engine25.network, name)

@@ -12,7 +12,7 @@ from seqopt.placement.budgets import travel
 from seqopt.placement.certificate import certify
 from seqopt.placement.costs import LayeredCosts
 from seqopt.placement.formulation import FormulationKind, Selection, formulations
-from seqopt.placement.interface import Aim
+from seqopt.placement.interface import Aim, CostProblem
 from seqopt.placement.solving import solve
 
 ALL = formulations()

@@ -23,7 +23,8 @@ from seqopt.contact.faces import bare_assembly, step_assembly
 from seqopt.contact.mortar import EPOXY
 from seqopt.contact.quadrature import opening_maps
 from seqopt.engines.discrete.engine import DiscreteEngine
-from seqopt.engines.discrete.system import BedStiffness, Pinch, System, build
+from seqopt.engines.discrete.pads import Pinch
+from seqopt.engines.discrete.system import BedStiffness, System, build_system
 from seqopt.engines.interface import Fields, Want
 from seqopt.network.network import GROUND, Network
 from seqopt.sequence.steps import Step
@@ -37,10 +38,10 @@ SPREADS = ("corners", "even")
 class AtCorners(DiscreteEngine):
     """Discrete elements on the study's bed, all of it at the corners of the faces."""
 
-    def solve(self, bricks: int, grips: ArrayLike, want: Want = Want.TABLE) -> Fields:
+    def solve(self, bricks: int, grips: ArrayLike, want: Want = Want.RESPONSES) -> Fields:
         """Return the fields; see `DiscreteEngine.solve`."""
         if bricks not in self._systems:
-            system = build(self.network, bricks, EPOXY, STUDY_BED)
+            system = build_system(self.network, bricks, EPOXY, STUDY_BED)
             self._systems[bricks] = at_corners(self.network, system)
         return super().solve(bricks, grips, want)
 

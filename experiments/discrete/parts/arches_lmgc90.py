@@ -34,13 +34,14 @@ from seqopt.arrays import Floats
 from seqopt.contact.assembly import Assembly
 from seqopt.contact.mortar import EPOXY
 from seqopt.engines.discrete.engine import DiscreteEngine
-from seqopt.engines.discrete.system import Across, BedStiffness, Pinch
+from seqopt.engines.discrete.pads import Across, Pinch
+from seqopt.engines.discrete.system import BedStiffness
 from seqopt.engines.interface import Engine, Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.kinematics import node_motion
 from seqopt.network.network import GROUND, Network
 from seqopt.sequence.steps import Step
-from seqopt.study.presets import STUDY_BED
+from seqopt.study.presets import STUDY_BED, STUDY_PADS
 
 PAD = 0.02  # m, side of the square that a pad touches: not printed
 THICK = 0.02  # m, of pads and ground; they are fixed and have no weight
@@ -164,7 +165,7 @@ def compared(
     engine: ComplianceEngine, step: Step, python: str, across: Across, spread: str
 ) -> dict[str, object] | None:
     """Return a row on one reading of a step, or None if LMGC90 breaks off."""
-    network, pinch = engine.network, Pinch(across, side=PAD)
+    network, pinch = engine.network, Pinch(across, STUDY_PADS, side=PAD)
     assembly, bed = posed(padded(network, step, pinch, spread), spread)
     twist, corner_force = bed_at_corners(assembly, bed)
     result = asked(python, scene_for(assembly, bed))

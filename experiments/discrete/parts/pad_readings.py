@@ -7,9 +7,10 @@ from itertools import product
 
 from experiments.discrete.parts.arch_pads import AtCorners, pads_at_corners
 from seqopt.engines.discrete.engine import DiscreteEngine
-from seqopt.engines.discrete.system import Across, BedStiffness, Pinch
+from seqopt.engines.discrete.pads import Across, Pinch
+from seqopt.engines.discrete.system import BedStiffness
 from seqopt.network.network import Network
-from seqopt.study.presets import STUDY_BED
+from seqopt.study.presets import STUDY_BED, STUDY_PADS
 
 PADS = (0.012, 0.02, 0.03)  # m
 CORNERS = "springs at corners"
@@ -33,7 +34,7 @@ class Reading:
     def of(cls, grip: str, side: float, joint: str) -> Reading:
         """Return the reading that the tables call so, from its pads' side in mm."""
         across = [a for a in Across if grip.endswith(a.name.lower())]
-        return cls(joint, Pinch(across[0], side=1e-3 * side) if across else None)
+        return cls(joint, Pinch(across[0], STUDY_PADS, side=1e-3 * side) if across else None)
 
     @property
     def grip(self) -> str:
@@ -50,5 +51,5 @@ class Reading:
 
 def readings() -> list[Reading]:
     """Return all readings of the table."""
-    pinches = [Pinch(across, side=side) for across, side in product(Across, PADS)]
+    pinches = [Pinch(across, STUDY_PADS, side=side) for across, side in product(Across, PADS)]
     return [Reading(joint, pinch) for pinch, joint in product((None, *pinches), JOINTS)]

@@ -10,7 +10,8 @@ import numpy as np
 
 from seqopt.arrays import Vector
 from seqopt.scene.arch import ArchShape, arch_scene
-from seqopt.scene.scene import Brick, Ground, Joint, Scene
+from seqopt.scene.parts import Brick, Ground, Joint
+from seqopt.scene.scene import Scene
 
 S = TypeVar("S", Joint, Ground)
 SPAN = 6.0  # m along the line of a flat arch

@@ -28,7 +28,7 @@ class Case(NamedTuple):
 
     def asked(self, setting: str) -> Want:
         """Return what a setting asks of these models."""
-        return {"reactions": Want.SUPPORT, "criterion": self.want, "all fields": Want.TABLE}[
+        return {"reactions": Want.SUPPORT, "criterion": self.want, "all fields": Want.RESPONSES}[
             setting
         ]
 
@@ -45,7 +45,7 @@ class Recorder:
         """The engine's network."""
         return self.engine.network
 
-    def solve(self, bricks: int, grips: ArrayLike, want: Want = Want.TABLE) -> Fields:
+    def solve(self, bricks: int, grips: ArrayLike, want: Want = Want.RESPONSES) -> Fields:
         """Answer and remember."""
         columns = grip_columns(self.network, bricks, grips)
         self.cases.append(Case(bricks, np.asarray(grips), columns, want))

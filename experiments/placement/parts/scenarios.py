@@ -9,7 +9,8 @@ from typing import TypeVar
 import numpy as np
 
 from seqopt.arrays import Vector
-from seqopt.scene.scene import Ground, Joint, Scene
+from seqopt.scene.parts import Ground, Joint
+from seqopt.scene.scene import Scene
 
 End = TypeVar("End", Joint, Ground)
 Grids = dict[str, tuple[float, ...]]

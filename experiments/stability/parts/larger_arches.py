@@ -18,7 +18,8 @@ from seqopt.network.network import Network
 from seqopt.placement.problem import pose
 from seqopt.placement.solving import solve
 from seqopt.responses.table import analyze
-from seqopt.scene.scene import Scene, Spring
+from seqopt.scene.parts import Spring
+from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Step
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.sequence.two_robots import METHODS

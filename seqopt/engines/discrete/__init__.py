@@ -1,1 +1,11 @@
-"""Room."""
+"""Discrete elements: rigid bricks on beds of points that part, slip and break.
+
+`DiscreteEngine` lays a bed over every joint's face (`BedStiffness` and `Mortar` say what it
+carries), holds nodes or pinches bricks between pads (`Pinch`), and follows the structure to rest.
+"""
+
+from seqopt.engines.discrete.engine import DiscreteEngine
+from seqopt.engines.discrete.pads import Across, Pinch
+from seqopt.engines.discrete.system import BedStiffness
+
+__all__ = ["Across", "BedStiffness", "DiscreteEngine", "Pinch"]

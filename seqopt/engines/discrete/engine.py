@@ -2,13 +2,13 @@ r"""The discrete-element engine: rigid bricks on beds of springs that part, slip
 
 A joint is its own elastic spring in series with a bed of points over the face between its bricks,
 so that within the elastic limits the answer is that of exactly rigid bricks; the bed takes over
-where tension or shear exceeds what the mortar holds (`seqopt.engines.discrete.friction_law`). With a `BedStiffness`
-the bed alone is the joint, as in the study's discrete-element models (section 3.2.3). Every grip
-holds its node, or pinches its brick between two pads.
+where tension or shear exceeds what the mortar holds (`seqopt.engines.discrete.friction_law`). With
+a `BedStiffness` the bed alone is the joint, as in the discrete-element models of Bruun et al.
+(section 3.2.3). Every grip holds its node, or pinches its brick between two pads.
 
 One grip set at a time: Newton's method with the exact tangent, the load in steps once a bond
 breaks. What it finds is an equilibrium within all limits, reached from rest with grips that only
-react. `seqopt certify` asks less: that forces exist, whatever brings them about.
+react. `seqopt.stability` asks less: that forces exist, whatever brings them about.
 """
 
 from __future__ import annotations
@@ -17,15 +17,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import linalg, sparse
 
-from seqopt.arrays import Floats, Ints, skew
+from seqopt.arrays import Floats, Ints
 from seqopt.contact.mortar import EPOXY, Mortar
 from seqopt.engines.discrete.equilibrium_path import Held, Settled, settle
-from seqopt.engines.discrete.system import BedStiffness, Pinch, System, build, pads
-from seqopt.engines.interface import Fields, Want, grip_columns
+from seqopt.engines.discrete.pads import Pinch, pad_stiffness
+from seqopt.engines.discrete.system import BedStiffness, System, build_system
+from seqopt.engines.interface import Fields, Want, grip_columns, join_sets, no_sets
 from seqopt.engines.rigid.mechanism import mechanism_error, require_resistance
-from seqopt.engines.rigid.recovery import respond, stack
+from seqopt.engines.rigid.recovery import Solution, respond
 from seqopt.errors import SeqoptError, SolverError
-from seqopt.network.kinematics import centroids, node_motion
+from seqopt.network.kinematics import node_motion, point_motion
 from seqopt.network.network import Network
 from seqopt.network.statics import build_statics
 
@@ -38,8 +39,8 @@ class DiscreteEngine:
     Parameters
     ----------
     network : Network
-    mortar : Mortar
-        What the joints hold; the study's epoxy by default.
+    mortar : Mortar, optional
+        What the joints hold; the epoxy of Bruun et al. by default.
     bed : BedStiffness, optional
         The joints themselves; by default they are as stiff as the scene says.
     pinch : Pinch, optional
@@ -61,29 +62,45 @@ class DiscreteEngine:
         """The network whose nodes and edges the fields follow."""
         return self._network
 
-    def solve(self, bricks: int, grips: ArrayLike, want: Want = Want.TABLE) -> Fields:
-        """Return the fields of the first ``bricks`` bricks; see `seqopt.engines.interface.Engine`.
+    def solve(self, bricks: int, grips: ArrayLike, want: Want = Want.RESPONSES) -> Fields:
+        """Return the fields of a partial structure for many grip sets.
 
         All fields are evaluated whatever is asked: finding the equilibrium dominates the cost.
 
+        Parameters
+        ----------
+        bricks : int
+            How many bricks stand.
+        grips : (S, r) int
+            Node numbers.
+        want : Want, optional
+
+        Returns
+        -------
+        Fields
+
         Raises
         ------
+        GripError
+            As of `seqopt.engines.interface.Engine`.
         MechanismError
             Also if the structure moves a tenth of a brick's length and is not stopped by then.
         SolverError
             Also if it neither comes to rest nor goes.
+        SceneError
+            If the faces of a joint do not overlap.
         """
         network = self._network
         columns = grip_columns(network, bricks, grips)
         for row in columns:
             require_resistance(network, bricks, row)
         if bricks not in self._systems:
-            self._systems[bricks] = build(network, bricks, self._mortar, self._bed)
+            self._systems[bricks] = build_system(network, bricks, self._mortar, self._bed)
         answers = [self._solve_one(self._systems[bricks], row) for row in columns]
-        return stack(network, bricks, columns, answers)
+        return join_sets([no_sets(network, bricks, columns.shape[1]), *answers])
 
-    def _solve_one(self, system: System, columns: Ints) -> tuple[Floats, ...]:
-        """Return the fields of one grip set, in the order of `Fields`."""
+    def _solve_one(self, system: System, columns: Ints) -> Fields:
+        """Return the fields of one grip set."""
         network, pinch = self._network, self._pinch
         nodes = network.node_position[network.inner.ravel()[columns]]
         held = held_nodes(network, system, columns, nodes)
@@ -104,51 +121,73 @@ def _not_at_rest(network: Network, held: Held, found: Settled, nodes: Ints) -> S
     names = ", ".join(str(network.node_name[n]) for n in nodes) or "nothing"
     return SolverError(
         f"{system.bricks} bricks held at {names}: discrete elements came to no rest and went "
-        "nowhere; certify says whether there is an equilibrium"
+        "nowhere; assess the step's stability to learn whether there is an equilibrium"
     )
 
 
 def held_nodes(network: Network, system: System, columns: Ints, nodes: Floats) -> Held:
-    """Return a system whose gripped nodes (r, 3) stand still."""
-    center = centroids(network)
+    """Return a system whose held nodes stand still.
+
+    Parameters
+    ----------
+    network : Network
+    system : System
+    columns : (r,) int
+        Grips as indices into ``network.inner.ravel()``.
+    nodes : (r, 3) float
+        Where they hold, m.
+
+    Returns
+    -------
+    Held
+    """
     blocks = [np.eye(6)] * (len(system.load) // 6)
     for body in np.unique(columns // 2):
-        arms = nodes[columns // 2 == body] - center[body]
-        moved = np.vstack([np.hstack([np.eye(3), -skew(arm)]) for arm in arms])
+        moved = point_motion(nodes[columns // 2 == body] - network.centroid[body]).reshape(-1, 6)
         blocks[body] = linalg.null_space(moved * system.unit[:6])
     free = sparse.csr_array(sparse.block_diag([sparse.csr_array(block) for block in blocks]))
     return Held(system, free, sparse.csr_array(system.layers.shape))
 
 
 def pinched(network: Network, system: System, columns: Ints, nodes: Floats, pinch: Pinch) -> Held:
-    """Return a system whose gripped bricks are held between pads beside their nodes (r, 3)."""
+    """Return a system whose held bricks are pinched between pads beside their nodes.
+
+    Parameters
+    ----------
+    network : Network
+    system : System
+    columns : (r,) int
+        Grips as indices into ``network.inner.ravel()``.
+    nodes : (r, 3) float
+        Where they hold, m.
+    pinch : Pinch
+
+    Returns
+    -------
+    Held
+    """
     blocks = [sparse.csr_array((6, 6))] * (len(system.load) // 6)
     for body, node in zip(columns // 2, nodes, strict=True):
-        held = pads(network, body, node, pinch) * np.outer(system.unit[:6], system.unit[:6])
-        blocks[body] = blocks[body] + sparse.csr_array(held)
+        pads = pad_stiffness(network, body, node, pinch) * np.outer(
+            system.unit[:6], system.unit[:6]
+        )
+        blocks[body] = blocks[body] + sparse.csr_array(pads)
     every = sparse.eye_array(len(system.load), format="csr")
     return Held(system, every, sparse.csr_array(sparse.block_diag(blocks, format="csr")))
 
 
-def _fields(
-    network: Network, held: Held, found: Settled, columns: Ints, nodes: Floats
-) -> tuple[Floats, ...]:
-    """Return the fields of one grip set, in the order of `Fields`."""
+def _fields(network: Network, held: Held, found: Settled, columns: Ints, nodes: Floats) -> Fields:
+    """Return the fields of one grip set."""
     system = held.system
     size = 6 * system.bricks
     moved = held.free @ found.motion
     wrench = np.zeros((len(network.springs.since), 6))
     wrench[system.acting] = system.bed_wrenches(found.force)
     exerted = -held.reaction(found.motion, found.force, system.load) - held.pads @ moved
-    return respond(
-        network,
-        columns,
-        maps=build_statics(network),
-        motion=node_motion(network, system.bricks),
-        twist=(system.unit * moved)[:size],
-        wrench=wrench,
-        force=_grip_forces(network, system, columns, nodes, exerted),
-    )
+    force = _grip_forces(network, system, columns, nodes, exerted)
+    solution = Solution((system.unit * moved)[:size], wrench, force)
+    motion = node_motion(network, system.bricks)
+    return respond(network, build_statics(network), motion, columns, solution)
 
 
 def _grip_forces(
@@ -162,8 +201,7 @@ def _grip_forces(
     out = np.zeros((len(columns), 3))
     for body in np.unique(columns // 2):
         mine = np.flatnonzero(columns // 2 == body)
-        arms = nodes[mine] - centroids(network)[body]
-        maps = np.hstack([np.vstack([np.eye(3), skew(arm)]) for arm in arms])
+        maps = point_motion(nodes[mine] - network.centroid[body]).reshape(-1, 6).T
         rows = slice(6 * body, 6 * body + 6)
         if len(mine) == 1:
             out[mine[0]] = exerted[rows][:3]

@@ -9,7 +9,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
-from seqopt.arrays import Floats
+from seqopt.arrays import Bools, Floats, FrozenValue, frozen
 from seqopt.engines.discrete.system import System
 
 ITERATIONS = 60
@@ -23,8 +23,8 @@ FAR = 0.1  # motion over a brick's length beyond which a structure has gone
 SUPPORT = 1e-12  # stiffness lent to every motion, over its own: a loose body can come to rest
 
 
-@dataclass(frozen=True)
-class Held:
+@dataclass(frozen=True, eq=False, repr=False)
+class Held(FrozenValue):
     """A system and what its grips do.
 
     Attributes
@@ -41,26 +41,73 @@ class Held:
     pads: sparse.csr_array
 
     def left(self, motion: Floats, force: Floats, load: Floats) -> Floats:
-        """Return what is not balanced in the free motions, (m,)."""
+        """Return what is not balanced in the free motions.
+
+        Parameters
+        ----------
+        motion, force, load
+            As of `reaction`.
+
+        Returns
+        -------
+        (m,) float
+            N.
+        """
         return np.asarray(self.free.T @ self.reaction(motion, force, load))
 
     def reaction(self, motion: Floats, force: Floats, load: Floats) -> Floats:
-        """Return what is not balanced on the bodies, (6n,): what the grips must take."""
+        """Return what is not balanced on the bodies: what the grips must take.
+
+        Parameters
+        ----------
+        motion : (m,) float
+            In the free motions.
+        force : (P, 3) float
+            Of the points, N.
+        load : (6n,) float
+            N.
+
+        Returns
+        -------
+        (6n,) float
+            N.
+        """
         system = self.system
         carried = system.gap.T @ system.bed_wrenches(force).ravel()
         return np.asarray(load + carried - (system.layers + self.pads) @ (self.free @ motion))
 
     def rounding(self, motion: Floats, force: Floats) -> float:
-        """Return what rounding leaves of a balance between large forces, N."""
+        """Return what rounding leaves of a balance between large forces.
+
+        Parameters
+        ----------
+        motion : (m,) float
+        force : (P, 3) float
+            N.
+
+        Returns
+        -------
+        float
+            N.
+        """
         moved = np.abs(self.free @ motion)
         return ROUNDING * float((self._sizes @ moved).max() + np.abs(force).sum())
 
     @cached_property
     def _sizes(self) -> sparse.csr_array:
-        return sparse.csr_array(abs(self.system.layers) + abs(self.pads))
+        return frozen(sparse.csr_array(abs(self.system.layers) + abs(self.pads)))
 
     def gone(self, state: Settled) -> bool:
-        """Return whether a state has moved too far for the bricks to be where they were."""
+        """Return whether a state has moved too far for the bricks to be where they were.
+
+        Parameters
+        ----------
+        state : Settled
+
+        Returns
+        -------
+        bool
+        """
         return bool(np.abs(state.motion).max(initial=0.0) > FAR * self.system.length)
 
     @cached_property
@@ -70,11 +117,11 @@ class Held:
         none = np.zeros((len(points.area), 3))
         _, slope = points.forces(none, none[:, 1:], np.zeros(len(none), bool))
         matrix = self.free.T @ (self.system.stiffness(slope) + self.pads) @ self.free
-        return np.asarray(matrix.diagonal())
+        return frozen(np.asarray(matrix.diagonal()))
 
 
-@dataclass(frozen=True)
-class Settled:
+@dataclass(frozen=True, eq=False, repr=False)
+class Settled(FrozenValue):
     """A state of the bodies.
 
     Attributes
@@ -93,12 +140,23 @@ class Settled:
     motion: Floats
     force: Floats
     slip: Floats
-    broken: np.ndarray
+    broken: Bools
     left: float
 
     @classmethod
     def start(cls, held: Held, *, broken: bool) -> Settled:
-        """Return the state without load."""
+        """Return the state without load.
+
+        Parameters
+        ----------
+        held : Held
+        broken : bool
+            Whether all bonds are lost at once.
+
+        Returns
+        -------
+        Settled
+        """
         points = len(held.system.points.area)
         none = np.zeros((points, 3))
         motion = np.zeros(held.free.shape[1])
@@ -115,6 +173,15 @@ def settle(held: Held) -> Settled:
 
     Where no bond breaks under the whole load at once, none would on the way to it: the limits are
     convex. Otherwise the load grows in steps, and a bond once broken stays so.
+
+    Parameters
+    ----------
+    held : Held
+
+    Returns
+    -------
+    Settled
+        An equilibrium if it rests.
     """
     points = held.system.points
     dry = points.mortar.tensile_strength == 0 and points.mortar.cohesion == 0

@@ -11,14 +11,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from seqopt.arrays import Floats
+from seqopt.arrays import Bools, Floats, FrozenValue
 from seqopt.contact.mortar import Mortar
 
 EXCESS = 1e-9  # stress above a limit that counts as none, over the stress scale
 
 
-@dataclass(frozen=True)
-class Points:
+@dataclass(frozen=True, eq=False, repr=False)
+class Points(FrozenValue):
     """The springs of P points of a bed.
 
     Attributes
@@ -39,18 +39,54 @@ class Points:
     stress_scale: float
 
     def trial(self, opening: Floats, slip: Floats) -> Floats:
-        """Return the forces (P, 3) of unbroken springs that have slipped, compression first, N."""
+        """Return the forces of unbroken springs that have slipped.
+
+        Parameters
+        ----------
+        opening : (P, 3) float
+            m.
+        slip : (P, 2) float
+            m.
+
+        Returns
+        -------
+        (P, 3) float
+            Compression first, N.
+        """
         stiffness = np.stack([self.normal, self.tangential, self.tangential], axis=1)
         force = -stiffness * opening
         force[:, 1:] += self.tangential[:, None] * slip
         return force
 
     def slipped(self, opening: Floats, force: Floats) -> Floats:
-        """Return the slip (P, 2) that is left when points carry forces (P, 3), m."""
+        """Return the slip that is left when points carry forces.
+
+        Parameters
+        ----------
+        opening : (P, 3) float
+            m.
+        force : (P, 3) float
+            N.
+
+        Returns
+        -------
+        (P, 2) float
+            m.
+        """
         return np.asarray(opening[:, 1:] + force[:, 1:] / self.tangential[:, None])
 
-    def exceeds(self, force: Floats) -> np.ndarray:
-        """Return at which points (P,) bonds do not hold forces (P, 3)."""
+    def exceeds(self, force: Floats) -> Bools:
+        """Return at which points bonds do not hold forces.
+
+        Parameters
+        ----------
+        force : (P, 3) float
+            N.
+
+        Returns
+        -------
+        (P,) bool
+        """
         mortar, margin = self.mortar, EXCESS * self.stress_scale
         normal, shear = force[:, 0] / self.area, np.linalg.norm(force[:, 1:], axis=1) / self.area
         return np.asarray(
@@ -58,10 +94,24 @@ class Points:
             | (shear > mortar.cohesion + mortar.friction * normal + margin)
         )
 
-    def forces(self, opening: Floats, slip: Floats, broken: np.ndarray) -> tuple[Floats, Floats]:
-        """Return forces (P, 3) on the second bodies for openings (P, 3), and how fast they fall.
+    def forces(self, opening: Floats, slip: Floats, broken: Bools) -> tuple[Floats, Floats]:
+        """Return forces on the second bodies, and how fast they fall.
 
-        The second array (P, 3, 3) is minus the derivative of the forces.
+        Parameters
+        ----------
+        opening : (P, 3) float
+            m.
+        slip : (P, 2) float
+            m.
+        broken : (P,) bool
+            Where the bond is lost.
+
+        Returns
+        -------
+        force : (P, 3) float
+            N.
+        slope : (P, 3, 3) float
+            Minus its derivative by the opening, N/m.
         """
         force = self.trial(opening, slip)
         slope = np.zeros((len(force), 3, 3))

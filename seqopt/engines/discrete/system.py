@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import IntEnum
 from functools import cached_property
 
 import numpy as np
 from scipy import linalg, sparse
 
-from seqopt.arrays import Floats, Ints, skew
+from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.contact.assembly import Assembly
 from seqopt.contact.faces import bare_assembly
 from seqopt.contact.mortar import Mortar
@@ -17,15 +16,26 @@ from seqopt.contact.quadrature import Quadrature, face_quadrature, first_points,
 from seqopt.contact.quadrature import quadrature_stiffness as bed_stiffness
 from seqopt.engines.discrete.friction_law import Points
 from seqopt.errors import SceneError
-from seqopt.network.kinematics import centroids, spring_maps
-from seqopt.network.network import GROUND, Network
+from seqopt.network.kinematics import deformation, spring_stiffness
+from seqopt.network.network import Network
 
-SHARE = 10.0  # how much stiffer a bed is than its joint, whichever way it moves
+BED_OVER_JOINT = 10.0  # how much stiffer a bed is than its joint, whichever way it moves
 
 
 @dataclass(frozen=True)
 class BedStiffness:
-    """Stiffness of a joint per area, N/m³, in place of the joint's own springs."""
+    """Stiffness of a joint or pad per area.
+
+    Parameters
+    ----------
+    normal, tangential : float
+        N/m³.
+
+    Raises
+    ------
+    SceneError
+        If one is not a positive number.
+    """
 
     normal: float
     tangential: float
@@ -36,33 +46,8 @@ class BedStiffness:
                 raise SceneError(f"bed: {name} is {getattr(self, name)}; give a positive number")
 
 
-class Across(IntEnum):
-    """Which way two pads press on a brick: along its width or its thickness."""
-
-    WIDTH = 1
-    THICKNESS = 2
-
-
-@dataclass(frozen=True)
-class Pinch:
-    """Two square pads that hold a brick on either side of its node and do not slip.
-
-    Parameters
-    ----------
-    across : Across
-    stiffness : BedStiffness
-        Of the pads; by default ten times the study's bed ("an order of magnitude greater").
-    side : float
-        m; the study does not say how large its pads are.
-    """
-
-    across: Across
-    stiffness: BedStiffness = BedStiffness(1e12, 1e11)
-    side: float = 0.03
-
-
-@dataclass(frozen=True)
-class System:
+@dataclass(frozen=True, eq=False, repr=False)
+class System(FrozenValue):
     """Bodies, what holds them together, and what pulls at them; the bricks are the first bodies.
 
     Twists are in m and rad over ``unit``, wrenches in N and N m times it.
@@ -99,18 +84,51 @@ class System:
     length: float
 
     def bed_wrenches(self, force: Floats) -> Floats:
-        """Return the wrenches (J, 6) of point forces (P, 3) on second bodies, about the springs."""
+        """Return the wrenches of point forces on second bodies, about the springs.
+
+        Parameters
+        ----------
+        force : (P, 3) float
+            N.
+
+        Returns
+        -------
+        (J, 6) float
+            N and N m.
+        """
         each = np.einsum("pij,pi->pj", self.maps, force)
         return np.asarray(np.add.reduceat(each, self._starts, axis=0))
 
     def stiffness(self, slope: Floats) -> sparse.csr_array:
-        """Return the stiffness (6n, 6n) of layers and beds whose points have slopes (P, 3, 3)."""
+        """Return the stiffness of layers and beds.
+
+        Parameters
+        ----------
+        slope : (P, 3, 3) float
+            How fast the forces of the points fall, from `Points.forces`, N/m.
+
+        Returns
+        -------
+        (6n, 6n) sparse
+            For twists over ``unit``.
+        """
         each = self.maps.transpose(0, 2, 1) @ slope @ self.maps
         joints = _diagonal(np.add.reduceat(each, self._starts, axis=0))
         return sparse.csr_array(self.gap.T @ joints @ self.gap + self.layers)
 
     def openings(self, twist: Floats) -> Floats:
-        """Return the openings (P, 3) of the points for twists (6n,) of the bodies."""
+        """Return the openings of the points for twists of the bodies.
+
+        Parameters
+        ----------
+        twist : (6n,) float
+            Over ``unit``.
+
+        Returns
+        -------
+        (P, 3) float
+            m.
+        """
         across = (self.gap @ twist).reshape(-1, 6)
         return np.asarray(np.einsum("pij,pj->pi", self.maps, across[self.face]))
 
@@ -124,8 +142,22 @@ class System:
         return first_points(self.face, len(self.acting))
 
 
-def build(network: Network, bricks: int, mortar: Mortar, bed: BedStiffness | None) -> System:
-    """Return the system of the first ``bricks`` bricks.
+def build_system(network: Network, bricks: int, mortar: Mortar, bed: BedStiffness | None) -> System:
+    """Return the system of a partial structure.
+
+    Parameters
+    ----------
+    network : Network
+    bricks : int
+        How many bricks stand.
+    mortar : Mortar
+        What the beds hold.
+    bed : BedStiffness or None
+        The joints themselves; by default beds in series with layers are as stiff as the scene says.
+
+    Returns
+    -------
+    System
 
     Raises
     ------
@@ -133,69 +165,60 @@ def build(network: Network, bricks: int, mortar: Mortar, bed: BedStiffness | Non
         If the faces of a joint do not overlap.
     """
     assembly = bare_assembly(network, bricks)
-    acting, _, stiffness = spring_maps(network, bricks)
-    springs = network.springs
-    where = springs.position[acting]
-    points = face_quadrature(assembly)
+    acting = network.springs.acting(bricks)
+    bodies, where = network.springs.bodies[acting], network.springs.position[acting]
+    stiffness, points = spring_stiffness(network, acting), face_quadrature(assembly)
     maps = opening_maps(assembly, points.point, points.face, where)
-    moduli = np.ones((len(acting), 2)) if bed is None else _given(bed, len(acting))
-    if bed is None:
-        moduli *= SHARE * _relative_stiffness(stiffness, bed_stiffness(points, maps, moduli))
-    bodies = springs.bodies[acting]
-    center = centroids(network)[:bricks]
-    layers: list[tuple[Ints, Floats]] = []
-    if bed is None:
-        plates = bricks + np.arange(len(acting))
-        own = bed_stiffness(points, maps, moduli)
-        layers = [(np.stack([bodies[:, 0], plates], axis=1), _without(stiffness, own))]
-        bodies = np.stack([plates, bodies[:, 1]], axis=1)
+    moduli = _moduli(bed, stiffness, points, maps)
+    center = network.centroid[:bricks]
+    below = above = bodies
+    if bed is None:  # between a joint's layer and its bed there is one more body, a plate
         center = np.vstack([center, where])
-    unit = np.tile(np.repeat([1.0, 1.0 / _length(network)], 3), len(center))
-    load = np.zeros((len(center), 6))
-    load[:bricks, :3] = network.weight[:bricks]
-    total = sparse.csr_array((load.size, load.size))
-    for pair, blocks in layers:
-        across = _across(pair, where, center) @ sparse.diags_array(unit)
-        total = total + across.T @ _diagonal(blocks) @ across
+        below, above = _plates(bodies, bricks)
+    length = max(network.scene.placed[0].dimensions)
+    unit = np.tile(np.repeat([1.0, 1.0 / length], 3), len(center))
+    layers = sparse.csr_array((unit.size, unit.size))
+    if bed is None:
+        own = _without(stiffness, bed_stiffness(points, maps, moduli))
+        across = deformation(below, where, center) @ sparse.diags_array(unit)
+        layers = layers + across.T @ _diagonal(own) @ across
     return System(
         bricks=bricks,
         acting=acting,
         points=_points(points, moduli, mortar, assembly),
         face=points.face,
         maps=maps,
-        gap=sparse.csr_array(_across(bodies, where, center) @ sparse.diags_array(unit)),
-        layers=sparse.csr_array(total),
-        load=load.ravel() * unit,
+        gap=sparse.csr_array(deformation(above, where, center) @ sparse.diags_array(unit)),
+        layers=sparse.csr_array(layers),
+        load=_load(network, bricks, unit),
         unit=unit,
-        length=_length(network),
+        length=length,
     )
 
 
-def pads(network: Network, brick: int, node: Floats, pinch: Pinch) -> Floats:
-    """Return the stiffness (6, 6) with which two pads beside a node (3,) hold a brick's twists."""
-    held = network.scene.placed[brick]
-    length, width = np.array(held.length_axis), np.array(held.width_axis)
-    axes = np.stack([length, width, np.cross(length, width)])
-    out = axes[pinch.across]
-    sides = np.delete(axes, pinch.across, axis=0)
-    moduli = pinch.stiffness.tangential * np.eye(3)
-    moduli += (pinch.stiffness.normal - pinch.stiffness.tangential) * np.outer(out, out)
-    total = np.zeros((6, 6))
-    reach = pinch.side / np.sqrt(12)  # four points here have a square's second moments
-    for sign in (-0.5, 0.5):
-        for a, b in ((-reach, -reach), (-reach, reach), (reach, -reach), (reach, reach)):
-            point = node + sign * held.dimensions[pinch.across] * out + a * sides[0] + b * sides[1]
-            moved = np.hstack([np.eye(3), -skew(point - centroids(network)[brick])])
-            total += pinch.side**2 / 4 * moved.T @ moduli @ moved
-    return total
+def _plates(bodies: Ints, bricks: int) -> tuple[Ints, Ints]:
+    """Return the bodies of layers, and of beds, (J, 2) each: a plate between each joint's two."""
+    plates = bricks + np.arange(len(bodies))
+    return np.stack([bodies[:, 0], plates], axis=1), np.stack([plates, bodies[:, 1]], axis=1)
 
 
-def _length(network: Network) -> float:
-    return max(network.scene.placed[0].dimensions)
+def _load(network: Network, bricks: int, unit: Floats) -> Floats:
+    """Return the weight of the bricks as wrenches (6n,) times their unit; plates weigh nothing."""
+    load = np.zeros((len(unit) // 6, 6))
+    load[:bricks, :3] = network.weight[:bricks]
+    return load.ravel() * unit
 
 
-def _given(bed: BedStiffness, count: int) -> Floats:
-    return np.tile([bed.normal, bed.tangential], (count, 1))
+def _moduli(
+    bed: BedStiffness | None, stiffness: Floats, points: Quadrature, maps: Floats
+) -> Floats:
+    """Return the moduli (J, 2) of given beds, or of some stiffer than their joints every way."""
+    if bed is not None:
+        return np.tile([bed.normal, bed.tangential], (len(stiffness), 1))
+    even = np.ones((len(stiffness), 2))
+    return even * (
+        BED_OVER_JOINT * _relative_stiffness(stiffness, bed_stiffness(points, maps, even))
+    )
 
 
 def _points(points: Quadrature, moduli: Floats, mortar: Mortar, assembly: Assembly) -> Points:
@@ -220,18 +243,3 @@ def _diagonal(blocks: Floats) -> sparse.csr_array:
     """Return blocks (J, 6, 6) as one matrix; SciPy deprecates `block_diag` of dense blocks."""
     place = np.arange(len(blocks) + 1)
     return sparse.csr_array(sparse.bsr_array((blocks, place[:-1], place)))
-
-
-def _across(bodies: Ints, at: Floats, center: Floats) -> sparse.csr_array:
-    """Return the twists (6J, 6n) of second bodies (J, 2) against first at points (J, 3)."""
-    rows, columns, values = [], [], []
-    for side, sign in ((0, -1.0), (1, 1.0)):
-        real = np.flatnonzero(bodies[:, side] != GROUND)
-        body = bodies[real, side]
-        block = np.tile(np.eye(6), (len(real), 1, 1))
-        block[:, :3, 3:] = -skew(at[real] - center[body])
-        rows.append((6 * real[:, None, None] + np.arange(6)[:, None] + np.zeros(6, int)).ravel())
-        columns.append((6 * body[:, None, None] + np.arange(6) + np.zeros((6, 1), int)).ravel())
-        values.append(sign * block.ravel())
-    entries = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
-    return sparse.csr_array(entries, shape=(6 * len(bodies), 6 * len(center)))

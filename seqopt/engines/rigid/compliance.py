@@ -9,18 +9,24 @@ set is solved again with wrenches and motions side by side (`seqopt.engines.rigi
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
-from itertools import combinations
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
 
-from seqopt.arrays import Floats, Ints
+from seqopt.arrays import Bools, Floats, Ints
 from seqopt.engines.basis import SPACE, Basis
-from seqopt.engines.interface import Fields, Want, grip_columns
-from seqopt.engines.rigid.ldlt import solve_positive
+from seqopt.engines.interface import (
+    Fields,
+    Want,
+    grip_columns,
+    keep_wanted,
+    merge_sets,
+    select_sets,
+)
+from seqopt.engines.rigid.grip_equations import grip_forces
 from seqopt.engines.rigid.mechanism import require_resistance
 from seqopt.engines.rigid.mixed import solve_mixed
 from seqopt.engines.rigid.operator import ComplianceOperator, OperatorBuilder
@@ -40,7 +46,7 @@ class ComplianceEngine:
     ----------
     network : Network
     basis : Basis, optional
-        The directions in which bricks are loaded and move; `seqopt.engines.planar` has fewer than all.
+        The directions in which bricks are loaded and move; all by default, fewer in a plane.
     """
 
     def __init__(self, network: Network, basis: Basis = SPACE) -> None:
@@ -60,8 +66,26 @@ class ComplianceEngine:
         """The network whose nodes and edges the fields follow."""
         return self._network
 
-    def solve(self, bricks: int, grips: ArrayLike, want: Want = Want.TABLE) -> Fields:
-        """Return the fields of the first ``bricks`` bricks; see `seqopt.engines.interface.Engine`."""
+    def solve(self, bricks: int, grips: ArrayLike, want: Want = Want.RESPONSES) -> Fields:
+        """Return the fields of a partial structure for many grip sets.
+
+        Parameters
+        ----------
+        bricks : int
+            How many bricks stand.
+        grips : (S, r) int
+            Node numbers.
+        want : Want, optional
+
+        Returns
+        -------
+        Fields
+
+        Raises
+        ------
+        GripError, MechanismError, SolverError
+            As of `seqopt.engines.interface.Engine`.
+        """
         columns = grip_columns(self._network, bricks, grips)
         if self._builder is None:
             for row in columns:
@@ -73,30 +97,35 @@ class ComplianceEngine:
         fields, trusted = solve_batch(operator, columns, want, even=self._even)
         if self._basis is not SPACE:
             fields = replace(fields, grip_force=fields.grip_force @ self._basis.force)
-        again = np.flatnonzero(~trusted)
-        if len(again):
-            _replace(fields, again, solve_mixed(self._network, bricks, columns[again]))
+        if not trusted.all():
+            better = solve_mixed(self._network, bricks, columns[~trusted])
+            better = keep_wanted(better, want)
+            fields = merge_sets(trusted, select_sets(fields, trusted), better)
         return fields
 
 
-def _replace(fields: Fields, sets: Ints, better: Fields) -> None:
-    """Write the better answers of some grip sets over those that were asked for."""
-    for name in Fields.__dataclass_fields__:
-        old = getattr(fields, name)
-        if old.shape[1]:
-            old[sets] = getattr(better, name)
-
-
 def solve_batch(
-    operator: ComplianceOperator, columns: Ints, want: Want = Want.TABLE, *, even: bool = True
-) -> tuple[Fields, np.ndarray]:
-    """Return the fields of grip sets (S, r) and which of them are accurate, (S,) bool.
+    operator: ComplianceOperator, columns: Ints, want: Want = Want.RESPONSES, *, even: bool = True
+) -> tuple[Fields, Bools]:
+    """Return the fields of grip sets, and which of them are accurate.
 
-    Grip sets are given as places in ``network.inner.ravel()``. Where the joints are not ``even``,
-    pivots do not tell the whole error.
+    Parameters
+    ----------
+    operator : ComplianceOperator
+    columns : (S, r) int
+        Grips as indices into ``network.inner.ravel()``.
+    want : Want, optional
+    even : bool, optional
+        Whether the joints are about equally stiff: where not, pivots do not tell the whole error.
+
+    Returns
+    -------
+    fields : Fields
+        Grip forces in the directions of the operator.
+    trusted : (S,) bool
     """
     sets, held = columns.shape
-    index = load_index(operator, columns)
+    index = operator.load_index(columns)
     force = np.empty(index.shape)
     trusted = np.empty(sets, dtype=bool)
     for start in range(0, sets, CHUNK):
@@ -106,39 +135,21 @@ def solve_batch(
     force[~trusted] = 0.0
     if not even:
         trusted &= ~cancels(operator, index, force)
-    asked = (
-        (operator.edge_force, Want.EDGES),
-        (operator.displacement, Want.DISPLACEMENTS),
-        (operator.support, Want.SUPPORT),
-        (operator.joint_wrench, Want.JOINTS),
-        (operator.brick_twist, Want.BRICKS),
-    )
     load = _loads(index, force, len(operator.flexibility))
-    edge_force, displacement, support, joint, twist = (
-        load @ rows if want & flag else np.empty((sets, 0)) for rows, flag in asked
-    )
-    grip_force = force.reshape(sets, held, directions(operator))  # loads act along x, y and z
+
+    def answer(rows: Floats, flag: Want, *shape: int) -> Floats:
+        wanted = load @ rows if want & flag else np.empty((sets, 0))
+        return np.asarray(wanted.reshape(sets, wanted.shape[1] // math.prod(shape), *shape))
+
     fields = Fields(
-        edge_force,
-        displacement.reshape(sets, displacement.shape[1] // 3, 3),
-        grip_force,
-        support,
-        joint.reshape(sets, joint.shape[1] // 6, 6),
-        twist.reshape(sets, twist.shape[1] // 6, 6),
+        edge_force=answer(operator.edge_force, Want.EDGES),
+        displacement=answer(operator.displacement, Want.DISPLACEMENTS, 3),
+        grip_force=force.reshape(sets, held, operator.directions),
+        support=answer(operator.support, Want.SUPPORT),
+        joint_wrench=answer(operator.joint_wrench, Want.JOINTS, 6),
+        brick_twist=answer(operator.brick_twist, Want.BRICKS, 6),
     )
     return fields, trusted
-
-
-def directions(operator: ComplianceOperator) -> int:
-    """Return in how many directions a node is loaded and held."""
-    return len(operator.flexibility) // (2 * operator.bricks)
-
-
-def load_index(operator: ComplianceOperator, columns: Ints) -> Ints:
-    """Return the rows of the operator (S, rd) that are the ``d`` loads at every grip (S, r)."""
-    count = directions(operator)
-    rows = count * columns[:, :, None] + np.arange(count)
-    return np.asarray(rows.reshape(len(columns), count * columns.shape[1]))
 
 
 def _loads(index: Ints, force: Floats, size: int) -> sparse.csr_array:
@@ -147,16 +158,29 @@ def _loads(index: Ints, force: Floats, size: int) -> sparse.csr_array:
     A few entries of hundreds: multiplying only these takes half the time of a dense product.
     """
     sets, count = index.shape
-    place = np.full((sets, count + 1), size, dtype=np.int32)
-    place[:, :-1] = index
+    column = np.full((sets, count + 1), size, dtype=np.int32)
+    column[:, :-1] = index
     value = np.ones((sets, count + 1))
     value[:, :-1] = force
-    first = np.arange(0, place.size + 1, count + 1, dtype=np.int32)
-    return sparse.csr_array((value.ravel(), place.ravel(), first), shape=(sets, size + 1))
+    first = np.arange(0, column.size + 1, count + 1, dtype=np.int32)
+    return sparse.csr_array((value.ravel(), column.ravel(), first), shape=(sets, size + 1))
 
 
-def cancels(operator: ComplianceOperator, index: Ints, force: Floats) -> np.ndarray:
-    """Return whether motions cancel at the grips of sets under their forces (S, k) at ``index``."""
+def cancels(operator: ComplianceOperator, index: Ints, force: Floats) -> Bools:
+    """Return whether motions cancel at the grips of sets.
+
+    Parameters
+    ----------
+    operator : ComplianceOperator
+    index : (S, k) int
+        Rows of the operator that the grips load.
+    force : (S, k) float
+        There, N.
+
+    Returns
+    -------
+    (S,) bool
+    """
     out = np.zeros(len(index), dtype=bool)
     motion = operator.displacement
     for row, rows in enumerate(index if index.size else ()):
@@ -165,80 +189,3 @@ def cancels(operator: ComplianceOperator, index: Ints, force: Floats) -> np.ndar
         left = np.abs(motion[-1] + force[row] @ motion[rows]).max()
         out[row] = parts.max() > CANCEL * left
     return out
-
-
-def grip_forces(operator: ComplianceOperator, columns: Ints, index: Ints) -> tuple[Floats, Floats]:
-    """Return the grips' forces (S, k) that hold still the degrees of freedom ``index`` (S, k).
-
-    The second array (S,) is the smallest scaled pivot of their equations: rounding over it bounds
-    the error.
-
-    Two grips on one rigid brick leave the force between them along the brick undetermined. Each
-    takes what reaches its own node, so that the inner edge between them carries nothing: the limit
-    of a stiff bar with both ends held.
-    """
-    sets, count = index.shape
-    size = len(operator.flexibility)
-    held = np.ascontiguousarray(index.T)
-    system = np.empty((count + 1, count, sets))
-    operator.flexibility.take(
-        held[:, None] * size + held,
-        out=system[:-1],
-        mode="clip",  # other modes copy once more
-    )
-    np.negative(operator.dead_displacement.take(held), out=system[-1])
-    pairs = _pairs(operator, columns)
-    if len(pairs.sets):
-        _brace(system, pairs)
-    answer, pivot = solve_positive(system)
-    force = np.ascontiguousarray(answer.T)
-    if len(pairs.sets):
-        _release(operator, index, force, pairs)
-    return force, pivot
-
-
-class Pairs(NamedTuple):
-    """Two grips on one brick: the set, their places in it, the brick, its axis (len, d)."""
-
-    sets: Ints
-    first: Ints
-    second: Ints
-    brick: Ints
-    axis: Floats
-
-
-def _pairs(operator: ComplianceOperator, columns: Ints) -> Pairs:
-    """Return all pairs of grips of the sets (S, r) that share a brick."""
-    places = np.array([*combinations(range(columns.shape[1]), 2)], dtype=np.int64).reshape(-1, 2)
-    bricks = columns.T // 2
-    hits = np.flatnonzero(bricks[places[:, 0]] == bricks[places[:, 1]])
-    pair, sets = np.divmod(hits, max(len(columns), 1))
-    brick = bricks[places[pair, 0], sets]
-    return Pairs(sets, places[pair, 0], places[pair, 1], brick, operator.axis[brick])
-
-
-def _brace(system: Floats, pairs: Pairs) -> None:
-    """Give the force between two grips on one brick a flexibility, so that there is one answer."""
-    count, sets = system.shape[1:]
-    width = pairs.axis.shape[1]
-    blocks = system[:-1].reshape(count // width, width, count // width, width, sets)
-    every = np.arange(count)[:, None]
-    scaled = system[every, every, pairs.sets].sum(axis=0)[:, None] * pairs.axis
-    block = scaled[:, :, None] * pairs.axis[:, None]
-    rows = np.array([pairs.first, pairs.second, pairs.second])
-    columns = np.array([pairs.first, pairs.second, pairs.first])
-    blocks[rows, :, columns, :, pairs.sets] += np.array([block, block, -block])
-
-
-def _release(operator: ComplianceOperator, index: Ints, force: Floats, pairs: Pairs) -> None:
-    """Shift the forces (S, k) of the pairs until their inner edges carry nothing."""
-    edge = operator.inner_edge[pairs.brick]
-    share = operator.edge_force[index[pairs.sets], edge[:, None]]
-    carried = operator.edge_force[-1, edge] + np.einsum("sk,sk->s", force[pairs.sets], share)
-    width = pairs.axis.shape[1]
-    share = share.reshape(len(edge), -1, width)
-    every = np.arange(len(edge))
-    between = share[every, pairs.first] - share[every, pairs.second]
-    shift = (carried / np.einsum("sk,sk->s", between, pairs.axis))[:, None] * pairs.axis
-    nodes = force.reshape(len(force), -1, width)
-    nodes[pairs.sets, [pairs.first, pairs.second]] += np.array([-shift, shift])

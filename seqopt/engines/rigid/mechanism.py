@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
 from scipy import linalg
 
-from seqopt.arrays import Floats, Ints
+from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.errors import MechanismError
 from seqopt.network.kinematics import node_motion, spring_maps
 from seqopt.network.network import Network
@@ -16,46 +16,121 @@ from seqopt.network.statics import Statics, build_statics
 NO_RESISTANCE = 1e-13  # smallest scaled eigenvalue of a structure that resists every motion
 
 
-class RigidStructure(NamedTuple):
-    """One partial structure: springs, stiffness (6b, 6b), motion of nodes (3N, 6b), statics."""
+@dataclass(frozen=True, eq=False, repr=False)
+class RigidStructure(FrozenValue):
+    """The parts of the stiffness of one partial structure.
+
+    Attributes
+    ----------
+    acting : (s,) int
+        The springs that act.
+    gap : (s, 6, 6b) float
+        Their deformations for unit twists of the bricks.
+    stiffness : (s, 6, 6) float
+        Theirs, N/m and N m/rad.
+    matrix : (6b, 6b) float
+        Stiffness of the structure without grips.
+    motion : (3n, 6b) float
+        Displacements of the nodes for unit twists.
+    inner_motion : (6b, 6b) float
+        Of these, the inner nodes in the order of ``network.inner``.
+    statics : Statics
+        Of the network.
+    """
 
     acting: Ints
     gap: Floats
     stiffness: Floats
     matrix: Floats
     motion: Floats
-    held: Floats
-    maps: Statics
+    inner_motion: Floats
+    statics: Statics
+
+    def forbidden(self, grips: Ints) -> Floats:
+        """Return the motions that grips forbid.
+
+        Parameters
+        ----------
+        grips : (r,) int
+            Indices into ``network.inner.ravel()``.
+
+        Returns
+        -------
+        (3r, 6b) float
+        """
+        return np.asarray(self.inner_motion[(3 * grips[:, None] + np.arange(3)).ravel()])
 
 
 def rigid_structure(network: Network, bricks: int) -> RigidStructure:
-    """Return the parts of the stiffness of the first ``bricks`` bricks."""
+    """Return the parts of the stiffness of a partial structure.
+
+    Parameters
+    ----------
+    network : Network
+    bricks : int
+        How many bricks stand.
+
+    Returns
+    -------
+    RigidStructure
+    """
     acting, gap, stiffness = spring_maps(network, bricks)
     matrix = np.einsum("sik,sij,sjl->kl", gap, stiffness, gap, optimize=True)
     motion = node_motion(network, bricks).toarray()
     inner = network.inner[:bricks].ravel()
-    held = motion[(3 * inner[:, None] + np.arange(3)).ravel()]
-    return RigidStructure(acting, gap, stiffness, matrix, motion, held, build_statics(network))
+    of_inner = motion[(3 * inner[:, None] + np.arange(3)).ravel()]
+    statics = build_statics(network)
+    return RigidStructure(acting, gap, stiffness, matrix, motion, of_inner, statics)
 
 
 def require_resistance(network: Network, bricks: int, columns: Ints) -> None:
-    """Raise a `MechanismError` if one grip set leaves a motion that nothing resists."""
+    """Check that one grip set leaves no motion that nothing resists.
+
+    Parameters
+    ----------
+    network : Network
+    bricks : int
+        How many bricks stand.
+    columns : (r,) int
+        Grips as indices into ``network.inner.ravel()``.
+
+    Raises
+    ------
+    MechanismError
+        If it does.
+    """
     parts = rigid_structure(network, bricks)
-    fixed = parts.held[(3 * columns[:, None] + np.arange(3)).ravel()]
-    resisting_modes(network, parts.matrix, fixed)
+    resisting_modes(network, parts.matrix, parts.forbidden(columns))
 
 
 def resisting_modes(
-    network: Network, matrix: Floats, fixed: Floats
+    network: Network, matrix: Floats, forbidden: Floats
 ) -> tuple[Floats, Floats, Floats]:
-    """Return eigenvalues and modes of the scaled stiffness, and the motions (6b, m) they combine.
+    """Return how a structure resists the motions that its grips leave.
+
+    Parameters
+    ----------
+    network : Network
+    matrix : (6b, 6b) float
+        Stiffness without grips.
+    forbidden : (c, 6b) float
+        Motions that the grips forbid.
+
+    Returns
+    -------
+    values : (m,) float
+        Eigenvalues of the scaled stiffness, ascending.
+    vectors : (m, m) float
+        Its modes.
+    motions : (6b, m) float
+        The motions that the modes combine.
 
     Raises
     ------
     MechanismError
         If the smallest eigenvalue is zero beside the largest.
     """
-    free = linalg.null_space(fixed) if len(fixed) else np.eye(len(matrix))
+    free = linalg.null_space(forbidden) if len(forbidden) else np.eye(len(matrix))
     reduced = free.T @ matrix @ free
     diagonal = np.diag(reduced)
     if not diagonal.max() > 0:
@@ -72,7 +147,21 @@ def mechanism_error(
     twist: Floats,
     text: str = "nothing resists a motion of brick {brick}; add a grip, a joint or stiffness",
 ) -> MechanismError:
-    """Return the error that shows an unresisted motion (6b,), its largest component scaled to 1."""
+    """Return the error that shows an unresisted motion.
+
+    Parameters
+    ----------
+    network : Network
+    twist : (6b,) float
+        The motion, of any size.
+    text : str, optional
+        What to say of the brick that moves most, ``{brick}``.
+
+    Returns
+    -------
+    MechanismError
+        With the motion's largest component scaled to 1.
+    """
     shape = (twist / np.abs(twist).max()).reshape(-1, 6)
     worst = int(np.abs(shape).max(axis=1).argmax())
     names = [brick.name for brick in network.scene.placed[: len(shape)]]

@@ -18,31 +18,32 @@ import numpy as np
 from scipy import linalg, sparse
 from scipy.sparse.linalg import SuperLU, splu
 
-from seqopt.arrays import Floats, Ints, skew
-from seqopt.engines.interface import Fields
+from seqopt.arrays import Floats, FrozenValue, Ints
+from seqopt.engines.interface import Fields, join_sets, no_sets
 from seqopt.engines.rigid.mechanism import require_resistance
-from seqopt.engines.rigid.recovery import respond, stack
+from seqopt.engines.rigid.recovery import Solution, respond
 from seqopt.errors import SolverError
-from seqopt.network.kinematics import centroids, node_motion
-from seqopt.network.network import GROUND, Network
+from seqopt.network.kinematics import deformation, node_motion
+from seqopt.network.network import Network
 from seqopt.network.statics import Statics, build_statics
 
-REFINEMENTS = 3
-CONVERGED = 1e-10  # largest last correction of forces, moments, shifts and turns, relative to each
+CORRECTIONS = 3  # after which an answer is judged
+LAST_CORRECTION = 1e-10  # the largest of forces, moments, shifts and turns, relative to each
 EMPTY = 1e-6  # forces this small beside the moments over a brick's length are not looked at alone
 
 
-@dataclass(frozen=True)
-class Ungripped:
+@dataclass(frozen=True, eq=False, repr=False)
+class Ungripped(FrozenValue):
     """What the systems of all grip sets of a partial structure have in common, scaled to order one.
 
     Attributes
     ----------
     network : Network
     bricks : int
-    motion : (3N, 6b) sparse
+    motion : (3n, 6b) sparse
         Displacements of the nodes for unit twists.
-    maps : Statics
+    statics : Statics
+        Of the network.
     deformation : (6s, 6b) sparse
         Scaled deformation of the acting springs, in their own axes, for scaled twists.
     stiffness : (6s,) float
@@ -61,7 +62,7 @@ class Ungripped:
     network: Network
     bricks: int
     motion: sparse.csr_array
-    maps: Statics
+    statics: Statics
     deformation: sparse.csr_array
     stiffness: Floats
     matrix: sparse.csr_array
@@ -72,53 +73,66 @@ class Ungripped:
     unit: float
 
 
-@dataclass(frozen=True)
-class MixedSystem:
+@dataclass(frozen=True, eq=False, repr=False)
+class MixedSystem(FrozenValue):
     """The system of one grip set.
 
     Attributes
     ----------
-    held : (c, 6b) sparse
-        Motions that the grips forbid, of scaled twists.
+    forbidden : (c, 6b) sparse
+        Scaled twists that the grips forbid.
     matrix : (6s + 6b + c,) square sparse
-    hand : (3r, c) float
+    force : (3r, c) float
         Forces of the grips for unit multipliers.
     """
 
-    held: sparse.csr_array
+    forbidden: sparse.csr_array
     matrix: sparse.csc_array
-    hand: Floats
+    force: Floats
 
 
-def ungripped(network: Network, bricks: int) -> Ungripped:
-    """Return what all systems of a partial structure have in common."""
+def ungripped_system(network: Network, bricks: int) -> Ungripped:
+    """Return what all systems of a partial structure have in common.
+
+    Parameters
+    ----------
+    network : Network
+    bricks : int
+        How many bricks stand.
+
+    Returns
+    -------
+    Ungripped
+    """
     springs = network.springs
-    acting = np.flatnonzero(springs.since <= bricks)
+    acting = springs.acting(bricks)
     steps = np.diff(network.node_position[network.inner[:bricks]], axis=1)
     length = float(np.linalg.norm(steps, axis=2).max())
     lever = np.array([1.0, 1.0, 1.0, length, length, length])
-    raw = np.hstack([springs.translational_stiffness, springs.rotational_stiffness])[acting]
-    raw = (raw / lever**2).ravel()
+    raw = (springs.stiffness[acting] / lever**2).ravel()
     unit = float(np.median(raw[raw > 0])) if raw.any() else 1.0
     stiffness = raw / unit
     twist_unit = np.tile(1 / lever, bricks)
-    deformation = _deformation(network, bricks, acting)
-    deformation = sparse.diags_array(np.tile(lever, len(acting))) @ deformation
-    deformation = deformation @ sparse.diags_array(twist_unit)
+    center = network.centroid[:bricks]
+    gap = deformation(
+        springs.bodies[acting], springs.position[acting], center, springs.axes[acting]
+    )
+    gap = sparse.diags_array(np.tile(lever, len(acting))) @ gap
+    gap = gap @ sparse.diags_array(twist_unit)
     row = 1 / np.maximum(1.0, stiffness)  # keeps a stiff joint's equation of order one
     blocks = [
-        [sparse.diags_array(row), sparse.diags_array(row * stiffness) @ deformation],
-        [-deformation.T, None],
+        [sparse.diags_array(row), sparse.diags_array(row * stiffness) @ gap],
+        [-gap.T, None],
     ]
     motion = node_motion(network, bricks)
-    weight = np.repeat(0.5 * network.weight[:bricks], 2, axis=0).ravel()
     inner = (3 * network.inner[:bricks].ravel()[:, None] + np.arange(3)).ravel()
+    weight = network.inner_weight[: 2 * bricks].ravel()
     return Ungripped(
         network=network,
         bricks=bricks,
         motion=motion,
-        maps=build_statics(network),
-        deformation=deformation,
+        statics=build_statics(network),
+        deformation=gap,
         stiffness=stiffness,
         matrix=sparse.csr_array(sparse.block_array(blocks)),
         load=motion[inner].T @ weight * twist_unit / unit,
@@ -130,71 +144,99 @@ def ungripped(network: Network, bricks: int) -> Ungripped:
 
 
 def mixed_system(parts: Ungripped, grips: Ints, shift: Floats | None = None) -> MixedSystem:
-    """Return the system of one grip set, places in ``network.inner.ravel()``.
+    """Return the system of one grip set.
 
     Parameters
     ----------
+    parts : Ungripped
+    grips : (r,) int
+        Indices into ``network.inner.ravel()``.
     shift : (6b,) float, optional
         Added to the diagonal of the scaled stiffness, so that a mechanism can be factored.
+
+    Returns
+    -------
+    MixedSystem
     """
-    rows, hand = _constraints(parts, grips)
-    held = sparse.csr_array(rows @ sparse.diags_array(parts.twist_unit))
+    rows, force = _constraints(parts, grips)
+    forbidden = sparse.csr_array(rows @ sparse.diags_array(parts.twist_unit))
     matrix, joints = parts.matrix, len(parts.wrench_unit)
     if shift is not None:
         below = sparse.diags_array(np.concatenate([np.zeros(joints), shift]))
         matrix = sparse.csr_array(matrix + below)
-    if len(hand):
-        of_all = (held.data, held.indices + joints, held.indptr)
-        rows = sparse.csr_array(of_all, shape=(held.shape[0], matrix.shape[0]))
+    if len(force):
+        of_all = (forbidden.data, forbidden.indices + joints, forbidden.indptr)
+        rows = sparse.csr_array(of_all, shape=(forbidden.shape[0], matrix.shape[0]))
         matrix = sparse.block_array([[matrix, -rows.T], [rows, None]], format="csr")
-    return MixedSystem(held, sparse.csc_array(matrix), hand)
+    return MixedSystem(forbidden, sparse.csc_array(matrix), force)
 
 
-def factor(system: MixedSystem) -> SuperLU:
-    """Return the factors; a `RuntimeError` means that the matrix is exactly singular."""
+def factorize(system: MixedSystem) -> SuperLU:
+    """Return the factors of a system.
+
+    Parameters
+    ----------
+    system : MixedSystem
+
+    Returns
+    -------
+    SuperLU
+
+    Raises
+    ------
+    RuntimeError
+        If the matrix is exactly singular.
+    """
     return splu(system.matrix)
 
 
 def solve_mixed(network: Network, bricks: int, columns: Ints) -> Fields:
-    """Return the fields of grip sets (S, r), given as places in ``network.inner.ravel()``.
+    """Return the fields of grip sets, one factorization for each.
 
-    A mechanism that no load excites passes: `seqopt.engines.rigid.mechanism.require_resistance` finds it.
+    A mechanism that no load excites passes:
+    `seqopt.engines.rigid.mechanism.require_resistance` finds it.
+
+    Parameters
+    ----------
+    network : Network
+    bricks : int
+        How many bricks stand.
+    columns : (S, r) int
+        Grips as indices into ``network.inner.ravel()``.
+
+    Returns
+    -------
+    Fields
 
     Raises
     ------
     MechanismError
         If a motion that the load excites meets no resistance.
     SolverError
-        If the answer still changes by more than `CONVERGED`.
+        If the answer still changes by more than `LAST_CORRECTION`.
     """
-    parts = ungripped(network, bricks)
-    return stack(network, bricks, columns, [_solve_one(parts, grips) for grips in columns])
+    parts = ungripped_system(network, bricks)
+    answers = [_solve_one(parts, grips) for grips in columns]
+    return join_sets([no_sets(network, bricks, columns.shape[1]), *answers])
 
 
-def _solve_one(parts: Ungripped, grips: Ints) -> tuple[Floats, ...]:
+def _solve_one(parts: Ungripped, grips: Ints) -> Fields:
+    """Return the fields of one grip set."""
     network, bricks = parts.network, parts.bricks
     system = mixed_system(parts, grips)
     joints, moves = len(parts.wrench_unit), len(parts.twist_unit)
     load = np.zeros(system.matrix.shape[0])
     load[joints : joints + moves] = parts.load
     try:
-        factors = factor(system)
+        factors = factorize(system)
     except RuntimeError as error:
         require_resistance(network, bricks, grips)
         raise SolverError(f"{bricks} bricks: exactly singular in double precision") from error
     result = factors.solve(load)
-    for _ in range(REFINEMENTS):
+    for _ in range(CORRECTIONS):
         correction = factors.solve(load - system.matrix @ result)
         result += correction
-    kinds = [
-        p[:, i].ravel()
-        for p in np.split(np.arange(joints + moves).reshape(-1, 2, 3), [joints // 6])
-        for i in (0, 1)
-    ]
-    size = [np.abs(result[kind]).max() for kind in kinds]
-    least = [EMPTY * max(size[:2])] * 2 + [EMPTY * max(size[2:])] * 2
-    change = [np.abs(correction[kind]).max() for kind in kinds]
-    if not all(c <= CONVERGED * max(s, e) for c, s, e in zip(change, size, least, strict=True)):
+    if not _unchanged(result, correction, joints, moves):
         require_resistance(network, bricks, grips)
         raise SolverError(
             f"{bricks} bricks: too close to a mechanism for double precision; "
@@ -204,32 +246,24 @@ def _solve_one(parts: Ungripped, grips: Ints) -> tuple[Floats, ...]:
     own = (result[:joints] * parts.wrench_unit).reshape(-1, 2, 3)
     axes = network.springs.axes[parts.acting]
     wrench[parts.acting] = np.einsum("shi,sij->shj", own, axes).reshape(-1, 6)
-    return respond(
-        network,
-        grips,
-        maps=parts.maps,
-        motion=parts.motion,
-        twist=result[joints : joints + moves] * parts.twist_unit,
-        wrench=wrench,
-        force=(system.hand @ (result[joints + moves :] * parts.unit)).reshape(-1, 3),
-    )
+    twist = result[joints : joints + moves] * parts.twist_unit
+    force = (system.force @ (result[joints + moves :] * parts.unit)).reshape(-1, 3)
+    solution = Solution(twist, wrench, force)
+    return respond(network, parts.statics, parts.motion, grips, solution)
 
 
-def _deformation(network: Network, bricks: int, acting: Ints) -> sparse.csr_array:
-    """Return the deformations of springs in their own axes for unit twists, (6s, 6b)."""
-    springs, center = network.springs, centroids(network)
-    turn = np.zeros((len(acting), 6, 6))
-    turn[:, :3, :3] = turn[:, 3:, 3:] = springs.axes[acting]
-    row, side = np.nonzero(springs.bodies[acting] != GROUND)
-    body = springs.bodies[acting[row], side]
-    block = np.tile(np.eye(6), (len(row), 1, 1))
-    block[:, :3, 3:] -= skew(springs.position[acting[row]] - center[body])
-    block = np.where(side, 1.0, -1.0)[:, None, None] * turn[row] @ block
-    rows = np.broadcast_to(6 * row[:, None, None] + np.arange(6)[:, None], block.shape)
-    columns = np.broadcast_to(6 * body[:, None, None] + np.arange(6), block.shape)
-    return sparse.csr_array(
-        (block.ravel(), (rows.ravel(), columns.ravel())), shape=(6 * len(acting), 6 * bricks)
-    )
+def _unchanged(result: Floats, correction: Floats, joints: int, moves: int) -> bool:
+    """Return whether the last correction is small beside forces, moments, shifts and turns each."""
+    kinds = [
+        p[:, i].ravel()
+        for p in np.split(np.arange(joints + moves).reshape(-1, 2, 3), [joints // 6])
+        for i in (0, 1)
+    ]
+    size = [np.abs(result[kind]).max() for kind in kinds]
+    least = [EMPTY * max(size[:2])] * 2 + [EMPTY * max(size[2:])] * 2
+    change = [np.abs(correction[kind]).max() for kind in kinds]
+    every = zip(change, size, least, strict=True)
+    return all(c <= LAST_CORRECTION * max(s, e) for c, s, e in every)
 
 
 def _constraints(parts: Ungripped, grips: Ints) -> tuple[sparse.csr_array, Floats]:
@@ -239,13 +273,13 @@ def _constraints(parts: Ungripped, grips: Ints) -> tuple[sparse.csr_array, Float
     """
     network = parts.network
     inner = network.inner.ravel()[grips]
-    held = parts.motion[(3 * inner[:, None] + np.arange(3)).ravel()]
+    motion = parts.motion[(3 * inner[:, None] + np.arange(3)).ravel()]
     directions = []
-    for i, place in enumerate(grips):
+    for i, brick in enumerate(grips // 2):
         free = np.eye(3)
-        if (grips[:i] // 2 == place // 2).any():
-            step = np.diff(network.node_position[network.inner[place // 2]], axis=0)
+        if (grips[:i] // 2 == brick).any():
+            step = np.diff(network.node_position[network.inner[brick]], axis=0)
             free = linalg.null_space(step)
         directions.append(free)
-    hand = linalg.block_diag(*directions) if len(grips) else np.zeros((0, 0))
-    return sparse.csr_array(sparse.csr_array(hand.T) @ held), hand
+    force = linalg.block_diag(*directions) if len(grips) else np.zeros((0, 0))
+    return sparse.csr_array(sparse.csr_array(force.T) @ motion), force

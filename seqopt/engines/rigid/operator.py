@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import linalg, sparse
 
-from seqopt.arrays import Floats
+from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.engines.basis import SPACE, Basis
 from seqopt.engines.rigid.spanning_tree import (
     SpanningTree,
@@ -16,13 +16,13 @@ from seqopt.engines.rigid.spanning_tree import (
     node_wrenches,
     twists,
 )
-from seqopt.network.kinematics import centroids, node_motion
+from seqopt.network.kinematics import node_motion
 from seqopt.network.network import Network
 from seqopt.network.statics import build_statics
 
 
-@dataclass(frozen=True)
-class ComplianceOperator:
+@dataclass(frozen=True, eq=False, repr=False)
+class ComplianceOperator(FrozenValue):
     """Responses of the first ``bricks`` bricks; rows of all arrays but the first are loads.
 
     Row ``dm + i`` is a unit force in direction ``i`` of d at the ``m``-th inner node
@@ -57,7 +57,28 @@ class ComplianceOperator:
     joint_wrench: Floats
     brick_twist: Floats
     axis: Floats
-    inner_edge: np.ndarray
+    inner_edge: Ints
+
+    @property
+    def directions(self) -> int:
+        """In how many directions a node is loaded and held, d."""
+        return len(self.flexibility) // (2 * self.bricks)
+
+    def load_index(self, columns: Ints) -> Ints:
+        """Return which loads act at every grip.
+
+        Parameters
+        ----------
+        columns : (S, r) int
+            Grips as indices into ``network.inner.ravel()``.
+
+        Returns
+        -------
+        (S, rd) int
+            Rows of the operator.
+        """
+        rows = self.directions * columns[:, :, None] + np.arange(self.directions)
+        return np.asarray(rows.reshape(len(columns), self.directions * columns.shape[1]))
 
 
 class OperatorBuilder:
@@ -65,6 +86,14 @@ class OperatorBuilder:
 
     Adding a brick with a free end only borders these arrays, so a smaller count is a slice of
     them; the springs that close loops enter as unknown wrenches.
+
+    Parameters
+    ----------
+    network : Network
+    tree : SpanningTree
+        On which the bricks hang.
+    basis : Basis, optional
+        The directions in which bricks are loaded and move; all by default.
     """
 
     def __init__(self, network: Network, tree: SpanningTree, basis: Basis = SPACE) -> None:
@@ -77,14 +106,24 @@ class OperatorBuilder:
         closing = closure_wrenches(network, tree, basis).reshape(count, size, -1)
         self.wrench = np.concatenate([loads, closing], axis=2)
         self.strain = compliances(network, tree.spring, basis) @ self.wrench
-        self.twist = twists(network, tree, self.strain, centroids(network), basis)
+        self.twist = twists(network, tree, self.strain, basis)
 
     def operator(self, bricks: int) -> ComplianceOperator:
-        """Return the operator of the first ``bricks`` bricks."""
+        """Return the operator of a partial structure.
+
+        Parameters
+        ----------
+        bricks : int
+            How many bricks stand.
+
+        Returns
+        -------
+        ComplianceOperator
+        """
         network, basis = self.network, self.basis
         loads = len(basis.force) * 2 * bricks
         closing, wrench, twist = self._closed(bricks)
-        weight = np.repeat(0.5 * network.weight[:bricks] @ basis.force.T, 2, axis=0).ravel()
+        weight = (network.inner_weight[: 2 * bricks] @ basis.force.T).ravel()
         carried = np.zeros((len(network.springs.since), len(basis.wrench), loads))
         carried[self.tree.spring[:bricks]] = -wrench
         carried[self.tree.closures[: len(closing)]] = closing

@@ -2,68 +2,77 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy import sparse
 
-from seqopt.arrays import Floats, Ints
+from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.engines.interface import Fields
 from seqopt.network.network import Network
 from seqopt.network.statics import Statics
 
 
-def stack(
-    network: Network, bricks: int, columns: Ints, answers: list[tuple[Floats, ...]]
-) -> Fields:
-    """Return the fields of grip sets (S, r) from the answer of each."""
-    edges, nodes = network.count_edges(bricks), network.count_nodes(bricks)
-    shapes = (
-        (edges,),
-        (nodes, 3),
-        (columns.shape[1], 3),
-        (6,),
-        (len(network.springs.since), 6),
-        (bricks, 6),
-    )
-    return Fields(
-        *(
-            np.array([answer[i] for answer in answers]).reshape(len(answers), *shape)
-            for i, shape in enumerate(shapes)
-        )
-    )
+@dataclass(frozen=True, eq=False, repr=False)
+class Solution(FrozenValue):
+    """What determines all fields of one grip set.
+
+    Attributes
+    ----------
+    twist : (6b,) float
+        Of the bricks, m and rad.
+    wrench : (S, 6) float
+        Of every spring of the network on its second body, N and N m; zero where it does not act.
+    force : (r, 3) float
+        Of the grips, N; two on one brick may share theirs in any way.
+    """
+
+    twist: Floats
+    wrench: Floats
+    force: Floats
 
 
 def respond(
     network: Network,
-    grips: Ints,
-    *,
-    maps: Statics,
+    statics: Statics,
     motion: Floats | sparse.csr_array,
-    twist: Floats,
-    wrench: Floats,
-    force: Floats,
-) -> tuple[Floats, ...]:
-    """Return the fields of one grip set, in the order of `Fields`, from what determines them.
+    grips: Ints,
+    solution: Solution,
+) -> Fields:
+    """Return the fields of one grip set.
 
     Parameters
     ----------
-    grips : (r,) int
-    maps : Statics
+    network : Network
+    statics : Statics
         Of the network.
-    motion : (3N, 6b) float
-        Displacements of the nodes for unit twists.
-    twist, wrench, force : (6b,), (S, 6), (r, 3) float
-        Of bricks, springs and grips; two grips on one brick may share their force in any way.
+    motion : (3n, 6b) float
+        Displacements of the nodes for unit twists; see `seqopt.network.kinematics.node_motion`.
+    grips : (r,) int
+        Indices into ``network.inner.ravel()``.
+    solution : Solution
+
+    Returns
+    -------
+    Fields
+        Of one set.
     """
+    twist, wrench, force = solution.twist, solution.wrench, solution.force.copy()
     bricks = len(twist) // 6
     edges = network.count_edges(bricks)
-    load = np.repeat(0.5 * network.weight[:bricks], 2, axis=0)
+    load = network.inner_weight[: 2 * bricks].copy()
     load[grips] += force
-    carried = maps.edge_of_spring[:edges] @ wrench[:, :3].ravel()
-    carried += maps.edge_of_load[:edges, : load.size] @ load.ravel()
+    carried = statics.edge_of_spring[:edges] @ wrench[:, :3].ravel()
+    carried += statics.edge_of_load[:edges, : load.size] @ load.ravel()
     _split_pairs(network, grips, force, carried)
-    support = maps.support_of_spring @ wrench[network.springs.support]
-    moved = (motion @ twist).reshape(-1, 3)
-    return carried, moved, force, support, wrench, twist.reshape(-1, 6)
+    return Fields(
+        edge_force=carried[None],
+        displacement=(motion @ twist).reshape(1, -1, 3),
+        grip_force=force[None],
+        support=(statics.support_of_spring @ wrench[network.springs.support])[None],
+        joint_wrench=wrench[None],
+        brick_twist=twist.reshape(1, -1, 6),
+    )
 
 
 def _split_pairs(network: Network, grips: Ints, force: Floats, carried: Floats) -> None:

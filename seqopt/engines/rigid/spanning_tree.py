@@ -6,13 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from seqopt.arrays import Floats, Ints
+from seqopt.arrays import Bools, Floats, FrozenValue, Ints
 from seqopt.engines.basis import SPACE, Basis
 from seqopt.network.network import GROUND, Network
 
 
-@dataclass(frozen=True)
-class SpanningTree:
+@dataclass(frozen=True, eq=False, repr=False)
+class SpanningTree(FrozenValue):
     """A tree in which every brick hangs on one spring; arrays run over bricks in build order.
 
     Attributes
@@ -29,15 +29,22 @@ class SpanningTree:
 
     spring: Ints
     parent: Ints
-    on_path: np.ndarray
+    on_path: Bools
     closures: Ints
 
 
 def grow_tree(network: Network) -> SpanningTree | None:
     """Return the tree that hangs every brick, when placed, on the spring nearest to the ground.
 
-    None if a spring has no stiffness in some direction or a brick is placed without a spring to
-    what stands: such a structure has no compliance of its own, and `seqopt.engines.rigid.dense` solves it.
+    Parameters
+    ----------
+    network : Network
+
+    Returns
+    -------
+    SpanningTree or None
+        None if a spring has no stiffness in some direction or a brick is placed without a spring to
+        what stands: such a structure has no compliance of its own.
     """
     springs = network.springs
     if min(springs.translational_stiffness.min(), springs.rotational_stiffness.min()) <= 0:
@@ -61,7 +68,21 @@ def grow_tree(network: Network) -> SpanningTree | None:
 
 
 def compliances(network: Network, which: Ints, basis: Basis = SPACE) -> Floats:
-    """Return the compliances of springs (len(which), k, k), k directions of a basis."""
+    """Return the compliances of springs.
+
+    Parameters
+    ----------
+    network : Network
+    which : (s,) int
+        Springs of the network.
+    basis : Basis, optional
+        k directions; all of space by default.
+
+    Returns
+    -------
+    (s, k, k) float
+        m/N and rad/(N m).
+    """
     springs = network.springs
     axes = springs.axes[which]
     count = len(basis.force)
@@ -76,9 +97,21 @@ def compliances(network: Network, which: Ints, basis: Basis = SPACE) -> Floats:
 
 
 def node_wrenches(network: Network, tree: SpanningTree, basis: Basis = SPACE) -> Floats:
-    """Return the wrenches that unit forces at the inner nodes send through the tree, (B, k, 2B, d).
+    """Return the wrenches that unit forces at the inner nodes send through the tree.
 
     The wrench through a brick's spring is the sum of the loads beyond it, taken about the spring.
+
+    Parameters
+    ----------
+    network : Network
+    tree : SpanningTree
+    basis : Basis, optional
+        d directions of forces, k of wrenches; all of space by default.
+
+    Returns
+    -------
+    (B, k, 2B, d) float
+        1 and m.
     """
     at = network.springs.position[tree.spring]
     owner = np.repeat(np.arange(len(at)), 2)
@@ -88,9 +121,21 @@ def node_wrenches(network: Network, tree: SpanningTree, basis: Basis = SPACE) ->
 
 
 def closure_wrenches(network: Network, tree: SpanningTree, basis: Basis = SPACE) -> Floats:
-    """Return the wrenches that unit wrenches of the closures send through the tree, (B, k, C, k).
+    """Return the wrenches that unit wrenches of the closures send through the tree.
 
     A closure's wrench acts on its second body, and against its first.
+
+    Parameters
+    ----------
+    network : Network
+    tree : SpanningTree
+    basis : Basis, optional
+        k directions; all of space by default.
+
+    Returns
+    -------
+    (B, k, C, k) float
+        1 and m.
     """
     springs = network.springs
     at, point = springs.position[tree.spring], springs.position[tree.closures]
@@ -104,11 +149,24 @@ def closure_wrenches(network: Network, tree: SpanningTree, basis: Basis = SPACE)
     return out
 
 
-def twists(
-    network: Network, tree: SpanningTree, strain: Floats, centroid: Floats, basis: Basis = SPACE
-) -> Floats:
-    """Return the bricks' twists (B, k, K) for the deformations (B, k, K) of the tree's springs."""
-    at = network.springs.position[tree.spring]
+def twists(network: Network, tree: SpanningTree, strain: Floats, basis: Basis = SPACE) -> Floats:
+    """Return the bricks' twists for deformations of the tree's springs.
+
+    Parameters
+    ----------
+    network : Network
+    tree : SpanningTree
+    strain : (B, k, K) float
+        Of K cases: translation and rotation of every spring's second body against its first.
+    basis : Basis, optional
+        k directions; all of space by default.
+
+    Returns
+    -------
+    (B, k, K) float
+        At the centroids.
+    """
+    centroid, at = network.centroid, network.springs.position[tree.spring]
     shift = len(basis.force)
     out = strain.copy()
     out[:, :shift] += _carried(basis, centroid - at) @ strain[:, shift:]

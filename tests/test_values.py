@@ -1,0 +1,169 @@
+"""Frozen values: read-only for good, compared by content, short at the prompt."""
+
+from __future__ import annotations
+
+import pickle
+from dataclasses import dataclass, fields, is_dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import pytest
+from scipy import sparse
+
+from seqopt.arrays import Floats, FrozenValue
+from seqopt.contact.elastic_limits import find_elastic_limits
+from seqopt.contact.faces import step_assembly
+from seqopt.contact.mortar import EPOXY
+from seqopt.contact.quadrature import face_quadrature
+from seqopt.engines.basis import SPACE
+from seqopt.engines.diagnosis import diagnose
+from seqopt.engines.discrete.engine import held_nodes
+from seqopt.engines.discrete.equilibrium_path import settle
+from seqopt.engines.discrete.system import build_system
+from seqopt.engines.interface import Fields, Want
+from seqopt.engines.plane import Plane
+from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.engines.rigid.mechanism import rigid_structure
+from seqopt.engines.rigid.mixed import mixed_system, ungripped_system
+from seqopt.engines.rigid.operator import OperatorBuilder
+from seqopt.engines.rigid.recovery import Solution
+from seqopt.engines.rigid.spanning_tree import grow_tree
+from seqopt.network.build import build_network
+from seqopt.network.statics import build_statics
+from seqopt.stability.assessment import assess, bonded
+from seqopt.stability.prover import Prover
+
+COMPRESSED = (sparse.csr_array, sparse.csc_array)
+
+
+@pytest.fixture(scope="module")
+def values(arch25):
+    """Return a value of every class of the mechanics that holds arrays, by the class's name."""
+    network = build_network(arch25)
+    tree = grow_tree(network)
+    grips = np.array([2])
+    assembly = step_assembly(network, 2, (2, None, None))
+    system = build_system(network, 2, EPOXY, None)
+    held = held_nodes(network, system, grips, network.node_position[network.inner.ravel()[grips]])
+    parts = ungripped_system(network, 2)
+    proven = Prover(assembly, _compiled())(bonded(assembly, EPOXY))
+    plane = Plane(np.zeros(3), np.array([0.0, 1.0, 0.0]), np.eye(3)[[0, 2]])
+    every = (
+        *(network, network.springs, build_statics(network)),
+        *(assembly, face_quadrature(assembly), find_elastic_limits(network, EPOXY)),
+        *(SPACE, plane, tree, OperatorBuilder(network, tree).operator(2), parts),
+        *(mixed_system(parts, grips), rigid_structure(network, 2)),
+        *(Solution(np.zeros(6), np.zeros((1, 6)), np.zeros((0, 3))), system, system.points, held),
+        *(settle(held), ComplianceEngine(network).solve(2, [[2]], Want.ALL)),
+        *(diagnose(network, 2, [2]), proven, proven.answer, assess(assembly, EPOXY)),
+    )
+    return {type(value).__name__: value for value in every}
+
+
+def _compiled():
+    from formulations.limit_analysis import compile_equilibrium  # noqa: PLC0415  # brings a solver
+
+    return compile_equilibrium
+
+
+def classes() -> set[type]:
+    """Return every class of frozen values in the package."""
+    found, left = set(), [FrozenValue]
+    while left:
+        below = left.pop().__subclasses__()
+        left += below
+        found |= {cls for cls in below if cls.__module__.startswith("seqopt.")}
+    return found
+
+
+def writable(content) -> list[str]:
+    """Return the arrays within a value, a matrix or a container that can be written to."""
+    if isinstance(content, np.ndarray):
+        return ["array"] if content.flags.writeable else []
+    if isinstance(content, COMPRESSED):
+        return writable((content.data, content.indices, content.indptr))
+    if isinstance(content, dict):
+        return [f"{key}: {found}" for key, part in content.items() for found in writable(part)]
+    if isinstance(content, tuple | list):
+        return [found for part in content for found in writable(part)]
+    return writable(vars(content)) if isinstance(content, FrozenValue) else []
+
+
+def evaluate(value) -> None:
+    """Evaluate the cached properties of a value."""
+    for name in dir(type(value)):
+        if isinstance(getattr(type(value), name), cached_property):
+            getattr(value, name)
+
+
+MECHANICS = ("scene", "network", "contact", "engines", "stability")
+
+
+def test_every_class_has_a_value_here(values):
+    mine = {c.__name__ for c in classes() if c.__module__.split(".")[1] in MECHANICS}
+    assert mine == set(values)
+
+
+def test_arrays_are_read_only_also_after_a_round_trip(values):
+    for value in values.values():
+        evaluate(value)
+        assert writable(value) == []
+        assert writable(pickle.loads(pickle.dumps(value))) == []
+
+
+def test_an_array_that_can_be_written_is_seen(values):
+    loose = replace(values["Springs"])
+    vars(loose)["extra"] = np.zeros(3)
+    assert writable(loose) == ["extra: array"]
+
+
+def test_equal_contents_make_equal_values(values):
+    for value in values.values():
+        again = pickle.loads(pickle.dumps(value))
+        assert again == value
+        assert hash(again) == hash(value)
+        assert value != "something else"
+
+
+def test_one_other_number_makes_another_value(values):
+    for value in values.values():
+        for name in (field.name for field in fields(value)):
+            old = getattr(value, name)
+            if isinstance(old, np.ndarray) and old.dtype == float and old.size:
+                assert replace(value, **{name: 2 * old + 1}) != value
+
+
+def test_representations_are_short(values, arch25):
+    for value in (*values.values(), arch25):
+        assert len(repr(value)) < 1000
+        assert "\n" not in repr(value)
+    assert repr(values["Fields"]).startswith("Fields(edge_force=<1 x 7 float64>")
+    assert repr(arch25) == "<Scene arch25: 25 bricks, 24 joints, 2 ground ends, 3 robots>"
+
+
+def test_classes_leave_comparison_to_their_base():
+    """``@dataclass`` alone would compare arrays by ``==`` and print them whole."""
+    for cls in classes():
+        assert is_dataclass(cls)
+        assert cls.__dataclass_params__.frozen
+        assert cls.__eq__ is FrozenValue.__eq__, cls
+        assert cls.__hash__ is FrozenValue.__hash__, cls
+
+
+def test_zeros_and_nans_are_alike_whatever_their_bits():
+    @dataclass(frozen=True, eq=False, repr=False)
+    class Numbers(FrozenValue):
+        row: Floats
+        one: float
+
+    first = Numbers(np.array([0.0, np.nan]), float("nan"))
+    second = Numbers(np.array([-0.0, -np.nan]), -float("nan"))
+    assert first == second
+    assert hash(first) == hash(second)
+    assert first != replace(first, one=1.0)
+
+
+def test_fields_cannot_be_written(values):
+    with pytest.raises(ValueError, match="read-only"):
+        values["Fields"].edge_force[0, 0] = 1.0
+    assert isinstance(values["Fields"], Fields)
