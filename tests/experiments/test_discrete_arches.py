@@ -20,8 +20,7 @@ from experiments.discrete.parts.arch_pads import AtCorners, pads_at_corners
 from experiments.discrete.parts.arches_lmgc90 import error, moved
 from experiments.discrete.parts.pad_readings import CORNERS, STEPS, Reading, readings
 from experiments.harness.plotting import RESULTS
-from seqopt.engines.discrete.pads import Across, Pinch
-from seqopt.engines.discrete.system import pads
+from seqopt.engines.discrete.pads import Across, Pinch, pad_stiffness
 from seqopt.sequence.two_robots import sequential
 from seqopt.study.presets import STUDY_PADS
 from seqopt.study.tables import printed
@@ -39,7 +38,9 @@ def test_even_pads_can_stand_for_pads_at_corners(engine25, across):
     center, axis = np.array(brick.position), np.array(brick.width_axis)
     if across == Across.THICKNESS:
         axis = np.cross(brick.length_axis, axis)
-    even, corners = (pads(engine25.network, 16, center, p) for p in (pinch, pads_at_corners(pinch)))
+    even, corners = (
+        pad_stiffness(engine25.network, 16, center, p) for p in (pinch, pads_at_corners(pinch))
+    )
     np.testing.assert_allclose(corners[:3, :3], even[:3, :3], atol=1e-6)
     turning = 2 * pinch.stiffness.tangential * pinch.side**4 / 6
     assert axis @ even[3:, 3:] @ axis == pytest.approx(turning)
