@@ -74,6 +74,8 @@ def undocumented(kind):
     """Return the parameters of a class that no section names."""
     if issubclass(kind, Enum) or getattr(kind, "_is_protocol", False):
         return []
+    if not inspect.isfunction(kind.__init__):  # an exception that takes what any takes
+        return []
     doc = get_doc_object(kind)
     named = {name for part in SECTIONS for entry in doc[part] for name in entry.name.split(", ")}
     return [str(p) for p in inspect.signature(kind).parameters if p not in named]
