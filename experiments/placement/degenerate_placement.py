@@ -35,6 +35,7 @@ from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.placement.certificate import judge as certified
 from seqopt.placement.formulation import Formulation, FormulationKind, formulations
 from seqopt.placement.interface import PlacementProblem
+from seqopt.placement.solving import require_fit
 
 FULL, SMALL = Size(5, 4, 7), Size(3, 3, 6)
 DRAWS = 20
@@ -45,9 +46,8 @@ MALFORMED = {"one cost NaN", "one cost -inf", "costs 1e308", "budget amount NaN"
 def answer(problem: PlacementProblem, formulation: Formulation) -> dict[str, object]:
     """Return what a formulation makes of a problem; see the module's text."""
     row: dict[str, object] = {"value": np.nan, "bound": np.nan, "choice": (), "message": ""}
-    if problem.budgets and not formulation.takes_budgets:
-        return row | {"status": "refused", "message": "it takes no budgets"}
     try:
+        require_fit(problem, formulation, {})
         selection = formulation.solve(problem)
     except (InfeasibleError, ProblemError, SolverError) as error:
         names: dict[type, str] = {InfeasibleError: "infeasible", ProblemError: "refused"}
@@ -68,10 +68,9 @@ def judge(problem: PlacementProblem, formulation: Formulation) -> dict[str, obje
     row = answer(problem, formulation) | {"exact": best, "optima": len(winners), "chosen": ""}
     status, value = row["status"], float(str(row["value"]))
     room = CLOSE * abs(best)
-    takes_budgets = formulation.takes_budgets
     grounds = {
         "infeasible": not winners,
-        "refused": bool(problem.budgets) and not takes_budgets,
+        "refused": bool(problem.budgets) and not formulation.takes_budgets,
         "answered": bool(winners) and value >= best - room,
     }
     if not grounds.get(str(status), status != "wrong"):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import inspect
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -93,11 +92,7 @@ def parse_options(formulation: Formulation, texts: Sequence[str]) -> dict[str, i
     ProblemError
         If there is no such option, or a value is not of its type.
     """
-    known = {
-        name: type(parameter.default)
-        for name, parameter in inspect.signature(formulation.solve).parameters.items()
-        if parameter.kind is inspect.Parameter.KEYWORD_ONLY
-    }
+    known = formulation.options
     out: dict[str, int | str] = {}
     for text in texts:
         name, _, value = text.partition("=")
@@ -105,11 +100,13 @@ def parse_options(formulation: Formulation, texts: Sequence[str]) -> dict[str, i
             raise ProblemError(
                 f"--option {text}: {formulation.name} has {', '.join(known) or 'no options'}"
             )
+        kind = type(known[name])
         try:
-            out[name] = known[name](value)
+            out[name] = kind(value)
         except ValueError as error:
-            kind = known[name].__name__
-            raise ProblemError(f"--option {text}: {name} is {value!r}; give an {kind}") from error
+            raise ProblemError(
+                f"--option {text}: {name} is {value!r}; give an {kind.__name__}"
+            ) from error
     return out
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
@@ -90,6 +91,15 @@ class Formulation:
     solve: Callable[..., Selection]
     reads: Reads = Reads.ALL
     takes_budgets: bool = False
+
+    @property
+    def options(self) -> dict[str, int | str]:
+        """The options of ``solve``, by name, and their defaults."""
+        return {
+            name: parameter.default
+            for name, parameter in inspect.signature(self.solve).parameters.items()
+            if parameter.kind is inspect.Parameter.KEYWORD_ONLY
+        }
 
 
 def formulation_names() -> tuple[str, ...]:

@@ -66,13 +66,36 @@ def solve(
     """
     if isinstance(formulation, str):
         formulation = find_formulation(formulation)
+    require_fit(problem, formulation, options)
+    return (_solve_all if proof else _solve_windows)(problem, formulation, options)
+
+
+def require_fit(
+    problem: PlacementProblem, formulation: Formulation, options: Mapping[str, object]
+) -> None:
+    """Raise an error unless a formulation is for such a problem and has such options.
+
+    Parameters
+    ----------
+    problem : PlacementProblem
+    formulation : Formulation
+    options : mapping of str to object
+
+    Raises
+    ------
+    ProblemError
+        If the problem has budgets that the formulation does not take, or an option is not its own.
+    """
     if problem.budgets and not formulation.takes_budgets:
         able = [name for name, other in formulations().items() if other.takes_budgets]
         raise ProblemError(
             f"{formulation.name}: the budget {problem.budgets[0].name!r} couples all moves; "
             f"use {' or '.join(able)}"
         )
-    return (_solve_all if proof else _solve_windows)(problem, formulation, options)
+    for name in options:
+        if name not in formulation.options:
+            known = ", ".join(formulation.options) or "no options"
+            raise ProblemError(f"option {name}: {formulation.name} has {known}")
 
 
 def _solve_all(

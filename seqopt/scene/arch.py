@@ -123,25 +123,19 @@ def arch_scene(
     <Scene small: 5 bricks, 4 joints, 2 ground ends, 3 robots>
     """
     tangent, left, ends = _axes(shape)
-    pattern = _pattern(shape)
-    offset = np.zeros(len(pattern)) if shape.offset is None else np.asarray(shape.offset, float)
-    middle = 0.5 * (ends[:-1] + ends[1:]) + offset[:, None] * np.cross(tangent, left)
-    bricks = [
-        _brick(shape, b, (tangent[i], left[i], middle[i]), (line_nodes or {}).get(b, 2 * b - 2))
-        for i, b in enumerate(range(1, len(pattern) + 1))
-    ]
+    bricks = _bricks(shape, (tangent, left, ends), line_nodes or {})
     bisector = tangent[:-1] + tangent[1:]
-    joints = [_joint(shape, b, ends[b], bisector[b - 1]) for b in range(1, len(pattern))]
+    joints = [_joint(shape, b, ends[b], bisector[b - 1]) for b in range(1, len(bricks))]
     grounds = [_ground(shape, 1, ends[0], tangent[0], -1.0)]
     if shape.closed:
-        grounds.append(_ground(shape, len(pattern), ends[-1], tangent[-1], 1.0))
+        grounds.append(_ground(shape, len(bricks), ends[-1], tangent[-1], 1.0))
     return Scene(
         name=name,
         provenance=provenance,
-        bricks=tuple(bricks),
+        bricks=bricks,
         joints=tuple(joints),
         grounds=tuple(grounds),
-        build_order=tuple(range(1, len(pattern) + 1)),
+        build_order=tuple(brick.name for brick in bricks),
         robots=robots_beside(shape) if robots is None else tuple(robots),
         blocked_nodes=(0,),
     )
@@ -193,6 +187,19 @@ def _axes(shape: ArchShape) -> tuple[Floats, Floats, Floats]:
     length = np.where(lies_along, shape.dimensions[0], shape.dimensions[1]) + shape.gap
     ends = np.vstack([np.zeros(3), np.cumsum(length[:, None] * tangent, axis=0)])
     return tangent, left, ends
+
+
+def _bricks(
+    shape: ArchShape, axes: tuple[Floats, Floats, Floats], line_nodes: Mapping[int, int]
+) -> tuple[Brick, ...]:
+    """Return all bricks, each in the middle between its ends and moved outward by its offset."""
+    tangent, left, ends = axes
+    offset = np.zeros(len(tangent)) if shape.offset is None else np.asarray(shape.offset, float)
+    middle = 0.5 * (ends[:-1] + ends[1:]) + offset[:, None] * np.cross(tangent, left)
+    poses = zip(tangent, left, middle, strict=True)
+    return tuple(
+        _brick(shape, b, pose, line_nodes.get(b, 2 * b - 2)) for b, pose in enumerate(poses, 1)
+    )
 
 
 def _brick(shape: ArchShape, b: int, pose: tuple[Floats, Floats, Floats], line_node: int) -> Brick:

@@ -345,7 +345,7 @@ def test_it_runs_as_a_program():
 
 def test_a_closed_pipe_is_no_error():
     done = subprocess.run(
-        f"{sys.executable} -m seqopt analyze --method three-robot | head -1",
+        f"{sys.executable} -m seqopt analyze --method published | head -1",
         shell=True,
         capture_output=True,
         text=True,

@@ -62,7 +62,7 @@ def test_budgets_only_mixtures_meet():
         ALL["overlap_mip"].solve(problem)
     selection = ALL["overlap_lp"].solve(problem)
     assert np.isfinite(selection.bound)
-    with pytest.raises(SolverError, match="use overlap_mip"):
+    with pytest.raises(SolverError, match="use a formulation that keeps budgets exactly"):
         certify(problem, selection, Aim.SUM)
 
 

@@ -158,6 +158,9 @@ def test_the_short_cut_does_what_the_long_way_does(arch25, engine25):
         ({"schedule": "loop"}, StepError, "give one of three-robot, modified-sequential"),
         ({"criterion": "ranks"}, ProblemError, "give one of equations-2-3"),
         ({"formulation": "dp"}, ProblemError, "give one of beam, cascade"),
+        ({"width": 3}, ProblemError, "option width: overlap_dp has no options"),
+        ({"formulation": "beam", "horizon": 3}, ProblemError, "option horizon: beam has width"),
+        ({"engine": "x"}, seqopt.SeqoptError, "known are auto"),
     ],
 )
 def test_a_wrong_word_gets_the_words_there_are(arch25, wrong, error, message):

@@ -56,4 +56,5 @@ def workload(net: Network) -> tuple[Problem, list[Case]]:
     """Return the posed problem and all models it takes."""
     recorder = Recorder(net)
     problem = pose(recorder, three_robot_loop(net), EQUATIONS)
+    assert problem.evaluation.models  # evaluated here, and so recorded
     return problem, recorder.cases

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from dataclasses import fields as dataclass_fields
 from itertools import pairwise, product
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from experiments.harness.arches import half_circle
 from seqopt.arrays import Floats
+from seqopt.engines.interface import Engine, Fields, Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.network.network import Network
 from seqopt.placement.costs import Budget, LayeredCosts
 from seqopt.placement.criteria import RESOLUTION, WorstRatio
 from seqopt.placement.interface import Aim, CostProblem, PlacementProblem
@@ -149,12 +153,28 @@ def arch(size: Size, criterion: Criterion, limits: tuple[Limit, ...] = ()) -> Pr
 
 def flat(size: Size, _: Rng) -> Problem:
     """Return a problem in which all possible choices respond equally."""
-    problem = arch(size, EQUATIONS)
-    states = tuple(
-        replace(state, responses={n: 0 * v + 7.0 for n, v in state.responses.items()})
-        for state in problem.evaluation.steps
-    )
-    return replace(problem, evaluation=replace(problem.evaluation, states=states))
+    engine = Even(ComplianceEngine(half_circle(size.bricks)))
+    return pose(engine, three_robot_loop(engine.network), EQUATIONS)
+
+
+class Even:
+    """An engine whose answers are all alike."""
+
+    def __init__(self, engine: Engine) -> None:
+        self.engine = engine
+
+    @property
+    def network(self) -> Network:
+        """The engine's network."""
+        return self.engine.network
+
+    def solve(self, bricks: int, grips: ArrayLike, want: Want = Want.RESPONSES) -> Fields:
+        """Return fields of sevens."""
+        fields = self.engine.solve(bricks, grips, want)
+        sevens = {
+            f.name: np.full_like(getattr(fields, f.name), 7.0) for f in dataclass_fields(fields)
+        }
+        return Fields(**sevens)
 
 
 def tight(size: Size, _: Rng) -> Problem:

@@ -166,40 +166,51 @@ def build_system(network: Network, bricks: int, mortar: Mortar, bed: BedStiffnes
     """
     assembly = bare_assembly(network, bricks)
     acting = network.springs.acting(bricks)
-    bodies, where = network.springs.bodies[acting], network.springs.position[acting]
-    stiffness, points = spring_stiffness(network, acting), face_quadrature(assembly)
-    maps = opening_maps(assembly, points.point, points.face, where)
+    points = face_quadrature(assembly)
+    maps = opening_maps(assembly, points.point, points.face, network.springs.position[acting])
+    stiffness = spring_stiffness(network, acting)
     moduli = _moduli(bed, stiffness, points, maps)
-    center = network.centroid[:bricks]
-    below = above = bodies
-    if bed is None:  # between a joint's layer and its bed there is one more body, a plate
-        center = np.vstack([center, where])
-        below, above = _plates(bodies, bricks)
-    length = max(network.scene.placed[0].dimensions)
-    unit = np.tile(np.repeat([1.0, 1.0 / length], 3), len(center))
-    layers = sparse.csr_array((unit.size, unit.size))
+    own = None
     if bed is None:
         own = _without(stiffness, bed_stiffness(points, maps, moduli))
-        across = deformation(below, where, center) @ sparse.diags_array(unit)
-        layers = layers + across.T @ _diagonal(own) @ across
+    length = max(network.scene.placed[0].dimensions)
+    gap, layers, unit = _joined(network, bricks, length, own)
     return System(
         bricks=bricks,
         acting=acting,
         points=_points(points, moduli, mortar, assembly),
         face=points.face,
         maps=maps,
-        gap=sparse.csr_array(deformation(above, where, center) @ sparse.diags_array(unit)),
-        layers=sparse.csr_array(layers),
+        gap=gap,
+        layers=layers,
         load=_load(network, bricks, unit),
         unit=unit,
         length=length,
     )
 
 
-def _plates(bodies: Ints, bricks: int) -> tuple[Ints, Ints]:
-    """Return the bodies of layers, and of beds, (J, 2) each: a plate between each joint's two."""
-    plates = bricks + np.arange(len(bodies))
-    return np.stack([bodies[:, 0], plates], axis=1), np.stack([plates, bodies[:, 1]], axis=1)
+def _joined(
+    network: Network, bricks: int, length: float, own: Floats | None
+) -> tuple[sparse.csr_array, sparse.csr_array, Floats]:
+    """Return twists across beds (6J, 6n), stiffness of layers (6n, 6n) and unit (6n,) of bodies.
+
+    Between a joint's layer of stiffness ``own`` (J, 6, 6) and its bed is one more body, a plate.
+    """
+    acting = network.springs.acting(bricks)
+    bodies, where = network.springs.bodies[acting], network.springs.position[acting]
+    below, center = bodies, network.centroid[:bricks]
+    if own is not None:
+        plates = bricks + np.arange(len(acting))
+        center = np.vstack([center, where])
+        below = np.stack([bodies[:, 0], plates], axis=1)
+        bodies = np.stack([plates, bodies[:, 1]], axis=1)
+    unit = np.tile(np.repeat([1.0, 1.0 / length], 3), len(center))
+    layers = sparse.csr_array((unit.size, unit.size))
+    if own is not None:
+        across = deformation(below, where, center) @ sparse.diags_array(unit)
+        layers = layers + across.T @ _diagonal(own) @ across
+    gap = deformation(bodies, where, center) @ sparse.diags_array(unit)
+    return sparse.csr_array(gap), sparse.csr_array(layers), unit
 
 
 def _load(network: Network, bricks: int, unit: Floats) -> Floats:
@@ -241,5 +252,5 @@ def _without(stiffness: Floats, bed: Floats) -> Floats:
 
 def _diagonal(blocks: Floats) -> sparse.csr_array:
     """Return blocks (J, 6, 6) as one matrix; SciPy deprecates `block_diag` of dense blocks."""
-    place = np.arange(len(blocks) + 1)
-    return sparse.csr_array(sparse.bsr_array((blocks, place[:-1], place)))
+    index = np.arange(len(blocks) + 1)
+    return sparse.csr_array(sparse.bsr_array((blocks, index[:-1], index)))
