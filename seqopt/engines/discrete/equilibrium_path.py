@@ -16,11 +16,13 @@ ITERATIONS = 60
 BALANCED = 1e-10  # largest force left on a body, over the heaviest body's weight
 ROUNDING = 1e-13  # relative
 LARGEST_STEP, SMALLEST_STEP = 0.1, 1e-3  # of the load, once a bond breaks
-FIRST = 1.0  # resistance to motion at first, over the stiffness
+FIRST_RESISTANCE = 1.0  # resistance to motion at first, over the stiffness
 MOVES = 120  # against a resistance
 HALVINGS = 4
 FAR = 0.1  # motion over a brick's length beyond which a structure has gone
-SUPPORT = 1e-12  # stiffness lent to every motion, over its own: a loose body can come to rest
+LENT_STIFFNESS = (
+    1e-12  # stiffness lent to every motion, over its own: a loose body can come to rest
+)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -224,7 +226,7 @@ def _balance(held: Held, state: Settled, share: float) -> Settled:
     """
     found = _newton(held, state, share, 0.0)
     state = replace(state, left=np.inf)
-    resistance = FIRST
+    resistance = FIRST_RESISTANCE
     for _ in range(MOVES):
         if found is not None and (found.rests or held.gone(found)):
             return found
@@ -239,7 +241,7 @@ def _balance(held: Held, state: Settled, share: float) -> Settled:
 def _newton(held: Held, state: Settled, share: float, resistance: float) -> Settled | None:
     """Return where a state moves to against a resistance, over the stiffness of every motion."""
     system, motion, shorter = held.system, state.motion, 0
-    drag = np.maximum(resistance, SUPPORT) * held.diagonal
+    drag = np.maximum(resistance, LENT_STIFFNESS) * held.diagonal
     step, best = np.zeros_like(motion), np.inf
     for _ in range(ITERATIONS):
         opening = system.openings(held.free @ motion)
