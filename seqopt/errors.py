@@ -44,6 +44,11 @@ class InfeasibleError(ProblemError):
 class MechanismError(SeqoptError, ArithmeticError):
     """Bricks, joints and grips leave a motion that nothing resists.
 
+    Parameters
+    ----------
+    message : str
+        One line that names the brick which moves most.
+
     Attributes
     ----------
     mode : tuple of (int, tuple of 6 float)

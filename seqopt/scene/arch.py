@@ -107,11 +107,13 @@ def arch_scene(
     Parameters
     ----------
     shape : ArchShape
-    name, provenance : str
+    name : str
     robots : sequence of Robot, optional
         By default `robots_beside` the arch.
     line_nodes : mapping of int to int, optional
         Per brick that lies across: which of its nodes is on the arch line; 2b-2 by default.
+    provenance : str
+        Where the numbers come from.
 
     Returns
     -------

@@ -119,10 +119,13 @@ def test_the_judge_tells_them_apart(reply, status, scale):
 def test_the_judge_sees_a_false_bound_and_an_answer_where_there_is_none():
     """With budgets the certificate cannot check a bound below the answer's own value."""
     problem = capped(SMALL, np.random.default_rng(0), 1.0, 0.6)
-    assert judge(problem, answers(ALL["overlap_mip"].solve))["status"] == "optimal"
+    assert (
+        judge(problem, replace(answers(ALL["overlap_mip"].solve), takes_budgets=True))["status"]
+        == "optimal"
+    )
     dearest = tuple(int(np.argmin(takes)) for takes in problem.budgets[0].single)
     value = problem.sums.cost(dearest)
-    bad = answers(lambda p: Selection(dearest, value, bound=value))
+    bad = replace(answers(lambda p: Selection(dearest, value, bound=value)), takes_budgets=True)
     assert judge(problem, bad)["status"] == "wrong"
     impossible = CASES["no pair allowed"](SMALL, np.random.default_rng(0))
     assert judge(impossible, answers(ALL["overlap_dp"].solve))["status"] == "infeasible"
