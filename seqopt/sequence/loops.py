@@ -80,13 +80,12 @@ def robot_loop(network: Network, robots: int | Sequence[str] = ()) -> Schedule:
     Returns
     -------
     Schedule
-        With one move for every brick except the first n; two robots: for every brick.
+        With one move for every brick except the last n; with two robots for every brick.
 
     Raises
     ------
     StepError
-        If there are fewer robots or bricks, or no robot is left for a role that reaches all bricks
-        which the role places.
+        If there are fewer robots or bricks, or none is left that reaches all bricks of a role.
 
     Examples
     --------

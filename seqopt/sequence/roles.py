@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence, Set
+from collections.abc import Mapping, Sequence, Set
 from itertools import permutations
+
+import numpy as np
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import maximum_bipartite_matching
 
 from seqopt.errors import StepError
 from seqopt.network.network import Network
@@ -11,7 +15,6 @@ from seqopt.scene.parts import Brick, Robot
 from seqopt.scene.scene import Scene
 
 Pair = tuple[int, int]  # who places, who holds meanwhile: indices of the scene's robots
-Casting = tuple[int, ...]  # a robot for every role
 _Ways = dict[Pair, tuple[int, tuple[Pair, ...]]]  # by pair: changes so far, pairs so far
 
 
@@ -140,7 +143,7 @@ def _nobody(scene: Scene, free: Sequence[int], able: Set[int], k: int) -> StepEr
     names = " and ".join(scene.robots[robot].name for robot in sorted({*free}))
     reach = "reach" if " and " in names else "reaches"
     why = f"brick {brick.name}: {names} {reach} none of its free nodes {nodes}"
-    if able:
+    if able and k:
         why += f"; {scene.robots[min(able)].name} does, and holds the brick before"
     return StepError(f"{why}; extend a reach or let another robot place it")
 
@@ -170,9 +173,9 @@ def cast(scene: Scene, roles: Sequence[Set[int]], robots: Sequence[int]) -> list
         [r for r in robots if all(can_place(scene, scene.robots[r], scene.placed[b]) for b in role)]
         for role in roles
     ]
-    found = next(_castings(fits), None)
-    if found is not None:
-        return list(found)
+    found = _first_match(fits)
+    if found:
+        return found
     role = min(range(len(roles)), key=lambda r: len(fits[r]))
     names = ", ".join(scene.robots[robot].name for robot in robots)
     bricks = ", ".join(str(scene.placed[b].name) for b in sorted(roles[role]))
@@ -183,16 +186,23 @@ def cast(scene: Scene, roles: Sequence[Set[int]], robots: Sequence[int]) -> list
     )
 
 
-def _castings(
-    fits: Sequence[Sequence[int]], taken: tuple[int, ...] = ()
-) -> Iterator[tuple[int, ...]]:
-    """Yield every way to fill the roles with different robots, in order."""
-    if len(taken) == len(fits):
-        yield taken
-        return
-    for robot in fits[len(taken)]:
-        if robot not in taken:
-            yield from _castings(fits, (*taken, robot))
+def _first_match(fits: Sequence[Sequence[int]]) -> list[int]:
+    """Return the first way to give every role a robot of its own; none if there is no way."""
+    for robot in fits[0] if fits else ():
+        rest = [[other for other in fit if other != robot] for fit in fits[1:]]
+        if _matched(rest):
+            return [robot, *_first_match(rest)]
+    return []
+
+
+def _matched(fits: Sequence[Sequence[int]]) -> bool:
+    """Return whether every role can have a robot that no other has."""
+    if not fits or not all(fits):
+        return not fits
+    able = np.zeros((len(fits), 1 + max(map(max, fits))), dtype=bool)
+    for role, robots in enumerate(fits):
+        able[role, list(robots)] = True
+    return bool((maximum_bipartite_matching(csr_array(able), perm_type="column") >= 0).all())
 
 
 def in_words(number: int) -> str:
