@@ -14,7 +14,7 @@ from scipy.sparse.csgraph import connected_components
 
 from seqopt.arrays import Ints
 from seqopt.errors import StepError
-from seqopt.network.network import Network
+from seqopt.network.network import GROUND, Network
 from seqopt.sequence.schedule import Move, OpenGrip, OpenStep
 from seqopt.sequence.steps import Step
 
@@ -95,6 +95,8 @@ def check_support(
     StepError
         Naming the step and the bricks that nothing holds.
     """
+    if _always_tied(network):
+        return
     scene = network.scene
     known: dict[int, tuple[Island, ...]] = {}
     for step in steps:
@@ -111,6 +113,19 @@ def check_support(
                     "joint ties them to a ground end and no robot is sure to hold them; "
                     "place them later, or hold them by one more robot"
                 )
+
+
+def _always_tied(network: Network) -> bool:
+    """Return whether every brick is tied to one that is supported as soon as it is placed."""
+    springs = network.springs
+    acting = springs.stiffness.any(axis=1)
+    supported = {GROUND}
+    for (first, second), since in zip(
+        springs.bodies[acting].tolist(), springs.since[acting].tolist(), strict=True
+    ):
+        if first in supported and since == second + 1:
+            supported.add(second)
+    return len(supported) == 1 + len(network.scene.placed)
 
 
 def _bricks(names: Iterable[int]) -> str:
