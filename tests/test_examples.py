@@ -69,7 +69,8 @@ def test_a_room_opens_with_an_example(room):
     assert all(hasattr(page, name) for name in page.__all__)
     nouns = [name for name in page.__all__ if name[0].isupper()]
     assert len(nouns) <= 8
-    assert 1 <= len(page.__all__) <= 10
+    assert len(page.__all__) <= 10
+    assert page.__all__ or room == "cli"  # whose page says why
 
 
 @pytest.mark.parametrize("name", sorted({*seqopt.__all__} - {"__version__"}))
