@@ -5,9 +5,9 @@ closed or not, with three robots beside and above. Every heuristic solves every 
 criteria, each relative to the arch's own scales; its gap is that of the certificate to the exact
 optimum. What one arch shows (1.03 % on `arch25` under equations 2 and 3) is one draw of these.
 
-The claim holds if under every criterion the cascade's median gap is at most 1 %, its largest over all
-is more than 10 %, and a beam of five stays within 1 % everywhere. These bounds were set after a first
-look at 149 of such arches with the same generator and another count; they are no law.
+The claim holds if under every criterion the cascade's median gap is at most 1 %, its largest over
+all is more than 10 %, and a beam of five stays within 1 % everywhere. These bounds were set after a
+first look at 149 of such arches; they are no law.
 
 Inputs: none. Command: ``python -m experiments.placement.heuristic_gaps [--quick]``. Writes
 ``experiments/results/heuristic_gaps.csv``.
