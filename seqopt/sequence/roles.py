@@ -179,10 +179,13 @@ def cast(scene: Scene, roles: Sequence[Set[int]], robots: Sequence[int]) -> list
     role = min(range(len(roles)), key=lambda r: len(fits[r]))
     names = ", ".join(scene.robots[robot].name for robot in robots)
     bricks = ", ".join(str(scene.placed[b].name) for b in sorted(roles[role]))
-    fit = ", ".join(scene.robots[robot].name for robot in fits[role]) or "none"
+    fit = ", ".join(scene.robots[robot].name for robot in fits[role])
+    why = (
+        f"only {fit} reaches them all, and is needed for others" if fit else "none reaches them all"
+    )
     raise StepError(
-        f"robots {names}: one and the same has to place bricks {bricks}; {fit} can, and another is "
-        "needed for the bricks between; extend a reach or write a schedule of your own"
+        f"robots {names}: one of them has to place bricks {bricks}, and {why}; extend a reach, name "
+        "other robots, or write a schedule of your own"
     )
 
 

@@ -109,9 +109,9 @@ def check_support(
         for island in known[step.bricks]:
             if not any(names and names <= island for names in holds):
                 raise StepError(
-                    f"step {step.number} ({step.kind.value}): {_bricks(island)} hang free: no "
-                    "joint ties them to a ground end and no robot is sure to hold them; "
-                    "place them later, or hold them by one more robot"
+                    f"step {step.number} ({step.kind.value}): {_hang(island)} free: no joint leads "
+                    "to a ground end and no robot is sure to hold on; place it later, or write a "
+                    "schedule in which one more robot holds it"
                 )
 
 
@@ -128,5 +128,7 @@ def _always_tied(network: Network) -> bool:
     return len(supported) == 1 + len(network.scene.placed)
 
 
-def _bricks(names: Iterable[int]) -> str:
-    return f"bricks {', '.join(map(str, sorted(names)))}"
+def _hang(names: Iterable[int]) -> str:
+    """Return the subject and the verb."""
+    listed = ", ".join(map(str, sorted(names)))
+    return f"bricks {listed} hang" if "," in listed else f"brick {listed} hangs"
