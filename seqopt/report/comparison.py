@@ -130,13 +130,12 @@ def compare(
         for name, plan in plans.items():
             tables[name] = plan.responses()
             rows[name] = _row(plan)
-        notes += _idle(scene, "three-robot loop", problem.schedule.steps)
         counted = paper_models(problem.schedule)
+        notes += _idle(scene, "three-robot loop", problem.schedule.steps)
         shared = {stage: plan.seconds[stage] for stage in ("respond", "rank")}
         if PUBLISHED in tables:
             ranks = rank_choice(problem, published_choice(problem))
             rows[PUBLISHED] |= _worth(problem, published_choice(problem))
-            rows[PUBLISHED]["problem"] = problem.schedule.method
     for name, steps in tables.items():
         over = overloads(scene, steps)
         rows[name] |= largest(scene, steps) | {"overloaded": bool(over)}
@@ -255,8 +254,8 @@ def _row(plan: Plan) -> dict[str, object]:
     }
 
 
-def _worth(problem: Problem, choice: tuple[int, ...]) -> dict[str, float]:
+def _worth(problem: Problem, choice: tuple[int, ...]) -> dict[str, object]:
     """Return the value of a choice, and how far it lies above the optimum."""
     value = problem.sums.cost(choice)
     gap = (value - least_sum(problem.sums)) / max(abs(value), TINY)
-    return {"objective": value, "gap": gap}
+    return {"problem": problem.schedule.method, "objective": value, "gap": gap}

@@ -184,8 +184,8 @@ def cast(scene: Scene, roles: Sequence[Set[int]], robots: Sequence[int]) -> list
         f"only {fit} reaches them all, and is needed for others" if fit else "none reaches them all"
     )
     raise StepError(
-        f"robots {names}: one of them has to place bricks {bricks}, and {why}; extend a reach, name "
-        "other robots, or write a schedule of your own"
+        f"robots {names}: one of them has to place bricks {bricks}, and {why}; extend a reach, "
+        "name other robots, or write a schedule of your own"
     )
 
 
