@@ -40,9 +40,7 @@ def optimize(
     scene : Scene or str
         Or the name of a built-in scene, or a scene file.
     schedule : Schedule, pathlib.Path or str
-        A name: ``"three-robot"``, ``"modified-sequential"``, ``"two-robot"``, or ``"loop"`` for all
-        robots of the scene; or a schedule file; or a schedule of this scene, for example one whose
-        method was told which robots to take.
+        A key of `seqopt.sequence.three_robots.SCHEDULES`, a schedule file, or a schedule.
     criterion : Criterion or str
         What a step costs; or a name of `seqopt.CRITERIA`.
     formulation : str

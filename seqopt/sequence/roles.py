@@ -179,13 +179,10 @@ def cast(scene: Scene, roles: Sequence[Set[int]], robots: Sequence[int]) -> list
     role = min(range(len(roles)), key=lambda r: len(fits[r]))
     names = ", ".join(scene.robots[robot].name for robot in robots)
     bricks = ", ".join(str(scene.placed[b].name) for b in sorted(roles[role]))
-    fit = ", ".join(scene.robots[robot].name for robot in fits[role])
-    why = (
-        f"only {fit} reaches them all, and is needed for others" if fit else "none reaches them all"
-    )
+    fit = ", ".join(scene.robots[robot].name for robot in fits[role]) or "none"
     raise StepError(
-        f"robots {names}: one of them has to place bricks {bricks}, and {why}; extend a reach, "
-        "name other robots, or write a schedule of your own"
+        f"robots {names}: not every role has a robot of its own: one places bricks {bricks}, all "
+        f"within reach of {fit}; extend a reach, name other robots, or write a schedule of your own"
     )
 
 
