@@ -90,7 +90,7 @@ def parse_schedule(where: Network | Scene, text: str, source: str) -> Schedule:
     rows = read_rows(scene, text, what)
     if not rows:
         raise StepError(f"{what}: it has no steps; give at least one")
-    _check_columns(scene, rows[0][1], what)
+    _check_columns(scene, text, what)
     steps: list[OpenStep] = []
     for line, row in rows:
         steps.append(_step(scene, row, steps, f"{what}, line {line}"))
@@ -179,11 +179,14 @@ def find_schedule(
     return read_schedule(network, path)
 
 
-def _check_columns(scene: Scene, row: Row, what: str) -> None:
-    """Require that no column belongs to a robot which the scene does not have."""
+def _check_columns(scene: Scene, text: str, what: str) -> None:
+    """Require that no column stands twice, and none belongs to a robot that there is not."""
     known = [f"{robot.name}_node" for robot in scene.robots]
-    for column in row:
-        if str(column).endswith("_node") and column not in known:
+    columns = next(csv.reader(io.StringIO(text)))
+    for column in columns:
+        if columns.count(column) > 1 and column:
+            raise StepError(f"{what}: column {column} stands twice; leave one out")
+        if column.endswith("_node") and column not in known:
             raise StepError(
                 f"{what}: column {column}: no robot of scene {scene.name} is called so; "
                 f"give {', '.join(known)}"
