@@ -82,8 +82,9 @@ def build_network(scene: Scene) -> Network:
 
 def _springs(scene: Scene, index_of: dict[int, int]) -> list[tuple[Joint | Ground, int]]:
     """Return joints and ground ends with the brick count from which each acts, in that order."""
-    springs = [(spring, _since(spring, index_of)) for spring in (*scene.grounds, *scene.joints)]
-    return sorted(springs, key=lambda entry: entry[1])
+    springs: list[Joint | Ground] = [*scene.grounds, *scene.joints]
+    since = [_since(spring, index_of) for spring in springs]
+    return sorted(zip(springs, since, strict=True), key=lambda entry: entry[1])
 
 
 def _since(spring: Joint | Ground, index_of: dict[int, int]) -> int:
