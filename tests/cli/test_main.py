@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import re
 import subprocess
 import sys
 
@@ -42,7 +43,7 @@ def test_compare_of_another_scene_shows_no_study(capsys, tmp_path):
     status, out, _ = run(capsys, "compare", str(path))
     assert status == 0
     assert "mine" in out
-    assert "406.0" not in out  # the study's numbers belong to its own arch
+    assert not re.search(r"406\.0(?!\d)", out)  # the study's numbers belong to its own arch
     assert "published" not in out
     assert "overlap_dp" in out
 
@@ -155,8 +156,8 @@ def test_optimize(capsys, tmp_path):
         (("--formulation", "overlap_dp", "--criteria", "beauty"), "--criteria beauty"),
         (("--formulation", "overlap_dp", "--criteria", "T_max=heavy"), "'heavy' is not a positive"),
         (("--formulation", "overlap_dp", "--limit", "T_max"), "--limit T_max"),
-        (("--formulation", "overlap_dp", "--limit", "F_largest=9"), "relax a limit"),
-        (("--formulation", "cascade", "--no-proof", "--limit", "F_largest=9"), "no allowed grip"),
+        (("--formulation", "overlap_dp", "--limit", "T_max=20"), "relax a limit"),
+        (("--formulation", "cascade", "--no-proof", "--limit", "T_max=64"), "no allowed grip"),
         (("--formulation", "minimax", "--no-proof"), "minimax looks beyond"),
     ],
 )
@@ -197,7 +198,9 @@ def test_optimize_without_proof(capsys, tmp_path):
 
 @pytest.mark.slow
 def test_compare_writes_tables_and_figures(capsys, tmp_path):
-    assert run(capsys, "compare", "--out", str(tmp_path), "--criteria", "weighted")[0] == 0
+    assert (
+        run(capsys, "compare", "--out", str(tmp_path), "--criteria", "weighted-published")[0] == 0
+    )
     names = {path.name for path in tmp_path.iterdir()}
     assert {"comparison.csv", "published_ranks.csv", "steps_overlap_dp.csv"} <= names
     for name in ("maxima.png", "responses.png", "gap_against_cost.png"):
