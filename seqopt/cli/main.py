@@ -15,12 +15,18 @@ from pathlib import Path
 import numpy as np
 
 from seqopt.cli.arguments import USAGE, parser
-from seqopt.cli.values import parse_criterion, parse_limits, parse_mortar, parse_options
+from seqopt.cli.values import (
+    parse_criterion,
+    parse_limits,
+    parse_mortar,
+    parse_options,
+    parse_robots,
+)
 from seqopt.contact.mortar import MORTARS
 from seqopt.engines.auto import AutoEngine
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import make_engine
-from seqopt.errors import FileError, SceneError, SeqoptError, SolverError
+from seqopt.errors import FileError, SceneError, SeqoptError, SolverError, StepError
 from seqopt.files import csv_text, make_folder, write_bytes, write_csv, write_text
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
@@ -34,8 +40,8 @@ from seqopt.responses.table import analyze, fields_archive
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import dump_scene, load_scene
 from seqopt.sequence.plan_file import read_plan
-from seqopt.sequence.steps import Step
-from seqopt.sequence.three_robots import make_schedule
+from seqopt.sequence.schedule_file import find_schedule
+from seqopt.sequence.steps import AnyStep, Step, idle_robots
 from seqopt.sequence.two_robots import METHODS
 from seqopt.stability.assessment import Verdict
 from seqopt.stability.steps import assess_steps, format_verdicts, stability_table
@@ -106,6 +112,12 @@ def _say_levels(engine: Engine) -> None:
         print(f"engine: {engine.unchecked}", file=sys.stderr)
 
 
+def _say_idle(scene: Scene, steps: Sequence[AnyStep]) -> None:
+    """Name the robots that never grip."""
+    if idle := idle_robots(scene, steps):
+        print(f"robots: {', '.join(idle)} never grip{'s' * (len(idle) == 1)}", file=sys.stderr)
+
+
 def _progress(stage: str) -> None:
     """Say what is being done where a person watches."""
     if sys.stderr.isatty():
@@ -141,7 +153,10 @@ def _optimize(options: argparse.Namespace) -> None:
     make_folder(options.out)
     start = time.perf_counter()
     network = build_network(scene)
-    engine, schedule = _engine(options, network), make_schedule(options.schedule, network)
+    engine, schedule = (
+        _engine(options, network),
+        find_schedule(network, options.schedule, parse_robots(options.robots)),
+    )
     assemble = time.perf_counter() - start
     problem = pose(engine, schedule, criterion, limits)
     plan = solve(problem, formulation, proof=not options.no_proof, **chosen)
@@ -161,6 +176,7 @@ def _optimize(options: argparse.Namespace) -> None:
     )
     for excess in plan.overloads:
         print(f"payload exceeded: {excess}")
+    _say_idle(scene, plan.steps)
 
 
 def _worth(plan: Plan) -> str:
@@ -182,6 +198,7 @@ def _analyze(options: argparse.Namespace) -> None:
     else:
         write_csv(options.out, table)
         print(f"{len(table)} steps written to {options.out}")
+    _say_idle(scene, steps)
 
 
 def _assess(options: argparse.Namespace) -> None:
@@ -207,10 +224,16 @@ def _assess(options: argparse.Namespace) -> None:
 
 def _steps(scene: Scene, options: argparse.Namespace) -> tuple[Step, ...]:
     """Return the closed sequence that the options name."""
+    robots = parse_robots(options.robots)
+    if robots and options.method not in METHODS:
+        raise StepError(
+            f"--robots {options.robots}: a plan says itself who holds; leave it out, or give "
+            f"--method {' or '.join(METHODS)}"
+        )
     if options.plan is not None:
         return read_plan(scene, options.plan)
     if options.method != PUBLISHED:
-        return METHODS[options.method](build_network(scene))
+        return METHODS[options.method](build_network(scene), robots)
     if not is_reference_arch(scene):
         raise SceneError(
             f"scene {scene.name}: --method {PUBLISHED} is the printed plan for arch25; "

@@ -53,6 +53,21 @@ def parse_criterion(text: str, crown: str | None = None) -> Criterion:
     return RankSum(text, tuple(terms), tuple(terms))
 
 
+def parse_robots(text: str) -> tuple[str, ...]:
+    """Return names of robots from words.
+
+    Parameters
+    ----------
+    text : str
+        Names with commas between them; nothing for none.
+
+    Returns
+    -------
+    tuple of str
+    """
+    return tuple(name.strip() for name in text.split(",")) if text else ()
+
+
 def parse_limits(texts: Sequence[str], scene: Scene) -> tuple[Limit, ...]:
     """Return limits from words.
 

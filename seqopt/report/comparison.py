@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,6 +22,8 @@ from seqopt.placement.solving import solve
 from seqopt.responses.quantities import RESPONSES
 from seqopt.responses.table import analyze, force_column
 from seqopt.scene.scene import Scene
+from seqopt.sequence.steps import AnyStep, idle_robots
+from seqopt.sequence.stretches import degeneration
 from seqopt.sequence.three_robots import modified_sequential, three_robot_loop
 from seqopt.sequence.two_robots import METHODS
 from seqopt.study.published import (
@@ -72,7 +74,8 @@ class Comparison:
     paper_models : tuple of int or None
         Models that Bruun et al. count: cascading, full overlap.
     notes : tuple of str
-        Payloads exceeded, and inconsistencies in the paper's own numbers.
+        Methods that degenerate, robots that never grip, payloads exceeded, and inconsistencies in
+        the paper's own numbers.
     refusal : str
         Why the scene has no three-robot loop; empty if it has.
     shared_seconds : mapping of str to float
@@ -128,11 +131,11 @@ def compare(
             tables[name] = plan.responses()
             rows[name] = _row(plan)
         counted = paper_models(problem.schedule)
+        notes += _idle(scene, "three-robot loop", problem.schedule.steps)
         shared = {stage: plan.seconds[stage] for stage in ("respond", "rank")}
         if PUBLISHED in tables:
             ranks = rank_choice(problem, published_choice(problem))
             rows[PUBLISHED] |= _worth(problem, published_choice(problem))
-            rows[PUBLISHED]["problem"] = problem.schedule.method
     for name, steps in tables.items():
         over = overloads(scene, steps)
         rows[name] |= largest(scene, steps) | {"overloaded": bool(over)}
@@ -155,7 +158,8 @@ def method_tables(engine: Engine) -> tuple[dict[str, pd.DataFrame], list[str]]:
     tables : dict of str to pandas.DataFrame
         By method, as `seqopt.analyze` makes them; the published plan for its own arch only.
     notes : list of str
-        Why other methods cannot build the scene.
+        Why other methods cannot build the scene or are not what they are called, and which robots
+        never grip.
 
     Raises
     ------
@@ -165,16 +169,31 @@ def method_tables(engine: Engine) -> tuple[dict[str, pd.DataFrame], list[str]]:
     scene = engine.network.scene
     tables: dict[str, pd.DataFrame] = {}
     refused: dict[str, StepError] = {}
+    notes: list[str] = []
     for name, method in METHODS.items():
         try:
-            tables[name] = analyze(engine, method(engine.network))
+            steps = method(engine.network)
         except StepError as error:
             refused[name] = error
+            continue
+        tables[name] = analyze(engine, steps)
+        why = degeneration(engine.network, name)
+        notes += [f"{name}: {why}"] if why else []
+        notes += _idle(scene, name, steps)
     if not tables:
         raise next(iter(refused.values()))
     if is_reference_arch(scene):
         tables[PUBLISHED] = analyze(engine, published_plan(scene))
-    return tables, [f"{name}: not possible here; {error}" for name, error in refused.items()]
+    refusals = [f"{name}: not possible here; {error}" for name, error in refused.items()]
+    return tables, refusals + notes
+
+
+def _idle(scene: Scene, name: str, steps: Iterable[AnyStep]) -> list[str]:
+    """Return a note that names the robots which never grip, if there are any."""
+    idle = idle_robots(scene, steps)
+    return (
+        [f"{name}: {', '.join(idle)} never {'grips' if len(idle) == 1 else 'grip'}"] if idle else []
+    )
 
 
 def _plans(
@@ -235,8 +254,8 @@ def _row(plan: Plan) -> dict[str, object]:
     }
 
 
-def _worth(problem: Problem, choice: tuple[int, ...]) -> dict[str, float]:
+def _worth(problem: Problem, choice: tuple[int, ...]) -> dict[str, object]:
     """Return the value of a choice, and how far it lies above the optimum."""
     value = problem.sums.cost(choice)
     gap = (value - least_sum(problem.sums)) / max(abs(value), TINY)
-    return {"objective": value, "gap": gap}
+    return {"problem": problem.schedule.method, "objective": value, "gap": gap}

@@ -77,12 +77,8 @@ def parse_plan(scene: Scene, text: str, source: str) -> tuple[Step, ...]:
     StepError
         If the text is not such a table or a step is impossible.
     """
-    reader = csv.DictReader(io.StringIO(text), restval="")
-    wanted = ["step", "type", "bricks", *(f"{robot.name}_node" for robot in scene.robots)]
-    missing = [column for column in wanted if column not in (reader.fieldnames or ())]
-    if missing:
-        raise StepError(f"plan {source}: column {missing[0]} is missing; give {', '.join(wanted)}")
-    steps = [_step(scene, row, f"plan {source}, line {reader.line_num}") for row in reader]
+    rows = read_rows(scene, text, f"plan {source}")
+    steps = [_step(scene, row, f"plan {source}, line {line}") for line, row in rows]
     for expected, step in enumerate(steps, start=1):
         if step.number != expected:
             raise StepError(
@@ -91,20 +87,91 @@ def parse_plan(scene: Scene, text: str, source: str) -> tuple[Step, ...]:
     return check_sequence(scene, steps)
 
 
+def read_rows(scene: Scene, text: str, what: str) -> list[tuple[int, Row]]:
+    """Return the rows of a table of steps.
+
+    Parameters
+    ----------
+    scene : Scene
+        Whose robots have a column each.
+    text : str
+        CSV, as in `parse_plan`.
+    what : str
+        What to call the table in messages.
+
+    Returns
+    -------
+    list of (int, dict of str to str)
+        The number of the line, and its cells by column.
+
+    Raises
+    ------
+    StepError
+        If a column is missing.
+    """
+    reader = csv.DictReader(io.StringIO(text), restval="")
+    wanted = ["step", "type", "bricks", *(f"{robot.name}_node" for robot in scene.robots)]
+    missing = [column for column in wanted if column not in (reader.fieldnames or ())]
+    if missing:
+        raise StepError(f"{what}: column {missing[0]} is missing; give {', '.join(wanted)}")
+    return [(reader.line_num, row) for row in reader]
+
+
 def _step(scene: Scene, row: Row, where: str) -> Step:
+    number, kind, bricks = read_cells(row, where)
+    grips = tuple(read_grip(scene, robot, row, where) for robot in scene.robots)
+    return Step(number, kind, bricks, grips)
+
+
+def read_cells(row: Row, where: str) -> tuple[int, StepKind, int]:
+    """Return what a row says beside its grips.
+
+    Parameters
+    ----------
+    row : dict of str to str
+        Cells by column.
+    where : str
+        What to call the row in messages.
+
+    Returns
+    -------
+    number : int
+    kind : StepKind
+    bricks : int
+
+    Raises
+    ------
+    StepError
+        If a cell is not a whole number, or there is no such type.
+    """
     kinds = {kind.value: kind for kind in StepKind}
     if row["type"] not in kinds:
         raise StepError(f"{where}: type is {row['type']!r}; give one of {', '.join(kinds)}")
-    return Step(
-        number=_integer(row, "step", where),
-        kind=kinds[row["type"]],
-        bricks=_integer(row, "bricks", where),
-        grips=tuple(_grip(scene, robot, row, where) for robot in scene.robots),
-    )
+    number, bricks = _integer(row, "step", where), _integer(row, "bricks", where)
+    return number, kinds[row["type"]], bricks
 
 
-def _grip(scene: Scene, robot: Robot, row: Row, where: str) -> int | None:
-    """Return the node a robot holds; its brick, if named, must be the node's."""
+def read_grip(scene: Scene, robot: Robot, row: Row, where: str) -> int | None:
+    """Return the node a robot holds; its brick, if named, must be the node's.
+
+    Parameters
+    ----------
+    scene : Scene
+    robot : Robot
+    row : dict of str to str
+        Cells by column.
+    where : str
+        What to call the row in messages.
+
+    Returns
+    -------
+    int or None
+
+    Raises
+    ------
+    StepError
+        If a cell is not a whole number, or the node is on another brick.
+    """
     if not row[f"{robot.name}_node"].strip():
         return None
     node = _integer(row, f"{robot.name}_node", where)
