@@ -18,7 +18,7 @@ import numpy as np
 
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints
 from seqopt.engines.interface import Engine, Want
-from seqopt.responses.quantities import RESPONSES, lengths
+from seqopt.responses.quantities import RESPONSES, lengths, require_finite
 from seqopt.sequence.schedule import OpenGrip, OpenStep, Schedule
 
 BLOCK = 2048  # grip sets whose fields are held at once: few enough to stay in the cache
@@ -252,9 +252,10 @@ def _answers(
     forces = []
     for start in range(0, max(len(grips), 1), BLOCK):
         fields = engine.solve(bricks, grips[start : start + BLOCK], want)
-        forces.append(lengths(fields.grip_force))
+        forces.append(require_finite("grip force", lengths(fields.grip_force), bricks))
         for response in asked:
-            found[response.name].append(response.of(engine.network, fields))
+            values = response.of(engine.network, fields)
+            found[response.name].append(require_finite(response.name, values, bricks))
     return {name: np.concatenate(parts) for name, parts in found.items()}, np.concatenate(forces)
 
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from seqopt.arrays import Floats
 from seqopt.engines.interface import Fields, Want
+from seqopt.errors import SolverError
 from seqopt.network.network import Network
 
 SLACK = 1e-6  # an edge is in tension above this share of the mean weight of a brick
@@ -57,6 +58,35 @@ def lengths(vectors: Floats) -> Floats:
         In the unit of the vectors.
     """
     return np.asarray(np.sqrt(_squared(vectors)))
+
+
+def require_finite(name: str, values: Floats, bricks: int) -> Floats:
+    """Return values of a response if all are finite.
+
+    Parameters
+    ----------
+    name : str
+        Of the response, for the message.
+    values : (...) float
+    bricks : int
+        How many bricks stand, for the message.
+
+    Returns
+    -------
+    (...) float
+        The same.
+
+    Raises
+    ------
+    SolverError
+        If one is not: NaN elsewhere means that a robot holds nothing.
+    """
+    if not np.isfinite(values).all():
+        raise SolverError(
+            f"{bricks} bricks: {name} is not finite; correct lengths, masses or stiffnesses "
+            "beyond all bounds in the scene, or the engine"
+        )
+    return values
 
 
 def grip_forces(network: Network, fields: Fields) -> Floats:

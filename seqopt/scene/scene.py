@@ -11,6 +11,7 @@ from functools import cached_property
 from seqopt.arrays import Vector
 from seqopt.errors import SceneError
 from seqopt.scene.checks import vector
+from seqopt.scene.geometry import check_bricks, check_springs
 from seqopt.scene.parts import Brick, Ground, Joint, Robot
 
 
@@ -71,6 +72,8 @@ class Scene:
         _unique(f"scene {self.name}: node", (n for brick in self.bricks for n in brick.nodes))
         _unique(f"scene {self.name}: robot", (robot.name for robot in self.robots))
         self._check_references()
+        check_bricks(self.bricks, self.gravity)
+        check_springs((*self.joints, *self.grounds), {brick.name: brick for brick in self.bricks})
 
     def __repr__(self) -> str:
         counts = (
