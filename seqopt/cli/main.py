@@ -8,7 +8,7 @@ import json
 import os
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -21,7 +21,15 @@ from seqopt.engines.auto import AutoEngine
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import make_engine
 from seqopt.errors import FileError, SceneError, SeqoptError, SolverError
-from seqopt.files import csv_text, make_folder, write_bytes, write_csv, write_text
+from seqopt.files import (
+    csv_text,
+    require_apart,
+    require_folder,
+    write_bytes,
+    write_csv,
+    write_folder,
+    write_text,
+)
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.placement.formulation import find_formulation
@@ -32,7 +40,7 @@ from seqopt.report.comparison import Comparison, compare
 from seqopt.report.text import format_comparison
 from seqopt.responses.table import analyze, fields_archive
 from seqopt.scene.scene import Scene
-from seqopt.scene.scene_file import dump_scene, load_scene
+from seqopt.scene.scene_file import builtin_scenes, dump_scene, load_scene
 from seqopt.sequence.plan_file import read_plan
 from seqopt.sequence.steps import Step
 from seqopt.sequence.three_robots import make_schedule
@@ -78,12 +86,12 @@ def _compare(options: argparse.Namespace) -> None:
     criterion = parse_criterion(options.criteria)
     if options.out is not None:
         _require_matplotlib(options.out)
-        make_folder(options.out)
+        require_folder(options.out)
     result = compare(engine, criterion, _progress)
     _say_levels(engine)
     print(format_comparison(result, scene, criterion))
     if options.out is not None and not result.refusal:
-        _write_comparison(options.out, result)
+        _write_comparison(options, result)
 
 
 def _engine(options: argparse.Namespace, network: Network) -> Engine:
@@ -117,19 +125,37 @@ def _require_matplotlib(folder: Path) -> None:
         raise FileError(f"figures for {folder} need matplotlib: pip install matplotlib")
 
 
-def _write_comparison(folder: Path, result: Comparison) -> None:
+def _write_comparison(options: argparse.Namespace, result: Comparison) -> None:
     from seqopt.report.charts import comparison_figures  # noqa: PLC0415  # matplotlib is an extra
 
-    write_text(folder / "comparison.csv", result.table.to_csv(float_format="%.6g"))
+    files: dict[str, bytes | str] = {
+        "comparison.csv": result.table.to_csv(float_format="%.6g"),
+        **{f"steps_{name}.csv": csv_text(table) for name, table in result.tables.items()},
+    }
     if result.ranks is not None:
-        write_text(folder / "published_ranks.csv", result.ranks.to_csv(index=False))
-    for name, table in result.tables.items():
-        write_csv(folder / f"steps_{name}.csv", table)
+        files["published_ranks.csv"] = result.ranks.to_csv(index=False)
     for name, figure in comparison_figures(result).items():
         buffer = io.BytesIO()
         figure.savefig(buffer, dpi=130)
-        write_bytes(folder / name, buffer.getvalue())
-    print(f"tables and figures written to {folder}")
+        files[name] = buffer.getvalue()
+    _write_folder(options, files)
+    print(f"tables and figures written to {options.out}")
+
+
+def _write_folder(options: argparse.Namespace, files: Mapping[str, bytes | str]) -> None:
+    require_apart([options.out / name for name in files], _inputs(options))
+    write_folder(options.out, files)
+
+
+def _require_apart(options: argparse.Namespace, *outputs: Path | None) -> None:
+    require_apart([path for path in outputs if path is not None], _inputs(options))
+
+
+def _inputs(options: argparse.Namespace) -> list[Path]:
+    """Return the files that a command reads."""
+    scene = [] if options.scene in builtin_scenes() else [Path(options.scene)]
+    plan = getattr(options, "plan", None)
+    return scene if plan is None else [*scene, plan]
 
 
 def _optimize(options: argparse.Namespace) -> None:
@@ -138,7 +164,7 @@ def _optimize(options: argparse.Namespace) -> None:
     criterion = parse_criterion(options.criteria)
     scene = load_scene(options.scene)
     limits = parse_limits(options.limit, scene)
-    make_folder(options.out)
+    require_folder(options.out)
     start = time.perf_counter()
     network = build_network(scene)
     engine, schedule = _engine(options, network), make_schedule(options.schedule, network)
@@ -151,10 +177,13 @@ def _optimize(options: argparse.Namespace) -> None:
         "models_paper_count": {"cascading": cascading, "overlap": overlap},
         "seconds": {"assemble": assemble, **plan.seconds},
     }
-    write_csv(options.out / "plan.csv", plan.responses())
-    write_csv(options.out / "selection.csv", plan.table())
-    write_csv(options.out / "responses.csv", plan.alternatives())
-    write_text(options.out / "summary.json", json.dumps(report, indent=2) + "\n")
+    files = {
+        "plan.csv": csv_text(plan.responses()),
+        "selection.csv": csv_text(plan.table()),
+        "responses.csv": csv_text(plan.alternatives()),
+        "summary.json": json.dumps(report, indent=2) + "\n",
+    }
+    _write_folder(options, files)
     print(
         f"{formulation.name} ({formulation.kind.value}): {_worth(plan)}, "
         f"{plan.models} models; written to {options.out}"
@@ -168,6 +197,7 @@ def _worth(plan: Plan) -> str:
 
 
 def _analyze(options: argparse.Namespace) -> None:
+    _require_apart(options, options.out, options.fields)
     scene = load_scene(options.scene)
     engine = _engine(options, build_network(scene))
     steps = _steps(scene, options)
@@ -183,6 +213,7 @@ def _analyze(options: argparse.Namespace) -> None:
 
 
 def _assess(options: argparse.Namespace) -> None:
+    _require_apart(options, options.out)
     scene = load_scene(options.scene)
     mortar = parse_mortar(options)
     network = build_network(scene)
@@ -218,6 +249,7 @@ def _steps(scene: Scene, options: argparse.Namespace) -> tuple[Step, ...]:
 
 
 def _scene(options: argparse.Namespace) -> None:
+    _require_apart(options, options.export)
     scene = load_scene(options.scene)
     parts = build_network(scene)
     count = len(scene.bricks)
