@@ -12,6 +12,7 @@ from seqopt.engines.interface import Engine, Fields
 from seqopt.errors import MechanismError, SolverError
 from seqopt.responses.quantities import RESPONSES, grip_forces, require_finite
 from seqopt.scene.parts import Robot
+from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Step
 
 
@@ -60,6 +61,28 @@ def force_column(robot: Robot) -> str:
     str
     """
     return f"F_{robot.name}_N"
+
+
+def steps_over_payload(scene: Scene, table: pd.DataFrame) -> dict[str, list[int]]:
+    """Return the steps in which robots would have to exert more than they can.
+
+    Parameters
+    ----------
+    scene : Scene
+        Whose robots have payloads.
+    table : pandas.DataFrame
+        From `analyze`.
+
+    Returns
+    -------
+    dict of str to list of int
+        Numbers of steps by name of the robot; robots that never do are not in it.
+    """
+    over = {
+        robot.name: table["step"][table[force_column(robot)].abs() > robot.payload].tolist()
+        for robot in scene.robots
+    }
+    return {name: steps for name, steps in over.items() if steps}
 
 
 def step_fields(engine: Engine, step: Step) -> Fields:
