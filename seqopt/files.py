@@ -42,7 +42,7 @@ def read_text(path: Path) -> str:
         if len(content) > LARGEST_INPUT:
             most = LARGEST_INPUT / 1e6
             raise FileError(f"cannot read {path}: it has more than {most:g} MB; name a smaller one")
-        return content.decode()
+        return content.decode("utf-8-sig")  # spreadsheets start text with a mark
     except (OSError, ValueError) as error:
         if isinstance(error, FileError):
             raise

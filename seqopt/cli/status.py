@@ -35,7 +35,8 @@ def status_of(error: BaseException) -> Status:
         complain("seqopt: interrupted")
         return Status.INTERRUPTED
     if isinstance(error, MemoryError):
-        complain(f"seqopt: out of memory: {error or 'no more is to be had'}; {LESS}")
+        advice = "" if isinstance(error, SeqoptError) else f"; {LESS}"
+        complain(f"seqopt: out of memory: {error or 'no more is to be had'}{advice}")
         return Status.FAILED
     if isinstance(error, SolverError):
         complain(f"seqopt: solver failed: {error}")

@@ -16,13 +16,9 @@ from typing import Any, TextIO
 import numpy as np
 
 from seqopt.errors import FileError, SceneWarning
+from seqopt.scene.checks import steers
 
-STEERING = {  # what Unicode has to turn lines about, beside its controls
-    *range(0x202A, 0x202F),
-    *range(0x2066, 0x206A),
-    0x2028,
-    0x2029,
-}
+LONGEST = 2000  # characters of a line on standard error
 
 
 def harmless(text: str, kept: str = "") -> str:
@@ -43,13 +39,7 @@ def harmless(text: str, kept: str = "") -> str:
     >>> harmless("rob" + chr(27) + "[2J")
     'rob\\x1b[2J'
     """
-    return "".join(
-        repr(sign)[1:-1] if sign not in kept and _steers(ord(sign)) else sign for sign in text
-    )
-
-
-def _steers(code: int) -> bool:
-    return code < 0x20 or 0x7F <= code < 0xA0 or 0xD800 <= code < 0xE000 or code in STEERING
+    return "".join(repr(sign)[1:-1] if sign not in kept and steers(sign) else sign for sign in text)
 
 
 def say(text: str) -> None:
@@ -89,6 +79,8 @@ def complain(text: str) -> None:
     ----------
     text : str
     """
+    if len(text) > LONGEST:
+        text = f"{text[: LONGEST // 2]} … {text[-LONGEST // 4 :]}"
     try:
         if sys.stderr is not None:
             print(harmless(text), file=sys.stderr, flush=True)

@@ -15,6 +15,7 @@ from seqopt.responses.choices import CHOICE_RESPONSES
 from seqopt.scene.scene import Scene
 from seqopt.study.presets import CRITERIA
 
+LARGEST = 1e100  # number: products of larger ones overflow
 RESPONSES = (*CHOICE_RESPONSES, "F_each")
 
 
@@ -139,7 +140,8 @@ def parse_mortar(options: argparse.Namespace) -> Mortar:
 
 def _response(name: str, where: str) -> str:
     if name not in RESPONSES and not name.startswith("F_"):
-        known = ", ".join((*CRITERIA, *RESPONSES, "F_ROBOT"))
+        names = (*CRITERIA, *RESPONSES) if where == "--criteria" else ("payload", *CHOICE_RESPONSES)
+        known = ", ".join((*names, "F_ROBOT"))
         raise ProblemError(f"{where} {name}: there is no such; give {known}")
     return name
 
@@ -149,8 +151,10 @@ def _number(text: str, where: str, zero: str = "") -> float:
         value = float(text)
     except ValueError:
         value = -1.0
-    if not 0 < value < float("inf") and not (zero and value == 0):
+    if not 0 < value <= LARGEST and not (zero and value == 0):
         raise ProblemError(
-            f"{where}: {text!r} is not a positive number" + (" or zero" if zero else "")
+            f"{where}: {text!r} is not a positive number"
+            + (" or zero" if zero else "")
+            + (f" up to {LARGEST:g}" if value > LARGEST else "")
         )
     return value

@@ -237,7 +237,7 @@ def pose(
     Raises
     ------
     ProblemError
-        If a response is named that there is not.
+        If a response is named that there is not, or no grip is open.
 
     Examples
     --------
@@ -248,6 +248,11 @@ def pose(
     >>> len(problem.schedule.moves), problem.criterion.name, problem.limits
     (22, 'worst-ratio', ())
     """
+    if not schedule.moves:
+        raise ProblemError(
+            f"schedule {schedule.method}: with {len(schedule.scene.bricks)} bricks it leaves no "
+            "grip open; there is nothing to choose, analyze its steps"
+        )
     robots = [robot.name for robot in schedule.scene.robots]
     asked = ResponsesAsked(criterion.for_robots(robots), tuple(limits), tuple(also))
     known = {*CHOICE_RESPONSES, *(f"F_{name}" for name in robots)}

@@ -160,10 +160,11 @@ def _plans(
     engine: Engine, criterion: Criterion, progress: Callable[[str], None]
 ) -> tuple[dict[str, Plan], Problem]:
     """Return the plan of the modified sequential method and of every formulation on the loop."""
+    loop = three_robot_loop(engine.network)  # whose refusal says most
     progress("modified sequential method")
     modified = pose(engine, modified_sequential(engine.network), criterion)
     plans = {"modified-sequential": solve(modified, "rank_search")}
-    problem = pose(engine, three_robot_loop(engine.network), criterion)
+    problem = pose(engine, loop, criterion)
     for name, formulation in formulations().items():
         progress(f"three-robot loop by {name}")
         plans[name] = solve(problem, formulation)

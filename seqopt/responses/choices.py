@@ -18,6 +18,7 @@ import numpy as np
 
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints
 from seqopt.engines.interface import Engine, Want
+from seqopt.responses.memory import require_memory
 from seqopt.responses.quantities import RESPONSES, lengths, require_finite
 from seqopt.sequence.schedule import OpenGrip, OpenStep, Schedule
 
@@ -127,7 +128,10 @@ def evaluate_choices(
     ------
     MechanismError, SolverError
         As the engine does.
+    MemoryShortError
+        If there is not the memory for them.
     """
+    require_memory(schedule, wanted)
     alike: dict[tuple[int, int], list[OpenStep]] = {}
     for step in schedule.steps:
         if step.moves:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from seqopt.errors import StepError
 from seqopt.files import read_text
+from seqopt.scene.checks import short, whole
 from seqopt.scene.parts import Robot
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Step, StepKind, check_sequence
@@ -77,11 +78,20 @@ def parse_plan(scene: Scene, text: str, source: str) -> tuple[Step, ...]:
     StepError
         If the text is not such a table or a step is impossible.
     """
-    reader = csv.DictReader(io.StringIO(text), restval="")
+    try:
+        return _steps(scene, csv.DictReader(io.StringIO(text), restval=""), source)
+    except csv.Error as error:
+        raise StepError(f"plan {source}: no CSV that can be read: {error}") from error
+
+
+def _steps(scene: Scene, reader: csv.DictReader[str], source: str) -> tuple[Step, ...]:
     wanted = ["step", "type", "bricks", *(f"{robot.name}_node" for robot in scene.robots)]
     missing = [column for column in wanted if column not in (reader.fieldnames or ())]
     if missing:
         raise StepError(f"plan {source}: column {missing[0]} is missing; give {', '.join(wanted)}")
+    twice = [column for column in wanted if (reader.fieldnames or ()).count(column) > 1]
+    if twice:
+        raise StepError(f"plan {source}: column {twice[0]} stands there twice; keep one")
     steps = [_step(scene, row, f"plan {source}, line {reader.line_num}") for row in reader]
     for expected, step in enumerate(steps, start=1):
         if step.number != expected:
@@ -94,7 +104,7 @@ def parse_plan(scene: Scene, text: str, source: str) -> tuple[Step, ...]:
 def _step(scene: Scene, row: Row, where: str) -> Step:
     kinds = {kind.value: kind for kind in StepKind}
     if row["type"] not in kinds:
-        raise StepError(f"{where}: type is {row['type']!r}; give one of {', '.join(kinds)}")
+        raise StepError(f"{where}: type is {short(row['type'])}; give one of {', '.join(kinds)}")
     return Step(
         number=_integer(row, "step", where),
         kind=kinds[row["type"]],
@@ -120,6 +130,7 @@ def _grip(scene: Scene, robot: Robot, row: Row, where: str) -> int | None:
 
 def _integer(row: Row, column: str, where: str) -> int:
     try:
-        return int(row[column])
+        return whole(column, int(row[column]))
     except ValueError as error:
-        raise StepError(f"{where}: {column} is {row[column]!r}; give a whole number") from error
+        text = short(row[column])
+        raise StepError(f"{where}: {column} is {text}; give a whole number") from error
