@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -15,6 +16,7 @@ from seqopt.responses.choices import CHOICE_RESPONSES
 from seqopt.scene.scene import Scene
 from seqopt.study.presets import CRITERIA
 
+BETWEEN = re.compile(r",(?![^\[]*\])")  # a comma that is not in brackets
 LARGEST = 1e100  # number: products of larger ones overflow
 RESPONSES = (*CHOICE_RESPONSES, "F_each")
 
@@ -39,8 +41,8 @@ def parse_criterion(text: str) -> Criterion:
     if text in CRITERIA:
         return CRITERIA[text]
     terms = []
-    for part in text.split(","):
-        name, _, weight = part.partition("=")
+    for part in BETWEEN.split(text):
+        name, weight = _split(part)
         terms.append((_response(name, "--criteria"), _number(weight or "1", f"--criteria {part}")))
     return RankSum(text, tuple(terms), tuple(terms))
 
@@ -66,7 +68,7 @@ def parse_limits(texts: Sequence[str], scene: Scene) -> tuple[Limit, ...]:
     """
     out: list[Limit] = []
     for text in texts:
-        name, _, value = text.partition("=")
+        name, value = _split(text)
         if text == "payload":
             out += payload_limits(scene)
         else:
@@ -136,6 +138,13 @@ def parse_mortar(options: argparse.Namespace) -> Mortar:
         if (text := getattr(options, name)) is not None
     }
     return replace(base, **given)
+
+
+def _split(text: str) -> tuple[str, str]:
+    """Return a response, whose brackets may hold anything, and the number after it."""
+    end = text.rfind("]") + 1
+    name, _, number = text[end:].partition("=")
+    return text[:end] + name, number
 
 
 def _response(name: str, where: str) -> str:

@@ -3,7 +3,8 @@
 Every criterion turns responses over choices, ``(C,)`` for one open move or ``(C, D)`` for two, into
 costs of the same shape. A name stands for a response: ``T_max``, ``M_sup``, ``D_max``, ``F_move``
 (the robot that takes its grip), ``F_largest`` (the largest grip force), ``F_`` and a robot's name
-(its force), ``F_each`` (the forces of all robots, a term each).
+(its force; in brackets where that means something else, as ``F_[sup]``), ``F_each`` (the forces of
+all robots, a term each).
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import numpy as np
 from seqopt.arrays import Floats
 from seqopt.placement.ranks import scaled_ranks
 from seqopt.placement.requirements import ChoiceResponses
+from seqopt.responses.quantities import robot_response
 
 Term = tuple[Any, ...]  # a name and its numbers
 RESOLUTION = (("F", 1.0), ("T", 1.0), ("M", 1.0), ("D", 1e-6))  # N, N, N m, m
@@ -242,7 +244,7 @@ def _each(terms: tuple[Term, ...], robots: Sequence[str]) -> tuple[Term, ...]:
     """Return terms in which ``F_each`` stands once for every robot."""
     out: list[Term] = []
     for term in terms:
-        names = [f"F_{robot}" for robot in robots] if term[0] == "F_each" else [term[0]]
+        names = [robot_response(robot) for robot in robots] if term[0] == "F_each" else [term[0]]
         out += [(name, *term[1:]) for name in names]
     return tuple(out)
 

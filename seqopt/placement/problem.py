@@ -17,6 +17,7 @@ from seqopt.placement.costs import Budget, LayeredCosts
 from seqopt.placement.interface import Aim
 from seqopt.placement.requirements import Criterion, Limit, ResponsesAsked
 from seqopt.responses.choices import CHOICE_RESPONSES, Evaluation, StepChoices
+from seqopt.responses.quantities import robot_response
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import Step
 
@@ -248,17 +249,21 @@ def pose(
     >>> len(problem.schedule.moves), problem.criterion.name, problem.limits
     (22, 'worst-ratio', ())
     """
-    if not schedule.moves:
-        raise ProblemError(
-            f"schedule {schedule.method}: with {len(schedule.scene.bricks)} bricks it leaves no "
-            "grip open; there is nothing to choose, analyze its steps"
-        )
+    _require_moves(schedule)
     robots = [robot.name for robot in schedule.scene.robots]
     asked = ResponsesAsked(criterion.for_robots(robots), tuple(limits), tuple(also))
-    known = {*CHOICE_RESPONSES, *(f"F_{name}" for name in robots)}
+    known = {*CHOICE_RESPONSES, *map(robot_response, robots)}
     for move in schedule.moves:
         if asked(move.bricks) - known:
             wrong = min(asked(move.bricks) - known)
             listed = ", ".join(sorted(known))
             raise ProblemError(f"response {wrong}: there is no such; give {listed}")
     return Problem(asked.criterion, asked.limits, Evaluation(engine, schedule, asked))
+
+
+def _require_moves(schedule: Schedule) -> None:
+    if not schedule.moves:
+        raise ProblemError(
+            f"schedule {schedule.method}: with {len(schedule.scene.bricks)} bricks it leaves no "
+            "grip open; there is nothing to choose, analyze its steps"
+        )

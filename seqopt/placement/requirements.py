@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from seqopt.arrays import Floats
+from seqopt.responses.quantities import robot_response
 from seqopt.scene.scene import Scene
 
 ChoiceResponses = Mapping[str, Floats]
@@ -99,7 +100,7 @@ def payload_limits(scene: Scene) -> tuple[Limit, ...]:
     tuple of Limit
         One for every robot, N.
     """
-    return tuple(Limit(f"F_{robot.name}", robot.payload) for robot in scene.robots)
+    return tuple(Limit(robot_response(robot.name), robot.payload) for robot in scene.robots)
 
 
 @dataclass(frozen=True)

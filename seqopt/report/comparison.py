@@ -18,7 +18,7 @@ from seqopt.placement.problem import Problem, pose
 from seqopt.placement.ranking import rank_choice
 from seqopt.placement.requirements import Criterion
 from seqopt.placement.solving import solve
-from seqopt.responses.quantities import RESPONSES
+from seqopt.responses.quantities import RESPONSES, robot_response
 from seqopt.responses.table import analyze, force_column
 from seqopt.scene.scene import Scene
 from seqopt.sequence.three_robots import modified_sequential, three_robot_loop
@@ -195,7 +195,9 @@ def largest(scene: Scene, table: pd.DataFrame) -> dict[str, float]:
 
 def _quantities(scene: Scene, table: pd.DataFrame) -> pd.Series[float]:
     """Return the largest responses of any step, the force of every robot for itself."""
-    values = {f"F_{r.name} [N]": table[force_column(r)].abs().max() for r in scene.robots}
+    values = {
+        f"{robot_response(r.name)} [N]": table[force_column(r)].abs().max() for r in scene.robots
+    }
     rest = largest(scene, table)
     return pd.Series(
         values | {f"{name} [{LARGEST[name]}]": rest[name] for name in rest if name != "F_rob"}

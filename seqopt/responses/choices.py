@@ -1,7 +1,7 @@
 """Responses of every open step of a schedule, over the choices that are open in it.
 
 Beside the responses of `seqopt.responses.quantities` there are those that belong to robots: the
-force of each (``F_`` and its name), of the one that takes its grip (``F_move``) and the largest
+force of each (`seqopt.responses.quantities.robot_response`), of the one that takes its grip (``F_move``) and the largest
 (``F_largest``), sizes without sign.
 """
 
@@ -19,7 +19,7 @@ import numpy as np
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints
 from seqopt.engines.interface import Engine, Want
 from seqopt.responses.memory import require_memory
-from seqopt.responses.quantities import RESPONSES, lengths, require_finite
+from seqopt.responses.quantities import RESPONSES, lengths, require_finite, robot_response
 from seqopt.sequence.schedule import OpenGrip, OpenStep, Schedule
 
 BLOCK = 2048  # grip sets whose fields are held at once: few enough to stay in the cache
@@ -266,7 +266,7 @@ def _answers(
 def _robot_forces(schedule: Schedule, step: OpenStep, forces: Floats) -> dict[str, Floats]:
     """Return the forces by robot, of the robot whose move decides the step, and the largest."""
     robots = [schedule.scene.robots[i].name for i in _robots_holding(step)]
-    out = {f"F_{name}": forces[:, i] for i, name in enumerate(robots)}
-    out["F_move"] = out[f"F_{schedule.moves[step.moves[-1]].robot}"]
+    out = {robot_response(name): forces[:, i] for i, name in enumerate(robots)}
+    out["F_move"] = out[robot_response(schedule.moves[step.moves[-1]].robot)]
     out["F_largest"] = forces.max(axis=1)
     return out

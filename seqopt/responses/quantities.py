@@ -60,6 +60,34 @@ def lengths(vectors: Floats) -> Floats:
     return np.asarray(np.sqrt(_squared(vectors)))
 
 
+TAKEN = {"rob", "max", "move", "largest", "each"}  # beside RESPONSES: other meanings of F_
+MARKS = set("[]=,;")  # of the language of criteria, limits and tables
+
+
+def robot_response(robot: str) -> str:
+    """Return the name of the force of a robot's grip, which nothing else has.
+
+    It is ``F_`` and the robot's name; where that means something else already, or cannot be read
+    back from a list, the name stands in brackets.
+
+    Parameters
+    ----------
+    robot : str
+        Its name.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> robot_response("rob1"), robot_response("sup"), robot_response("a,b")
+    ('F_rob1', 'F_[sup]', 'F_[a,b]')
+    """
+    means_more = robot in TAKEN or f"F_{robot}" in RESPONSES or MARKS & set(robot)
+    return f"F_[{robot}]" if means_more or not robot.strip() else f"F_{robot}"
+
+
 def require_finite(name: str, values: Floats, bricks: int) -> Floats:
     """Return values of a response if all are finite.
 

@@ -10,7 +10,7 @@ import pandas as pd
 
 from seqopt.engines.interface import Engine, Fields
 from seqopt.errors import MechanismError, SolverError
-from seqopt.responses.quantities import RESPONSES, grip_forces, require_finite
+from seqopt.responses.quantities import RESPONSES, grip_forces, require_finite, robot_response
 from seqopt.scene.parts import Robot
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Step
@@ -60,7 +60,7 @@ def force_column(robot: Robot) -> str:
     -------
     str
     """
-    return f"F_{robot.name}_N"
+    return f"{robot_response(robot.name)}_N"
 
 
 def steps_over_payload(scene: Scene, table: pd.DataFrame) -> dict[str, list[int]]:
