@@ -19,7 +19,14 @@ from scipy import sparse
 from scipy.sparse.linalg import SuperLU, splu
 
 from seqopt.arrays import Floats, Ints
-from seqopt.engines.interface import Fields, Want, grip_columns, join_sets, no_sets
+from seqopt.engines.interface import (
+    Fields,
+    Want,
+    grip_columns,
+    join_sets,
+    no_sets,
+    require_finite,
+)
 from seqopt.engines.rigid.mechanism import require_resistance
 from seqopt.errors import SolverError
 from seqopt.network.network import Network, PartKind
@@ -78,7 +85,8 @@ class FrameEngine:
         network = self._network
         columns = grip_columns(network, bricks, grips)
         answers = [_solve_one(network, bricks, row, self._contrast) for row in columns]
-        return join_sets([no_sets(network, bricks, columns.shape[1]), *answers])
+        answer = join_sets([no_sets(network, bricks, columns.shape[1]), *answers])
+        return require_finite(answer, bricks, grips)
 
 
 class _Frame(NamedTuple):
@@ -112,13 +120,13 @@ def _solve_one(network: Network, bricks: int, columns: Ints, contrast: float) ->
     motion[unknown] = _solve(reduced, frame.stiffness, load.ravel()[unknown], contrast, examine)
     stress = frame.stiffness * (frame.deformation @ motion)
     reaction = (frame.deformation.T @ stress).reshape(load.shape) - load
-    support = base[network.node_spring[base] == network.springs.support]
+    of_end = network.node_spring[base] == network.springs.support[:, None]  # (G, base nodes)
     moved = motion.reshape(load.shape)
     return Fields(
         edge_force=stress[None, :edges],
         displacement=moved[None, :nodes, :3],
         grip_force=reaction[None, held, :3],
-        support=reaction[support].sum(axis=0)[None],
+        support=(of_end @ reaction[base])[None],
         joint_wrench=_joint_wrenches(network, bricks, stress[-6 * frame.halves :])[None],
         brick_twist=moved[network.inner[:bricks]].mean(axis=1)[None],
     )

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints
-from seqopt.errors import GripError
+from seqopt.errors import GripError, SolverError
 from seqopt.network.network import Network
 
 
@@ -42,9 +42,9 @@ class Fields(FrozenValue):
         Of every network node, m.
     grip_force : (S, r, 3) float
         Force of every grip on the structure, N.
-    support : (S, 6) float
-        Reaction on the structure at the first ground end, N, and its moment about the fixed
-        point, N m.
+    support : (S, G, 6) float
+        Reaction on the structure at every ground end of the scene, in its order, N, and its moment
+        about the end's own fixed point, N m; zero where the end does not act.
     joint_wrench : (S, J, 6) float
         Force and moment, about its position, of every spring of the network on its second body
         (`Springs.bodies`), N and N m; zero where it does not act.
@@ -71,7 +71,7 @@ class Engine(Protocol):
     >>> engine: Engine = make_engine("compliance", build_network(load_scene("arch25")))
     >>> fields = engine.solve(2, [[2], [3]], Want.SUPPORT)  # two bricks, node 2 or 3 held
     >>> fields.grip_force.shape, fields.support.shape, fields.displacement.shape
-    ((2, 1, 3), (2, 6), (2, 0, 3))
+    ((2, 1, 3), (2, 2, 6), (2, 0, 3))
     """
 
     @property
@@ -131,6 +131,39 @@ def keep_wanted(answer: Fields, want: Want) -> Fields:
     return replace(answer, **{name: getattr(answer, name)[:, :0] for name in dropped})
 
 
+def require_finite(answer: Fields, bricks: int, grips: ArrayLike) -> Fields:
+    """Return fields if all of their numbers are finite.
+
+    Parameters
+    ----------
+    answer : Fields
+    bricks : int
+        How many bricks stand.
+    grips : (S, r) int
+        Node numbers, for the message.
+
+    Returns
+    -------
+    Fields
+        The same.
+
+    Raises
+    ------
+    SolverError
+        If one is not: NaN elsewhere means that a robot holds nothing.
+    """
+    for name in NAMES:
+        values = getattr(answer, name)
+        if not np.isfinite(values.sum()) and not np.isfinite(values).all():
+            of_set = ~np.isfinite(values).reshape(len(values), -1).all(axis=1)
+            nodes = ", ".join(map(str, np.asarray(grips)[int(of_set.argmax())])) or "none"
+            raise SolverError(
+                f"{bricks} bricks, held nodes {nodes}: {name.replace('_', ' ')} is not finite; "
+                "correct lengths, masses or stiffnesses beyond all bounds in the scene"
+            )
+    return answer
+
+
 def no_sets(network: Network, bricks: int, held: int) -> Fields:
     """Return the fields of no grip set at all: their shapes.
 
@@ -151,7 +184,7 @@ def no_sets(network: Network, bricks: int, held: int) -> Fields:
         edge_force=np.empty((0, network.count_edges(bricks))),
         displacement=np.empty((0, network.count_nodes(bricks), 3)),
         grip_force=np.empty((0, held, 3)),
-        support=np.empty((0, 6)),
+        support=np.empty((0, len(network.springs.support), 6)),
         joint_wrench=np.empty((0, len(network.springs.since), 6)),
         brick_twist=np.empty((0, bricks, 6)),
     )

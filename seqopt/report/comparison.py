@@ -19,7 +19,7 @@ from seqopt.placement.promises import overloads
 from seqopt.placement.ranking import rank_choice
 from seqopt.placement.requirements import Criterion
 from seqopt.placement.solving import solve
-from seqopt.responses.quantities import RESPONSES
+from seqopt.responses.quantities import RESPONSES, robot_response
 from seqopt.responses.table import analyze, force_column
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import AnyStep, idle_robots
@@ -200,10 +200,11 @@ def _plans(
     engine: Engine, criterion: Criterion, progress: Callable[[str], None]
 ) -> tuple[dict[str, Plan], Problem]:
     """Return the plan of the modified sequential method and of every formulation on the loop."""
+    loop = three_robot_loop(engine.network)  # whose refusal says most
     progress("modified sequential method")
     modified = pose(engine, modified_sequential(engine.network), criterion)
     plans = {"modified-sequential": solve(modified, "rank_search")}
-    problem = pose(engine, three_robot_loop(engine.network), criterion)
+    problem = pose(engine, loop, criterion)
     for name, formulation in formulations().items():
         progress(f"three-robot loop by {name}")
         plans[name] = solve(problem, formulation)
@@ -234,7 +235,9 @@ def largest(scene: Scene, table: pd.DataFrame) -> dict[str, float]:
 
 def _quantities(scene: Scene, table: pd.DataFrame) -> pd.Series[float]:
     """Return the largest responses of any step, the force of every robot for itself."""
-    values = {f"F_{r.name} [N]": table[force_column(r)].abs().max() for r in scene.robots}
+    values = {
+        f"{robot_response(r.name)} [N]": table[force_column(r)].abs().max() for r in scene.robots
+    }
     rest = largest(scene, table)
     return pd.Series(
         values | {f"{name} [{LARGEST[name]}]": rest[name] for name in rest if name != "F_rob"}

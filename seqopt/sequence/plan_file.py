@@ -8,6 +8,7 @@ from pathlib import Path
 
 from seqopt.errors import StepError
 from seqopt.files import read_text
+from seqopt.scene.checks import short, whole
 from seqopt.scene.parts import Robot
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Step, StepKind, check_sequence
@@ -107,13 +108,22 @@ def read_rows(scene: Scene, text: str, what: str) -> list[tuple[int, Row]]:
     Raises
     ------
     StepError
-        If a column is missing.
+        If a column is missing or stands there twice, or the text is no CSV.
     """
-    reader = csv.DictReader(io.StringIO(text), restval="")
+    try:
+        return _rows(scene, csv.DictReader(io.StringIO(text), restval=""), what)
+    except csv.Error as error:
+        raise StepError(f"{what}: no CSV that can be read: {error}") from error
+
+
+def _rows(scene: Scene, reader: csv.DictReader[str], what: str) -> list[tuple[int, Row]]:
     wanted = ["step", "type", "bricks", *(f"{robot.name}_node" for robot in scene.robots)]
     missing = [column for column in wanted if column not in (reader.fieldnames or ())]
     if missing:
         raise StepError(f"{what}: column {missing[0]} is missing; give {', '.join(wanted)}")
+    twice = [column for column in wanted if (reader.fieldnames or ()).count(column) > 1]
+    if twice:
+        raise StepError(f"{what}: column {twice[0]} stands there twice; keep one")
     return [(reader.line_num, row) for row in reader]
 
 
@@ -146,7 +156,7 @@ def read_cells(row: Row, where: str) -> tuple[int, StepKind, int]:
     """
     kinds = {kind.value: kind for kind in StepKind}
     if row["type"] not in kinds:
-        raise StepError(f"{where}: type is {row['type']!r}; give one of {', '.join(kinds)}")
+        raise StepError(f"{where}: type is {short(row['type'])}; give one of {', '.join(kinds)}")
     number, bricks = _integer(row, "step", where), _integer(row, "bricks", where)
     return number, kinds[row["type"]], bricks
 
@@ -187,6 +197,7 @@ def read_grip(scene: Scene, robot: Robot, row: Row, where: str) -> int | None:
 
 def _integer(row: Row, column: str, where: str) -> int:
     try:
-        return int(row[column])
+        return whole(column, int(row[column]))
     except ValueError as error:
-        raise StepError(f"{where}: {column} is {row[column]!r}; give a whole number") from error
+        text = short(row[column])
+        raise StepError(f"{where}: {column} is {text}; give a whole number") from error

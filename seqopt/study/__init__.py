@@ -21,6 +21,7 @@ The paper is arXiv 2104.04856. No other room knows a number of theirs.
 from seqopt.study.presets import CRITERIA, ROBOTS
 from seqopt.study.published import (
     IRREGULARITIES,
+    as_printed,
     is_reference_arch,
     printed_maxima,
     published_plan,
@@ -31,6 +32,7 @@ __all__ = [
     "CRITERIA",
     "IRREGULARITIES",
     "ROBOTS",
+    "as_printed",
     "is_reference_arch",
     "printed",
     "printed_maxima",
