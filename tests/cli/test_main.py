@@ -7,6 +7,7 @@ import json
 import re
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -14,8 +15,11 @@ import pytest
 
 from seqopt.cli.main import main
 from seqopt.responses.table import analyze, step_fields
+from seqopt.scene.scene_file import save_scene
+from seqopt.sequence.schedule_file import schedule_text
 from seqopt.sequence.two_robots import cantilever, sequential
 from seqopt.study.tables import printed_steps
+from tests.builders import anywhere, from_both_ends
 
 
 def run(capsys, *arguments):
@@ -146,9 +150,59 @@ def test_optimize(capsys, tmp_path):
     assert (status, out.count("\n")) == (0, 91)
 
 
+def test_optimize_a_schedule_from_a_file(capsys, tmp_path, loop25):
+    """Written out and read again, the loop gives the same plan."""
+    path = tmp_path / "mine.csv"
+    path.write_text(schedule_text(loop25), encoding="utf-8")
+    for folder, words in (("file", ("--schedule", str(path))), ("name", ())):
+        arguments = ("optimize", "--formulation", "overlap_dp", *words)
+        status, _, err = run(capsys, *arguments, "--out", str(tmp_path / folder))
+        assert (status, err) == (0, "")
+    plans = [(tmp_path / name / "plan.csv").read_bytes() for name in ("file", "name")]
+    assert plans[0] == plans[1]
+    report = json.loads((tmp_path / "file" / "summary.json").read_text(encoding="utf-8"))
+    assert report["schedule"] == "mine"
+    assert report["idle_robots"] == []
+
+
+def test_robots_by_name_and_those_that_never_grip(capsys, tmp_path):
+    words = ("--schedule", "two-robot", "--robots", "rob3,rob1", "--formulation", "overlap_dp")
+    status, _, err = run(capsys, "optimize", *words, "--out", str(tmp_path))
+    assert (status, err) == (0, "robots: rob2 never grips\n")
+    report = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
+    assert (report["schedule"], report["idle_robots"]) == ("two-robot", ["rob2"])
+    status, out, err = run(capsys, "analyze", "--method", "sequential", "--robots", "rob3, rob2")
+    assert (status, err) == (0, "robots: rob1 never grips\n")
+    first = pd.read_csv(io.StringIO(out)).iloc[0]
+    assert first["rob3_node"] == 1
+    assert np.isnan(first["rob2_node"])
+    assert run(capsys, "analyze", "--method", "published")[2] == ""
+
+
+def test_compare_names_idle_robots_and_degenerate_methods(capsys, tmp_path):
+    status, out, _ = run(capsys, "compare")
+    assert status == 0
+    assert "- sequential: rob3 never grips\n" in out
+    assert "the sequential method here" not in out
+    path = tmp_path / "both.json"
+    save_scene(replace(from_both_ends(7), robots=anywhere(4)), path)
+    status, out, _ = run(capsys, "compare", str(path))
+    assert status == 0
+    assert "- sequential: rob3, rob4 never grip\n" in out
+    assert "- three-robot loop: rob4 never grips\n" in out
+    assert "- cantilever: no brick extends one that is held" in out
+
+
 @pytest.mark.parametrize(
     ("arguments", "named"),
     [
+        (
+            ("--formulation", "overlap_dp", "--schedule", "ring"),
+            "schedule 'ring': there is no such",
+        ),
+        (("--formulation", "overlap_dp", "--schedule", "no.csv"), "cannot read no.csv"),
+        (("--formulation", "overlap_dp", "--robots", "rob1,rob2"), "three-robot takes three"),
+        (("--formulation", "overlap_dp", "--robots", "rob1,,rob2"), "robot '': there is no such"),
         (("--formulation", "simplex"), "formulation 'simplex'"),
         (("--formulation", "beam", "--option", "depth=3"), "--option depth=3: beam has width"),
         (("--formulation", "beam", "--option", "width=wide"), "width is 'wide'; give an int"),
@@ -319,6 +373,12 @@ def test_help_teaches(capsys, command):
         (("analyze", "--method", "sequential", "--plan", "no.csv"), "not allowed with"),
         (("analyze", "--method", "sequential", "--out", "no/dir/x.csv"), "no/dir/x.csv"),
         (("scene", "--export", "no/dir/x.json"), "no/dir/x.json"),
+        (("analyze", "--method", "sequential", "--robots", "rob1,rob9"), "robot 'rob9'"),
+        (
+            ("analyze", "--method", "published", "--robots", "rob1,rob2"),
+            "--robots rob1,rob2: a plan",
+        ),
+        (("assess", "--plan", "no.csv", "--robots", "rob1,rob2"), "--robots rob1,rob2: a plan"),
         (("assess",), "--method --plan is required"),
         (("assess", "--method", "sequential", "--plan", "x.csv"), "not allowed with"),
         (("assess", "--method", "sequential", "--mortar", "glue"), "'glue' (choose from 'epoxy'"),
