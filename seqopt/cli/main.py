@@ -16,6 +16,7 @@ import numpy as np
 import pandas as pd
 
 from seqopt.cli.arguments import parser
+from seqopt.cli.notes import say_idle, say_levels
 from seqopt.cli.status import Status, status_of
 from seqopt.cli.terminal import complain, flush, progress, quiet_numbers, say, show, silence
 from seqopt.cli.values import (
@@ -24,12 +25,12 @@ from seqopt.cli.values import (
     parse_mortar,
     parse_options,
     parse_robots,
+    parse_steps,
 )
 from seqopt.contact.mortar import MORTARS
-from seqopt.engines.auto import AutoEngine
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import make_engine
-from seqopt.errors import FileError, SceneError, SeqoptError, SolverError, StepError
+from seqopt.errors import FileError, SceneError, SeqoptError, SolverError
 from seqopt.files import (
     csv_text,
     require_apart,
@@ -51,13 +52,10 @@ from seqopt.report.text import format_comparison
 from seqopt.responses.table import analyze, fields_archive
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import builtin_scenes, dump_scene, load_scene
-from seqopt.sequence.plan_file import read_plan
 from seqopt.sequence.schedule_file import find_schedule
-from seqopt.sequence.steps import AnyStep, Step, idle_robots
-from seqopt.sequence.two_robots import METHODS
 from seqopt.stability.assessment import Verdict
 from seqopt.stability.steps import assess_steps, format_verdicts, stability_table
-from seqopt.study.published import PUBLISHED, is_reference_arch, paper_models, published_plan
+from seqopt.study.published import paper_models
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -103,7 +101,7 @@ def _compare(options: argparse.Namespace) -> Status:
         _require_matplotlib(options.out)
         require_folder(options.out)
     result = compare(engine, criterion, progress)
-    _say_levels(engine)
+    say_levels(engine)
     show(format_comparison(result, scene, criterion) + "\n")
     if options.out is not None and not result.refusal:
         _write_comparison(options, result)
@@ -116,22 +114,6 @@ def _engine(options: argparse.Namespace, network: Network) -> Engine:
         return make_engine(options.engine, network, mortar)
     except SceneError as error:
         raise SceneError(f"--engine {options.engine}: {error}") from error
-
-
-def _say_levels(engine: Engine) -> None:
-    """Say which levels an engine that picks them took, and why."""
-    if not isinstance(engine, AutoEngine):
-        return
-    for choice, sets in engine.tally.items():
-        complain(f"engine: {choice.level.value} for {sets} grip sets: {choice.reason}")
-    if engine.unchecked:
-        complain(f"engine: {engine.unchecked}")
-
-
-def _say_idle(scene: Scene, steps: Sequence[AnyStep]) -> None:
-    """Name the robots that never grip."""
-    if idle := idle_robots(scene, steps):
-        complain(f"robots: {', '.join(idle)} never grip{'s' * (len(idle) == 1)}")
 
 
 def _require_matplotlib(folder: Path) -> None:
@@ -181,14 +163,12 @@ def _optimize(options: argparse.Namespace) -> Status:
     require_folder(options.out)
     start = time.perf_counter()
     network = build_network(scene)
-    engine, schedule = (
-        _engine(options, network),
-        find_schedule(network, options.schedule, parse_robots(options.robots)),
-    )
+    engine = _engine(options, network)
+    schedule = find_schedule(network, options.schedule, parse_robots(options.robots))
     assemble = time.perf_counter() - start
     problem = pose(engine, schedule, criterion, limits)
     plan = solve(problem, formulation, proof=not options.no_proof, **chosen)
-    _say_levels(engine)
+    say_levels(engine)
     cascading, overlap = paper_models(schedule)
     report = plan.summary() | {
         "models_paper_count": {"cascading": cascading, "overlap": overlap},
@@ -208,8 +188,9 @@ def _optimize(options: argparse.Namespace) -> Status:
     )
     for excess in plan.overloads:
         say(f"payload exceeded: {excess}")
-    _say_idle(scene, plan.steps)
-    return _payloads_hold(options, scene, table)
+    status = _payloads_hold(options, scene, table)
+    say_idle(scene, plan.steps)
+    return status
 
 
 def _payloads_hold(options: argparse.Namespace, scene: Scene, *tables: pd.DataFrame) -> Status:
@@ -231,9 +212,9 @@ def _analyze(options: argparse.Namespace) -> Status:
     _require_apart(options, options.out, options.fields)
     scene = load_scene(options.scene)
     engine = _engine(options, build_network(scene))
-    steps = _steps(scene, options)
+    steps = parse_steps(scene, options)
     table = analyze(engine, steps)
-    _say_levels(engine)
+    say_levels(engine)
     if options.fields is not None:
         write_bytes(options.fields, fields_archive(engine, steps))
     if options.out is None:
@@ -241,8 +222,9 @@ def _analyze(options: argparse.Namespace) -> Status:
     else:
         write_csv(options.out, table)
         say(f"{len(table)} steps written to {options.out}")
-    _say_idle(scene, steps)
-    return _payloads_hold(options, scene, table)
+    status = _payloads_hold(options, scene, table)
+    say_idle(scene, steps)
+    return status
 
 
 def _assess(options: argparse.Namespace) -> Status:
@@ -250,7 +232,7 @@ def _assess(options: argparse.Namespace) -> Status:
     scene = load_scene(options.scene)
     mortar = parse_mortar(options)
     network = build_network(scene)
-    steps = _steps(scene, options)
+    steps = parse_steps(scene, options)
     results = assess_steps(network, steps, mortar, progress)
     table = stability_table(steps, results)
     if options.out is None:
@@ -267,26 +249,6 @@ def _assess(options: argparse.Namespace) -> Status:
         )
     falls = any(result.verdict is Verdict.FALLS for result in results)
     return Status.DOES_NOT_HOLD if falls else Status.DONE
-
-
-def _steps(scene: Scene, options: argparse.Namespace) -> tuple[Step, ...]:
-    """Return the closed sequence that the options name."""
-    robots = parse_robots(options.robots)
-    if robots and options.method not in METHODS:
-        raise StepError(
-            f"--robots {options.robots}: a plan says itself who holds; leave it out, or give "
-            f"--method {' or '.join(METHODS)}"
-        )
-    if options.plan is not None:
-        return read_plan(scene, options.plan)
-    if options.method != PUBLISHED:
-        return METHODS[options.method](build_network(scene), robots)
-    if not is_reference_arch(scene):
-        raise SceneError(
-            f"scene {scene.name}: --method {PUBLISHED} is the printed plan for arch25; "
-            "give --plan FILE for another scene"
-        )
-    return published_plan(scene)
 
 
 def _scene(options: argparse.Namespace) -> None:

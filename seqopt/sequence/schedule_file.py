@@ -180,12 +180,9 @@ def find_schedule(
 
 
 def _check_columns(scene: Scene, text: str, what: str) -> None:
-    """Require that no column stands twice, and none belongs to a robot that there is not."""
+    """Require that no column belongs to a robot which the scene does not have."""
     known = [f"{robot.name}_node" for robot in scene.robots]
-    columns = next(csv.reader(io.StringIO(text)))
-    for column in columns:
-        if columns.count(column) > 1 and column:
-            raise StepError(f"{what}: column {column} stands twice; leave one out")
+    for column in next(csv.reader(io.StringIO(text))):
         if column.endswith("_node") and column not in known:
             raise StepError(
                 f"{what}: column {column}: no robot of scene {scene.name} is called so; "

@@ -39,7 +39,7 @@ def shell(line):
 @pytest.mark.parametrize(
     ("line", "status", "said"),
     [
-        ("seqopt analyze --method sequential | head -1 >&2", 0, "step,type,bricks"),
+        ("seqopt analyze --method published | head -1 >&2", 0, "step,type,bricks"),
         ("seqopt --help | true", 0, ""),
         ("seqopt analyze --method sequential >/dev/full", 2, "No space left on device"),
         ("seqopt --help >/dev/full", 2, "No space left on device"),
