@@ -149,9 +149,9 @@ def _require_apart(options: argparse.Namespace, *outputs: Path | None) -> None:
 
 def _inputs(options: argparse.Namespace) -> list[Path]:
     """Return the files that a command reads."""
-    scene = [] if options.scene in builtin_scenes() else [Path(options.scene)]
-    plan = getattr(options, "plan", None)
-    return scene if plan is None else [*scene, plan]
+    scene = None if options.scene in builtin_scenes() else options.scene
+    named = (scene, getattr(options, "plan", None), getattr(options, "schedule", None))
+    return [Path(name) for name in named if name is not None]
 
 
 def _optimize(options: argparse.Namespace) -> Status:

@@ -165,6 +165,16 @@ def test_optimize_a_schedule_from_a_file(capsys, tmp_path, loop25):
     assert report["idle_robots"] == []
 
 
+def test_a_schedule_is_not_written_over(capsys, tmp_path, loop25):
+    path = tmp_path / "plan.csv"
+    path.write_text(schedule_text(loop25), encoding="utf-8")
+    words = ("--formulation", "overlap_dp", "--schedule", str(path), "--out", str(tmp_path))
+    status, _, err = run(capsys, "optimize", *words)
+    assert (status, err.count("\n")) == (2, 1)
+    assert "plan.csv: it is the input; name another file" in err
+    assert path.read_text(encoding="utf-8") == schedule_text(loop25)
+
+
 def test_robots_by_name_and_those_that_never_grip(capsys, tmp_path):
     words = ("--schedule", "two-robot", "--robots", "rob3,rob1", "--formulation", "overlap_dp")
     status, _, err = run(capsys, "optimize", *words, "--out", str(tmp_path))
