@@ -10,7 +10,7 @@ import numpy as np
 
 from seqopt.network.build import build_network
 from seqopt.scene.arch import ArchShape, arch_scene
-from seqopt.scene.parts import Brick, Ground, Robot
+from seqopt.scene.parts import Brick, Ground, Joint, Robot
 from seqopt.scene.reach import Side
 from seqopt.scene.scene import Scene
 
@@ -75,6 +75,58 @@ def block(size=(0.4, 0.3, 0.1), lean=0.0, gravity=9.81, **stiffness):
         robots=(Robot(name="rob1", payload=100.0),),
         gravity=(0.0, 0.0, -gravity),
     )
+
+
+def from_both_ends(count, pattern="VLR", order=None):
+    """An arch of which both ends are built; they meet at a closing brick. By default in turn."""
+    closing = (count + 1) // 2
+    left, right = [*range(1, closing)], [*range(count, closing, -1)]
+    pairs = [name for pair in zip(left, right, strict=False) for name in pair]
+    rest = (left + right)[len(pairs) :] if len(left) == len(right) else right[len(left) :]
+    pitch = np.linspace(1.3, -1.3, count).tolist()
+    scene = arch_scene(ArchShape(pitch=pitch, pattern=pattern), "both ends")
+    return replace(scene, build_order=tuple(order or (*pairs, *rest, closing)))
+
+
+def branch(length=0.2):
+    """A trunk of two bricks with two arms of two: a Y whose arms grow in turn."""
+    up, s = (0.0, 0.0, 1.0), math.sqrt(0.5)
+    ways = {1: up, 2: up, 3: (-s, 0.0, s), 4: (s, 0.0, s), 5: (-s, 0.0, s), 6: (s, 0.0, s)}
+    below = {2: 1, 3: 2, 4: 2, 5: 3, 6: 4}
+    start = {1: np.zeros(3)}
+    for name, other in below.items():
+        start[name] = start[other] + length * np.array(ways[other])
+    stiff = {"translational_stiffness": (1e8,) * 3, "rotational_stiffness": (1e6,) * 3}
+
+    def spring(name):
+        place = tuple(start[name].tolist())
+        return {"position": place, "along": ways[name], "across": (0.0, 1.0, 0.0)} | stiff
+
+    return Scene(
+        name="branch",
+        bricks=tuple(
+            Brick(
+                name=name,
+                position=tuple((start[name] + 0.5 * length * np.array(way)).tolist()),
+                length_axis=way,
+                width_axis=(0.0, 1.0, 0.0),
+                dimensions=(length, 0.1, 0.05),
+                density=2000.0,
+                nodes=(2 * name, 2 * name + 1),
+                placing_node=2 * name + 1,
+            )
+            for name, way in ways.items()
+        ),
+        joints=tuple(Joint(bricks=(b, a), **spring(a)) for a, b in below.items()),
+        grounds=(Ground(brick=1, anchor=(0.0, 0.0, -0.05), **spring(1)),),
+        build_order=(1, 2, 3, 4, 5, 6),
+        robots=anywhere(3),
+    )
+
+
+def anywhere(count):
+    """So many robots that reach everything."""
+    return tuple(Robot(name=f"rob{i + 1}", payload=400.0) for i in range(count))
 
 
 def hinged(scene, joint):

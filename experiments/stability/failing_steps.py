@@ -30,7 +30,7 @@ from seqopt.network.build import build_network
 from seqopt.network.network import GROUND, Network
 from seqopt.placement.problem import pose
 from seqopt.placement.solving import solve
-from seqopt.responses.table import analyze
+from seqopt.responses.table import analyze, force_column
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.steps import Step
 from seqopt.sequence.three_robots import modified_sequential, three_robot_loop
@@ -68,7 +68,7 @@ def tabulate(engine: ComplianceEngine, name: str, steps: tuple[Step, ...]) -> pd
     """Return margins and elastic responses of every step."""
     net = engine.network
     table = analyze(engine, steps)
-    robots = [f"F_{robot.name}_N" for robot in net.scene.robots]
+    robots = [force_column(robot) for robot in net.scene.robots]
     largest = table[robots].abs().max(axis=1).fillna(0.0)
     dry = stability_table(steps, assess_steps(net, steps, DRY))
     bound = stability_table(steps, assess_steps(net, steps, EPOXY))

@@ -19,7 +19,14 @@ from scipy import sparse
 from scipy.sparse.linalg import SuperLU, splu
 
 from seqopt.arrays import Floats, Ints
-from seqopt.engines.interface import Fields, Want, grip_columns, join_sets, no_sets
+from seqopt.engines.interface import (
+    Fields,
+    Want,
+    grip_columns,
+    join_sets,
+    no_sets,
+    require_finite,
+)
 from seqopt.engines.rigid.mechanism import require_resistance
 from seqopt.errors import SolverError
 from seqopt.network.network import Network, PartKind
@@ -78,7 +85,8 @@ class FrameEngine:
         network = self._network
         columns = grip_columns(network, bricks, grips)
         answers = [_solve_one(network, bricks, row, self._contrast) for row in columns]
-        return join_sets([no_sets(network, bricks, columns.shape[1]), *answers])
+        answer = join_sets([no_sets(network, bricks, columns.shape[1]), *answers])
+        return require_finite(answer, bricks, grips)
 
 
 class _Frame(NamedTuple):

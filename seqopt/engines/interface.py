@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints
-from seqopt.errors import GripError
+from seqopt.errors import GripError, SolverError
 from seqopt.network.network import Network
 
 
@@ -129,6 +129,39 @@ def keep_wanted(answer: Fields, want: Want) -> Fields:
     """
     dropped = [name for name, flag in FLAGS.items() if not want & flag]
     return replace(answer, **{name: getattr(answer, name)[:, :0] for name in dropped})
+
+
+def require_finite(answer: Fields, bricks: int, grips: ArrayLike) -> Fields:
+    """Return fields if all of their numbers are finite.
+
+    Parameters
+    ----------
+    answer : Fields
+    bricks : int
+        How many bricks stand.
+    grips : (S, r) int
+        Node numbers, for the message.
+
+    Returns
+    -------
+    Fields
+        The same.
+
+    Raises
+    ------
+    SolverError
+        If one is not: NaN elsewhere means that a robot holds nothing.
+    """
+    for name in NAMES:
+        values = getattr(answer, name)
+        if not np.isfinite(values.sum()) and not np.isfinite(values).all():
+            of_set = ~np.isfinite(values).reshape(len(values), -1).all(axis=1)
+            nodes = ", ".join(map(str, np.asarray(grips)[int(of_set.argmax())])) or "none"
+            raise SolverError(
+                f"{bricks} bricks, held nodes {nodes}: {name.replace('_', ' ')} is not finite; "
+                "correct lengths, masses or stiffnesses beyond all bounds in the scene"
+            )
+    return answer
 
 
 def no_sets(network: Network, bricks: int, held: int) -> Fields:

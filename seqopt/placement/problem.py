@@ -18,6 +18,7 @@ from seqopt.placement.interface import Aim
 from seqopt.placement.requirements import Criterion, Limit, ResponsesAsked
 from seqopt.placement.scales import SceneFacts
 from seqopt.responses.choices import CHOICE_RESPONSES, Evaluation, StepChoices
+from seqopt.responses.quantities import robot_response
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import Step
 
@@ -237,7 +238,7 @@ def pose(
     Raises
     ------
     ProblemError
-        If a response is named that there is not.
+        If a response is named that there is not, or no grip is open.
 
     Examples
     --------
@@ -248,12 +249,21 @@ def pose(
     >>> len(problem.schedule.moves), problem.criterion.name, problem.limits
     (22, 'worst-ratio', ())
     """
+    _require_moves(schedule)
     facts = SceneFacts(engine)
     asked = ResponsesAsked(criterion.for_scene(facts), tuple(limits), tuple(also))
-    known = {*CHOICE_RESPONSES, *(f"F_{name}" for name in facts.robots)}
+    known = {*CHOICE_RESPONSES, *map(robot_response, facts.robots)}
     for move in schedule.moves:
         if asked(move.bricks) - known:
             wrong = min(asked(move.bricks) - known)
             listed = ", ".join(sorted(known))
             raise ProblemError(f"response {wrong}: there is no such; give {listed}")
     return Problem(asked.criterion, asked.limits, Evaluation(engine, schedule, asked))
+
+
+def _require_moves(schedule: Schedule) -> None:
+    if not schedule.moves:
+        raise ProblemError(
+            f"schedule {schedule.method}: with {len(schedule.scene.bricks)} bricks it leaves no "
+            "grip open; there is nothing to choose, analyze its steps"
+        )

@@ -11,7 +11,7 @@ import pandas as pd
 from seqopt.errors import InfeasibleError
 from seqopt.placement.problem import Problem
 from seqopt.placement.requirements import Limit, payload_limits
-from seqopt.responses.quantities import RESPONSES
+from seqopt.responses.quantities import RESPONSES, robot_response
 from seqopt.responses.table import analyze, force_column
 from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import OpenStep
@@ -107,7 +107,9 @@ def response_along(scene: Scene, table: pd.DataFrame, name: str) -> np.ndarray:
     if name in RESPONSES:
         response = RESPONSES[name]
         return table[response.column].to_numpy(float) / response.scale
-    forces = {f"F_{robot.name}": table[force_column(robot)].abs() for robot in scene.robots}
+    forces = {
+        robot_response(robot.name): table[force_column(robot)].abs() for robot in scene.robots
+    }
     if name == "F_largest":
         return pd.DataFrame(forces).max(axis=1).to_numpy(float)
     return forces[name].to_numpy(float)

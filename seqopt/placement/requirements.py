@@ -10,6 +10,7 @@ import numpy as np
 
 from seqopt.arrays import Bools, Floats
 from seqopt.placement.scales import SceneFacts
+from seqopt.responses.quantities import robot_response
 from seqopt.scene.scene import Scene
 
 ChoiceResponses = Mapping[str, Floats]
@@ -124,7 +125,7 @@ def payload_limits(scene: Scene) -> tuple[Limit, ...]:
     tuple of Limit
         One for every robot, N.
     """
-    return tuple(Limit(f"F_{robot.name}", robot.payload) for robot in scene.robots)
+    return tuple(Limit(robot_response(robot.name), robot.payload) for robot in scene.robots)
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ import numpy as np
 from seqopt.engines.interface import Engine
 from seqopt.errors import ProblemError, StepError
 from seqopt.network.network import Network
-from seqopt.responses.quantities import RESPONSES
+from seqopt.responses.quantities import RESPONSES, robot_response
 from seqopt.responses.table import analyze, force_column
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Step
@@ -161,7 +161,7 @@ class SceneFacts:
         """Return the largest responses of a method's steps, SI units."""
         table = analyze(self.engine, steps)
         forces = {
-            f"F_{robot.name}": float(table[force_column(robot)].abs().max())
+            robot_response(robot.name): float(table[force_column(robot)].abs().max())
             for robot in self.engine.network.scene.robots
         }
         out = {"F_largest": float(np.nanmax([*forces.values()]))}

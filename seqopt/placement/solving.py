@@ -17,6 +17,7 @@ from seqopt.placement.formulation import (
     Selection,
     find_formulation,
     formulations,
+    select,
 )
 from seqopt.placement.interface import Handed, PlacementProblem
 from seqopt.placement.plan import Plan
@@ -108,7 +109,7 @@ def _solve_all(
     seconds: dict[str, float] = {}
     stages = problem.seconds(formulation.aim)  # computes the costs: solving is timed alone
     with _timed(seconds, "solve"):
-        selection = formulation.solve(Handed(problem), **options)  # the judge keeps the originals
+        selection = select(formulation, Handed(problem), **options)  # the judge has the originals
     seconds["compile"] = selection.compile_seconds
     seconds["solve"] -= selection.compile_seconds
     with _timed(seconds, "verify"):

@@ -1,7 +1,7 @@
 """Responses of every open step of a schedule, over the choices that are open in it.
 
 Beside the responses of `seqopt.responses.quantities` there are those that belong to robots: the
-force of each (``F_`` and its name), of the one that takes its grip (``F_move``) and the largest
+force of each (`robot_response` there), of the one that takes its grip (``F_move``) and the largest
 (``F_largest``), sizes without sign.
 """
 
@@ -18,7 +18,8 @@ import numpy as np
 
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints
 from seqopt.engines.interface import Engine, Want
-from seqopt.responses.quantities import RESPONSES, lengths
+from seqopt.responses.memory import require_memory
+from seqopt.responses.quantities import RESPONSES, lengths, require_finite, robot_response
 from seqopt.sequence.schedule import OpenGrip, OpenStep, Schedule
 
 BLOCK = 2048  # grip sets whose fields are held at once: few enough to stay in the cache
@@ -127,7 +128,10 @@ def evaluate_choices(
     ------
     MechanismError, SolverError
         As the engine does.
+    MemoryShortError
+        If there is not the memory for them.
     """
+    require_memory(schedule, wanted)
     alike: dict[tuple[int, int], list[OpenStep]] = {}
     for step in schedule.steps:
         if step.moves:
@@ -252,16 +256,17 @@ def _answers(
     forces = []
     for start in range(0, max(len(grips), 1), BLOCK):
         fields = engine.solve(bricks, grips[start : start + BLOCK], want)
-        forces.append(lengths(fields.grip_force))
+        forces.append(require_finite("grip force", lengths(fields.grip_force), bricks))
         for response in asked:
-            found[response.name].append(response.of(engine.network, fields))
+            values = response.of(engine.network, fields)
+            found[response.name].append(require_finite(response.name, values, bricks))
     return {name: np.concatenate(parts) for name, parts in found.items()}, np.concatenate(forces)
 
 
 def _robot_forces(schedule: Schedule, step: OpenStep, forces: Floats) -> dict[str, Floats]:
     """Return the forces by robot, of the robot whose move decides the step, and the largest."""
     robots = [schedule.scene.robots[i].name for i in _robots_holding(step)]
-    out = {f"F_{name}": forces[:, i] for i, name in enumerate(robots)}
-    out["F_move"] = out[f"F_{schedule.moves[step.moves[-1]].robot}"]
+    out = {robot_response(name): forces[:, i] for i, name in enumerate(robots)}
+    out["F_move"] = out[robot_response(schedule.moves[step.moves[-1]].robot)]
     out["F_largest"] = forces.max(axis=1)
     return out

@@ -13,6 +13,7 @@ import numpy as np
 
 from seqopt.arrays import Floats
 from seqopt.engines.interface import Fields, Want
+from seqopt.errors import SolverError
 from seqopt.network.network import Network
 
 SLACK = 1e-6  # an edge is in tension above this share of the mean weight of a brick
@@ -57,6 +58,63 @@ def lengths(vectors: Floats) -> Floats:
         In the unit of the vectors.
     """
     return np.asarray(np.sqrt(_squared(vectors)))
+
+
+TAKEN = {"rob", "max", "move", "largest", "each"}  # beside RESPONSES: other meanings of F_
+MARKS = set("[]=,;")  # of the language of criteria, limits and tables
+
+
+def robot_response(robot: str) -> str:
+    """Return the name of the force of a robot's grip, which nothing else has.
+
+    It is ``F_`` and the robot's name; where that means something else already, or cannot be read
+    back from a list, the name stands in brackets.
+
+    Parameters
+    ----------
+    robot : str
+        Its name.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> robot_response("rob1"), robot_response("sup"), robot_response("a,b")
+    ('F_rob1', 'F_[sup]', 'F_[a,b]')
+    """
+    means_more = robot in TAKEN or f"F_{robot}" in RESPONSES or MARKS & set(robot)
+    return f"F_[{robot}]" if means_more or not robot.strip() else f"F_{robot}"
+
+
+def require_finite(name: str, values: Floats, bricks: int) -> Floats:
+    """Return values of a response if all are finite.
+
+    Parameters
+    ----------
+    name : str
+        Of the response, for the message.
+    values : (...) float
+    bricks : int
+        How many bricks stand, for the message.
+
+    Returns
+    -------
+    (...) float
+        The same.
+
+    Raises
+    ------
+    SolverError
+        If one is not: NaN elsewhere means that a robot holds nothing.
+    """
+    if not np.isfinite(values).all():
+        raise SolverError(
+            f"{bricks} bricks: {name} is not finite; correct lengths, masses or stiffnesses "
+            "beyond all bounds in the scene, or the engine"
+        )
+    return values
 
 
 def grip_forces(network: Network, fields: Fields) -> Floats:

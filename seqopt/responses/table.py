@@ -11,7 +11,14 @@ import pandas as pd
 from seqopt.engines.interface import Engine, Fields
 from seqopt.errors import MechanismError, SolverError
 from seqopt.network.network import Network
-from seqopt.responses.quantities import RESPONSES, grip_forces, support_forces, support_moments
+from seqopt.responses.quantities import (
+    RESPONSES,
+    grip_forces,
+    require_finite,
+    robot_response,
+    support_forces,
+    support_moments,
+)
 from seqopt.scene.parts import Robot
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Step
@@ -65,7 +72,7 @@ def force_column(robot: Robot) -> str:
     -------
     str
     """
-    return f"F_{robot.name}_N"
+    return f"{robot_response(robot.name)}_N"
 
 
 def support_columns(scene: Scene) -> list[tuple[str, str]]:
@@ -164,7 +171,8 @@ def fields_archive(engine: Engine, steps: Sequence[Step]) -> bytes:
 def _row(engine: Engine, step: Step) -> dict[str, object]:
     network = engine.network
     scene, fields = network.scene, step_fields(engine, step)
-    forces = iter(grip_forces(network, fields)[0])
+    held = require_finite("grip force", grip_forces(network, fields), step.bricks)
+    forces = iter(held[0])
     row: dict[str, object] = {"step": step.number, "type": step.kind.value, "bricks": step.bricks}
     for robot, node in zip(scene.robots, step.grips, strict=True):
         row[f"{robot.name}_brick"] = pd.NA if node is None else scene.brick_of_node[node].name
@@ -172,7 +180,8 @@ def _row(engine: Engine, step: Step) -> dict[str, object]:
     for robot, node in zip(scene.robots, step.grips, strict=True):
         row[force_column(robot)] = np.nan if node is None else next(forces)
     for response in RESPONSES.values():
-        row[response.column] = response.of(network, fields)[0] * response.scale
+        values = require_finite(response.name, response.of(network, fields), step.bricks)
+        row[response.column] = values[0] * response.scale
     return row | _supports(network, step, fields)
 
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
 from dataclasses import asdict
+from functools import partial
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -74,7 +76,7 @@ def load_scene(name: str) -> Scene:
         source = resources.files("seqopt").joinpath(f"data/scenes/{name}.json")
         return parse_scene(source.read_text(encoding="utf-8"), name)
     path = Path(name)
-    if not path.suffix and not path.exists():
+    if not path.suffix and not os.path.lexists(path):
         known = ", ".join(builtin_scenes())
         raise SceneError(f"scene {name}: no such built-in scene or file; built in: {known}")
     return parse_scene(read_text(path), name)
@@ -100,11 +102,27 @@ def parse_scene(text: str, source: str = "text") -> Scene:
         If the text is not JSON, breaks the schema or describes no scene that can be.
     """
     try:
-        document = json.loads(text)
+        document = json.loads(text, object_pairs_hook=partial(_entries, source))
+        _check_schema(document, source)
     except json.JSONDecodeError as error:
         raise SceneError(f"scene {source}: not JSON, line {error.lineno}: {error.msg}") from error
-    _check_schema(document, source)
+    except RecursionError as error:
+        raise SceneError(f"scene {source}: nested too deep for a scene; give one") from error
+    except SceneError:
+        raise
+    except ValueError as error:  # an integer of thousands of digits
+        raise SceneError(f"scene {source}: a number has too many digits; give fewer") from error
     return scene_from_dict(document)
+
+
+def _entries(source: str, pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """Return an object of a document, each of whose keys stands there once."""
+    out = dict(pairs)
+    if len(out) < len(pairs):
+        keys = [key for key, _ in pairs]
+        twice = next(key for key in keys if keys.count(key) > 1)
+        raise SceneError(f"scene {source}: key {twice!r} stands twice in one object; keep one")
+    return out
 
 
 def scene_from_dict(document: dict[str, Any]) -> Scene:

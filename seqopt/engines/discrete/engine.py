@@ -22,7 +22,14 @@ from seqopt.contact.mortar import EPOXY, Mortar
 from seqopt.engines.discrete.equilibrium_path import Held, Settled, settle
 from seqopt.engines.discrete.pads import Pinch, pad_stiffness
 from seqopt.engines.discrete.system import BedStiffness, System, build_system
-from seqopt.engines.interface import Fields, Want, grip_columns, join_sets, no_sets
+from seqopt.engines.interface import (
+    Fields,
+    Want,
+    grip_columns,
+    join_sets,
+    no_sets,
+    require_finite,
+)
 from seqopt.engines.rigid.mechanism import mechanism_error, require_resistance
 from seqopt.engines.rigid.recovery import Solution, respond
 from seqopt.errors import SeqoptError, SolverError
@@ -97,7 +104,8 @@ class DiscreteEngine:
         if bricks not in self._systems:
             self._systems[bricks] = build_system(network, bricks, self._mortar, self._bed)
         answers = [self._solve_one(self._systems[bricks], row) for row in columns]
-        return join_sets([no_sets(network, bricks, columns.shape[1]), *answers])
+        answer = join_sets([no_sets(network, bricks, columns.shape[1]), *answers])
+        return require_finite(answer, bricks, grips)
 
     def _solve_one(self, system: System, columns: Ints) -> Fields:
         """Return the fields of one grip set."""

@@ -24,6 +24,7 @@ from seqopt.engines.interface import (
     grip_columns,
     keep_wanted,
     merge_sets,
+    require_finite,
     select_sets,
 )
 from seqopt.engines.rigid.grip_equations import grip_forces
@@ -90,7 +91,8 @@ class ComplianceEngine:
         if self._builder is None:
             for row in columns:
                 require_resistance(self._network, bricks, row)
-            return solve_mixed(self._network, bricks, columns)
+            answer = solve_mixed(self._network, bricks, columns)
+            return require_finite(answer, bricks, grips)
         if bricks not in self._operators:
             self._operators[bricks] = self._builder.operator(bricks)
         operator = self._operators[bricks]
@@ -101,7 +103,7 @@ class ComplianceEngine:
             better = solve_mixed(self._network, bricks, columns[~trusted])
             better = keep_wanted(better, want)
             fields = merge_sets(trusted, select_sets(fields, trusted), better)
-        return fields
+        return require_finite(fields, bricks, grips)
 
 
 def solve_batch(
