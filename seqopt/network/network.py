@@ -55,6 +55,8 @@ class Springs(FrozenValue):
         N/m, N m/rad.
     support : int
         Index of the spring of the scene's first ground end.
+    thickness : (S,) float
+        Of joints that say so, m; NaN for others.
     """
 
     bodies: Ints
@@ -66,6 +68,7 @@ class Springs(FrozenValue):
     translational_stiffness: Floats
     rotational_stiffness: Floats
     support: int
+    thickness: Floats
 
     def acting(self, bricks: int) -> Ints:
         """Return the springs that act on a partial structure.
