@@ -1,8 +1,8 @@
 """Responses of every open step of a schedule, over the choices that are open in it.
 
 Beside the responses of `seqopt.responses.quantities` there are those that belong to robots: the
-force of each (`robot_response` there), of the one that takes its grip (``F_move``) and the largest
-(``F_largest``), sizes without sign.
+force of each (``F_`` and its name, as `robot_response` writes it), of the one that takes its grip
+(``F_move``) and the largest (``F_largest``), sizes without sign.
 """
 
 from __future__ import annotations
