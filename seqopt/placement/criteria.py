@@ -1,9 +1,10 @@
 """Criteria: what a step costs, from the responses of all choices that compete in it.
 
 Every criterion turns responses over choices, ``(C,)`` for one open move or ``(C, D)`` for two, into
-costs of the same shape. A name stands for a response: ``T_max``, ``M_sup``, ``D_max``, ``F_move``
-(the robot that takes its grip), ``F_largest`` (the largest grip force), ``F_`` and a robot's name
-(its force), ``F_each`` (the forces of all robots, a term each).
+costs of the same shape. A name stands for a response: ``T_max``, ``M_sup``, ``D_max``, ``C_max``
+(the largest compression), ``F_move`` (the robot that takes its grip), ``F_largest`` (the largest
+grip force), ``F_`` and a robot's name (its force), ``F_each`` (the forces of all robots, a term
+each).
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from seqopt.placement.ranks import scaled_ranks
 from seqopt.placement.requirements import ChoiceResponses
 
 Term = tuple[Any, ...]  # a name and its numbers
-RESOLUTION = (("F", 1.0), ("T", 1.0), ("M", 1.0), ("D", 1e-6))  # N, N, N m, m
+RESOLUTION = (("F", 1.0), ("T", 1.0), ("C", 1.0), ("M", 1.0), ("D", 1e-6))  # N, N, N, N m, m
 
 
 @dataclass(frozen=True)
