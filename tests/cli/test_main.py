@@ -32,7 +32,7 @@ def test_compare(capsys):
     assert status == 0
     assert "three-robot" in out
     assert "paper" in out
-    assert "406.0" in out  # the study's F_rob2 of the sequential method
+    assert "406.0" in out  # the paper's F_rob2 of the sequential method
     assert "step 47" in out
     assert "22" in out
 
@@ -42,7 +42,7 @@ def test_compare_of_another_scene_shows_no_study(capsys, tmp_path):
     status, out, _ = run(capsys, "compare", str(path))
     assert status == 0
     assert "mine" in out
-    assert "406.0" not in out  # the study's numbers belong to its own arch
+    assert "406.0" not in out  # the paper's numbers belong to its own arch
     assert "published" not in out
     assert "overlap_dp" in out
 

@@ -53,7 +53,7 @@ def test_ranks_and_choices_do_not_know_units(arch25, plain, criterion, scales):
     """Where responses are rounded for ranks, the resolution is given in the same units."""
     length, force, softness = scales
     shift = force * softness
-    units = {"F": force, "T": force, "M": force * length, "D": shift}
+    units = {"F": force, "T": force, "C": force, "M": force * length, "D": shift}
     same = replace(
         criterion, resolution=tuple((n, units[n] * size) for n, size in criterion.resolution)
     )

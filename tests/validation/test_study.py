@@ -84,7 +84,7 @@ def test_equal_states_are_equal_rows(tables):
 
 @pytest.mark.parametrize("quantity", ["M_sup", "D_max"])
 def test_twisting_steps(tables, quantity):
-    """The study's table of the eight off-center steps, within print and 2 %."""
+    """The paper's table of the eight off-center steps, within print and 2 %."""
     column = {"M_sup": "M_sup_Nm", "D_max": "D_max_1e-3mm"}[quantity]
     study = printed("sequential_offcenter").set_index("step")[column]
     ours = tables["sequential"].set_index("step")[column].loc[study.index]

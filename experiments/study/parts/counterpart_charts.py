@@ -69,16 +69,16 @@ def vault_tests(figure: Figure, table: pd.DataFrame, _own: Ours) -> None:
     outline.set_aspect("equal")
     outline.set(xlabel="m", title="Joints and load of the eight tests")
     study = printed("arch_stiffness")
-    slopes = {"measured": study["k_e_kN_mm"][0], "study": study["k_m_kN_mm"][0]}
+    slopes = {"measured": study["k_e_kN_mm"][0], "paper": study["k_m_kN_mm"][0]}
     slopes["here"] = of(table, "fig:secant_stiff")["ours"].iloc[0]
-    marks = {"measured": ("k", "-", 2.5), "study": ("0.5", "--", 1.5), "here": (OURS, ":", 2)}
+    marks = {"measured": ("k", "-", 2.5), "paper": ("0.5", "--", 1.5), "here": (OURS, ":", 2)}
     for name, slope in slopes.items():
         color, style, width = marks[name]
         label = f"{name}: {slope:.1f} kN/mm"
         secants.plot([0, 0.5], [0, 0.5 * slope], color=color, ls=style, lw=width, label=label)
     secants.set(xlabel="displacement [mm]", ylabel="load [kN]", title="Secants of test 1")
     at = study["test"].to_numpy(float)
-    shown = {"measured": study["k_e_kN_mm"], "study": study["k_m_kN_mm"], "here": bed_of_springs()}
+    shown = {"measured": study["k_e_kN_mm"], "paper": study["k_m_kN_mm"], "here": bed_of_springs()}
     for i, (name, values) in enumerate(shown.items()):
         bars.bar(at + 0.27 * (i - 1), values, 0.25, color=("k", "0.6", OURS)[i], label=name)
     bars.set(yscale="log", xlabel="test", ylabel="stiffness [kN/mm]", title="Stiffness")

@@ -26,9 +26,9 @@ TITLES = {
     "plan": "Grips and responses of the published three-robot plan",
 }
 INTRODUCTION = """\
-# Counterparts of the study's figures and tables
+# Counterparts of the paper's figures and tables
 
-Every figure and table of the [study](paper.md) that has numbers, and what seqopt gives in its
+Every figure and table of the [paper](paper.md) that has numbers, and what seqopt gives in its
 place. `python -m experiments.study.paper_counterparts` computes all of it anew in a few seconds,
 draws the pictures and writes this page; `experiments/results/paper_counterparts.csv` holds every
 value. Photographs, sketches and definitions have no numbers. Where another experiment goes deeper,
@@ -42,7 +42,7 @@ otherwise.
 CONVENTIONS = """\
 In the CSV a grip is its node, no grip is -1, and an optimized grip O3 is 1003. Forces of robots and
 of the support are compared by size, `T_pct` to within two edges. Figures and tables are numbered in
-the order of the study's source.
+the order of the paper's source.
 
 """
 
@@ -111,7 +111,7 @@ def page(table: pd.DataFrame) -> str:
         f"{words.count(PARTLY)} agree in part, {words.count(DISAGREES)} disagree.\n"
     )
     head = (
-        "| in the study | shows | numbers | command (`python -m experiments.`) | picture "
+        "| in the paper | shows | numbers | command (`python -m experiments.`) | picture "
         "| agreement |\n|---|---|---|---|---|---|"
     )
     lines = [line(item, table) for item in ITEMS]

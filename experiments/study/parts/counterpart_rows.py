@@ -1,4 +1,4 @@
-"""Printed and computed values, side by side, of every figure and table of the study.
+"""Printed and computed values, side by side, of every figure and table of the paper.
 
 Every function yields the rows of one item of `experiments.study.parts.paper_items`, named by its
 label in `COUNTERPARTS`.
@@ -105,7 +105,7 @@ def lever_arm(own: Ours) -> Rows:
 
 
 def cantilever_over_sequential(own: Ours) -> Rows:
-    """Compare both methods; ratios are those of values rounded to print, as the study's are."""
+    """Compare both methods; ratios are those of values rounded to print, as the paper's are."""
     sides = {"C": own.steps("cantilever"), "S": own.steps("sequential")}
     columns = {"M": "M_sup_Nm", "D": "D_max_1e-3mm", "T": "F_max_N"}
     for want in read(COMPARED).to_dict("records"):

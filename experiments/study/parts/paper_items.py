@@ -1,4 +1,4 @@
-"""The study's figures and tables in the order of its source, and what each shows.
+"""The paper's figures and tables in the order of its source, and what each shows.
 
 Data only, so that nothing else is needed to tell whether all have a counterpart. Photographs,
 sketches and definitions have no numbers; plots of data and drawings with dimensions do. Numbers
@@ -14,7 +14,7 @@ STEPS = "values (T_pct to two edges)"  # what is counted in the tables of all st
 
 @dataclass(frozen=True)
 class Item:
-    """A figure or table of the study.
+    """A figure or table of the paper.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ ITEMS = (
          "stability.failing_steps"),
     Item("fig:sequential_twist", "Figure 10", "4.1", "lever arm; displaced shape at step 35",
          "twisting", "figures", ("fig:sequential_twist_offcenter", "fig:sequential_twist_35"),
-         why="The lever arm is support moment over robot force after the crown; the study's own "
+         why="The lever arm is support moment over robot force after the crown; the paper's own "
          "columns leave its 135 ± 15 mm too."),
     Item("table:cantilever_compare", "Table 5", "4.2", "both methods at the twisting steps",
          "twisting"),
@@ -103,7 +103,7 @@ ITEMS = (
     Item("table:2robot_forces", "Table 7", "4.3", "largest robot forces of the two-robot methods",
          "maxima"),
     Item("table:optimization1", "Table 8", "5.2.1", "the modified sequential method", "sequences",
-         why="The study's count of bricks is one short in every row, against its Table A.1; "
+         why="The paper's count of bricks is one short in every row, against its Table A.1; "
          "all grips agree."),
     Item("table:optimization2", "Table 9", "5.2.2", "the cascade of the three-robot method",
          "sequences"),
