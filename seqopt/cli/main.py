@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import argparse
-import io
 import json
 import sys
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
-from importlib.util import find_spec
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
 from seqopt.cli.arguments import parser
+from seqopt.cli.outputs import (
+    comparison_files,
+    keep_apart,
+    require_matplotlib,
+    write_outputs,
+)
 from seqopt.cli.status import Status, status_of
 from seqopt.cli.terminal import complain, flush, progress, quiet_numbers, say, show, silence
 from seqopt.cli.values import (
@@ -29,14 +32,12 @@ from seqopt.contact.mortar import MORTARS
 from seqopt.engines.auto import AutoEngine
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import make_engine
-from seqopt.errors import FileError, SceneError, SeqoptError, SolverError, StepError
+from seqopt.errors import SceneError, SeqoptError, SolverError, StepError
 from seqopt.files import (
     csv_text,
-    require_apart,
     require_folder,
     write_bytes,
     write_csv,
-    write_folder,
     write_text,
 )
 from seqopt.network.build import build_network
@@ -46,11 +47,11 @@ from seqopt.placement.plan import Plan
 from seqopt.placement.problem import pose
 from seqopt.placement.promises import overloads
 from seqopt.placement.solving import solve
-from seqopt.report.comparison import Comparison, compare
+from seqopt.report.comparison import compare
 from seqopt.report.text import format_comparison
 from seqopt.responses.table import analyze, fields_archive
 from seqopt.scene.scene import Scene
-from seqopt.scene.scene_file import builtin_scenes, dump_scene, load_scene
+from seqopt.scene.scene_file import dump_scene, load_scene
 from seqopt.sequence.plan_file import read_plan
 from seqopt.sequence.schedule_file import find_schedule
 from seqopt.sequence.steps import AnyStep, Step, idle_robots
@@ -100,13 +101,14 @@ def _compare(options: argparse.Namespace) -> Status:
     engine = _engine(options, build_network(scene))
     criterion = parse_criterion(options.criteria, options.crown)
     if options.out is not None:
-        _require_matplotlib(options.out)
+        require_matplotlib(options.out)
         require_folder(options.out)
     result = compare(engine, criterion, progress)
     _say_levels(engine)
     show(format_comparison(result, scene, criterion) + "\n")
     if options.out is not None and not result.refusal:
-        _write_comparison(options, result)
+        write_outputs(options, comparison_files(result))
+        say(f"tables and figures written to {options.out}")
     return _payloads_hold(options, scene, *result.tables.values())
 
 
@@ -132,44 +134,6 @@ def _say_idle(scene: Scene, steps: Sequence[AnyStep]) -> None:
     """Name the robots that never grip."""
     if idle := idle_robots(scene, steps):
         complain(f"robots: {', '.join(idle)} never grip{'s' * (len(idle) == 1)}")
-
-
-def _require_matplotlib(folder: Path) -> None:
-    if find_spec("matplotlib") is None:
-        raise FileError(f"figures for {folder} need matplotlib: pip install matplotlib")
-
-
-def _write_comparison(options: argparse.Namespace, result: Comparison) -> None:
-    from seqopt.report.charts import comparison_figures  # noqa: PLC0415  # matplotlib is an extra
-
-    files: dict[str, bytes | str] = {
-        "comparison.csv": result.table.to_csv(float_format="%.6g"),
-        **{f"steps_{name}.csv": csv_text(table) for name, table in result.tables.items()},
-    }
-    if result.ranks is not None:
-        files["published_ranks.csv"] = result.ranks.to_csv(index=False)
-    for name, figure in comparison_figures(result).items():
-        buffer = io.BytesIO()
-        figure.savefig(buffer, dpi=130)
-        files[name] = buffer.getvalue()
-    _write_folder(options, files)
-    say(f"tables and figures written to {options.out}")
-
-
-def _write_folder(options: argparse.Namespace, files: Mapping[str, bytes | str]) -> None:
-    require_apart([options.out / name for name in files], _inputs(options))
-    write_folder(options.out, files)
-
-
-def _require_apart(options: argparse.Namespace, *outputs: Path | None) -> None:
-    require_apart([path for path in outputs if path is not None], _inputs(options))
-
-
-def _inputs(options: argparse.Namespace) -> list[Path]:
-    """Return the files that a command reads."""
-    scene = [] if options.scene in builtin_scenes() else [Path(options.scene)]
-    plan = getattr(options, "plan", None)
-    return scene if plan is None else [*scene, plan]
 
 
 def _optimize(options: argparse.Namespace) -> Status:
@@ -201,7 +165,7 @@ def _optimize(options: argparse.Namespace) -> Status:
         "responses.csv": csv_text(plan.alternatives()),
         "summary.json": json.dumps(report, indent=2) + "\n",
     }
-    _write_folder(options, files)
+    write_outputs(options, files)
     say(
         f"{formulation.name} ({formulation.kind.value}): {_worth(plan)}, "
         f"{plan.models} models; written to {options.out}"
@@ -228,7 +192,7 @@ def _worth(plan: Plan) -> str:
 
 
 def _analyze(options: argparse.Namespace) -> Status:
-    _require_apart(options, options.out, options.fields)
+    keep_apart(options, options.out, options.fields)
     scene = load_scene(options.scene)
     engine = _engine(options, build_network(scene))
     steps = _steps(scene, options)
@@ -246,7 +210,7 @@ def _analyze(options: argparse.Namespace) -> Status:
 
 
 def _assess(options: argparse.Namespace) -> Status:
-    _require_apart(options, options.out)
+    keep_apart(options, options.out)
     scene = load_scene(options.scene)
     mortar = parse_mortar(options)
     network = build_network(scene)
@@ -290,7 +254,7 @@ def _steps(scene: Scene, options: argparse.Namespace) -> tuple[Step, ...]:
 
 
 def _scene(options: argparse.Namespace) -> None:
-    _require_apart(options, options.export)
+    keep_apart(options, options.export)
     scene = load_scene(options.scene)
     parts = build_network(scene)
     count = len(scene.bricks)
