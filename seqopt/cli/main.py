@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 import argparse
-import io
 import json
 import sys
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
-from importlib.util import find_spec
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
 from seqopt.cli.arguments import parser
-from seqopt.cli.notes import say_idle, say_levels
+from seqopt.cli.outputs import (
+    comparison_files,
+    keep_apart,
+    require_matplotlib,
+    write_outputs,
+)
 from seqopt.cli.status import Status, status_of
 from seqopt.cli.terminal import complain, flush, progress, quiet_numbers, say, show, silence
 from seqopt.cli.values import (
@@ -25,19 +27,17 @@ from seqopt.cli.values import (
     parse_mortar,
     parse_options,
     parse_robots,
-    parse_steps,
 )
 from seqopt.contact.mortar import MORTARS
+from seqopt.engines.auto import AutoEngine
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import make_engine
-from seqopt.errors import FileError, SceneError, SeqoptError, SolverError
+from seqopt.errors import SceneError, SeqoptError, SolverError, StepError
 from seqopt.files import (
     csv_text,
-    require_apart,
     require_folder,
     write_bytes,
     write_csv,
-    write_folder,
     write_text,
 )
 from seqopt.network.build import build_network
@@ -47,15 +47,18 @@ from seqopt.placement.plan import Plan
 from seqopt.placement.problem import pose
 from seqopt.placement.promises import overloads
 from seqopt.placement.solving import solve
-from seqopt.report.comparison import Comparison, compare
+from seqopt.report.comparison import compare
 from seqopt.report.text import format_comparison
 from seqopt.responses.table import analyze, fields_archive
 from seqopt.scene.scene import Scene
-from seqopt.scene.scene_file import builtin_scenes, dump_scene, load_scene
+from seqopt.scene.scene_file import dump_scene, load_scene
+from seqopt.sequence.plan_file import read_plan
 from seqopt.sequence.schedule_file import find_schedule
+from seqopt.sequence.steps import AnyStep, Step, idle_robots
+from seqopt.sequence.two_robots import METHODS
 from seqopt.stability.assessment import Verdict
 from seqopt.stability.steps import assess_steps, format_verdicts, stability_table
-from seqopt.study.published import paper_models
+from seqopt.study.published import PUBLISHED, is_reference_arch, paper_models, published_plan
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -98,13 +101,14 @@ def _compare(options: argparse.Namespace) -> Status:
     engine = _engine(options, build_network(scene))
     criterion = parse_criterion(options.criteria, options.crown)
     if options.out is not None:
-        _require_matplotlib(options.out)
+        require_matplotlib(options.out)
         require_folder(options.out)
     result = compare(engine, criterion, progress)
-    say_levels(engine)
+    _say_levels(engine)
     show(format_comparison(result, scene, criterion) + "\n")
     if options.out is not None and not result.refusal:
-        _write_comparison(options, result)
+        write_outputs(options, comparison_files(result))
+        say(f"tables and figures written to {options.out}")
     return _payloads_hold(options, scene, *result.tables.values())
 
 
@@ -116,42 +120,20 @@ def _engine(options: argparse.Namespace, network: Network) -> Engine:
         raise SceneError(f"--engine {options.engine}: {error}") from error
 
 
-def _require_matplotlib(folder: Path) -> None:
-    if find_spec("matplotlib") is None:
-        raise FileError(f"figures for {folder} need matplotlib: pip install matplotlib")
+def _say_levels(engine: Engine) -> None:
+    """Say which levels an engine that picks them took, and why."""
+    if not isinstance(engine, AutoEngine):
+        return
+    for choice, sets in engine.tally.items():
+        complain(f"engine: {choice.level.value} for {sets} grip sets: {choice.reason}")
+    if engine.unchecked:
+        complain(f"engine: {engine.unchecked}")
 
 
-def _write_comparison(options: argparse.Namespace, result: Comparison) -> None:
-    from seqopt.report.charts import comparison_figures  # noqa: PLC0415  # matplotlib is an extra
-
-    files: dict[str, bytes | str] = {
-        "comparison.csv": result.table.to_csv(float_format="%.6g"),
-        **{f"steps_{name}.csv": csv_text(table) for name, table in result.tables.items()},
-    }
-    if result.ranks is not None:
-        files["published_ranks.csv"] = result.ranks.to_csv(index=False)
-    for name, figure in comparison_figures(result).items():
-        buffer = io.BytesIO()
-        figure.savefig(buffer, dpi=130)
-        files[name] = buffer.getvalue()
-    _write_folder(options, files)
-    say(f"tables and figures written to {options.out}")
-
-
-def _write_folder(options: argparse.Namespace, files: Mapping[str, bytes | str]) -> None:
-    require_apart([options.out / name for name in files], _inputs(options))
-    write_folder(options.out, files)
-
-
-def _require_apart(options: argparse.Namespace, *outputs: Path | None) -> None:
-    require_apart([path for path in outputs if path is not None], _inputs(options))
-
-
-def _inputs(options: argparse.Namespace) -> list[Path]:
-    """Return the files that a command reads."""
-    scene = None if options.scene in builtin_scenes() else options.scene
-    named = (scene, getattr(options, "plan", None), getattr(options, "schedule", None))
-    return [Path(name) for name in named if name is not None]
+def _say_idle(scene: Scene, steps: Sequence[AnyStep]) -> None:
+    """Name the robots that never grip."""
+    if idle := idle_robots(scene, steps):
+        complain(f"robots: {', '.join(idle)} never grip{'s' * (len(idle) == 1)}")
 
 
 def _optimize(options: argparse.Namespace) -> Status:
@@ -163,12 +145,14 @@ def _optimize(options: argparse.Namespace) -> Status:
     require_folder(options.out)
     start = time.perf_counter()
     network = build_network(scene)
-    engine = _engine(options, network)
-    schedule = find_schedule(network, options.schedule, parse_robots(options.robots))
+    engine, schedule = (
+        _engine(options, network),
+        find_schedule(network, options.schedule, parse_robots(options.robots)),
+    )
     assemble = time.perf_counter() - start
     problem = pose(engine, schedule, criterion, limits)
     plan = solve(problem, formulation, proof=not options.no_proof, **chosen)
-    say_levels(engine)
+    _say_levels(engine)
     cascading, overlap = paper_models(schedule)
     report = plan.summary() | {
         "models_paper_count": {"cascading": cascading, "overlap": overlap},
@@ -181,16 +165,15 @@ def _optimize(options: argparse.Namespace) -> Status:
         "responses.csv": csv_text(plan.alternatives()),
         "summary.json": json.dumps(report, indent=2) + "\n",
     }
-    _write_folder(options, files)
+    write_outputs(options, files)
     say(
         f"{formulation.name} ({formulation.kind.value}): {_worth(plan)}, "
         f"{plan.models} models; written to {options.out}"
     )
     for excess in plan.overloads:
         say(f"payload exceeded: {excess}")
-    status = _payloads_hold(options, scene, table)
-    say_idle(scene, plan.steps)
-    return status
+    _say_idle(scene, plan.steps)
+    return _payloads_hold(options, scene, table)
 
 
 def _payloads_hold(options: argparse.Namespace, scene: Scene, *tables: pd.DataFrame) -> Status:
@@ -209,12 +192,12 @@ def _worth(plan: Plan) -> str:
 
 
 def _analyze(options: argparse.Namespace) -> Status:
-    _require_apart(options, options.out, options.fields)
+    keep_apart(options, options.out, options.fields)
     scene = load_scene(options.scene)
     engine = _engine(options, build_network(scene))
-    steps = parse_steps(scene, options)
+    steps = _steps(scene, options)
     table = analyze(engine, steps)
-    say_levels(engine)
+    _say_levels(engine)
     if options.fields is not None:
         write_bytes(options.fields, fields_archive(engine, steps))
     if options.out is None:
@@ -222,17 +205,16 @@ def _analyze(options: argparse.Namespace) -> Status:
     else:
         write_csv(options.out, table)
         say(f"{len(table)} steps written to {options.out}")
-    status = _payloads_hold(options, scene, table)
-    say_idle(scene, steps)
-    return status
+    _say_idle(scene, steps)
+    return _payloads_hold(options, scene, table)
 
 
 def _assess(options: argparse.Namespace) -> Status:
-    _require_apart(options, options.out)
+    keep_apart(options, options.out)
     scene = load_scene(options.scene)
     mortar = parse_mortar(options)
     network = build_network(scene)
-    steps = parse_steps(scene, options)
+    steps = _steps(scene, options)
     results = assess_steps(network, steps, mortar, progress)
     table = stability_table(steps, results)
     if options.out is None:
@@ -251,8 +233,28 @@ def _assess(options: argparse.Namespace) -> Status:
     return Status.DOES_NOT_HOLD if falls else Status.DONE
 
 
+def _steps(scene: Scene, options: argparse.Namespace) -> tuple[Step, ...]:
+    """Return the closed sequence that the options name."""
+    robots = parse_robots(options.robots)
+    if robots and options.method not in METHODS:
+        raise StepError(
+            f"--robots {options.robots}: a plan says itself who holds; leave it out, or give "
+            f"--method {' or '.join(METHODS)}"
+        )
+    if options.plan is not None:
+        return read_plan(scene, options.plan)
+    if options.method != PUBLISHED:
+        return METHODS[options.method](build_network(scene), robots)
+    if not is_reference_arch(scene):
+        raise SceneError(
+            f"scene {scene.name}: --method {PUBLISHED} is the printed plan for arch25; "
+            "give --plan FILE for another scene"
+        )
+    return published_plan(scene)
+
+
 def _scene(options: argparse.Namespace) -> None:
-    _require_apart(options, options.export)
+    keep_apart(options, options.export)
     scene = load_scene(options.scene)
     parts = build_network(scene)
     count = len(scene.bricks)

@@ -8,19 +8,14 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from seqopt.contact.mortar import MORTARS, Mortar
-from seqopt.errors import ProblemError, SceneError, StepError
-from seqopt.network.build import build_network
+from seqopt.errors import ProblemError
 from seqopt.placement.criteria import RankSum
 from seqopt.placement.formulation import Formulation
 from seqopt.placement.requirements import Criterion, Limit, payload_limits
 from seqopt.placement.scales import NEVER
 from seqopt.responses.choices import CHOICE_RESPONSES
 from seqopt.scene.scene import Scene
-from seqopt.sequence.plan_file import read_plan
-from seqopt.sequence.steps import Step
-from seqopt.sequence.two_robots import METHODS
 from seqopt.study.presets import CRITERIA
-from seqopt.study.published import PUBLISHED, is_reference_arch, published_plan
 
 BETWEEN = re.compile(r",(?![^\[]*\])")  # a comma that is not in brackets
 LARGEST = 1e100  # number: products of larger ones overflow
@@ -74,42 +69,6 @@ def parse_robots(text: str) -> tuple[str, ...]:
     tuple of str
     """
     return tuple(name.strip() for name in text.split(",")) if text else ()
-
-
-def parse_steps(scene: Scene, options: argparse.Namespace) -> tuple[Step, ...]:
-    """Return the closed sequence that the options name.
-
-    Parameters
-    ----------
-    scene : Scene
-    options : argparse.Namespace
-        With ``method``, ``plan`` and ``robots``.
-
-    Returns
-    -------
-    tuple of Step
-
-    Raises
-    ------
-    SceneError, StepError, FileError
-        If the sequence is impossible in the scene, or cannot be read.
-    """
-    robots = parse_robots(options.robots)
-    if robots and options.method not in METHODS:
-        raise StepError(
-            f"--robots {options.robots}: a plan says itself who holds; leave it out, or give "
-            f"--method {' or '.join(METHODS)}"
-        )
-    if options.plan is not None:
-        return read_plan(scene, options.plan)
-    if options.method != PUBLISHED:
-        return METHODS[options.method](build_network(scene), robots)
-    if not is_reference_arch(scene):
-        raise SceneError(
-            f"scene {scene.name}: --method {PUBLISHED} is the printed plan for arch25; "
-            "give --plan FILE for another scene"
-        )
-    return published_plan(scene)
 
 
 def parse_limits(texts: Sequence[str], scene: Scene) -> tuple[Limit, ...]:

@@ -135,6 +135,7 @@ def _arrays(
             translational_stiffness=np.array([s.translational_stiffness for s, _ in springs]),
             rotational_stiffness=np.array([s.rotational_stiffness for s, _ in springs]),
             support=_support(scene, index_of, springs),
+            thickness=np.array([s.thickness for s, _ in springs], dtype=float),  # None is NaN
         ),
         node_position=np.array([node.position for node in nodes]),
         node_kind=np.array([node.kind for node in nodes]),

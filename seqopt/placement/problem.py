@@ -238,7 +238,7 @@ def pose(
     Raises
     ------
     ProblemError
-        If a response is named that there is not, or no grip is open.
+        If there is no such response, or no grip is open.
 
     Examples
     --------
@@ -249,10 +249,9 @@ def pose(
     >>> len(problem.schedule.moves), problem.criterion.name, problem.limits
     (22, 'worst-ratio', ())
     """
-    _require_moves(schedule)
     facts = SceneFacts(engine)
+    known = {*CHOICE_RESPONSES, *map(robot_response, _robots_with_moves(schedule))}
     asked = ResponsesAsked(criterion.for_scene(facts), tuple(limits), tuple(also))
-    known = {*CHOICE_RESPONSES, *map(robot_response, facts.robots)}
     for move in schedule.moves:
         if asked(move.bricks) - known:
             wrong = min(asked(move.bricks) - known)
@@ -261,9 +260,11 @@ def pose(
     return Problem(asked.criterion, asked.limits, Evaluation(engine, schedule, asked))
 
 
-def _require_moves(schedule: Schedule) -> None:
+def _robots_with_moves(schedule: Schedule) -> list[str]:
+    """Return the names of the robots of a schedule that leaves grips open."""
     if not schedule.moves:
         raise ProblemError(
             f"schedule {schedule.method}: with {len(schedule.scene.bricks)} bricks it leaves no "
             "grip open; there is nothing to choose, analyze its steps"
         )
+    return [robot.name for robot in schedule.scene.robots]

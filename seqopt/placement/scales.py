@@ -23,6 +23,7 @@ NEVER = math.inf  # the brick count of a crown that is never reached
 ROUNDED = (
     ("F", 0.0278513762761887),
     ("T", 0.0278513762761887),
+    ("C", 0.0278513762761887),
     ("M", 0.11321697673247444),
     ("D", 8.531988813508194),
 )
@@ -64,7 +65,13 @@ class Units:
         float
             N, N m or m.
         """
-        units = {"F": self.force, "T": self.force, "M": self.moment, "D": self.displacement}
+        units = {
+            "F": self.force,
+            "T": self.force,
+            "C": self.force,
+            "M": self.moment,
+            "D": self.displacement,
+        }
         return units[response[0]]
 
 

@@ -139,7 +139,7 @@ def compare(
     for name, steps in tables.items():
         over = overloads(scene, steps)
         rows[name] |= largest(scene, steps) | {"overloaded": bool(over)}
-        notes += [f"{name}: payload exceeded, {excess}" for excess in over]
+        notes += [f"{name}: {excess}" for excess in over]
     notes += [f"In the paper: {text}" for text in IRREGULARITIES if printed is not None]
     table = pd.DataFrame.from_dict(rows, orient="index").reindex(columns=COLUMNS)
     return Comparison(maxima, printed, table, tables, ranks, counted, tuple(notes), refusal, shared)

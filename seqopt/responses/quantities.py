@@ -234,6 +234,15 @@ displacements of all nodes.
 """
 
 
+_COMPRESSION = Response(
+    "C_max", "C_max_N", 1.0, _EDGES, lambda _, f: np.maximum(0.0, -f.edge_force.min(axis=1))
+)
+CHOSEN_BY: dict[str, Response] = {**RESPONSES, _COMPRESSION.name: _COMPRESSION}
+"""Responses that criteria and limits can name: those of the tables, and ``C_max``, the largest
+compression of any edge as a size, N (``F_min`` without its sign; zero if no edge is compressed).
+"""
+
+
 def responses_of(network: Network, fields: Fields) -> dict[str, Floats]:
     """Return all responses of S grip sets with r grips each, SI units.
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from seqopt.arrays import Floats, Vector
 from seqopt.errors import SceneError
-from seqopt.scene.parts import Brick, Ground, Joint, Robot
+from seqopt.scene.parts import THICKEST, Brick, Ground, Joint, Robot
 from seqopt.scene.reach import Anywhere, Reach, Side
 from seqopt.scene.scene import Scene
 
@@ -76,6 +76,11 @@ class ArchShape:
     dimensions: Vector = (0.246, 0.116, 0.053)
     density: float = 2420.0
     closed: bool = True
+
+    @property
+    def thickness(self) -> float | None:
+        """The width of a joint, m, where it is so thick that a joint must say so."""
+        return self.gap if self.gap > THICKEST * min(self.dimensions) else None
 
     def __post_init__(self) -> None:
         count = len(self.pitch)
@@ -240,6 +245,7 @@ def _joint(shape: ArchShape, brick: int, position: Floats, direction: Floats) ->
         across=_across(direction),
         translational_stiffness=shape.translational_stiffness,
         rotational_stiffness=shape.rotational_stiffness,
+        thickness=shape.thickness,
     )
 
 
@@ -251,6 +257,7 @@ def _ground(shape: ArchShape, brick: int, end: Floats, tangent: Floats, sign: fl
         across=_across(tangent),
         translational_stiffness=shape.translational_stiffness,
         rotational_stiffness=shape.rotational_stiffness,
+        thickness=shape.thickness,
         anchor=_vector(end + sign * shape.stub * tangent),
     )
 

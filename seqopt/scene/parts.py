@@ -14,6 +14,8 @@ from seqopt.errors import SceneError
 from seqopt.scene.checks import axes, positive, printable, vector, whole, wholes
 from seqopt.scene.reach import Anywhere, Reach
 
+THICKEST = 0.5  # of a joint that does not say, over the smallest dimension of its bricks
+
 
 @dataclass(frozen=True, kw_only=True)
 class Brick:
@@ -113,6 +115,9 @@ class Spring:
         N/m along the three axes, zero allowed.
     rotational_stiffness : Vector
         N m/rad about the three axes, zero allowed.
+    thickness : float, optional
+        Of what lies between the faces, m: to be given where it is more than `THICKEST` of the
+        smallest dimension of the bricks; faces farther apart do not touch.
     """
 
     position: Vector
@@ -120,6 +125,7 @@ class Spring:
     across: Vector
     translational_stiffness: Vector
     rotational_stiffness: Vector
+    thickness: float | None = None
 
     def _check(self, where: str) -> None:
         _set(self, "position", vector(f"{where}: position", self.position))
@@ -128,6 +134,8 @@ class Spring:
         _set(self, "across", second)
         for name in ("translational_stiffness", "rotational_stiffness"):
             _set(self, name, vector(f"{where}: {name}", getattr(self, name), at_least=0.0))
+        if self.thickness is not None:
+            _set(self, "thickness", positive(f"{where}: thickness", self.thickness, "m"))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -165,6 +165,9 @@ def scene_to_dict(scene: Scene) -> dict[str, Any]:
     dict
     """
     document = {"format": "seqopt-scene", "version": VERSION, **asdict(scene)}
+    for spring in (*document["joints"], *document["grounds"]):
+        if spring["thickness"] is None:
+            del spring["thickness"]
     names = {cls: kind for kind, cls in REACHES.items()}
     for entry, robot in zip(document["robots"], scene.robots, strict=True):
         entry["reach"] = {"kind": names[type(robot.reach)], **entry["reach"]}

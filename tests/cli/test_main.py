@@ -37,7 +37,7 @@ def test_compare(capsys):
     assert status == 0
     assert "three-robot" in out
     assert "paper" in out
-    assert "406.0" in out  # the study's F_rob2 of the sequential method
+    assert "406.0" in out  # the paper's F_rob2 of the sequential method
     assert "step 47" in out
     assert "22" in out
 
@@ -47,7 +47,7 @@ def test_compare_of_another_scene_shows_no_study(capsys, tmp_path):
     status, out, _ = run(capsys, "compare", str(path))
     assert status == 0
     assert "mine" in out
-    assert not re.search(r"406\.0(?!\d)", out)  # the study's numbers belong to its own arch
+    assert not re.search(r"406\.0(?!\d)", out)  # the paper's numbers belong to its own arch
     assert "published" not in out
     assert "overlap_dp" in out
 
@@ -220,8 +220,6 @@ def test_compare_names_idle_robots_and_degenerate_methods(capsys, tmp_path):
         (("--formulation", "overlap_dp", "--criteria", "beauty"), "--criteria beauty"),
         (("--formulation", "overlap_dp", "--criteria", "T_max=heavy"), "'heavy' is not a positive"),
         (("--formulation", "overlap_dp", "--limit", "T_max"), "--limit T_max"),
-        (("--formulation", "overlap_dp", "--limit", "T_max=20"), "relax a limit"),
-        (("--formulation", "cascade", "--no-proof", "--limit", "T_max=64"), "no allowed grip"),
         (("--formulation", "minimax", "--no-proof"), "minimax looks beyond"),
     ],
 )
@@ -236,12 +234,17 @@ def test_optimize_refuses_in_one_line(capsys, tmp_path, arguments, named):
 @pytest.mark.parametrize(
     ("arguments", "status", "named"),
     [
-        (("overlap_dp",), 3, "relax a limit"),  # proven: no choice is allowed
-        (("cascade", "--no-proof"), 4, "no allowed grip"),  # a dead end proves nothing
+        (("overlap_dp", "--limit", "F_largest=9"), 3, "nothing is left to choose"),
+        (("overlap_dp", "--limit", "T_max=20"), 3, "relax a limit"),  # proven: no choice is allowed
+        (
+            ("cascade", "--no-proof", "--limit", "T_max=64"),
+            4,
+            "no allowed grip",
+        ),  # a dead end proves nothing
     ],
 )
 def test_no_answer_is_no_bad_input(capsys, tmp_path, arguments, status, named):
-    words = ("--formulation", *arguments, "--limit", "F_largest=9", "--out", str(tmp_path / "out"))
+    words = ("--formulation", *arguments, "--out", str(tmp_path / "out"))
     found, _, err = run(capsys, "optimize", *words)
     assert (found, err.count("\n")) == (status, 1)
     assert named in err
