@@ -20,7 +20,7 @@ import numpy as np
 import pandas as pd
 
 from seqopt.arrays import Floats
-from seqopt.placement.criteria import RESOLUTION
+from seqopt.study.presets import RESOLUTION
 from seqopt.placement.problem import Problem
 from seqopt.placement.ranking import TIED, rank_of
 from seqopt.placement.ranks import mean_ranks
