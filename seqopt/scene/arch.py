@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from seqopt.arrays import Floats, Vector
-from seqopt.errors import SceneError
+from seqopt.errors import SceneError, SceneWarning
 from seqopt.scene.parts import THICKEST, Brick, Ground, Joint, Robot
 from seqopt.scene.reach import Anywhere, Reach, Side
 from seqopt.scene.scene import Scene
@@ -91,6 +92,16 @@ class ArchShape:
             if values is not None and len(values) != count:
                 raise SceneError(
                     f"arch: {len(values)} {name} and {count} pitch values; give as many"
+                )
+        for name in ("pitch", "roll", "yaw"):
+            angles = getattr(self, name)
+            largest = 0.0 if angles is None else max(map(abs, angles))
+            if largest > 2 * math.pi:
+                warnings.warn(
+                    f"arch: {name} has {largest:g} rad, more than a turn; give radians, if degrees "
+                    "are meant",
+                    SceneWarning,
+                    stacklevel=3,
                 )
         if not self.pattern or set(self.pattern) - set(LETTERS):
             raise SceneError(f"arch: pattern is {self.pattern!r}; give letters of {LETTERS}")

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import json
 import os
+import warnings
 from dataclasses import asdict
 from functools import partial
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from seqopt.errors import SceneError
+from seqopt.errors import SceneError, SceneWarning
 from seqopt.files import read_text, write_text
+from seqopt.scene.doubts import doubts
 from seqopt.scene.parts import Brick, Ground, Joint, Robot
 from seqopt.scene.reach import Anywhere, Reach, Side, Sphere
 from seqopt.scene.scene import Scene
@@ -67,6 +69,11 @@ def load_scene(name: str) -> Scene:
     FileError
         If the file cannot be read.
 
+    Warns
+    -----
+    SceneWarning
+        Where something in a file is probably not meant: see `seqopt.scene.doubts`.
+
     Examples
     --------
     >>> load_scene("arch25")
@@ -79,7 +86,10 @@ def load_scene(name: str) -> Scene:
     if not path.suffix and not os.path.lexists(path):
         known = ", ".join(builtin_scenes())
         raise SceneError(f"scene {name}: no such built-in scene or file; built in: {known}")
-    return parse_scene(read_text(path), name)
+    scene = parse_scene(read_text(path), str(name))
+    for doubt in doubts(scene):
+        warnings.warn(f"scene {name}: {doubt}", SceneWarning, stacklevel=2)
+    return scene
 
 
 def parse_scene(text: str, source: str = "text") -> Scene:
