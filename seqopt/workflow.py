@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 from seqopt.engines.interface import Engine
@@ -23,7 +24,7 @@ from seqopt.study.presets import CRITERIA, EQUATIONS
 
 
 def optimize(
-    scene: Scene | str,
+    scene: Scene | str | Path,
     schedule: str = "three-robot",
     criterion: Criterion | str = EQUATIONS,
     formulation: str = "overlap_dp",
@@ -36,7 +37,7 @@ def optimize(
 
     Parameters
     ----------
-    scene : Scene or str
+    scene : Scene, str or pathlib.Path
         Or the name of a built-in scene, or a scene file.
     schedule : str
         ``"three-robot"`` or ``"modified-sequential"``.
@@ -74,9 +75,9 @@ def optimize(
     return replace(plan, seconds={"assemble": assemble, **plan.seconds})
 
 
-def _assemble(scene: Scene | str, schedule: str, engine: str) -> tuple[Engine, Schedule]:
+def _assemble(scene: Scene | str | Path, schedule: str, engine: str) -> tuple[Engine, Schedule]:
     """Return the engine and the schedule of a scene, all by name."""
-    network = build_network(load_scene(scene) if isinstance(scene, str) else scene)
+    network = build_network(load_scene(scene) if isinstance(scene, str | Path) else scene)
     return make_engine(engine, network), make_schedule(schedule, network)
 
 

@@ -49,3 +49,27 @@ DRY = Mortar(friction=FRICTION)
 EPOXY = Mortar(friction=FRICTION, tensile_strength=3e6, cohesion=2e6)
 """The epoxy putty of Bruun et al. (section 3.2.3: 25°, 3 MPa, and 2 MPa printed as "2 MPa/m")."""
 MORTARS = {"epoxy": EPOXY, "dry": DRY}
+
+
+def find_mortar(mortar: Mortar | str) -> Mortar:
+    """Return a mortar, by name or itself.
+
+    Parameters
+    ----------
+    mortar : Mortar or str
+        A mortar, or a name of `MORTARS`.
+
+    Returns
+    -------
+    Mortar
+
+    Raises
+    ------
+    SceneError
+        If it is neither.
+    """
+    if isinstance(mortar, Mortar):
+        return mortar
+    if mortar not in MORTARS:
+        raise SceneError(f"mortar {mortar!r}: give a Mortar, or one of {', '.join(MORTARS)}")
+    return MORTARS[mortar]

@@ -13,11 +13,13 @@ import pandas as pd
 from seqopt.arrays import Floats
 from seqopt.engines.interface import Engine
 from seqopt.errors import ProblemError
+from seqopt.network.network import Network
 from seqopt.placement.costs import Budget, LayeredCosts
 from seqopt.placement.interface import Aim
 from seqopt.placement.requirements import Criterion, Limit, ResponsesAsked
 from seqopt.responses.choices import CHOICE_RESPONSES, Evaluation, StepChoices
 from seqopt.responses.quantities import robot_response
+from seqopt.scene.checks import short
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import Step
 
@@ -249,7 +251,9 @@ def pose(
     >>> len(problem.schedule.moves), problem.criterion.name, problem.limits
     (22, 'worst-ratio', ())
     """
+    _require_kinds(engine, schedule, criterion)
     robots = _robots_with_moves(schedule)
+    limits = (limits,) if isinstance(limits, Limit) else limits
     asked = ResponsesAsked(criterion.for_robots(robots), tuple(limits), tuple(also))
     known = {*CHOICE_RESPONSES, *map(robot_response, robots)}
     for move in schedule.moves:
@@ -268,3 +272,15 @@ def _robots_with_moves(schedule: Schedule) -> list[str]:
             "grip open; there is nothing to choose, analyze its steps"
         )
     return [robot.name for robot in schedule.scene.robots]
+
+
+def _require_kinds(engine: Engine, schedule: Schedule, criterion: Criterion) -> None:
+    """Say what is wanted where something else is given."""
+    wanted = (
+        (engine, isinstance(getattr(engine, "network", None), Network), "engine", "make_engine"),
+        (schedule, isinstance(schedule, Schedule), "schedule", "three_robot_loop"),
+        (criterion, hasattr(criterion, "for_robots"), "criterion", "CRITERIA"),
+    )
+    for given, right, what, source in wanted:
+        if not right:
+            raise ProblemError(f"{short(given)} is no {what}; take one of seqopt.{source}")

@@ -9,11 +9,12 @@ import numpy as np
 import pandas as pd
 
 from seqopt.engines.interface import Engine, Fields
-from seqopt.errors import MechanismError, SolverError
+from seqopt.errors import MechanismError, SceneError, SolverError
+from seqopt.network.network import Network
 from seqopt.responses.quantities import RESPONSES, grip_forces, require_finite, robot_response
 from seqopt.scene.parts import Robot
 from seqopt.scene.scene import Scene
-from seqopt.sequence.steps import Step
+from seqopt.sequence.steps import Step, require_steps
 
 
 def analyze(engine: Engine, steps: Sequence[Step]) -> pd.DataFrame:
@@ -36,6 +37,8 @@ def analyze(engine: Engine, steps: Sequence[Step]) -> pd.DataFrame:
     ------
     MechanismError, SolverError
         As the engine does, the step named.
+    SceneError, StepError
+        If these are no engine, or no steps.
 
     Examples
     --------
@@ -46,7 +49,10 @@ def analyze(engine: Engine, steps: Sequence[Step]) -> pd.DataFrame:
     >>> table.loc[46, ["step", "bricks", "M_sup_Nm", "D_max_1e-3mm"]].round(1).tolist()
     [47.0, 24.0, 66.3, 305.9]
     """
-    return pd.DataFrame([_row(engine, step) for step in steps])
+    if not isinstance(getattr(engine, "network", None), Network):
+        kind = type(engine).__name__
+        raise SceneError(f"a {kind} is no engine; give make_engine('compliance', network)")
+    return pd.DataFrame([_row(engine, step) for step in require_steps(steps)])
 
 
 def force_column(robot: Robot) -> str:

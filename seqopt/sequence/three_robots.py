@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from seqopt.errors import StepError
+from seqopt.network.build import network_of
 from seqopt.network.network import Network
+from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import Move, OpenGrip, OpenStep, Schedule
 from seqopt.sequence.steps import Grips, StepKind, reachable
 from seqopt.sequence.two_robots import placing_node, sequential
@@ -13,7 +15,7 @@ from seqopt.sequence.two_robots import placing_node, sequential
 ScheduleMethod = Callable[[Network], Schedule]
 
 
-def three_robot_loop(network: Network) -> Schedule:
+def three_robot_loop(network: Network | Scene) -> Schedule:
     """Return the four-step loop of three robots whose roles rotate.
 
     The first three robots place a brick each. Then, once per brick: the robot whose grip was chosen
@@ -23,7 +25,7 @@ def three_robot_loop(network: Network) -> Schedule:
 
     Parameters
     ----------
-    network : Network
+    network : Network or Scene
         Of a scene with at least three robots and four bricks.
 
     Returns
@@ -45,6 +47,7 @@ def three_robot_loop(network: Network) -> Schedule:
     >>> [(step.kind.value, step.moves) for step in schedule.steps[5:8]]
     [('release', (0,)), ('reposition', (0, 1)), ('release', (1,))]
     """
+    network = network_of(network)
     scene = network.scene
     total = len(scene.placed)
     if len(scene.robots) < 3 or total < 4:
@@ -88,7 +91,7 @@ def _loop(network: Network) -> tuple[list[OpenStep], list[int]]:
     return steps, robots
 
 
-def modified_sequential(network: Network) -> Schedule:
+def modified_sequential(network: Network | Scene) -> Schedule:
     """Return the sequential method with a third support, chosen anew after every placed brick.
 
     Once two robots hold the arch, the third takes a grip for three steps: its own reposition, the
@@ -97,7 +100,7 @@ def modified_sequential(network: Network) -> Schedule:
 
     Parameters
     ----------
-    network : Network
+    network : Network or Scene
         Of a scene with at least three robots.
 
     Returns
@@ -118,6 +121,7 @@ def modified_sequential(network: Network) -> Schedule:
     >>> len(schedule.steps), len(schedule.moves), schedule.moves[0].robot
     (95, 23, 'rob3')
     """
+    network = network_of(network)
     scene = network.scene
     if len(scene.robots) < 3:
         raise StepError(f"scene {scene.name}: {len(scene.robots)} robots; this method needs three")
@@ -166,14 +170,14 @@ SCHEDULES: dict[str, ScheduleMethod] = {
 }
 
 
-def make_schedule(name: str, network: Network) -> Schedule:
+def make_schedule(name: str, network: Network | Scene) -> Schedule:
     """Return a schedule by name.
 
     Parameters
     ----------
     name : str
         A key of `SCHEDULES`.
-    network : Network
+    network : Network or Scene
 
     Returns
     -------
@@ -186,4 +190,4 @@ def make_schedule(name: str, network: Network) -> Schedule:
     """
     if name not in SCHEDULES:
         raise StepError(f"schedule {name!r}: there is no such; give one of {', '.join(SCHEDULES)}")
-    return SCHEDULES[name](network)
+    return SCHEDULES[name](network_of(network))

@@ -7,9 +7,11 @@ from collections.abc import Callable, Set
 import numpy as np
 
 from seqopt.errors import StepError
+from seqopt.network.build import network_of
 from seqopt.network.network import Network, PartKind
 from seqopt.scene.parts import Brick, Robot
 from seqopt.scene.reach import Side
+from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Step, StepKind, check_sequence, reachable
 
 Method = Callable[[Network], tuple[Step, ...]]
@@ -73,14 +75,14 @@ def placing_node(network: Network, robot: Robot, brick: Brick) -> int:
     return brick.placing_node if brick.placing_node in free else free[0]
 
 
-def sequential(network: Network) -> tuple[Step, ...]:
+def sequential(network: Network | Scene) -> tuple[Step, ...]:
     """Two robots take turns: one places the next brick while the other holds the last one.
 
     Source: section 4.1 of Bruun et al.
 
     Parameters
     ----------
-    network : Network
+    network : Network or Scene
         Of a scene with at least two robots; the first two build.
 
     Returns
@@ -100,10 +102,11 @@ def sequential(network: Network) -> tuple[Step, ...]:
     >>> [(step.kind.value, step.held) for step in seqopt.sequential(network)[:3]]
     [('place', (1,)), ('place', (1, 2)), ('release', (2,))]
     """
+    network = network_of(network)
     return _two_robots(network, swap_after={brick.name for brick in network.scene.bricks})
 
 
-def cantilever(network: Network) -> tuple[Step, ...]:
+def cantilever(network: Network | Scene) -> tuple[Step, ...]:
     """One robot holds while the other places bricks, up to one that lies along; then they swap.
 
     A brick lies along the structure if joints meet both of its inner nodes. Source: section 4.2 of
@@ -111,7 +114,7 @@ def cantilever(network: Network) -> tuple[Step, ...]:
 
     Parameters
     ----------
-    network : Network
+    network : Network or Scene
         Of a scene with at least two robots; the first two build.
 
     Returns
@@ -131,6 +134,7 @@ def cantilever(network: Network) -> tuple[Step, ...]:
     >>> [(step.kind.value, step.held) for step in seqopt.cantilever(network)[5:8]]
     [('place', (1, 7)), ('release', (7,)), ('place', (8, 7))]
     """
+    network = network_of(network)
     return _two_robots(network, swap_after=lies_along(network))
 
 
