@@ -251,8 +251,7 @@ def pose(
     >>> len(problem.schedule.moves), problem.criterion.name, problem.limits
     (22, 'worst-ratio', ())
     """
-    _require_kinds(engine, schedule, criterion)
-    robots = _robots_with_moves(schedule)
+    robots = _robots(engine, schedule, criterion)
     limits = (limits,) if isinstance(limits, Limit) else limits
     asked = ResponsesAsked(criterion.for_robots(robots), tuple(limits), tuple(also))
     known = {*CHOICE_RESPONSES, *map(robot_response, robots)}
@@ -264,8 +263,9 @@ def pose(
     return Problem(asked.criterion, asked.limits, Evaluation(engine, schedule, asked))
 
 
-def _robots_with_moves(schedule: Schedule) -> list[str]:
-    """Return the names of the robots of a schedule that leaves grips open."""
+def _robots(engine: Engine, schedule: Schedule, criterion: Criterion) -> list[str]:
+    """Return the names of a schedule's robots if all is what it should be, and grips are open."""
+    _require_kinds(engine, schedule, criterion)
     if not schedule.moves:
         raise ProblemError(
             f"schedule {schedule.method}: with {len(schedule.scene.bricks)} bricks it leaves no "
