@@ -94,7 +94,7 @@ def axial_forces(engine: Engine) -> Figure:
 
 
 def tables_as_printed(engine: Engine) -> dict[str, pd.DataFrame]:
-    """Return the responses of every method with the support that the study prints."""
+    """Return the responses of every method with the support that the paper prints."""
     scene = engine.network.scene
     return {name: as_printed(scene, table) for name, table in method_tables(engine)[0].items()}
 

@@ -26,7 +26,13 @@ import pandas as pd
 
 from experiments.harness.claim import Claim, Finding, Options
 from experiments.harness.plotting import RESULTS, new_figure, save_figure
-from experiments.study.parts.compression import FOUND, beside_displacement, compression, rules
+from experiments.study.parts.compression import (
+    CROWN,
+    FOUND,
+    beside_displacement,
+    compression,
+    rules,
+)
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network
 from seqopt.placement.criteria import RankSum
@@ -38,7 +44,6 @@ from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.study.presets import CLOSEST, EQUATIONS, RESOLUTION
 from seqopt.study.published import published_choice
 
-CROWN = 13  # of the arch of Bruun et al.
 FINE = tuple((letter, 1e-6 * size) for letter, size in RESOLUTION)
 SETTINGS = {name: value for name, value in vars(FOUND).items() if name != "fourth"}
 SETS = {

@@ -22,6 +22,7 @@ from experiments.placement import (
     decision_sensitivity,
     degenerate_placement,
     formulation_cost,
+    heuristic_gaps,
     speed_accuracy,
 )
 from experiments.stability import failing_steps, witnesses
@@ -115,6 +116,7 @@ def checks() -> dict[str, tuple[Check, Tables, Callable[..., Iterator[tuple[Any,
             (rows("frame_contrast"),),
             spoil_contrast,
         ),
+        "heuristic_gaps": (heuristic_gaps.holds, (rows("heuristic_gaps"),), spoil_gaps),
         "identify_arch25": (
             lambda table: arch_scores.holds(table, quick=False),
             (rows("identify_arch25_refit"),),
@@ -224,6 +226,11 @@ def spoil_contrast(table):
     ),)  # fmt: skip
     flat = table.assign(**dict.fromkeys(frame_contrast.FIELDS, 1e-07), refused=0)
     yield (flat,)  # no contrast is better than another
+
+
+def spoil_gaps(table):
+    yield (spoiled(table, "gap", 0.02, formulation="cascade"),)
+    yield (spoiled(table, "gap", 0.02, formulation="beam", draw=table["draw"].iloc[0]),)
 
 
 def spoil_identified(table):

@@ -24,9 +24,10 @@ from seqopt.placement.problem import Problem
 from seqopt.placement.ranking import TIED, rank_of
 from seqopt.placement.ranks import mean_ranks
 from seqopt.responses.choices import StepChoices
-from seqopt.study.presets import CROWN, RESOLUTION
+from seqopt.study.presets import RESOLUTION
 from seqopt.study.published import published_choice
 
+CROWN = 13  # bricks of the arch of Bruun et al. up to its crown
 BEFORE = ("T_max", "M_sup", "F_sum")
 AFTER = ("T_max", "M_sup", "F_move")  # and one of FOURTH
 FOURTH = ("C_max", "D_max")

@@ -59,7 +59,7 @@ class Ours:
         return self.engine.network.scene
 
     def steps(self, method: str) -> pd.DataFrame:
-        """Return the responses of a method by step, the support's as the study prints them."""
+        """Return the responses of a method by step, the support's as the paper prints them."""
         return as_printed(self.scene, self.methods.tables[method]).set_index("step")
 
 
