@@ -155,8 +155,11 @@ def about_vertical(angle):
     return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
 
 
-def moved(scene, change):
-    """Return the scene with positions passed through a function, axes through its linear part."""
+def moved(scene, change, size=1.0):
+    """Return the scene with positions passed through a function, axes through its linear part.
+
+    Bricks are ``size`` times as large.
+    """
 
     def axis(v):
         a, o = np.array(change(np.array(v))), np.array(change(np.zeros(3)))
@@ -178,6 +181,7 @@ def moved(scene, change):
                 position=point(b.position),
                 length_axis=axis(b.length_axis),
                 width_axis=axis(b.width_axis),
+                dimensions=tuple(size * d for d in b.dimensions),
             )
             for b in scene.bricks
         ),
@@ -188,7 +192,7 @@ def moved(scene, change):
 
 def scaled(scene, length=1.0, density=1.0, stiffness=1.0):
     """Scale lengths (rotational stiffness with their square), densities, stiffnesses, payloads."""
-    out = moved(scene, lambda p: length * p)
+    out = moved(scene, lambda p: length * p, length)  # at once: halves of it may make no scene
 
     def spring(s):
         return replace(
@@ -205,14 +209,7 @@ def scaled(scene, length=1.0, density=1.0, stiffness=1.0):
 
     return replace(
         out,
-        bricks=tuple(
-            replace(
-                b,
-                dimensions=tuple(length * d for d in b.dimensions),
-                density=density * b.density,
-            )
-            for b in out.bricks
-        ),
+        bricks=tuple(replace(b, density=density * b.density) for b in out.bricks),
         joints=tuple(map(spring, out.joints)),
         grounds=tuple(map(spring, out.grounds)),
         robots=tuple(map(robot, out.robots)),

@@ -84,7 +84,8 @@ def robot_response(robot: str) -> str:
     >>> robot_response("rob1"), robot_response("sup"), robot_response("a,b")
     ('F_rob1', 'F_[sup]', 'F_[a,b]')
     """
-    means_more = robot in TAKEN or f"F_{robot}" in RESPONSES or MARKS & set(robot)
+    of_an_end = robot.startswith("sup_")  # `seqopt.responses.table.support_columns`
+    means_more = robot in TAKEN or of_an_end or f"F_{robot}" in RESPONSES or MARKS & set(robot)
     return f"F_[{robot}]" if means_more or not robot.strip() else f"F_{robot}"
 
 
