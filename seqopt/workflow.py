@@ -24,7 +24,7 @@ from seqopt.study.presets import CRITERIA, EQUATIONS
 
 
 def optimize(
-    scene: Scene | str,
+    scene: Scene | str | Path,
     schedule: Schedule | Path | str = "three-robot",
     criterion: Criterion | str = EQUATIONS,
     formulation: str = "overlap_dp",
@@ -37,7 +37,7 @@ def optimize(
 
     Parameters
     ----------
-    scene : Scene or str
+    scene : Scene, str or pathlib.Path
         Or the name of a built-in scene, or a scene file.
     schedule : Schedule, pathlib.Path or str
         A key of `seqopt.sequence.three_robots.SCHEDULES`, a schedule file, or a schedule.
@@ -76,10 +76,10 @@ def optimize(
 
 
 def _assemble(
-    scene: Scene | str, schedule: Schedule | Path | str, engine: str
+    scene: Scene | str | Path, schedule: Schedule | Path | str, engine: str
 ) -> tuple[Engine, Schedule]:
     """Return the engine and the schedule of a scene."""
-    network = build_network(load_scene(scene) if isinstance(scene, str) else scene)
+    network = build_network(load_scene(scene) if isinstance(scene, str | Path) else scene)
     return make_engine(engine, network), find_schedule(network, schedule)
 
 

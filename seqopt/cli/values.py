@@ -10,7 +10,7 @@ from dataclasses import replace
 from seqopt.contact.mortar import MORTARS, Mortar
 from seqopt.errors import ProblemError
 from seqopt.placement.criteria import RankSum
-from seqopt.placement.formulation import Formulation
+from seqopt.placement.formulation import Formulation, as_formulation
 from seqopt.placement.requirements import Criterion, Limit, payload_limits
 from seqopt.placement.scales import NEVER
 from seqopt.responses.choices import CHOICE_RESPONSES
@@ -100,12 +100,12 @@ def parse_limits(texts: Sequence[str], scene: Scene) -> tuple[Limit, ...]:
     return tuple(out)
 
 
-def parse_options(formulation: Formulation, texts: Sequence[str]) -> dict[str, int | str]:
+def parse_options(formulation: Formulation | str, texts: Sequence[str]) -> dict[str, int | str]:
     """Return the options of a formulation from words.
 
     Parameters
     ----------
-    formulation : Formulation
+    formulation : Formulation or str
         Whose ``solve`` says which options there are and of which type.
     texts : sequence of str
         Each ``NAME=VALUE``.
@@ -119,6 +119,7 @@ def parse_options(formulation: Formulation, texts: Sequence[str]) -> dict[str, i
     ProblemError
         If there is no such option, or a value is not of its type.
     """
+    formulation = as_formulation(formulation)
     known = formulation.options
     out: dict[str, int | str] = {}
     for text in texts:

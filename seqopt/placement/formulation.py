@@ -172,6 +172,30 @@ def find_formulation(name: str) -> Formulation:
     return _load(next(entry for entry in entry_points(group=GROUP) if entry.name == name))
 
 
+def as_formulation(given: Formulation | str) -> Formulation:
+    """Return a formulation, by name or itself.
+
+    Parameters
+    ----------
+    given : Formulation or str
+
+    Returns
+    -------
+    Formulation
+
+    Raises
+    ------
+    ProblemError
+        If it is neither.
+    """
+    if isinstance(given, Formulation):
+        return given
+    if isinstance(given, str):
+        return find_formulation(given)
+    known = ", ".join(formulation_names())
+    raise ProblemError(f"a {type(given).__name__} is no formulation; give one of {known}")
+
+
 def select(formulation: Formulation, problem: PlacementProblem, **options: Any) -> Selection:
     """Return the selection of a formulation, with numbers where numbers belong.
 

@@ -13,12 +13,14 @@ import pandas as pd
 from seqopt.arrays import Floats
 from seqopt.engines.interface import Engine
 from seqopt.errors import ProblemError
+from seqopt.network.network import Network
 from seqopt.placement.costs import Budget, LayeredCosts
 from seqopt.placement.interface import Aim
 from seqopt.placement.requirements import Criterion, Limit, ResponsesAsked
 from seqopt.placement.scales import SceneFacts
 from seqopt.responses.choices import CHOICE_RESPONSES, Evaluation, StepChoices
 from seqopt.responses.quantities import robot_response
+from seqopt.scene.checks import short
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import Step
 
@@ -249,9 +251,10 @@ def pose(
     >>> len(problem.schedule.moves), problem.criterion.name, problem.limits
     (22, 'worst-ratio', ())
     """
-    facts = SceneFacts(engine)
-    known = {*CHOICE_RESPONSES, *map(robot_response, _robots_with_moves(schedule))}
-    asked = ResponsesAsked(criterion.for_scene(facts), tuple(limits), tuple(also))
+    robots = _robots(engine, schedule, criterion)
+    limits = (limits,) if isinstance(limits, Limit) else limits
+    asked = ResponsesAsked(criterion.for_scene(SceneFacts(engine)), tuple(limits), tuple(also))
+    known = {*CHOICE_RESPONSES, *map(robot_response, robots)}
     for move in schedule.moves:
         if asked(move.bricks) - known:
             wrong = min(asked(move.bricks) - known)
@@ -260,11 +263,24 @@ def pose(
     return Problem(asked.criterion, asked.limits, Evaluation(engine, schedule, asked))
 
 
-def _robots_with_moves(schedule: Schedule) -> list[str]:
-    """Return the names of the robots of a schedule that leaves grips open."""
+def _robots(engine: Engine, schedule: Schedule, criterion: Criterion) -> list[str]:
+    """Return the names of a schedule's robots if all is what it should be, and grips are open."""
+    _require_kinds(engine, schedule, criterion)
     if not schedule.moves:
         raise ProblemError(
             f"schedule {schedule.method}: with {len(schedule.scene.bricks)} bricks it leaves no "
             "grip open; there is nothing to choose, analyze its steps"
         )
     return [robot.name for robot in schedule.scene.robots]
+
+
+def _require_kinds(engine: Engine, schedule: Schedule, criterion: Criterion) -> None:
+    """Say what is wanted where something else is given."""
+    wanted = (
+        (engine, isinstance(getattr(engine, "network", None), Network), "engine", "make_engine"),
+        (schedule, isinstance(schedule, Schedule), "schedule", "three_robot_loop"),
+        (criterion, hasattr(criterion, "for_scene"), "criterion", "CRITERIA"),
+    )
+    for given, right, what, source in wanted:
+        if not right:
+            raise ProblemError(f"{short(given)} is no {what}; take one of seqopt.{source}")

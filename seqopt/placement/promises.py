@@ -115,7 +115,7 @@ def response_along(scene: Scene, table: pd.DataFrame, name: str) -> np.ndarray:
         SI units, sizes without sign; NaN where the robot does not grip.
     """
     if name == "C_max":
-        return np.maximum(-table[RESPONSES["F_min"].column].to_numpy(float), 0.0)
+        return np.asarray(np.maximum(-table[RESPONSES["F_min"].column].to_numpy(float), 0.0))
     if name in RESPONSES:
         response = RESPONSES[name]
         return table[response.column].to_numpy(float) / response.scale

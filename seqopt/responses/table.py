@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from seqopt.engines.interface import Engine, Fields
-from seqopt.errors import MechanismError, SolverError
+from seqopt.errors import MechanismError, SceneError, SolverError
 from seqopt.network.network import Network
 from seqopt.responses.quantities import (
     RESPONSES,
@@ -21,7 +21,7 @@ from seqopt.responses.quantities import (
 )
 from seqopt.scene.parts import Robot
 from seqopt.scene.scene import Scene
-from seqopt.sequence.steps import Step
+from seqopt.sequence.steps import Step, require_steps
 
 
 def analyze(engine: Engine, steps: Sequence[Step]) -> pd.DataFrame:
@@ -46,6 +46,8 @@ def analyze(engine: Engine, steps: Sequence[Step]) -> pd.DataFrame:
     ------
     MechanismError, SolverError
         As the engine does, the step named.
+    SceneError, StepError
+        If these are no engine, or no steps.
 
     Examples
     --------
@@ -58,7 +60,10 @@ def analyze(engine: Engine, steps: Sequence[Step]) -> pd.DataFrame:
     >>> table.loc[48, ["step", "M_sup_Nm", "M_sup_1_Nm", "M_sup_25_Nm"]].round(1).tolist()
     [49.0, 6.5, 0.8, 6.5]
     """
-    return pd.DataFrame([_row(engine, step) for step in steps])
+    if not isinstance(getattr(engine, "network", None), Network):
+        kind = type(engine).__name__
+        raise SceneError(f"a {kind} is no engine; give make_engine('compliance', network)")
+    return pd.DataFrame([_row(engine, step) for step in require_steps(steps)])
 
 
 def force_column(robot: Robot) -> str:

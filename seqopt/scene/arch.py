@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from seqopt.arrays import Floats, Vector
-from seqopt.errors import SceneError
+from seqopt.errors import SceneError, SceneWarning
+from seqopt.scene.checks import short
 from seqopt.scene.parts import THICKEST, Brick, Ground, Joint, Robot
 from seqopt.scene.reach import Anywhere, Reach, Side
 from seqopt.scene.scene import Scene
@@ -83,6 +85,8 @@ class ArchShape:
         return self.gap if self.gap > THICKEST * min(self.dimensions) else None
 
     def __post_init__(self) -> None:
+        for name in ("pitch", "roll", "yaw", "offset"):
+            _check_numbers(name, getattr(self, name))
         count = len(self.pitch)
         if not count:
             raise SceneError("arch: pitch is empty; give one angle per brick")
@@ -91,6 +95,16 @@ class ArchShape:
             if values is not None and len(values) != count:
                 raise SceneError(
                     f"arch: {len(values)} {name} and {count} pitch values; give as many"
+                )
+        for name in ("pitch", "roll", "yaw"):
+            angles = getattr(self, name)
+            largest = 0.0 if angles is None else max(map(abs, angles))
+            if largest > 2 * math.pi:
+                warnings.warn(
+                    f"arch: {name} has {largest:g} rad, more than a turn; give radians, if degrees "
+                    "are meant",
+                    SceneWarning,
+                    stacklevel=3,
                 )
         if not self.pattern or set(self.pattern) - set(LETTERS):
             raise SceneError(f"arch: pattern is {self.pattern!r}; give letters of {LETTERS}")
@@ -129,6 +143,8 @@ def arch_scene(
     >>> arch_scene(ArchShape(pitch=(1.2, 0.6, 0.0, -0.6, -1.2), pattern="V"), "small")
     <Scene small: 5 bricks, 4 joints, 2 ground ends, 3 robots>
     """
+    if not isinstance(shape, ArchShape):
+        raise SceneError(f"a {type(shape).__name__} is no shape of an arch; give ArchShape(...)")
     tangent, left, ends = _axes(shape)
     bricks = _bricks(shape, (tangent, left, ends), line_nodes or {})
     bisector = tangent[:-1] + tangent[1:]
@@ -173,6 +189,15 @@ def robots_beside(shape: ArchShape) -> tuple[Robot, ...]:
         Robot(name=f"rob{i}", payload=weight, reach=reach)
         for i, reach in enumerate(reaches, start=1)
     )
+
+
+def _check_numbers(name: str, values: Sequence[float] | None) -> None:
+    try:
+        flat = values is None or np.asarray(values, dtype=float).ndim == 1
+    except (TypeError, ValueError, OverflowError):
+        flat = False
+    if not flat:
+        raise SceneError(f"arch: {name} is {short(values)}; give a number per brick")
 
 
 def _pattern(shape: ArchShape) -> str:

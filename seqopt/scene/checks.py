@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 import operator
 from collections.abc import Iterable
+from typing import TypeVar
 
 from seqopt.arrays import Vector
 from seqopt.errors import SceneError
 
+Part = TypeVar("Part")
 LARGEST_NUMBER = 10**15  # of a brick or node: what arrays of numbers hold without loss
 TURNS = {*range(0x202A, 0x202F), *range(0x2066, 0x206A), 0x2028, 0x2029}  # turn or break lines
 UNIT_TOLERANCE = 1e-9  # how far a direction may be from unit length, or a pair from a right angle
@@ -104,6 +106,32 @@ def wholes(where: str, values: Iterable[int]) -> tuple[int, ...]:
     if isinstance(values, str) or not isinstance(values, Iterable):
         raise SceneError(f"{where} is {short(values)}; give whole numbers")
     return tuple(whole(where, value) for value in values)
+
+
+def parts(where: str, values: Iterable[Part], kind: type[Part]) -> tuple[Part, ...]:
+    """Return parts of a scene if all are of one kind.
+
+    Parameters
+    ----------
+    where : str
+        What they are, for the message.
+    values : iterable of object
+    kind : type
+
+    Returns
+    -------
+    tuple of object
+
+    Raises
+    ------
+    SceneError
+        If one is of another kind, or there is nothing to go through.
+    """
+    found = tuple(values) if isinstance(values, Iterable) else (values,)
+    for value in found:
+        if not isinstance(value, kind):
+            raise SceneError(f"{where}: {short(value)} is none; give each as {kind.__name__}(...)")
+    return found
 
 
 def short(value: object, most: int = 60) -> str:

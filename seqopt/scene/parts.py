@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from seqopt.arrays import Vector
 from seqopt.errors import SceneError
 from seqopt.scene.checks import axes, positive, printable, vector, whole, wholes
-from seqopt.scene.reach import Anywhere, Reach
+from seqopt.scene.reach import Anywhere, Reach, as_reach
 
 THICKEST = 0.5  # of a joint that does not say, over the smallest dimension of its bricks
 
@@ -222,6 +222,7 @@ class Robot:
 
     def __post_init__(self) -> None:
         printable("robot", self.name)
+        _set(self, "reach", as_reach(f"robot {self.name}: reach", self.reach))
         _set(self, "payload", positive(f"robot {self.name}: payload", self.payload, "N"))
 
 

@@ -10,9 +10,11 @@ from functools import cached_property
 
 from seqopt.arrays import Vector
 from seqopt.errors import SceneError
-from seqopt.scene.checks import printable, vector, wholes
+from seqopt.scene.checks import parts, printable, vector, wholes
 from seqopt.scene.geometry import check_bricks, check_springs
 from seqopt.scene.parts import Brick, Ground, Joint, Robot
+
+KINDS = {"bricks": Brick, "joints": Joint, "grounds": Ground, "robots": Robot}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,8 +63,8 @@ class Scene:
     provenance: str = ""
 
     def __post_init__(self) -> None:
-        for name in ("bricks", "joints", "grounds", "build_order", "robots", "blocked_nodes"):
-            _set(self, name, tuple(getattr(self, name)))
+        for name, kind in KINDS.items():
+            _set(self, name, parts(f"scene: {name}", getattr(self, name), kind))
         printable("scene", self.name)
         for name in ("build_order", "blocked_nodes"):
             _set(self, name, wholes(f"scene {self.name}: {name}", getattr(self, name)))

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import json
 import os
+import warnings
 from dataclasses import asdict
 from functools import partial
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from seqopt.errors import SceneError
+from seqopt.errors import SceneError, SceneWarning
 from seqopt.files import read_text, write_text
+from seqopt.scene.doubts import doubts
 from seqopt.scene.parts import Brick, Ground, Joint, Robot
 from seqopt.scene.reach import Anywhere, Reach, Side, Sphere
 from seqopt.scene.scene import Scene
@@ -48,12 +50,12 @@ def builtin_scenes() -> tuple[str, ...]:
     return tuple(sorted(item.name.removesuffix(".json") for item in folder.iterdir()))
 
 
-def load_scene(name: str) -> Scene:
+def load_scene(name: str | Path) -> Scene:
     """Return a built-in scene by name, or the scene of a JSON file.
 
     Parameters
     ----------
-    name : str
+    name : str or pathlib.Path
         One of `builtin_scenes`, or the path of a file.
 
     Returns
@@ -67,11 +69,19 @@ def load_scene(name: str) -> Scene:
     FileError
         If the file cannot be read.
 
+    Warns
+    -----
+    SceneWarning
+        Where something in a file is probably not meant: see `seqopt.scene.doubts`.
+
     Examples
     --------
     >>> load_scene("arch25")
     <Scene arch25: 25 bricks, 24 joints, 2 ground ends, 3 robots>
     """
+    if not isinstance(name, str | Path):
+        raise SceneError(f"a {type(name).__name__} is no name of a scene; give text or a path")
+    name = str(name)
     if name in builtin_scenes():
         source = resources.files("seqopt").joinpath(f"data/scenes/{name}.json")
         return parse_scene(source.read_text(encoding="utf-8"), name)
@@ -79,7 +89,10 @@ def load_scene(name: str) -> Scene:
     if not path.suffix and not os.path.lexists(path):
         known = ", ".join(builtin_scenes())
         raise SceneError(f"scene {name}: no such built-in scene or file; built in: {known}")
-    return parse_scene(read_text(path), name)
+    scene = parse_scene(read_text(path), name)
+    for doubt in doubts(scene):
+        warnings.warn(f"scene {name}: {doubt}", SceneWarning, stacklevel=2)
+    return scene
 
 
 def parse_scene(text: str, source: str = "text") -> Scene:

@@ -7,7 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from seqopt.errors import StepError
+from seqopt.network.build import network_of
 from seqopt.network.network import Network
+from seqopt.scene.scene import Scene
 from seqopt.sequence.moves import open_schedule
 from seqopt.sequence.roles import cast, find_robots, in_words, take_turns
 from seqopt.sequence.schedule import OpenGrip, OpenStep, Schedule
@@ -15,7 +17,7 @@ from seqopt.sequence.steps import StepKind
 from seqopt.sequence.two_robots import alternate, placing_node
 
 
-def two_robot_loop(network: Network, robots: Sequence[str] = ()) -> Schedule:
+def two_robot_loop(network: Network | Scene, robots: Sequence[str] = ()) -> Schedule:
     """Return the loop of two robots: the sequential method with every grip open.
 
     While one robot holds the newest brick the other places the next one, at a node that is to be
@@ -50,6 +52,7 @@ def two_robot_loop(network: Network, robots: Sequence[str] = ()) -> Schedule:
     >>> [move.candidates for move in schedule.moves[:3]]
     [(1,), (2,), (4,)]
     """
+    network = network_of(network)
     chosen = find_robots(network.scene, robots, "two-robot", 2)
     starts = [(chosen[0], chosen[1])] if robots else []
     every = {brick.name for brick in network.scene.bricks}
@@ -59,7 +62,7 @@ def two_robot_loop(network: Network, robots: Sequence[str] = ()) -> Schedule:
     return open_schedule("two-robot", network, steps)
 
 
-def robot_loop(network: Network, robots: int | Sequence[str] = ()) -> Schedule:
+def robot_loop(network: Network | Scene, robots: int | Sequence[str] = ()) -> Schedule:
     """Return the four-step loop of any number of robots whose roles rotate.
 
     Every robot but the last places a brick, and the last one takes the first open grip on one more.
@@ -96,6 +99,7 @@ def robot_loop(network: Network, robots: int | Sequence[str] = ()) -> Schedule:
     >>> robot_loop(network, 2).method
     'two-robot'
     """
+    network = network_of(network)
     scene = network.scene
     names = () if isinstance(robots, int) else tuple(robots)
     count = robots if isinstance(robots, int) else len(names) or len(scene.robots)

@@ -105,6 +105,31 @@ def idle_robots(scene: Scene, steps: Iterable[AnyStep]) -> tuple[str, ...]:
     return tuple(robot.name for i, robot in enumerate(scene.robots) if i not in busy)
 
 
+def require_steps(steps: Sequence[Step]) -> Sequence[Step]:
+    """Return steps if that is what they are.
+
+    Parameters
+    ----------
+    steps : sequence of Step
+
+    Returns
+    -------
+    sequence of Step
+        The same.
+
+    Raises
+    ------
+    StepError
+        If they are something else, a schedule whose grips are open, say.
+    """
+    if not isinstance(steps, Sequence) or not all(isinstance(step, Step) for step in steps):
+        raise StepError(
+            f"a {type(steps).__name__} is no sequence of steps; give those of a method, of a plan, "
+            "or of a schedule that is filled"
+        )
+    return steps
+
+
 def reachable(scene: Scene, robot: Robot, bricks: int) -> tuple[int, ...]:
     """Return the nodes of the first bricks that a robot may hold.
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Protocol
 
 from seqopt.errors import StepError
+from seqopt.network.build import network_of
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
 from seqopt.sequence.loops import robot_loop, two_robot_loop
@@ -19,12 +20,12 @@ from seqopt.sequence.two_robots import sequential
 class ScheduleMethod(Protocol):
     """A rule that makes a schedule."""
 
-    def __call__(self, network: Network, robots: Sequence[str] = ()) -> Schedule:
+    def __call__(self, network: Network | Scene, robots: Sequence[str] = ()) -> Schedule:
         """Return the schedule of the build.
 
         Parameters
         ----------
-        network : Network
+        network : Network or Scene
         robots : sequence of str, optional
             Names of the robots in the order of their roles; found from their reach by default.
 
@@ -34,7 +35,7 @@ class ScheduleMethod(Protocol):
         """
 
 
-def three_robot_loop(network: Network, robots: Sequence[str] = ()) -> Schedule:
+def three_robot_loop(network: Network | Scene, robots: Sequence[str] = ()) -> Schedule:
     """Return the four-step loop of three robots whose roles rotate.
 
     The first three robots place a brick each. Then, once per brick: the robot whose grip was chosen
@@ -44,7 +45,7 @@ def three_robot_loop(network: Network, robots: Sequence[str] = ()) -> Schedule:
 
     Parameters
     ----------
-    network : Network
+    network : Network or Scene
         Of a scene with at least three robots and four bricks.
     robots : sequence of str, optional
         Names of three robots in the order in which they place the first bricks; by default the
@@ -69,12 +70,13 @@ def three_robot_loop(network: Network, robots: Sequence[str] = ()) -> Schedule:
     >>> [(step.kind.value, step.moves) for step in schedule.steps[5:8]]
     [('release', (0,)), ('reposition', (0, 1)), ('release', (1,))]
     """
+    network = network_of(network)
     if robots:
         find_robots(network.scene, robots, "three-robot", 3)
     return robot_loop(network, robots or 3)
 
 
-def modified_sequential(network: Network, robots: Sequence[str] = ()) -> Schedule:
+def modified_sequential(network: Network | Scene, robots: Sequence[str] = ()) -> Schedule:
     """Return the sequential method with a third support, chosen anew after every placed brick.
 
     Once two robots hold the arch, the third takes a grip for three steps: its own reposition, the
@@ -83,7 +85,7 @@ def modified_sequential(network: Network, robots: Sequence[str] = ()) -> Schedul
 
     Parameters
     ----------
-    network : Network
+    network : Network or Scene
         Of a scene with at least three robots.
     robots : sequence of str, optional
         Names of the two that take turns, and of the one that supports. By default the first two are
@@ -108,6 +110,7 @@ def modified_sequential(network: Network, robots: Sequence[str] = ()) -> Schedul
     >>> len(schedule.steps), len(schedule.moves), schedule.moves[0].robot
     (95, 23, 'rob3')
     """
+    network = network_of(network)
     chosen = find_robots(network.scene, robots, "modified-sequential", 3)
     plain = sequential(network, robots[:2])
     steps = _supported(network.scene, plain, chosen[2:] if robots else chosen)
@@ -158,14 +161,14 @@ SCHEDULES: dict[str, ScheduleMethod] = {
 }
 
 
-def make_schedule(name: str, network: Network, robots: Sequence[str] = ()) -> Schedule:
+def make_schedule(name: str, network: Network | Scene, robots: Sequence[str] = ()) -> Schedule:
     """Return a schedule by name.
 
     Parameters
     ----------
     name : str
         A key of `SCHEDULES`; ``"loop"`` is the loop of all robots of the scene.
-    network : Network
+    network : Network or Scene
     robots : sequence of str, optional
         Names of the robots in the order of their roles; found from their reach by default.
 

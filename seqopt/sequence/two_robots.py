@@ -8,9 +8,11 @@ from typing import Protocol, TypeVar
 import numpy as np
 
 from seqopt.errors import StepError
+from seqopt.network.build import network_of
 from seqopt.network.network import Network
 from seqopt.scene.parts import Brick, Robot
 from seqopt.scene.reach import Side
+from seqopt.scene.scene import Scene
 from seqopt.sequence.roles import Pair, find_robots, take_turns
 from seqopt.sequence.steps import Step, StepKind, check_sequence
 from seqopt.sequence.stretches import begins_elsewhere, lies_along
@@ -78,14 +80,14 @@ def placing_node(network: Network, robot: Robot, brick: Brick) -> int:
     return brick.placing_node if brick.placing_node in free else free[0]
 
 
-def sequential(network: Network, robots: Sequence[str] = ()) -> tuple[Step, ...]:
+def sequential(network: Network | Scene, robots: Sequence[str] = ()) -> tuple[Step, ...]:
     """Two robots take turns: one places the next brick while the other holds the last one.
 
     Source: section 4.1 of Bruun et al.
 
     Parameters
     ----------
-    network : Network
+    network : Network or Scene
         Of a scene with at least two robots.
     robots : sequence of str, optional
         Names of the one that places the first brick and of the other. By default the first two of
@@ -111,11 +113,12 @@ def sequential(network: Network, robots: Sequence[str] = ()) -> tuple[Step, ...]
     >>> seqopt.sequential(network, robots=("rob3", "rob2"))[1].grips
     (None, 2, 1)
     """
+    network = network_of(network)
     every = {brick.name for brick in network.scene.bricks}
     return _two_robots(network, "sequential", every, robots)
 
 
-def cantilever(network: Network, robots: Sequence[str] = ()) -> tuple[Step, ...]:
+def cantilever(network: Network | Scene, robots: Sequence[str] = ()) -> tuple[Step, ...]:
     """One robot holds while the other places bricks, up to one that lies along; then they swap.
 
     A brick lies along the structure if joints meet both of its inner nodes. They also swap after a
@@ -124,7 +127,7 @@ def cantilever(network: Network, robots: Sequence[str] = ()) -> tuple[Step, ...]
 
     Parameters
     ----------
-    network : Network
+    network : Network or Scene
         Of a scene with at least two robots.
     robots : sequence of str, optional
         As in `sequential`.
@@ -146,6 +149,7 @@ def cantilever(network: Network, robots: Sequence[str] = ()) -> tuple[Step, ...]
     >>> [(step.kind.value, step.held) for step in seqopt.cantilever(network)[5:8]]
     [('place', (1, 7)), ('release', (7,)), ('place', (8, 7))]
     """
+    network = network_of(network)
     swaps = lies_along(network) | begins_elsewhere(network)
     return _two_robots(network, "cantilever", swaps, robots)
 

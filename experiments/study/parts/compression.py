@@ -20,12 +20,11 @@ import numpy as np
 import pandas as pd
 
 from seqopt.arrays import Floats
-from seqopt.placement.criteria import RESOLUTION
 from seqopt.placement.problem import Problem
 from seqopt.placement.ranking import TIED, rank_of
 from seqopt.placement.ranks import mean_ranks
 from seqopt.responses.choices import StepChoices
-from seqopt.study.presets import CROWN
+from seqopt.study.presets import CROWN, RESOLUTION
 from seqopt.study.published import published_choice
 
 BEFORE = ("T_max", "M_sup", "F_sum")

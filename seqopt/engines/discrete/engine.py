@@ -33,9 +33,11 @@ from seqopt.engines.interface import (
 from seqopt.engines.rigid.mechanism import mechanism_error, require_resistance
 from seqopt.engines.rigid.recovery import Solution, respond
 from seqopt.errors import SeqoptError, SolverError
+from seqopt.network.build import network_of
 from seqopt.network.kinematics import node_motion, point_motion
 from seqopt.network.network import Network
 from seqopt.network.statics import build_statics
+from seqopt.scene.scene import Scene
 
 GONE = "joints part or slip and brick {brick} goes; add a grip, a bond or friction"
 
@@ -45,7 +47,7 @@ class DiscreteEngine:
 
     Parameters
     ----------
-    network : Network
+    network : Network or Scene
     mortar : Mortar, optional
         What the joints hold; the epoxy of Bruun et al. by default.
     bed : BedStiffness, optional
@@ -56,12 +58,13 @@ class DiscreteEngine:
 
     def __init__(
         self,
-        network: Network,
+        network: Network | Scene,
         mortar: Mortar = EPOXY,
         bed: BedStiffness | None = None,
         pinch: Pinch | None = None,
     ) -> None:
-        self._network, self._mortar, self._bed, self._pinch = network, mortar, bed, pinch
+        self._network, self._mortar = network_of(network), mortar
+        self._bed, self._pinch = bed, pinch
         self._systems: dict[int, System] = {}
 
     @property

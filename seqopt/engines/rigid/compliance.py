@@ -32,7 +32,9 @@ from seqopt.engines.rigid.mechanism import require_resistance
 from seqopt.engines.rigid.mixed import solve_mixed
 from seqopt.engines.rigid.operator import ComplianceOperator, OperatorBuilder
 from seqopt.engines.rigid.spanning_tree import grow_tree
+from seqopt.network.build import network_of
 from seqopt.network.network import Network
+from seqopt.scene.scene import Scene
 
 CHUNK = 2048  # grip sets per pass: keeps the work arrays in the processor's cache
 TRUSTED = 1e-5  # smallest scaled pivot of the grips' equations that keeps errors below about 1e-9
@@ -45,12 +47,13 @@ class ComplianceEngine:
 
     Parameters
     ----------
-    network : Network
+    network : Network or Scene
     basis : Basis, optional
         The directions in which bricks are loaded and move; all by default, fewer in a plane.
     """
 
-    def __init__(self, network: Network, basis: Basis = SPACE) -> None:
+    def __init__(self, network: Network | Scene, basis: Basis = SPACE) -> None:
+        network = network_of(network)
         self._network = network
         self._basis = basis
         tree = grow_tree(network)
