@@ -182,7 +182,7 @@ def find_schedule(
 def _check_columns(scene: Scene, text: str, what: str) -> None:
     """Require that no column belongs to a robot which the scene does not have."""
     known = [f"{robot.name}_node" for robot in scene.robots]
-    for column in next(filter(None, csv.reader(io.StringIO(text)))):
+    for column in next(csv.reader(io.StringIO(text))):
         if column.endswith("_node") and column not in known:
             raise StepError(
                 f"{what}: column {column}: no robot of scene {scene.name} is called so; "

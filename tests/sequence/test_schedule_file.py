@@ -68,10 +68,6 @@ def test_spaces_and_other_columns_do_not_matter(arch25):
             HEADER.replace("rob3_node", "rob3_node,rob1_node") + "1,place,1,1,,,\n",
             "column rob1_node stands there twice",
         ),
-        (
-            "\n" + HEADER.replace("rob3_node", "rob3_node,rob4_node") + "1,place,1,1,,,\n",
-            "column rob4_node: no robot of scene arch25",
-        ),
         (HEADER + "1,put,1,1,,\n", "line 2: type is 'put'; give one of place"),
         (HEADER + "1,place,one,1,,\n", "line 2: bricks is 'one'; give a whole number"),
         (HEADER + "1,place,1,1,,,5\n", "line 2: it has more cells than there are columns"),
