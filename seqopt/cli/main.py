@@ -7,15 +7,15 @@ import io
 import json
 import sys
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 
 from seqopt.cli.arguments import parser
+from seqopt.cli.outputs import payloads_hold, require_outputs_apart, write_results
 from seqopt.cli.status import Status, status_of
 from seqopt.cli.terminal import complain, flush, progress, quiet_numbers, say, show, silence
 from seqopt.cli.values import parse_criterion, parse_limits, parse_mortar, parse_options
@@ -26,11 +26,9 @@ from seqopt.engines.registry import make_engine
 from seqopt.errors import FileError, SceneError, SeqoptError, SolverError
 from seqopt.files import (
     csv_text,
-    require_apart,
     require_folder,
     write_bytes,
     write_csv,
-    write_folder,
     write_text,
 )
 from seqopt.network.build import build_network
@@ -41,9 +39,9 @@ from seqopt.placement.problem import pose
 from seqopt.placement.solving import solve
 from seqopt.report.comparison import Comparison, compare
 from seqopt.report.text import format_comparison
-from seqopt.responses.table import analyze, fields_archive, steps_over_payload
+from seqopt.responses.table import analyze, fields_archive
 from seqopt.scene.scene import Scene
-from seqopt.scene.scene_file import builtin_scenes, dump_scene, load_scene
+from seqopt.scene.scene_file import dump_scene, load_scene
 from seqopt.sequence.plan_file import read_plan
 from seqopt.sequence.steps import Step
 from seqopt.sequence.three_robots import make_schedule
@@ -100,7 +98,7 @@ def _compare(options: argparse.Namespace) -> Status:
     show(format_comparison(result, scene, criterion) + "\n")
     if options.out is not None and not result.refusal:
         _write_comparison(options, result)
-    return _payloads_hold(options, scene, *result.tables.values())
+    return payloads_hold(options, scene, *result.tables.values())
 
 
 def _engine(options: argparse.Namespace, network: Network) -> Engine:
@@ -139,24 +137,8 @@ def _write_comparison(options: argparse.Namespace, result: Comparison) -> None:
         buffer = io.BytesIO()
         figure.savefig(buffer, dpi=130)
         files[name] = buffer.getvalue()
-    _write_folder(options, files)
+    write_results(options, files)
     say(f"tables and figures written to {options.out}")
-
-
-def _write_folder(options: argparse.Namespace, files: Mapping[str, bytes | str]) -> None:
-    require_apart([options.out / name for name in files], _inputs(options))
-    write_folder(options.out, files)
-
-
-def _require_apart(options: argparse.Namespace, *outputs: Path | None) -> None:
-    require_apart([path for path in outputs if path is not None], _inputs(options))
-
-
-def _inputs(options: argparse.Namespace) -> list[Path]:
-    """Return the files that a command reads."""
-    scene = [] if options.scene in builtin_scenes() else [Path(options.scene)]
-    plan = getattr(options, "plan", None)
-    return scene if plan is None else [*scene, plan]
 
 
 def _optimize(options: argparse.Namespace) -> Status:
@@ -185,21 +167,12 @@ def _optimize(options: argparse.Namespace) -> Status:
         "responses.csv": csv_text(plan.alternatives()),
         "summary.json": json.dumps(report, indent=2) + "\n",
     }
-    _write_folder(options, files)
+    write_results(options, files)
     say(
         f"{formulation.name} ({formulation.kind.value}): {_worth(plan)}, "
         f"{plan.models} models; written to {options.out}"
     )
-    return _payloads_hold(options, scene, table)
-
-
-def _payloads_hold(options: argparse.Namespace, scene: Scene, *tables: pd.DataFrame) -> Status:
-    """Return the status that ``--strict`` asks for."""
-    over = set().union(*(steps_over_payload(scene, table) for table in tables))
-    if not options.strict or not over:
-        return Status.DONE
-    complain(f"seqopt: payload exceeded: {', '.join(sorted(over))}")
-    return Status.DOES_NOT_HOLD
+    return payloads_hold(options, scene, table)
 
 
 def _worth(plan: Plan) -> str:
@@ -209,7 +182,7 @@ def _worth(plan: Plan) -> str:
 
 
 def _analyze(options: argparse.Namespace) -> Status:
-    _require_apart(options, options.out, options.fields)
+    require_outputs_apart(options, options.out, options.fields)
     scene = load_scene(options.scene)
     engine = _engine(options, build_network(scene))
     steps = _steps(scene, options)
@@ -222,11 +195,11 @@ def _analyze(options: argparse.Namespace) -> Status:
     else:
         write_csv(options.out, table)
         say(f"{len(table)} steps written to {options.out}")
-    return _payloads_hold(options, scene, table)
+    return payloads_hold(options, scene, table)
 
 
 def _assess(options: argparse.Namespace) -> Status:
-    _require_apart(options, options.out)
+    require_outputs_apart(options, options.out)
     scene = load_scene(options.scene)
     mortar = parse_mortar(options)
     network = build_network(scene)
@@ -264,7 +237,7 @@ def _steps(scene: Scene, options: argparse.Namespace) -> tuple[Step, ...]:
 
 
 def _scene(options: argparse.Namespace) -> None:
-    _require_apart(options, options.export)
+    require_outputs_apart(options, options.export)
     scene = load_scene(options.scene)
     parts = build_network(scene)
     count = len(scene.bricks)

@@ -252,8 +252,7 @@ def pose(
     (22, 'worst-ratio', ())
     """
     robots = _robots(engine, schedule, criterion)
-    limits = (limits,) if isinstance(limits, Limit) else limits
-    asked = ResponsesAsked(criterion.for_robots(robots), tuple(limits), tuple(also))
+    asked = ResponsesAsked(criterion.for_robots(robots), _several(limits), tuple(also))
     known = {*CHOICE_RESPONSES, *map(robot_response, robots)}
     for move in schedule.moves:
         if asked(move.bricks) - known:
@@ -284,3 +283,7 @@ def _require_kinds(engine: Engine, schedule: Schedule, criterion: Criterion) -> 
     for given, right, what, source in wanted:
         if not right:
             raise ProblemError(f"{short(given)} is no {what}; take one of seqopt.{source}")
+
+
+def _several(limits: Sequence[Limit] | Limit) -> tuple[Limit, ...]:
+    return (limits,) if isinstance(limits, Limit) else tuple(limits)
