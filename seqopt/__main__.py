@@ -8,6 +8,8 @@ import os
 import signal
 import sys
 
+INTERRUPTED = 130  # as seqopt.cli.status has it, which may not be there yet
+
 
 def run() -> int:
     """Run the command of the shell; an interrupt while it starts is one too.
@@ -22,11 +24,17 @@ def run() -> int:
         _open_streams()
         from seqopt.cli.main import main  # noqa: PLC0415  # what an interrupt may meet
 
-        return main()
+        status = main()
     except KeyboardInterrupt:
         with contextlib.suppress(OSError, AttributeError):
             sys.stderr.write("seqopt: interrupted\n")
-        return 130
+        status = INTERRUPTED
+    if status == INTERRUPTED:  # else Python may end by the signal, where it met an exec of text
+        for stream in (sys.stdout, sys.stderr):
+            with contextlib.suppress(OSError, AttributeError):
+                stream.flush()
+        os._exit(INTERRUPTED)
+    return status
 
 
 def _take_signals() -> None:

@@ -143,8 +143,6 @@ def arch_scene(
     >>> arch_scene(ArchShape(pitch=(1.2, 0.6, 0.0, -0.6, -1.2), pattern="V"), "small")
     <Scene small: 5 bricks, 4 joints, 2 ground ends, 3 robots>
     """
-    if not isinstance(shape, ArchShape):
-        raise SceneError(f"a {type(shape).__name__} is no shape of an arch; give ArchShape(...)")
     tangent, left, ends = _axes(shape)
     bricks = _bricks(shape, (tangent, left, ends), line_nodes or {})
     bisector = tangent[:-1] + tangent[1:]
@@ -206,6 +204,8 @@ def _pattern(shape: ArchShape) -> str:
 
 def _axes(shape: ArchShape) -> tuple[Floats, Floats, Floats]:
     """Return the bricks' directions along the arch, to the left, and the points between them."""
+    if not isinstance(shape, ArchShape):
+        raise SceneError(f"a {type(shape).__name__} is no shape of an arch; give ArchShape(...)")
     pitch = np.asarray(shape.pitch, dtype=float)
     zero = np.zeros_like(pitch)
     roll, yaw = (zero if a is None else np.asarray(a, float) for a in (shape.roll, shape.yaw))
