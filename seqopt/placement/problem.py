@@ -256,10 +256,9 @@ def pose(
     asked = ResponsesAsked(criterion.for_scene(SceneFacts(engine)), tuple(limits), tuple(also))
     known = {*CHOICE_RESPONSES, *map(robot_response, robots)}
     for move in schedule.moves:
-        if asked(move.bricks) - known:
-            wrong = min(asked(move.bricks) - known)
+        if unknown := asked(move.bricks) - known:
             listed = ", ".join(sorted(known))
-            raise ProblemError(f"response {wrong}: there is no such; give {listed}")
+            raise ProblemError(f"response {min(unknown)}: there is no such; give {listed}")
     return Problem(asked.criterion, asked.limits, Evaluation(engine, schedule, asked))
 
 
