@@ -35,6 +35,7 @@ def shell(line):
     )
 
 
+@pytest.mark.slow
 @posix
 @pytest.mark.parametrize(
     ("line", "status", "said"),
@@ -85,6 +86,9 @@ def test_an_interrupt_is_one_line(tmp_path, which, after):
     time.sleep(after)
     program.send_signal(which)
     out, err = program.communicate(timeout=30)
+    if program.returncode == 0:  # a fast machine was done before: then the result is whole
+        assert len((tmp_path / "out.csv").read_text(encoding="utf-8").splitlines()) == 50
+        return
     assert (program.returncode, out, err) == (130, "", "seqopt: interrupted\n")
     assert not list(tmp_path.iterdir())
 

@@ -162,6 +162,7 @@ def test_the_integer_program_is_exact_with_budgets(problem, data):
             ALL["overlap_mip"].solve(capped)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("criterion", CRITERIA.values(), ids=CRITERIA)
 @pytest.mark.parametrize("method", SCHEDULES)
 def test_exact_ones_agree_on_the_reference_arch(engine25, criterion, method):
