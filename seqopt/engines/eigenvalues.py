@@ -7,7 +7,12 @@ from scipy import sparse
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from seqopt.arrays import Floats, Ints
-from seqopt.engines.rigid.mixed import MixedSystem, factorize, mixed_system, ungripped_system
+from seqopt.engines.rigid.mixed_system import (
+    MixedSystem,
+    factorize,
+    mixed_system,
+    ungripped_system,
+)
 from seqopt.network.network import Network
 
 UNRESISTED = 1e-17  # smallest scaled eigenvalue of a structure that resists every motion

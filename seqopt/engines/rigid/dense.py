@@ -51,8 +51,8 @@ def _solve_one(network: Network, parts: RigidStructure, grips: Ints) -> Fields:
     wrench[parts.acting] = -np.einsum("sij,sjk,k->si", parts.stiffness, parts.gap, twist)
     missing = parts.matrix @ twist - pull
     force = np.asarray(np.linalg.lstsq(forbidden.T, missing, rcond=None)[0].reshape(-1, 3))
-    solution = Solution(twist, wrench, force)
-    return respond(network, parts.statics, parts.motion, grips, solution)
+    solution = Solution(twist[None], wrench[None], force[None])
+    return respond(network, parts.statics, parts.motion, grips[None], solution)
 
 
 def _constrained(network: Network, matrix: Floats, forbidden: Floats, load: Floats) -> Floats:
