@@ -39,7 +39,7 @@ from experiments.harness.claim import Claim, Finding, Options
 from experiments.harness.plotting import RESULTS
 from seqopt.arrays import Floats, Ints
 from seqopt.engines.diagnosis import WELL
-from seqopt.engines.eigenvalues import UNRESISTED, spectrum
+from seqopt.engines.rigid.eigenvalues import UNRESISTED, spectrum
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import Fields, Want, grip_columns
 from seqopt.engines.residuals import residual

@@ -8,12 +8,13 @@ import numpy as np
 from scipy import linalg
 
 from seqopt.arrays import Floats, FrozenValue, Ints
+from seqopt.engines.rigid.eigenvalues import UNRESISTED, spectrum
 from seqopt.errors import MechanismError
 from seqopt.network.kinematics import node_motion, spring_maps
 from seqopt.network.network import Network
 from seqopt.network.statics import Statics, build_statics
 
-NO_RESISTANCE = 1e-13  # smallest scaled eigenvalue of a structure that resists every motion
+ROUNDING = 1e-13  # a smaller eigenvalue of the assembled stiffness may be rounding alone
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -86,6 +87,9 @@ def rigid_structure(network: Network, bricks: int) -> RigidStructure:
 def require_resistance(network: Network, bricks: int, columns: Ints) -> None:
     """Check that one grip set leaves no motion that nothing resists.
 
+    The assembled stiffness settles most cases at once. It cannot tell a soft support from none; the
+    eigenvalue that `seqopt.engines.diagnosis` judges by can.
+
     Parameters
     ----------
     network : Network
@@ -100,17 +104,31 @@ def require_resistance(network: Network, bricks: int, columns: Ints) -> None:
         If it does.
     """
     parts = rigid_structure(network, bricks)
-    resisting_modes(network, parts.matrix, parts.forbidden(columns))
+    values, vectors, motions = resisting_modes(parts.matrix, parts.forbidden(columns))
+    if lost_to_rounding(values) and spectrum(network, bricks, columns)[0] < UNRESISTED:
+        raise mechanism_error(network, motions @ vectors[:, 0])
 
 
-def resisting_modes(
-    network: Network, matrix: Floats, forbidden: Floats
-) -> tuple[Floats, Floats, Floats]:
+def lost_to_rounding(values: Floats) -> bool:
+    """Return whether the least of eigenvalues may be rounding alone.
+
+    Parameters
+    ----------
+    values : (m,) float
+        Eigenvalues of a scaled stiffness, ascending.
+
+    Returns
+    -------
+    bool
+    """
+    return len(values) > 0 and not values[0] >= ROUNDING * values[-1]
+
+
+def resisting_modes(matrix: Floats, forbidden: Floats) -> tuple[Floats, Floats, Floats]:
     """Return how a structure resists the motions that its grips leave.
 
     Parameters
     ----------
-    network : Network
     matrix : (6b, 6b) float
         Stiffness without grips.
     forbidden : (c, 6b) float
@@ -124,21 +142,12 @@ def resisting_modes(
         Its modes.
     motions : (6b, m) float
         The motions that the modes combine.
-
-    Raises
-    ------
-    MechanismError
-        If the smallest eigenvalue is zero beside the largest.
     """
     free = linalg.null_space(forbidden) if len(forbidden) else np.eye(len(matrix))
-    reduced = free.T @ matrix @ free
-    diagonal = np.diag(reduced)
-    if not diagonal.max() > 0:
-        raise mechanism_error(network, free[:, 0])
-    motions = free / np.sqrt(np.maximum(diagonal, NO_RESISTANCE * diagonal.max()))
+    diagonal = np.diag(free.T @ matrix @ free)
+    most = max(diagonal.max(initial=0.0), np.finfo(float).tiny / ROUNDING)
+    motions = free / np.sqrt(np.maximum(diagonal, ROUNDING * most))
     values, vectors = np.linalg.eigh(motions.T @ matrix @ motions)
-    if values[0] < NO_RESISTANCE * values[-1]:
-        raise mechanism_error(network, motions @ vectors[:, 0])
     return values, vectors, motions
 
 
