@@ -110,6 +110,9 @@ def unchanged(parts: Ungripped, states: Floats, corrections: Floats) -> Bools:
 
 def _sizes(parts: Ungripped, states: Floats) -> Floats:
     """Return the largest force, moment, shift and turn of each state, (S, 4)."""
-    joints = len(parts.wrench_unit)
-    kinds = [part.reshape(len(states), -1, 2, 3) for part in np.split(states, [joints], axis=1)]
+    ends = [len(parts.wrench_unit)]
+    kinds = [
+        part.reshape(len(states), part.shape[1] // 6, 2, 3)
+        for part in np.split(states, ends, axis=1)
+    ]
     return np.hstack([np.abs(part).max(axis=(1, 3), initial=0.0) for part in kinds])

@@ -217,10 +217,10 @@ def unscaled(parts: Ungripped, states: Floats) -> tuple[Floats, Floats]:
     """
     springs, sets = parts.network.springs, len(states)
     joints = len(parts.wrench_unit)
-    own = (states[:, :joints] * parts.wrench_unit).reshape(sets, -1, 2, 3)
+    own = (states[:, :joints] * parts.wrench_unit).reshape(sets, len(parts.acting), 2, 3)
     wrench = np.zeros((sets, len(springs.since), 6))
     turned = np.einsum("nshi,sij->nshj", own, springs.axes[parts.acting])
-    wrench[:, parts.acting] = turned.reshape(sets, -1, 6)
+    wrench[:, parts.acting] = turned.reshape(sets, len(parts.acting), 6)
     return wrench, states[:, joints:] * parts.twist_unit
 
 
@@ -239,8 +239,9 @@ def rescaled(parts: Ungripped, wrench: Floats, twist: Floats) -> Floats:
     -------
     (S, 6s + 6b) float
     """
+    joints = len(parts.wrench_unit)
     acting = wrench[:, parts.acting].reshape(len(wrench), len(parts.acting), 2, 3)
     own = np.einsum("nshj,sij->nshi", acting, parts.network.springs.axes[parts.acting])
     return np.hstack(
-        [own.reshape(len(wrench), -1) / parts.wrench_unit, twist / parts.twist_unit]
+        [own.reshape(len(wrench), joints) / parts.wrench_unit, twist / parts.twist_unit]
     )

@@ -62,16 +62,16 @@ def respond(
     edges = network.count_edges(bricks)
     load = np.tile(network.inner_weight[: 2 * bricks], (sets, 1, 1))
     load[np.arange(sets)[:, None], columns] += force
-    carried = (statics.edge_of_spring[:edges] @ wrench[:, :, :3].reshape(sets, -1).T).T
-    carried += (statics.edge_of_load[:edges, : 6 * bricks] @ load.reshape(sets, -1).T).T
+    carried = (statics.edge_of_spring[:edges] @ wrench[:, :, :3].reshape(sets, 3 * wrench.shape[1]).T).T
+    carried += (statics.edge_of_load[:edges, : 6 * bricks] @ load.reshape(sets, 6 * bricks).T).T
     _split_pairs(network, columns, force, carried)
     return Fields(
         edge_force=carried,
-        displacement=(motion @ twist.T).T.reshape(sets, -1, 3),
+        displacement=(motion @ twist.T).T.reshape(sets, motion.shape[0] // 3, 3),
         grip_force=force,
         support=wrench[:, network.springs.support] @ statics.support_of_spring.T,
         joint_wrench=wrench,
-        brick_twist=twist.reshape(sets, -1, 6),
+        brick_twist=twist.reshape(sets, bricks, 6),
     )
 
 
