@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from seqopt.arrays import Floats, FrozenValue
-from seqopt.engines.rigid.eigenvalues import UNRESISTED, spectrum
 from seqopt.engines.interface import Engine, Want, grip_columns
 from seqopt.engines.residuals import Residuals, residual
+from seqopt.engines.rigid.eigenvalues import UNRESISTED, spectrum
 from seqopt.engines.rigid.mixed import solve_mixed
 from seqopt.errors import MechanismError, SolverError
 from seqopt.network.network import Network

@@ -3,9 +3,9 @@
 With the flexibility ``G`` of the inner nodes and their displacements ``d`` under the weight, grips
 at the nodes ``S`` exert the forces ``λ`` that hold them still, ``G[S, S] λ = -d[S]``; every
 response is then the sum of the responses to the weight and to ``λ``. Where these nearly cancel
-(grips far out on a long chain and close together, or beyond a joint that is nearly loose), and where
-something is loose, grip sets are corrected by the residuals of wrenches and motions side by side
-(`seqopt.engines.rigid.refinement`).
+(grips far out on a long chain and close together, or beyond a joint that is nearly loose), and
+where something is loose, grip sets are corrected by the residuals of wrenches and motions side by
+side (`seqopt.engines.rigid.refinement`).
 """
 
 from __future__ import annotations
@@ -30,6 +30,7 @@ from seqopt.engines.rigid.grip_equations import grip_forces
 from seqopt.engines.rigid.operator import ComplianceOperator, OperatorBuilder, load_matrix
 from seqopt.engines.rigid.refinement import Refinement
 from seqopt.engines.rigid.spanning_tree import grow_tree
+from seqopt.engines.threads import one_thread
 from seqopt.network.network import Network
 
 CHUNK = 2048  # grip sets per pass: keeps the work arrays in the processor's cache
@@ -53,8 +54,10 @@ class ComplianceEngine:
         self._basis = basis
         tree = grow_tree(network)
         self._tied = len(tree.spring)
-        self._builder = OperatorBuilder(network, tree, basis)
+        with one_thread():
+            self._builder = OperatorBuilder(network, tree, basis)
         self._operators: dict[int, ComplianceOperator] = {}
+        self._even = _count_even(network)
         self._refinement: Refinement | None = None  # of the brick count that was asked last
 
     @property
@@ -86,7 +89,7 @@ class ComplianceEngine:
         operator = self._operator(bricks)
         if operator is None:
             return keep_wanted(self._refined(bricks, columns), want)
-        fields, trusted = solve_batch(operator, columns, want, even=self._even(bricks))
+        fields, trusted = solve_batch(operator, columns, want, even=bricks <= self._even)
         if self._basis is not SPACE:
             fields = replace(fields, grip_force=fields.grip_force @ self._basis.force)
         if not trusted.all():
@@ -99,24 +102,17 @@ class ComplianceEngine:
         if bricks > self._tied:
             return None
         if bricks not in self._operators:
-            self._operators[bricks] = self._builder.operator(bricks)
+            with one_thread():
+                self._operators[bricks] = self._builder.operator(bricks)
         return self._operators[bricks]
-
-    def _even(self, bricks: int) -> bool:
-        """Return whether the joints of a partial structure are about equally stiff."""
-        springs = self._network.springs
-        acting = springs.acting(bricks)
-        return all(
-            stiffness[acting].min() >= EVEN * stiffness[acting].max()
-            for stiffness in (springs.translational_stiffness, springs.rotational_stiffness)
-        )
 
     def _refined(self, bricks: int, columns: Ints) -> Fields:
         """Return the fields of grip sets that the operator alone does not answer well enough."""
-        if self._refinement is None or self._refinement.bricks != bricks:
-            operator = self._operator(bricks) if self._basis is SPACE else None
-            self._refinement = Refinement(self._network, bricks, operator)
-        return self._refinement.solve(columns)
+        operator = self._operator(bricks) if self._basis is SPACE else None
+        with one_thread():
+            if self._refinement is None or self._refinement.bricks != bricks:
+                self._refinement = Refinement(self._network, bricks, operator)
+            return self._refinement.solve(columns)
 
 
 def solve_batch(
@@ -165,6 +161,18 @@ def solve_batch(
         brick_twist=answer(operator.brick_twist, Want.BRICKS, 6),
     )
     return fields, trusted
+
+
+def _count_even(network: Network) -> int:
+    """Return up to how many bricks all joints that act are about equally stiff."""
+    springs = network.springs
+    order = np.argsort(springs.since, kind="stable")
+    even = np.ones(len(order), dtype=bool)
+    for stiffness in (springs.translational_stiffness, springs.rotational_stiffness):
+        low = np.minimum.accumulate(stiffness[order].min(axis=1))
+        high = np.maximum.accumulate(stiffness[order].max(axis=1))
+        even &= low >= EVEN * high
+    return len(network.inner) if even.all() else int(springs.since[order][even.argmin()]) - 1
 
 
 def cancels(operator: ComplianceOperator, index: Ints, force: Floats) -> Bools:

@@ -76,7 +76,7 @@ def _softness(flexibility: Floats, reach: Floats, resistance: Floats, unit: floa
     """
     if not len(reach):
         return 0.0
-    own = np.trace(flexibility) / max(float((reach**2).sum()), np.finfo(float).tiny)
+    own = float(np.trace(flexibility)) / max(float((reach**2).sum()), np.finfo(float).tiny)
     most = TIED / max(float(np.abs(resistance).sum()), np.finfo(float).tiny)
     return min(max(own, 1 / unit), most)
 

@@ -7,9 +7,7 @@ import numpy as np
 from seqopt.arrays import Floats
 
 
-def solve_positive(
-    system: Floats, negative: int = 0, scale: float = 1.0
-) -> tuple[Floats, Floats]:
+def solve_positive(system: Floats, negative: int = 0, scale: float = 1.0) -> tuple[Floats, Floats]:
     """Solve S positive definite systems of k unknowns in place, the batch along the last axis.
 
     The last unknowns may be those of a saddle: then only what is left of their equations, when the

@@ -2,9 +2,9 @@ r"""One factorization for all grip sets of a partial structure, loose parts incl
 
 Parts that nothing, or only something soft, ties to the rest can move by themselves: a brick that
 robots alone hold, what turns about a hinge. The system of `seqopt.engines.rigid.mixed_system`
-without grips is then singular, or nearly. Held at one brick of each such part, :math:`W u = \alpha`,
-it is as good as that of a sound structure; how far the loose motions go, :math:`\alpha`, is an
-unknown of each grip set beside the forces of its grips.
+without grips is then singular, or nearly. Held at one brick of each such part, :math:`W u =
+\alpha`, it is as good as that of a sound structure; how far the loose motions go, :math:`\alpha`,
+is an unknown of each grip set beside the forces of its grips.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from scipy.sparse.linalg import SuperLU, splu
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.engines.rigid.mixed_system import Ungripped
+from seqopt.errors import SolverError
 from seqopt.network.kinematics import point_motion
 from seqopt.network.network import GROUND
 
@@ -80,7 +81,7 @@ def hold_loose(parts: Ungripped) -> HeldSystem:
 
     Raises
     ------
-    RuntimeError
+    SolverError
         If it is exactly singular all the same.
     """
     matrix, rows = parts.matrix, _held_motions(parts)
@@ -89,8 +90,14 @@ def hold_loose(parts: Ungripped) -> HeldSystem:
         wide = sparse.csr_array(
             (rows.data, rows.indices + joints, rows.indptr), shape=(rows.shape[0], matrix.shape[0])
         )
-        matrix = sparse.block_array([[matrix, -wide.T], [wide, None]])
-    return HeldSystem(parts, rows.shape[0], splu(sparse.csc_array(matrix)))
+        matrix = sparse.block_array([[matrix, -wide.T], [wide, None]], format="csr")
+    try:
+        factors = splu(sparse.csc_array(matrix))
+    except RuntimeError as error:  # SuperLU met an exactly zero pivot
+        raise SolverError(
+            f"{parts.bricks} bricks: exactly singular in double precision; stiffen what is soft"
+        ) from error
+    return HeldSystem(parts, rows.shape[0], factors)
 
 
 def _held_motions(parts: Ungripped) -> sparse.csr_array:

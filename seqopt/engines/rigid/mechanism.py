@@ -9,6 +9,7 @@ from scipy import linalg
 
 from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.engines.rigid.eigenvalues import UNRESISTED, spectrum
+from seqopt.engines.threads import one_thread
 from seqopt.errors import MechanismError
 from seqopt.network.kinematics import node_motion, spring_maps
 from seqopt.network.network import Network
@@ -104,7 +105,8 @@ def require_resistance(network: Network, bricks: int, columns: Ints) -> None:
         If it does.
     """
     parts = rigid_structure(network, bricks)
-    values, vectors, motions = resisting_modes(parts.matrix, parts.forbidden(columns))
+    with one_thread():
+        values, vectors, motions = resisting_modes(parts.matrix, parts.forbidden(columns))
     if lost_to_rounding(values) and spectrum(network, bricks, columns)[0] < UNRESISTED:
         raise mechanism_error(network, motions @ vectors[:, 0])
 

@@ -83,7 +83,8 @@ def _solve_one(parts: Ungripped, grips: Ints) -> Fields:
         )
     wrench, twist = unscaled(parts, result[None, : joints + moves])
     force = (system.force @ (result[joints + moves :] * parts.unit)).reshape(1, -1, 3)
-    return respond(network, parts.statics, parts.motion, grips[None], Solution(twist, wrench, force))
+    solution = Solution(twist, wrench, force)
+    return respond(network, parts.statics, parts.motion, grips[None], solution)
 
 
 def unchanged(parts: Ungripped, states: Floats, corrections: Floats) -> Bools:

@@ -62,7 +62,8 @@ def respond(
     edges = network.count_edges(bricks)
     load = np.tile(network.inner_weight[: 2 * bricks], (sets, 1, 1))
     load[np.arange(sets)[:, None], columns] += force
-    carried = (statics.edge_of_spring[:edges] @ wrench[:, :, :3].reshape(sets, 3 * wrench.shape[1]).T).T
+    through = wrench[:, :, :3].reshape(sets, 3 * wrench.shape[1])
+    carried = (statics.edge_of_spring[:edges] @ through.T).T
     carried += (statics.edge_of_load[:edges, : 6 * bricks] @ load.reshape(sets, 6 * bricks).T).T
     _split_pairs(network, columns, force, carried)
     return Fields(
