@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import pandas as pd
 from matplotlib.figure import Figure
 
 from experiments.harness.claim import Claim, Finding, Options
@@ -22,6 +23,7 @@ from seqopt.network.build import build_network
 from seqopt.report.comparison import method_tables
 from seqopt.report.draw import View, draw_bricks, draw_grips, draw_network, draw_responses
 from seqopt.scene.scene_file import load_scene
+from seqopt.study.published import as_printed
 from seqopt.study.tables import printed_steps
 
 VIEW = View(azimuth=35, elevation=22)
@@ -78,16 +80,22 @@ def axial_forces(engine: Engine) -> Figure:
     return figure
 
 
+def tables_as_printed(engine: Engine) -> dict[str, pd.DataFrame]:
+    """Return the responses of every method with the support that the study prints."""
+    scene = engine.network.scene
+    return {name: as_printed(scene, table) for name, table in method_tables(engine)[0].items()}
+
+
 def responses_along_the_build(engine: Engine) -> Figure:
     figure = new_figure(8, 8)
     axes = figure.subplots(len(COLUMNS), 1, sharex=True)
-    draw_responses(axes, method_tables(engine)[0], COLUMNS)
+    draw_responses(axes, tables_as_printed(engine), COLUMNS)
     axes[-1].set(yscale="log", ylim=(0.1, 500))
     return figure
 
 
 def printed_against_computed(engine: Engine) -> Figure:
-    tables = method_tables(engine)[0]
+    tables = tables_as_printed(engine)
     figure = new_figure(9, 6.5)
     panels = figure.subplots(3, 4).ravel()
     for panel, column in zip(panels, VALUES, strict=False):

@@ -63,7 +63,7 @@ def optimize(
     Examples
     --------
     >>> import seqopt
-    >>> plan = seqopt.optimize("arch25", criterion="worst-ratio", formulation="minimax")
+    >>> plan = seqopt.optimize("arch25", criterion="worst-ratio-published", formulation="minimax")
     >>> round(plan.certificate.objective, 3)
     1.185
     """

@@ -30,6 +30,14 @@ def small_arch(count):
     return arch_scene(ArchShape(pitch=np.linspace(1.3, -1.3, count).tolist()))
 
 
+def from_both_sides(count, pattern="V"):
+    """A symmetric arch; bricks are placed at both ends in turn, and the crown's comes last."""
+    shape = ArchShape(pitch=np.linspace(1.3, -1.3, count).tolist(), pattern=pattern)
+    inward = zip(range(1, count + 1), range(count, 0, -1), strict=True)
+    order = [brick for pair in inward for brick in pair][:count]
+    return replace(arch_scene(shape, "from-both-sides"), build_order=tuple(order))
+
+
 def block(size=(0.4, 0.3, 0.1), lean=0.0, gravity=9.81, **stiffness):
     """A brick on ground that leans by an angle about y; nobody holds it."""
     height = size[2]

@@ -10,7 +10,7 @@ from seqopt.placement.costs import LayeredCosts
 from seqopt.placement.interface import CostProblem
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.study.presets import ROBOTS
-from tests.builders import about_vertical, moved
+from tests.builders import about_vertical, from_both_sides, moved
 
 angles = st.floats(-0.3, 0.3)
 
@@ -34,6 +34,13 @@ def arches(draw, max_bricks=7, min_bricks=1):
         closed=draw(st.booleans()),
     )
     return arch_scene(shape, robots=ROBOTS)
+
+
+@st.composite
+def both_sided(draw, pattern=None):
+    """A small arch that is built from both of its ends at once and closes at the crown."""
+    shape = st.sampled_from(["VLR", "V", "LR", "VL"]) if pattern is None else st.just(pattern)
+    return from_both_sides(draw(st.integers(2, 7)), draw(shape))
 
 
 @st.composite

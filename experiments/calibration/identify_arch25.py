@@ -64,11 +64,12 @@ from experiments.harness.yardstick import ROUNDING, VALUES, errors, percentiles,
 from seqopt.arrays import Floats
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network
-from seqopt.responses.quantities import TO_1E_3MM, responses_of
+from seqopt.responses.quantities import TO_1E_3MM, responses_of, support_forces, support_moments
 from seqopt.responses.table import analyze
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import load_scene, save_scene
 from seqopt.sequence.two_robots import METHODS
+from seqopt.study.published import as_printed
 from seqopt.study.tables import printed_steps
 
 SCENE = HOME.parent / "seqopt" / "data" / "scenes" / "arch25.json"
@@ -112,12 +113,14 @@ def produced(scene: Scene, wanted: Target) -> Floats:
     engine = ComplianceEngine(build_network(scene))
     out = []
     for bricks, grips, robots in wanted.groups:
-        answer = responses_of(engine.network, engine.solve(bricks, grips))
+        fields = engine.solve(bricks, grips)
+        answer = responses_of(engine.network, fields)
         force = np.full((len(grips), 3), np.nan)
         force[:, robots] = answer["F_rob"]
         size = [TO_1E_3MM * answer[name] for name in ("D_max", "D_avg", "D_std")]
-        rest = [answer[name] for name in ("F_sup", "M_sup", "F_min", "T_max", "F_avg")]
-        out.append(np.column_stack([force, *rest, *size]))
+        first = [support_forces(engine.network, fields)[:, 0], support_moments(fields)[:, 0]]
+        rest = [answer[name] for name in ("F_min", "T_max", "F_avg")]
+        out.append(np.column_stack([force, *first, *rest, *size]))
     return np.vstack(out)
 
 
@@ -180,7 +183,8 @@ def scores(scene: Scene) -> pd.DataFrame:
     engine = ComplianceEngine(build_network(scene))
     rows, all_errors = {}, []
     for name, method in METHODS.items():
-        printed, table = printed_steps(name), analyze(engine, method(engine.network))
+        printed = printed_steps(name)
+        table = as_printed(scene, analyze(engine, method(engine.network)))
         all_errors.append(errors(table, printed))
         rows[name] = (*percentiles(all_errors[-1]), 100 * tension_share(table, printed))
     rows["both"] = (*percentiles(pd.concat(all_errors)), np.nan)
@@ -194,7 +198,8 @@ def cross(most: int) -> pd.DataFrame:
     for known, other in (("sequential", "cantilever"), ("cantilever", "sequential")):
         numbers, groups = identify(target([printed_steps(known)]), PLAN_ANGLES, most)
         engine = ComplianceEngine(build_network(scene_of(numbers, groups)))
-        table = errors(analyze(engine, METHODS[other](engine.network)), printed_steps(other))
+        found = analyze(engine, METHODS[other](engine.network))
+        table = errors(as_printed(engine.network.scene, found), printed_steps(other))
         unseen = printed_steps(other)["same_in_both"].to_numpy() == 0
         rows.append((known, other, *percentiles(table[unseen])))
     return pd.DataFrame(rows, columns=["fitted", "scored", *PERCENTILES])

@@ -102,14 +102,15 @@ def turn(net: Network, cases: list[Case], name: str, few: int, rng: np.random.Ge
 def difference(engine: ComplianceEngine, answers: list[tuple[Case, int, Answer]]) -> float:
     """Return the largest difference of any field from the engine's, over its largest entry.
 
-    Force and moment of the support are fields of their own.
+    Forces and moments of the supports are fields of their own.
     """
     worst = 0.0
     for case, i, answer in answers:
         exact = engine.solve(case.bricks, case.grips[i : i + 1])
         pairs = {n: (x, getattr(exact, n)[0]) for n, x in answer._asdict().items()}
         found, true = pairs.pop("support")
-        pairs |= {"support_force": (found[:3], true[:3]), "support_moment": (found[3:], true[3:])}
+        for kind, part in (("force", slice(3)), ("moment", slice(3, 6))):
+            pairs[f"support_{kind}"] = (found[:, part], true[:, part])
         worst = max(worst, *(_gap(*pair) for pair in pairs.values()))
     return worst
 

@@ -45,6 +45,7 @@ from seqopt.placement.formulation import find_formulation
 from seqopt.placement.problem import Problem, pose
 from seqopt.placement.ranking import move_costs, rank_of
 from seqopt.placement.requirements import Criterion
+from seqopt.placement.scales import SceneFacts
 from seqopt.placement.solving import solve
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import load_scene
@@ -67,10 +68,10 @@ class Decision:
 
 
 def problems(scene: Scene, schedule: Schedule) -> dict[str, Problem]:
-    """Return the problem under every criterion, the models of all solved once."""
+    """Return the problem under every criterion of the nominal scene, all models solved once."""
     posed = pose(ComplianceEngine(build_network(scene)), schedule, EQUATIONS, also=ALSO)
-    robots = [robot.name for robot in scene.robots]
-    return {c.name: replace(posed, criterion=c.for_robots(robots)) for c in TESTED}
+    nominal = SceneFacts(ComplianceEngine(build_network(schedule.scene)))
+    return {c.name: replace(posed, criterion=c.for_scene(nominal)) for c in TESTED}
 
 
 def judge(problem: Problem, nominal: Decision) -> dict[str, float]:

@@ -1,8 +1,9 @@
 """Claim: where dynamic programming serves, a general solver costs hundreds of times more.
 
-Method: the three-robot loop on chains of growing length, criterion `weighted`; every formulation of
-the sum solves the same posed problem in one process on one core, the best of several rounds counts,
-and the answers are certified. Posing the problem (all responses) is timed beside them.
+Method: the three-robot loop on chains of growing length, criterion `weighted-published`; every
+formulation of the sum solves the same posed problem in one process on one core, the best of several
+rounds counts, and the answers are certified. Posing the problem (all responses) is timed beside
+them.
 
 Inputs: chains on a half circle, and `arch25`. Command: ``python -m
 experiments.placement.formulation_cost [--quick]``. Writes

@@ -34,11 +34,12 @@ from experiments.harness.plotting import RESULTS
 from experiments.harness.profiles import shifted_mean
 from experiments.harness.runs import NO_PROOF, REFERENCE, contenders
 from experiments.placement.parts.speed_charts import headline, profile_charts
-from seqopt.study.presets import CRITERIA
+from seqopt.study.presets import CLOSEST, EQUATIONS, WEIGHTED, WORST_RATIO
 
 STORE = RESULTS / "runs.csv"
 LIMIT = 100.0  # seconds per process; what fails is charged as much
 SHIFT = 0.01  # s, of geometric means
+COMPARED = tuple(c.name for c in (EQUATIONS, CLOSEST, WEIGHTED, WORST_RATIO))
 KEY = ["scene", "engine", "criterion", "version"]
 Spec = tuple[str, str, str, int]  # scene, engine, criterion, repeats
 
@@ -46,12 +47,12 @@ Spec = tuple[str, str, str, int]  # scene, engine, criterion, repeats
 def specs(*, quick: bool) -> list[Spec]:
     """Return what is run."""
     if quick:
-        return [("chain7", engine, "weighted", 1) for engine in (REFERENCE, "frame 1e7")]
+        return [("chain7", engine, "weighted-published", 1) for engine in (REFERENCE, "frame 1e7")]
     small, large = ("chain7", "chain13", "chain19", "arch25"), ("chain37", "chain49")
     frames = ("frame 1e7", "frame 1e3")
-    out = [(scene, REFERENCE, c, 5) for c, scene in product(CRITERIA, small)]
-    out += [(scene, REFERENCE, c, 2) for c, scene in product(CRITERIA, large)]
-    out += [(scene, e, c, 2) for c, e, scene in product(CRITERIA, frames, small[:2])]
+    out = [(scene, REFERENCE, c, 5) for c, scene in product(COMPARED, small)]
+    out += [(scene, REFERENCE, c, 2) for c, scene in product(COMPARED, large)]
+    out += [(scene, e, c, 2) for c, e, scene in product(COMPARED, frames, small[:2])]
     late = (("chain19", frames[0]), ("chain37", frames[0]), *(("arch25", e) for e in frames))
     out += [(scene, e, "equations-2-3", 1) for scene, e in late]
     out += [(scene, "auto", "equations-2-3", 5) for scene in small]

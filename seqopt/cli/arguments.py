@@ -158,6 +158,12 @@ def _add_assess(commands: Commands, parents: list[_Parser]) -> None:
 
 def _criterion_argument(command: argparse.ArgumentParser) -> None:
     command.add_argument(
+        "--crown",
+        metavar="BRICKS",
+        help="for criteria of ranks: bricks placed at the crown, or none; by default derived from "
+        "the scene",
+    )
+    command.add_argument(
         "--criteria",
         default=EQUATIONS.name,
         metavar="NAME",

@@ -75,7 +75,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _compare(options: argparse.Namespace) -> None:
     scene = load_scene(options.scene)
     engine = _engine(options, build_network(scene))
-    criterion = parse_criterion(options.criteria)
+    criterion = parse_criterion(options.criteria, options.crown)
     if options.out is not None:
         _require_matplotlib(options.out)
         make_folder(options.out)
@@ -135,7 +135,7 @@ def _write_comparison(folder: Path, result: Comparison) -> None:
 def _optimize(options: argparse.Namespace) -> None:
     formulation = find_formulation(options.formulation)
     chosen = parse_options(formulation, options.option)
-    criterion = parse_criterion(options.criteria)
+    criterion = parse_criterion(options.criteria, options.crown)
     scene = load_scene(options.scene)
     limits = parse_limits(options.limit, scene)
     make_folder(options.out)
@@ -159,6 +159,8 @@ def _optimize(options: argparse.Namespace) -> None:
         f"{formulation.name} ({formulation.kind.value}): {_worth(plan)}, "
         f"{plan.models} models; written to {options.out}"
     )
+    for excess in plan.overloads:
+        print(f"payload exceeded: {excess}")
 
 
 def _worth(plan: Plan) -> str:

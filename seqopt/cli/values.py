@@ -11,6 +11,7 @@ from seqopt.errors import ProblemError
 from seqopt.placement.criteria import RankSum
 from seqopt.placement.formulation import Formulation
 from seqopt.placement.requirements import Criterion, Limit, payload_limits
+from seqopt.placement.scales import NEVER
 from seqopt.responses.choices import CHOICE_RESPONSES
 from seqopt.scene.scene import Scene
 from seqopt.study.presets import CRITERIA
@@ -18,13 +19,15 @@ from seqopt.study.presets import CRITERIA
 RESPONSES = (*CHOICE_RESPONSES, "F_each")
 
 
-def parse_criterion(text: str) -> Criterion:
+def parse_criterion(text: str, crown: str | None = None) -> Criterion:
     """Return a criterion by name, or a rank sum of named responses with weights.
 
     Parameters
     ----------
     text : str
         A name of `seqopt.CRITERIA`, or responses as ``T_max,M_sup=2``; a weight is 1 by default.
+    crown : str, optional
+        Bricks placed at the crown, or ``none``.
 
     Returns
     -------
@@ -33,8 +36,14 @@ def parse_criterion(text: str) -> Criterion:
     Raises
     ------
     ProblemError
-        If there is no such criterion or response, or a weight is not positive.
+        If there is no such criterion or response, a weight is not positive, or the criterion has
+        no crown.
     """
+    if crown is not None:
+        named = CRITERIA.get(text)
+        if not isinstance(named, RankSum):
+            raise ProblemError(f"--crown {crown}: {text} has none; leave it out")
+        return replace(named, crown=NEVER if crown == "none" else _number(crown, "--crown"))
     if text in CRITERIA:
         return CRITERIA[text]
     terms = []

@@ -53,8 +53,8 @@ class Springs(FrozenValue):
         Rows are the unit vectors of the spring's own axes.
     translational_stiffness, rotational_stiffness : (S, 3) float
         N/m, N m/rad.
-    support : int
-        Index of the spring of the scene's first ground end.
+    support : (G,) int
+        Indices of the springs that are ground ends, in the scene's order.
     """
 
     bodies: Ints
@@ -65,7 +65,7 @@ class Springs(FrozenValue):
     axes: Floats
     translational_stiffness: Floats
     rotational_stiffness: Floats
-    support: int
+    support: Ints
 
     def acting(self, bricks: int) -> Ints:
         """Return the springs that act on a partial structure.

@@ -16,6 +16,7 @@ from seqopt.errors import ProblemError
 from seqopt.placement.costs import Budget, LayeredCosts
 from seqopt.placement.interface import Aim
 from seqopt.placement.requirements import Criterion, Limit, ResponsesAsked
+from seqopt.placement.scales import SceneFacts
 from seqopt.responses.choices import CHOICE_RESPONSES, Evaluation, StepChoices
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import Step
@@ -150,8 +151,7 @@ class Problem:
         costs = self.criterion.costs(responses, move.bricks, len(move.candidates))
         costs = np.where(np.isfinite(costs), costs, np.inf)
         for limit in self.limits:
-            over = responses[limit.response] > limit.bound
-            costs[over] = np.inf
+            costs[limit.exceeded(responses[limit.response])] = np.inf
         return costs
 
     def table(self, choices: StepChoices) -> pd.DataFrame:
@@ -248,9 +248,9 @@ def pose(
     >>> len(problem.schedule.moves), problem.criterion.name, problem.limits
     (22, 'worst-ratio', ())
     """
-    robots = [robot.name for robot in schedule.scene.robots]
-    asked = ResponsesAsked(criterion.for_robots(robots), tuple(limits), tuple(also))
-    known = {*CHOICE_RESPONSES, *(f"F_{name}" for name in robots)}
+    facts = SceneFacts(engine)
+    asked = ResponsesAsked(criterion.for_scene(facts), tuple(limits), tuple(also))
+    known = {*CHOICE_RESPONSES, *(f"F_{name}" for name in facts.robots)}
     for move in schedule.moves:
         if asked(move.bricks) - known:
             wrong = min(asked(move.bricks) - known)

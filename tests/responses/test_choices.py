@@ -10,8 +10,9 @@ import pytest
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import ProblemError
 from seqopt.network.build import build_network
-from seqopt.placement.criteria import RankSum, equal
+from seqopt.placement.criteria import RankSum
 from seqopt.placement.problem import pose
+from seqopt.placement.terms import equal
 from seqopt.responses import choices as evaluation
 from seqopt.responses.choices import CHOICE_RESPONSES, evaluate_choices
 from seqopt.responses.quantities import responses_of

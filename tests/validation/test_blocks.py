@@ -27,7 +27,7 @@ def test_a_block_slides_beyond_the_angle_of_friction(angle):
         with pytest.raises(MechanismError, match="1 bricks: joints part or slip and brick 1 goes"):
             engine.solve(1, HERE)
     else:
-        force = engine.solve(1, HERE).support[0, :3]
+        force = engine.solve(1, HERE).support[0, 0, :3]
         assert force == pytest.approx([0, 0, scene.bricks[0].mass * 9.81], abs=1e-6)
 
 

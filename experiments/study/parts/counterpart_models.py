@@ -28,6 +28,7 @@ from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.sequence.two_robots import METHODS
 from seqopt.study.presets import EQUATIONS
+from seqopt.study.published import as_printed
 from seqopt.study.tables import printed
 
 Rows = Iterator["Row"]
@@ -58,8 +59,8 @@ class Ours:
         return self.engine.network.scene
 
     def steps(self, method: str) -> pd.DataFrame:
-        """Return the responses of a method by step."""
-        return self.methods.tables[method].set_index("step")
+        """Return the responses of a method by step, the support's as the study prints them."""
+        return as_printed(self.scene, self.methods.tables[method]).set_index("step")
 
 
 def ours() -> Ours:

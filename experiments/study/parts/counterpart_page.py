@@ -40,8 +40,8 @@ otherwise.
 """
 CONVENTIONS = """\
 In the CSV a grip is its node, no grip is -1, and an optimized grip O3 is 1003. Forces of robots and
-of the support are compared by size, `T_pct` to within two edges. Figures and tables are numbered in
-the order of the study's source.
+of the support, the first ground end, are compared by size, `T_pct` to within two edges. Figures and
+tables are numbered in the order of the study's source.
 
 """
 

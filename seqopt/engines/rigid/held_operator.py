@@ -16,6 +16,7 @@ from seqopt.arrays import Floats
 from seqopt.engines.rigid.loose import HeldSystem
 from seqopt.engines.rigid.mixed_system import Ungripped, unscaled
 from seqopt.engines.rigid.operator import ComplianceOperator
+from seqopt.engines.rigid.recovery import reactions
 
 TIED = 0.1  # most that what resists loose motions may be of the springs that they stand on
 
@@ -103,7 +104,7 @@ def _operator(
         dead_displacement=flexibility @ weight,
         edge_force=with_weight(edge_force),
         displacement=with_weight((parts.motion @ twist.T).T),
-        support=with_weight(wrench[:, network.springs.support] @ statics.support_of_spring.T),
+        support=with_weight(reactions(network, statics, wrench).reshape(len(states), -1)),
         joint_wrench=with_weight(wrench.reshape(len(states), -1)),
         brick_twist=with_weight(twist),
         axis=network.edge_axis[inner_edge],

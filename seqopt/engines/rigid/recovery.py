@@ -70,10 +70,30 @@ def respond(
         edge_force=carried,
         displacement=(motion @ twist.T).T.reshape(sets, motion.shape[0] // 3, 3),
         grip_force=force,
-        support=wrench[:, network.springs.support] @ statics.support_of_spring.T,
+        support=reactions(network, statics, wrench),
         joint_wrench=wrench,
         brick_twist=twist.reshape(sets, bricks, 6),
     )
+
+
+def reactions(network: Network, statics: Statics, wrench: Floats) -> Floats:
+    """Return force and moment of every ground end about its fixed point.
+
+    Parameters
+    ----------
+    network : Network
+    statics : Statics
+        Of the network.
+    wrench : (S, J, 6) float
+        Of every spring of the network on its second body, N and N m.
+
+    Returns
+    -------
+    (S, G, 6) float
+        N and N m.
+    """
+    at_spring = wrench[:, network.springs.support]
+    return np.asarray(np.einsum("gij,sgj->sgi", statics.support_of_spring, at_spring))
 
 
 def _split_pairs(network: Network, columns: Ints, force: Floats, carried: Floats) -> None:
