@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from hypothesis import strategies as st
 
@@ -60,6 +62,29 @@ def states(draw, scenes=None, max_grips=3):
         size.flatmap(lambda k: st.lists(st.sampled_from(free), min_size=k, max_size=k, unique=True))
     )
     return scene, bricks, np.array([grips], dtype=np.int64).reshape(1, -1)
+
+
+@st.composite
+def loosened(draw, scenes):
+    """A scene some of whose joints are missing, or have no stiffness in some directions."""
+    scene = draw(scenes)
+    joints = []
+    for joint in scene.joints:
+        kind = draw(st.sampled_from(["kept", "kept", "kept", "torsion", "hinge", "any", "missing"]))
+        slack = {"torsion": (0,), "hinge": (0, 1, 2)}.get(kind, ())
+        if kind == "any":
+            slack = draw(st.sets(st.integers(0, 5)))
+        own = [*joint.rotational_stiffness, *joint.translational_stiffness]
+        own = [0.0 if i in slack else k for i, k in enumerate(own)]
+        if kind != "missing":
+            joints.append(
+                replace(
+                    joint,
+                    rotational_stiffness=tuple(own[:3]),
+                    translational_stiffness=tuple(own[3:]),
+                )
+            )
+    return replace(scene, joints=tuple(joints))
 
 
 @st.composite

@@ -39,12 +39,12 @@ from experiments.harness.claim import Claim, Finding, Options
 from experiments.harness.plotting import RESULTS
 from seqopt.arrays import Floats, Ints
 from seqopt.engines.diagnosis import WELL
+from seqopt.engines.eigenvalues import UNRESISTED, spectrum
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import Fields, Want, grip_columns
 from seqopt.engines.residuals import residual
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.engines.rigid.dense import solve_dense
-from seqopt.engines.rigid.eigenvalues import UNRESISTED, spectrum
 from seqopt.engines.rigid.mixed import solve_mixed
 from seqopt.errors import MechanismError, SolverError
 from seqopt.network.build import build_network

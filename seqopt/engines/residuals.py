@@ -63,8 +63,7 @@ def residual(network: Network, bricks: int, columns: Ints, fields: Fields) -> Re
     """
     springs, center = network.springs, network.centroid[:bricks]
     acting = springs.acting(bricks)
-    bodies, at = springs.bodies[acting], springs.position[acting]
-    axes = springs.axes[acting]
+    bodies, at, axes = springs.bodies[acting], springs.position[acting], springs.axes[acting]
     raw = springs.stiffness[acting]
     wrench, twist = fields.joint_wrench[0, acting], fields.brick_twist[0]
     gap, moved = np.zeros_like(wrench), np.zeros_like(wrench)

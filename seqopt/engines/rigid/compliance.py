@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -52,10 +53,7 @@ class ComplianceEngine:
     def __init__(self, network: Network, basis: Basis = SPACE) -> None:
         self._network = network
         self._basis = basis
-        tree = grow_tree(network)
-        self._tied = len(tree.spring)
-        with one_thread():
-            self._builder = OperatorBuilder(network, tree, basis)
+        self._tree = grow_tree(network)
         self._operators: dict[int, ComplianceOperator] = {}
         self._even = _count_even(network)
         self._refinement: Refinement | None = None  # of the brick count that was asked last
@@ -99,12 +97,17 @@ class ComplianceEngine:
 
     def _operator(self, bricks: int) -> ComplianceOperator | None:
         """Return the operator of a partial structure, or None where something may be loose."""
-        if bricks > self._tied:
+        if bricks > len(self._tree.spring):
             return None
         if bricks not in self._operators:
             with one_thread():
                 self._operators[bricks] = self._builder.operator(bricks)
         return self._operators[bricks]
+
+    @cached_property
+    def _builder(self) -> OperatorBuilder:
+        """Made when the first operator is: a scene that is loose from the start has none."""
+        return OperatorBuilder(self._network, self._tree, self._basis)
 
     def _refined(self, bricks: int, columns: Ints) -> Fields:
         """Return the fields of grip sets that the operator alone does not answer well enough."""

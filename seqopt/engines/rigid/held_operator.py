@@ -73,11 +73,13 @@ def held_operator(system: HeldSystem) -> ComplianceOperator:
 def _softness(flexibility: Floats, reach: Floats, resistance: Floats, unit: float) -> float:
     """Return the softness of the springs that loose motions stand on, m/N.
 
-    About that of the structure where they reach, so that the grips' equations keep their digits.
+    About that of the structure where they reach, so that the grips' equations keep their digits. A
+    motion that reaches no node, as of bricks that turn about the line they lie on, counts as if it
+    took one node along: beside that, rounding stays small.
     """
     if not len(reach):
         return 0.0
-    own = float(np.trace(flexibility)) / max(float((reach**2).sum()), np.finfo(float).tiny)
+    own = float(np.trace(flexibility)) / max(float((reach**2).sum()), float(len(reach)))
     most = TIED / max(float(np.abs(resistance).sum()), np.finfo(float).tiny)
     return min(max(own, 1 / unit), most)
 

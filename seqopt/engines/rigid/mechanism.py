@@ -8,7 +8,7 @@ import numpy as np
 from scipy import linalg
 
 from seqopt.arrays import Floats, FrozenValue, Ints
-from seqopt.engines.rigid.eigenvalues import UNRESISTED, spectrum
+from seqopt.engines.rigid.mixed_system import ungripped_system
 from seqopt.engines.threads import one_thread
 from seqopt.errors import MechanismError
 from seqopt.network.kinematics import node_motion, spring_maps
@@ -16,6 +16,7 @@ from seqopt.network.network import Network
 from seqopt.network.statics import Statics, build_statics
 
 ROUNDING = 1e-13  # a smaller eigenvalue of the assembled stiffness may be rounding alone
+UNTIED = 1e-13  # share of the largest deformation of ties that is rounding: nothing is tied
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -88,8 +89,8 @@ def rigid_structure(network: Network, bricks: int) -> RigidStructure:
 def require_resistance(network: Network, bricks: int, columns: Ints) -> None:
     """Check that one grip set leaves no motion that nothing resists.
 
-    The assembled stiffness settles most cases at once. It cannot tell a soft support from none; the
-    eigenvalue that `seqopt.engines.diagnosis` judges by can.
+    The assembled stiffness settles most cases at once. It cannot tell a soft support from none;
+    `free_motion` can.
 
     Parameters
     ----------
@@ -107,8 +108,40 @@ def require_resistance(network: Network, bricks: int, columns: Ints) -> None:
     parts = rigid_structure(network, bricks)
     with one_thread():
         values, vectors, motions = resisting_modes(parts.matrix, parts.forbidden(columns))
-    if lost_to_rounding(values) and spectrum(network, bricks, columns)[0] < UNRESISTED:
+    if lost_to_rounding(values) and free_motion(network, bricks, columns) is not None:
         raise mechanism_error(network, motions @ vectors[:, 0])
+
+
+def free_motion(network: Network, bricks: int, columns: Ints) -> Floats | None:
+    """Return a motion that deforms no spring with any stiffness and moves no held node.
+
+    How stiff springs are does not count: a soft one ties as well as a stiff one, so that rounding
+    has nothing to hide behind.
+
+    Parameters
+    ----------
+    network : Network
+    bricks : int
+        How many bricks stand.
+    columns : (r,) int
+        Grips as indices into ``network.inner.ravel()``.
+
+    Returns
+    -------
+    (b, 6) float or None
+        Translation over the length of the longest brick's inner edge, and rotation; the largest
+        component is 1. None if there is no such motion.
+    """
+    parts = ungripped_system(network, bricks)
+    node = 3 * network.inner.ravel()[columns][:, None] + np.arange(3)
+    held = parts.motion[node.ravel()].toarray() * parts.twist_unit
+    ties = np.vstack([parts.deformation[parts.stiffness > 0].toarray(), held])
+    with one_thread():
+        _, sizes, motions = linalg.svd(ties, full_matrices=len(ties) < ties.shape[1])
+    if len(sizes) == ties.shape[1] and sizes[-1] > UNTIED * sizes[0]:
+        return None
+    motion = motions[-1]
+    return np.asarray((motion / motion[np.abs(motion).argmax()]).reshape(-1, 6))
 
 
 def lost_to_rounding(values: Floats) -> bool:

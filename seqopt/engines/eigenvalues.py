@@ -15,7 +15,7 @@ from seqopt.engines.rigid.mixed_system import (
 )
 from seqopt.network.network import Network
 
-UNRESISTED = 1e-17  # smallest scaled eigenvalue of a structure that resists every motion
+UNRESISTED = 1e-17  # a scaled eigenvalue below this is found by a shift
 LEAST_DIAGONAL = 1e-13  # over the largest: by it a motion without stiffness is scaled
 SHIFT = 1e-15  # added to the scaled stiffness of a mechanism to find its mode
 EIGENVALUE_TOLERANCE = 1e-6  # relative
