@@ -214,6 +214,28 @@ def merge_sets(which: Bools, inside: Fields, outside: Fields) -> Fields:
     return join_sets([inside, outside], [which, ~which])
 
 
+def replace_sets(answer: Fields, which: Bools, better: Fields) -> Fields:
+    """Return fields in which those of some grip sets are others.
+
+    Parameters
+    ----------
+    answer : Fields
+        Of all sets.
+    which : (S,) bool
+        The sets whose fields are replaced.
+    better : Fields
+        Theirs, in their order.
+
+    Returns
+    -------
+    Fields
+    """
+    whole = {name: getattr(answer, name).copy() for name in NAMES}
+    for name in NAMES:
+        whole[name][which] = getattr(better, name)
+    return Fields(**whole)
+
+
 def grip_columns(network: Network, bricks: int, grips: ArrayLike) -> Ints:
     """Return grip sets as indices into ``network.inner.ravel()``, checked.
 

@@ -24,8 +24,7 @@ from seqopt.engines.interface import (
     Want,
     grip_columns,
     keep_wanted,
-    merge_sets,
-    select_sets,
+    replace_sets,
 )
 from seqopt.engines.rigid.grip_equations import grip_forces
 from seqopt.engines.rigid.operator import ComplianceOperator, OperatorBuilder, load_matrix
@@ -92,7 +91,7 @@ class ComplianceEngine:
             fields = replace(fields, grip_force=fields.grip_force @ self._basis.force)
         if not trusted.all():
             better = keep_wanted(self._refined(bricks, columns[~trusted]), want)
-            fields = merge_sets(trusted, select_sets(fields, trusted), better)
+            fields = replace_sets(fields, ~trusted, better)
         return fields
 
     def _operator(self, bricks: int) -> ComplianceOperator | None:
