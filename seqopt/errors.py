@@ -63,3 +63,11 @@ class MechanismError(SeqoptError, ArithmeticError):
 
 class SolverError(SeqoptError, ArithmeticError):
     """A numerical method failed to answer; this says nothing about the structure."""
+
+
+class MemoryShortError(SeqoptError, MemoryError):
+    """There is not the memory for what is asked; the text says how much it takes."""
+
+
+class SceneWarning(UserWarning):
+    """Something in a scene can be, and probably is not meant."""

@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 import os
+import signal
+import stat
 import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 import pandas as pd
 
 from seqopt.errors import FileError
+
+LARGEST_INPUT = 64_000_000  # bytes; a scene of 100,000 bricks has 40 million
+HIDDEN = ".seqopt-"  # start of the names of what is not complete yet
 
 
 def read_text(path: Path) -> str:
@@ -25,13 +32,21 @@ def read_text(path: Path) -> str:
     Raises
     ------
     FileError
-        If the file cannot be read, or is not UTF-8.
+        If the file cannot be read, is a pipe or device, larger than `LARGEST_INPUT`, or not UTF-8.
     """
     try:
-        return path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
-        raise FileError(f"cannot read {path}: {reason}; name a readable file") from error
+        if not stat.S_ISREG(Path(path).stat().st_mode):  # a pipe would be waited for
+            raise FileError(f"cannot read {path}: it is no regular file; name one")
+        with Path(path).open("rb") as stream:
+            content = stream.read(LARGEST_INPUT + 1)
+        if len(content) > LARGEST_INPUT:
+            most = LARGEST_INPUT / 1e6
+            raise FileError(f"cannot read {path}: it has more than {most:g} MB; name a smaller one")
+        return content.decode("utf-8-sig")  # spreadsheets start text with a mark
+    except (OSError, ValueError) as error:
+        if isinstance(error, FileError):
+            raise
+        raise FileError(f"cannot read {path}: {_reason(error)}; name a readable file") from error
 
 
 def write_text(path: Path, text: str) -> None:
@@ -47,7 +62,7 @@ def write_text(path: Path, text: str) -> None:
     FileError
         If the file cannot be written.
     """
-    write_bytes(path, text.encode())
+    _write(path, text)
 
 
 def csv_text(table: pd.DataFrame) -> str:
@@ -85,6 +100,8 @@ def write_csv(path: Path, table: pd.DataFrame) -> None:
 def write_bytes(path: Path, content: bytes) -> None:
     """Write a file whole: it appears under its name only once complete.
 
+    A link is followed to its target; a file that is there keeps its mode.
+
     Parameters
     ----------
     path : pathlib.Path
@@ -93,20 +110,86 @@ def write_bytes(path: Path, content: bytes) -> None:
     Raises
     ------
     FileError
-        If the file cannot be written.
+        If the file cannot be written, or what is there is no regular file: a device, say.
     """
+    _write(path, content)
+
+
+def write_folder(folder: Path, files: Mapping[str, bytes | str]) -> None:
+    """Write files into a folder, all of them or none.
+
+    A new folder appears under its name with all of its files at once. In one that is there all
+    files are complete beside their places before the first is put in its place.
+
+    Parameters
+    ----------
+    folder : pathlib.Path
+        Those above it are made too.
+    files : mapping of str to (bytes or str)
+        Content by name.
+
+    Raises
+    ------
+    FileError
+        If a file or the folder cannot be written.
+    """
+    target = Path(os.path.realpath(folder))
     try:
-        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-        try:
-            with os.fdopen(handle, "wb") as stream:
-                stream.write(content)
-            Path(name).chmod(0o666 & ~_umask())
-            Path(name).replace(path)
-        except BaseException:
-            Path(name).unlink(missing_ok=True)
-            raise
-    except OSError as error:
-        raise FileError(f"cannot write {path}: {error.strerror}; name a writable file") from error
+        if target.exists():
+            _put_all([(target / name, content) for name, content in files.items()])
+            return
+        make_folder(target.parent)
+        with tempfile.TemporaryDirectory(dir=target.parent, prefix=HIDDEN) as hidden:
+            whole = Path(hidden) / "whole"
+            whole.mkdir()  # as open as any new folder; the one around it is private
+            _put_all([(whole / name, content) for name, content in files.items()])
+            with _undisturbed():
+                whole.rename(target)
+    except (OSError, ValueError) as error:
+        raise _unwritable(folder, error) from error
+
+
+def require_apart(outputs: Sequence[Path], inputs: Sequence[Path] = ()) -> None:
+    """Raise an error if two outputs are one file, or one is an input.
+
+    Parameters
+    ----------
+    outputs : sequence of pathlib.Path
+    inputs : sequence of pathlib.Path, optional
+
+    Raises
+    ------
+    FileError
+        Naming the path.
+    """
+    seen: list[Path] = []
+    for path in outputs:
+        if any(_is_same(path, other) for other in inputs):
+            raise FileError(f"cannot write {path}: it is the input; name another file")
+        if any(_is_same(path, other) for other in seen):
+            raise FileError(f"cannot write {path}: two outputs go there; name another file")
+        seen.append(path)
+
+
+def require_folder(path: Path) -> None:
+    """Raise an error, before anything is computed, if a folder cannot be written.
+
+    Parameters
+    ----------
+    path : pathlib.Path
+        It need not be there.
+
+    Raises
+    ------
+    FileError
+        If it, or what is above it, is no folder or cannot be written.
+    """
+    there = Path(os.path.realpath(path))
+    while not os.path.lexists(there) and there != there.parent:
+        there = there.parent
+    if not there.is_dir() or not os.access(there, os.W_OK | os.X_OK):
+        what = "cannot be written" if there.is_dir() else "is no folder"
+        raise FileError(f"cannot make folder {path}: {there} {what}; name another")
 
 
 def make_folder(path: Path) -> None:
@@ -125,6 +208,85 @@ def make_folder(path: Path) -> None:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise FileError(f"cannot make folder {path}: {error.strerror}; name another") from error
+
+
+def _write(path: Path, content: bytes | str) -> None:
+    try:
+        _put_all([(path, content)])
+    except (OSError, ValueError) as error:
+        raise _unwritable(path, error) from error
+
+
+def _stage(path: Path, content: bytes | str) -> tuple[Path, Path]:
+    """Write content beside its place; return the file that has it, and the place."""
+    content = content.encode() if isinstance(content, str) else content
+    target = Path(os.path.realpath(path))
+    mode = 0o666 & ~_umask()
+    if target.exists():
+        if not target.is_file():
+            what = "folder" if target.is_dir() else "device or pipe"
+            raise FileError(f"cannot write {path}: it is a {what}; name a regular file")
+        mode = stat.S_IMODE(target.stat().st_mode)
+    handle, name = tempfile.mkstemp(dir=target.parent, prefix=HIDDEN)
+    try:
+        with os.fdopen(handle, "wb") as stream:
+            stream.write(content)
+        Path(name).chmod(mode)
+    except BaseException:
+        Path(name).unlink(missing_ok=True)
+        raise
+    return Path(name), target
+
+
+def _put_all(files: Sequence[tuple[Path, bytes | str]]) -> None:
+    """Write files; then put them in their places, one right after the other."""
+    staged: list[tuple[Path, Path]] = []
+    try:
+        for path, content in files:
+            staged.append(_stage(path, content))
+        with _undisturbed():
+            for hidden, target in staged:
+                hidden.replace(target)
+    finally:
+        for hidden, _ in staged:
+            hidden.unlink(missing_ok=True)
+
+
+@contextmanager
+def _undisturbed() -> Iterator[None]:
+    """Hold back the signals that end a program, where the system can."""
+    if os.name != "posix":
+        yield
+        return
+    ends = {signal.SIGINT, signal.SIGTERM, signal.SIGHUP}
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, ends)
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _is_same(path: Path, other: Path) -> bool:
+    """Return whether two paths lead to one file, whether or not it is there."""
+    try:
+        return path.samefile(other)
+    except OSError:  # one of them is not there
+        return os.path.realpath(path) == os.path.realpath(other)
+
+
+def _unwritable(path: Path, error: Exception) -> FileError:
+    if isinstance(error, FileError):
+        return error
+    return FileError(f"cannot write {path}: {_reason(error)}; name a writable file")
+
+
+def _reason(error: Exception) -> str:
+    """Return why a file cannot be read or written, in a few words."""
+    if isinstance(error, OSError):
+        return error.strerror or str(error)
+    if isinstance(error, UnicodeEncodeError):
+        return f"{error.object[error.start]!r} in it is half a character"
+    return "it is not UTF-8 text" if isinstance(error, UnicodeError) else str(error)
 
 
 def _umask() -> int:

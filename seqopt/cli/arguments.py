@@ -6,6 +6,8 @@ import argparse
 from pathlib import Path
 from typing import NoReturn, TypeAlias
 
+from seqopt.cli.status import Status
+from seqopt.cli.terminal import complain, show
 from seqopt.contact.mortar import MORTARS
 from seqopt.engines.registry import ENGINES
 from seqopt.placement.formulation import formulation_names
@@ -15,14 +17,16 @@ from seqopt.sequence.two_robots import METHODS
 from seqopt.study.presets import CRITERIA, EQUATIONS
 from seqopt.study.published import PUBLISHED
 
-USAGE = 2  # exit status where the user must act
-
 
 class _Parser(argparse.ArgumentParser):
-    """A parser whose errors are one line."""
+    """A parser whose errors are one line, and whose help is a result like others."""
+
+    def print_help(self, file: object = None) -> None:
+        show(self.format_help())
 
     def error(self, message: str) -> NoReturn:
-        self.exit(USAGE, f"{self.prog}: error: {message} (see {self.prog} --help)\n")
+        complain(f"{self.prog}: error: {message} (see {self.prog} --help)")
+        self.exit(Status.BAD_INPUT)
 
 
 Commands: TypeAlias = "argparse._SubParsersAction[_Parser]"
@@ -34,7 +38,8 @@ def parser() -> argparse.ArgumentParser:
     Returns
     -------
     argparse.ArgumentParser
-        ``command`` names what is to be run. A wrong word ends the program with status `USAGE`.
+        ``command`` names what is to be run. A wrong word ends the program with status
+        `seqopt.cli.status.Status.BAD_INPUT`.
     """
     whole = _Parser(
         prog="seqopt",
@@ -83,6 +88,14 @@ def _engine_arguments() -> _Parser:
     return engine
 
 
+def _strict_argument(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "--strict",
+        action="store_true",
+        help="end with status 1 if a robot would exceed its payload in a step",
+    )
+
+
 def _add_compare(commands: Commands, parents: list[_Parser]) -> None:
     command = commands.add_parser(
         "compare",
@@ -93,6 +106,7 @@ def _add_compare(commands: Commands, parents: list[_Parser]) -> None:
     )
     _criterion_argument(command)
     command.add_argument("--out", type=Path, metavar="DIR", help="write tables and figures there")
+    _strict_argument(command)
 
 
 def _add_analyze(commands: Commands, parents: list[_Parser]) -> None:
@@ -114,6 +128,7 @@ def _add_analyze(commands: Commands, parents: list[_Parser]) -> None:
         metavar="FILE",
         help="NumPy archive (.npz) to write: every edge force, node displacement and reaction",
     )
+    _strict_argument(command)
 
 
 def _steps_arguments(command: argparse.ArgumentParser) -> None:
@@ -125,6 +140,17 @@ def _steps_arguments(command: argparse.ArgumentParser) -> None:
         help=f"how the build goes; {PUBLISHED} is the printed three-robot plan of arch25",
     )
     steps.add_argument("--plan", type=Path, metavar="FILE", help="CSV of the steps")
+    _robots_argument(command, "--method sequential or cantilever: the two")
+
+
+def _robots_argument(command: argparse.ArgumentParser, whose: str) -> None:
+    command.add_argument(
+        "--robots",
+        default="",
+        metavar="NAME,NAME[,NAME]",
+        help=f"with {whose} robots that take part, in the order of their roles (default: the first "
+        "of the scene whose reach allows the build)",
+    )
 
 
 def _add_assess(commands: Commands, parents: list[_Parser]) -> None:
@@ -190,10 +216,12 @@ def _add_optimize(commands: Commands, parents: list[_Parser]) -> None:
     )
     command.add_argument(
         "--schedule",
-        choices=tuple(SCHEDULES),
         default=next(iter(SCHEDULES)),
-        help="which build has the open grips (default: %(default)s)",
+        metavar="NAME|FILE",
+        help=f"which build has the open grips: {', '.join(SCHEDULES)} (of all robots), or a CSV "
+        "file of steps in which open grips are marked ? (default: %(default)s)",
     )
+    _robots_argument(command, "a schedule by name: the")
     _criterion_argument(command)
     command.add_argument(
         "--limit",
@@ -216,6 +244,7 @@ def _add_optimize(commands: Commands, parents: list[_Parser]) -> None:
         "or so; how far the choice is from the optimum stays unknown",
     )
     command.add_argument("--out", type=Path, metavar="DIR", required=True, help="folder to write")
+    _strict_argument(command)
 
 
 def _add_scene(commands: Commands, parents: list[_Parser]) -> None:

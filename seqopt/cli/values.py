@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import argparse
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 
 from seqopt.contact.mortar import MORTARS, Mortar
 from seqopt.errors import ProblemError
 from seqopt.placement.criteria import RankSum
-from seqopt.placement.formulation import Formulation
+from seqopt.placement.formulation import Formulation, as_formulation
 from seqopt.placement.requirements import Criterion, Limit, payload_limits
 from seqopt.placement.scales import NEVER
 from seqopt.responses.choices import CHOICE_RESPONSES
 from seqopt.scene.scene import Scene
 from seqopt.study.presets import CRITERIA
 
+BETWEEN = re.compile(r",(?![^\[]*\])")  # a comma that is not in brackets
+LARGEST = 1e100  # number: products of larger ones overflow
 RESPONSES = (*CHOICE_RESPONSES, "F_each")
 
 
@@ -47,10 +50,25 @@ def parse_criterion(text: str, crown: str | None = None) -> Criterion:
     if text in CRITERIA:
         return CRITERIA[text]
     terms = []
-    for part in text.split(","):
-        name, _, weight = part.partition("=")
+    for part in BETWEEN.split(text):
+        name, weight = _split(part)
         terms.append((_response(name, "--criteria"), _number(weight or "1", f"--criteria {part}")))
     return RankSum(text, tuple(terms), tuple(terms))
+
+
+def parse_robots(text: str) -> tuple[str, ...]:
+    """Return names of robots from words.
+
+    Parameters
+    ----------
+    text : str
+        Names with commas between them; nothing for none.
+
+    Returns
+    -------
+    tuple of str
+    """
+    return tuple(name.strip() for name in text.split(",")) if text else ()
 
 
 def parse_limits(texts: Sequence[str], scene: Scene) -> tuple[Limit, ...]:
@@ -74,7 +92,7 @@ def parse_limits(texts: Sequence[str], scene: Scene) -> tuple[Limit, ...]:
     """
     out: list[Limit] = []
     for text in texts:
-        name, _, value = text.partition("=")
+        name, value = _split(text)
         if text == "payload":
             out += payload_limits(scene)
         else:
@@ -82,12 +100,12 @@ def parse_limits(texts: Sequence[str], scene: Scene) -> tuple[Limit, ...]:
     return tuple(out)
 
 
-def parse_options(formulation: Formulation, texts: Sequence[str]) -> dict[str, int | str]:
+def parse_options(formulation: Formulation | str, texts: Sequence[str]) -> dict[str, int | str]:
     """Return the options of a formulation from words.
 
     Parameters
     ----------
-    formulation : Formulation
+    formulation : Formulation or str
         Whose ``solve`` says which options there are and of which type.
     texts : sequence of str
         Each ``NAME=VALUE``.
@@ -101,6 +119,7 @@ def parse_options(formulation: Formulation, texts: Sequence[str]) -> dict[str, i
     ProblemError
         If there is no such option, or a value is not of its type.
     """
+    formulation = as_formulation(formulation)
     known = formulation.options
     out: dict[str, int | str] = {}
     for text in texts:
@@ -146,9 +165,17 @@ def parse_mortar(options: argparse.Namespace) -> Mortar:
     return replace(base, **given)
 
 
+def _split(text: str) -> tuple[str, str]:
+    """Return a response, whose brackets may hold anything, and the number after it."""
+    end = text.rfind("]") + 1
+    name, _, number = text[end:].partition("=")
+    return text[:end] + name, number
+
+
 def _response(name: str, where: str) -> str:
     if name not in RESPONSES and not name.startswith("F_"):
-        known = ", ".join((*CRITERIA, *RESPONSES, "F_ROBOT"))
+        names = (*CRITERIA, *RESPONSES) if where == "--criteria" else ("payload", *CHOICE_RESPONSES)
+        known = ", ".join((*names, "F_ROBOT"))
         raise ProblemError(f"{where} {name}: there is no such; give {known}")
     return name
 
@@ -158,8 +185,10 @@ def _number(text: str, where: str, zero: str = "") -> float:
         value = float(text)
     except ValueError:
         value = -1.0
-    if not 0 < value < float("inf") and not (zero and value == 0):
+    if not 0 < value <= LARGEST and not (zero and value == 0):
         raise ProblemError(
-            f"{where}: {text!r} is not a positive number" + (" or zero" if zero else "")
+            f"{where}: {text!r} is not a positive number"
+            + (" or zero" if zero else "")
+            + (f" up to {LARGEST:g}" if value > LARGEST else "")
         )
     return value

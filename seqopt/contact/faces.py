@@ -8,6 +8,7 @@ import numpy as np
 
 from seqopt.arrays import Floats
 from seqopt.contact.assembly import Assembly
+from seqopt.contact.joint_space import JointSpace, distance_beside, face_distance
 from seqopt.errors import SceneError
 from seqopt.network.network import GROUND, Network
 from seqopt.scene.parts import Brick
@@ -36,7 +37,7 @@ def step_assembly(network: Network, bricks: int, grips: Sequence[int | None]) ->
     Raises
     ------
     SceneError
-        If the faces of a joint do not overlap.
+        If the bricks of a joint do not touch there: see `seqopt.contact.joint_space`.
     """
     placed = network.scene.placed
     acting = network.springs.acting(bricks)
@@ -76,7 +77,7 @@ def bare_assembly(network: Network, bricks: int) -> Assembly:
     Raises
     ------
     SceneError
-        If the faces of a joint do not overlap.
+        If the bricks of a joint do not touch there: see `seqopt.contact.joint_space`.
     """
     nobody = (None,) * len(network.scene.robots)
     return step_assembly(network, bricks, nobody)
@@ -89,8 +90,19 @@ def _contact(network: Network, spring: int) -> tuple[str, Floats, Floats]:
     start = "ground" if first == GROUND else str(placed[first].name)
     name = f"{start}-{placed[second].name}"
     between = [placed[b] for b in (first, second) if b != GROUND]
-    axes = _oriented(springs.axes[spring], springs.position[spring], between)
-    return name, axes[0], _overlap(axes, springs.position[spring], between, name)
+    point = springs.position[spring]
+    axes = _oriented(springs.axes[spring], point, between)
+    common = _overlap(axes, point, between, name)
+    middle = point + common.mean(axis=0) @ axes[1:]
+    before = -face_distance(between[0], -axes[0], middle) if len(between) > 1 else 0.0
+    JointSpace(
+        name=name,
+        bricks=tuple(between),
+        ends=(before, face_distance(between[-1], axes[0], middle)),
+        beside=distance_beside(common),
+        thickness=float(springs.thickness[spring]),
+    ).require_touching()
+    return name, axes[0], np.asarray(point + common @ axes[1:])
 
 
 def _oriented(axes: Floats, point: Floats, between: list[Brick]) -> Floats:
@@ -101,7 +113,7 @@ def _oriented(axes: Floats, point: Floats, between: list[Brick]) -> Floats:
 
 
 def _overlap(axes: Floats, point: Floats, between: list[Brick], name: str) -> Floats:
-    """Return the corners (m, 3) of the overlap of the bricks' faces in a contact's plane."""
+    """Return the corners (m, 2) of the overlap of the bricks' faces in a contact's plane."""
     flat = [(_face(brick, axes[0], point) - point) @ axes[1:].T for brick in between]
     common = _ordered(flat[0])
     for other in flat[1:]:
@@ -112,7 +124,7 @@ def _overlap(axes: Floats, point: Floats, between: list[Brick], name: str) -> Fl
             f"joint {name}: the faces of its bricks do not overlap along its normal; "
             "move the joint between them or correct its axis"
         )
-    return np.asarray(point + common @ axes[1:])
+    return common
 
 
 def _face(brick: Brick, normal: Floats, point: Floats) -> Floats:

@@ -61,3 +61,27 @@ Examples
 (3000000.0, 2000000.0)
 """
 MORTARS = {"epoxy": EPOXY, "dry": DRY}
+
+
+def find_mortar(mortar: Mortar | str) -> Mortar:
+    """Return a mortar, by name or itself.
+
+    Parameters
+    ----------
+    mortar : Mortar or str
+        A mortar, or a name of `MORTARS`.
+
+    Returns
+    -------
+    Mortar
+
+    Raises
+    ------
+    SceneError
+        If it is neither.
+    """
+    if isinstance(mortar, Mortar):
+        return mortar
+    if mortar not in MORTARS:
+        raise SceneError(f"mortar {mortar!r}: give a Mortar, or one of {', '.join(MORTARS)}")
+    return MORTARS[mortar]

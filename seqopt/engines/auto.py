@@ -29,7 +29,9 @@ from seqopt.engines.planar import PlanarEngine
 from seqopt.engines.plane import NoPlane, find_plane, off_plane
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import SceneError
+from seqopt.network.build import network_of
 from seqopt.network.network import Network
+from seqopt.scene.scene import Scene
 
 
 class Level(Enum):
@@ -65,7 +67,7 @@ class AutoEngine:
 
     Parameters
     ----------
-    network : Network
+    network : Network or Scene
     mortar : Mortar, optional
         What the joints hold; the epoxy of Bruun et al. by default.
 
@@ -77,7 +79,8 @@ class AutoEngine:
         Why elastic limits are not checked; empty if they are.
     """
 
-    def __init__(self, network: Network, mortar: Mortar = EPOXY) -> None:
+    def __init__(self, network: Network | Scene, mortar: Mortar = EPOXY) -> None:
+        network = network_of(network)
         self._rigid = ComplianceEngine(network)
         self._discrete = DiscreteEngine(network, mortar)
         self._planar: PlanarEngine | None = None

@@ -19,10 +19,19 @@ from scipy import sparse
 from scipy.sparse.linalg import SuperLU, splu
 
 from seqopt.arrays import Floats, Ints
-from seqopt.engines.interface import Fields, Want, grip_columns, join_sets, no_sets
+from seqopt.engines.interface import (
+    Fields,
+    Want,
+    grip_columns,
+    join_sets,
+    no_sets,
+    require_finite,
+)
 from seqopt.engines.rigid.mechanism import require_resistance
 from seqopt.errors import SolverError
+from seqopt.network.build import network_of
 from seqopt.network.network import Network, PartKind
+from seqopt.scene.scene import Scene
 
 CONTRAST = 1e7  # bar over joint stiffness; see experiments/engines/frame_contrast.py
 FRAME_CORRECTIONS = 3  # after which a solution is judged
@@ -36,14 +45,14 @@ class FrameEngine:
 
     Parameters
     ----------
-    network : Network
+    network : Network or Scene
     contrast : float, optional
         Stiffness of the bars over that of the stiffest joint, in stretching and in bending. Low
         values bend the bars, high ones spoil the conditioning.
     """
 
-    def __init__(self, network: Network, contrast: float = CONTRAST) -> None:
-        self._network = network
+    def __init__(self, network: Network | Scene, contrast: float = CONTRAST) -> None:
+        self._network = network_of(network)
         self._contrast = contrast
 
     @property
@@ -78,7 +87,8 @@ class FrameEngine:
         network = self._network
         columns = grip_columns(network, bricks, grips)
         answers = [_solve_one(network, bricks, row, self._contrast) for row in columns]
-        return join_sets([no_sets(network, bricks, columns.shape[1]), *answers])
+        answer = join_sets([no_sets(network, bricks, columns.shape[1]), *answers])
+        return require_finite(answer, bricks, grips)
 
 
 class _Frame(NamedTuple):
@@ -217,7 +227,8 @@ def _solve(
     scale = 1 / np.sqrt(np.maximum(matrix.diagonal(), np.finfo(float).tiny))
     scaled = (sparse.diags_array(scale) @ matrix @ sparse.diags_array(scale)).tocsc()
     failure = SolverError(
-        f"frame at contrast {contrast:g}: too ill-conditioned; lower the contrast"
+        f"frame at contrast {contrast:g}: too ill-conditioned; take the engine compliance, or in "
+        "Python a lower contrast"
     )
     try:
         factor = splu(scaled, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints
-from seqopt.errors import GripError
+from seqopt.errors import GripError, SolverError
 from seqopt.network.network import Network
 
 
@@ -131,6 +131,39 @@ def keep_wanted(answer: Fields, want: Want) -> Fields:
     return replace(answer, **{name: getattr(answer, name)[:, :0] for name in dropped})
 
 
+def require_finite(answer: Fields, bricks: int, grips: ArrayLike) -> Fields:
+    """Return fields if all of their numbers are finite.
+
+    Parameters
+    ----------
+    answer : Fields
+    bricks : int
+        How many bricks stand.
+    grips : (S, r) int
+        Node numbers, for the message.
+
+    Returns
+    -------
+    Fields
+        The same.
+
+    Raises
+    ------
+    SolverError
+        If one is not: NaN elsewhere means that a robot holds nothing.
+    """
+    for name in NAMES:
+        values = getattr(answer, name)
+        if not np.isfinite(values.sum()) and not np.isfinite(values).all():
+            of_set = ~np.isfinite(values).reshape(len(values), -1).all(axis=1)
+            nodes = ", ".join(map(str, np.asarray(grips)[int(of_set.argmax())])) or "none"
+            raise SolverError(
+                f"{bricks} bricks, held nodes {nodes}: {name.replace('_', ' ')} is not finite; "
+                "correct lengths, masses or stiffnesses beyond all bounds in the scene"
+            )
+    return answer
+
+
 def no_sets(network: Network, bricks: int, held: int) -> Fields:
     """Return the fields of no grip set at all: their shapes.
 
@@ -212,28 +245,6 @@ def merge_sets(which: Bools, inside: Fields, outside: Fields) -> Fields:
     Fields
     """
     return join_sets([inside, outside], [which, ~which])
-
-
-def replace_sets(answer: Fields, which: Bools, better: Fields) -> Fields:
-    """Return fields in which those of some grip sets are others.
-
-    Parameters
-    ----------
-    answer : Fields
-        Of all sets.
-    which : (S,) bool
-        The sets whose fields are replaced.
-    better : Fields
-        Theirs, in their order.
-
-    Returns
-    -------
-    Fields
-    """
-    whole = {name: getattr(answer, name).copy() for name in NAMES}
-    for name in NAMES:
-        whole[name][which] = getattr(better, name)
-    return Fields(**whole)
 
 
 def grip_columns(network: Network, bricks: int, grips: ArrayLike) -> Ints:

@@ -14,7 +14,9 @@ from seqopt.engines.interface import Fields, Want, grip_columns
 from seqopt.engines.plane import NoPlane, Plane, find_plane, off_plane
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import GripError, SceneError
+from seqopt.network.build import network_of
 from seqopt.network.network import Network
+from seqopt.scene.scene import Scene
 
 ELSE = "use the compliance engine"
 
@@ -24,7 +26,7 @@ class PlanarEngine:
 
     Parameters
     ----------
-    network : Network
+    network : Network or Scene
     plane : Plane, optional
         The structure's, if it is known; by default it is found.
 
@@ -34,7 +36,8 @@ class PlanarEngine:
         If bricks, springs or gravity leave the scene's plane.
     """
 
-    def __init__(self, network: Network, plane: Plane | None = None) -> None:
+    def __init__(self, network: Network | Scene, plane: Plane | None = None) -> None:
+        network = network_of(network)
         found = find_plane(network) if plane is None else plane
         if isinstance(found, NoPlane):
             raise SceneError(f"{found.reason}; {ELSE}")

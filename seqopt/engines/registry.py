@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from seqopt.contact.mortar import Mortar
+from seqopt.contact.mortar import Mortar, find_mortar
 from seqopt.engines.auto import AutoEngine
 from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.frame import FrameEngine
@@ -12,7 +12,9 @@ from seqopt.engines.interface import Engine
 from seqopt.engines.planar import PlanarEngine
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import SceneError
+from seqopt.network.build import network_of
 from seqopt.network.network import Network
+from seqopt.scene.scene import Scene
 
 ENGINES: dict[str, Callable[[Network], Engine]] = {
     "auto": AutoEngine,
@@ -27,15 +29,15 @@ LIMITED: dict[str, Callable[[Network, Mortar], Engine]] = {
 }  # engines whose joints hold only what their mortar does
 
 
-def make_engine(name: str, network: Network, mortar: Mortar | None = None) -> Engine:
+def make_engine(name: str, network: Network | Scene, mortar: Mortar | str | None = None) -> Engine:
     """Return an engine by name.
 
     Parameters
     ----------
     name : str
         One of `ENGINES`.
-    network : Network
-    mortar : Mortar, optional
+    network : Network or Scene
+    mortar : Mortar or str, optional
         What the joints hold; by default the engine's own choice.
 
     Returns
@@ -58,6 +60,7 @@ def make_engine(name: str, network: Network, mortar: Mortar | None = None) -> En
     """
     if name not in ENGINES:
         raise SceneError(f"engine {name}: there is none; known are {', '.join(ENGINES)}")
+    network = network_of(network)
     if mortar is None:
         return ENGINES[name](network)
     if name not in LIMITED:
@@ -65,4 +68,4 @@ def make_engine(name: str, network: Network, mortar: Mortar | None = None) -> En
             f"engine {name}: its joints hold anything, so that a mortar changes nothing; "
             f"take the engine {' or '.join(LIMITED)}"
         )
-    return LIMITED[name](network, mortar)
+    return LIMITED[name](network, find_mortar(mortar))

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from seqopt.arrays import Ints
+from seqopt.errors import SceneError
 from seqopt.network.network import GROUND, Network, PartKind, Springs
 from seqopt.scene.parts import Brick, Ground, Joint
 from seqopt.scene.scene import Scene
@@ -44,13 +45,18 @@ def build_network(scene: Scene) -> Network:
     -------
     Network
 
+    Raises
+    ------
+    SceneError
+        If it is none.
+
     Examples
     --------
     >>> from seqopt.scene.scene_file import load_scene
     >>> build_network(load_scene("arch25"))
     <Network arch25: 25 bricks, 26 springs, 78 nodes, 77 edges>
     """
-    index_of = {brick.name: i for i, brick in enumerate(scene.placed)}
+    index_of = _indices(scene)
     springs = _springs(scene, index_of)
     names = _joint_names(springs)
     nodes, edges = [], []
@@ -78,6 +84,36 @@ def build_network(scene: Scene) -> Network:
     nodes.sort(key=lambda node: node.since)
     edges.sort(key=lambda edge: edge.since)
     return _arrays(scene, index_of, springs, nodes, edges)
+
+
+def network_of(given: Network | Scene) -> Network:
+    """Return a network, or that of a scene.
+
+    Parameters
+    ----------
+    given : Network or Scene
+
+    Returns
+    -------
+    Network
+
+    Raises
+    ------
+    SceneError
+        If it is neither.
+    """
+    if isinstance(given, Network | Scene):
+        return given if isinstance(given, Network) else build_network(given)
+    kind = type(given).__name__
+    raise SceneError(f"a {kind} is no network; give build_network(scene), or the scene itself")
+
+
+def _indices(scene: Scene) -> dict[int, int]:
+    """Return the indices of bricks in build order by their names."""
+    if not isinstance(scene, Scene):
+        kind = type(scene).__name__
+        raise SceneError(f"a {kind} is no scene; give one, as load_scene('arch25') returns it")
+    return {brick.name: i for i, brick in enumerate(scene.placed)}
 
 
 def _springs(scene: Scene, index_of: dict[int, int]) -> list[tuple[Joint | Ground, int]]:
@@ -135,6 +171,7 @@ def _arrays(
             translational_stiffness=np.array([s.translational_stiffness for s, _ in springs]),
             rotational_stiffness=np.array([s.rotational_stiffness for s, _ in springs]),
             support=_support(scene, index_of, springs),
+            thickness=np.array([s.thickness for s, _ in springs], dtype=float),  # None is NaN
         ),
         node_position=np.array([node.position for node in nodes]),
         node_kind=np.array([node.kind for node in nodes]),

@@ -55,6 +55,8 @@ class Springs(FrozenValue):
         N/m, N m/rad.
     support : (G,) int
         Indices of the springs that are ground ends, in the scene's order.
+    thickness : (S,) float
+        Of joints that say so, m; NaN for others.
     """
 
     bodies: Ints
@@ -66,6 +68,7 @@ class Springs(FrozenValue):
     translational_stiffness: Floats
     rotational_stiffness: Floats
     support: Ints
+    thickness: Floats
 
     def acting(self, bricks: int) -> Ints:
         """Return the springs that act on a partial structure.

@@ -10,6 +10,7 @@ from seqopt.arrays import Floats
 from seqopt.errors import ProblemError
 from seqopt.placement.costs import Budget
 from seqopt.placement.problem import Problem
+from seqopt.responses.quantities import robot_response
 from seqopt.sequence.schedule import OpenGrip
 
 
@@ -55,7 +56,7 @@ def robot_use(problem: Problem, robot: str, force: float, bound: float) -> Budge
     Parameters
     ----------
     problem : Problem
-        Whose choices the budget is for; it evaluates ``F_`` and the robot's name.
+        Whose choices the budget is for; it evaluates the robot's force.
     robot : str
         Name of the robot.
     force : float
@@ -73,7 +74,7 @@ def robot_use(problem: Problem, robot: str, force: float, bound: float) -> Budge
     ProblemError
         If the problem does not evaluate the force of this robot.
     """
-    return steps_over(problem, f"F_{robot}", force, bound)
+    return steps_over(problem, robot_response(robot), force, bound)
 
 
 def travel(problem: Problem, bound: float) -> Budget:

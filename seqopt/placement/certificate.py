@@ -14,6 +14,7 @@ from seqopt.placement.formulation import (
     Formulation,
     FormulationKind,
     Selection,
+    as_formulation,
 )
 from seqopt.placement.interface import Aim, PlacementProblem
 
@@ -186,7 +187,9 @@ def _connected(costs: LayeredCosts, level: float) -> bool:
     return bool(reached.any())
 
 
-def judge(problem: PlacementProblem, selection: Selection, formulation: Formulation) -> Certificate:
+def judge(
+    problem: PlacementProblem, selection: Selection, formulation: Formulation | str
+) -> Certificate:
     """Certify a selection, and hold its formulation to what it promises.
 
     Parameters
@@ -195,7 +198,7 @@ def judge(problem: PlacementProblem, selection: Selection, formulation: Formulat
         What was solved.
     selection : Selection
         What the formulation claims.
-    formulation : Formulation
+    formulation : Formulation or str
         What made the selection.
 
     Returns
@@ -208,6 +211,7 @@ def judge(problem: PlacementProblem, selection: Selection, formulation: Formulat
         If the certificate fails, or without budgets a formulation that is no heuristic misses the
         optimum.
     """
+    formulation = as_formulation(formulation)
     certificate = certify(problem, selection, formulation.aim)
     exact = formulation.kind is not FormulationKind.HEURISTIC and not problem.budgets
     if exact and certificate.gap > TOLERANCE:

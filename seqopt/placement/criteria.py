@@ -1,9 +1,10 @@
 """Criteria: what a step costs, from the responses of all choices that compete in it.
 
 Every criterion turns responses over choices, ``(C,)`` for one open move or ``(C, D)`` for two, into
-costs of the same shape. A name stands for a response: ``T_max``, ``M_sup``, ``D_max``, ``F_move``
-(the robot that takes its grip), ``F_largest`` (the largest grip force), ``F_`` and a robot's name
-(its force), ``F_each`` (the forces of all robots, a term each).
+costs of the same shape. A name stands for a response: ``T_max``, ``M_sup``, ``D_max``, ``C_max``
+(the largest compression), ``F_move`` (the robot that takes its grip), ``F_largest`` (the largest
+grip force), ``F_`` and a robot's name (its force; in brackets where that means something else, as
+``F_[sup]``), ``F_each`` (the forces of all robots, a term each).
 """
 
 from __future__ import annotations

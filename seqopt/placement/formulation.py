@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import inspect
+import operator
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
-from importlib.metadata import entry_points
+from importlib.metadata import EntryPoint, entry_points
+from typing import Any
 
 import numpy as np
 
 from seqopt.arrays import FrozenValue
-from seqopt.errors import ProblemError
-from seqopt.placement.interface import Aim
+from seqopt.errors import ProblemError, SeqoptError, SolverError
+from seqopt.placement.interface import Aim, PlacementProblem
 
 GROUP = "seqopt.formulations"
 
@@ -127,8 +129,24 @@ def formulations() -> dict[str, Formulation]:
     >>> [name for name, f in seqopt.formulations().items() if f.takes_budgets]
     ['overlap_lp', 'overlap_mip']
     """
-    found = {entry.name: entry.load() for entry in entry_points(group=GROUP)}
+    found = {entry.name: _load(entry) for entry in entry_points(group=GROUP)}
     return dict(sorted(found.items()))
+
+
+def _load(entry: EntryPoint) -> Formulation:
+    try:
+        found = entry.load()
+    except Exception as error:  # whatever a package of others may raise
+        raise ProblemError(
+            f"formulation {entry.name!r}: {entry.value} cannot be loaded: {_said(error)}; "
+            "install it anew or remove it"
+        ) from error
+    if not isinstance(found, Formulation):
+        raise ProblemError(
+            f"formulation {entry.name!r}: {entry.value} is a {type(found).__name__}; "
+            "let the entry point name a Formulation"
+        )
+    return found
 
 
 def find_formulation(name: str) -> Formulation:
@@ -151,4 +169,80 @@ def find_formulation(name: str) -> Formulation:
     if name not in formulation_names():
         known = ", ".join(formulation_names())
         raise ProblemError(f"formulation {name!r}: there is no such; give one of {known}")
-    return formulations()[name]
+    return _load(next(entry for entry in entry_points(group=GROUP) if entry.name == name))
+
+
+def as_formulation(given: Formulation | str) -> Formulation:
+    """Return a formulation, by name or itself.
+
+    Parameters
+    ----------
+    given : Formulation or str
+
+    Returns
+    -------
+    Formulation
+
+    Raises
+    ------
+    ProblemError
+        If it is neither.
+    """
+    if isinstance(given, Formulation):
+        return given
+    if isinstance(given, str):
+        return find_formulation(given)
+    known = ", ".join(formulation_names())
+    raise ProblemError(f"a {type(given).__name__} is no formulation; give one of {known}")
+
+
+def select(formulation: Formulation, problem: PlacementProblem, **options: Any) -> Selection:
+    """Return the selection of a formulation, with numbers where numbers belong.
+
+    Parameters
+    ----------
+    formulation : Formulation
+    problem : PlacementProblem
+    **options
+        Of the formulation.
+
+    Returns
+    -------
+    Selection
+        Claimed, not proven.
+
+    Raises
+    ------
+    ProblemError, SolverError
+        As the formulation does; a `SolverError` also if it raises anything else, or returns
+        something that is no selection.
+    """
+    try:
+        found: object = formulation.solve(problem, **options)
+    except (SeqoptError, MemoryError):
+        raise
+    except Exception as error:  # whatever a formulation of others may raise
+        raise SolverError(f"formulation {formulation.name} failed: {_said(error)}") from error
+    if not isinstance(found, Selection):
+        kind = type(found).__name__
+        raise SolverError(f"formulation {formulation.name} returned a {kind}, not a Selection")
+    try:
+        seconds = float(found.compile_seconds)
+        if not 0 <= seconds < np.inf:
+            raise ValueError(f"compile_seconds is {seconds}")
+        return Selection(
+            choice=tuple(operator.index(index) for index in found.choice),
+            objective=float(found.objective),
+            bound=float(found.bound),
+            prices={str(name): float(price) for name, price in found.prices.items()},
+            compile_seconds=seconds,
+        )
+    except (TypeError, ValueError, AttributeError, OverflowError) as error:
+        raise SolverError(
+            f"formulation {formulation.name} returned a Selection that is none: {_said(error)}"
+        ) from error
+
+
+def _said(error: Exception) -> str:
+    """Return what an error of others says, in a line."""
+    return " ".join(f"{type(error).__name__}: {error}".split())

@@ -23,7 +23,7 @@ from seqopt.placement.ranking import move_costs, rank_of
 from seqopt.placement.window_search import WindowSearch
 from seqopt.responses.choices import window_models
 from seqopt.responses.table import analyze
-from seqopt.sequence.steps import Step
+from seqopt.sequence.steps import Step, idle_robots
 
 
 @dataclass(frozen=True, repr=False)
@@ -206,7 +206,7 @@ class Plan:
             Names of scene, schedule, formulation and criterion; ``status`` (``optimal``,
             ``claimed optimal`` where budgets leave the proof to the solver, ``feasible`` or
             ``unproven``), ``objective``, ``bound``, ``gap``, ``claimed_gap``; the payloads that
-            are exceeded; ``models_evaluated`` and ``seconds``.
+            are exceeded; ``idle_robots``, which never grip; ``models_evaluated`` and ``seconds``.
         """
         schedule, proof = self._posed.schedule, self.certificate
         status = "unproven"
@@ -226,6 +226,7 @@ class Plan:
             "bound": None if proof is None else proof.bound,
             "gap": None if proof is None else proof.gap,
             "claimed_gap": None if proof is None else proof.claimed_gap,
+            "idle_robots": list(idle_robots(schedule.scene, self.steps)),
             "payload_exceeded": [str(excess) for excess in self.overloads],
             "models_evaluated": self.models,
             "seconds": dict(self.seconds),

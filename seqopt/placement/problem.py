@@ -13,11 +13,14 @@ import pandas as pd
 from seqopt.arrays import Floats
 from seqopt.engines.interface import Engine
 from seqopt.errors import ProblemError
+from seqopt.network.network import Network
 from seqopt.placement.costs import Budget, LayeredCosts
 from seqopt.placement.interface import Aim
 from seqopt.placement.requirements import Criterion, Limit, ResponsesAsked
 from seqopt.placement.scales import SceneFacts
 from seqopt.responses.choices import CHOICE_RESPONSES, Evaluation, StepChoices
+from seqopt.responses.quantities import robot_response
+from seqopt.scene.checks import short
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import Step
 
@@ -237,7 +240,7 @@ def pose(
     Raises
     ------
     ProblemError
-        If a response is named that there is not.
+        If there is no such response, or no grip is open.
 
     Examples
     --------
@@ -248,12 +251,35 @@ def pose(
     >>> len(problem.schedule.moves), problem.criterion.name, problem.limits
     (22, 'worst-ratio', ())
     """
-    facts = SceneFacts(engine)
-    asked = ResponsesAsked(criterion.for_scene(facts), tuple(limits), tuple(also))
-    known = {*CHOICE_RESPONSES, *(f"F_{name}" for name in facts.robots)}
+    robots = _robots(engine, schedule, criterion)
+    limits = (limits,) if isinstance(limits, Limit) else limits
+    asked = ResponsesAsked(criterion.for_scene(SceneFacts(engine)), tuple(limits), tuple(also))
+    known = {*CHOICE_RESPONSES, *map(robot_response, robots)}
     for move in schedule.moves:
-        if asked(move.bricks) - known:
-            wrong = min(asked(move.bricks) - known)
+        if unknown := asked(move.bricks) - known:
             listed = ", ".join(sorted(known))
-            raise ProblemError(f"response {wrong}: there is no such; give {listed}")
+            raise ProblemError(f"response {min(unknown)}: there is no such; give {listed}")
     return Problem(asked.criterion, asked.limits, Evaluation(engine, schedule, asked))
+
+
+def _robots(engine: Engine, schedule: Schedule, criterion: Criterion) -> list[str]:
+    """Return the names of a schedule's robots if all is what it should be, and grips are open."""
+    _require_kinds(engine, schedule, criterion)
+    if not schedule.moves:
+        raise ProblemError(
+            f"schedule {schedule.method}: with {len(schedule.scene.bricks)} bricks it leaves no "
+            "grip open; there is nothing to choose, analyze its steps"
+        )
+    return [robot.name for robot in schedule.scene.robots]
+
+
+def _require_kinds(engine: Engine, schedule: Schedule, criterion: Criterion) -> None:
+    """Say what is wanted where something else is given."""
+    wanted = (
+        (engine, isinstance(getattr(engine, "network", None), Network), "engine", "make_engine"),
+        (schedule, isinstance(schedule, Schedule), "schedule", "three_robot_loop"),
+        (criterion, hasattr(criterion, "for_scene"), "criterion", "CRITERIA"),
+    )
+    for given, right, what, source in wanted:
+        if not right:
+            raise ProblemError(f"{short(given)} is no {what}; take one of seqopt.{source}")

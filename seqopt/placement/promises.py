@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
@@ -11,7 +11,7 @@ import pandas as pd
 from seqopt.errors import InfeasibleError
 from seqopt.placement.problem import Problem
 from seqopt.placement.requirements import Limit, payload_limits
-from seqopt.responses.quantities import RESPONSES
+from seqopt.responses.quantities import RESPONSES, robot_response
 from seqopt.responses.table import analyze, force_column
 from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import OpenStep
@@ -29,15 +29,23 @@ class Excess:
         Numbers of the steps.
     largest : float
         The largest value in them, SI units.
+    robot : str
+        Whose payload it is; empty for other limits.
     """
 
     limit: Limit
     steps: tuple[int, ...]
     largest: float
+    robot: str = ""
 
     def __str__(self) -> str:
         listed = ", ".join(map(str, self.steps))
         where = f"step{'s' * (len(self.steps) > 1)} {listed}"
+        if self.robot:
+            return (
+                f"{self.robot} holds up to {self.largest:.1f} N, more than its payload of "
+                f"{self.limit.bound:g} N ({where})"
+            )
         return (
             f"{self.limit.response} is up to {self.largest:.6g} of {self.limit.bound:.6g} ({where})"
         )
@@ -85,7 +93,9 @@ def overloads(scene: Scene, table: pd.DataFrame) -> tuple[Excess, ...]:
     tuple of Excess
         In the order of the robots.
     """
-    return excesses(scene, table, payload_limits(scene))
+    names = {robot_response(robot.name): robot.name for robot in scene.robots}
+    found = excesses(scene, table, payload_limits(scene))
+    return tuple(replace(excess, robot=names[excess.limit.response]) for excess in found)
 
 
 def response_along(scene: Scene, table: pd.DataFrame, name: str) -> np.ndarray:
@@ -97,17 +107,21 @@ def response_along(scene: Scene, table: pd.DataFrame, name: str) -> np.ndarray:
     table : pandas.DataFrame
         From `seqopt.analyze`.
     name : str
-        ``T_max``, ``M_sup``, ``D_max``, ``F_largest`` or ``F_`` and a robot's name.
+        ``T_max``, ``C_max``, ``M_sup``, ``D_max``, ``F_largest`` or ``F_`` and a robot's name.
 
     Returns
     -------
     (steps,) float
         SI units, sizes without sign; NaN where the robot does not grip.
     """
+    if name == "C_max":
+        return np.asarray(np.maximum(-table[RESPONSES["F_min"].column].to_numpy(float), 0.0))
     if name in RESPONSES:
         response = RESPONSES[name]
         return table[response.column].to_numpy(float) / response.scale
-    forces = {f"F_{robot.name}": table[force_column(robot)].abs() for robot in scene.robots}
+    forces = {
+        robot_response(robot.name): table[force_column(robot)].abs() for robot in scene.robots
+    }
     if name == "F_largest":
         return pd.DataFrame(forces).max(axis=1).to_numpy(float)
     return forces[name].to_numpy(float)

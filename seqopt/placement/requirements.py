@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from numbers import Real
 from typing import Protocol
 
 import numpy as np
 
 from seqopt.arrays import Bools, Floats
+from seqopt.errors import ProblemError
 from seqopt.placement.scales import SceneFacts
+from seqopt.responses.quantities import robot_response
+from seqopt.scene.checks import short
 from seqopt.scene.scene import Scene
 
 ChoiceResponses = Mapping[str, Floats]
@@ -87,6 +92,11 @@ class Limit:
     bound : float
         SI units.
 
+    Raises
+    ------
+    ProblemError
+        If these are no name and no number.
+
     Examples
     --------
     >>> import seqopt
@@ -96,6 +106,15 @@ class Limit:
 
     response: str
     bound: float
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.response, str) or not isinstance(self.bound, Real):
+            raise ProblemError(
+                f"limit {short(self.response)} of {short(self.bound)}: give the name of a response "
+                "and a number"
+            )
+        if math.isnan(self.bound):
+            raise ProblemError(f"limit {self.response}: its bound is NaN; give a number")
 
     def exceeded(self, values: Floats) -> Bools:
         """Return where values of the response exceed the limit.
@@ -124,7 +143,7 @@ def payload_limits(scene: Scene) -> tuple[Limit, ...]:
     tuple of Limit
         One for every robot, N.
     """
-    return tuple(Limit(f"F_{robot.name}", robot.payload) for robot in scene.robots)
+    return tuple(Limit(robot_response(robot.name), robot.payload) for robot in scene.robots)
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ import numpy as np
 from seqopt.engines.interface import Engine
 from seqopt.errors import ProblemError, StepError
 from seqopt.network.network import Network
-from seqopt.responses.quantities import RESPONSES
+from seqopt.responses.quantities import RESPONSES, robot_response
 from seqopt.responses.table import analyze, force_column
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Step
@@ -23,6 +23,7 @@ NEVER = math.inf  # the brick count of a crown that is never reached
 ROUNDED = (
     ("F", 0.0278513762761887),
     ("T", 0.0278513762761887),
+    ("C", 0.0278513762761887),
     ("M", 0.11321697673247444),
     ("D", 8.531988813508194),
 )
@@ -64,7 +65,13 @@ class Units:
         float
             N, N m or m.
         """
-        units = {"F": self.force, "T": self.force, "M": self.moment, "D": self.displacement}
+        units = {
+            "F": self.force,
+            "T": self.force,
+            "C": self.force,
+            "M": self.moment,
+            "D": self.displacement,
+        }
         return units[response[0]]
 
 
@@ -161,7 +168,7 @@ class SceneFacts:
         """Return the largest responses of a method's steps, SI units."""
         table = analyze(self.engine, steps)
         forces = {
-            f"F_{robot.name}": float(table[force_column(robot)].abs().max())
+            robot_response(robot.name): float(table[force_column(robot)].abs().max())
             for robot in self.engine.network.scene.robots
         }
         out = {"F_largest": float(np.nanmax([*forces.values()]))}

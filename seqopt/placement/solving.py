@@ -15,8 +15,9 @@ from seqopt.placement.formulation import (
     Formulation,
     Reads,
     Selection,
-    find_formulation,
+    as_formulation,
     formulations,
+    select,
 )
 from seqopt.placement.interface import Handed, PlacementProblem
 from seqopt.placement.plan import Plan
@@ -65,8 +66,11 @@ def solve(
     >>> seqopt.solve(problem, "cascade").certificate.gap > 0.009
     True
     """
-    if isinstance(formulation, str):
-        formulation = find_formulation(formulation)
+    formulation = as_formulation(formulation)
+    if not isinstance(getattr(problem, "budgets", None), tuple):
+        raise ProblemError(
+            f"a {type(problem).__name__} is no problem; give one that seqopt.pose made"
+        )
     require_fit(problem, formulation, options)
     if isinstance(problem, Problem):
         require_possible(problem)
@@ -74,7 +78,7 @@ def solve(
 
 
 def require_fit(
-    problem: PlacementProblem, formulation: Formulation, options: Mapping[str, object]
+    problem: PlacementProblem, formulation: Formulation | str, options: Mapping[str, object]
 ) -> None:
     """Raise an error unless a formulation is for such a problem and has such options.
 
@@ -89,6 +93,7 @@ def require_fit(
     ProblemError
         If the problem has budgets that the formulation does not take, or an option is not its own.
     """
+    formulation = as_formulation(formulation)
     if problem.budgets and not formulation.takes_budgets:
         able = [name for name, other in formulations().items() if other.takes_budgets]
         raise ProblemError(
@@ -108,7 +113,7 @@ def _solve_all(
     seconds: dict[str, float] = {}
     stages = problem.seconds(formulation.aim)  # computes the costs: solving is timed alone
     with _timed(seconds, "solve"):
-        selection = formulation.solve(Handed(problem), **options)  # the judge keeps the originals
+        selection = select(formulation, Handed(problem), **options)  # the judge has the originals
     seconds["compile"] = selection.compile_seconds
     seconds["solve"] -= selection.compile_seconds
     with _timed(seconds, "verify"):

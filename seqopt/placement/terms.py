@@ -10,6 +10,7 @@ import numpy as np
 from seqopt.arrays import Floats
 from seqopt.errors import ProblemError
 from seqopt.placement.scales import SceneFacts
+from seqopt.responses.quantities import robot_response
 
 Term = tuple[Any, ...]  # a name and its numbers
 Number = TypeVar("Number")
@@ -95,7 +96,7 @@ def spell_out(terms: tuple[Term, ...], robots: Sequence[str]) -> tuple[Term, ...
     """
     out: list[Term] = []
     for term in terms:
-        names = [f"F_{robot}" for robot in robots] if term[0] == "F_each" else [term[0]]
+        names = [robot_response(robot) for robot in robots] if term[0] == "F_each" else [term[0]]
         out += [(name, *term[1:]) for name in names]
     return tuple(out)
 

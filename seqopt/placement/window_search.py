@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from seqopt.arrays import Floats
-from seqopt.errors import ProblemError
+from seqopt.errors import SolverError
 from seqopt.placement.problem import Problem
 from seqopt.responses.choices import Evaluation
 from seqopt.sequence.schedule import OpenGrip, Schedule
@@ -74,7 +74,7 @@ def search_windows(problem: Problem) -> WindowSearch:
 
     Raises
     ------
-    ProblemError
+    SolverError
         If a move has no candidate left after the choices before it. Others may have led on.
     """
     schedule = problem.schedule
@@ -86,7 +86,7 @@ def search_windows(problem: Problem) -> WindowSearch:
         found = replace(found, shared=(*found.shared, shared))
         costs = found.costs(k)
         if not np.isfinite(costs).any():
-            raise ProblemError(
+            raise SolverError(
                 f"move {k + 1}, step {move.step}: {move.robot} has no allowed grip after the "
                 "choices before it; relax a limit, or let a formulation look at all choices"
             )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,9 +19,11 @@ from seqopt.placement.promises import overloads
 from seqopt.placement.ranking import rank_choice
 from seqopt.placement.requirements import Criterion
 from seqopt.placement.solving import solve
-from seqopt.responses.quantities import RESPONSES
+from seqopt.responses.quantities import RESPONSES, robot_response
 from seqopt.responses.table import analyze, force_column
 from seqopt.scene.scene import Scene
+from seqopt.sequence.steps import AnyStep, idle_robots
+from seqopt.sequence.stretches import degeneration
 from seqopt.sequence.three_robots import modified_sequential, three_robot_loop
 from seqopt.sequence.two_robots import METHODS
 from seqopt.study.published import (
@@ -72,7 +74,8 @@ class Comparison:
     paper_models : tuple of int or None
         Models that Bruun et al. count: cascading, full overlap.
     notes : tuple of str
-        Payloads exceeded, and inconsistencies in the paper's own numbers.
+        Methods that degenerate, robots that never grip, payloads exceeded, and inconsistencies in
+        the paper's own numbers.
     refusal : str
         Why the scene has no three-robot loop; empty if it has.
     shared_seconds : mapping of str to float
@@ -128,15 +131,15 @@ def compare(
             tables[name] = plan.responses()
             rows[name] = _row(plan)
         counted = paper_models(problem.schedule)
+        notes += _idle(scene, "three-robot loop", problem.schedule.steps)
         shared = {stage: plan.seconds[stage] for stage in ("respond", "rank")}
         if PUBLISHED in tables:
             ranks = rank_choice(problem, published_choice(problem))
             rows[PUBLISHED] |= _worth(problem, published_choice(problem))
-            rows[PUBLISHED]["problem"] = problem.schedule.method
     for name, steps in tables.items():
         over = overloads(scene, steps)
         rows[name] |= largest(scene, steps) | {"overloaded": bool(over)}
-        notes += [f"{name}: payload exceeded, {excess}" for excess in over]
+        notes += [f"{name}: {excess}" for excess in over]
     notes += [f"In the paper: {text}" for text in IRREGULARITIES if printed is not None]
     table = pd.DataFrame.from_dict(rows, orient="index").reindex(columns=COLUMNS)
     return Comparison(maxima, printed, table, tables, ranks, counted, tuple(notes), refusal, shared)
@@ -155,7 +158,8 @@ def method_tables(engine: Engine) -> tuple[dict[str, pd.DataFrame], list[str]]:
     tables : dict of str to pandas.DataFrame
         By method, as `seqopt.analyze` makes them; the published plan for its own arch only.
     notes : list of str
-        Why other methods cannot build the scene.
+        Why other methods cannot build the scene or are not what they are called, and which robots
+        never grip.
 
     Raises
     ------
@@ -165,26 +169,42 @@ def method_tables(engine: Engine) -> tuple[dict[str, pd.DataFrame], list[str]]:
     scene = engine.network.scene
     tables: dict[str, pd.DataFrame] = {}
     refused: dict[str, StepError] = {}
+    notes: list[str] = []
     for name, method in METHODS.items():
         try:
-            tables[name] = analyze(engine, method(engine.network))
+            steps = method(engine.network)
         except StepError as error:
             refused[name] = error
+            continue
+        tables[name] = analyze(engine, steps)
+        why = degeneration(engine.network, name)
+        notes += [f"{name}: {why}"] if why else []
+        notes += _idle(scene, name, steps)
     if not tables:
         raise next(iter(refused.values()))
     if is_reference_arch(scene):
         tables[PUBLISHED] = analyze(engine, published_plan(scene))
-    return tables, [f"{name}: not possible here; {error}" for name, error in refused.items()]
+    refusals = [f"{name}: not possible here; {error}" for name, error in refused.items()]
+    return tables, refusals + notes
+
+
+def _idle(scene: Scene, name: str, steps: Iterable[AnyStep]) -> list[str]:
+    """Return a note that names the robots which never grip, if there are any."""
+    idle = idle_robots(scene, steps)
+    return (
+        [f"{name}: {', '.join(idle)} never {'grips' if len(idle) == 1 else 'grip'}"] if idle else []
+    )
 
 
 def _plans(
     engine: Engine, criterion: Criterion, progress: Callable[[str], None]
 ) -> tuple[dict[str, Plan], Problem]:
     """Return the plan of the modified sequential method and of every formulation on the loop."""
+    loop = three_robot_loop(engine.network)  # whose refusal says most
     progress("modified sequential method")
     modified = pose(engine, modified_sequential(engine.network), criterion)
     plans = {"modified-sequential": solve(modified, "rank_search")}
-    problem = pose(engine, three_robot_loop(engine.network), criterion)
+    problem = pose(engine, loop, criterion)
     for name, formulation in formulations().items():
         progress(f"three-robot loop by {name}")
         plans[name] = solve(problem, formulation)
@@ -215,7 +235,9 @@ def largest(scene: Scene, table: pd.DataFrame) -> dict[str, float]:
 
 def _quantities(scene: Scene, table: pd.DataFrame) -> pd.Series[float]:
     """Return the largest responses of any step, the force of every robot for itself."""
-    values = {f"F_{r.name} [N]": table[force_column(r)].abs().max() for r in scene.robots}
+    values = {
+        f"{robot_response(r.name)} [N]": table[force_column(r)].abs().max() for r in scene.robots
+    }
     rest = largest(scene, table)
     return pd.Series(
         values | {f"{name} [{LARGEST[name]}]": rest[name] for name in rest if name != "F_rob"}
@@ -235,8 +257,8 @@ def _row(plan: Plan) -> dict[str, object]:
     }
 
 
-def _worth(problem: Problem, choice: tuple[int, ...]) -> dict[str, float]:
+def _worth(problem: Problem, choice: tuple[int, ...]) -> dict[str, object]:
     """Return the value of a choice, and how far it lies above the optimum."""
     value = problem.sums.cost(choice)
     gap = (value - least_sum(problem.sums)) / max(abs(value), TINY)
-    return {"objective": value, "gap": gap}
+    return {"problem": problem.schedule.method, "objective": value, "gap": gap}

@@ -1,8 +1,8 @@
 """Responses of every open step of a schedule, over the choices that are open in it.
 
 Beside the responses of `seqopt.responses.quantities` there are those that belong to robots: the
-force of each (``F_`` and its name), of the one that takes its grip (``F_move``) and the largest
-(``F_largest``), sizes without sign.
+force of each (``F_`` and its name, as `robot_response` writes it), of the one that takes its grip
+(``F_move``) and the largest (``F_largest``), sizes without sign.
 """
 
 from __future__ import annotations
@@ -18,11 +18,12 @@ import numpy as np
 
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints
 from seqopt.engines.interface import Engine, Want
-from seqopt.responses.quantities import RESPONSES, lengths
+from seqopt.responses.memory import require_memory
+from seqopt.responses.quantities import CHOSEN_BY, lengths, require_finite, robot_response
 from seqopt.sequence.schedule import OpenGrip, OpenStep, Schedule
 
 BLOCK = 2048  # grip sets whose fields are held at once: few enough to stay in the cache
-CHOICE_RESPONSES = ("T_max", "M_sup", "D_max", "F_move", "F_largest")  # and one per robot
+CHOICE_RESPONSES = ("T_max", "M_sup", "D_max", "C_max", "F_move", "F_largest")  # and one per robot
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -127,7 +128,10 @@ def evaluate_choices(
     ------
     MechanismError, SolverError
         As the engine does.
+    MemoryShortError
+        If there is not the memory for them.
     """
+    require_memory(schedule, wanted)
     alike: dict[tuple[int, int], list[OpenStep]] = {}
     for step in schedule.steps:
         if step.moves:
@@ -246,22 +250,23 @@ def _answers(
     engine: Engine, bricks: int, grips: Ints, names: Set[str]
 ) -> tuple[dict[str, Floats], Floats]:
     """Return the wanted responses of grip sets (S, r) and the sizes (S, r) of their forces."""
-    asked = [RESPONSES[name] for name in sorted(names & RESPONSES.keys())]
+    asked = [CHOSEN_BY[name] for name in sorted(names & CHOSEN_BY.keys())]
     want = reduce(or_, (response.needs for response in asked), Want(0))
     found: dict[str, list[Floats]] = {response.name: [] for response in asked}
     forces = []
     for start in range(0, max(len(grips), 1), BLOCK):
         fields = engine.solve(bricks, grips[start : start + BLOCK], want)
-        forces.append(lengths(fields.grip_force))
+        forces.append(require_finite("grip force", lengths(fields.grip_force), bricks))
         for response in asked:
-            found[response.name].append(response.of(engine.network, fields))
+            values = response.of(engine.network, fields)
+            found[response.name].append(require_finite(response.name, values, bricks))
     return {name: np.concatenate(parts) for name, parts in found.items()}, np.concatenate(forces)
 
 
 def _robot_forces(schedule: Schedule, step: OpenStep, forces: Floats) -> dict[str, Floats]:
     """Return the forces by robot, of the robot whose move decides the step, and the largest."""
     robots = [schedule.scene.robots[i].name for i in _robots_holding(step)]
-    out = {f"F_{name}": forces[:, i] for i, name in enumerate(robots)}
-    out["F_move"] = out[f"F_{schedule.moves[step.moves[-1]].robot}"]
+    out = {robot_response(name): forces[:, i] for i, name in enumerate(robots)}
+    out["F_move"] = out[robot_response(schedule.moves[step.moves[-1]].robot)]
     out["F_largest"] = forces.max(axis=1)
     return out

@@ -13,6 +13,7 @@ import numpy as np
 
 from seqopt.arrays import Floats
 from seqopt.engines.interface import Fields, Want
+from seqopt.errors import SolverError
 from seqopt.network.network import Network
 
 SLACK = 1e-6  # an edge is in tension above this share of the mean weight of a brick
@@ -57,6 +58,64 @@ def lengths(vectors: Floats) -> Floats:
         In the unit of the vectors.
     """
     return np.asarray(np.sqrt(_squared(vectors)))
+
+
+TAKEN = {"rob", "max", "move", "largest", "each"}  # beside RESPONSES: other meanings of F_
+MARKS = set("[]=,;")  # of the language of criteria, limits and tables
+
+
+def robot_response(robot: str) -> str:
+    """Return the name of the force of a robot's grip, which nothing else has.
+
+    It is ``F_`` and the robot's name; where that means something else already, or cannot be read
+    back from a list, the name stands in brackets.
+
+    Parameters
+    ----------
+    robot : str
+        Its name.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> robot_response("rob1"), robot_response("sup"), robot_response("a,b")
+    ('F_rob1', 'F_[sup]', 'F_[a,b]')
+    """
+    of_an_end = robot.startswith("sup_")  # `seqopt.responses.table.support_columns`
+    means_more = robot in TAKEN or of_an_end or f"F_{robot}" in RESPONSES or MARKS & set(robot)
+    return f"F_[{robot}]" if means_more or not robot.strip() else f"F_{robot}"
+
+
+def require_finite(name: str, values: Floats, bricks: int) -> Floats:
+    """Return values of a response if all are finite.
+
+    Parameters
+    ----------
+    name : str
+        Of the response, for the message.
+    values : (...) float
+    bricks : int
+        How many bricks stand, for the message.
+
+    Returns
+    -------
+    (...) float
+        The same.
+
+    Raises
+    ------
+    SolverError
+        If one is not: NaN elsewhere means that a robot holds nothing.
+    """
+    if not np.isfinite(values).all():
+        raise SolverError(
+            f"{bricks} bricks: {name} is not finite; correct lengths, masses or stiffnesses "
+            "beyond all bounds in the scene, or the engine"
+        )
+    return values
 
 
 def grip_forces(network: Network, fields: Fields) -> Floats:
@@ -173,6 +232,15 @@ at any, about the end's fixed point (Bruun et al. print those of the first end);
 ``F_min``, ``T_max`` and ``F_avg`` run over the axial forces of all edges, tension positive;
 ``T_pct`` is the share of edges in tension, percent; ``D_max``, ``D_avg`` and ``D_std`` run over the
 displacements of all nodes.
+"""
+
+
+_COMPRESSION = Response(
+    "C_max", "C_max_N", 1.0, _EDGES, lambda _, f: np.maximum(0.0, -f.edge_force.min(axis=1))
+)
+CHOSEN_BY: dict[str, Response] = {**RESPONSES, _COMPRESSION.name: _COMPRESSION}
+"""Responses that criteria and limits can name: those of the tables, and ``C_max``, the largest
+compression of any edge as a size, N (``F_min`` without its sign; zero if no edge is compressed).
 """
 
 

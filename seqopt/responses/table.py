@@ -9,12 +9,19 @@ import numpy as np
 import pandas as pd
 
 from seqopt.engines.interface import Engine, Fields
-from seqopt.errors import MechanismError, SolverError
+from seqopt.errors import MechanismError, SceneError, SolverError
 from seqopt.network.network import Network
-from seqopt.responses.quantities import RESPONSES, grip_forces, support_forces, support_moments
+from seqopt.responses.quantities import (
+    RESPONSES,
+    grip_forces,
+    require_finite,
+    robot_response,
+    support_forces,
+    support_moments,
+)
 from seqopt.scene.parts import Robot
 from seqopt.scene.scene import Scene
-from seqopt.sequence.steps import Step
+from seqopt.sequence.steps import Step, require_steps
 
 
 def analyze(engine: Engine, steps: Sequence[Step]) -> pd.DataFrame:
@@ -39,6 +46,8 @@ def analyze(engine: Engine, steps: Sequence[Step]) -> pd.DataFrame:
     ------
     MechanismError, SolverError
         As the engine does, the step named.
+    SceneError, StepError
+        If these are no engine, or no steps.
 
     Examples
     --------
@@ -51,7 +60,10 @@ def analyze(engine: Engine, steps: Sequence[Step]) -> pd.DataFrame:
     >>> table.loc[48, ["step", "M_sup_Nm", "M_sup_1_Nm", "M_sup_25_Nm"]].round(1).tolist()
     [49.0, 6.5, 0.8, 6.5]
     """
-    return pd.DataFrame([_row(engine, step) for step in steps])
+    if not isinstance(getattr(engine, "network", None), Network):
+        kind = type(engine).__name__
+        raise SceneError(f"a {kind} is no engine; give make_engine('compliance', network)")
+    return pd.DataFrame([_row(engine, step) for step in require_steps(steps)])
 
 
 def force_column(robot: Robot) -> str:
@@ -65,7 +77,7 @@ def force_column(robot: Robot) -> str:
     -------
     str
     """
-    return f"F_{robot.name}_N"
+    return f"{robot_response(robot.name)}_N"
 
 
 def support_columns(scene: Scene) -> list[tuple[str, str]]:
@@ -164,7 +176,8 @@ def fields_archive(engine: Engine, steps: Sequence[Step]) -> bytes:
 def _row(engine: Engine, step: Step) -> dict[str, object]:
     network = engine.network
     scene, fields = network.scene, step_fields(engine, step)
-    forces = iter(grip_forces(network, fields)[0])
+    held = require_finite("grip force", grip_forces(network, fields), step.bricks)
+    forces = iter(held[0])
     row: dict[str, object] = {"step": step.number, "type": step.kind.value, "bricks": step.bricks}
     for robot, node in zip(scene.robots, step.grips, strict=True):
         row[f"{robot.name}_brick"] = pd.NA if node is None else scene.brick_of_node[node].name
@@ -172,7 +185,8 @@ def _row(engine: Engine, step: Step) -> dict[str, object]:
     for robot, node in zip(scene.robots, step.grips, strict=True):
         row[force_column(robot)] = np.nan if node is None else next(forces)
     for response in RESPONSES.values():
-        row[response.column] = response.of(network, fields)[0] * response.scale
+        values = require_finite(response.name, response.of(network, fields), step.bricks)
+        row[response.column] = values[0] * response.scale
     return row | _supports(network, step, fields)
 
 

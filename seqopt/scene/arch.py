@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from seqopt.arrays import Floats, Vector
-from seqopt.errors import SceneError
-from seqopt.scene.parts import Brick, Ground, Joint, Robot
+from seqopt.errors import SceneError, SceneWarning
+from seqopt.scene.checks import short
+from seqopt.scene.parts import THICKEST, Brick, Ground, Joint, Robot
 from seqopt.scene.reach import Anywhere, Reach, Side
 from seqopt.scene.scene import Scene
 
@@ -77,7 +79,14 @@ class ArchShape:
     density: float = 2420.0
     closed: bool = True
 
+    @property
+    def thickness(self) -> float | None:
+        """The width of a joint, m, where it is so thick that a joint must say so."""
+        return self.gap if self.gap > THICKEST * min(self.dimensions) else None
+
     def __post_init__(self) -> None:
+        for name in ("pitch", "roll", "yaw", "offset"):
+            _check_numbers(name, getattr(self, name))
         count = len(self.pitch)
         if not count:
             raise SceneError("arch: pitch is empty; give one angle per brick")
@@ -86,6 +95,16 @@ class ArchShape:
             if values is not None and len(values) != count:
                 raise SceneError(
                     f"arch: {len(values)} {name} and {count} pitch values; give as many"
+                )
+        for name in ("pitch", "roll", "yaw"):
+            angles = getattr(self, name)
+            largest = 0.0 if angles is None else max(map(abs, angles))
+            if largest > 2 * math.pi:
+                warnings.warn(
+                    f"arch: {name} has {largest:g} rad, more than a turn; give radians, if degrees "
+                    "are meant",
+                    SceneWarning,
+                    stacklevel=3,
                 )
         if not self.pattern or set(self.pattern) - set(LETTERS):
             raise SceneError(f"arch: pattern is {self.pattern!r}; give letters of {LETTERS}")
@@ -170,12 +189,23 @@ def robots_beside(shape: ArchShape) -> tuple[Robot, ...]:
     )
 
 
+def _check_numbers(name: str, values: Sequence[float] | None) -> None:
+    try:
+        flat = values is None or np.asarray(values, dtype=float).ndim == 1
+    except (TypeError, ValueError, OverflowError):
+        flat = False
+    if not flat:
+        raise SceneError(f"arch: {name} is {short(values)}; give a number per brick")
+
+
 def _pattern(shape: ArchShape) -> str:
     return (shape.pattern * len(shape.pitch))[: len(shape.pitch)]
 
 
 def _axes(shape: ArchShape) -> tuple[Floats, Floats, Floats]:
     """Return the bricks' directions along the arch, to the left, and the points between them."""
+    if not isinstance(shape, ArchShape):
+        raise SceneError(f"a {type(shape).__name__} is no shape of an arch; give ArchShape(...)")
     pitch = np.asarray(shape.pitch, dtype=float)
     zero = np.zeros_like(pitch)
     roll, yaw = (zero if a is None else np.asarray(a, float) for a in (shape.roll, shape.yaw))
@@ -240,6 +270,7 @@ def _joint(shape: ArchShape, brick: int, position: Floats, direction: Floats) ->
         across=_across(direction),
         translational_stiffness=shape.translational_stiffness,
         rotational_stiffness=shape.rotational_stiffness,
+        thickness=shape.thickness,
     )
 
 
@@ -251,6 +282,7 @@ def _ground(shape: ArchShape, brick: int, end: Floats, tangent: Floats, sign: fl
         across=_across(tangent),
         translational_stiffness=shape.translational_stiffness,
         rotational_stiffness=shape.rotational_stiffness,
+        thickness=shape.thickness,
         anchor=_vector(end + sign * shape.stub * tangent),
     )
 

@@ -3,12 +3,155 @@
 from __future__ import annotations
 
 import math
+import operator
 from collections.abc import Iterable
+from typing import TypeVar
 
 from seqopt.arrays import Vector
 from seqopt.errors import SceneError
 
+Part = TypeVar("Part")
+LARGEST_NUMBER = 10**15  # of a brick or node: what arrays of numbers hold without loss
+TURNS = {*range(0x202A, 0x202F), *range(0x2066, 0x206A), 0x2028, 0x2029}  # turn or break lines
 UNIT_TOLERANCE = 1e-9  # how far a direction may be from unit length, or a pair from a right angle
+
+
+def steers(sign: str) -> bool:
+    """Return whether a character steers a terminal or is half of one, and is none to be read.
+
+    Parameters
+    ----------
+    sign : str
+        One character.
+
+    Returns
+    -------
+    bool
+        For control characters, lone surrogates, and what turns or breaks lines.
+    """
+    code = ord(sign)
+    return code < 0x20 or 0x7F <= code < 0xA0 or 0xD800 <= code < 0xE000 or code in TURNS
+
+
+def printable(where: str, value: str) -> str:
+    """Return a name that can be printed and written.
+
+    Parameters
+    ----------
+    where : str
+        What it names, for the message.
+    value : str
+
+    Returns
+    -------
+    str
+
+    Raises
+    ------
+    SceneError
+        If it is no text, or holds what steers a terminal or half a character.
+    """
+    if not isinstance(value, str) or any(map(steers, value)):
+        raise SceneError(f"{where}: its name is {short(value)}; give text of printable characters")
+    return value
+
+
+def whole(where: str, value: int) -> int:
+    """Return a whole number, as bricks and nodes have for names.
+
+    Parameters
+    ----------
+    where : str
+        What it is, for the message.
+    value : int
+
+    Returns
+    -------
+    int
+
+    Raises
+    ------
+    SceneError
+        If it is none, or larger than `LARGEST_NUMBER`.
+    """
+    try:
+        number = int(value) if isinstance(value, float) else operator.index(value)
+    except (TypeError, ValueError, OverflowError):
+        number = LARGEST_NUMBER + 1
+    if number != value or isinstance(value, bool) or abs(number) > LARGEST_NUMBER:
+        raise SceneError(
+            f"{where} is {short(value)}; give a whole number up to {LARGEST_NUMBER:.0e}"
+        )
+    return number
+
+
+def wholes(where: str, values: Iterable[int]) -> tuple[int, ...]:
+    """Return whole numbers.
+
+    Parameters
+    ----------
+    where : str
+        What they are, for the message.
+    values : iterable of int
+
+    Returns
+    -------
+    tuple of int
+
+    Raises
+    ------
+    SceneError
+        If there are none to go through, or one is not whole.
+    """
+    if isinstance(values, str) or not isinstance(values, Iterable):
+        raise SceneError(f"{where} is {short(values)}; give whole numbers")
+    return tuple(whole(where, value) for value in values)
+
+
+def parts(where: str, values: Iterable[Part], kind: type[Part]) -> tuple[Part, ...]:
+    """Return parts of a scene if all are of one kind.
+
+    Parameters
+    ----------
+    where : str
+        What they are, for the message.
+    values : iterable of object
+    kind : type
+
+    Returns
+    -------
+    tuple of object
+
+    Raises
+    ------
+    SceneError
+        If one is of another kind, or there is nothing to go through.
+    """
+    found = tuple(values) if isinstance(values, Iterable) else (values,)
+    for value in found:
+        if not isinstance(value, kind):
+            raise SceneError(f"{where}: {short(value)} is none; give each as {kind.__name__}(...)")
+    return found
+
+
+def short(value: object, most: int = 60) -> str:
+    """Return a representation of a value that fits a line.
+
+    Parameters
+    ----------
+    value : object
+    most : int, optional
+        Characters.
+
+    Returns
+    -------
+    str
+    """
+    try:
+        text = repr(value)
+    except ValueError:  # an integer of more digits than Python writes
+        text = "a number of thousands of digits"
+    return text if len(text) <= most else f"{text[: most - 1]}…"
 
 
 def vector(where: str, values: Iterable[float], at_least: float = -math.inf) -> Vector:
@@ -33,8 +176,8 @@ def vector(where: str, values: Iterable[float], at_least: float = -math.inf) -> 
     """
     try:
         x, y, z = (float(value) for value in values)
-    except (TypeError, ValueError) as error:
-        raise SceneError(f"{where} is {values!r}; give three numbers") from error
+    except (TypeError, ValueError, OverflowError) as error:
+        raise SceneError(f"{where} is {short(values)}; give three numbers") from error
     if not all(math.isfinite(c) and c >= at_least for c in (x, y, z)):
         bound = "" if at_least == -math.inf else f", each at least {at_least:g}"
         raise SceneError(f"{where} is {[x, y, z]}; give three finite numbers{bound}")
@@ -61,9 +204,13 @@ def positive(where: str, value: float, unit: str) -> float:
     SceneError
         If it is no number, not finite or not positive.
     """
-    if not (isinstance(value, int | float) and math.isfinite(value) and value > 0):
-        raise SceneError(f"{where} is {value!r}; give a positive number of {unit}")
-    return float(value)
+    try:
+        number = float(value) if isinstance(value, int | float) else math.nan
+    except OverflowError:
+        number = math.inf
+    if not 0 < number < math.inf:
+        raise SceneError(f"{where} is {short(value)}; give a positive number of {unit}")
+    return number
 
 
 def axes(where: str, first: Iterable[float], second: Iterable[float]) -> tuple[Vector, Vector]:

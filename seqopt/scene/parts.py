@@ -11,8 +11,10 @@ from dataclasses import dataclass, field
 
 from seqopt.arrays import Vector
 from seqopt.errors import SceneError
-from seqopt.scene.checks import axes, positive, vector
-from seqopt.scene.reach import Anywhere, Reach
+from seqopt.scene.checks import axes, positive, printable, vector, whole, wholes
+from seqopt.scene.reach import Anywhere, Reach, as_reach
+
+THICKEST = 0.5  # of a joint that does not say, over the smallest dimension of its bricks
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,6 +54,7 @@ class Brick:
     placing_node: int
 
     def __post_init__(self) -> None:
+        _set(self, "name", whole("brick: its name", self.name))
         where = f"brick {self.name}"
         _set(self, "position", vector(f"{where}: position", self.position))
         _set(self, "dimensions", vector(f"{where}: dimensions", self.dimensions))
@@ -63,8 +66,9 @@ class Brick:
         _set(self, "length_axis", first)
         _set(self, "width_axis", second)
         _set(self, "density", positive(f"{where}: density", self.density, "kg/m³"))
-        _set(self, "nodes", tuple(self.nodes))
-        if len(set(self.nodes)) != 2:
+        _set(self, "nodes", wholes(f"{where}: nodes", self.nodes))
+        _set(self, "placing_node", whole(f"{where}: placing_node", self.placing_node))
+        if len(set(self.nodes)) != 2 or len(self.nodes) != 2:
             raise SceneError(f"{where}: nodes are {list(self.nodes)}; give two different numbers")
         if self.placing_node not in self.nodes:
             raise SceneError(
@@ -111,6 +115,9 @@ class Spring:
         N/m along the three axes, zero allowed.
     rotational_stiffness : Vector
         N m/rad about the three axes, zero allowed.
+    thickness : float, optional
+        Of what lies between the faces, m: to be given where it is more than `THICKEST` of the
+        smallest dimension of the bricks; faces farther apart do not touch.
     """
 
     position: Vector
@@ -118,6 +125,7 @@ class Spring:
     across: Vector
     translational_stiffness: Vector
     rotational_stiffness: Vector
+    thickness: float | None = None
 
     def _check(self, where: str) -> None:
         _set(self, "position", vector(f"{where}: position", self.position))
@@ -126,6 +134,8 @@ class Spring:
         _set(self, "across", second)
         for name in ("translational_stiffness", "rotational_stiffness"):
             _set(self, name, vector(f"{where}: {name}", getattr(self, name), at_least=0.0))
+        if self.thickness is not None:
+            _set(self, "thickness", positive(f"{where}: thickness", self.thickness, "m"))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -146,9 +156,9 @@ class Joint(Spring):
     bricks: tuple[int, int]
 
     def __post_init__(self) -> None:
-        _set(self, "bricks", tuple(self.bricks))
+        _set(self, "bricks", wholes("joint: bricks", self.bricks))
         where = f"joint {self.bricks}"
-        if len(set(self.bricks)) != 2:
+        if len(set(self.bricks)) != 2 or len(self.bricks) != 2:
             raise SceneError(f"{where}: name two different bricks")
         self._check(where)
 
@@ -177,7 +187,10 @@ class Ground(Spring):
     closes_with: int | None = None
 
     def __post_init__(self) -> None:
+        _set(self, "brick", whole("ground end: brick", self.brick))
         where = f"ground end of brick {self.brick}"
+        if self.closes_with is not None:
+            _set(self, "closes_with", whole(f"{where}: closes_with", self.closes_with))
         self._check(where)
         _set(self, "anchor", vector(f"{where}: anchor", self.anchor))
         if self.anchor == self.position:
@@ -200,7 +213,7 @@ class Robot:
     Raises
     ------
     SceneError
-        If the payload is not a positive number.
+        If the name cannot be printed or the payload is not a positive number.
     """
 
     name: str
@@ -208,6 +221,8 @@ class Robot:
     reach: Reach = field(default_factory=Anywhere)
 
     def __post_init__(self) -> None:
+        printable("robot", self.name)
+        _set(self, "reach", as_reach(f"robot {self.name}: reach", self.reach))
         _set(self, "payload", positive(f"robot {self.name}: payload", self.payload, "N"))
 
 

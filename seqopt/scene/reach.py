@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from seqopt.arrays import Vector
 from seqopt.errors import SceneError
-from seqopt.scene.checks import UNIT_TOLERANCE, dot, positive, vector
+from seqopt.scene.checks import UNIT_TOLERANCE, dot, positive, short, vector
 
 
 @dataclass(frozen=True)
@@ -110,3 +110,28 @@ class Sphere:
 
 
 Reach = Anywhere | Side | Sphere
+
+
+def as_reach(where: str, given: Reach | str) -> Reach:
+    """Return a reach; ``"anywhere"`` is one too.
+
+    Parameters
+    ----------
+    where : str
+        What it is, for the message.
+    given : Reach or str
+
+    Returns
+    -------
+    Reach
+
+    Raises
+    ------
+    SceneError
+        If it is something else.
+    """
+    if isinstance(given, str) and given == "anywhere":
+        return Anywhere()
+    if not isinstance(given, Anywhere | Side | Sphere):
+        raise SceneError(f"{where} is {short(given)}; give Anywhere(), Side(...) or Sphere(...)")
+    return given

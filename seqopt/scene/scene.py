@@ -10,8 +10,11 @@ from functools import cached_property
 
 from seqopt.arrays import Vector
 from seqopt.errors import SceneError
-from seqopt.scene.checks import vector
+from seqopt.scene.checks import parts, printable, vector, wholes
+from seqopt.scene.geometry import check_bricks, check_springs
 from seqopt.scene.parts import Brick, Ground, Joint, Robot
+
+KINDS = {"bricks": Brick, "joints": Joint, "grounds": Ground, "robots": Robot}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,8 +63,11 @@ class Scene:
     provenance: str = ""
 
     def __post_init__(self) -> None:
-        for name in ("bricks", "joints", "grounds", "build_order", "robots", "blocked_nodes"):
-            _set(self, name, tuple(getattr(self, name)))
+        for name, kind in KINDS.items():
+            _set(self, name, parts(f"scene: {name}", getattr(self, name), kind))
+        printable("scene", self.name)
+        for name in ("build_order", "blocked_nodes"):
+            _set(self, name, wholes(f"scene {self.name}: {name}", getattr(self, name)))
         _set(self, "gravity", vector(f"scene {self.name}: gravity", self.gravity))
         if not self.bricks:
             raise SceneError(f"scene {self.name}: it has no bricks; give at least one")
@@ -71,6 +77,8 @@ class Scene:
         _unique(f"scene {self.name}: node", (n for brick in self.bricks for n in brick.nodes))
         _unique(f"scene {self.name}: robot", (robot.name for robot in self.robots))
         self._check_references()
+        check_bricks(self.bricks, self.gravity)
+        check_springs((*self.joints, *self.grounds), {brick.name: brick for brick in self.bricks})
 
     def __repr__(self) -> str:
         counts = (

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import json
+import os
+import warnings
 from dataclasses import asdict
+from functools import partial
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from seqopt.errors import SceneError
+from seqopt.errors import SceneError, SceneWarning
 from seqopt.files import read_text, write_text
+from seqopt.scene.doubts import doubts
 from seqopt.scene.parts import Brick, Ground, Joint, Robot
 from seqopt.scene.reach import Anywhere, Reach, Side, Sphere
 from seqopt.scene.scene import Scene
@@ -46,12 +50,12 @@ def builtin_scenes() -> tuple[str, ...]:
     return tuple(sorted(item.name.removesuffix(".json") for item in folder.iterdir()))
 
 
-def load_scene(name: str) -> Scene:
+def load_scene(name: str | Path) -> Scene:
     """Return a built-in scene by name, or the scene of a JSON file.
 
     Parameters
     ----------
-    name : str
+    name : str or pathlib.Path
         One of `builtin_scenes`, or the path of a file.
 
     Returns
@@ -65,19 +69,30 @@ def load_scene(name: str) -> Scene:
     FileError
         If the file cannot be read.
 
+    Warns
+    -----
+    SceneWarning
+        Where something in a file is probably not meant: see `seqopt.scene.doubts`.
+
     Examples
     --------
     >>> load_scene("arch25")
     <Scene arch25: 25 bricks, 24 joints, 2 ground ends, 3 robots>
     """
+    if not isinstance(name, str | Path):
+        raise SceneError(f"a {type(name).__name__} is no name of a scene; give text or a path")
+    name = str(name)
     if name in builtin_scenes():
         source = resources.files("seqopt").joinpath(f"data/scenes/{name}.json")
         return parse_scene(source.read_text(encoding="utf-8"), name)
     path = Path(name)
-    if not path.suffix and not path.exists():
+    if not path.suffix and not os.path.lexists(path):
         known = ", ".join(builtin_scenes())
         raise SceneError(f"scene {name}: no such built-in scene or file; built in: {known}")
-    return parse_scene(read_text(path), name)
+    scene = parse_scene(read_text(path), name)
+    for doubt in doubts(scene):
+        warnings.warn(f"scene {name}: {doubt}", SceneWarning, stacklevel=2)
+    return scene
 
 
 def parse_scene(text: str, source: str = "text") -> Scene:
@@ -100,11 +115,27 @@ def parse_scene(text: str, source: str = "text") -> Scene:
         If the text is not JSON, breaks the schema or describes no scene that can be.
     """
     try:
-        document = json.loads(text)
+        document = json.loads(text, object_pairs_hook=partial(_entries, source))
+        _check_schema(document, source)
     except json.JSONDecodeError as error:
         raise SceneError(f"scene {source}: not JSON, line {error.lineno}: {error.msg}") from error
-    _check_schema(document, source)
+    except RecursionError as error:
+        raise SceneError(f"scene {source}: nested too deep for a scene; give one") from error
+    except SceneError:
+        raise
+    except ValueError as error:  # an integer of thousands of digits
+        raise SceneError(f"scene {source}: a number has too many digits; give fewer") from error
     return scene_from_dict(document)
+
+
+def _entries(source: str, pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """Return an object of a document, each of whose keys stands there once."""
+    out = dict(pairs)
+    if len(out) < len(pairs):
+        keys = [key for key, _ in pairs]
+        twice = next(key for key in keys if keys.count(key) > 1)
+        raise SceneError(f"scene {source}: key {twice!r} stands twice in one object; keep one")
+    return out
 
 
 def scene_from_dict(document: dict[str, Any]) -> Scene:
@@ -147,6 +178,9 @@ def scene_to_dict(scene: Scene) -> dict[str, Any]:
     dict
     """
     document = {"format": "seqopt-scene", "version": VERSION, **asdict(scene)}
+    for spring in (*document["joints"], *document["grounds"]):
+        if spring["thickness"] is None:
+            del spring["thickness"]
     names = {cls: kind for kind, cls in REACHES.items()}
     for entry, robot in zip(document["robots"], scene.robots, strict=True):
         entry["reach"] = {"kind": names[type(robot.reach)], **entry["reach"]}

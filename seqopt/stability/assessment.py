@@ -237,9 +237,10 @@ def least_friction(prove: Prover, mortar: Mortar) -> float:
     low = (0.0, lacking(0.0))
     if not low[1] > EXACT:
         return max(low[1], 0.0) * 0.0
-    enough = [f for f in (mortar.friction, ROUGHEST) if lacking(f) <= EXACT]
+    tried = {f: lacking(f) for f in (mortar.friction, ROUGHEST)}
+    enough = [f for f, lack in tried.items() if lack <= EXACT]
     if not enough:
-        return np.inf
+        return np.nan if np.isnan(list(tried.values())).any() else np.inf
     high = enough[0]
     before: tuple[float, float] | None = None
     step = FRICTION_STEP

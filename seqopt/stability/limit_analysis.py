@@ -27,6 +27,7 @@ from seqopt.contact.assembly import Assembly
 
 EXACT = 1e-6  # largest violation of an accepted proof, over the force scale and max(1, z)
 GAP = 1e-3  # largest difference between the two proofs, relative to max(1, z)
+ROUNDING = 1e-12  # work in a motion that is none, over the largest entry of the motion
 LARGEST_FORCE = 10.0  # of a corner, over total weight and payloads: prices motions that violate
 CAP = 1e5  # z is sought between 0 and this
 
@@ -173,6 +174,29 @@ def violation(assembly: Assembly, case: Case, answer: Answer) -> float:
     return float(worst) if np.isfinite(worst) else np.inf
 
 
+def is_finite(assembly: Assembly, answer: Answer) -> bool:
+    """Return whether all numbers of an answer are finite, and as many as the assembly needs.
+
+    Parameters
+    ----------
+    assembly : Assembly
+    answer : Answer
+
+    Returns
+    -------
+    bool
+        What is not finite proves nothing: no comparison holds against it.
+    """
+    parts = (
+        (answer.contact_force, (len(assembly.corner), 3)),
+        (answer.grip_force, (len(assembly.payload), 3)),
+        (answer.motion, (len(assembly.centroid), 6)),
+    )
+    return bool(np.isfinite(answer.value)) and all(
+        part.shape == shape and np.isfinite(part).all() for part, shape in parts
+    )
+
+
 def bound(assembly: Assembly, case: Case, answer: Answer) -> float:
     """Return the z that an answer's motion proves: none below (smallest) or above (largest) exists.
 
@@ -191,14 +215,15 @@ def bound(assembly: Assembly, case: Case, answer: Answer) -> float:
     float
     """
     nothing = 0.0 if case.sense is Sense.SMALLEST else CAP
-    motion = answer.motion.ravel()
-    if not np.isfinite(motion).all() or not np.isfinite(answer.value):
+    if not is_finite(assembly, answer):
         return nothing
-    taken = _taken(assembly, case, answer.motion, (answer.value, 0.0, 1.0))
-    start = float(assembly.load() @ motion) - taken[1]
-    growth = float(assembly.load(case.pull) @ motion) - (taken[2] - taken[1])
+    size = np.frexp(np.abs(answer.motion).max())[1]  # a power of two: scaling by it is exact
+    motion = np.ldexp(answer.motion, -size)
+    taken = _taken(assembly, case, motion, (answer.value, 0.0, 1.0))
+    start = float(assembly.load() @ motion.ravel()) - taken[1]
+    growth = float(assembly.load(case.pull) @ motion.ravel()) - (taken[2] - taken[1])
     if case.sense is Sense.SMALLEST:
-        if not start > 0:
+        if not start > ROUNDING:
             return nothing
         return min(start / -growth, CAP) if growth < 0 else CAP
     return min(max(-start / growth, 0.0), CAP) if growth > 0 else nothing

@@ -20,6 +20,7 @@ from seqopt.stability.limit_analysis import (
     Compile,
     Sense,
     bound,
+    is_finite,
     limits,
     violation,
 )
@@ -114,7 +115,8 @@ class Prover:
         )
         answer = self._compile(helped)(strongest, 0)
         self.claims[answer.claim] += 1
-        return replace(answer, value=bound(helped, strongest, answer))
+        known = is_finite(helped, answer)
+        return replace(answer, value=bound(helped, strongest, answer) if known else np.nan)
 
 
 def proven_value(assembly: Assembly, case: Case, answer: Answer) -> float:
@@ -129,8 +131,10 @@ def proven_value(assembly: Assembly, case: Case, answer: Answer) -> float:
     Returns
     -------
     float
-        NaN if they do not.
+        NaN if they do not, or a number of the answer is not finite.
     """
+    if not is_finite(assembly, answer):
+        return np.nan
     scale = max(1.0, abs(answer.value))
     if not violation(assembly, case, answer) <= EXACT * scale:
         return np.nan

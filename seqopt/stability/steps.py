@@ -8,9 +8,11 @@ import numpy as np
 import pandas as pd
 
 from seqopt.contact.faces import step_assembly
-from seqopt.contact.mortar import Mortar
+from seqopt.contact.mortar import Mortar, find_mortar
+from seqopt.network.build import network_of
 from seqopt.network.network import Network
-from seqopt.sequence.steps import Step
+from seqopt.scene.scene import Scene
+from seqopt.sequence.steps import Step, require_steps
 from seqopt.stability.assessment import Stability, Verdict, assess
 from seqopt.stability.limit_analysis import Claim
 
@@ -18,19 +20,19 @@ Progress = Callable[[str], None]
 
 
 def assess_steps(
-    network: Network,
+    network: Network | Scene,
     steps: Sequence[Step],
-    mortar: Mortar,
+    mortar: Mortar | str,
     progress: Progress = lambda _: None,
 ) -> tuple[Stability, ...]:
     """Return verdict and margins of every step.
 
     Parameters
     ----------
-    network : Network
+    network : Network or Scene
     steps : sequence of Step
-    mortar : Mortar
-        Of all joints.
+    mortar : Mortar or str
+        Of all joints; or its name.
     progress : callable, optional
         Told in words which step is next.
 
@@ -51,8 +53,9 @@ def assess_steps(
     >>> [stability.verdict.value for stability in seqopt.assess_steps(network, steps, seqopt.EPOXY)]
     ['stands', 'stands']
     """
+    network, mortar = network_of(network), find_mortar(mortar)
     out = []
-    for step in steps:
+    for step in require_steps(steps):
         progress(f"step {step.number} of {len(steps)}")
         out.append(
             assess(step_assembly(network, step.bricks, step.grips), mortar, network.scene.up)

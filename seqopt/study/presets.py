@@ -27,7 +27,7 @@ STUDY_BED = BedStiffness(normal=100e9, tangential=10e9)
 STUDY_PADS = BedStiffness(normal=1e12, tangential=1e11)
 """Of a robot's grip: stiffer "by an order of magnitude"; how large its pads are is not printed."""
 
-RESOLUTION = (("F", 1.0), ("T", 1.0), ("M", 1.0), ("D", 1e-6))
+RESOLUTION = (("F", 1.0), ("T", 1.0), ("C", 1.0), ("M", 1.0), ("D", 1e-6))
 """Rounding (N, N, N m, m) with which ranks explain most of the choices in the published plan."""
 
 EQUATIONS = RankSum(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given, reject, settings
 from hypothesis import strategies as st
 
 from seqopt.contact.mortar import DRY, Mortar
@@ -12,7 +12,7 @@ from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.interface import Want
 from seqopt.engines.planar import PlanarEngine
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.errors import MechanismError, SolverError
+from seqopt.errors import MechanismError, SceneError, SolverError
 from seqopt.network.build import build_network
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.two_robots import METHODS
@@ -38,7 +38,10 @@ def test_within_the_elastic_limits_discrete_elements_are_rigid_bricks(state):
     scene, bricks, grips = state
     net = build_network(scene)
     strong = Mortar(friction=1.0, tensile_strength=1e12, cohesion=1e12)
-    found = DiscreteEngine(net, strong).solve(bricks, grips, Want.ALL)
+    try:
+        found = DiscreteEngine(net, strong).solve(bricks, grips, Want.ALL)
+    except SceneError:  # bent so far that bricks interpenetrate
+        reject()
     exact = ComplianceEngine(net).solve(bricks, grips, Want.ALL)
     assert largest_difference(found, exact, net) <= 1e-7
 

@@ -156,7 +156,7 @@ def test_the_short_cut_does_what_the_long_way_does(arch25, engine25):
     ("wrong", "error", "message"),
     [
         ({"scene": "arch26"}, seqopt.SeqoptError, "no such built-in scene or file"),
-        ({"schedule": "loop"}, StepError, "give one of three-robot, modified-sequential"),
+        ({"schedule": "ring"}, StepError, "give one of three-robot, modified-sequential"),
         ({"criterion": "ranks"}, ProblemError, "give one of equations-2-3"),
         ({"formulation": "dp"}, ProblemError, "give one of beam, cascade"),
         ({"width": 3}, ProblemError, "option width: overlap_dp has no options"),

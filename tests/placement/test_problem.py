@@ -28,7 +28,7 @@ def test_a_third_support_ends_twisting(engine25):
 
 
 def test_models(problem25):
-    """The study counts 2,576 and 22,724; reach, occupancy and equal models leave fewer."""
+    """The paper counts 2,576 and 22,724; reach, occupancy and equal models leave fewer."""
     assert paper_models(problem25.schedule) == (2576, 22724)
     choices = sum(next(iter(s.responses.values())).size for s in problem25.evaluation.steps)
     assert problem25.evaluation.models < choices < 22724

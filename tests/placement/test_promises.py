@@ -41,7 +41,9 @@ def test_payloads_hold_on_every_step_or_are_named(arch25):
     table = over.responses()
     assert over.overloads[0].largest == table["F_rob1_N"].abs().max()
     assert over.summary()["payload_exceeded"] == [str(over.overloads[0])]
-    assert "F_rob1 is up to 375.44 of 350 (step" in str(over.overloads[0])
+    assert "rob1 holds up to 375.4 N, more than its payload of 350 N (step" in str(
+        over.overloads[0]
+    )
 
 
 def test_methods_without_a_choice_are_looked_at_too(engine25):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from seqopt.errors import ProblemError
+from seqopt.errors import ProblemError, SolverError
 from seqopt.placement.problem import pose
 from seqopt.placement.requirements import Limit
 from seqopt.placement.solving import solve
@@ -16,7 +16,7 @@ from seqopt.study.presets import EQUATIONS, WEIGHTED
 
 def test_a_dead_end_that_the_cascade_foresees(engine25):
     schedule, limits = three_robot_loop(engine25.network), [Limit("T_max", 64.0)]
-    with pytest.raises(ProblemError, match="move 8, step 31: rob2 has no allowed grip after"):
+    with pytest.raises(SolverError, match="move 8, step 31: rob2 has no allowed grip after"):
         search_windows(pose(engine25, schedule, EQUATIONS, limits))
     plan = solve(pose(engine25, schedule, EQUATIONS, limits), "cascade")
     assert len(plan.nodes) == len(schedule.moves)
@@ -46,7 +46,7 @@ def test_the_table_says_what_the_next_one_costs(engine25):
 
 def test_a_dead_end_is_named(engine25):
     schedule = three_robot_loop(engine25.network)
-    with pytest.raises(ProblemError, match="move 1, step 3: rob3 has no allowed grip"):
+    with pytest.raises(SolverError, match="move 1, step 3: rob3 has no allowed grip"):
         search_windows(pose(engine25, schedule, EQUATIONS, [Limit("F_largest", 9.0)]))
 
 

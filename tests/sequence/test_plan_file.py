@@ -37,3 +37,23 @@ def test_a_plan_from_a_file(tmp_path, arch25):
         Step(1, StepKind.PLACE, 1, (1, None, None)),
         Step(2, StepKind.PLACE, 2, (1, 2, None)),
     )
+
+
+HEAD = "step,type,bricks,rob1_node,rob2_node,rob3_node\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "named"),
+    [
+        (HEAD + "1,place,1," + "1" * 131_073 + ",,\n", "no CSV that can be read: field larger"),
+        ("x" * 200_000, "no CSV that can be read: field larger"),
+        (HEAD.replace("\n", "\r") + "1,place,1,1,,\r", "no CSV that can be read: new-line"),
+        (HEAD + "1,place,1," + "1" * 5000 + ",,\n", "rob1_node is '1111"),
+        (HEAD + f"1,place,1,{10**400},,\n", "rob1_node is '1000"),
+        (HEAD.strip() + ",rob1_node\n1,place,1,1,,,4\n", "column rob1_node stands there twice"),
+    ],
+)
+def test_what_is_no_table_of_steps_gets_one_line(arch25, text, named):
+    with pytest.raises(StepError, match=named) as caught:
+        parse_plan(arch25, text, "plan.csv")
+    assert len(str(caught.value)) < 300

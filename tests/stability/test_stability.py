@@ -123,3 +123,49 @@ def test_a_ring_of_blocks_has_its_volume():
     assert isinstance(ring(3, 1.0, 0.1), Blocks)
     assert CAP > 1
     assert Answer  # the protocol's value is public
+
+
+def test_minus_infinity_is_no_proof():
+    """An infinite value made every tolerance infinite: an overhang that falls stood."""
+    falling = stack([0.7]).assembly(2000.0)
+    minus = assess(falling, DRY, compiled=liar(lambda a, _: replace(a, value=-np.inf)))
+    assert minus.verdict is Verdict.UNDECIDED
+    assert np.isnan(minus.friction)  # nothing proven is not "no friction is enough"
+
+
+def faked(rng, true):
+    """An answer with any mixture of odd numbers, some of them true."""
+
+    def entries(array):
+        odd = rng.choice([0.0, 1.0, 1e-320, -1e-320, 1e308, -1e308, np.inf, -np.inf, np.nan])
+        kinds = (array, np.full_like(array, odd), rng.standard_normal(array.shape), -array)
+        return kinds[rng.integers(len(kinds))]
+
+    values = [true.value, 0.0, 1e-7, -1.0, 1.0, CAP, 1e308, -1e308, np.inf, -np.inf, np.nan]
+    return replace(
+        true,
+        claim=list(Claim)[rng.integers(len(Claim))],
+        value=float(values[rng.integers(len(values))]),
+        contact_force=entries(true.contact_force),
+        grip_force=entries(true.grip_force),
+        motion=entries(true.motion),
+    )
+
+
+@pytest.mark.parametrize("falls", [True, False])
+def test_faked_answers_give_no_false_verdict(falls):
+    """120 solvers that fake all of their answers, for a stack that falls and one that stands."""
+    leaning = stack([0.7 if falls else 0.2]).assembly(2000.0)
+    truth = Verdict.FALLS if falls else Verdict.STANDS
+    true = compile_equilibrium(leaning)(bonded(leaning, DRY))
+    verdicts = []
+    for seed in range(120):
+        rng = np.random.default_rng(seed)
+
+        def compiled(assembly, rng=rng):
+            grips = np.zeros((len(assembly.payload), 3))  # hands, in the proof that nothing will do
+            return lambda *_: faked(rng, replace(true, grip_force=grips))
+
+        with np.errstate(all="ignore"):
+            verdicts.append(assess(leaning, DRY, compiled=compiled).verdict)
+    assert set(verdicts) <= {Verdict.UNDECIDED, truth}

@@ -78,7 +78,7 @@ NORMAL, TANGENTIAL = STUDY_BED.normal, STUDY_BED.tangential
 
 
 def twist_of(scene, kind=DiscreteEngine):
-    """How a block moves and turns on the study's bed, and its weight."""
+    """How a block moves and turns on the paper's bed, and its weight."""
     net = build_network(scene)
     return kind(net, bed=STUDY_BED).solve(1, HERE, Want.ALL).brick_twist[0, 0], -net.weight[0, 2]
 

@@ -104,7 +104,7 @@ def starting_guess() -> Floats:
     middle = np.cumsum(length) - length / 2
     along = (middle / length.sum() - 0.5) * 2 * a * np.sinh(half / a)
     pitch = np.arctan(-along / a)
-    area = 0.116 * 0.053  # contact, m²; the study prints stiffness per area, two springs in series
+    area = 0.116 * 0.053  # contact, m²; the paper prints stiffness per area, two springs in series
     stiffness = np.log([100e9 * area / 2, 0.9e9 * area / 2])
     return np.concatenate([pitch, [0.0], np.zeros(len(ALONG)), [0.014, 0.0615, 0.09], stiffness])
 

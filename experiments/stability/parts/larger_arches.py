@@ -17,7 +17,7 @@ from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.placement.problem import pose
 from seqopt.placement.solving import solve
-from seqopt.responses.table import analyze
+from seqopt.responses.table import analyze, force_column
 from seqopt.scene.parts import Spring
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Step
@@ -86,7 +86,7 @@ def extremes(label: str, times: float, scene: Scene, methods: Plans) -> Rows:
     engine = ComplianceEngine(build_network(scene))
     for name, steps in methods.items():
         table = analyze(engine, steps)
-        robots = [f"F_{robot.name}_N" for robot in scene.robots]
+        robots = [force_column(robot) for robot in scene.robots]
         needed = np.array(bonds(engine.network, steps))
         yield {
             "scaling": label,

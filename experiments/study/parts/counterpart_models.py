@@ -1,4 +1,4 @@
-"""Printed and computed values of the study's arch, vault tests and discrete elements.
+"""Printed and computed values of the paper's arch, vault tests and discrete elements.
 
 The first half of `experiments.study.parts.counterpart_rows`: what the model rests on.
 """
@@ -55,11 +55,11 @@ class Ours:
 
     @property
     def scene(self) -> Scene:
-        """The study's arch as it ships."""
+        """The paper's arch as it ships."""
         return self.engine.network.scene
 
     def steps(self, method: str) -> pd.DataFrame:
-        """Return the responses of a method by step, the support's as the study prints them."""
+        """Return the responses of a method by step, the support's as the paper prints them."""
         return as_printed(self.scene, self.methods.tables[method]).set_index("step")
 
 

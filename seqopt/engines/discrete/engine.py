@@ -22,13 +22,22 @@ from seqopt.contact.mortar import EPOXY, Mortar
 from seqopt.engines.discrete.equilibrium_path import Held, Settled, settle
 from seqopt.engines.discrete.pads import Pinch, pad_stiffness
 from seqopt.engines.discrete.system import BedStiffness, System, build_system
-from seqopt.engines.interface import Fields, Want, grip_columns, join_sets, no_sets
+from seqopt.engines.interface import (
+    Fields,
+    Want,
+    grip_columns,
+    join_sets,
+    no_sets,
+    require_finite,
+)
 from seqopt.engines.rigid.mechanism import mechanism_error, require_resistance
 from seqopt.engines.rigid.recovery import Solution, respond
 from seqopt.errors import SeqoptError, SolverError
+from seqopt.network.build import network_of
 from seqopt.network.kinematics import node_motion, point_motion
 from seqopt.network.network import Network
 from seqopt.network.statics import build_statics
+from seqopt.scene.scene import Scene
 
 GONE = "joints part or slip and brick {brick} goes; add a grip, a bond or friction"
 
@@ -38,7 +47,7 @@ class DiscreteEngine:
 
     Parameters
     ----------
-    network : Network
+    network : Network or Scene
     mortar : Mortar, optional
         What the joints hold; the epoxy of Bruun et al. by default.
     bed : BedStiffness, optional
@@ -49,12 +58,13 @@ class DiscreteEngine:
 
     def __init__(
         self,
-        network: Network,
+        network: Network | Scene,
         mortar: Mortar = EPOXY,
         bed: BedStiffness | None = None,
         pinch: Pinch | None = None,
     ) -> None:
-        self._network, self._mortar, self._bed, self._pinch = network, mortar, bed, pinch
+        self._network, self._mortar = network_of(network), mortar
+        self._bed, self._pinch = bed, pinch
         self._systems: dict[int, System] = {}
 
     @property
@@ -97,7 +107,8 @@ class DiscreteEngine:
         if bricks not in self._systems:
             self._systems[bricks] = build_system(network, bricks, self._mortar, self._bed)
         answers = [self._solve_one(self._systems[bricks], row) for row in columns]
-        return join_sets([no_sets(network, bricks, columns.shape[1]), *answers])
+        answer = join_sets([no_sets(network, bricks, columns.shape[1]), *answers])
+        return require_finite(answer, bricks, grips)
 
     def _solve_one(self, system: System, columns: Ints) -> Fields:
         """Return the fields of one grip set."""

@@ -20,18 +20,21 @@ from numpy.typing import ArrayLike
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.engines.basis import SPACE, Basis
 from seqopt.engines.interface import (
+    NAMES,
     Fields,
     Want,
     grip_columns,
     keep_wanted,
-    replace_sets,
+    require_finite,
 )
 from seqopt.engines.rigid.grip_equations import grip_forces
 from seqopt.engines.rigid.operator import ComplianceOperator, OperatorBuilder, load_matrix
 from seqopt.engines.rigid.refinement import Refinement
 from seqopt.engines.rigid.spanning_tree import grow_tree
 from seqopt.engines.threads import one_thread
+from seqopt.network.build import network_of
 from seqopt.network.network import Network
+from seqopt.scene.scene import Scene
 
 CHUNK = 2048  # grip sets per pass: keeps the work arrays in the processor's cache
 TRUSTED = 1e-5  # smallest scaled pivot of the grips' equations that keeps errors below about 1e-9
@@ -44,12 +47,13 @@ class ComplianceEngine:
 
     Parameters
     ----------
-    network : Network
+    network : Network or Scene
     basis : Basis, optional
         The directions in which bricks are loaded and move; all by default, fewer in a plane.
     """
 
-    def __init__(self, network: Network, basis: Basis = SPACE) -> None:
+    def __init__(self, network: Network | Scene, basis: Basis = SPACE) -> None:
+        network = network_of(network)
         self._network = network
         self._basis = basis
         self._tree = grow_tree(network)
@@ -85,14 +89,15 @@ class ComplianceEngine:
         columns = grip_columns(self._network, bricks, grips)
         operator = self._operator(bricks)
         if operator is None:
-            return keep_wanted(self._refined(bricks, columns), want)
+            answer = keep_wanted(self._refined(bricks, columns), want)
+            return require_finite(answer, bricks, grips)
         fields, trusted = solve_batch(operator, columns, want, even=bricks <= self._even)
         if self._basis is not SPACE:
             fields = replace(fields, grip_force=fields.grip_force @ self._basis.force)
         if not trusted.all():
             better = keep_wanted(self._refined(bricks, columns[~trusted]), want)
-            fields = replace_sets(fields, ~trusted, better)
-        return fields
+            fields = _replaced(fields, ~trusted, better)
+        return require_finite(fields, bricks, grips)
 
     def _operator(self, bricks: int) -> ComplianceOperator | None:
         """Return the operator of a partial structure, or None where something may be loose."""
@@ -163,6 +168,14 @@ def solve_batch(
         brick_twist=answer(operator.brick_twist, Want.BRICKS, 6),
     )
     return fields, trusted
+
+
+def _replaced(answer: Fields, which: Bools, better: Fields) -> Fields:
+    """Return fields in which those of the sets ``which`` are others; the rest is copied once."""
+    whole = {name: getattr(answer, name).copy() for name in NAMES}
+    for name in NAMES:
+        whole[name][which] = getattr(better, name)
+    return Fields(**whole)
 
 
 def _count_even(network: Network) -> int:

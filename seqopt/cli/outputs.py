@@ -1,0 +1,111 @@
+"""What commands write: folders that appear whole, apart from what the command reads."""
+
+from __future__ import annotations
+
+import argparse
+import io
+from collections.abc import Mapping
+from importlib.util import find_spec
+from pathlib import Path
+
+from seqopt.errors import FileError
+from seqopt.files import csv_text, require_apart, write_folder
+from seqopt.report.comparison import Comparison
+from seqopt.scene.scene_file import builtin_scenes
+
+
+def require_matplotlib(folder: Path) -> None:
+    """Raise an error unless figures can be drawn.
+
+    Parameters
+    ----------
+    folder : pathlib.Path
+        Where they are to be written.
+
+    Raises
+    ------
+    FileError
+        If the extra that draws them is not installed.
+    """
+    if find_spec("matplotlib") is None:
+        raise FileError(f"figures for {folder} need matplotlib: pip install matplotlib")
+
+
+def comparison_files(result: Comparison) -> dict[str, bytes | str]:
+    """Return the tables and figures of a comparison by file name.
+
+    Parameters
+    ----------
+    result : Comparison
+
+    Returns
+    -------
+    dict of str to (bytes or str)
+    """
+    from seqopt.report.charts import comparison_figures  # noqa: PLC0415  # matplotlib is an extra
+
+    files: dict[str, bytes | str] = {
+        "comparison.csv": result.table.to_csv(float_format="%.6g"),
+        **{f"steps_{name}.csv": csv_text(table) for name, table in result.tables.items()},
+    }
+    if result.ranks is not None:
+        files["published_ranks.csv"] = result.ranks.to_csv(index=False)
+    for name, figure in comparison_figures(result).items():
+        buffer = io.BytesIO()
+        figure.savefig(buffer, dpi=130)
+        files[name] = buffer.getvalue()
+    return files
+
+
+def write_outputs(options: argparse.Namespace, files: Mapping[str, bytes | str]) -> None:
+    """Write the folder that a command was asked for, whole.
+
+    Parameters
+    ----------
+    options : argparse.Namespace
+        With ``out``, the folder, and what the command reads.
+    files : mapping of str to (bytes or str)
+        By file name.
+
+    Raises
+    ------
+    FileError
+        If one would overwrite what the command reads, or the folder cannot be written.
+    """
+    require_apart([options.out / name for name in files], inputs(options))
+    write_folder(options.out, files)
+
+
+def keep_apart(options: argparse.Namespace, *outputs: Path | None) -> None:
+    """Raise an error if outputs are one file, or one that the command reads.
+
+    Parameters
+    ----------
+    options : argparse.Namespace
+        Of the command.
+    *outputs : pathlib.Path or None
+        What it is to write.
+
+    Raises
+    ------
+    FileError
+        Naming the file.
+    """
+    require_apart([path for path in outputs if path is not None], inputs(options))
+
+
+def inputs(options: argparse.Namespace) -> list[Path]:
+    """Return the files that a command reads.
+
+    Parameters
+    ----------
+    options : argparse.Namespace
+        Of the command.
+
+    Returns
+    -------
+    list of pathlib.Path
+    """
+    scene = None if options.scene in builtin_scenes() else options.scene
+    named = (scene, getattr(options, "plan", None), getattr(options, "schedule", None))
+    return [Path(name) for name in named if name is not None]

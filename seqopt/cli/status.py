@@ -1,0 +1,52 @@
+"""Exit statuses: what the end of a command says to the program that called it."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+from seqopt.cli.terminal import complain
+from seqopt.errors import InfeasibleError, MechanismError, SeqoptError, SolverError
+
+
+class Status(IntEnum):
+    """How a command ended."""
+
+    DONE = 0
+    DOES_NOT_HOLD = 1  # done, and something asked for does not hold
+    BAD_INPUT = 2
+    NO_ANSWER = 3  # infeasible, or a mechanism
+    FAILED = 4  # a solver, or memory; says nothing about the structure
+    INTERRUPTED = 130
+
+
+def status_of(error: BaseException) -> Status:
+    """Say in a line on standard error what went wrong, and return the exit status.
+
+    Parameters
+    ----------
+    error : BaseException
+        An error of seqopt, of the system, of memory, or an interrupt.
+
+    Returns
+    -------
+    Status
+    """
+    if isinstance(error, KeyboardInterrupt):
+        complain("seqopt: interrupted")
+        return Status.INTERRUPTED
+    if isinstance(error, MemoryError):
+        advice = "" if isinstance(error, SeqoptError) else f"; {LESS}"
+        complain(f"seqopt: out of memory: {error or 'no more is to be had'}{advice}")
+        return Status.FAILED
+    if isinstance(error, SolverError):
+        complain(f"seqopt: solver failed: {error}")
+        return Status.FAILED
+    if isinstance(error, OSError) and not isinstance(error, SeqoptError):
+        complain(f"seqopt: error: cannot write standard output: {error.strerror or error}")
+        return Status.BAD_INPUT
+    complain(f"seqopt: error: {error}")
+    none = isinstance(error, MechanismError | InfeasibleError)
+    return Status.NO_ANSWER if none else Status.BAD_INPUT
+
+
+LESS = "take robots that reach less, block nodes, or a computer with more memory"

@@ -1,0 +1,70 @@
+"""Where the command line writes: never over its input, never two results into one file."""
+
+from __future__ import annotations
+
+import os
+import stat
+from pathlib import Path
+
+import pytest
+
+from seqopt.cli.main import main
+
+PLAN = "step,type,bricks,rob1_node,rob2_node,rob3_node\n1,place,1,1,,\n"
+
+
+def refused(capsys, *words):
+    assert main(list(map(str, words))) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1
+    return error
+
+
+@pytest.mark.skipif(os.name != "posix", reason="devices are POSIX's")
+@pytest.mark.parametrize(
+    "words", [("analyze", "--method", "sequential", "--out"), ("scene", "--export")]
+)
+def test_a_device_is_no_output(capsys, words):
+    assert "device" in refused(capsys, *words, "/dev/null")
+    assert stat.S_ISCHR(Path("/dev/null").stat().st_mode)
+
+
+def test_two_outputs_are_two_files(capsys, tmp_path):
+    path = tmp_path / "out"
+    words = ("analyze", "--method", "sequential", "--out", path, "--fields", path)
+    assert "two outputs go there" in refused(capsys, *words)
+    assert not path.exists()
+
+
+def test_an_input_is_not_overwritten(capsys, tmp_path):
+    scene, plan = tmp_path / "plan.csv", tmp_path / "steps.csv"  # a scene under an output's name
+    assert main(["scene", "--export", str(scene)]) == 0
+    plan.write_text(PLAN, encoding="utf-8")
+    capsys.readouterr()
+    before = scene.read_bytes()
+    for words in (
+        ("scene", scene, "--export", scene),
+        ("analyze", "--plan", plan, "--out", plan),
+        ("analyze", "--plan", plan, "--fields", plan),
+        ("analyze", scene, "--plan", plan, "--out", scene),
+        ("assess", "--plan", plan, "--out", plan),
+        ("optimize", scene, "--formulation", "overlap_dp", "--out", tmp_path),
+    ):
+        assert "it is the input" in refused(capsys, *words)
+    assert scene.read_bytes() == before
+    assert plan.read_text(encoding="utf-8") == PLAN
+    assert len(list(tmp_path.iterdir())) == 2
+
+
+@pytest.mark.skipif(os.name != "posix", reason="pipes are POSIX's")
+def test_a_pipe_is_no_input(capsys, tmp_path):
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    for words in (("scene", pipe), ("analyze", "--plan", pipe), ("scene", "/dev/zero")):
+        assert "it is no regular file" in refused(capsys, *words)
+
+
+def test_a_failure_makes_no_folder(capsys, tmp_path):
+    words = ("optimize", "--formulation", "overlap_dp", "--limit", "F_largest=9")
+    assert main([*words, "--out", str(tmp_path / "new" / "out")]) != 0
+    assert not list(tmp_path.iterdir())

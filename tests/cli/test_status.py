@@ -1,0 +1,147 @@
+"""How a command ends: one table of statuses, and never a traceback."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from seqopt.cli import main as commands
+from seqopt.cli.main import main
+from seqopt.cli.status import Status
+from seqopt.scene.scene_file import load_scene, save_scene
+from tests.builders import ROOT
+
+posix = pytest.mark.skipif(os.name != "posix", reason="signals and devices are POSIX's")
+ANALYZE = ("analyze", "--method", "sequential")
+
+
+def shell(line):
+    """A line of the shell, in which ``seqopt`` is this one."""
+    program = f"{sys.executable} -W error -m seqopt"
+    return subprocess.run(
+        line.replace("seqopt", program),
+        shell=True,
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=ROOT,
+    )
+
+
+@posix
+@pytest.mark.parametrize(
+    ("line", "status", "said"),
+    [
+        ("seqopt analyze --method sequential | head -1 >&2", 0, "step,type,bricks"),
+        ("seqopt --help | true", 0, ""),
+        ("seqopt analyze --method sequential >/dev/full", 2, "No space left on device"),
+        ("seqopt --help >/dev/full", 2, "No space left on device"),
+        ("seqopt scene >/dev/full", 2, "No space left on device"),
+        ("seqopt analyze --method sequential >&-", 2, "standard output is closed"),
+        ("seqopt scene >&-", 2, "standard output is closed"),
+        ("seqopt scene arch52 2>&-", 2, ""),
+        ("seqopt scene arch52 2>/dev/full", 2, ""),
+        ("seqopt scene arch52 >&- 2>&- <&-", 2, ""),
+        ("PYTHONIOENCODING=ascii seqopt assess --help", 0, ""),
+    ],
+)
+def test_streams_that_are_closed_or_full(line, status, said):
+    done = shell(line)
+    assert done.returncode == status
+    assert said in done.stderr
+    assert "Traceback" not in done.stdout + done.stderr
+    assert "Exception ignored" not in done.stderr
+    notes = [line for line in done.stderr.splitlines() if not line.startswith("robots: ")]
+    assert len(notes) <= 1
+
+
+@posix
+def test_a_closed_stream_does_not_spoil_a_file(tmp_path):
+    out = tmp_path / "out.csv"
+    assert shell(f"seqopt analyze --method sequential --out {out} >&-").returncode == 0
+    assert out.read_text(encoding="utf-8").startswith("step,type")
+    assert "written" not in out.read_text(encoding="utf-8")
+
+
+@posix
+@pytest.mark.parametrize("which", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize("after", [0.3, 1.5])
+def test_an_interrupt_is_one_line(tmp_path, which, after):
+    words = ["assess", "--method", "sequential", "--out", str(tmp_path / "out.csv")]
+    program = subprocess.Popen(
+        [sys.executable, "-m", "seqopt", *words],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        cwd=ROOT,
+    )
+    time.sleep(after)
+    program.send_signal(which)
+    out, err = program.communicate(timeout=30)
+    assert (program.returncode, out, err) == (130, "", "seqopt: interrupted\n")
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("error", "status", "said"),
+    [
+        (KeyboardInterrupt(), Status.INTERRUPTED, "seqopt: interrupted"),
+        (MemoryError("Unable to allocate 5 GiB"), Status.FAILED, "Unable to allocate 5 GiB; take"),
+        (OSError(28, "No space left on device"), Status.BAD_INPUT, "standard output: No space"),
+    ],
+)
+def test_what_ends_a_command_is_one_line(capsys, monkeypatch, error, status, said):
+    def fails(options):
+        raise error
+
+    monkeypatch.setitem(commands.COMMANDS, "scene", fails)
+    assert main(["scene"]) == status
+    err = capsys.readouterr().err
+    assert said in err
+    assert err.count("\n") == 1
+
+
+def test_statuses():
+    """The table of docs/command_line.md is this one."""
+    page = Path(ROOT, "docs", "command_line.md").read_text(encoding="utf-8")
+    rows = [line.split("|")[1].strip() for line in page.splitlines() if line.startswith("| ")]
+    assert [row for row in rows if row.isdigit()] == [str(status.value) for status in Status]
+
+
+@pytest.mark.parametrize(
+    ("words", "status"),
+    [
+        ((*ANALYZE,), 0),
+        ((*ANALYZE, "--strict"), 1),  # rob2 would hold 406 N of 392 N
+        (("analyze", "--method", "cantilever", "--strict"), 1),
+        (("compare", "--strict"), 1),
+    ],
+)
+def test_strict_asks_for_payloads(capsys, words, status):
+    assert main(list(words)) == status
+    err = capsys.readouterr().err
+    assert ("seqopt: payload exceeded: rob2 holds up to" in err) == (status == 1)
+
+
+@pytest.mark.parametrize(("limits", "status"), [((), 0), (("--limit", "F_largest=300"), 0)])
+def test_strict_is_content_where_payloads_hold(capsys, tmp_path, limits, status):
+    words = ("optimize", "--formulation", "overlap_dp", "--strict", "--out", str(tmp_path / "o"))
+    assert main([*words, *limits]) == status
+
+
+def test_a_mechanism_has_no_answer(capsys, tmp_path):
+    plan = tmp_path / "plan.csv"
+    plan.write_text("step,type,bricks,rob1_node\n1,place,1,1\n", encoding="utf-8")
+    arch = load_scene("arch25")
+    loose = replace(arch.grounds[0], translational_stiffness=(0.0, 0.0, 0.0))
+    grounds = (replace(loose, rotational_stiffness=(0.0, 0.0, 0.0)), arch.grounds[1])
+    save_scene(replace(arch, grounds=grounds, robots=arch.robots[:1]), tmp_path / "s.json")
+    assert main(["analyze", str(tmp_path / "s.json"), "--plan", str(plan)]) == Status.NO_ANSWER
+    assert "nothing resists" in capsys.readouterr().err

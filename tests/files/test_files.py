@@ -1,0 +1,192 @@
+"""Files: written whole or not at all, to regular files only, and read only if they end."""
+
+from __future__ import annotations
+
+import os
+import stat
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+from seqopt import files
+from seqopt.errors import FileError
+from seqopt.files import read_text, require_apart, require_folder, write_folder, write_text
+
+posix = pytest.mark.skipif(os.name != "posix", reason="links, modes and pipes are POSIX's")
+
+
+def names(folder):
+    """Everything in a folder, hidden files too."""
+    return sorted(path.name for path in folder.rglob("*"))
+
+
+@posix
+def test_a_device_stays_a_device(tmp_path):
+    """`--out /dev/null` replaced it, as root, by a file."""
+    for path in (Path("/dev/null"), tmp_path / "null"):
+        if path.parent == tmp_path:
+            path.symlink_to("/dev/null")
+        with pytest.raises(FileError, match="null: it is a device or pipe; name a regular file"):
+            write_text(path, "x")
+    assert stat.S_ISCHR(Path("/dev/null").stat().st_mode)
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(FileError, match="device or pipe"):
+        write_text(tmp_path / "pipe", "x")
+    assert stat.S_ISFIFO((tmp_path / "pipe").stat().st_mode)
+
+
+@posix
+def test_a_link_is_followed_and_a_mode_is_kept(tmp_path):
+    target, link = tmp_path / "target", tmp_path / "link"
+    target.write_text("old", encoding="utf-8")
+    target.chmod(0o640)
+    link.symlink_to(target)
+    write_text(link, "new")
+    assert link.is_symlink()
+    assert target.read_text(encoding="utf-8") == "new"
+    assert stat.S_IMODE(target.stat().st_mode) == 0o640
+    assert names(tmp_path) == ["link", "target"]
+
+
+def test_a_folder_is_no_file(tmp_path):
+    with pytest.raises(FileError, match="it is a folder"):
+        write_text(tmp_path, "x")
+
+
+@pytest.mark.parametrize("length", [246, 255])
+def test_a_long_name_is_a_name(tmp_path, length):
+    path = tmp_path / ("x" * length)
+    write_text(path, "text")
+    assert read_text(path) == "text"
+    with pytest.raises(FileError, match="too long"):
+        write_text(tmp_path / ("x" * 256), "text")
+
+
+@posix
+@pytest.mark.parametrize("kind", ["pipe", "device", "folder"])
+def test_what_does_not_end_is_not_read(tmp_path, kind):
+    path = {"pipe": tmp_path / "pipe", "device": Path("/dev/zero"), "folder": tmp_path}[kind]
+    if kind == "pipe":
+        os.mkfifo(path)
+    found = []
+
+    def read():
+        with pytest.raises(FileError, match="no regular file"):
+            read_text(path)
+        found.append(kind)
+
+    thread = threading.Thread(target=read, daemon=True)
+    thread.start()
+    thread.join(5)
+    assert found == [kind]
+
+
+def test_a_file_that_is_too_large_is_not_read(tmp_path, monkeypatch):
+    monkeypatch.setattr(files, "LARGEST_INPUT", 10)
+    path = tmp_path / "large"
+    path.write_text("x" * 11, encoding="utf-8")
+    with pytest.raises(FileError, match="more than 1e-05 MB; name a smaller one"):
+        read_text(path)
+    path.write_text("x" * 10, encoding="utf-8")
+    assert read_text(path) == "x" * 10
+
+
+def test_what_is_no_text_is_refused(tmp_path):
+    (tmp_path / "bytes").write_bytes(b"\xff")
+    with pytest.raises(FileError, match="not UTF-8 text"):
+        read_text(tmp_path / "bytes")
+    with pytest.raises(FileError, match="half a character"):
+        write_text(tmp_path / "half", "\ud800")
+    with pytest.raises(FileError, match="null"):
+        read_text(tmp_path / "a\0b")
+    assert names(tmp_path) == ["bytes"]
+
+
+def test_outputs_and_inputs_are_apart(tmp_path):
+    first, second = tmp_path / "a", tmp_path / "b"
+    require_apart([first, second])
+    with pytest.raises(FileError, match="a: two outputs go there"):
+        require_apart([first, tmp_path / "." / "a"])
+    with pytest.raises(FileError, match="a: it is the input"):
+        require_apart([first], [first])
+    first.touch()
+    second.symlink_to(first)
+    with pytest.raises(FileError, match="b: two outputs go there"):
+        require_apart([first, second])
+
+
+FILES = {"one": "1", "two": b"2", "three": "3"}
+
+
+def broken_at(monkeypatch, count):
+    """Let writing fail after some files."""
+    stage = files._stage
+    staged = []
+
+    def fails(path, content):
+        if len(staged) == count:
+            raise OSError(28, "No space left on device")
+        staged.append(path)
+        return stage(path, content)
+
+    monkeypatch.setattr(files, "_stage", fails)
+
+
+@pytest.mark.parametrize("there", [True, False])
+@pytest.mark.parametrize("count", [0, 1, 2])
+def test_a_folder_appears_whole_or_not_at_all(tmp_path, monkeypatch, there, count):
+    folder = tmp_path / "new" / "out"
+    before = {"one": "old"}
+    if there:
+        write_folder(folder, before)
+    broken_at(monkeypatch, count)
+    with pytest.raises(FileError, match="No space left on device"):
+        write_folder(folder, FILES)
+    assert names(tmp_path) == (["new", "one", "out"] if there else ["new"])
+    monkeypatch.undo()
+    write_folder(folder, FILES)
+    assert names(folder) == sorted(FILES)
+    assert (folder / "one").read_text(encoding="utf-8") == "1"
+    assert names(tmp_path) == sorted(["new", "out", *FILES])
+
+
+@posix
+def test_a_new_folder_is_as_open_as_any(tmp_path):
+    (tmp_path / "any").mkdir()
+    write_folder(tmp_path / "new", FILES)
+    modes = {(tmp_path / name).stat().st_mode for name in ("any", "new")}
+    assert len(modes) == 1
+
+
+def test_other_files_of_a_folder_stay(tmp_path):
+    (tmp_path / "mine").write_text("mine", encoding="utf-8")
+    write_folder(tmp_path, FILES)
+    assert names(tmp_path) == sorted([*FILES, "mine"])
+
+
+def test_nobody_sees_a_part_of_a_new_folder(tmp_path):
+    """Watched by another thread while it is written."""
+    seen, done = set(), threading.Event()
+
+    def watch():
+        while not done.is_set():
+            if (tmp_path / "out").exists():
+                seen.add(tuple(names(tmp_path / "out")))
+
+    thread = threading.Thread(target=watch)
+    thread.start()
+    write_folder(tmp_path / "out", {str(i): "x" * 100_000 for i in range(30)})
+    time.sleep(0.01)
+    done.set()
+    thread.join()
+    assert seen == {tuple(sorted(map(str, range(30))))}
+
+
+def test_a_folder_that_cannot_be_is_refused_early(tmp_path):
+    (tmp_path / "file").touch()
+    require_folder(tmp_path / "new" / "out")
+    with pytest.raises(FileError, match="file is no folder"):
+        require_folder(tmp_path / "file" / "out")
+    assert names(tmp_path) == ["file"]

@@ -1,0 +1,136 @@
+"""Robots' columns and responses collide with nothing, whatever the robots are called."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from seqopt.cli.main import main
+from seqopt.cli.values import parse_criterion, parse_limits
+from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.network.build import build_network
+from seqopt.placement.budgets import robot_use
+from seqopt.placement.problem import pose
+from seqopt.placement.requirements import Limit, payload_limits
+from seqopt.placement.solving import solve
+from seqopt.report.comparison import compare
+from seqopt.responses.choices import CHOICE_RESPONSES
+from seqopt.responses.quantities import RESPONSES, robot_response
+from seqopt.responses.table import analyze
+from seqopt.scene.scene_file import save_scene
+from seqopt.sequence.three_robots import three_robot_loop
+from seqopt.sequence.two_robots import sequential
+from seqopt.study.presets import EQUATIONS, WORST_RATIO
+from tests.builders import six_bricks
+
+NAMES = [
+    "sup",
+    "sup_6",
+    "max",
+    "min",
+    "avg",
+    "move",
+    "largest",
+    "each",
+    "rob",
+    "[sup]",
+    "a,b",
+    "a=b",
+    "]",
+]
+EVERY = replace(EQUATIONS, before=(("F_each", 1.0),), after=(("F_each", 1.0),))
+
+
+def called(*names):
+    """The arch of six bricks with robots of other names and payloads that bind."""
+    scene = six_bricks()
+    robots = [replace(r, name=n, payload=20.0) for n, r in zip(names, scene.robots, strict=True)]
+    return replace(scene, robots=tuple(robots))
+
+
+def posed(scene, criterion, **more):
+    network = build_network(scene)
+    return pose(ComplianceEngine(network), three_robot_loop(network), criterion, **more)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_name_changes_no_number(name):
+    plain, odd = called("one", "two", "three"), called(name, "two", "three")
+    tables = []
+    for scene in (plain, odd):
+        network = build_network(scene)
+        tables.append(analyze(ComplianceEngine(network), sequential(network)))
+    assert len(tables[0].columns) == len(set(tables[1].columns))
+    for first, second in zip(tables[0], tables[1], strict=True):
+        pd.testing.assert_series_equal(tables[0][first], tables[1][second], check_names=False)
+    assert {response.column for response in RESPONSES.values()} <= set(tables[1])
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("criterion", [EVERY, EQUATIONS, WORST_RATIO], ids=lambda c: c.name)
+def test_a_name_changes_no_choice(name, criterion):
+    also = ("F_move", "F_largest", "T_max", "M_sup", "F_sup", "F_min", "F_avg")[:4]
+    scenes = called("one", "two", "three"), called("one", name, "three")
+    plain, odd = (posed(scene, criterion, also=also) for scene in scenes)
+    for first, second in zip(plain.sums.single, odd.sums.single, strict=True):
+        np.testing.assert_array_equal(first, second)
+    for first, second in zip(plain.evaluation.steps, odd.evaluation.steps, strict=True):
+        for response in also:
+            np.testing.assert_array_equal(first.responses[response], second.responses[response])
+    chosen = solve(plain, "overlap_dp"), solve(odd, "overlap_dp")
+    assert chosen[0].selection == chosen[1].selection
+    assert len(chosen[0].alternatives().columns) == len(chosen[1].alternatives().columns)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_name_hides_no_overload(name):
+    scene = called("one", name, "three")
+    notes = compare(ComplianceEngine(build_network(scene)), EQUATIONS).notes
+    assert any(f"sequential: {name} holds up to" in note for note in notes)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_limits_and_budgets_mean_the_robot(name):
+    scene = called("one", name, "three")
+    limits = payload_limits(scene)
+    assert limits[1] == Limit(robot_response(name), 20.0)
+    problem = posed(scene, EQUATIONS, limits=limits, also=(robot_response(name),))
+    own = [step.responses[robot_response(name)] for step in problem.evaluation.steps]
+    budget = robot_use(problem, name, 0.0, 99.0)
+    assert sum(a.sum() for a in (*budget.single, *budget.shared)) == sum((a > 0).sum() for a in own)
+
+
+@given(first=st.text(max_size=4), second=st.text(max_size=4))
+def test_no_two_robots_share_a_name(first, second):
+    taken = {*RESPONSES, *CHOICE_RESPONSES, "F_each", "F_rob", "F_max"}
+    assert robot_response(first) not in taken
+    assert (robot_response(first) == robot_response(second)) == (first == second)
+
+
+@pytest.mark.parametrize("name", ["rob1", "robot 2", "Roboter-Ä"])
+def test_names_as_they_were(name):
+    assert robot_response(name) == f"F_{name}"
+
+
+@pytest.mark.parametrize("name", ["sup", "a,b", "a=b", "[sup"])
+def test_words_of_the_command_line(name):
+    text = robot_response(name)
+    assert parse_limits([f"{text}=300"], six_bricks()) == (Limit(text, 300.0),)
+    criterion = parse_criterion(f"T_max,{text}=2,M_sup")
+    assert criterion.before == (("T_max", 1.0), (text, 2.0), ("M_sup", 1.0))
+
+
+def test_the_command_line_offers_them(capsys, tmp_path):
+    save_scene(called("sup", "max", "each"), tmp_path / "s.json")
+    words = ["optimize", str(tmp_path / "s.json"), "--formulation", "overlap_dp"]
+    out = ["--out", str(tmp_path / "out")]
+    assert main([*words, *out, "--limit", "F_sup=9"]) == 2
+    assert "F_[each], F_[max], F_[sup]" in capsys.readouterr().err
+    assert main([*words, *out, "--criteria", "F_[sup],T_max", "--limit", "F_[max]=900"]) == 0
+    table = pd.read_csv(tmp_path / "out" / "plan.csv")
+    assert {"F_sup_N", "F_[sup]_N", "F_max_N", "F_[max]_N"} <= set(table)

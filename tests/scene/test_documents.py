@@ -1,0 +1,80 @@
+"""Scene files that are no scenes, however they are broken: one line each."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from seqopt.errors import SceneError
+from seqopt.scene.parts import Joint, Robot
+from seqopt.scene.scene_file import dump_scene, load_scene, parse_scene
+from tests.builders import six_bricks
+
+TEXT = dump_scene(six_bricks())
+
+
+def changed(change):
+    document = json.loads(TEXT)
+    change(document)
+    return json.dumps(document)
+
+
+def renamed(document, name):
+    document["bricks"][0]["name"] = document["build_order"][0] = name
+    document["joints"][0]["bricks"][0] = document["grounds"][0]["brick"] = name
+
+
+@pytest.mark.parametrize(
+    ("text", "named"),
+    [
+        ("[" * 100_000, "nested too deep"),
+        (TEXT[:-2] + ',"x":' + "[" * 100_000 + "]" * 100_000 + "}", "nested too deep"),
+        (TEXT.replace("2420.0", "9" * 5000), "too many digits"),
+        (changed(lambda d: d["bricks"][0].update(density=10**400)), "brick 1: density is 1000"),
+        (changed(lambda d: d["bricks"][0].update(position=[10**400, 0, 0])), "position is .1000"),
+        (changed(lambda d: renamed(d, 10**400)), "brick: its name is 1000"),
+        (changed(lambda d: d["bricks"][1].update(nodes=[10**30, 3])), "brick 2: nodes is 1000"),
+        (changed(lambda d: d.update(name="\ud800")), "scene: its name is '.ud800'"),
+        (changed(lambda d: d["robots"][0].update(name="\ud800")), "robot: its name is '.ud800'"),
+        (changed(lambda d: d.update(name="\x1b[2J")), "scene: its name is '.x1b.2J'"),
+        (changed(lambda d: d["robots"][0].update(name="a\u202eb")), "robot: its name"),
+        (TEXT[:-2] + ',"name":"other"}', "key 'name' stands twice in one object; keep one"),
+        (TEXT.replace('"density": 2420.0', '"density": 1, "density": 2'), "'density' stands twice"),
+    ],
+)
+def test_one_line_says_what_is_wrong(text, named):
+    with pytest.raises(SceneError, match=named) as caught:
+        parse_scene(text, "broken.json")
+    assert "\n" not in str(caught.value)
+    assert len(str(caught.value)) < 400
+
+
+def test_numbers_that_are_whole_are_names():
+    text = changed(lambda d: d["bricks"][1].update(nodes=[2.0, 3.0], placing_node=3.0))
+    assert parse_scene(text).bricks[1].nodes == (2, 3)
+    assert all(isinstance(node, int) for node in parse_scene(text).bricks[1].nodes)
+
+
+def test_a_mark_at_the_start_is_no_content(tmp_path):
+    """Editors and spreadsheets write it; text has none."""
+    path = tmp_path / "scene.json"
+    path.write_text(TEXT, encoding="utf-8-sig")
+    assert load_scene(str(path)) == six_bricks()
+
+
+def test_a_name_that_is_too_long_is_no_scene():
+    with pytest.raises(SceneError, match="no such built-in scene or file"):
+        load_scene("x" * 5000)
+
+
+@pytest.mark.parametrize(("part", "value"), [("bricks", (1.5, 2)), ("bricks", 3), ("bricks", "12")])
+def test_parts_want_whole_numbers(part, value):
+    joint = six_bricks().joints[0]
+    with pytest.raises(SceneError, match=r"give .*whole number"):
+        Joint(**{**vars(joint), part: value})
+
+
+def test_a_number_of_thousands_of_digits_can_be_told():
+    with pytest.raises(SceneError, match="a number of thousands of digits"):
+        Robot(name="rob", payload=10**5000)

@@ -1,0 +1,119 @@
+"""What is given in Python in another form: what is meant is taken, or what is wanted is said."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import seqopt
+from seqopt.cli.values import parse_options
+from seqopt.engines.auto import AutoEngine
+from seqopt.engines.discrete.engine import DiscreteEngine
+from seqopt.engines.frame import FrameEngine
+from seqopt.engines.planar import PlanarEngine
+from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.errors import SeqoptError
+from seqopt.placement.certificate import judge
+from seqopt.placement.solving import require_fit
+from seqopt.scene.parts import Robot
+from seqopt.scene.reach import Anywhere
+from tests.builders import six_bricks
+
+SCENE = six_bricks()
+FLAT = six_bricks("V")
+NETWORK = seqopt.build_network(SCENE)
+ENGINE = ComplianceEngine(NETWORK)
+LOOP = seqopt.three_robot_loop(NETWORK)
+EQUATIONS = seqopt.CRITERIA["equations-2-3"]
+PROBLEM = seqopt.pose(ENGINE, LOOP, EQUATIONS)
+
+
+@pytest.mark.parametrize(
+    "engine", [ComplianceEngine, FrameEngine, PlanarEngine, DiscreteEngine, AutoEngine]
+)
+def test_engines_take_a_scene(engine):
+    made = engine(FLAT)
+    held = np.array([[2]])
+    expected = engine(seqopt.build_network(FLAT)).solve(2, held)
+    assert made.solve(2, held) == expected
+
+
+@pytest.mark.parametrize(
+    "method",
+    [seqopt.sequential, seqopt.cantilever, seqopt.three_robot_loop, seqopt.modified_sequential],
+)
+def test_methods_take_a_scene(method):
+    assert method(SCENE) == method(NETWORK)
+
+
+def test_what_is_meant_is_taken(tmp_path):
+    assert Robot(name="r", payload=1.0, reach="anywhere").reach == Anywhere()
+    assert seqopt.make_engine("discrete", SCENE, "dry").network.scene == SCENE
+    steps = seqopt.sequential(SCENE)[:2]
+    dry = seqopt.assess_steps(SCENE, steps, "dry")
+    assert dry == seqopt.assess_steps(NETWORK, steps, seqopt.DRY)
+    limit = seqopt.Limit("T_max", 1e6)
+    assert seqopt.pose(ENGINE, LOOP, EQUATIONS, limit).limits == (limit,)
+    selection = seqopt.formulations()["overlap_dp"].solve(PROBLEM)
+    assert judge(PROBLEM, selection, "overlap_dp").gap == 0.0
+    require_fit(PROBLEM, "beam", {"width": 3})
+    assert parse_options("beam", ["width=3"]) == {"width": 3}
+    path = tmp_path / "scene.json"
+    seqopt.save_scene(SCENE, str(path))  # type: ignore[arg-type]
+    assert seqopt.load_scene(path) == SCENE
+    assert seqopt.optimize(path).nodes == seqopt.optimize(SCENE).nodes
+    (tmp_path / "plan.csv").write_text(
+        "step,type,bricks,rob1_node,rob2_node,rob3_node\n1,place,1,1,,\n", encoding="utf-8"
+    )
+    assert len(seqopt.read_plan(SCENE, str(tmp_path / "plan.csv"))) == 1  # type: ignore[arg-type]
+
+
+WRONG = {
+    "a float is no network": lambda: ComplianceEngine(3.0),
+    "a str is no network": lambda: seqopt.sequential("arch25"),
+    "a NoneType is no network": lambda: seqopt.make_engine("auto", None),
+    "a Network is no scene": lambda: seqopt.build_network(NETWORK),
+    "a str is no scene": lambda: seqopt.build_network("arch25"),
+    "a int is no name of a scene": lambda: seqopt.load_scene(25),
+    "mortar 'glue': give a Mortar, or one of": lambda: seqopt.make_engine("auto", SCENE, "glue"),
+    "robot r: reach is 'far'; give Anywhere": lambda: Robot(name="r", payload=1.0, reach="far"),
+    "robot r: reach is 3; give": lambda: Robot(name="r", payload=1.0, reach=3),
+    "robot: its name is 3": lambda: Robot(name=3, payload=1.0),
+    "is no engine; take one of": lambda: seqopt.pose(NETWORK, LOOP, EQUATIONS),
+    "is no schedule; take one of": lambda: seqopt.pose(ENGINE, seqopt.sequential, EQUATIONS),
+    "'weighted' is no criterion": lambda: seqopt.pose(ENGINE, LOOP, "weighted"),
+    "a Schedule is no problem": lambda: seqopt.solve(LOOP, "overlap_dp"),
+    "a int is no formulation": lambda: seqopt.solve(PROBLEM, 3),
+    "formulation 'simplex'": lambda: seqopt.solve(PROBLEM, "simplex"),
+    "a Network is no engine": lambda: seqopt.analyze(NETWORK, seqopt.sequential(NETWORK)),
+    "a Schedule is no sequence of steps": lambda: seqopt.analyze(ENGINE, LOOP),
+    "a list is no sequence of steps": lambda: seqopt.assess_steps(NETWORK, [1], seqopt.DRY),
+    "limit 3 of 'much'": lambda: seqopt.Limit(3, "much"),
+    "its bound is NaN": lambda: seqopt.Limit("T_max", np.nan),
+    "arch: pitch is 3": lambda: seqopt.ArchShape(pitch=3),
+    "arch: roll is 'left'": lambda: seqopt.ArchShape(pitch=[1.0], roll="left"),
+    "a list is no shape of an arch": lambda: seqopt.arch_scene([1.0, 0.5]),
+    "scene: bricks: 3 is none; give each as Brick": lambda: seqopt.Scene(
+        **{k: v for k, v in vars(SCENE).items() if k in SCENE.__dataclass_fields__} | {"bricks": 3}
+    ),
+    "scene: robots: 'rob1' is none; give each as Robot": lambda: seqopt.Scene(
+        **{k: v for k, v in vars(SCENE).items() if k in SCENE.__dataclass_fields__}
+        | {"robots": ["rob1"]}
+    ),
+}
+
+
+@pytest.mark.parametrize("said", WRONG)
+def test_what_is_wanted_is_said(said):
+    with pytest.raises(SeqoptError) as caught:
+        WRONG[said]()
+    assert said in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_tables_are_not_changed_by_it():
+    steps = seqopt.sequential(NETWORK)
+    pd.testing.assert_frame_equal(
+        seqopt.analyze(ENGINE, steps), seqopt.analyze(ENGINE, list(steps))
+    )
