@@ -156,7 +156,7 @@ def lost_to_rounding(values: Floats) -> bool:
     -------
     bool
     """
-    return len(values) > 0 and not values[0] >= ROUNDING * values[-1]
+    return len(values) > 0 and not values[0] > ROUNDING * values[-1]  # all may be zero
 
 
 def resisting_modes(matrix: Floats, forbidden: Floats) -> tuple[Floats, Floats, Floats]:
