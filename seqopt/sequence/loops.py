@@ -99,8 +99,7 @@ def robot_loop(network: Network | Scene, robots: int | Sequence[str] = ()) -> Sc
     >>> robot_loop(network, 2).method
     'two-robot'
     """
-    network = network_of(network)
-    scene = network.scene
+    scene = (network := network_of(network)).scene
     names = () if isinstance(robots, int) else tuple(robots)
     count = robots if isinstance(robots, int) else len(names) or len(scene.robots)
     if count <= 2:

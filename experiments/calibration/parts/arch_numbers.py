@@ -83,9 +83,9 @@ def scene_of(numbers: Floats, groups: Sequence[Free]) -> Scene:
         np.exp(part[f"log_{kind}_stiffness"]) for kind in ("translational", "rotational")
     )
     shape = ArchShape(
-        pitch=pitch.tolist(),
-        roll=roll.tolist(),
-        yaw=yaw.tolist(),
+        pitch=_within_a_turn(pitch),
+        roll=_within_a_turn(roll),
+        yaw=_within_a_turn(yaw),
         offset=part.get("offset", np.zeros(BRICKS)).tolist(),
         gap=float(part["gap"][0]),
         overhang=float(part["overhang"][0]),
@@ -94,6 +94,12 @@ def scene_of(numbers: Floats, groups: Sequence[Free]) -> Scene:
         rotational_stiffness=(float(angular[0]), float(angular[-1]), float(angular[-1])),
     )
     return arch_scene(shape, "arch25", robots=ROBOTS, line_nodes=LINE_NODES, provenance=PROVENANCE)
+
+
+def _within_a_turn(angles: Floats) -> list[float]:
+    """Return the same directions by the smallest angles, for a search may step beyond a turn."""
+    turns: list[float] = (angles - 2 * np.pi * np.round(angles / (2 * np.pi))).tolist()
+    return turns
 
 
 def starting_guess() -> Floats:
