@@ -136,6 +136,26 @@ def hinged(scene, joint):
     return replace(scene, joints=tuple(joints))
 
 
+def torsion_free(scene, joint):
+    """The scene with one joint that does not resist turning about its first axis."""
+    joints = list(scene.joints)
+    _, b, c = joints[joint].rotational_stiffness
+    joints[joint] = replace(joints[joint], rotational_stiffness=(0.0, b, c))
+    return replace(scene, joints=tuple(joints))
+
+
+def on_soft_ground(scene, turning):
+    """The scene on a first ground end of that rotational stiffness, N m/rad."""
+    first, *others = scene.grounds
+    soft = replace(first, rotational_stiffness=(turning, turning, turning))
+    return replace(scene, grounds=(soft, *others))
+
+
+def all_nodes(net, bricks):
+    """All nodes of the bricks placed, as one grip set."""
+    return [[int(net.node_name[i]) for i in net.inner[:bricks].ravel()]]
+
+
 def far_reaching(scene):
     """The scene with robots on their sides that reach across whatever the arch does."""
     robots = tuple(

@@ -106,6 +106,29 @@ def states(draw, scenes=None, max_grips=3):
 
 
 @st.composite
+def loosened(draw, scenes):
+    """A scene some of whose joints are missing, or have no stiffness in some directions."""
+    scene = draw(scenes)
+    joints = []
+    for joint in scene.joints:
+        kind = draw(st.sampled_from(["kept", "kept", "kept", "torsion", "hinge", "any", "missing"]))
+        slack = {"torsion": (0,), "hinge": (0, 1, 2)}.get(kind, ())
+        if kind == "any":
+            slack = draw(st.sets(st.integers(0, 5)))
+        own = [*joint.rotational_stiffness, *joint.translational_stiffness]
+        own = [0.0 if i in slack else k for i, k in enumerate(own)]
+        if kind != "missing":
+            joints.append(
+                replace(
+                    joint,
+                    rotational_stiffness=tuple(own[:3]),
+                    translational_stiffness=tuple(own[3:]),
+                )
+            )
+    return replace(scene, joints=tuple(joints))
+
+
+@st.composite
 def flat_arches(draw):
     """An arch whose bricks all lie along it, in one plane that is turned about the vertical."""
     count = draw(st.integers(2, 7))

@@ -45,12 +45,6 @@ def chain(count: int) -> Network:
     return build_network(arch_scene(ArchShape(pitch=np.linspace(1.4, -0.2, count), closed=False)))
 
 
-def tree_of(net: Network) -> SpanningTree:
-    tree = grow_tree(net)
-    assert tree is not None
-    return tree
-
-
 def engines_side_by_side(sets: int, models: int, rounds: int) -> dict[str, float]:
     """Return seconds per grip set of both engines and their ratio, in turns."""
     net = build_network(load_scene("arch25"))
@@ -89,7 +83,7 @@ def preparation(rounds: int) -> float:
 
     def prepare() -> None:
         net = build_network(load_scene("arch25"))
-        builder = OperatorBuilder(net, tree_of(net))
+        builder = OperatorBuilder(net, grow_tree(net))
         for bricks in range(1, 26):
             builder.operator(bricks)
 
@@ -105,7 +99,7 @@ def growth(counts: list[int], rounds: int) -> pd.DataFrame:
     rows = []
     for count in counts:
         net = chain(count)
-        tree = tree_of(net)
+        tree = grow_tree(net)
         repeat = rounds if count <= 200 else 1
         build = best(
             lambda net=net, tree=tree, n=count: OperatorBuilder(net, tree).operator(n), repeat

@@ -2,8 +2,9 @@
 
 Two questions are kept apart. The backward error says whether the fields answer a problem next to
 the one that was asked; a long chain may be solved well although its condition is huge and the plain
-residual, relative to the load, looks like failure. The smallest eigenvalue of the stiffness, scaled
-by its diagonal, says whether the structure resists every motion at all.
+residual, relative to the load, looks like failure. Whether the structure resists every motion at
+all is asked of the ties that springs and grips are, however soft; the smallest eigenvalue of the
+stiffness, scaled by its diagonal, says how well it does.
 """
 
 from __future__ import annotations
@@ -15,13 +16,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from seqopt.arrays import Floats, FrozenValue
-from seqopt.engines.eigenvalues import UNRESISTED, spectrum
+from seqopt.engines.eigenvalues import spectrum
 from seqopt.engines.interface import Engine, Want, grip_columns
 from seqopt.engines.residuals import Residuals, residual
+from seqopt.engines.rigid.mechanism import free_motion
 from seqopt.engines.rigid.mixed import solve_mixed
 from seqopt.errors import MechanismError, SolverError
 from seqopt.network.network import Network
 
+LOOKED_INTO = 1e-15  # a smallest scaled eigenvalue below which a motion may be free
 WELL = 1e-9  # largest backward error of fields that keep the nine digits an engine promises
 
 
@@ -44,7 +47,7 @@ class Diagnosis(FrozenValue):
     residuals : Residuals or None
         None if the engine refused.
     smallest_eigenvalue : float
-        Of the constrained stiffness scaled by its diagonal, without unit.
+        Of the constrained stiffness scaled by its diagonal, without unit; 0 of a mechanism.
     condition : float
         Largest over smallest scaled eigenvalue.
     mode : (b, 6) float
@@ -90,6 +93,9 @@ def diagnose(source: Engine | Network, bricks: int, grips: ArrayLike) -> Diagnos
     numbers = np.array(grips, dtype=np.int64).reshape(1, -1)
     columns = grip_columns(network, bricks, numbers)
     lowest, condition, mode = spectrum(network, bricks, columns[0])
+    free = free_motion(network, bricks, columns[0]) if lowest < LOOKED_INTO else None
+    if free is not None:
+        lowest, condition, mode = 0.0, np.inf, free
     residuals, refusal = None, None
     try:
         if isinstance(source, Network):
@@ -109,9 +115,8 @@ def _judge(
     residuals: Residuals | None,
     refusal: MechanismError | SolverError | None,
 ) -> tuple[Finding, str]:
-    if lowest < UNRESISTED:
-        text = f"smallest scaled eigenvalue {lowest:.1e}, below {UNRESISTED:g}: the mode meets"
-        return Finding.MECHANISM, f"{text} no resistance"
+    if not lowest:
+        return Finding.MECHANISM, "joints, ground and grips leave the mode free: nothing resists it"
     if residuals is None:
         return Finding.ILL_CONDITIONED, f"condition {condition:.1e}; the engine refused: {refusal}"
     error = residuals.backward_error

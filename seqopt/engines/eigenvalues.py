@@ -7,10 +7,15 @@ from scipy import sparse
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from seqopt.arrays import Floats, Ints
-from seqopt.engines.rigid.mixed import MixedSystem, factorize, mixed_system, ungripped_system
+from seqopt.engines.rigid.mixed_system import (
+    MixedSystem,
+    factorize,
+    mixed_system,
+    ungripped_system,
+)
 from seqopt.network.network import Network
 
-UNRESISTED = 1e-17  # smallest scaled eigenvalue of a structure that resists every motion
+UNRESISTED = 1e-17  # a scaled eigenvalue below this is found by a shift
 LEAST_DIAGONAL = 1e-13  # over the largest: by it a motion without stiffness is scaled
 SHIFT = 1e-15  # added to the scaled stiffness of a mechanism to find its mode
 EIGENVALUE_TOLERANCE = 1e-6  # relative

@@ -24,9 +24,11 @@ class Residuals:
     equilibrium : float
         Force or moment left on a brick over the largest sum of magnitudes on one.
     joints : float
-        Wrench of a joint less stiffness times deformation, over the sum of the magnitudes in it.
+        Wrench of a joint less stiffness times deformation, over the sum of the magnitudes in it, or
+        over the weight of a brick where they are smaller.
     grips : float
-        Motion of a held node over the largest motion of any brick.
+        Motion of a held node over the largest motion of any brick, or over what the weight of a
+        brick does to the stiffest joint where all are smaller.
     plain : float
         Stiffness times motions less load, over the load: no measure of quality, shown to compare.
     """
@@ -61,8 +63,7 @@ def residual(network: Network, bricks: int, columns: Ints, fields: Fields) -> Re
     """
     springs, center = network.springs, network.centroid[:bricks]
     acting = springs.acting(bricks)
-    bodies, at = springs.bodies[acting], springs.position[acting]
-    axes = springs.axes[acting]
+    bodies, at, axes = springs.bodies[acting], springs.position[acting], springs.axes[acting]
     raw = springs.stiffness[acting]
     wrench, twist = fields.joint_wrench[0, acting], fields.brick_twist[0]
     gap, moved = np.zeros_like(wrench), np.zeros_like(wrench)
@@ -75,6 +76,7 @@ def residual(network: Network, bricks: int, columns: Ints, fields: Fields) -> Re
     law = _spring_force(axes, raw, gap)
     size = raw.reshape(-1, 2, 3).max(axis=2)[:, :, None]
     scale = (size * moved.reshape(-1, 2, 3) + np.abs(wrench).reshape(-1, 2, 3)).max(axis=2)
+    heavy, least = _beside_weight(network, bricks, raw)
     apart = np.abs(wrench + law).reshape(-1, 2, 3).max(axis=2)
     node = network.node_position[network.inner[:bricks].ravel()]
     owner = columns // 2
@@ -88,10 +90,20 @@ def residual(network: Network, bricks: int, columns: Ints, fields: Fields) -> Re
     plain = _balance(center, [*_both(bodies, at, -law), *outside])[0]
     return Residuals(
         equilibrium=_ratio(left[0], left[1]),
-        joints=float((apart / np.maximum(scale, np.finfo(float).tiny)).max()),
-        grips=float(np.abs(still).max(initial=0.0) / max(motion, np.finfo(float).tiny)),
+        joints=float((apart / np.maximum(scale, heavy)).max()),
+        grips=float(np.abs(still).max(initial=0.0) / max(motion, least)),
         plain=float(np.linalg.norm(plain[:, :3]) / np.linalg.norm(dead)),
     )
+
+
+def _beside_weight(network: Network, bricks: int, stiffness: Floats) -> tuple[Floats, float]:
+    """Return the weight of a brick, its moment over a brick's length, and what it moves, m."""
+    tiny = np.finfo(float).tiny
+    heavy = float(np.linalg.norm(network.weight[:bricks], axis=1).max())
+    ends = network.node_position[network.inner[:bricks]]
+    longest = float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).max())
+    moved = heavy / max(stiffness[:, :3].max(initial=0.0), tiny)
+    return np.maximum([heavy, heavy * longest], tiny), max(moved, tiny)
 
 
 Pull = tuple[Ints, Floats, Floats]  # bricks, points and wrenches about them

@@ -196,9 +196,9 @@ def _fields(network: Network, held: Held, found: Settled, columns: Ints, nodes: 
     wrench[system.acting] = system.bed_wrenches(found.force)
     exerted = -held.reaction(found.motion, found.force, system.load) - held.pads @ moved
     force = _grip_forces(network, system, columns, nodes, exerted)
-    solution = Solution((system.unit * moved)[:size], wrench, force)
+    solution = Solution((system.unit * moved)[None, :size], wrench[None], force[None])
     motion = node_motion(network, system.bricks)
-    return respond(network, build_statics(network), motion, columns, solution)
+    return respond(network, build_statics(network), motion, columns[None], solution)
 
 
 def _grip_forces(

@@ -3,35 +3,35 @@
 With the flexibility ``G`` of the inner nodes and their displacements ``d`` under the weight, grips
 at the nodes ``S`` exert the forces ``λ`` that hold them still, ``G[S, S] λ = -d[S]``; every
 response is then the sum of the responses to the weight and to ``λ``. Where these nearly cancel
-(grips far out on a long chain and close together, or beyond a joint that is nearly loose) the grip
-set is solved again with wrenches and motions side by side (`seqopt.engines.rigid.mixed`).
+(grips far out on a long chain and close together, or beyond a joint that is nearly loose), and
+where something is loose, grip sets are corrected by the residuals of wrenches and motions side by
+side (`seqopt.engines.rigid.refinement`).
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy import sparse
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.engines.basis import SPACE, Basis
 from seqopt.engines.interface import (
+    NAMES,
     Fields,
     Want,
     grip_columns,
     keep_wanted,
-    merge_sets,
     require_finite,
-    select_sets,
 )
 from seqopt.engines.rigid.grip_equations import grip_forces
-from seqopt.engines.rigid.mechanism import require_resistance
-from seqopt.engines.rigid.mixed import solve_mixed
-from seqopt.engines.rigid.operator import ComplianceOperator, OperatorBuilder
+from seqopt.engines.rigid.operator import ComplianceOperator, OperatorBuilder, load_matrix
+from seqopt.engines.rigid.refinement import Refinement
 from seqopt.engines.rigid.spanning_tree import grow_tree
+from seqopt.engines.threads import one_thread
 from seqopt.network.build import network_of
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
@@ -56,14 +56,10 @@ class ComplianceEngine:
         network = network_of(network)
         self._network = network
         self._basis = basis
-        tree = grow_tree(network)
-        self._builder = None if tree is None else OperatorBuilder(network, tree, basis)
+        self._tree = grow_tree(network)
         self._operators: dict[int, ComplianceOperator] = {}
-        springs = network.springs
-        self._even = all(
-            stiffness.min() >= EVEN * stiffness.max()
-            for stiffness in (springs.translational_stiffness, springs.rotational_stiffness)
-        )
+        self._even = _count_even(network)
+        self._refinement: Refinement | None = None  # of the brick count that was asked last
 
     @property
     def network(self) -> Network:
@@ -91,22 +87,39 @@ class ComplianceEngine:
             As of `seqopt.engines.interface.Engine`.
         """
         columns = grip_columns(self._network, bricks, grips)
-        if self._builder is None:
-            for row in columns:
-                require_resistance(self._network, bricks, row)
-            answer = solve_mixed(self._network, bricks, columns)
+        operator = self._operator(bricks)
+        if operator is None:
+            answer = keep_wanted(self._refined(bricks, columns), want)
             return require_finite(answer, bricks, grips)
-        if bricks not in self._operators:
-            self._operators[bricks] = self._builder.operator(bricks)
-        operator = self._operators[bricks]
-        fields, trusted = solve_batch(operator, columns, want, even=self._even)
+        fields, trusted = solve_batch(operator, columns, want, even=bricks <= self._even)
         if self._basis is not SPACE:
             fields = replace(fields, grip_force=fields.grip_force @ self._basis.force)
         if not trusted.all():
-            better = solve_mixed(self._network, bricks, columns[~trusted])
-            better = keep_wanted(better, want)
-            fields = merge_sets(trusted, select_sets(fields, trusted), better)
+            better = keep_wanted(self._refined(bricks, columns[~trusted]), want)
+            fields = _replaced(fields, ~trusted, better)
         return require_finite(fields, bricks, grips)
+
+    def _operator(self, bricks: int) -> ComplianceOperator | None:
+        """Return the operator of a partial structure, or None where something may be loose."""
+        if bricks > len(self._tree.spring):
+            return None
+        if bricks not in self._operators:
+            with one_thread():
+                self._operators[bricks] = self._builder.operator(bricks)
+        return self._operators[bricks]
+
+    @cached_property
+    def _builder(self) -> OperatorBuilder:
+        """Made when the first operator is: a scene that is loose from the start has none."""
+        return OperatorBuilder(self._network, self._tree, self._basis)
+
+    def _refined(self, bricks: int, columns: Ints) -> Fields:
+        """Return the fields of grip sets that the operator alone does not answer well enough."""
+        operator = self._operator(bricks) if self._basis is SPACE else None
+        with one_thread():
+            if self._refinement is None or self._refinement.bricks != bricks:
+                self._refinement = Refinement(self._network, bricks, operator)
+            return self._refinement.solve(columns)
 
 
 def solve_batch(
@@ -140,7 +153,7 @@ def solve_batch(
     force[~trusted] = 0.0
     if not even:
         trusted &= ~cancels(operator, index, force)
-    load = _loads(index, force, len(operator.flexibility))
+    load = load_matrix(index, force, len(operator.flexibility))
 
     def answer(rows: Floats, flag: Want, *shape: int) -> Floats:
         wanted = load @ rows if want & flag else np.empty((sets, 0))
@@ -149,7 +162,7 @@ def solve_batch(
     fields = Fields(
         edge_force=answer(operator.edge_force, Want.EDGES),
         displacement=answer(operator.displacement, Want.DISPLACEMENTS, 3),
-        grip_force=force.reshape(sets, held, operator.directions),
+        grip_force=force[:, : held * operator.directions].reshape(sets, held, operator.directions),
         support=answer(operator.support, Want.SUPPORT, 6),
         joint_wrench=answer(operator.joint_wrench, Want.JOINTS, 6),
         brick_twist=answer(operator.brick_twist, Want.BRICKS, 6),
@@ -157,18 +170,24 @@ def solve_batch(
     return fields, trusted
 
 
-def _loads(index: Ints, force: Floats, size: int) -> sparse.csr_array:
-    """Return forces (S, k) at the rows ``index``, and the weight, as a matrix (S, size + 1).
+def _replaced(answer: Fields, which: Bools, better: Fields) -> Fields:
+    """Return fields in which those of the sets ``which`` are others; the rest is copied once."""
+    whole = {name: getattr(answer, name).copy() for name in NAMES}
+    for name in NAMES:
+        whole[name][which] = getattr(better, name)
+    return Fields(**whole)
 
-    A few entries of hundreds: multiplying only these takes half the time of a dense product.
-    """
-    sets, count = index.shape
-    column = np.full((sets, count + 1), size, dtype=np.int32)
-    column[:, :-1] = index
-    value = np.ones((sets, count + 1))
-    value[:, :-1] = force
-    first = np.arange(0, column.size + 1, count + 1, dtype=np.int32)
-    return sparse.csr_array((value.ravel(), column.ravel(), first), shape=(sets, size + 1))
+
+def _count_even(network: Network) -> int:
+    """Return up to how many bricks all joints that act are about equally stiff."""
+    springs = network.springs
+    order = np.argsort(springs.since, kind="stable")
+    even = np.ones(len(order), dtype=bool)
+    for stiffness in (springs.translational_stiffness, springs.rotational_stiffness):
+        low = np.minimum.accumulate(stiffness[order].min(axis=1))
+        high = np.maximum.accumulate(stiffness[order].max(axis=1))
+        even &= low >= EVEN * high
+    return len(network.inner) if even.all() else int(springs.since[order][even.argmin()]) - 1
 
 
 def cancels(operator: ComplianceOperator, index: Ints, force: Floats) -> Bools:
@@ -187,10 +206,15 @@ def cancels(operator: ComplianceOperator, index: Ints, force: Floats) -> Bools:
     (S,) bool
     """
     out = np.zeros(len(index), dtype=bool)
-    motion = operator.displacement
-    for row, rows in enumerate(index if index.size else ()):
-        parts = np.abs(operator.flexibility[np.ix_(rows, rows)]) @ np.abs(force[row])
-        parts += np.abs(operator.dead_displacement[rows])
-        left = np.abs(motion[-1] + force[row] @ motion[rows]).max()
-        out[row] = parts.max() > CANCEL * left
+    if not index.size:
+        return out
+    size = np.abs(operator.flexibility)
+    dead = operator.dead_displacement
+    for start in range(0, len(index), CHUNK):
+        rows, pull = index[start : start + CHUNK], force[start : start + CHUNK]
+        held = rows[:, :, None], rows[:, None]
+        parts = np.einsum("sij,sj->si", size[held], np.abs(pull)) + np.abs(dead[rows])
+        load = load_matrix(rows, pull, len(size))
+        left = np.abs(load @ operator.displacement).max(axis=1)
+        out[start : start + CHUNK] = parts.max(axis=1) > CANCEL * left
     return out

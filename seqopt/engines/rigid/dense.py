@@ -6,7 +6,13 @@ import numpy as np
 
 from seqopt.arrays import Floats, Ints
 from seqopt.engines.interface import Fields, join_sets, no_sets
-from seqopt.engines.rigid.mechanism import RigidStructure, resisting_modes, rigid_structure
+from seqopt.engines.rigid.mechanism import (
+    RigidStructure,
+    lost_to_rounding,
+    require_resistance,
+    resisting_modes,
+    rigid_structure,
+)
 from seqopt.engines.rigid.recovery import Solution, respond
 from seqopt.errors import SolverError
 from seqopt.network.network import Network
@@ -34,7 +40,8 @@ def solve_dense(network: Network, bricks: int, columns: Ints) -> Fields:
     MechanismError
         If nothing resists a motion.
     SolverError
-        If the backward error of an answer is larger than `BACKWARD`.
+        If a motion is resisted too little for the assembled stiffness to tell, or the backward
+        error of an answer is larger than `BACKWARD`.
     """
     parts = rigid_structure(network, bricks)
     answers = [_solve_one(network, parts, grips) for grips in columns]
@@ -46,18 +53,22 @@ def _solve_one(network: Network, parts: RigidStructure, grips: Ints) -> Fields:
     bricks = len(parts.matrix) // 6
     pull = parts.inner_motion.T @ network.inner_weight[: 2 * bricks].ravel()
     forbidden = parts.forbidden(grips)
-    twist = _constrained(network, parts.matrix, forbidden, pull)
+    modes = resisting_modes(parts.matrix, forbidden)
+    if lost_to_rounding(modes[0]):
+        require_resistance(network, bricks, grips)
+        raise SolverError(f"direct solve of {bricks} bricks: too close to a mechanism")
+    twist = _constrained(parts.matrix, modes, pull)
     wrench = np.zeros((len(network.springs.since), 6))
     wrench[parts.acting] = -np.einsum("sij,sjk,k->si", parts.stiffness, parts.gap, twist)
     missing = parts.matrix @ twist - pull
     force = np.asarray(np.linalg.lstsq(forbidden.T, missing, rcond=None)[0].reshape(-1, 3))
-    solution = Solution(twist, wrench, force)
-    return respond(network, parts.statics, parts.motion, grips, solution)
+    solution = Solution(twist[None], wrench[None], force[None])
+    return respond(network, parts.statics, parts.motion, grips[None], solution)
 
 
-def _constrained(network: Network, matrix: Floats, forbidden: Floats, load: Floats) -> Floats:
-    """Return the twists under a load with some motions held still."""
-    values, vectors, motions = resisting_modes(network, matrix, forbidden)
+def _constrained(matrix: Floats, modes: tuple[Floats, Floats, Floats], load: Floats) -> Floats:
+    """Return the twists under a load that modes of the stiffness resist."""
+    values, vectors, motions = modes
     target = motions.T @ load
     answer = vectors @ (vectors.T @ target / values)
     residual = np.abs(motions.T @ (matrix @ (motions @ answer)) - target).max()

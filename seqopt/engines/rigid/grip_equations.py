@@ -34,6 +34,36 @@ def grip_forces(operator: ComplianceOperator, columns: Ints, index: Ints) -> tup
     pivot : (S,) float
         The smallest scaled pivot of the equations: rounding over it bounds the error.
     """
+    dead = operator.dead_displacement.take(np.ascontiguousarray(index.T))
+    force, pivot, pairs = _solved(operator, columns, index, dead)
+    if len(pairs.sets):
+        _release(operator, index, force, pairs)
+    return force, pivot
+
+
+def still_forces(operator: ComplianceOperator, columns: Ints, index: Ints, moved: Floats) -> Floats:
+    """Return the forces with which grips undo given displacements of their nodes.
+
+    Parameters
+    ----------
+    operator : ComplianceOperator
+    columns, index : (S, r), (S, k) int
+        As of `grip_forces`.
+    moved : (S, k) float
+        m; of loose motions, the force that pulls at them, N.
+
+    Returns
+    -------
+    (S, k) float
+        N; between two grips on one brick, none.
+    """
+    return _solved(operator, columns, index, np.ascontiguousarray(moved.T))[0]
+
+
+def _solved(
+    operator: ComplianceOperator, columns: Ints, index: Ints, dead: Floats
+) -> tuple[Floats, Floats, _Pairs]:
+    """Return forces (S, k) that undo displacements (k, S), smallest pivots, and pairs of grips."""
     sets, count = index.shape
     size = len(operator.flexibility)
     rows = np.ascontiguousarray(index.T)
@@ -43,15 +73,14 @@ def grip_forces(operator: ComplianceOperator, columns: Ints, index: Ints) -> tup
         out=system[:-1],
         mode="clip",  # other modes copy once more
     )
-    np.negative(operator.dead_displacement.take(rows), out=system[-1])
+    np.negative(dead, out=system[-1])
     pairs = _pairs(operator, columns)
     if len(pairs.sets):
-        _brace(system, pairs)
-    answer, pivot = solve_positive(system)
-    force = np.ascontiguousarray(answer.T)
-    if len(pairs.sets):
-        _release(operator, index, force, pairs)
-    return force, pivot
+        nodes = count - operator.loose
+        _brace(system[:nodes, :nodes], pairs)
+    scale = 1 / operator.softness if operator.loose else 1.0
+    answer, pivot = solve_positive(system, operator.loose, scale)
+    return np.ascontiguousarray(answer.T), pivot, pairs
 
 
 class _Pairs(NamedTuple):
@@ -78,7 +107,7 @@ def _brace(system: Floats, pairs: _Pairs) -> None:
     """Give the force between two grips on one brick a flexibility, so that there is one answer."""
     count, sets = system.shape[1:]
     width = pairs.axis.shape[1]
-    blocks = system[:-1].reshape(count // width, width, count // width, width, sets)
+    blocks = system.reshape(count // width, width, count // width, width, sets)
     every = np.arange(count)[:, None]
     scaled = system[every, every, pairs.sets].sum(axis=0)[:, None] * pairs.axis
     block = scaled[:, :, None] * pairs.axis[:, None]
@@ -93,9 +122,9 @@ def _release(operator: ComplianceOperator, index: Ints, force: Floats, pairs: _P
     share = operator.edge_force[index[pairs.sets], edge[:, None]]
     carried = operator.edge_force[-1, edge] + np.einsum("sk,sk->s", force[pairs.sets], share)
     width = pairs.axis.shape[1]
-    share = share.reshape(len(edge), -1, width)
+    nodes = force[:, : force.shape[1] - operator.loose].reshape(len(force), -1, width)
+    share = share[:, : nodes.shape[1] * width].reshape(len(edge), -1, width)
     every = np.arange(len(edge))
     between = share[every, pairs.first] - share[every, pairs.second]
     shift = (carried / np.einsum("sk,sk->s", between, pairs.axis))[:, None] * pairs.axis
-    nodes = force.reshape(len(force), -1, width)
     nodes[pairs.sets, [pairs.first, pairs.second]] += np.array([-shift, shift])

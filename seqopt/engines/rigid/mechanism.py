@@ -8,12 +8,15 @@ import numpy as np
 from scipy import linalg
 
 from seqopt.arrays import Floats, FrozenValue, Ints
+from seqopt.engines.rigid.mixed_system import ungripped_system
+from seqopt.engines.threads import one_thread
 from seqopt.errors import MechanismError
 from seqopt.network.kinematics import node_motion, spring_maps
 from seqopt.network.network import Network
 from seqopt.network.statics import Statics, build_statics
 
-NO_RESISTANCE = 1e-13  # smallest scaled eigenvalue of a structure that resists every motion
+ROUNDING = 1e-13  # a smaller eigenvalue of the assembled stiffness may be rounding alone
+UNTIED = 1e-13  # share of the largest deformation of ties that is rounding: nothing is tied
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -86,6 +89,9 @@ def rigid_structure(network: Network, bricks: int) -> RigidStructure:
 def require_resistance(network: Network, bricks: int, columns: Ints) -> None:
     """Check that one grip set leaves no motion that nothing resists.
 
+    The assembled stiffness settles most cases at once. It cannot tell a soft support from none;
+    `free_motion` can.
+
     Parameters
     ----------
     network : Network
@@ -100,17 +106,64 @@ def require_resistance(network: Network, bricks: int, columns: Ints) -> None:
         If it does.
     """
     parts = rigid_structure(network, bricks)
-    resisting_modes(network, parts.matrix, parts.forbidden(columns))
+    with one_thread():
+        values, vectors, motions = resisting_modes(parts.matrix, parts.forbidden(columns))
+    if lost_to_rounding(values) and free_motion(network, bricks, columns) is not None:
+        raise mechanism_error(network, motions @ vectors[:, 0])
 
 
-def resisting_modes(
-    network: Network, matrix: Floats, forbidden: Floats
-) -> tuple[Floats, Floats, Floats]:
-    """Return how a structure resists the motions that its grips leave.
+def free_motion(network: Network, bricks: int, columns: Ints) -> Floats | None:
+    """Return a motion that deforms no spring with any stiffness and moves no held node.
+
+    How stiff springs are does not count: a soft one ties as well as a stiff one, so that rounding
+    has nothing to hide behind.
 
     Parameters
     ----------
     network : Network
+    bricks : int
+        How many bricks stand.
+    columns : (r,) int
+        Grips as indices into ``network.inner.ravel()``.
+
+    Returns
+    -------
+    (b, 6) float or None
+        Translation over the length of the longest brick's inner edge, and rotation; the largest
+        component is 1. None if there is no such motion.
+    """
+    parts = ungripped_system(network, bricks)
+    node = 3 * network.inner.ravel()[columns][:, None] + np.arange(3)
+    held = parts.motion[node.ravel()].toarray() * parts.twist_unit
+    ties = np.vstack([parts.deformation[parts.stiffness > 0].toarray(), held])
+    with one_thread():
+        _, sizes, motions = linalg.svd(ties, full_matrices=len(ties) < ties.shape[1])
+    if len(sizes) == ties.shape[1] and sizes[-1] > UNTIED * sizes[0]:
+        return None
+    motion = motions[-1]
+    return np.asarray((motion / motion[np.abs(motion).argmax()]).reshape(-1, 6))
+
+
+def lost_to_rounding(values: Floats) -> bool:
+    """Return whether the least of eigenvalues may be rounding alone.
+
+    Parameters
+    ----------
+    values : (m,) float
+        Eigenvalues of a scaled stiffness, ascending.
+
+    Returns
+    -------
+    bool
+    """
+    return len(values) > 0 and not values[0] > ROUNDING * values[-1]  # all may be zero
+
+
+def resisting_modes(matrix: Floats, forbidden: Floats) -> tuple[Floats, Floats, Floats]:
+    """Return how a structure resists the motions that its grips leave.
+
+    Parameters
+    ----------
     matrix : (6b, 6b) float
         Stiffness without grips.
     forbidden : (c, 6b) float
@@ -124,21 +177,12 @@ def resisting_modes(
         Its modes.
     motions : (6b, m) float
         The motions that the modes combine.
-
-    Raises
-    ------
-    MechanismError
-        If the smallest eigenvalue is zero beside the largest.
     """
     free = linalg.null_space(forbidden) if len(forbidden) else np.eye(len(matrix))
-    reduced = free.T @ matrix @ free
-    diagonal = np.diag(reduced)
-    if not diagonal.max() > 0:
-        raise mechanism_error(network, free[:, 0])
-    motions = free / np.sqrt(np.maximum(diagonal, NO_RESISTANCE * diagonal.max()))
+    diagonal = np.diag(free.T @ matrix @ free)
+    most = max(diagonal.max(initial=0.0), np.finfo(float).tiny / ROUNDING)
+    motions = free / np.sqrt(np.maximum(diagonal, ROUNDING * most))
     values, vectors = np.linalg.eigh(motions.T @ matrix @ motions)
-    if values[0] < NO_RESISTANCE * values[-1]:
-        raise mechanism_error(network, motions @ vectors[:, 0])
     return values, vectors, motions
 
 

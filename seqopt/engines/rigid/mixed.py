@@ -1,193 +1,31 @@
-r"""Rigid bricks solved with joint wrenches and motions as unknowns side by side.
+"""Rigid bricks solved with joint wrenches and motions as unknowns side by side.
 
-Stiffness form squares what separates a stiff joint from a soft chain. Kept apart, the deformations
-of the joints, the equilibrium of the bricks and the stillness of the grips make one sparse system
-
-.. math:: s + C B u = 0, \qquad -B^T s - H^T \lambda = f, \qquad H u = 0
-
-(wrenches :math:`s`, stiffnesses :math:`C`, twists :math:`u`, grip forces :math:`\lambda`) whose
-condition does not grow with the length of a chain as its stiffness does. One factorization per
-grip set, corrected until it no longer changes.
+One factorization of the system of `seqopt.engines.rigid.mixed_system` per grip set, corrected until
+it no longer changes: slow, sure, and the last resort of the fast engine.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
-from scipy import linalg, sparse
-from scipy.sparse.linalg import SuperLU, splu
 
-from seqopt.arrays import Floats, FrozenValue, Ints
+from seqopt.arrays import Bools, Floats, Ints
 from seqopt.engines.interface import Fields, join_sets, no_sets
 from seqopt.engines.rigid.mechanism import require_resistance
+from seqopt.engines.rigid.mixed_system import (
+    Ungripped,
+    factorize,
+    mixed_system,
+    ungripped_system,
+    unscaled,
+)
 from seqopt.engines.rigid.recovery import Solution, respond
 from seqopt.errors import SolverError
-from seqopt.network.kinematics import deformation, node_motion
 from seqopt.network.network import Network
-from seqopt.network.statics import Statics, build_statics
 
 CORRECTIONS = 3  # after which an answer is judged
 LAST_CORRECTION = 1e-10  # the largest of forces, moments, shifts and turns, relative to each
 EMPTY = 1e-6  # forces this small beside the moments over a brick's length are not looked at alone
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Ungripped(FrozenValue):
-    """What the systems of all grip sets of a partial structure have in common, scaled to order one.
-
-    Attributes
-    ----------
-    network : Network
-    bricks : int
-    motion : (3n, 6b) sparse
-        Displacements of the nodes for unit twists.
-    statics : Statics
-        Of the network.
-    deformation : (6s, 6b) sparse
-        Scaled deformation of the acting springs, in their own axes, for scaled twists.
-    stiffness : (6s,) float
-        Over ``unit``.
-    matrix : (6s + 6b,) square sparse
-        The system without grips.
-    load : (6b,) float
-        The weight, scaled.
-    acting : (s,) int
-    twist_unit, wrench_unit : (6b,), (6s,) float
-        What turns scaled twists into m and rad, scaled wrenches into N and N m.
-    unit : float
-        N/m.
-    """
-
-    network: Network
-    bricks: int
-    motion: sparse.csr_array
-    statics: Statics
-    deformation: sparse.csr_array
-    stiffness: Floats
-    matrix: sparse.csr_array
-    load: Floats
-    acting: Ints
-    twist_unit: Floats
-    wrench_unit: Floats
-    unit: float
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class MixedSystem(FrozenValue):
-    """The system of one grip set.
-
-    Attributes
-    ----------
-    forbidden : (c, 6b) sparse
-        Scaled twists that the grips forbid.
-    matrix : (6s + 6b + c,) square sparse
-    force : (3r, c) float
-        Forces of the grips for unit multipliers.
-    """
-
-    forbidden: sparse.csr_array
-    matrix: sparse.csc_array
-    force: Floats
-
-
-def ungripped_system(network: Network, bricks: int) -> Ungripped:
-    """Return what all systems of a partial structure have in common.
-
-    Parameters
-    ----------
-    network : Network
-    bricks : int
-        How many bricks stand.
-
-    Returns
-    -------
-    Ungripped
-    """
-    springs = network.springs
-    acting = springs.acting(bricks)
-    steps = np.diff(network.node_position[network.inner[:bricks]], axis=1)
-    length = float(np.linalg.norm(steps, axis=2).max())
-    lever = np.array([1.0, 1.0, 1.0, length, length, length])
-    raw = (springs.stiffness[acting] / lever**2).ravel()
-    unit = float(np.median(raw[raw > 0])) if raw.any() else 1.0
-    stiffness = raw / unit
-    twist_unit = np.tile(1 / lever, bricks)
-    center = network.centroid[:bricks]
-    gap = deformation(
-        springs.bodies[acting], springs.position[acting], center, springs.axes[acting]
-    )
-    gap = sparse.diags_array(np.tile(lever, len(acting))) @ gap
-    gap = gap @ sparse.diags_array(twist_unit)
-    row = 1 / np.maximum(1.0, stiffness)  # keeps a stiff joint's equation of order one
-    blocks = [
-        [sparse.diags_array(row), sparse.diags_array(row * stiffness) @ gap],
-        [-gap.T, None],
-    ]
-    motion = node_motion(network, bricks)
-    inner = (3 * network.inner[:bricks].ravel()[:, None] + np.arange(3)).ravel()
-    weight = network.inner_weight[: 2 * bricks].ravel()
-    return Ungripped(
-        network=network,
-        bricks=bricks,
-        motion=motion,
-        statics=build_statics(network),
-        deformation=gap,
-        stiffness=stiffness,
-        matrix=sparse.csr_array(sparse.block_array(blocks)),
-        load=motion[inner].T @ weight * twist_unit / unit,
-        acting=acting,
-        twist_unit=twist_unit,
-        wrench_unit=unit * np.tile(lever, len(acting)),
-        unit=unit,
-    )
-
-
-def mixed_system(parts: Ungripped, grips: Ints, shift: Floats | None = None) -> MixedSystem:
-    """Return the system of one grip set.
-
-    Parameters
-    ----------
-    parts : Ungripped
-    grips : (r,) int
-        Indices into ``network.inner.ravel()``.
-    shift : (6b,) float, optional
-        Added to the diagonal of the scaled stiffness, so that a mechanism can be factored.
-
-    Returns
-    -------
-    MixedSystem
-    """
-    rows, force = _constraints(parts, grips)
-    forbidden = sparse.csr_array(rows @ sparse.diags_array(parts.twist_unit))
-    matrix, joints = parts.matrix, len(parts.wrench_unit)
-    if shift is not None:
-        below = sparse.diags_array(np.concatenate([np.zeros(joints), shift]))
-        matrix = sparse.csr_array(matrix + below)
-    if len(force):
-        of_all = (forbidden.data, forbidden.indices + joints, forbidden.indptr)
-        rows = sparse.csr_array(of_all, shape=(forbidden.shape[0], matrix.shape[0]))
-        matrix = sparse.block_array([[matrix, -rows.T], [rows, None]], format="csr")
-    return MixedSystem(forbidden, sparse.csc_array(matrix), force)
-
-
-def factorize(system: MixedSystem) -> SuperLU:
-    """Return the factors of a system.
-
-    Parameters
-    ----------
-    system : MixedSystem
-
-    Returns
-    -------
-    SuperLU
-
-    Raises
-    ------
-    RuntimeError
-        If the matrix is exactly singular.
-    """
-    return splu(system.matrix)
+LIGHT = 1e-3  # nor what is this small beside the weight, or the motion it makes at a typical joint
 
 
 def solve_mixed(network: Network, bricks: int, columns: Ints) -> Fields:
@@ -236,50 +74,46 @@ def _solve_one(parts: Ungripped, grips: Ints) -> Fields:
     for _ in range(CORRECTIONS):
         correction = factors.solve(load - system.matrix @ result)
         result += correction
-    if not _unchanged(result, correction, joints, moves):
+    both = np.stack([result, correction])[:, None, : joints + moves]
+    if not unchanged(parts, *both)[0]:
         require_resistance(network, bricks, grips)
         raise SolverError(
             f"{bricks} bricks: too close to a mechanism for double precision; "
             "add a grip or stiffness"
         )
-    wrench = np.zeros((len(network.springs.since), 6))
-    own = (result[:joints] * parts.wrench_unit).reshape(-1, 2, 3)
-    axes = network.springs.axes[parts.acting]
-    wrench[parts.acting] = np.einsum("shi,sij->shj", own, axes).reshape(-1, 6)
-    twist = result[joints : joints + moves] * parts.twist_unit
-    force = (system.force @ (result[joints + moves :] * parts.unit)).reshape(-1, 3)
+    wrench, twist = unscaled(parts, result[None, : joints + moves])
+    force = (system.force @ (result[joints + moves :] * parts.unit)).reshape(1, -1, 3)
     solution = Solution(twist, wrench, force)
-    return respond(network, parts.statics, parts.motion, grips, solution)
+    return respond(network, parts.statics, parts.motion, grips[None], solution)
 
 
-def _unchanged(result: Floats, correction: Floats, joints: int, moves: int) -> bool:
-    """Return whether the last correction is small beside forces, moments, shifts and turns each."""
-    kinds = [
-        p[:, i].ravel()
-        for p in np.split(np.arange(joints + moves).reshape(-1, 2, 3), [joints // 6])
-        for i in (0, 1)
-    ]
-    size = [np.abs(result[kind]).max() for kind in kinds]
-    least = [EMPTY * max(size[:2])] * 2 + [EMPTY * max(size[2:])] * 2
-    change = [np.abs(correction[kind]).max() for kind in kinds]
-    every = zip(change, size, least, strict=True)
-    return all(c <= LAST_CORRECTION * max(s, e) for c, s, e in every)
+def unchanged(parts: Ungripped, states: Floats, corrections: Floats) -> Bools:
+    """Return whether corrections are small beside forces, moments, shifts and turns each.
 
+    Where nothing moves, as where robots hold every brick at both nodes, what is left is rounding:
+    it is measured against the weight.
 
-def _constraints(parts: Ungripped, grips: Ints) -> tuple[sparse.csr_array, Floats]:
-    """Return independent motions that grips forbid (c, 6b), and their forces (3r, c).
+    Parameters
+    ----------
+    parts : Ungripped
+    states, corrections : (S, 6s + 6b) float
+        Scaled wrenches and twists.
 
-    A second grip on a brick forbids nothing along the line to the first.
+    Returns
+    -------
+    (S,) bool
     """
-    network = parts.network
-    inner = network.inner.ravel()[grips]
-    motion = parts.motion[(3 * inner[:, None] + np.arange(3)).ravel()]
-    directions = []
-    for i, brick in enumerate(grips // 2):
-        free = np.eye(3)
-        if (grips[:i] // 2 == brick).any():
-            step = np.diff(network.node_position[network.inner[brick]], axis=0)
-            free = linalg.null_space(step)
-        directions.append(free)
-    force = linalg.block_diag(*directions) if len(grips) else np.zeros((0, 0))
-    return sparse.csr_array(sparse.csr_array(force.T) @ motion), force
+    size, change = _sizes(parts, states), _sizes(parts, corrections)
+    other = size.reshape(-1, 2, 2).max(axis=2).repeat(2, axis=1)
+    least = np.maximum(EMPTY * other, LIGHT * np.abs(parts.load).max())
+    return np.asarray((change <= LAST_CORRECTION * np.maximum(size, least)).all(axis=1))
+
+
+def _sizes(parts: Ungripped, states: Floats) -> Floats:
+    """Return the largest force, moment, shift and turn of each state, (S, 4)."""
+    ends = [len(parts.wrench_unit)]
+    kinds = [
+        part.reshape(len(states), part.shape[1] // 6, 2, 3)
+        for part in np.split(states, ends, axis=1)
+    ]
+    return np.hstack([np.abs(part).max(axis=(1, 3), initial=0.0) for part in kinds])

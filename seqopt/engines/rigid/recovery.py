@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import permutations
 
 import numpy as np
 from scipy import sparse
@@ -15,15 +16,15 @@ from seqopt.network.statics import Statics
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Solution(FrozenValue):
-    """What determines all fields of one grip set.
+    """What determines all fields of S grip sets.
 
     Attributes
     ----------
-    twist : (6b,) float
+    twist : (S, 6b) float
         Of the bricks, m and rad.
-    wrench : (S, 6) float
+    wrench : (S, J, 6) float
         Of every spring of the network on its second body, N and N m; zero where it does not act.
-    force : (r, 3) float
+    force : (S, r, 3) float
         Of the grips, N; two on one brick may share theirs in any way.
     """
 
@@ -36,10 +37,10 @@ def respond(
     network: Network,
     statics: Statics,
     motion: Floats | sparse.csr_array,
-    grips: Ints,
+    columns: Ints,
     solution: Solution,
 ) -> Fields:
-    """Return the fields of one grip set.
+    """Return the fields of grip sets.
 
     Parameters
     ----------
@@ -48,45 +49,62 @@ def respond(
         Of the network.
     motion : (3n, 6b) float
         Displacements of the nodes for unit twists; see `seqopt.network.kinematics.node_motion`.
-    grips : (r,) int
-        Indices into ``network.inner.ravel()``.
+    columns : (S, r) int
+        Grips as indices into ``network.inner.ravel()``.
     solution : Solution
 
     Returns
     -------
     Fields
-        Of one set.
     """
     twist, wrench, force = solution.twist, solution.wrench, solution.force.copy()
-    bricks = len(twist) // 6
+    sets, bricks = len(twist), twist.shape[1] // 6
     edges = network.count_edges(bricks)
-    load = network.inner_weight[: 2 * bricks].copy()
-    load[grips] += force
-    carried = statics.edge_of_spring[:edges] @ wrench[:, :3].ravel()
-    carried += statics.edge_of_load[:edges, : load.size] @ load.ravel()
-    _split_pairs(network, grips, force, carried)
+    load = np.tile(network.inner_weight[: 2 * bricks], (sets, 1, 1))
+    load[np.arange(sets)[:, None], columns] += force
+    through = wrench[:, :, :3].reshape(sets, 3 * wrench.shape[1])
+    carried = (statics.edge_of_spring[:edges] @ through.T).T
+    carried += (statics.edge_of_load[:edges, : 6 * bricks] @ load.reshape(sets, 6 * bricks).T).T
+    _split_pairs(network, columns, force, carried)
     return Fields(
-        edge_force=carried[None],
-        displacement=(motion @ twist).reshape(1, -1, 3),
-        grip_force=force[None],
-        support=_reactions(network, statics, wrench)[None],
-        joint_wrench=wrench[None],
-        brick_twist=twist.reshape(1, -1, 6),
+        edge_force=carried,
+        displacement=(motion @ twist.T).T.reshape(sets, motion.shape[0] // 3, 3),
+        grip_force=force,
+        support=reactions(network, statics, wrench),
+        joint_wrench=wrench,
+        brick_twist=twist.reshape(sets, bricks, 6),
     )
 
 
-def _reactions(network: Network, statics: Statics, wrench: Floats) -> Floats:
-    """Return force and moment (G, 6) of every ground end about its fixed point."""
-    at_spring = wrench[network.springs.support]
-    return np.array([a @ b for a, b in zip(statics.support_of_spring, at_spring, strict=True)])
+def reactions(network: Network, statics: Statics, wrench: Floats) -> Floats:
+    """Return force and moment of every ground end about its fixed point.
+
+    Parameters
+    ----------
+    network : Network
+    statics : Statics
+        Of the network.
+    wrench : (S, J, 6) float
+        Of every spring of the network on its second body, N and N m.
+
+    Returns
+    -------
+    (S, G, 6) float
+        N and N m.
+    """
+    at_spring = wrench[:, network.springs.support]
+    return np.asarray(np.einsum("gij,sgj->sgi", statics.support_of_spring, at_spring))
 
 
-def _split_pairs(network: Network, grips: Ints, force: Floats, carried: Floats) -> None:
+def _split_pairs(network: Network, columns: Ints, force: Floats, carried: Floats) -> None:
     """Let each of two grips on one brick take what reaches its own node."""
-    for brick in np.flatnonzero(np.bincount(grips // 2) == 2):
-        edge = int(np.flatnonzero((network.edge_brick == brick) & (network.edge_spring < 0))[0])
-        second = np.flatnonzero(grips == 2 * brick + 1)[0]
-        first = np.flatnonzero(grips == 2 * brick)[0]
-        force[second] -= carried[edge] * network.edge_axis[edge]
-        force[first] += carried[edge] * network.edge_axis[edge]
-        carried[edge] = 0.0
+    inner = np.flatnonzero(network.edge_spring < 0)
+    edge_of = np.empty(len(network.inner), dtype=np.int64)
+    edge_of[network.edge_brick[inner]] = inner
+    for i, j in permutations(range(columns.shape[1]), 2):
+        sets = np.flatnonzero((columns[:, i] % 2 == 0) & (columns[:, j] == columns[:, i] + 1))
+        edge = edge_of[columns[sets, i] // 2]
+        shift = carried[sets, edge][:, None] * network.edge_axis[edge]
+        force[sets, i] += shift
+        force[sets, j] -= shift
+        carried[sets, edge] = 0.0

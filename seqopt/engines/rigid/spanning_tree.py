@@ -13,7 +13,7 @@ from seqopt.network.network import GROUND, Network
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SpanningTree(FrozenValue):
-    """A tree in which every brick hangs on one spring; arrays run over bricks in build order.
+    """A tree in which every brick hangs on one spring; arrays run over the first bricks placed.
 
     Attributes
     ----------
@@ -24,7 +24,7 @@ class SpanningTree(FrozenValue):
     on_path : (B, B) bool
         Whether the row's brick lies between the column's brick and the ground, itself included.
     closures : (C,) int
-        Springs outside the tree, in the order in which they begin to act.
+        Springs among these bricks outside the tree, in the order in which they begin to act.
     """
 
     spring: Ints
@@ -33,8 +33,12 @@ class SpanningTree(FrozenValue):
     closures: Ints
 
 
-def grow_tree(network: Network) -> SpanningTree | None:
+def grow_tree(network: Network) -> SpanningTree:
     """Return the tree that hangs every brick, when placed, on the spring nearest to the ground.
+
+    It ends before the brick with which a spring without stiffness in some direction begins to act,
+    or that is placed without a spring to what stands: from there on a structure may have no
+    compliance of its own.
 
     Parameters
     ----------
@@ -42,29 +46,31 @@ def grow_tree(network: Network) -> SpanningTree | None:
 
     Returns
     -------
-    SpanningTree or None
-        None if a spring has no stiffness in some direction or a brick is placed without a spring to
-        what stands: such a structure has no compliance of its own.
+    SpanningTree
+        Of as many bricks as are tied in every direction when placed; maybe none.
     """
     springs = network.springs
-    if min(springs.translational_stiffness.min(), springs.rotational_stiffness.min()) <= 0:
-        return None
-    count = len(network.inner)
+    count = _count_tied(network)
     spring, parent = np.empty((2, count), dtype=np.int64)
     depth = np.zeros(count + 1, dtype=np.int64)  # the ground, index -1, comes last
     on_path = np.eye(count, dtype=bool)
     for b in range(count):
         mine = np.flatnonzero((springs.bodies[:, 1] == b) & (springs.since == b + 1))
-        if not len(mine):
-            return None
         best = mine[np.argmin(depth[springs.bodies[mine, 0]])]
         spring[b], parent[b] = best, springs.bodies[best, 0]
         depth[b] = depth[parent[b]] + 1
         if parent[b] != GROUND:
             on_path[:, b] |= on_path[:, parent[b]]
-    return SpanningTree(
-        spring, parent, on_path, np.setdiff1d(np.arange(len(springs.since)), spring)
-    )
+    return SpanningTree(spring, parent, on_path, np.setdiff1d(springs.acting(count), spring))
+
+
+def _count_tied(network: Network) -> int:
+    """Return how many bricks stand when the first is placed without a tie in every direction."""
+    springs = network.springs
+    slack = springs.since[(springs.stiffness <= 0).any(axis=1)]
+    hung = springs.bodies[springs.since == springs.bodies[:, 1] + 1, 1]
+    bare = np.setdiff1d(np.arange(len(network.inner)), hung)
+    return int(min([len(network.inner), *bare, *(slack - 1)]))
 
 
 def compliances(network: Network, which: Ints, basis: Basis = SPACE) -> Floats:
@@ -115,7 +121,8 @@ def node_wrenches(network: Network, tree: SpanningTree, basis: Basis = SPACE) ->
     """
     at = network.springs.position[tree.spring]
     owner = np.repeat(np.arange(len(at)), 2)
-    out = _unit_wrenches(network.node_position[network.inner.ravel()], at, basis)
+    inner = network.inner[: len(at)].ravel()
+    out = _unit_wrenches(network.node_position[inner], at, basis)
     out *= tree.on_path[:, None, owner, None]
     return out
 
@@ -166,7 +173,7 @@ def twists(network: Network, tree: SpanningTree, strain: Floats, basis: Basis = 
     (B, k, K) float
         At the centroids.
     """
-    centroid, at = network.centroid, network.springs.position[tree.spring]
+    centroid, at = network.centroid[: len(tree.spring)], network.springs.position[tree.spring]
     shift = len(basis.force)
     out = strain.copy()
     out[:, :shift] += _carried(basis, centroid - at) @ strain[:, shift:]

@@ -1,0 +1,116 @@
+"""The compliance operator of a partial structure, loose parts included, from its held system.
+
+A loose motion stands on a spring of its own that every grip set takes away again: with the
+flexibility ``G`` of the structure on these springs of softness ``s`` and the displacements ``R``
+that the loose motions make, forces ``λ`` and motions ``β`` follow from ``G λ + R β = -d`` and
+``Rᵀ λ - K β = -p``, where ``p`` is how the weight pulls at the motions and ``K`` how soft springs
+resist them, mostly not at all.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import sparse
+
+from seqopt.arrays import Floats
+from seqopt.engines.rigid.loose import HeldSystem
+from seqopt.engines.rigid.mixed_system import Ungripped, unscaled
+from seqopt.engines.rigid.operator import ComplianceOperator
+from seqopt.engines.rigid.recovery import reactions
+
+TIED = 0.1  # most that what resists loose motions may be of the springs that they stand on
+
+
+def inner_motion(parts: Ungripped) -> sparse.csr_array:
+    """Return the displacements of the inner nodes for scaled twists.
+
+    Parameters
+    ----------
+    parts : Ungripped
+
+    Returns
+    -------
+    (6b, 6b) sparse
+        In the order of ``network.inner``, m.
+    """
+    inner = parts.network.inner[: parts.bricks].ravel()
+    rows = parts.motion[(3 * inner[:, None] + np.arange(3)).ravel()]
+    return sparse.csr_array(rows @ sparse.diags_array(parts.twist_unit))
+
+
+def held_operator(system: HeldSystem) -> ComplianceOperator:
+    """Return the operator of a partial structure whose loose motions are unknowns of grip sets.
+
+    Parameters
+    ----------
+    system : HeldSystem
+
+    Returns
+    -------
+    ComplianceOperator
+        Of all directions of space, with a load for each loose motion after those of the nodes.
+    """
+    parts, loose = system.parts, system.loose
+    joints, loads = len(parts.wrench_unit), 6 * parts.bricks
+    inner = inner_motion(parts)
+    right = np.zeros((loads + loose, joints + loads))
+    right[:loads, joints:] = inner.toarray() / parts.unit
+    moved = np.zeros((loads + loose, loose))
+    moved[loads:] = np.eye(loose)
+    states, pull = system.solve(right, moved)
+    motion = (inner @ states[:, joints:].T).T
+    reach, resistance = motion[loads:], pull[loads:]
+    softness = _softness(motion[:loads], reach, resistance, parts.unit)
+    states[:loads] += softness * (reach.T @ states[loads:])
+    flexibility = np.zeros((loads + loose, loads + loose))
+    flexibility[:loads, :loads] = motion[:loads] + softness * (reach.T @ reach)
+    flexibility[loads:, :loads], flexibility[:loads, loads:] = reach, reach.T
+    corner = np.linalg.solve(np.eye(loose) - softness * resistance, resistance)
+    flexibility[loads:, loads:] = -0.5 * (corner + corner.T)
+    return _operator(parts, states, flexibility, softness)
+
+
+def _softness(flexibility: Floats, reach: Floats, resistance: Floats, unit: float) -> float:
+    """Return the softness of the springs that loose motions stand on, m/N.
+
+    About that of the structure where they reach, so that the grips' equations keep their digits. A
+    motion that reaches no node, as of bricks that turn about the line they lie on, counts as if it
+    took one node along: beside that, rounding stays small.
+    """
+    if not len(reach):
+        return 0.0
+    own = float(np.trace(flexibility)) / max(float((reach**2).sum()), float(len(reach)))
+    most = TIED / max(float(np.abs(resistance).sum()), np.finfo(float).tiny)
+    return min(max(own, 1 / unit), most)
+
+
+def _operator(
+    parts: Ungripped, states: Floats, flexibility: Floats, softness: float
+) -> ComplianceOperator:
+    """Return the operator whose loads and loose motions lead to scaled states (l + m, n)."""
+    network, bricks, statics = parts.network, parts.bricks, parts.statics
+    loads, edges = 6 * bricks, network.count_edges(bricks)
+    weight = np.zeros(len(states))
+    weight[:loads] = network.inner_weight[: 2 * bricks].ravel()
+    wrench, twist = unscaled(parts, states)
+    edge_force = (statics.edge_of_spring[:edges] @ wrench[:, :, :3].reshape(len(states), -1).T).T
+    edge_force[:loads] += statics.edge_of_load[:edges, :loads].toarray().T
+    inner_edge = np.flatnonzero(network.edge_spring[:edges] < 0)
+
+    def with_weight(rows: Floats) -> Floats:
+        return np.vstack([rows, weight @ rows])
+
+    return ComplianceOperator(
+        bricks=bricks,
+        flexibility=flexibility,
+        dead_displacement=flexibility @ weight,
+        edge_force=with_weight(edge_force),
+        displacement=with_weight((parts.motion @ twist.T).T),
+        support=with_weight(reactions(network, statics, wrench).reshape(len(states), -1)),
+        joint_wrench=with_weight(wrench.reshape(len(states), -1)),
+        brick_twist=with_weight(twist),
+        axis=network.edge_axis[inner_edge],
+        inner_edge=inner_edge,
+        loose=len(states) - loads,
+        softness=softness,
+    )

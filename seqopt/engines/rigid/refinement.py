@@ -1,0 +1,144 @@
+"""Answers of many grip sets corrected together, with one factorization per brick count.
+
+What is left of the equations of `seqopt.engines.rigid.mixed_system` when an answer is put in is
+answered by the system without grips, all sets as right-hand sides of one solution, and by the
+grips' equations of the operator. The first correction of an answer is its error, but for the share
+by which the operator itself is wrong; the next one is that share smaller.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+
+from seqopt.arrays import Bools, Floats, Ints
+from seqopt.engines.interface import Fields, join_sets, merge_sets, no_sets
+from seqopt.engines.rigid.grip_equations import grip_forces, still_forces
+from seqopt.engines.rigid.held_operator import held_operator, inner_motion
+from seqopt.engines.rigid.loose import HeldSystem, hold_loose
+from seqopt.engines.rigid.mechanism import require_resistance
+from seqopt.engines.rigid.mixed import solve_mixed, unchanged
+from seqopt.engines.rigid.mixed_system import rescaled, ungripped_system, unscaled
+from seqopt.engines.rigid.operator import ComplianceOperator, load_matrix
+from seqopt.engines.rigid.recovery import Solution, respond
+from seqopt.network.network import Network
+
+TOGETHER = 256  # grip sets per pass: their unknowns stay in the processor's cache
+STEPS = 5  # corrections, after which a set is solved on its own
+HARDLY_HELD = 1e-9  # a pivot of loose motions below which they are looked into one by one
+
+
+class Refinement:
+    """Answers grip sets of one partial structure to rounding, whatever is loose in it.
+
+    Parameters
+    ----------
+    network : Network
+    bricks : int
+        How many bricks stand.
+    operator : ComplianceOperator, optional
+        Of all directions of space, if there is one; it serves if nothing is loose.
+    """
+
+    def __init__(
+        self, network: Network, bricks: int, operator: ComplianceOperator | None = None
+    ) -> None:
+        self.network, self.bricks = network, bricks
+        self.parts = ungripped_system(network, bricks)
+        self.held: HeldSystem = hold_loose(self.parts)
+        if operator is None or self.held.loose:
+            operator = held_operator(self.held)
+        self.operator = operator
+        self.inner = inner_motion(self.parts)
+        weighed = sparse.csr_array(self.parts.load[None])
+        self.pulls = sparse.vstack([self.inner / self.parts.unit, weighed], format="csr")
+        springs, rows = len(network.springs.since), len(operator.brick_twist)
+        wrench = operator.joint_wrench.reshape(rows, springs, 6)
+        self.states = rescaled(self.parts, wrench, operator.brick_twist)
+
+    def solve(self, columns: Ints) -> Fields:
+        """Return all fields of grip sets.
+
+        Parameters
+        ----------
+        columns : (S, r) int
+            Grips as indices into ``network.inner.ravel()``.
+
+        Returns
+        -------
+        Fields
+
+        Raises
+        ------
+        MechanismError, SolverError
+            As of `seqopt.engines.interface.Engine`.
+        """
+        empty = no_sets(self.network, self.bricks, columns.shape[1])
+        starts = range(0, len(columns), TOGETHER)
+        return join_sets([empty, *(self._together(columns[i : i + TOGETHER]) for i in starts)])
+
+    def _together(self, columns: Ints) -> Fields:
+        """Return the fields of a few sets."""
+        operator, parts, bricks = self.operator, self.parts, self.bricks
+        index = operator.load_index(columns)
+        force, pivot = grip_forces(operator, columns, index)
+        if operator.loose:
+            for row in columns[~(pivot >= HARDLY_HELD)]:
+                require_resistance(self.network, bricks, row)
+        answers = _Answers(self._states(index, force), force[:, : 3 * columns.shape[1]].copy())
+        done = self._correct(columns, index, answers)
+        wrench, twist = unscaled(parts, answers.states[done])
+        held = answers.force[done].reshape(int(done.sum()), columns.shape[1], 3)
+        solution = Solution(twist, wrench, held)
+        fields = respond(self.network, parts.statics, parts.motion, columns[done], solution)
+        if done.all():
+            return fields
+        return merge_sets(done, fields, solve_mixed(self.network, bricks, columns[~done]))
+
+    def _states(self, index: Ints, force: Floats, weight: float = 1.0) -> Floats:
+        """Return the scaled answers (S, n) to forces (S, k) at loads, and the weight or none."""
+        return np.asarray(load_matrix(index, force, len(self.states) - 1, weight) @ self.states)
+
+    def _correct(self, columns: Ints, index: Ints, answers: _Answers) -> Bools:
+        """Correct answers until they no longer change; return which have come so far, (S,)."""
+        done = np.zeros(len(columns), dtype=bool)
+        left = np.flatnonzero(np.isfinite(answers.states).all(axis=1))
+        for _ in range(STEPS):
+            state, force = answers.states[left], answers.force[left]
+            change, more = self._correction(columns[left], index[left], state, force)
+            answers.states[left] = state + change
+            answers.force[left] = force + more
+            done[left] = unchanged(self.parts, state, change)
+            left = left[~done[left] & np.isfinite(change).all(axis=1)]
+            if not len(left):
+                break
+        return done
+
+    def _correction(
+        self, columns: Ints, index: Ints, states: Floats, force: Floats
+    ) -> tuple[Floats, Floats]:
+        """Return what must be added to scaled answers (S, n) and grip forces (S, 3r)."""
+        operator, parts = self.operator, self.parts
+        joints, nodes = len(parts.wrench_unit), force.shape[1]
+        pulled = load_matrix(index[:, :nodes], force, 6 * self.bricks, 1.0) @ self.pulls
+        missing = -(parts.matrix @ states.T).T
+        missing[:, joints:] += pulled
+        answer, pull = self.held.solve(missing)
+        moved = (self.inner @ (states + answer)[:, joints:].T).T
+        loose = -operator.softness * pull  # how far what is missing moves loose parts
+        moved += loose @ operator.flexibility[6 * self.bricks :, : 6 * self.bricks]
+        moved = np.hstack([np.take_along_axis(moved, index[:, :nodes], axis=1), -pull])
+        change = still_forces(operator, columns, index, moved)
+        more = change[:, :nodes].copy()
+        change[:, nodes:] += loose
+        return answer + self._states(index, change, 0.0), more
+
+
+@dataclass(frozen=True)
+class _Answers:
+    """Scaled wrenches and twists (S, n), and forces of the grips (S, 3r), corrected in place."""
+
+    states: Floats
+    force: Floats

@@ -1,0 +1,328 @@
+"""What is loose, nearly loose or badly held is answered for many grip sets together."""
+
+from __future__ import annotations
+
+from contextlib import nullcontext, suppress
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from experiments.engines.parts.grip_sets import grip_sets
+from experiments.engines.parts.limit_scenes import HELD, chain, loosened, without_joint
+from experiments.engines.parts.reference_chain import solve_exactly
+from experiments.harness.walls import running_bond
+from seqopt.engines.diagnosis import Finding, diagnose
+from seqopt.engines.frame import FrameEngine
+from seqopt.engines.interface import NAMES, Want, grip_columns
+from seqopt.engines.planar import PlanarEngine
+from seqopt.engines.rigid import compliance, refinement
+from seqopt.engines.rigid.compliance import ComplianceEngine, solve_batch
+from seqopt.engines.rigid.dense import solve_dense
+from seqopt.engines.rigid.held_operator import held_operator
+from seqopt.engines.rigid.ldlt import solve_positive
+from seqopt.engines.rigid.loose import hold_loose
+from seqopt.engines.rigid.mechanism import require_resistance
+from seqopt.engines.rigid.mixed import solve_mixed
+from seqopt.engines.rigid.mixed_system import ungripped_system
+from seqopt.engines.rigid.refinement import Refinement
+from seqopt.engines.rigid.spanning_tree import grow_tree
+from seqopt.errors import MechanismError, SolverError
+from seqopt.network.build import build_network
+from seqopt.placement.problem import pose
+from seqopt.scene.arch import ArchShape, arch_scene
+from seqopt.sequence.three_robots import three_robot_loop
+from seqopt.study.presets import EQUATIONS
+from tests.builders import all_nodes, block, hinged, on_soft_ground, six_bricks, torsion_free
+
+NONE = np.zeros((1, 0), dtype=int)
+TWISTED = 12  # the joint of arch25 that acts from 14 bricks on
+
+
+def apart(fields, others):
+    """The largest difference of each set and field, relative to its largest entry."""
+    worst = 0.0
+    for name in NAMES:
+        a, b = (getattr(f, name).reshape(len(f.grip_force), -1) for f in (fields, others))
+        size = np.abs(b).max(axis=1, initial=1e-300)
+        worst = max(worst, (np.abs(a - b).max(axis=1, initial=0) / size).max())
+    return worst
+
+
+@pytest.fixture
+def together(monkeypatch):
+    """Forbid what looks at grip sets one by one."""
+
+    def one_by_one(*_):
+        raise AssertionError("a grip set was looked at on its own")
+
+    monkeypatch.setattr(refinement, "solve_mixed", one_by_one)
+    monkeypatch.setattr(refinement, "require_resistance", one_by_one)
+
+
+# a loose joint, an island
+
+
+def test_a_torsion_free_joint_matters_only_where_it_acts(arch25, engine25, monkeypatch):
+    monkeypatch.setattr(compliance, "Refinement", None)  # nothing is corrected
+    engine = ComplianceEngine(build_network(torsion_free(arch25, TWISTED)))
+    for bricks in (1, 7, TWISTED + 1):
+        sets = grip_sets(engine.network, bricks, 20) if bricks > 1 else NONE
+        mine, whole = (e.solve(bricks, sets, Want.ALL) for e in (engine, engine25))
+        assert mine == whole
+    with pytest.raises(TypeError):
+        engine.solve(TWISTED + 2, NONE)
+
+
+def test_an_arch_with_a_torsion_free_joint_is_posed_together(arch25, together):
+    """It took 49 s, set by set, and now solves none on its own."""
+    net = build_network(torsion_free(arch25, TWISTED))
+    problem = pose(ComplianceEngine(net), three_robot_loop(net), EQUATIONS)
+    assert all(np.isfinite(cost).any() for cost in problem.sums.single)
+
+
+@pytest.mark.parametrize(("bricks", "loose"), [(13, 0), (14, 1), (24, 1), (25, 0)])
+def test_loose_motions_are_counted(arch25, bricks, loose):
+    """A closed arch resists even at a joint that does not."""
+    net = build_network(torsion_free(arch25, TWISTED))
+    assert hold_loose(ungripped_system(net, bricks)).loose == loose
+
+
+@pytest.mark.parametrize("bricks", [14, 20, 25])
+@pytest.mark.parametrize("kind", ["torsion", "hinge", "island"])
+def test_sets_together_agree_with_sets_on_their_own(arch25, kind, bricks):
+    """Every set that is a mechanism is called one, every other one answered alike."""
+    scene = {
+        "torsion": torsion_free(arch25, TWISTED),
+        "hinge": hinged(arch25, 3),
+        "island": replace(arch25, joints=arch25.joints[:11] + arch25.joints[12:]),
+    }[kind]
+    net = build_network(scene)
+    engine, sound = ComplianceEngine(net), []
+    sets = [*grip_sets(net, bricks, 40), (21, 24, 26), (24, 26, 27), (25, 26, 27)]
+    for grips in sets:
+        row = grip_columns(net, bricks, [grips])
+        try:
+            require_resistance(net, bricks, row[0])
+            solve_mixed(net, bricks, row)
+        except MechanismError:
+            with pytest.raises(MechanismError):
+                engine.solve(bricks, [grips])
+        else:
+            sound.append(grips)
+    assert sound
+    alone = solve_mixed(net, bricks, grip_columns(net, bricks, sound))
+    assert apart(engine.solve(bricks, sound, Want.ALL), alone) <= 1e-9
+    assert bricks == 25 or len(sound) < len(sets)
+
+
+def test_an_unloaded_mechanism_is_found():
+    """Bricks in line beyond a torsion-free joint have no reason to turn, and nothing to stop them.
+
+    Grips on that line do not keep them either; one beside it does.
+    """
+    shape = ArchShape(pitch=np.full(4, 0.3), pattern="V", closed=False)
+    engine = ComplianceEngine(build_network(torsion_free(arch_scene(shape), 1)))
+    for grips in ([[]], [[7]], [[5, 6, 7]]):
+        with pytest.raises(MechanismError, match="nothing resists"):
+            engine.solve(4, np.array(grips, dtype=int).reshape(1, -1))
+    beside = replace(shape, pattern="VVVL")
+    engine = ComplianceEngine(build_network(torsion_free(arch_scene(beside), 1)))
+    assert np.isfinite(engine.solve(4, [[7]]).displacement).all()
+
+
+def test_a_scene_that_is_loose_from_its_first_brick():
+    """Ground that does not resist turning: no operator at any brick count."""
+    scene = on_soft_ground(six_bricks(), 0.0)
+    net = build_network(scene)
+    assert len(grow_tree(net).spring) == 0
+    engine = ComplianceEngine(net)
+    for bricks, grips in ((1, []), (3, [3])):
+        with pytest.raises(MechanismError):
+            engine.solve(bricks, np.array(grips, dtype=int).reshape(1, -1))
+    sets = [(3, 5), (2, 9), (11, 6)]
+    alone = solve_mixed(net, 6, grip_columns(net, 6, sets))
+    assert apart(engine.solve(6, sets, Want.ALL), alone) <= 1e-9
+
+
+def test_a_loose_joint_in_a_plane():
+    """Motions out of the plane are asked about where something is loose."""
+    net = build_network(hinged(six_bricks("V"), 2))
+    a, b = (engine(net).solve(5, [[7, 9], [8, 6]]) for engine in (PlanarEngine, ComplianceEngine))
+    assert apart(a, b) <= 1e-12
+
+
+def test_a_wall_with_loose_joints():
+    scene = running_bond(4, 4)
+    joints = [
+        replace(joint, rotational_stiffness=(0.0, *joint.rotational_stiffness[1:]))
+        if i % 7 == 3
+        else joint
+        for i, joint in enumerate(scene.joints)
+    ]
+    net = build_network(replace(scene, joints=tuple(joints)))
+    sets = grip_sets(net, 16, 20)
+    direct = solve_dense(net, 16, grip_columns(net, 16, sets))
+    assert apart(ComplianceEngine(net).solve(16, sets, Want.ALL), direct) <= 1e-9
+
+
+def test_the_operator_of_a_loose_structure_is_symmetric(arch25):
+    """Reciprocity: what a force moves at a loose motion, the motion moves at the force."""
+    system = hold_loose(ungripped_system(build_network(hinged(arch25, 3)), 20))
+    operator = held_operator(system)
+    assert operator.loose == system.loose == 3
+    matrix = operator.flexibility
+    assert np.abs(matrix - matrix.T).max() <= 1e-12 * np.abs(matrix).max()
+    assert operator.directions == 3
+    assert len(operator.brick_twist) == 6 * 20 + 3 + 1
+
+
+def test_a_saddle_among_many_systems():
+    rng = np.random.default_rng(5)
+    root, reach = rng.standard_normal((7, 4, 4)), rng.standard_normal((7, 2, 4))
+    matrix = np.zeros((7, 6, 6))
+    matrix[:, :4, :4] = root @ root.transpose(0, 2, 1)
+    matrix[:, 4:, :4], matrix[:, :4, 4:] = reach, reach.transpose(0, 2, 1)
+    load = rng.standard_normal((7, 6))
+    system = np.concatenate([np.tril(matrix), load[:, None]], axis=1).transpose(1, 2, 0).copy()
+    answer, pivot = solve_positive(system, negative=2)
+    expected = np.linalg.solve(matrix, load[..., None])[..., 0]
+    assert np.abs(answer.T - expected).max() <= 1e-9 * np.abs(expected).max()
+    assert (pivot > 0).all()
+    matrix[0, 4:, :4] = 0.0  # nothing holds these motions
+    system = np.concatenate([np.tril(matrix), load[:, None]], axis=1).transpose(1, 2, 0).copy()
+    _, pivot = solve_positive(system, negative=2)
+    assert not pivot[0] > 0
+    assert (pivot[1:] > 0).all()
+
+
+# grip sets that the operator alone does not answer well enough
+
+
+@pytest.mark.parametrize("count", [75, 150])
+def test_close_grips_on_a_long_chain_are_corrected_together(count, together):
+    net = build_network(chain(count))
+    tip = 2 * count - 1
+    sets = [(tip, tip - 1, tip - 2), (tip, tip - 2, tip - 4), (tip - 1, tip - 2, tip - 3)]
+    engine = ComplianceEngine(net)
+    _, trusted = solve_batch(engine._operator(count), grip_columns(net, count, sets))
+    assert not trusted.any()
+    fields = engine.solve(count, sets, Want.ALL)
+    for row, places in enumerate(grip_columns(net, count, sets)):
+        exact = solve_exactly(net, count, places)
+        moved = fields.displacement[row, net.inner.ravel()]
+        assert np.abs(moved - exact.displacement).max() <= 1e-12 * np.abs(exact.displacement).max()
+
+
+def test_the_first_correction_is_the_error(arch25):
+    """Spoiled by a millionth, an answer is off by that much less in the next step."""
+    net = build_network(arch25)
+    better = Refinement(net, 20, ComplianceEngine(net)._operator(20))
+    index = better.operator.load_index(columns := grip_columns(net, 20, [[7, 20, 33]]))
+    right, _ = refinement.grip_forces(better.operator, columns, index)
+    wrong = right * (1 + 1e-6)
+    change, more = better._correction(columns, index, better._states(index, wrong), wrong)
+    assert wrong + more == pytest.approx(right, rel=1e-12)
+    assert np.abs(more).max() == pytest.approx(1e-6 * np.abs(right).max(), rel=1e-3)
+    left = better._states(index, wrong) + change - better._states(index, right)
+    assert np.abs(left).max() <= 1e-12 * np.abs(better._states(index, right)).max()
+
+
+def test_what_does_not_settle_is_solved_on_its_own(monkeypatch):
+    """Negative control: without corrections the last resort answers, and as well."""
+    net = build_network(loosened(chain(25), 1e-9, only_turning=True))
+    sets = [HELD, (30, 37, 49)]
+    usual = ComplianceEngine(net).solve(25, sets, Want.ALL)
+    monkeypatch.setattr(refinement, "STEPS", 0)
+    assert apart(ComplianceEngine(net).solve(25, sets, Want.ALL), usual) <= 1e-9
+
+
+def test_a_part_held_by_three_grips_needs_no_second_look(together):
+    net = without_joint(chain(25))
+    assert np.isfinite(ComplianceEngine(net).solve(25, [HELD]).displacement).all()
+
+
+# every brick held at both nodes
+
+
+@pytest.mark.parametrize("bricks", [1, 2, 6])
+def test_every_brick_held_at_both_nodes(bricks):
+    """Nothing moves and no joint carries: sound, however rounding compares with itself."""
+    scene = replace(six_bricks(), blocked_nodes=())
+    net = build_network(scene)
+    for held in (net, build_network(hinged(scene, 2))):
+        sets = all_nodes(held, bricks)
+        columns = grip_columns(held, bricks, sets)
+        answers = [
+            solve_mixed(net, bricks, columns),
+            ComplianceEngine(held).solve(bricks, sets, Want.ALL),
+            FrameEngine(held).solve(bricks, sets),
+        ]
+        weight = np.linalg.norm(net.weight[:bricks], axis=1).sum()
+        for fields in answers:
+            assert fields.grip_force.sum(axis=(0, 1)) == pytest.approx([0, 0, weight], abs=1e-9)
+            assert np.abs(fields.joint_wrench).max() <= 1e-9 * weight
+            assert np.abs(fields.displacement).max() <= 1e-12
+        for source in (held, ComplianceEngine(held), FrameEngine(held)):
+            assert diagnose(source, bricks, sets[0]).finding is Finding.SOLVED_WELL
+
+
+def test_a_false_answer_is_seen_where_nothing_moves():
+    """Negative control: a joint that is said to carry a millionth of a brick's weight."""
+    net = build_network(replace(six_bricks(), blocked_nodes=()))
+
+    class Spoiled:
+        network = net
+
+        def solve(self, bricks, grips, want):
+            fields = ComplianceEngine(net).solve(bricks, grips, want)
+            wrench = fields.joint_wrench.copy()
+            wrench[0, 1, 2] += 1e-6 * np.linalg.norm(net.weight[0])
+            return replace(fields, joint_wrench=wrench)
+
+    assert diagnose(Spoiled(), 6, all_nodes(net, 6)[0]).finding is Finding.ILL_CONDITIONED
+
+
+# soft ground
+
+
+@pytest.mark.parametrize("turning", [1e-2, 2.4e-6, 1e-9])
+@pytest.mark.parametrize("grips", [(), (4,), (10,), (10, 17)])
+def test_soft_ground_is_no_mechanism(arch25, turning, grips):
+    """It is answered well, or refused as too much for double precision, by every route."""
+    net = build_network(on_soft_ground(arch25, turning))
+    columns = grip_columns(net, 10, np.array([grips], dtype=int).reshape(1, -1))
+    require_resistance(net, 10, columns[0])
+    for source in (net, ComplianceEngine(net), FrameEngine(net)):
+        assert diagnose(source, 10, grips).finding is not Finding.MECHANISM
+    for solve in (ComplianceEngine(net).solve, FrameEngine(net).solve):
+        with suppress(SolverError) if len(grips) < 2 else nullcontext():
+            solve(10, np.array([grips], dtype=int).reshape(1, -1))
+    with suppress(SolverError):
+        solve_dense(net, 10, columns)
+
+
+def test_ground_that_does_not_resist_is_a_mechanism(arch25):
+    """Negative control: the same without any stiffness."""
+    net = build_network(on_soft_ground(arch25, 0.0))
+    for engine in (ComplianceEngine(net), FrameEngine(net)):
+        with pytest.raises(MechanismError):
+            engine.solve(3, [[4]])
+        assert diagnose(engine, 3, [4]).finding is Finding.MECHANISM
+
+
+@pytest.mark.parametrize("engine", [ComplianceEngine, FrameEngine])
+def test_nothing_but_a_grip_holds_a_brick(engine):
+    """No stiffness anywhere: eigenvalues that are all zero are small beside each other."""
+    nothing = (0.0, 0.0, 0.0)
+    scene = block(translational_stiffness=nothing, rotational_stiffness=nothing)
+    with pytest.raises(MechanismError, match="brick 1"):
+        engine(build_network(scene)).solve(1, [[1]])
+
+
+def test_a_single_brick_on_soft_ground_is_answered():
+    """The weight over the softness: 2.4e-6 N m/rad against an arm of a tenth of a meter."""
+    net = build_network(block(lean=0.3, rotational_stiffness=(2.4e-6, 2.4e-6, 2.4e-6)))
+    twist = ComplianceEngine(net).solve(1, NONE, Want.BRICKS).brick_twist[0, 0]
+    arm = net.centroid[0] - net.springs.position[0]
+    assert twist[3:] == pytest.approx(np.cross(arm, net.weight[0]) / 2.4e-6, rel=1e-9, abs=1e-3)
