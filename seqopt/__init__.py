@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from seqopt.scene.scene_file import load_scene, save_scene
     from seqopt.sequence.plan_file import read_plan
     from seqopt.sequence.schedule import Schedule
+    from seqopt.sequence.schedule_file import read_schedule
     from seqopt.sequence.steps import Step
     from seqopt.sequence.three_robots import modified_sequential, three_robot_loop
     from seqopt.sequence.two_robots import cantilever, sequential
@@ -70,6 +71,7 @@ _HOMES = {
     "scene.scene_file": ("load_scene", "save_scene"),
     "sequence.plan_file": ("read_plan",),
     "sequence.schedule": ("Schedule",),
+    "sequence.schedule_file": ("read_schedule",),
     "sequence.steps": ("Step",),
     "sequence.three_robots": ("modified_sequential", "three_robot_loop"),
     "sequence.two_robots": ("cantilever", "sequential"),
@@ -95,6 +97,7 @@ __all__ = [  # noqa: RUF022  # in the order in which they are met
     "three_robot_loop",
     "modified_sequential",
     "read_plan",
+    "read_schedule",
     "Engine",
     "make_engine",
     "analyze",

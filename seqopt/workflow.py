@@ -19,13 +19,13 @@ from seqopt.placement.solving import solve
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.schedule import Schedule
-from seqopt.sequence.three_robots import make_schedule
+from seqopt.sequence.schedule_file import find_schedule
 from seqopt.study.presets import CRITERIA, EQUATIONS
 
 
 def optimize(
     scene: Scene | str | Path,
-    schedule: str = "three-robot",
+    schedule: Schedule | Path | str = "three-robot",
     criterion: Criterion | str = EQUATIONS,
     formulation: str = "overlap_dp",
     engine: str = "auto",
@@ -39,8 +39,8 @@ def optimize(
     ----------
     scene : Scene, str or pathlib.Path
         Or the name of a built-in scene, or a scene file.
-    schedule : str
-        ``"three-robot"`` or ``"modified-sequential"``.
+    schedule : Schedule, pathlib.Path or str
+        A key of `seqopt.sequence.three_robots.SCHEDULES`, a schedule file, or a schedule.
     criterion : Criterion or str
         What a step costs; or a name of `seqopt.CRITERIA`.
     formulation : str
@@ -64,7 +64,7 @@ def optimize(
     Examples
     --------
     >>> import seqopt
-    >>> plan = seqopt.optimize("arch25", criterion="worst-ratio", formulation="minimax")
+    >>> plan = seqopt.optimize("arch25", criterion="worst-ratio-published", formulation="minimax")
     >>> round(plan.certificate.objective, 3)
     1.185
     """
@@ -75,10 +75,12 @@ def optimize(
     return replace(plan, seconds={"assemble": assemble, **plan.seconds})
 
 
-def _assemble(scene: Scene | str | Path, schedule: str, engine: str) -> tuple[Engine, Schedule]:
-    """Return the engine and the schedule of a scene, all by name."""
+def _assemble(
+    scene: Scene | str | Path, schedule: Schedule | Path | str, engine: str
+) -> tuple[Engine, Schedule]:
+    """Return the engine and the schedule of a scene."""
     network = build_network(load_scene(scene) if isinstance(scene, str | Path) else scene)
-    return make_engine(engine, network), make_schedule(schedule, network)
+    return make_engine(engine, network), find_schedule(network, schedule)
 
 
 def find_criterion(criterion: Criterion | str) -> Criterion:

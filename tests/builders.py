@@ -10,7 +10,7 @@ import numpy as np
 
 from seqopt.network.build import build_network
 from seqopt.scene.arch import ArchShape, arch_scene
-from seqopt.scene.parts import Brick, Ground, Robot
+from seqopt.scene.parts import Brick, Ground, Joint, Robot
 from seqopt.scene.reach import Side
 from seqopt.scene.scene import Scene
 
@@ -28,6 +28,14 @@ def six_bricks(pattern="VLR"):
 
 def small_arch(count):
     return arch_scene(ArchShape(pitch=np.linspace(1.3, -1.3, count).tolist()))
+
+
+def from_both_sides(count, pattern="V"):
+    """A symmetric arch; bricks are placed at both ends in turn, and the crown's comes last."""
+    shape = ArchShape(pitch=np.linspace(1.3, -1.3, count).tolist(), pattern=pattern)
+    inward = zip(range(1, count + 1), range(count, 0, -1), strict=True)
+    order = [brick for pair in inward for brick in pair][:count]
+    return replace(arch_scene(shape, "from-both-sides"), build_order=tuple(order))
 
 
 def block(size=(0.4, 0.3, 0.1), lean=0.0, gravity=9.81, **stiffness):
@@ -69,6 +77,58 @@ def block(size=(0.4, 0.3, 0.1), lean=0.0, gravity=9.81, **stiffness):
     )
 
 
+def from_both_ends(count, pattern="VLR", order=None):
+    """An arch of which both ends are built; they meet at a closing brick. By default in turn."""
+    closing = (count + 1) // 2
+    left, right = [*range(1, closing)], [*range(count, closing, -1)]
+    pairs = [name for pair in zip(left, right, strict=False) for name in pair]
+    rest = (left + right)[len(pairs) :] if len(left) == len(right) else right[len(left) :]
+    pitch = np.linspace(1.3, -1.3, count).tolist()
+    scene = arch_scene(ArchShape(pitch=pitch, pattern=pattern), "both ends")
+    return replace(scene, build_order=tuple(order or (*pairs, *rest, closing)))
+
+
+def branch(length=0.2):
+    """A trunk of two bricks with two arms of two: a Y whose arms grow in turn."""
+    up, s = (0.0, 0.0, 1.0), math.sqrt(0.5)
+    ways = {1: up, 2: up, 3: (-s, 0.0, s), 4: (s, 0.0, s), 5: (-s, 0.0, s), 6: (s, 0.0, s)}
+    below = {2: 1, 3: 2, 4: 2, 5: 3, 6: 4}
+    start = {1: np.zeros(3)}
+    for name, other in below.items():
+        start[name] = start[other] + length * np.array(ways[other])
+    stiff = {"translational_stiffness": (1e8,) * 3, "rotational_stiffness": (1e6,) * 3}
+
+    def spring(name):
+        place = tuple(start[name].tolist())
+        return {"position": place, "along": ways[name], "across": (0.0, 1.0, 0.0)} | stiff
+
+    return Scene(
+        name="branch",
+        bricks=tuple(
+            Brick(
+                name=name,
+                position=tuple((start[name] + 0.5 * length * np.array(way)).tolist()),
+                length_axis=way,
+                width_axis=(0.0, 1.0, 0.0),
+                dimensions=(length, 0.1, 0.05),
+                density=2000.0,
+                nodes=(2 * name, 2 * name + 1),
+                placing_node=2 * name + 1,
+            )
+            for name, way in ways.items()
+        ),
+        joints=tuple(Joint(bricks=(b, a), **spring(a)) for a, b in below.items()),
+        grounds=(Ground(brick=1, anchor=(0.0, 0.0, -0.05), **spring(1)),),
+        build_order=(1, 2, 3, 4, 5, 6),
+        robots=anywhere(3),
+    )
+
+
+def anywhere(count):
+    """So many robots that reach everything."""
+    return tuple(Robot(name=f"rob{i + 1}", payload=400.0) for i in range(count))
+
+
 def hinged(scene, joint):
     """The scene with one joint without rotational stiffness."""
     joints = list(scene.joints)
@@ -95,8 +155,11 @@ def about_vertical(angle):
     return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
 
 
-def moved(scene, change):
-    """Return the scene with positions passed through a function, axes through its linear part."""
+def moved(scene, change, size=1.0):
+    """Return the scene with positions passed through a function, axes through its linear part.
+
+    Bricks are ``size`` times as large.
+    """
 
     def axis(v):
         a, o = np.array(change(np.array(v))), np.array(change(np.zeros(3)))
@@ -118,6 +181,7 @@ def moved(scene, change):
                 position=point(b.position),
                 length_axis=axis(b.length_axis),
                 width_axis=axis(b.width_axis),
+                dimensions=tuple(size * d for d in b.dimensions),
             )
             for b in scene.bricks
         ),
@@ -128,7 +192,7 @@ def moved(scene, change):
 
 def scaled(scene, length=1.0, density=1.0, stiffness=1.0):
     """Scale lengths (rotational stiffness with their square), densities, stiffnesses, payloads."""
-    out = moved(scene, lambda p: length * p)
+    out = moved(scene, lambda p: length * p, length)  # at once: halves of it may make no scene
 
     def spring(s):
         return replace(
@@ -145,14 +209,7 @@ def scaled(scene, length=1.0, density=1.0, stiffness=1.0):
 
     return replace(
         out,
-        bricks=tuple(
-            replace(
-                b,
-                dimensions=tuple(length * d for d in b.dimensions),
-                density=density * b.density,
-            )
-            for b in out.bricks
-        ),
+        bricks=tuple(replace(b, density=density * b.density) for b in out.bricks),
         joints=tuple(map(spring, out.joints)),
         grounds=tuple(map(spring, out.grounds)),
         robots=tuple(map(robot, out.robots)),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from hypothesis import strategies as st
 
@@ -9,8 +11,10 @@ from experiments.harness.walls import running_bond
 from seqopt.placement.costs import LayeredCosts
 from seqopt.placement.interface import CostProblem
 from seqopt.scene.arch import ArchShape, arch_scene
+from seqopt.scene.parts import Robot
+from seqopt.scene.reach import Anywhere, Side, Sphere
 from seqopt.study.presets import ROBOTS
-from tests.builders import about_vertical, moved
+from tests.builders import about_vertical, from_both_sides, moved
 
 angles = st.floats(-0.3, 0.3)
 
@@ -37,9 +41,55 @@ def arches(draw, max_bricks=7, min_bricks=1):
 
 
 @st.composite
+def both_sided(draw, pattern=None):
+    """A small arch that is built from both of its ends at once and closes at the crown."""
+    shape = st.sampled_from(["VLR", "V", "LR", "VL"]) if pattern is None else st.just(pattern)
+    return from_both_sides(draw(st.integers(2, 7)), draw(shape))
+
+
+@st.composite
 def walls(draw):
     """A small wall in running bond: bricks with several joints, loops from the start."""
     return running_bond(draw(st.integers(2, 4)), draw(st.integers(2, 3)))
+
+
+@st.composite
+def teams(draw, scene, least=2):
+    """The scene with two to five robots, each of which reaches all, a side, or a sphere."""
+    points = np.array([brick.position for brick in scene.bricks])
+    middle, size = points.mean(axis=0), 0.3 + np.ptp(points, axis=0).max()
+    share = st.floats(-0.5, 0.5)
+    spheres = st.builds(
+        lambda x, y, z, r: Sphere(
+            center=tuple((middle + size * np.array([x, y, z])).tolist()), radius=r * size
+        ),
+        *(share, share, share, st.floats(0.4, 1.2)),
+    )
+    sides = st.builds(
+        lambda sign, far: Side(toward=(0.0, sign, 0.0), point=(0.0, -sign * far, 0.0)),
+        *(st.sampled_from([-1.0, 1.0]), st.floats(0.0, 0.2)),
+    )
+    reaches = draw(
+        st.lists(st.one_of(st.just(Anywhere()), sides, spheres), min_size=least, max_size=5)
+    )
+    robots = (Robot(name=f"rob{i}", payload=500.0, reach=r) for i, r in enumerate(reaches, 1))
+    return replace(scene, robots=tuple(robots))
+
+
+@st.composite
+def builds(draw):
+    """An arch, a wall, an arch built from both ends, or one in any order, and any robots."""
+    kind = draw(st.sampled_from(["arch", "wall", "both ends", "any order"]))
+    if kind == "wall":
+        return draw(teams(draw(walls())))
+    scene = draw(arches(max_bricks=9))
+    names = [*scene.build_order]
+    if kind == "any order":
+        names = draw(st.permutations(names))
+    elif kind == "both ends":
+        ends = draw(st.lists(st.sampled_from([0, -1]), min_size=len(names), max_size=len(names)))
+        names = [names.pop(end) for end in ends]
+    return draw(teams(replace(scene, build_order=tuple(names))))
 
 
 @st.composite

@@ -1,23 +1,28 @@
-"""Claim: joints as beds of springs fit eight vault tests better than the study's calibration.
+"""Claim: beds of springs fit eight vault tests better than printed only where that is minimized.
 
 A bed of springs over the area of a joint has a linear stiffness ``k_t b t`` and a rotational one
-``k_r b t³ / 12``. With one pair of values its mean absolute error over the measured stiffnesses is
-below the study's 19.0 %. With a rotational stiffness in proportion to the area or to ``b t²`` no
-pair of values is.
+``k_r b t³ / 12``. Minimized over one pair of values, its mean absolute error over the measured
+stiffnesses is below the 19.0 % of the column that Bruun et al. print; two tests are then met
+exactly, by construction. With a rotational stiffness in proportion to the area or to ``b t²`` no
+pair of values is below it. Beyond that the tests do not say which is closer: the paired gain is
+within its 95 % interval of none, and with the law chosen anew for every test left out the paper's
+column is closer. The claim fails if any of this does not come out.
 
 Method: every vault is a chain of rigid bricks with joints at both abutments. Under each law the
 stiffness is ``k_t`` times a function of ``k_r / k_t``. For a given ratio the best ``k_t`` is known
 in closed form (a weighted median for absolute errors, a quotient for squares), so one search over
 the ratio finds the global optimum. Every test is also predicted from a fit to the other seven. The
 confidence region holds all pairs whose sum of squares is at most ``1 + p F(p, 8 - 2) / (8 - 2)``
-times the smallest, ``p = 2``; a profile has ``p = 1``. Every fitted stiffness is computed again
-with the compliance operator of the scene. How the study's own column comes about is the subject of
-`experiments.calibration.parts.calibration_readings`.
+times the smallest, ``p = 2``; a profile has ``p = 1``. What bounds ``k_r`` is found by other routes
+too, and with joints stiffer or softer across (`experiments.calibration.parts.calibration_spread`).
+Every fitted stiffness is computed again with the compliance operator of the scene. How the paper's
+own column comes about is the subject of `experiments.calibration.parts.calibration_readings`.
 
 Inputs: ``arch_tests.csv``, ``arch_stiffness.csv`` in ``seqopt/data/paper``. Command: ``python -m
 experiments.calibration.calibration [--quick]``. Writes ``experiments/results/calibration.csv``,
-``calibration_fits.csv``, ``calibration_geometry.csv``, ``calibration_readings.csv``,
-``calibration_entries.csv`` and ``docs/figures/calibration.png``.
+``calibration_fits.csv``, ``calibration_comparison.csv``, ``calibration_routes.csv``,
+``calibration_geometry.csv``, ``calibration_readings.csv``, ``calibration_entries.csv`` and
+``docs/figures/calibration.png``.
 """
 
 from __future__ import annotations
@@ -26,7 +31,6 @@ from itertools import product
 
 import numpy as np
 import pandas as pd
-from scipy import stats
 
 from experiments.calibration.parts.barrel_vaults import (
     LINES,
@@ -40,19 +44,22 @@ from experiments.calibration.parts.barrel_vaults import (
 )
 from experiments.calibration.parts.calibration_chart import chart
 from experiments.calibration.parts.calibration_readings import entries, readings, summary
+from experiments.calibration.parts.calibration_spread import (
+    ANEW,
+    GAIN_HIGH,
+    GAIN_LOW,
+    IN_SAMPLE,
+    comparison,
+    interval,
+    left_out,
+    rotational,
+    threshold,
+    whole,
+)
 from experiments.calibration.parts.laws import BED, LAWS, MEASURES, Law, errors, fit, laws
 from experiments.harness.claim import Claim, Finding, Options
 from experiments.harness.plotting import RESULTS
 from seqopt.arrays import Floats
-
-LEVEL = 0.95
-
-
-def left_out(law: Law, measure: str) -> tuple[list[tuple[float, float]], Floats]:
-    """Return the pairs fitted without each test in turn, and the error on that test."""
-    count = len(law.tests)
-    pairs = [fit(law, measure, np.arange(count) != i) for i in range(count)]
-    return pairs, np.array([errors(law, pair)[i] for i, pair in enumerate(pairs)])
 
 
 def turning_share(law: Law, pair: tuple[float, float]) -> Floats:
@@ -60,12 +67,6 @@ def turning_share(law: Law, pair: tuple[float, float]) -> Floats:
     step = 1e-4
     near = pair[1] / pair[0] * np.exp([-step, step])
     return np.asarray(np.diff(np.log(law.curves(near)), axis=1)[:, 0] / (2 * step))
-
-
-def threshold(numbers: int, fitted: int, count: int = 8) -> float:
-    """Return the border of a region of ``numbers`` of the fitted ones, over the least sum."""
-    rest = count - fitted
-    return float(1 + numbers * stats.f.ppf(LEVEL, numbers, rest) / rest)
 
 
 def squares(law: Law, k_t: Floats, k_r: Floats) -> Floats:
@@ -92,21 +93,8 @@ def intervals(law: Law) -> dict[str, float]:
     limit = threshold(1, 1 if law.bounds[0] == law.bounds[1] else 2)
     out = {}
     for name, (values, sums) in profiles(law).items():
-        inside = np.flatnonzero(sums <= limit * sums.min())
-        out[f"{name}_from"] = 0.0 if inside[0] == 0 else float(values[inside[0]])
-        out[f"{name}_to"] = np.inf if inside[-1] == len(values) - 1 else float(values[inside[-1]])
+        out[f"{name}_from"], out[f"{name}_to"] = interval(values, sums, limit)
     return out
-
-
-def chosen_anew(models: dict[str, Law]) -> tuple[list[str], Floats]:
-    """Return the law that fits best without each test, and its error on that test."""
-    names, out = [], []
-    for i in range(8):
-        kept = np.arange(8) != i
-        trials = {name: errors(law, fit(law, "absolute", kept)) for name, law in models.items()}
-        names.append(min(trials, key=lambda name: float(np.abs(trials[name][kept]).mean())))
-        out.append(trials[names[-1]][i])
-    return names, np.array(out)
 
 
 def geometries(tests: tuple[Vault, ...]) -> pd.DataFrame:
@@ -114,7 +102,7 @@ def geometries(tests: tuple[Vault, ...]) -> pd.DataFrame:
     rows = []
     for line, place in product(LINES, PLACES):
         law = Law(BED, tests, tuple(planar_parts(chain(v, line, place)) for v in tests))
-        pair = fit(law, "absolute", np.ones(len(tests), dtype=bool))
+        pair = fit(law, "absolute", whole(law))
         row: dict[str, object] = {"line": line, "place": place, "k_t": pair[0], "k_r": pair[1]}
         row["mean_absolute_percent"] = 100 * np.abs(errors(law, pair)).mean()
         row["left_out_percent"] = 100 * np.abs(left_out(law, "absolute")[1]).mean()
@@ -124,7 +112,7 @@ def geometries(tests: tuple[Vault, ...]) -> pd.DataFrame:
 
 def tabulate(law: Law, measure: str, label: str) -> tuple[pd.DataFrame, dict[str, object]]:
     """Return a row per test and one summary row for one law and measure."""
-    pair = fit(law, measure, np.ones(len(law.tests), dtype=bool))
+    pair = fit(law, measure, whole(law))
     error, out = errors(law, pair), left_out(law, measure)[1]
     share = turning_share(law, pair)
     rows, gap = [], 0.0
@@ -134,7 +122,7 @@ def tabulate(law: Law, measure: str, label: str) -> tuple[pd.DataFrame, dict[str
         gap = max(gap, abs(k / (vault.measured * (1 + error[i])) - 1))
         row = {"law": label, "measure": measure, "test": vault.test, "k_e": vault.measured / 1e6}
         row |= {"k_m": vault.study / 1e6, "k_fit": k / 1e6, "turning_share": share[i]}
-        row |= {"study_percent": 100 * (vault.study / vault.measured - 1)}
+        row |= {"paper_percent": 100 * (vault.study / vault.measured - 1)}
         rows.append(row | {"fit_percent": 100 * error[i], "left_out_percent": 100 * out[i]})
     total = {"law": label, "measure": measure, "k_t": pair[0], "k_r": pair[1]}
     total |= {"mean_absolute_percent": 100 * np.abs(error).mean()}
@@ -155,27 +143,35 @@ def experiment(options: Options) -> Finding:
     print(fits.to_string(index=False, float_format="%.4g"))
     bed = table[(table["law"] == BED) & (table["measure"] == "absolute")]
     print(bed.drop(columns=["law", "measure"]).to_string(index=False, float_format="%.3g"))
-    study = float(bed["study_percent"].abs().mean())
-    print(f"mean absolute error of the study: {study:.2f} %")
+    beside = comparison(models)
+    print(beside.to_string(index=False, float_format="%.2f", na_rep=""))
     if not quick:
-        save(table, fits, models)
+        save(table, fits, models, beside)
+    return Finding(holds(fits, beside) and bool(fits["engine_gap"].max() <= 1e-9))
+
+
+def holds(fits: pd.DataFrame, beside: pd.DataFrame) -> bool:
+    """Return whether the bed alone leads in what is minimized, and nothing else says it leads."""
     error = fits[fits["measure"] == "absolute"].set_index("law")["mean_absolute_percent"]
-    worse = error[["b t", "b t2"]].min()
-    holds = error[BED] <= study < worse and fits["engine_gap"].max() <= 1e-9
-    return Finding(bool(holds))
+    own, paper = (beside.set_index("what")[f"{name}_percent"] for name in ("bed", "paper"))
+    leads = error[BED] < paper[IN_SAMPLE] < error[["b t", "b t2"]].min()
+    open_still = own[GAIN_LOW] < 0 < own[GAIN_HIGH] and own[ANEW] > paper[ANEW]
+    return bool(leads and open_still)
 
 
-def save(table: pd.DataFrame, fits: pd.DataFrame, models: dict[str, Law]) -> None:
+def save(
+    table: pd.DataFrame, fits: pd.DataFrame, models: dict[str, Law], beside: pd.DataFrame
+) -> None:
     RESULTS.mkdir(exist_ok=True)
     bed = models[BED]
     scan, single, other = readings(), entries(), geometries(bed.tests)
     print(summary(scan))
-    for frame in (single, other):
+    bounds = rotational(bed.tests)
+    for frame in (single, other, bounds):
         print(frame.to_string(index=False, float_format="%.4g"))
-    names, out = chosen_anew({name: models[name] for name in LAWS})
-    print(f"law chosen anew without each test: {names}, {100 * np.abs(out).mean():.2f} %")
     kept = fits.drop(columns="engine_gap")  # rounding, another on every machine
     frames = {"": table, "_fits": kept, "_readings": scan, "_entries": single, "_geometry": other}
+    frames |= {"_comparison": beside, "_routes": bounds}
     for end, frame in frames.items():
         path = RESULTS / f"calibration{end}.csv"
         frame.to_csv(path, index=False, float_format="%.4g", lineterminator="\n")

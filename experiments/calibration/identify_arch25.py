@@ -1,8 +1,8 @@
-"""Claim: numbers with a meaning reproduce both printed tables of the 25-brick arch.
+"""Claim: an arch of numbers with a meaning, fitted to Tables A.1 and A.2, also meets Table B.1.
 
-The study prints span, height, brick and pattern of its arch but no coordinates, and joint
-stiffnesses per area. This experiment recovers the rest from Tables A.1 and A.2 alone. The responses
-of the three-robot plan take no part.
+Bruun et al. print span, height, brick and pattern of their arch but no coordinates, and joint
+stiffnesses per area. This experiment recovers the rest from Tables A.1 and A.2 alone. Table B.1,
+the responses of the three-robot plan, takes no part: it says how far the result predicts.
 
 Method: the shape is a chain of bricks (`seqopt.scene.arch`) with
 
@@ -23,9 +23,10 @@ degree of softening; a fit that ends worse than the shipped one goes on, up to t
 the tables alone lead from a catenary to a fit like the shipped one. ``--full`` starts from two plan
 angles with at most 40 evaluations, as the shipped scene did; the best of its first stages goes on.
 Either states how far its errors and numbers are from the shipped ones. The claim fails if the
-shipped scene is worse than the bounds that the tests hold it to, or if the median, 90th or 95th
-percentile of the new errors (in percent) is larger than the shipped one by more than the
-yardstick's rounding, 0.05.
+median, 90th or 95th percentile of the shipped scene's errors is above 0.15, 1.9 or 4 %, on both
+fitted tables together or on Table B.1, or if one of the new fit on the fitted tables is larger than
+the shipped one by more than the yardstick's rounding, 0.05. What the new fit gives on Table B.1 is
+shown and not judged.
 
 Inputs: the tables that ship with the package. Command: ``python -m
 experiments.calibration.identify_arch25 [--quick] [--full] [--write] [--cross] [--variants]``.
@@ -58,23 +59,29 @@ from experiments.calibration.parts.arch_numbers import (
     start_of,
     starting_guess,
 )
+from experiments.calibration.parts.arch_scores import (
+    FITTED,
+    NUMBERS,
+    PERCENTILES,
+    beside_shipped,
+    holds,
+    scores,
+)
 from experiments.harness.claim import Claim, Finding, Option, Options
 from experiments.harness.plotting import HOME, RESULTS
-from experiments.harness.yardstick import ROUNDING, VALUES, errors, percentiles, tension_share
+from experiments.harness.yardstick import VALUES, errors, percentiles
 from seqopt.arrays import Floats
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network
-from seqopt.responses.quantities import TO_1E_3MM, responses_of
+from seqopt.responses.quantities import TO_1E_3MM, responses_of, support_forces, support_moments
 from seqopt.responses.table import analyze
 from seqopt.scene.scene import Scene
-from seqopt.scene.scene_file import load_scene, save_scene
+from seqopt.scene.scene_file import save_scene
 from seqopt.sequence.two_robots import METHODS
+from seqopt.study.published import as_printed
 from seqopt.study.tables import printed_steps
 
 SCENE = HOME.parent / "seqopt" / "data" / "scenes" / "arch25.json"
-NUMBERS = RESULTS / "identify_arch25.csv"
-PERCENTILES = ["median_pct", "p90_pct", "p95_pct"]
-LIMITS = [0.15, 1.9, 4.0]  # percent, as in the tests
 MORE = 2  # times that a fit worse than the shipped one is continued
 SOFTENING = (0.1, 0.03, 0.02, 0.01)  # residuals above this share count less and less
 OFFSET_PRIOR = 5.0  # residual per m: an offset of 1 mm weighs like an error of 0.5 %
@@ -112,12 +119,14 @@ def produced(scene: Scene, wanted: Target) -> Floats:
     engine = ComplianceEngine(build_network(scene))
     out = []
     for bricks, grips, robots in wanted.groups:
-        answer = responses_of(engine.network, engine.solve(bricks, grips))
+        fields = engine.solve(bricks, grips)
+        answer = responses_of(engine.network, fields)
         force = np.full((len(grips), 3), np.nan)
         force[:, robots] = answer["F_rob"]
         size = [TO_1E_3MM * answer[name] for name in ("D_max", "D_avg", "D_std")]
-        rest = [answer[name] for name in ("F_sup", "M_sup", "F_min", "T_max", "F_avg")]
-        out.append(np.column_stack([force, *rest, *size]))
+        first = [support_forces(engine.network, fields)[:, 0], support_moments(fields)[:, 0]]
+        rest = [answer[name] for name in ("F_min", "T_max", "F_avg")]
+        out.append(np.column_stack([force, *first, *rest, *size]))
     return np.vstack(out)
 
 
@@ -175,26 +184,14 @@ def identify(wanted: Target, angles: Sequence[float], most: int) -> tuple[Floats
     return numbers, groups
 
 
-def scores(scene: Scene) -> pd.DataFrame:
-    """Return the yardstick of a scene on both tables."""
-    engine = ComplianceEngine(build_network(scene))
-    rows, all_errors = {}, []
-    for name, method in METHODS.items():
-        printed, table = printed_steps(name), analyze(engine, method(engine.network))
-        all_errors.append(errors(table, printed))
-        rows[name] = (*percentiles(all_errors[-1]), 100 * tension_share(table, printed))
-    rows["both"] = (*percentiles(pd.concat(all_errors)), np.nan)
-    columns = [*PERCENTILES, "T_pct_within_2_edges_pct"]
-    return pd.DataFrame.from_dict(rows, orient="index", columns=columns)
-
-
 def cross(most: int) -> pd.DataFrame:
     """Fit one table, score the rows that only the other has."""
     rows = []
     for known, other in (("sequential", "cantilever"), ("cantilever", "sequential")):
         numbers, groups = identify(target([printed_steps(known)]), PLAN_ANGLES, most)
         engine = ComplianceEngine(build_network(scene_of(numbers, groups)))
-        table = errors(analyze(engine, METHODS[other](engine.network)), printed_steps(other))
+        found = analyze(engine, METHODS[other](engine.network))
+        table = errors(as_printed(engine.network.scene, found), printed_steps(other))
         unseen = printed_steps(other)["same_in_both"].to_numpy() == 0
         rows.append((known, other, *percentiles(table[unseen])))
     return pd.DataFrame(rows, columns=["fitted", "scored", *PERCENTILES])
@@ -211,30 +208,6 @@ def compare_variants(wanted: Target, most: int) -> pd.DataFrame:
     return pd.DataFrame(rows).drop(columns="T_pct_within_2_edges_pct")
 
 
-def beside_shipped(fitted: pd.DataFrame, scene: Scene) -> pd.DataFrame:
-    """Return percentiles of a fit beside the shipped ones, and how far its numbers are off."""
-    new, old = (scores(one).loc["both", PERCENTILES] for one in (scene, load_scene("arch25")))
-    rows = [
-        {"what": name, "unit": "%", "shipped": old[name], "new": new[name]} for name in PERCENTILES
-    ]
-    table = pd.DataFrame(rows)
-    table["difference"] = table["new"] - table["shipped"]
-    both = fitted.merge(pd.read_csv(NUMBERS), on=["name", "index", "unit"])
-    gap = (both["value_x"] - both["value_y"]).abs().groupby([both["name"], both["unit"]]).max()
-    far = [
-        {"what": f"{name}, largest difference", "unit": unit, "difference": value}
-        for (name, unit), value in gap.items()
-    ]
-    return pd.concat([table, pd.DataFrame(far)], ignore_index=True)
-
-
-def holds(table: pd.DataFrame, *, quick: bool) -> bool:
-    """Return whether the shipped fit is within its limits, and the new one not worse than it."""
-    part = table[table["what"].isin(PERCENTILES)]
-    good = bool((part["shipped"].to_numpy(float) <= LIMITS).all())
-    return good and (quick or bool((part["difference"] <= ROUNDING).all()))
-
-
 def explore(options: Options) -> None:
     """Fit one table alone, or other sets of numbers, and store how well."""
     if options.cross:
@@ -242,13 +215,13 @@ def explore(options: Options) -> None:
         print(table.to_string(index=False, float_format="%.2f"))
         table.to_csv(RESULTS / "identify_arch25_cross.csv", index=False, float_format="%.3f")
     if options.variants:
-        table = compare_variants(target([printed_steps(name) for name in METHODS]), 40)
+        table = compare_variants(target([printed_steps(name) for name in FITTED]), 40)
         table.to_csv(RESULTS / "identify_arch25_variants.csv", index=False, float_format="%.4g")
 
 
 def repeat(options: Options) -> tuple[Floats, Sequence[Free]]:
     """Identify anew; what is worse than the shipped fit is fitted on, up to twice."""
-    both = target([printed_steps(name) for name in METHODS])
+    both = target([printed_steps(name) for name in FITTED])
     most = 2 if options.quick else 40 if options.full else 10
     numbers, groups = identify(both, PLAN_ANGLES if options.full else PLAN_ANGLES[:1], most)
     for _ in range(0 if options.quick else MORE):

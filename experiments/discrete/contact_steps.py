@@ -1,11 +1,12 @@
-"""Claim: bricks laid dry that come to rest are proven to stand, and more fall than must.
+"""Claim: dry bricks that come to rest are proven to stand; some that could stand become unstable.
 
 Method: every step of the sequential and the cantilever method on `arch25` without bonds, once by
 discrete elements (do the bricks come to rest, from rest, with grips that only react?) and once by
 the certificate (are there forces in balance that friction, compression and payloads allow?). What
 comes to rest shows such forces, so no step may rest that is proven to fall. The converse is open:
-forces may exist that nothing brings about. The claim fails if a step rests that falls, or if every
-step that is proven to stand comes to rest.
+forces may exist that nothing brings about. The claim fails if a step rests that is not proven to
+stand, or if none that is proven to stand becomes unstable; steps that were not followed to an end
+count for neither. One arch and two methods: how many steps differ elsewhere is not said.
 
 Inputs: the shipped scene. Command: ``python -m experiments.discrete.contact_steps [--quick]``.
 Writes ``experiments/results/contact_steps.csv`` and ``docs/figures/contact_steps.png``.
@@ -106,6 +107,13 @@ def chart(table: pd.DataFrame) -> None:
     save_figure(figure, "contact_steps.png")
 
 
+def holds(table: pd.DataFrame) -> bool:
+    """Return whether all that rests stands, and something that stands becomes unstable."""
+    stands = table["certificate"] == Verdict.STANDS.value
+    rests, goes = (table["discrete"] == ending for ending in (RESTS, GOES))
+    return bool(stands[rests].all() and rests.any() and (stands & goes).any())
+
+
 def experiment(options: Options) -> Finding:
     quick: bool = options.quick
     net = build_network(load_scene("arch25"))
@@ -121,15 +129,17 @@ def experiment(options: Options) -> Finding:
     stands = table["certificate"] == Verdict.STANDS.value
     rests = table["discrete"] == RESTS
     ratio = (table["D_max_1e-3mm"] / table["D_max_rigid_1e-3mm"])[rests]
-    print(f"at rest the largest displacement is {ratio.median():.3g} times that of bonded bricks")
+    print(
+        f"at rest the largest displacement is {ratio.median():.3g} times that of bonded bricks in "
+        f"the median ({ratio.min():.3g} to {ratio.max():.3g})"
+    )
     wrong = table[rests & ~stands]
     print(f"steps that rest and are not proven to stand: {len(wrong)}")
     if not quick:
         RESULTS.mkdir(exist_ok=True)
         table.to_csv(RESULTS / "contact_steps.csv", index=False, float_format="%.4g")
         chart(table)
-    holds = wrong.empty and bool((stands & ~rests).any())
-    return Finding(holds)
+    return Finding(holds(table))
 
 
 CLAIM = Claim(experiment, quick="ten steps, nothing written")

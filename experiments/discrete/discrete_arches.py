@@ -1,7 +1,7 @@
-"""Claim: no reading of the study's discrete-element models gives the errors that it prints.
+"""Claim: no reading tried of the paper's discrete-element models gives the errors that it prints.
 
-Method: the study compares its model with discrete elements on four partial arches (17, 18, 23 and
-24 bricks, one robot holding the last) and prints the mean difference of the displacements of all
+Method: Bruun et al. compare their model with discrete elements on four partial arches (17, 18, 23
+and 24 bricks, one robot holding the last) and print the mean difference of the displacements of all
 inner nodes that no robot holds (section 3.2.3, table 3). Here
 `seqopt.engines.discrete.engine.DiscreteEngine` solves the same arches with rigid bricks on beds of
 100e6 kN/m³ normal and 10e6 kN/m³ tangential. What print leaves open is read in several ways:
@@ -56,7 +56,7 @@ KEYS = ["grip", "side_mm", "joint"]
 
 
 def row_of(engine: ComplianceEngine, step: Step, reading: Reading) -> dict[str, object]:
-    """Return the mean error of our model against a reading, as the study's."""
+    """Return the mean error of our model against a reading, as Bruun et al. take it."""
     discrete = reading.engine(engine.network)
     own, ours = moved(engine, step), moved(discrete, step)
     tension, shear = stresses(discrete, step)
@@ -191,6 +191,15 @@ def report_witness(table: pd.DataFrame, source: str, steps: list[Step]) -> None:
             print(f"largest {name}: {table[name].abs().max():.2g}")
 
 
+def holds(table: pd.DataFrame, study: pd.Series[float]) -> bool:
+    """Return whether nothing breaks or slips and no reading is near on all arches.
+
+    The rows hold the stated readings and the best size of every pad, so the nearest is among them.
+    """
+    errors = table.pivot_table(index=["pads", *KEYS], columns="bricks", values="error_pct")
+    return within_limits(table) and bool(farthest(errors, study).min() > NEAR)
+
+
 def experiment(options: Options) -> Finding:
     engine = ComplianceEngine(build_network(load_scene("arch25")))
     steps = arches(engine, quick=options.quick)
@@ -212,15 +221,13 @@ def experiment(options: Options) -> Finding:
     print("the best pads of 4 to 50 mm, for every grip and joint:")
     report(best, study)
     print(largest_fall(scanned, study))
-    elastic = within_limits(table)
     if not options.quick:
         seen, source = witness_rows(engine, steps, python_with_lmgc90(options.lmgc90))
         report_witness(seen, source, steps)
         RESULTS.mkdir(exist_ok=True)
         table.to_csv(RESULTS / "discrete_arches.csv", index=False, float_format="%.4g")
         chart(errors, best, study, seen, NEAR)
-    least = min(farthest(best, study).min(), farthest(errors, study).min())
-    return Finding(elastic and bool(least > NEAR))
+    return Finding(holds(table, study))
 
 
 CLAIM = Claim(

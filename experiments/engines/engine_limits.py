@@ -1,4 +1,4 @@
-"""Claim: the fast engine is exact to 1e-9 up to 100 bricks, and beyond never worse than direct.
+"""Claim: in all cases tried the fast engine errs by 1e-9 at most, and no more than a direct solve.
 
 Method: chains of 2 to 2,000 bricks, walls, slender bricks, one joint from stiff to nearly absent,
 grips close together or in a line, a chain in two parts held by robots alone. Fast engine, stiff-bar
@@ -7,7 +7,11 @@ against sixty-digit arithmetic on the same rigid bricks. The error is the larges
 joint forces and joint moments, each relative to its largest entry, over the grip sets of a point; a
 point counts as refused if any set is. Backward error and smallest scaled eigenvalue are those of
 `seqopt.engines.diagnosis`. The claim also asks that a mechanism is called one, with its mode, and
-that a frame that is wrong by more than 1e-3 is not found to be solved well.
+that a frame that is wrong by more than 1e-3 is not found to be solved well. The comparison with the
+direct solve is made beyond 100 bricks; two errors below 1e-12 are alike.
+
+The cases are a choice and no proof. Random grip sets beyond a joint of 1e-8 to 1e-10 of the others'
+stiffness, which are not among them, were answered with errors of up to 9e-9 (a few of 4,000).
 
 Inputs: none. Command: ``python -m experiments.engines.engine_limits [--quick]``. Writes
 ``experiments/results/engine_limits.csv`` and ``docs/figures/engine_limits.png``; the longest chain

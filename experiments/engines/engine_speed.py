@@ -1,4 +1,7 @@
-"""Claim: the fast engine answers grip sets a thousand times faster than the frame it is checked by.
+"""Claim: in the median the fast engine answers grip sets a thousand times faster than the frame.
+
+That is the frame that checks it. The lowest ratio of a round is stored beside the median and has to
+be 100 at least: a round in which the machine was busy elsewhere was seen at 541.
 
 Method: on `arch25` with 17 bricks, random sets of three grips, every edge force and every node
 displacement evaluated; fast and reference engine take turns in one process on one core; the best
@@ -13,6 +16,7 @@ Inputs: the shipped scene; seed 0. Command: ``python -m experiments.engines.engi
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import partial
 
 import numpy as np
@@ -33,6 +37,7 @@ from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.scene_file import load_scene
 
 ASKED = Want.EDGES | Want.DISPLACEMENTS
+MEDIAN, LOWEST = 1000.0, 100.0  # ratios that are claimed
 
 
 def chain(count: int) -> Network:
@@ -161,9 +166,14 @@ def experiment(options: Options) -> Finding:
             RESULTS / "engine_speed.csv", header=["value"], float_format="%.4g"
         )
         chart(table)
-    holds = 1 / figures["fast_s_per_set"] >= 3e5 and figures["ratio_median"] >= 1000
-    holds = holds and figures["prepare_all_counts_s"] <= 0.05
-    return on_this_run(holds=holds)
+    return on_this_run(holds=holds(figures))
+
+
+def holds(figures: Mapping[str, float]) -> bool:
+    """Return whether ratios, sets per second and preparation are as claimed."""
+    ratios = figures["ratio_median"] >= MEDIAN and figures["ratio_lowest"] >= LOWEST
+    often = 1 / figures["fast_s_per_set"] >= 3e5
+    return bool(ratios and often and figures["prepare_all_counts_s"] <= 0.05)
 
 
 CLAIM = Claim(experiment, quick="small sizes, nothing written", times=Times.JUDGED)

@@ -3,7 +3,10 @@
 Method: every published state (Tables A.1, A.2 and the three-robot plan) of `arch25`, by the frame
 at bar-to-joint contrasts from 1e2 to 1e11; largest difference from the exactly rigid bricks,
 relative to the largest entry of the field in that state. The direct solve of the same rigid bricks
-is the check of the fast engine. A solver that refuses is counted.
+is the check of the fast engine. A solver that refuses is counted. The good contrast, 1e7, was found
+in such a sweep on this arch. The claim fails if at another contrast the worst of all fields is
+smaller, if it is not ten times as large at either end of the sweep (a refusal counts as well), or
+if the two solutions of rigid bricks differ by more than 1e-9.
 
 Inputs: the shipped scene. Command: ``python -m experiments.engines.frame_contrast [--quick]``.
 Writes ``experiments/results/frame_contrast.csv`` and ``docs/figures/frame_contrast.png``.
@@ -32,7 +35,7 @@ FIELDS = ("edge_force", "displacement", "grip_force", "support")
 
 
 def published_steps(engine: Engine) -> list[Step]:
-    """Return one step for every different state that the study analyzes."""
+    """Return one step for every different state that Bruun et al. analyze."""
     steps = [step for method in METHODS.values() for step in method(engine.network)]
     steps += published_plan(engine.network.scene)
     return list({(step.bricks, frozenset(step.held)): step for step in steps}.values())
@@ -97,13 +100,20 @@ def experiment(options: Options) -> Finding:
     print(table.to_string(index=False, float_format="%.2g"))
     gap = direct_gap(steps, fast)
     print(f"direct solve of the same rigid bricks: {gap:.2g}")
-    default = table.loc[table["contrast"] == CONTRAST, list(FIELDS)].to_numpy().max()
     if not quick:
         RESULTS.mkdir(exist_ok=True)
         table.to_csv(RESULTS / "frame_contrast.csv", index=False, float_format="%.3g")
         chart(table)
-    holds = default <= 5e-6 and gap <= 1e-9
-    return Finding(holds)
+    return Finding(holds(table, gap))
+
+
+def holds(table: pd.DataFrame, gap: float) -> bool:
+    """Return whether the default contrast is the good one, and rigid bricks agree to 1e-9."""
+    worst = table.set_index("contrast")[list(FIELDS)].max(axis=1)
+    ends = table.sort_values("contrast").iloc[[0, -1]].set_index("contrast")
+    best = float(worst[CONTRAST])
+    bad = (worst[ends.index] >= 10 * best) | (ends["refused"] > 0)
+    return bool(best <= min(5e-6, worst.min()) and bad.all() and gap <= 1e-9)
 
 
 CLAIM = Claim(experiment, quick="few states, nothing written")

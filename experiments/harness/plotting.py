@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 HOME = Path(__file__).resolve().parent.parent
 RESULTS = HOME / "results"
 FIGURES = HOME.parent / "docs" / "figures"
+DPI = 150
 
 
 def new_figure(width: float, height: float) -> Figure:
@@ -23,4 +24,4 @@ def new_figure(width: float, height: float) -> Figure:
 def save_figure(figure: Figure, name: str) -> None:
     """Write a figure of the documentation."""
     FIGURES.mkdir(exist_ok=True)
-    figure.savefig(FIGURES / name, dpi=150, metadata={"Software": None})
+    figure.savefig(FIGURES / name, dpi=DPI, metadata={"Software": None})

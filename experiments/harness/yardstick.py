@@ -25,7 +25,8 @@ def errors(produced: pd.DataFrame, printed: pd.DataFrame) -> pd.DataFrame:
     """Return errors in percent, a row per step and a column per response.
 
     The error is what exceeds the rounding, over the printed size or 1, whichever is larger. Signed
-    sizes (F_rob, F_sup) are compared without sign. NaN where the table prints nothing.
+    sizes (F_rob, F_sup) are compared without sign. NaN where the table prints nothing. Produced
+    tables must be as printed: with the first end's support (`seqopt.study.published.as_printed`).
     """
     out = {}
     by_step = produced.set_index("step").loc[printed["step"]]

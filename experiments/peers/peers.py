@@ -1,11 +1,12 @@
-"""Claim: on the full overlap of `arch25` the fast engine is far ahead of the tools one would take.
+"""Claim: on the full overlap of `arch25` the fast engine is tens of times as fast as other tools.
 
-That is: at least 60 times as fast as the best package at its leanest and 20 times as the best loop
-that one would write with SciPy, whether only reactions are asked, what the criterion needs, or
-every edge force and node displacement; with the latter two within 3 times of the dense matrix
-products that such a batch takes. (The engine's own products are sparse; they are measured too.)
+That is: in every round at least 60 times as fast as the best package at its leanest and 20 times as
+the best loop that one would write with SciPy, what is prepared once aside, whether only reactions
+are asked, what the criterion needs, or every edge force and node displacement; with the latter two
+within 3 times of the dense matrix products that such a batch takes. (The engine's own products are
+sparse; they are measured too.)
 
-Method: the distinct models of the three-robot loop under equations 2 and 3, which the study counts
+Method: the distinct models of the three-robot loop under equations 2 and 3, which the paper counts
 as 22,724. Engine and peers take turns in one process on one core. The engine answers all models; a
 peer a few random ones of every brick count and number of grips, drawn anew in every round, and its
 time is extended to all. Models kept by a peer and operators of the engine are timed and counted.
@@ -102,14 +103,15 @@ def turn(net: Network, cases: list[Case], name: str, few: int, rng: np.random.Ge
 def difference(engine: ComplianceEngine, answers: list[tuple[Case, int, Answer]]) -> float:
     """Return the largest difference of any field from the engine's, over its largest entry.
 
-    Force and moment of the support are fields of their own.
+    Forces and moments of the supports are fields of their own.
     """
     worst = 0.0
     for case, i, answer in answers:
         exact = engine.solve(case.bricks, case.grips[i : i + 1])
         pairs = {n: (x, getattr(exact, n)[0]) for n, x in answer._asdict().items()}
         found, true = pairs.pop("support")
-        pairs |= {"support_force": (found[:3], true[:3]), "support_moment": (found[3:], true[3:])}
+        for kind, part in (("force", slice(3)), ("moment", slice(3, 6))):
+            pairs[f"support_{kind}"] = (found[:, part], true[:, part])
         worst = max(worst, *(_gap(*pair) for pair in pairs.values()))
     return worst
 
@@ -189,13 +191,13 @@ def judge(table: pd.DataFrame, ways: pd.DataFrame) -> bool:
             ("package", peers[packaged], PACKAGE),
             ("loop", peers[~packaged], LOOP),
         ):
-            for name, row in those.nsmallest(1, "ratio").iterrows():
+            for name, row in those.nsmallest(1, "ratio_lowest").iterrows():
                 print(
                     f"{setting}: best {label} {name}: {row['ratio']:.0f} times (lowest "
                     f"{row['ratio_lowest']:.0f}; preparation counted {row['ratio_whole']:.0f}); "
                     f"claimed {target:.0f}"
                 )
-                holds.append(float(row["ratio"]) >= target)
+                holds.append(float(row["ratio_lowest"]) >= target)
         print(
             f"{setting}: {near:.2g} times the dense products; claimed {NEAR:.0f} "
             f"({1 / float(part['ratio'][SPARSE]):.2g} times its own sparse ones)"

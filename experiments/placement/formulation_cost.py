@@ -1,8 +1,13 @@
-"""Claim: where dynamic programming serves, a general solver costs hundreds of times more.
+"""Claim: where dynamic programming serves, a solver costs tens of times more, on `arch25` hundreds.
 
-Method: the three-robot loop on chains of growing length, criterion `weighted`; every formulation of
-the sum solves the same posed problem in one process on one core, the best of several rounds counts,
-and the answers are certified. Posing the problem (all responses) is timed beside them.
+The ratio grows with the brick count: over chains of 6 to 50 bricks the linear program was seen at
+64 to 1,300 times, the integer program at 99 to 1,900. On every size it has to be 20 at least, on
+`arch25` 100.
+
+Method: the three-robot loop on chains of growing length, criterion `weighted-published`; every
+formulation of the sum solves the same posed problem in one process on one core, the best of several
+rounds counts, and the answers are certified. Posing the problem (all responses) is timed beside
+them.
 
 Inputs: chains on a half circle, and `arch25`. Command: ``python -m
 experiments.placement.formulation_cost [--quick]``. Writes
@@ -11,6 +16,7 @@ experiments.placement.formulation_cost [--quick]``. Writes
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import partial
 
 import pandas as pd
@@ -30,6 +36,9 @@ from seqopt.placement.solving import solve
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.study.presets import EQUATIONS, WEIGHTED
+
+GENERAL = ("overlap_lp", "overlap_mip")
+ANYWHERE, ON_THE_ARCH = 20.0, 100.0  # ratios that are claimed
 
 
 def problem_of(net: Network, criterion: Criterion) -> Problem:
@@ -83,17 +92,32 @@ def experiment(options: Options) -> Finding:
     reference = measure(build_network(load_scene("arch25")), EQUATIONS, rounds)
     whole = reference["pose"] + reference["overlap_dp"]
     print(f"arch25, equations 2 and 3: posed and solved exactly in {whole:.3f} s")
-    ratio = {n: reference[n] / reference["overlap_dp"] for n in ("overlap_lp", "overlap_mip")}
-    for name, value in ratio.items():
-        print(f"{name} over overlap_dp on arch25: {value:.0f}")
+    for name, value in ratios(table).items():
+        own = reference[str(name)] / reference["overlap_dp"]
+        print(
+            f"{name} over overlap_dp on arch25: {own:.0f}; on chains {value.min():.0f} to "
+            f"{value.max():.0f}"
+        )
     if not quick:
         RESULTS.mkdir(exist_ok=True)
         frame = pd.concat([table, pd.DataFrame([reference])], ignore_index=True)
         frame.to_csv(RESULTS / "formulation_cost.csv", index=False, float_format="%.4g")
         chart(table)
+    return on_this_run(holds=holds(table, reference))
+
+
+def ratios(table: pd.DataFrame) -> pd.DataFrame:
+    """Return the times of the general solvers over that of dynamic programming."""
+    return table[list(GENERAL)].div(table["overlap_dp"], axis=0)
+
+
+def holds(table: pd.DataFrame, reference: Mapping[str, float]) -> bool:
+    """Return whether solvers are slower on every size and on the arch, and the answers exact."""
+    arch = ratios(pd.DataFrame([reference])).to_numpy().min()
     exact = max(table["gap_overlap_dp"].max(), table["gap_overlap_mip"].max())
-    holds = min(ratio.values()) >= 100 and exact <= 1e-6 and whole <= 0.5
-    return on_this_run(holds=holds)
+    posed = reference["pose"] + reference["overlap_dp"] <= 0.5
+    slower = ratios(table).to_numpy().min() >= ANYWHERE and arch >= ON_THE_ARCH
+    return bool(slower and exact <= 1e-6 and posed)
 
 
 CLAIM = Claim(experiment, quick="small chains, nothing written", times=Times.JUDGED)

@@ -1,15 +1,15 @@
-"""Claim: the sequential and the cantilever method fail for want of bond, the larger the sooner.
+"""Claim: without bond the sequential and the cantilever method fail; larger arches need more of it.
 
 Method: every step of every method on `arch25` is certified as rigid blocks (friction 25 degrees)
-beside its elastic responses and the study's limits (0.1 mm, 30 N m, payload 392.4 N). Then the
+beside its elastic responses and the paper's limits (0.1 mm, 30 N m, payload 392.4 N). Then the
 same bricks make longer arches of the same shape, and the same arch is built larger or of heavier
 bricks. Payloads grow there with the number of bricks and with their weight, so that the bond alone
 is asked about; what robots would have to carry stands beside it.
 
-The study's claims, as they are tested: (1) the twisting steps make the sequential method fail
-first, and the sooner the larger the arch; (2) the cantilever method leans on the mortar: most steps
-with cantilevered bricks stand by bond alone, and it needs more bond than the sequential method;
-(3) the three-robot plan needs less bond than both.
+The claims of Bruun et al., as they are tested: (1) the twisting steps make the sequential method
+fail first, and the sooner the larger the arch; (2) the cantilever method leans on the mortar: most
+steps with cantilevered bricks stand by bond alone, and it needs more bond than the sequential
+method; (3) the three-robot plan needs less bond than both. One arch, and arches of its shape.
 
 Inputs: the shipped scene and plan. Command: ``python -m experiments.stability.failing_steps
 [--quick]``. Writes ``experiments/results/failing_steps.csv``, ``failing_scale.csv`` and
@@ -39,7 +39,7 @@ from seqopt.stability.steps import assess_steps, stability_table
 from seqopt.study.presets import EQUATIONS
 from seqopt.study.published import published_plan
 
-TWISTING = (9, 11, 21, 23, 33, 35, 45, 47)  # table 4 of the study
+TWISTING = (9, 11, 21, 23, 33, 35, 45, 47)  # table 4 of the paper
 SCALED = ("sequential", "cantilever", "three-robot, published", "three-robot, optimized")
 
 
@@ -108,7 +108,7 @@ def holds(steps: pd.DataFrame, scale: pd.DataFrame) -> dict[str, bool]:
     )
     published = worst["three-robot, published"]
     return {
-        "every step is decided, and stands with the study's epoxy": bool(
+        "every step is decided, and stands with the paper's epoxy": bool(
             (steps["epoxy"] == "stands").all() and (steps["unproven"] == 0).all()
         ),
         "without bond the sequential method falls at every twisting step": set(TWISTING)

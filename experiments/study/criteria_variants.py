@@ -1,13 +1,20 @@
-"""Claim: the printed plan follows no criterion exactly; a variant of the equations comes closer.
+"""Claim: no criterion tried names all published nodes first; some name more than those printed.
 
 Method: for every optimization of the published three-robot plan, the choices before it being as
 published, rank all candidates by each variant of the criteria (equation 1: ranks summed over the
 four states of the window) and count how often the published node comes first or among the first
 three. Variants: which responses are ranked before and after the crown, up to which brick count the
-first set holds, and to what responses are rounded before they are ranked.
+first set holds, and to what responses are rounded before they are ranked. Which variant comes
+closest was seen after all were tried on the one plan there is: it describes that plan and predicts
+nothing.
+
+A further rule was picked among 3.2 million and not cross-validated
+(`experiments.study.parts.compression`). It is reported as an observation and is no part of the
+verdict: after the crown, compression explains the published choices better than displacement. It is
+set beside itself with displacement in 32 settings.
 
 Inputs: the shipped scene and plan. Command: ``python -m experiments.study.criteria_variants
-[--quick]``. Writes ``experiments/results/criteria_variants.csv`` and
+[--quick]``. Writes ``experiments/results/criteria_variants.csv``, ``criteria_compression.csv`` and
 ``docs/figures/criteria_variants.png``.
 """
 
@@ -19,17 +26,26 @@ import pandas as pd
 
 from experiments.harness.claim import Claim, Finding, Options
 from experiments.harness.plotting import RESULTS, new_figure, save_figure
+from experiments.study.parts.compression import (
+    CROWN,
+    FOUND,
+    beside_displacement,
+    compression,
+    rules,
+)
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network
-from seqopt.placement.criteria import RESOLUTION, RankSum, equal
+from seqopt.placement.criteria import RankSum
 from seqopt.placement.problem import Problem, pose
 from seqopt.placement.ranking import rank_choice
+from seqopt.placement.terms import equal
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.three_robots import three_robot_loop
-from seqopt.study.presets import CLOSEST, CROWN, EQUATIONS
+from seqopt.study.presets import CLOSEST, EQUATIONS, RESOLUTION
 from seqopt.study.published import published_choice
 
 FINE = tuple((letter, 1e-6 * size) for letter, size in RESOLUTION)
+SETTINGS = {name: value for name, value in vars(FOUND).items() if name != "fourth"}
 SETS = {
     "equation 2": equal("T_max", "M_sup", "F_rob1", "F_rob2", "F_rob3"),
     "equation 3": equal("T_max", "M_sup", "F_move", "D_max"),
@@ -53,7 +69,7 @@ def variants() -> list[RankSum]:
         for crown in (CROWN, CROWN + 1):
             for resolution, rounded in ((RESOLUTION, "1"), (FINE, "1e-6")):
                 name = f"{before} | {after} | {crown} | {rounded}"
-                out.append(RankSum(name, SETS[before], SETS[after], crown, resolution))
+                out.append(RankSum(name, SETS[before], SETS[after], crown, resolution=resolution))
     return out
 
 
@@ -77,7 +93,13 @@ def scores(problem: Problem, criteria: list[RankSum]) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def chart(table: pd.DataFrame) -> None:
+def holds(table: pd.DataFrame, optimizations: int) -> bool:
+    """Return whether none names every published node first, and one more than the equations do."""
+    most, printed = table["first"].max(), table["first"].iloc[0]
+    return bool(printed < most < optimizations)
+
+
+def chart(table: pd.DataFrame, observed: pd.DataFrame) -> None:
     figure = new_figure(7, 4.2)
     axes = figure.subplots()
     spread = 0.12 * (table.groupby(["first", "among_three"]).cumcount() % 5)
@@ -87,6 +109,11 @@ def chart(table: pd.DataFrame) -> None:
     best = table.sort_values(["first", "among_three"]).iloc[-1]
     label = f"{best['before_crown']} | {best['after_crown']}"
     axes.plot(best["first"], best["among_three"], "^", ms=9, label=label)
+    for fourth, mark in (("C_max", "P"), ("D_max", "X")):
+        rows = observed[observed["fourth"] == fourth]
+        rows = rows[rows[[*SETTINGS]].eq(SETTINGS).all(axis=1)]
+        label = f"observed rule, with {fourth} after the crown"
+        axes.plot(rows["first"], rows["among_three"], mark, ms=9, ls="none", label=label)
     axes.set(
         xlabel="published node first, of 22 optimizations",
         ylabel="published node among the first three",
@@ -99,24 +126,29 @@ def chart(table: pd.DataFrame) -> None:
 def experiment(options: Options) -> Finding:
     quick: bool = options.quick
     engine = ComplianceEngine(build_network(load_scene("arch25")))
-    also = ("T_max", "M_sup", "D_max", "F_move", "F_largest", "F_rob1", "F_rob2", "F_rob3")
+    robots = ("F_rob1", "F_rob2", "F_rob3")
+    also = ("T_max", "M_sup", "D_max", "C_max", "F_move", "F_largest", *robots)
     problem = pose(engine, three_robot_loop(engine.network), EQUATIONS, also=also)
     tried = variants()
     wanted = {CLOSEST.before, CLOSEST.after}
-    chosen = [c for c in tried if {c.before, c.after} == wanted and c.crown == CLOSEST.crown]
+    chosen = [
+        c for c in tried if {c.before, c.after} == wanted and c.crown == CROWN + CLOSEST.delay
+    ]
     table = scores(problem, [tried[0], *chosen] if quick else tried)
     ordered = table.sort_values(["first", "among_three"], ascending=False)
     print(ordered.head(12).to_string(index=False))
     print("equations as printed")
     print(table.head(1).to_string(index=False))
+    observed = compression(problem, [FOUND] if quick else rules())
+    print("rules with compression or displacement after the crown, an observation")
+    print(observed.to_string(index=False))
     if not quick:
+        print(beside_displacement(observed).to_string())
         RESULTS.mkdir(exist_ok=True)
         table.to_csv(RESULTS / "criteria_variants.csv", index=False)
-        chart(table)
-    printed, best = table.iloc[0], ordered.iloc[0]
-    holds = 10 <= printed["first"] < best["first"] and best["first"] >= 14
-    holds = holds and printed["among_three"] >= 15 and best["among_three"] >= 20
-    return Finding(bool(holds))
+        observed.to_csv(RESULTS / "criteria_compression.csv", index=False)
+        chart(table, observed)
+    return Finding(holds(table, len(problem.schedule.moves)))
 
 
 CLAIM = Claim(experiment, quick="few variants, nothing written")

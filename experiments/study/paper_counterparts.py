@@ -1,10 +1,10 @@
-"""Claim: all figures and tables of the study with numbers have a counterpart; three disagree.
+"""Claim: all figures and tables of the paper with numbers have a counterpart; three disagree.
 
 These three are the secant stiffness of a vault test, the calibrated stiffness of all eight, and the
 errors against discrete elements. The others agree at least in part: half or more of their values
 are within 5 % of print beyond rounding (`experiments.harness.yardstick`).
 
-Method: `experiments.study.parts.paper_items` lists the study's figures and tables in order with
+Method: `experiments.study.parts.paper_items` lists the paper's figures and tables in order with
 what has no numbers; `experiments.study.parts.counterpart_rows` computes every printed value anew.
 Which three disagree was seen in the first run; the claim fails if a fourth does, if one of the
 three agrees, or if an item has no values. How far the calibration and the discrete elements are

@@ -6,7 +6,7 @@
 nothing, so that ``seqopt.cli.main`` stays the module.
 
 >>> from seqopt.cli.main import main
->>> main(["scene", "arch25"])  # doctest: +ELLIPSIS
+>>> int(main(["scene", "arch25"]))  # doctest: +ELLIPSIS
 arch25: 25 bricks, 24 joints, 2 ground ends
 ...
 0

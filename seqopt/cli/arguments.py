@@ -140,6 +140,17 @@ def _steps_arguments(command: argparse.ArgumentParser) -> None:
         help=f"how the build goes; {PUBLISHED} is the printed three-robot plan of arch25",
     )
     steps.add_argument("--plan", type=Path, metavar="FILE", help="CSV of the steps")
+    _robots_argument(command, "--method sequential or cantilever: the two")
+
+
+def _robots_argument(command: argparse.ArgumentParser, whose: str) -> None:
+    command.add_argument(
+        "--robots",
+        default="",
+        metavar="NAME,NAME[,NAME]",
+        help=f"with {whose} robots that take part, in the order of their roles (default: the first "
+        "of the scene whose reach allows the build)",
+    )
 
 
 def _add_assess(commands: Commands, parents: list[_Parser]) -> None:
@@ -173,6 +184,12 @@ def _add_assess(commands: Commands, parents: list[_Parser]) -> None:
 
 def _criterion_argument(command: argparse.ArgumentParser) -> None:
     command.add_argument(
+        "--crown",
+        metavar="BRICKS",
+        help="for criteria of ranks: bricks placed at the crown, or none; by default derived from "
+        "the scene",
+    )
+    command.add_argument(
         "--criteria",
         default=EQUATIONS.name,
         metavar="NAME",
@@ -199,10 +216,12 @@ def _add_optimize(commands: Commands, parents: list[_Parser]) -> None:
     )
     command.add_argument(
         "--schedule",
-        choices=tuple(SCHEDULES),
         default=next(iter(SCHEDULES)),
-        help="which build has the open grips (default: %(default)s)",
+        metavar="NAME|FILE",
+        help=f"which build has the open grips: {', '.join(SCHEDULES)} (of all robots), or a CSV "
+        "file of steps in which open grips are marked ? (default: %(default)s)",
     )
+    _robots_argument(command, "a schedule by name: the")
     _criterion_argument(command)
     command.add_argument(
         "--limit",

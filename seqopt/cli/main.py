@@ -3,27 +3,36 @@
 from __future__ import annotations
 
 import argparse
-import io
 import json
 import sys
 import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from importlib.util import find_spec
-from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
 from seqopt.cli.arguments import parser
-from seqopt.cli.outputs import payloads_hold, require_outputs_apart, write_results
+from seqopt.cli.outputs import (
+    comparison_files,
+    keep_apart,
+    require_matplotlib,
+    write_outputs,
+)
 from seqopt.cli.status import Status, status_of
 from seqopt.cli.terminal import complain, flush, progress, quiet_numbers, say, show, silence
-from seqopt.cli.values import parse_criterion, parse_limits, parse_mortar, parse_options
+from seqopt.cli.values import (
+    parse_criterion,
+    parse_limits,
+    parse_mortar,
+    parse_options,
+    parse_robots,
+)
 from seqopt.contact.mortar import MORTARS
 from seqopt.engines.auto import AutoEngine
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import make_engine
-from seqopt.errors import FileError, SceneError, SeqoptError, SolverError
+from seqopt.errors import SceneError, SeqoptError, SolverError, StepError
 from seqopt.files import (
     csv_text,
     require_folder,
@@ -36,15 +45,16 @@ from seqopt.network.network import Network
 from seqopt.placement.formulation import find_formulation
 from seqopt.placement.plan import Plan
 from seqopt.placement.problem import pose
+from seqopt.placement.promises import overloads
 from seqopt.placement.solving import solve
-from seqopt.report.comparison import Comparison, compare
+from seqopt.report.comparison import compare
 from seqopt.report.text import format_comparison
 from seqopt.responses.table import analyze, fields_archive
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import dump_scene, load_scene
 from seqopt.sequence.plan_file import read_plan
-from seqopt.sequence.steps import Step
-from seqopt.sequence.three_robots import make_schedule
+from seqopt.sequence.schedule_file import find_schedule
+from seqopt.sequence.steps import AnyStep, Step, idle_robots
 from seqopt.sequence.two_robots import METHODS
 from seqopt.stability.assessment import Verdict
 from seqopt.stability.steps import assess_steps, format_verdicts, stability_table
@@ -89,16 +99,17 @@ def _run(arguments: Sequence[str] | None) -> int:
 def _compare(options: argparse.Namespace) -> Status:
     scene = load_scene(options.scene)
     engine = _engine(options, build_network(scene))
-    criterion = parse_criterion(options.criteria)
+    criterion = parse_criterion(options.criteria, options.crown)
     if options.out is not None:
-        _require_matplotlib(options.out)
+        require_matplotlib(options.out)
         require_folder(options.out)
     result = compare(engine, criterion, progress)
     _say_levels(engine)
     show(format_comparison(result, scene, criterion) + "\n")
     if options.out is not None and not result.refusal:
-        _write_comparison(options, result)
-    return payloads_hold(options, scene, *result.tables.values())
+        write_outputs(options, comparison_files(result))
+        say(f"tables and figures written to {options.out}")
+    return _payloads_hold(options, scene, *result.tables.values())
 
 
 def _engine(options: argparse.Namespace, network: Network) -> Engine:
@@ -119,38 +130,25 @@ def _say_levels(engine: Engine) -> None:
         complain(f"engine: {engine.unchecked}")
 
 
-def _require_matplotlib(folder: Path) -> None:
-    if find_spec("matplotlib") is None:
-        raise FileError(f"figures for {folder} need matplotlib: pip install matplotlib")
-
-
-def _write_comparison(options: argparse.Namespace, result: Comparison) -> None:
-    from seqopt.report.charts import comparison_figures  # noqa: PLC0415  # matplotlib is an extra
-
-    files: dict[str, bytes | str] = {
-        "comparison.csv": result.table.to_csv(float_format="%.6g"),
-        **{f"steps_{name}.csv": csv_text(table) for name, table in result.tables.items()},
-    }
-    if result.ranks is not None:
-        files["published_ranks.csv"] = result.ranks.to_csv(index=False)
-    for name, figure in comparison_figures(result).items():
-        buffer = io.BytesIO()
-        figure.savefig(buffer, dpi=130)
-        files[name] = buffer.getvalue()
-    write_results(options, files)
-    say(f"tables and figures written to {options.out}")
+def _say_idle(scene: Scene, steps: Sequence[AnyStep]) -> None:
+    """Name the robots that never grip."""
+    if idle := idle_robots(scene, steps):
+        complain(f"robots: {', '.join(idle)} never grip{'s' * (len(idle) == 1)}")
 
 
 def _optimize(options: argparse.Namespace) -> Status:
     formulation = find_formulation(options.formulation)
     chosen = parse_options(formulation, options.option)
-    criterion = parse_criterion(options.criteria)
+    criterion = parse_criterion(options.criteria, options.crown)
     scene = load_scene(options.scene)
     limits = parse_limits(options.limit, scene)
     require_folder(options.out)
     start = time.perf_counter()
     network = build_network(scene)
-    engine, schedule = _engine(options, network), make_schedule(options.schedule, network)
+    engine, schedule = (
+        _engine(options, network),
+        find_schedule(network, options.schedule, parse_robots(options.robots)),
+    )
     assemble = time.perf_counter() - start
     problem = pose(engine, schedule, criterion, limits)
     plan = solve(problem, formulation, proof=not options.no_proof, **chosen)
@@ -167,12 +165,24 @@ def _optimize(options: argparse.Namespace) -> Status:
         "responses.csv": csv_text(plan.alternatives()),
         "summary.json": json.dumps(report, indent=2) + "\n",
     }
-    write_results(options, files)
+    write_outputs(options, files)
     say(
         f"{formulation.name} ({formulation.kind.value}): {_worth(plan)}, "
         f"{plan.models} models; written to {options.out}"
     )
-    return payloads_hold(options, scene, table)
+    for excess in plan.overloads:
+        say(f"payload exceeded: {excess}")
+    _say_idle(scene, plan.steps)
+    return _payloads_hold(options, scene, table)
+
+
+def _payloads_hold(options: argparse.Namespace, scene: Scene, *tables: pd.DataFrame) -> Status:
+    """Return the status that ``--strict`` asks for."""
+    over = [str(excess) for table in tables for excess in overloads(scene, table)]
+    if not options.strict or not over:
+        return Status.DONE
+    complain(f"seqopt: payload exceeded: {'; '.join(over)}")
+    return Status.DOES_NOT_HOLD
 
 
 def _worth(plan: Plan) -> str:
@@ -182,7 +192,7 @@ def _worth(plan: Plan) -> str:
 
 
 def _analyze(options: argparse.Namespace) -> Status:
-    require_outputs_apart(options, options.out, options.fields)
+    keep_apart(options, options.out, options.fields)
     scene = load_scene(options.scene)
     engine = _engine(options, build_network(scene))
     steps = _steps(scene, options)
@@ -195,11 +205,12 @@ def _analyze(options: argparse.Namespace) -> Status:
     else:
         write_csv(options.out, table)
         say(f"{len(table)} steps written to {options.out}")
-    return payloads_hold(options, scene, table)
+    _say_idle(scene, steps)
+    return _payloads_hold(options, scene, table)
 
 
 def _assess(options: argparse.Namespace) -> Status:
-    require_outputs_apart(options, options.out)
+    keep_apart(options, options.out)
     scene = load_scene(options.scene)
     mortar = parse_mortar(options)
     network = build_network(scene)
@@ -224,10 +235,16 @@ def _assess(options: argparse.Namespace) -> Status:
 
 def _steps(scene: Scene, options: argparse.Namespace) -> tuple[Step, ...]:
     """Return the closed sequence that the options name."""
+    robots = parse_robots(options.robots)
+    if robots and options.method not in METHODS:
+        raise StepError(
+            f"--robots {options.robots}: a plan says itself who holds; leave it out, or give "
+            f"--method {' or '.join(METHODS)}"
+        )
     if options.plan is not None:
         return read_plan(scene, options.plan)
     if options.method != PUBLISHED:
-        return METHODS[options.method](build_network(scene))
+        return METHODS[options.method](build_network(scene), robots)
     if not is_reference_arch(scene):
         raise SceneError(
             f"scene {scene.name}: --method {PUBLISHED} is the printed plan for arch25; "
@@ -237,7 +254,7 @@ def _steps(scene: Scene, options: argparse.Namespace) -> tuple[Step, ...]:
 
 
 def _scene(options: argparse.Namespace) -> None:
-    require_outputs_apart(options, options.export)
+    keep_apart(options, options.export)
     scene = load_scene(options.scene)
     parts = build_network(scene)
     count = len(scene.bricks)

@@ -1,78 +1,111 @@
-"""What a command leaves: results that are no input, whole folders, and whether payloads hold."""
+"""What commands write: folders that appear whole, apart from what the command reads."""
 
 from __future__ import annotations
 
 import argparse
+import io
 from collections.abc import Mapping
+from importlib.util import find_spec
 from pathlib import Path
 
-import pandas as pd
-
-from seqopt.cli.status import Status
-from seqopt.cli.terminal import complain
-from seqopt.files import require_apart, write_folder
-from seqopt.responses.table import steps_over_payload
-from seqopt.scene.scene import Scene
+from seqopt.errors import FileError
+from seqopt.files import csv_text, require_apart, write_folder
+from seqopt.report.comparison import Comparison
 from seqopt.scene.scene_file import builtin_scenes
 
 
-def write_results(options: argparse.Namespace, files: Mapping[str, bytes | str]) -> None:
-    """Write the files of a command into its folder, all of them or none.
+def require_matplotlib(folder: Path) -> None:
+    """Raise an error unless figures can be drawn.
 
     Parameters
     ----------
-    options : argparse.Namespace
-        With the folder, ``out``.
-    files : mapping of str to (bytes or str)
-        Content by name.
+    folder : pathlib.Path
+        Where they are to be written.
 
     Raises
     ------
     FileError
-        If one cannot be written, or would replace an input.
+        If the extra that draws them is not installed.
     """
-    require_outputs_apart(options, *(options.out / name for name in files))
-    write_folder(options.out, files)
+    if find_spec("matplotlib") is None:
+        raise FileError(f"figures for {folder} need matplotlib: pip install matplotlib")
 
 
-def require_outputs_apart(options: argparse.Namespace, *outputs: Path | None) -> None:
-    """Raise an error if two outputs of a command are one file, or one is an input.
+def comparison_files(result: Comparison) -> dict[str, bytes | str]:
+    """Return the tables and figures of a comparison by file name.
 
     Parameters
     ----------
-    options : argparse.Namespace
-        With the inputs, ``scene`` and ``plan``.
-    *outputs : pathlib.Path or None
-        None where nothing is written.
-
-    Raises
-    ------
-    FileError
-        Naming the path.
-    """
-    inputs = [] if options.scene in builtin_scenes() else [Path(options.scene)]
-    if getattr(options, "plan", None) is not None:
-        inputs.append(options.plan)
-    require_apart([path for path in outputs if path is not None], inputs)
-
-
-def payloads_hold(options: argparse.Namespace, scene: Scene, *tables: pd.DataFrame) -> Status:
-    """Return the status that ``--strict`` asks for, and say which robots exceed their payloads.
-
-    Parameters
-    ----------
-    options : argparse.Namespace
-        With ``strict``.
-    scene : Scene
-    *tables : pandas.DataFrame
-        Responses of steps, from `seqopt.analyze`.
+    result : Comparison
 
     Returns
     -------
-    Status
+    dict of str to (bytes or str)
     """
-    over = set().union(*(steps_over_payload(scene, table) for table in tables))
-    if not options.strict or not over:
-        return Status.DONE
-    complain(f"seqopt: payload exceeded: {', '.join(sorted(over))}")
-    return Status.DOES_NOT_HOLD
+    from seqopt.report.charts import comparison_figures  # noqa: PLC0415  # matplotlib is an extra
+
+    files: dict[str, bytes | str] = {
+        "comparison.csv": result.table.to_csv(float_format="%.6g"),
+        **{f"steps_{name}.csv": csv_text(table) for name, table in result.tables.items()},
+    }
+    if result.ranks is not None:
+        files["published_ranks.csv"] = result.ranks.to_csv(index=False)
+    for name, figure in comparison_figures(result).items():
+        buffer = io.BytesIO()
+        figure.savefig(buffer, dpi=130)
+        files[name] = buffer.getvalue()
+    return files
+
+
+def write_outputs(options: argparse.Namespace, files: Mapping[str, bytes | str]) -> None:
+    """Write the folder that a command was asked for, whole.
+
+    Parameters
+    ----------
+    options : argparse.Namespace
+        With ``out``, the folder, and what the command reads.
+    files : mapping of str to (bytes or str)
+        By file name.
+
+    Raises
+    ------
+    FileError
+        If one would overwrite what the command reads, or the folder cannot be written.
+    """
+    require_apart([options.out / name for name in files], inputs(options))
+    write_folder(options.out, files)
+
+
+def keep_apart(options: argparse.Namespace, *outputs: Path | None) -> None:
+    """Raise an error if outputs are one file, or one that the command reads.
+
+    Parameters
+    ----------
+    options : argparse.Namespace
+        Of the command.
+    *outputs : pathlib.Path or None
+        What it is to write.
+
+    Raises
+    ------
+    FileError
+        Naming the file.
+    """
+    require_apart([path for path in outputs if path is not None], inputs(options))
+
+
+def inputs(options: argparse.Namespace) -> list[Path]:
+    """Return the files that a command reads.
+
+    Parameters
+    ----------
+    options : argparse.Namespace
+        Of the command.
+
+    Returns
+    -------
+    list of pathlib.Path
+    """
+    scene = None if options.scene in builtin_scenes() else options.scene
+    named = (scene, getattr(options, "plan", None), getattr(options, "schedule", None))
+    return [Path(name) for name in named if name is not None]

@@ -12,6 +12,7 @@ from seqopt.errors import ProblemError
 from seqopt.placement.criteria import RankSum
 from seqopt.placement.formulation import Formulation, as_formulation
 from seqopt.placement.requirements import Criterion, Limit, payload_limits
+from seqopt.placement.scales import NEVER
 from seqopt.responses.choices import CHOICE_RESPONSES
 from seqopt.scene.scene import Scene
 from seqopt.study.presets import CRITERIA
@@ -21,13 +22,15 @@ LARGEST = 1e100  # number: products of larger ones overflow
 RESPONSES = (*CHOICE_RESPONSES, "F_each")
 
 
-def parse_criterion(text: str) -> Criterion:
+def parse_criterion(text: str, crown: str | None = None) -> Criterion:
     """Return a criterion by name, or a rank sum of named responses with weights.
 
     Parameters
     ----------
     text : str
         A name of `seqopt.CRITERIA`, or responses as ``T_max,M_sup=2``; a weight is 1 by default.
+    crown : str, optional
+        Bricks placed at the crown, or ``none``.
 
     Returns
     -------
@@ -36,8 +39,14 @@ def parse_criterion(text: str) -> Criterion:
     Raises
     ------
     ProblemError
-        If there is no such criterion or response, or a weight is not positive.
+        If there is no such criterion or response, a weight is not positive, or the criterion has
+        no crown.
     """
+    if crown is not None:
+        named = CRITERIA.get(text)
+        if not isinstance(named, RankSum):
+            raise ProblemError(f"--crown {crown}: {text} has none; leave it out")
+        return replace(named, crown=NEVER if crown == "none" else _number(crown, "--crown"))
     if text in CRITERIA:
         return CRITERIA[text]
     terms = []
@@ -45,6 +54,21 @@ def parse_criterion(text: str) -> Criterion:
         name, weight = _split(part)
         terms.append((_response(name, "--criteria"), _number(weight or "1", f"--criteria {part}")))
     return RankSum(text, tuple(terms), tuple(terms))
+
+
+def parse_robots(text: str) -> tuple[str, ...]:
+    """Return names of robots from words.
+
+    Parameters
+    ----------
+    text : str
+        Names with commas between them; nothing for none.
+
+    Returns
+    -------
+    tuple of str
+    """
+    return tuple(name.strip() for name in text.split(",")) if text else ()
 
 
 def parse_limits(texts: Sequence[str], scene: Scene) -> tuple[Limit, ...]:

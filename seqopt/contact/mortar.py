@@ -45,9 +45,21 @@ class Mortar:
 
 FRICTION = math.tan(math.radians(25.0))
 DRY = Mortar(friction=FRICTION)
-"""Blocks laid dry: compression and friction alone."""
+"""Blocks laid dry: compression and friction alone.
+
+Examples
+--------
+>>> DRY.cohesion
+0.0
+"""
 EPOXY = Mortar(friction=FRICTION, tensile_strength=3e6, cohesion=2e6)
-"""The epoxy putty of Bruun et al. (section 3.2.3: 25°, 3 MPa, and 2 MPa printed as "2 MPa/m")."""
+"""The epoxy putty of Bruun et al. (section 3.2.3: 25°, 3 MPa, and 2 MPa printed as "2 MPa/m").
+
+Examples
+--------
+>>> EPOXY.tensile_strength, EPOXY.cohesion
+(3000000.0, 2000000.0)
+"""
 MORTARS = {"epoxy": EPOXY, "dry": DRY}
 
 

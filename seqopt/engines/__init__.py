@@ -14,7 +14,7 @@ An engine is made by name from a network and answers grip sets in batches:
 Only what is wanted is evaluated; what supports and grips carry is all of the weight:
 
 >>> fields = engine.solve(4, [[7, 1]], Want.SUPPORT)
->>> carried = fields.support[0, :3] + fields.grip_force[0].sum(axis=0)
+>>> carried = fields.support[0, :, :3].sum(axis=0) + fields.grip_force[0].sum(axis=0)
 >>> bool(abs(carried + network.weight[:4].sum(axis=0)).max() < 1e-9)
 True
 

@@ -122,13 +122,13 @@ def _solve_one(network: Network, bricks: int, columns: Ints, contrast: float) ->
     motion[unknown] = _solve(reduced, frame.stiffness, load.ravel()[unknown], contrast, examine)
     stress = frame.stiffness * (frame.deformation @ motion)
     reaction = (frame.deformation.T @ stress).reshape(load.shape) - load
-    support = base[network.node_spring[base] == network.springs.support]
+    of_end = network.node_spring[base] == network.springs.support[:, None]  # (G, base nodes)
     moved = motion.reshape(load.shape)
     return Fields(
         edge_force=stress[None, :edges],
         displacement=moved[None, :nodes, :3],
         grip_force=reaction[None, held, :3],
-        support=reaction[support].sum(axis=0)[None],
+        support=(of_end @ reaction[base])[None],
         joint_wrench=_joint_wrenches(network, bricks, stress[-6 * frame.halves :])[None],
         brick_twist=moved[network.inner[:bricks]].mean(axis=1)[None],
     )

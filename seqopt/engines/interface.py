@@ -42,9 +42,9 @@ class Fields(FrozenValue):
         Of every network node, m.
     grip_force : (S, r, 3) float
         Force of every grip on the structure, N.
-    support : (S, 6) float
-        Reaction on the structure at the first ground end, N, and its moment about the fixed
-        point, N m.
+    support : (S, G, 6) float
+        Reaction on the structure at every ground end of the scene, in its order, N, and its moment
+        about the end's own fixed point, N m; zero where the end does not act.
     joint_wrench : (S, J, 6) float
         Force and moment, about its position, of every spring of the network on its second body
         (`Springs.bodies`), N and N m; zero where it does not act.
@@ -71,7 +71,7 @@ class Engine(Protocol):
     >>> engine: Engine = make_engine("compliance", build_network(load_scene("arch25")))
     >>> fields = engine.solve(2, [[2], [3]], Want.SUPPORT)  # two bricks, node 2 or 3 held
     >>> fields.grip_force.shape, fields.support.shape, fields.displacement.shape
-    ((2, 1, 3), (2, 6), (2, 0, 3))
+    ((2, 1, 3), (2, 2, 6), (2, 0, 3))
     """
 
     @property
@@ -184,7 +184,7 @@ def no_sets(network: Network, bricks: int, held: int) -> Fields:
         edge_force=np.empty((0, network.count_edges(bricks))),
         displacement=np.empty((0, network.count_nodes(bricks), 3)),
         grip_force=np.empty((0, held, 3)),
-        support=np.empty((0, 6)),
+        support=np.empty((0, len(network.springs.support), 6)),
         joint_wrench=np.empty((0, len(network.springs.since), 6)),
         brick_twist=np.empty((0, bricks, 6)),
     )

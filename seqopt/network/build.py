@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from seqopt.arrays import Ints
 from seqopt.errors import SceneError
 from seqopt.network.network import GROUND, Network, PartKind, Springs
 from seqopt.scene.parts import Brick, Ground, Joint
@@ -117,13 +118,17 @@ def _indices(scene: Scene) -> dict[int, int]:
 
 def _springs(scene: Scene, index_of: dict[int, int]) -> list[tuple[Joint | Ground, int]]:
     """Return joints and ground ends with the brick count from which each acts, in that order."""
-    springs: list[tuple[Joint | Ground, int]] = []
-    for ground in scene.grounds:
-        closes = ground.brick if ground.closes_with is None else ground.closes_with
-        springs.append((ground, max(index_of[ground.brick], index_of[closes]) + 1))
-    for joint in scene.joints:
-        springs.append((joint, max(index_of[b] for b in joint.bricks) + 1))
-    return sorted(springs, key=lambda entry: entry[1])
+    springs: list[Joint | Ground] = [*scene.grounds, *scene.joints]
+    since = [_since(spring, index_of) for spring in springs]
+    return sorted(zip(springs, since, strict=True), key=lambda entry: entry[1])
+
+
+def _since(spring: Joint | Ground, index_of: dict[int, int]) -> int:
+    """Return the brick count from which a spring acts."""
+    if isinstance(spring, Joint):
+        return max(index_of[b] for b in spring.bricks) + 1
+    closes = spring.brick if spring.closes_with is None else spring.closes_with
+    return max(index_of[spring.brick], index_of[closes]) + 1
 
 
 def _joint_names(springs: list[tuple[Joint | Ground, int]]) -> list[tuple[object, ...]]:
@@ -154,7 +159,6 @@ def _arrays(
     index = {node.name: i for i, node in enumerate(nodes)}
     along = np.array([spring.along for spring, _ in springs])
     across = np.array([spring.across for spring, _ in springs])
-    support = scene.grounds[0]
     return Network(
         scene=scene,
         springs=Springs(
@@ -166,7 +170,7 @@ def _arrays(
             axes=np.stack([along, across, np.cross(along, across)], axis=1),
             translational_stiffness=np.array([s.translational_stiffness for s, _ in springs]),
             rotational_stiffness=np.array([s.rotational_stiffness for s, _ in springs]),
-            support=next(i for i, (spring, _) in enumerate(springs) if spring is support),
+            support=_support(scene, index_of, springs),
             thickness=np.array([s.thickness for s, _ in springs], dtype=float),  # None is NaN
         ),
         node_position=np.array([node.position for node in nodes]),
@@ -183,6 +187,16 @@ def _arrays(
         edge_spring=np.array([edge.spring for edge in edges]),
         weight=np.array([brick.mass for brick in scene.placed])[:, None] * np.array(scene.gravity),
     )
+
+
+def _support(
+    scene: Scene, index_of: dict[int, int], springs: list[tuple[Joint | Ground, int]]
+) -> Ints:
+    """Return the places of the scene's ground ends among springs sorted by when they act."""
+    order = np.argsort([_since(ground, index_of) for ground in scene.grounds], kind="stable")
+    out = np.empty(len(order), dtype=np.int64)
+    out[order] = [i for i, (spring, _) in enumerate(springs) if isinstance(spring, Ground)]
+    return out
 
 
 def _bodies(spring: Joint | Ground, index_of: dict[int, int]) -> tuple[int, int]:

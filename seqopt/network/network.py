@@ -53,8 +53,8 @@ class Springs(FrozenValue):
         Rows are the unit vectors of the spring's own axes.
     translational_stiffness, rotational_stiffness : (S, 3) float
         N/m, N m/rad.
-    support : int
-        Index of the spring of the scene's first ground end.
+    support : (G,) int
+        Indices of the springs that are ground ends, in the scene's order.
     thickness : (S,) float
         Of joints that say so, m; NaN for others.
     """
@@ -67,7 +67,7 @@ class Springs(FrozenValue):
     axes: Floats
     translational_stiffness: Floats
     rotational_stiffness: Floats
-    support: int
+    support: Ints
     thickness: Floats
 
     def acting(self, bricks: int) -> Ints:

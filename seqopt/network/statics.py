@@ -13,7 +13,7 @@ from seqopt.network.network import Network, PartKind
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Statics(FrozenValue):
-    """Linear maps from forces to what the edges and the support carry, for the whole scene.
+    """Linear maps from forces to what the edges and the supports carry, for the whole scene.
 
     Attributes
     ----------
@@ -21,9 +21,9 @@ class Statics(FrozenValue):
         Axial edge forces for unit forces that springs exert on their second bodies.
     edge_of_load : (E, 6B) sparse
         Axial edge forces for unit forces on the inner nodes, in the order of `Network.inner`.
-    support_of_spring : (6, 6) float
-        Force and moment at the fixed point of the first ground end for the wrench its spring
-        exerts on its second body.
+    support_of_spring : (G, 6, 6) float
+        Force and moment at the fixed point of every ground end, in the scene's order, for the
+        wrench its spring exerts on its second body.
     """
 
     edge_of_spring: sparse.csr_array
@@ -64,8 +64,8 @@ def build_statics(network: Network) -> Statics:
     values = np.vstack([sign * axis[outer], sign[arrives] * axis[through]])
     second = 2 * network.edge_brick[inner] + 1
     support = springs.support
-    moment = np.eye(6)
-    moment[3:, :3] = skew(springs.position[support] - springs.anchor[support])
+    moment = np.tile(np.eye(6), (len(support), 1, 1))
+    moment[:, 3:, :3] = skew(springs.position[support] - springs.anchor[support])
     return Statics(
         edge_of_spring=_by_threes(rows, columns, values, (len(axis), len(springs.since))),
         edge_of_load=_by_threes(inner, second, axis[inner], (len(axis), network.inner.size)),

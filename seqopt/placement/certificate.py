@@ -44,7 +44,7 @@ class Certificate(FrozenValue):
     Examples
     --------
     >>> import seqopt
-    >>> proof = seqopt.optimize("arch25", criterion="worst-ratio").certificate
+    >>> proof = seqopt.optimize("arch25", criterion="worst-ratio-published").certificate
     >>> round(proof.objective, 3), round(proof.bound, 3), proof.gap
     (57.538, 57.538, 0.0)
     """
@@ -93,6 +93,11 @@ def certify(problem: PlacementProblem, selection: Selection, aim: Aim) -> Certif
                 f"(the claimed bound is {selection.bound:.9g})"
             )
     bound = least(costs, aim)
+    if value < bound - TOLERANCE * scale:
+        raise SolverError(
+            f"the least value found anew, {bound:.9g}, lies above that of the choice, {value:.9g}: "
+            "the costs changed while they were judged"
+        )
     highest = value if problem.budgets else bound
     if not selection.bound <= highest + TOLERANCE * scale:  # NaN is no bound
         raise SolverError(f"the claimed bound {selection.bound:.9g} exceeds {highest:.9g}")

@@ -1,27 +1,24 @@
 """Criteria: what a step costs, from the responses of all choices that compete in it.
 
 Every criterion turns responses over choices, ``(C,)`` for one open move or ``(C, D)`` for two, into
-costs of the same shape. A name stands for a response: ``T_max``, ``M_sup``, ``D_max``, ``F_move``
-(the robot that takes its grip), ``F_largest`` (the largest grip force), ``F_`` and a robot's name
-(its force; in brackets where that means something else, as ``F_[sup]``), ``F_each`` (the forces of
-all robots, a term each).
+costs of the same shape. A name stands for a response: ``T_max``, ``M_sup``, ``D_max``, ``C_max``
+(the largest compression), ``F_move`` (the robot that takes its grip), ``F_largest`` (the largest
+grip force), ``F_`` and a robot's name (its force; in brackets where that means something else, as
+``F_[sup]``), ``F_each`` (the forces of all robots, a term each).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from seqopt.arrays import Floats
 from seqopt.placement.ranks import scaled_ranks
 from seqopt.placement.requirements import ChoiceResponses
-from seqopt.responses.quantities import robot_response
-
-Term = tuple[Any, ...]  # a name and its numbers
-RESOLUTION = (("F", 1.0), ("T", 1.0), ("M", 1.0), ("D", 1e-6))  # N, N, N m, m
+from seqopt.placement.scales import NEVER, ROUNDED, SceneFacts
+from seqopt.placement.terms import known, present, scale_of, spell_out
 
 
 @dataclass(frozen=True)
@@ -40,17 +37,28 @@ class RankSum:
         What the criterion is called.
     before, after : tuple of (str, float)
         Weight of every response in moves before the crown and from it on.
-    crown : int, optional
-        Brick count of a move from which ``after`` holds; by default it never does.
-    resolution : tuple of (str, float)
-        What a response is rounded to, by its first letter: N, N m, m.
+    crown : float, optional
+        Brick count of a move from which ``after`` holds, `NEVER` if it does not; by default that at
+        which the scene's build reaches its crown.
+    delay : int
+        How many bricks after the scene's crown ``after`` begins to hold.
+    resolution : tuple of (str, float), optional
+        What a response is rounded to, by its first letter: N, N m, m. By default `ROUNDED` in the
+        scene's own units, so that density, length, stiffness and units of force change no choice.
     """
 
     name: str
     before: tuple[tuple[str, float], ...]
     after: tuple[tuple[str, float], ...]
-    crown: int | None = None
-    resolution: tuple[tuple[str, float], ...] = RESOLUTION
+    crown: float | None = None
+    delay: int = 0
+    resolution: tuple[tuple[str, float], ...] | None = None
+
+    @property
+    def settings(self) -> Mapping[str, object]:
+        """Its crown, None where there is none, and what it rounds to."""
+        crown = None if self.crown == NEVER else self.crown
+        return {"crown": crown, "resolution": dict(self.resolution or ())}
 
     def wanted(self, bricks: int) -> tuple[str, ...]:
         """Return the responses that it needs of a move.
@@ -67,19 +75,34 @@ class RankSum:
         """
         return tuple(name for name, _ in self._terms(bricks))
 
-    def for_robots(self, robots: Sequence[str]) -> RankSum:
-        """Return the criterion with ``F_each`` spelled out for the robots of a scene.
+    def for_scene(self, facts: SceneFacts) -> RankSum:
+        """Return the criterion with everything that it takes from a scene filled in.
 
         Parameters
         ----------
-        robots : sequence of str
-            Their names.
+        facts : SceneFacts
+            Of the scene.
 
         Returns
         -------
         RankSum
         """
-        return replace(self, before=_each(self.before, robots), after=_each(self.after, robots))
+        crown = self.crown
+        if self.before == self.after:
+            crown = NEVER
+        elif crown is None:
+            crown = facts.crown + self.delay
+        resolution = self.resolution
+        if resolution is None:
+            resolution = tuple((name, share * facts.units.of(name)) for name, share in ROUNDED)
+        return replace(
+            self,
+            before=spell_out(self.before, facts.robots),
+            after=spell_out(self.after, facts.robots),
+            crown=crown,
+            delay=0,
+            resolution=resolution,
+        )
 
     def costs(self, responses: ChoiceResponses, bricks: int, choices: int) -> Floats:
         """Return the weighted mean of the ranks.
@@ -100,13 +123,13 @@ class RankSum:
         """
         terms = self._terms(bricks)
         total: Floats = np.zeros_like(responses[terms[0][0]])
-        steps = dict(self.resolution)
+        rounding = dict(known(self.resolution, self.name))
         for name, weight in terms:
-            total = total + weight * scaled_ranks(responses[name] / steps[name[0]], choices)
+            total = total + weight * scaled_ranks(responses[name] / rounding[name[0]], choices)
         return total / sum(weight for _, weight in terms)
 
     def _terms(self, bricks: int) -> tuple[tuple[str, float], ...]:
-        return self.before if self.crown is None or bricks < self.crown else self.after
+        return self.before if bricks < known(self.crown, self.name) else self.after
 
 
 @dataclass(frozen=True)
@@ -117,12 +140,18 @@ class WeightedSum:
     ----------
     name : str
         What the criterion is called.
-    terms : tuple of (str, float, float)
-        Response, weight, scale (N, N m or m).
+    terms : tuple of (str, float, float or None)
+        Response, weight, scale (N, N m or m). By default (None) the scale is the least that any
+        fixed method of the scene reaches of the response's largest value.
     """
 
     name: str
-    terms: tuple[tuple[str, float, float], ...]
+    terms: tuple[tuple[str, float, float | None], ...]
+
+    @property
+    def settings(self) -> Mapping[str, object]:
+        """What responses are divided by, SI units."""
+        return {"scales": {name: scale for name, _, scale in self.terms}}
 
     def wanted(self, bricks: int) -> tuple[str, ...]:
         """Return the responses that it needs.
@@ -139,19 +168,23 @@ class WeightedSum:
         """
         return tuple(name for name, _, _ in self.terms)
 
-    def for_robots(self, robots: Sequence[str]) -> WeightedSum:
-        """Return the criterion with ``F_each`` spelled out for the robots of a scene.
+    def for_scene(self, facts: SceneFacts) -> WeightedSum:
+        """Return the criterion with everything that it takes from a scene filled in.
 
         Parameters
         ----------
-        robots : sequence of str
-            Their names.
+        facts : SceneFacts
+            Of the scene.
 
         Returns
         -------
         WeightedSum
         """
-        return replace(self, terms=_each(self.terms, robots))
+        terms = spell_out(self.terms, facts.robots)
+        scaled = tuple(
+            (name, weight, scale_of(facts, name, scale)) for name, weight, scale in terms
+        )
+        return replace(self, terms=scaled)
 
     def costs(self, responses: ChoiceResponses, bricks: int, choices: int) -> Floats:
         """Return the weighted sums.
@@ -168,7 +201,10 @@ class WeightedSum:
         (C,) or (C, D) float
             NaN where a choice is impossible.
         """
-        parts = [w / scale * _present(responses[name]) for name, w, scale in self.terms]
+        parts = [
+            weight / known(scale, self.name) * present(responses[name])
+            for name, weight, scale in self.terms
+        ]
         return np.asarray(sum(parts))
 
 
@@ -180,12 +216,18 @@ class WorstRatio:
     ----------
     name : str
         What the criterion is called.
-    limits : tuple of (str, float)
-        Response and limit (N, N m or m).
+    limits : tuple of (str, float or None)
+        Response and limit (N, N m or m). By default (None) the limit is the least that any fixed
+        method of the scene reaches of the response's largest value.
     """
 
     name: str
-    limits: tuple[tuple[str, float], ...]
+    limits: tuple[tuple[str, float | None], ...]
+
+    @property
+    def settings(self) -> Mapping[str, object]:
+        """What responses are divided by, SI units."""
+        return {"scales": dict(self.limits)}
 
     def wanted(self, bricks: int) -> tuple[str, ...]:
         """Return the responses that it needs.
@@ -202,19 +244,20 @@ class WorstRatio:
         """
         return tuple(name for name, _ in self.limits)
 
-    def for_robots(self, robots: Sequence[str]) -> WorstRatio:
-        """Return the criterion with ``F_each`` spelled out for the robots of a scene.
+    def for_scene(self, facts: SceneFacts) -> WorstRatio:
+        """Return the criterion with everything that it takes from a scene filled in.
 
         Parameters
         ----------
-        robots : sequence of str
-            Their names.
+        facts : SceneFacts
+            Of the scene.
 
         Returns
         -------
         WorstRatio
         """
-        return replace(self, limits=_each(self.limits, robots))
+        limits = spell_out(self.limits, facts.robots)
+        return replace(self, limits=tuple((name, scale_of(facts, name, s)) for name, s in limits))
 
     def costs(self, responses: ChoiceResponses, bricks: int, choices: int) -> Floats:
         """Return the largest ratios.
@@ -231,35 +274,12 @@ class WorstRatio:
         (C,) or (C, D) float
             1 where a response is at its limit; NaN where a choice is impossible.
         """
-        parts = [_present(responses[name]) / limit for name, limit in self.limits]
+        parts = [present(responses[name]) / known(limit, self.name) for name, limit in self.limits]
         return np.asarray(np.max(np.stack(parts), axis=0))
 
 
-def _present(values: Floats) -> Floats:
-    """Return the values, or zeros where the robot does not grip in any choice."""
-    return np.zeros_like(values) if np.isnan(values).all() else values
-
-
-def _each(terms: tuple[Term, ...], robots: Sequence[str]) -> tuple[Term, ...]:
-    """Return terms in which ``F_each`` stands once for every robot."""
-    out: list[Term] = []
-    for term in terms:
-        names = [robot_response(robot) for robot in robots] if term[0] == "F_each" else [term[0]]
-        out += [(name, *term[1:]) for name in names]
-    return tuple(out)
-
-
-def equal(*names: str) -> tuple[tuple[str, float], ...]:
-    """Return equally weighted terms of a `RankSum`.
-
-    Parameters
-    ----------
-    *names : str
-        Responses.
-
-    Returns
-    -------
-    tuple of (str, float)
-        Each with weight 1.
-    """
-    return tuple((name, 1.0) for name in names)
+SCALED = ("F_largest", "M_sup", "T_max", "D_max")
+OVER_METHODS = WeightedSum("weighted", tuple((name, 1.0, None) for name in SCALED))
+"""The sum of responses over what the scene's fixed methods reach."""
+WORST_OVER_METHODS = WorstRatio("worst-ratio", tuple((name, None) for name in SCALED))
+"""The largest of these ratios."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 import pandas as pd
@@ -17,11 +18,12 @@ from seqopt.placement.formulation import (
 )
 from seqopt.placement.interface import PlacementProblem
 from seqopt.placement.problem import Problem
+from seqopt.placement.promises import Excess, overloads
 from seqopt.placement.ranking import move_costs, rank_of
 from seqopt.placement.window_search import WindowSearch
 from seqopt.responses.choices import window_models
 from seqopt.responses.table import analyze
-from seqopt.sequence.steps import Step
+from seqopt.sequence.steps import Step, idle_robots
 
 
 @dataclass(frozen=True, repr=False)
@@ -87,15 +89,17 @@ class Plan:
 
     @property
     def models(self) -> int:
-        """How many different models were solved for it."""
-        return sum(problem.evaluation.models for problem in self.explored)
+        """How many different models it looked at."""
+        return self._posed.evaluation.models if self.search is None else self._window_models
 
     @property
     def models_needed(self) -> int:
         """How many different models the formulation looks at: fewer where it asks for windows."""
-        if self.formulation.reads is Reads.WINDOW:
-            return window_models(self._posed.schedule, self.selection.choice)
-        return self.models
+        return self._window_models if self.formulation.reads is Reads.WINDOW else self.models
+
+    @property
+    def _window_models(self) -> int:
+        return window_models(self._posed.schedule, self.selection.choice)
 
     @property
     def _posed(self) -> Problem:
@@ -104,6 +108,11 @@ class Plan:
                 "the problem is given by its costs alone and has no steps; pose it with a schedule"
             )
         return self.problem
+
+    @cached_property
+    def overloads(self) -> tuple[Excess, ...]:
+        """The payloads that steps of the plan exceed, whether or not a limit was asked for."""
+        return overloads(self._posed.schedule.scene, self._responses)
 
     def responses(self) -> pd.DataFrame:
         """Return the responses of every step and the robots whose grips were chosen in it.
@@ -118,6 +127,10 @@ class Plan:
         ProblemError
             If the problem is given by its costs alone; so do the tables below.
         """
+        return self._responses.copy()
+
+    @cached_property
+    def _responses(self) -> pd.DataFrame:
         schedule = self._posed.schedule
         table = analyze(self._posed.engine, self.steps)
         open_at = {step.number: step.moves for step in schedule.steps}
@@ -191,13 +204,15 @@ class Plan:
         -------
         dict
             Names of scene, schedule, formulation and criterion; ``status`` (``optimal``,
-            ``feasible`` or ``unproven``), ``objective``, ``bound``, ``gap``; ``models_evaluated``
-            and ``seconds``.
+            ``claimed optimal`` where budgets leave the proof to the solver, ``feasible`` or
+            ``unproven``), ``objective``, ``bound``, ``gap``, ``claimed_gap``; the payloads that
+            are exceeded; ``idle_robots``, which never grip; ``models_evaluated`` and ``seconds``.
         """
         schedule, proof = self._posed.schedule, self.certificate
         status = "unproven"
         if proof is not None:
-            status = "optimal" if proof.gap <= TOLERANCE else "feasible"
+            proven, claimed = proof.gap <= TOLERANCE, proof.claimed_gap <= TOLERANCE
+            status = "optimal" if proven else "claimed optimal" if claimed else "feasible"
         return {
             "scene": schedule.scene.name,
             "schedule": schedule.method,
@@ -205,10 +220,14 @@ class Plan:
             "kind": self.formulation.kind.value,
             "aim": self.formulation.aim.value,
             "criterion": self._posed.criterion.name,
+            **self._posed.criterion.settings,
             "status": status,
             "objective": None if proof is None else proof.objective,
             "bound": None if proof is None else proof.bound,
             "gap": None if proof is None else proof.gap,
+            "claimed_gap": None if proof is None else proof.claimed_gap,
+            "idle_robots": list(idle_robots(schedule.scene, self.steps)),
+            "payload_exceeded": [str(excess) for excess in self.overloads],
             "models_evaluated": self.models,
             "seconds": dict(self.seconds),
         }

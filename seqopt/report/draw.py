@@ -50,7 +50,7 @@ class View:
         return np.stack([right, np.cross(toward, right), toward])
 
 
-def draw_bricks(
+def draw_bricks(  # noqa: PLR0913  # what is drawn, and how, each by its name
     axes: Axes,
     network: Network,
     bricks: int,
@@ -102,7 +102,7 @@ def draw_bricks(
     _frame(axes)
 
 
-def draw_network(
+def draw_network(  # noqa: PLR0913  # what is drawn, and how, each by its name
     axes: Axes,
     network: Network,
     bricks: int,

@@ -19,11 +19,11 @@ import numpy as np
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints
 from seqopt.engines.interface import Engine, Want
 from seqopt.responses.memory import require_memory
-from seqopt.responses.quantities import RESPONSES, lengths, require_finite, robot_response
+from seqopt.responses.quantities import CHOSEN_BY, lengths, require_finite, robot_response
 from seqopt.sequence.schedule import OpenGrip, OpenStep, Schedule
 
 BLOCK = 2048  # grip sets whose fields are held at once: few enough to stay in the cache
-CHOICE_RESPONSES = ("T_max", "M_sup", "D_max", "F_move", "F_largest")  # and one per robot
+CHOICE_RESPONSES = ("T_max", "M_sup", "D_max", "C_max", "F_move", "F_largest")  # and one per robot
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -250,7 +250,7 @@ def _answers(
     engine: Engine, bricks: int, grips: Ints, names: Set[str]
 ) -> tuple[dict[str, Floats], Floats]:
     """Return the wanted responses of grip sets (S, r) and the sizes (S, r) of their forces."""
-    asked = [RESPONSES[name] for name in sorted(names & RESPONSES.keys())]
+    asked = [CHOSEN_BY[name] for name in sorted(names & CHOSEN_BY.keys())]
     want = reduce(or_, (response.needs for response in asked), Want(0))
     found: dict[str, list[Floats]] = {response.name: [] for response in asked}
     forces = []

@@ -84,7 +84,8 @@ def robot_response(robot: str) -> str:
     >>> robot_response("rob1"), robot_response("sup"), robot_response("a,b")
     ('F_rob1', 'F_[sup]', 'F_[a,b]')
     """
-    means_more = robot in TAKEN or f"F_{robot}" in RESPONSES or MARKS & set(robot)
+    of_an_end = robot.startswith("sup_")  # `seqopt.responses.table.support_columns`
+    means_more = robot in TAKEN or of_an_end or f"F_{robot}" in RESPONSES or MARKS & set(robot)
     return f"F_[{robot}]" if means_more or not robot.strip() else f"F_{robot}"
 
 
@@ -135,6 +136,40 @@ def grip_forces(network: Network, fields: Fields) -> Floats:
     return _signed(network, fields.grip_force)
 
 
+def support_forces(network: Network, fields: Fields) -> Floats:
+    """Return the size of the reaction at every ground end, negative where it points down.
+
+    Parameters
+    ----------
+    network : Network
+        Of a scene that says where up is.
+    fields : Fields
+        Of S grip sets, with the supports.
+
+    Returns
+    -------
+    (S, G) float
+        N; zero where the end does not act yet. Ends in the scene's order.
+    """
+    return _signed(network, fields.support[..., :3])
+
+
+def support_moments(fields: Fields) -> Floats:
+    """Return the size of the moment at every ground end about its fixed point.
+
+    Parameters
+    ----------
+    fields : Fields
+        Of S grip sets, with the supports.
+
+    Returns
+    -------
+    (S, G) float
+        N m; zero where the end does not act yet. Ends in the scene's order.
+    """
+    return lengths(fields.support[..., 3:])
+
+
 def _squared(vectors: Floats) -> Floats:
     """Return the squared lengths of vectors (..., 3)."""
     x, y, z = np.moveaxis(vectors, -1, 0)  # adding whole arrays outruns sums of three
@@ -143,6 +178,13 @@ def _squared(vectors: Floats) -> Floats:
 
 def _signed(network: Network, vectors: Floats) -> Floats:
     return np.asarray(np.copysign(lengths(vectors), vectors @ np.array(network.scene.up)))
+
+
+def _largest_force(network: Network, fields: Fields) -> Floats:
+    """Return the support force of largest size (S,), signed; of two as large the one upward."""
+    forces = support_forces(network, fields)
+    up, down = forces.max(axis=1), forces.min(axis=1)
+    return np.asarray(np.where(up >= -down, up, down))
 
 
 def _in_tension(network: Network, fields: Fields) -> Floats:
@@ -154,8 +196,8 @@ _EDGES, _MOTION, _SUPPORT = Want.EDGES, Want.DISPLACEMENTS, Want.SUPPORT
 RESPONSES: dict[str, Response] = {
     response.name: response
     for response in (
-        Response("F_sup", "F_sup_N", 1.0, _SUPPORT, lambda n, f: _signed(n, f.support[:, :3])),
-        Response("M_sup", "M_sup_Nm", 1.0, _SUPPORT, lambda _, f: lengths(f.support[:, 3:])),
+        Response("F_sup", "F_sup_N", 1.0, _SUPPORT, _largest_force),
+        Response("M_sup", "M_sup_Nm", 1.0, _SUPPORT, lambda _, f: support_moments(f).max(axis=1)),
         Response("F_min", "F_min_N", 1.0, _EDGES, lambda _, f: f.edge_force.min(axis=1)),
         Response("T_max", "F_max_N", 1.0, _EDGES, lambda _, f: f.edge_force.max(axis=1)),
         Response("F_avg", "F_avg_N", 1.0, _EDGES, lambda _, f: f.edge_force.mean(axis=1)),
@@ -185,10 +227,20 @@ RESPONSES: dict[str, Response] = {
 }
 """By name, in the order of the columns of Table A.1.
 
-``F_sup`` and ``M_sup`` are the force at the first ground end, signed like a grip's, and its moment;
+``F_sup`` is the largest force at any ground end, signed like a grip's, ``M_sup`` the largest moment
+at any, about the end's fixed point (Bruun et al. print those of the first end);
 ``F_min``, ``T_max`` and ``F_avg`` run over the axial forces of all edges, tension positive;
 ``T_pct`` is the share of edges in tension, percent; ``D_max``, ``D_avg`` and ``D_std`` run over the
 displacements of all nodes.
+"""
+
+
+_COMPRESSION = Response(
+    "C_max", "C_max_N", 1.0, _EDGES, lambda _, f: np.maximum(0.0, -f.edge_force.min(axis=1))
+)
+CHOSEN_BY: dict[str, Response] = {**RESPONSES, _COMPRESSION.name: _COMPRESSION}
+"""Responses that criteria and limits can name: those of the tables, and ``C_max``, the largest
+compression of any edge as a size, N (``F_min`` without its sign; zero if no edge is compressed).
 """
 
 
@@ -200,7 +252,7 @@ def responses_of(network: Network, fields: Fields) -> dict[str, Floats]:
     network : Network
         The network that the fields run over.
     fields : Fields
-        With edge forces, displacements and the support (`Want.RESPONSES`).
+        With edge forces, displacements and the supports (`Want.RESPONSES`).
 
     Returns
     -------

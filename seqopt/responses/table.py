@@ -11,7 +11,14 @@ import pandas as pd
 from seqopt.engines.interface import Engine, Fields
 from seqopt.errors import MechanismError, SceneError, SolverError
 from seqopt.network.network import Network
-from seqopt.responses.quantities import RESPONSES, grip_forces, require_finite, robot_response
+from seqopt.responses.quantities import (
+    RESPONSES,
+    grip_forces,
+    require_finite,
+    robot_response,
+    support_forces,
+    support_moments,
+)
 from seqopt.scene.parts import Robot
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Step, require_steps
@@ -31,7 +38,9 @@ def analyze(engine: Engine, steps: Sequence[Step]) -> pd.DataFrame:
     -------
     pandas.DataFrame
         Forces in N, moments in N m, displacements in 1e-3 mm, as the columns' names say; an empty
-        cell is a robot that does not grip.
+        cell is a robot that does not grip. Where a scene has more than one ground end, ``F_sup``
+        and ``M_sup`` are the largest over them, and a pair of further columns per end, such as
+        ``F_sup_25_N`` and ``M_sup_25_Nm`` for that of brick 25, has its own: empty until it acts.
 
     Raises
     ------
@@ -48,6 +57,8 @@ def analyze(engine: Engine, steps: Sequence[Step]) -> pd.DataFrame:
     >>> table = seqopt.analyze(engine, seqopt.sequential(network))
     >>> table.loc[46, ["step", "bricks", "M_sup_Nm", "D_max_1e-3mm"]].round(1).tolist()
     [47.0, 24.0, 66.3, 305.9]
+    >>> table.loc[48, ["step", "M_sup_Nm", "M_sup_1_Nm", "M_sup_25_Nm"]].round(1).tolist()
+    [49.0, 6.5, 0.8, 6.5]
     """
     if not isinstance(getattr(engine, "network", None), Network):
         kind = type(engine).__name__
@@ -69,26 +80,31 @@ def force_column(robot: Robot) -> str:
     return f"{robot_response(robot.name)}_N"
 
 
-def steps_over_payload(scene: Scene, table: pd.DataFrame) -> dict[str, list[int]]:
-    """Return the steps in which robots would have to exert more than they can.
+def support_columns(scene: Scene) -> list[tuple[str, str]]:
+    """Return the columns of a table that hold what a scene's ground ends carry one by one.
 
     Parameters
     ----------
     scene : Scene
-        Whose robots have payloads.
-    table : pandas.DataFrame
-        From `analyze`.
 
     Returns
     -------
-    dict of str to list of int
-        Numbers of steps by name of the robot; robots that never do are not in it.
+    list of (str, str)
+        Of the force, N, and the moment, N m, of every ground end in the scene's order, named after
+        the end's brick, and counted from its second end on; none where the scene has one end.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> support_columns(seqopt.load_scene("arch25"))
+    [('F_sup_1_N', 'M_sup_1_Nm'), ('F_sup_25_N', 'M_sup_25_Nm')]
     """
-    over = {
-        robot.name: table["step"][table[force_column(robot)].abs() > robot.payload].tolist()
-        for robot in scene.robots
-    }
-    return {name: steps for name, steps in over.items() if steps}
+    bricks = [ground.brick for ground in scene.grounds]
+    if len(bricks) == 1:
+        return []
+    before = [bricks[:i].count(brick) for i, brick in enumerate(bricks)]
+    names = [f"{b}_{n + 1}" if n else f"{b}" for b, n in zip(bricks, before, strict=True)]
+    return [(f"F_sup_{name}_N", f"M_sup_{name}_Nm") for name in names]
 
 
 def step_fields(engine: Engine, step: Step) -> Fields:
@@ -122,7 +138,8 @@ def fields_archive(engine: Engine, steps: Sequence[Step]) -> bytes:
 
     Arrays are named ``step1_edge_force``, ``step1_displacement``, ``step1_grip_force``,
     ``step1_support`` and so on, as in `Fields` without its first axis; ``edge_nodes`` (E, 2),
-    ``node_position`` (N, 3) and ``node_name`` (N,) say what they run over.
+    ``node_position`` (N, 3), ``node_name`` (N,), and of the ground ends ``support_brick`` (G,) and
+    ``support_point`` (G, 3), the fixed points, say what they run over.
 
     Parameters
     ----------
@@ -144,6 +161,8 @@ def fields_archive(engine: Engine, steps: Sequence[Step]) -> bytes:
         "edge_nodes": network.edge_nodes,
         "node_position": network.node_position,
         "node_name": np.array([str(name) for name in network.node_name]),
+        "support_brick": np.array([ground.brick for ground in network.scene.grounds]),
+        "support_point": network.springs.anchor[network.springs.support],
     }
     for step in steps:
         fields = step_fields(engine, step)
@@ -168,4 +187,15 @@ def _row(engine: Engine, step: Step) -> dict[str, object]:
     for response in RESPONSES.values():
         values = require_finite(response.name, response.of(network, fields), step.bricks)
         row[response.column] = values[0] * response.scale
-    return row
+    return row | _supports(network, step, fields)
+
+
+def _supports(network: Network, step: Step, fields: Fields) -> dict[str, float]:
+    """Return the cells of every ground end where there are several; NaN where one does not act."""
+    acts = network.springs.since[network.springs.support] <= step.bricks
+    forces = np.where(acts, support_forces(network, fields)[0], np.nan)
+    moments = np.where(acts, support_moments(fields)[0], np.nan)
+    cells: dict[str, float] = {}
+    for columns, *values in zip(support_columns(network.scene), forces, moments, strict=False):
+        cells |= dict(zip(columns, values, strict=True))
+    return cells

@@ -28,7 +28,7 @@ class Scene:
     bricks : tuple of Brick
     joints : tuple of Joint
     grounds : tuple of Ground
-        The first one is the support at which F_sup and M_sup are taken.
+        The supports; F_sup and M_sup are the largest over them.
     build_order : tuple of int
         Names of all bricks in the order of placing.
     robots : tuple of Robot

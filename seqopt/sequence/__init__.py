@@ -14,21 +14,24 @@ checked in its scene. A schedule is a sequence some of whose grips are still to 
 >>> move = schedule.moves[0]
 >>> move.robot, move.step, move.candidates
 ('rob3', 3, (4, 5))
+
+Loops of two robots and of more are in `seqopt.sequence.loops`.
 """
 
 from seqopt.sequence.plan_file import read_plan
-from seqopt.sequence.schedule import Move, Schedule
+from seqopt.sequence.schedule import Schedule
+from seqopt.sequence.schedule_file import read_schedule
 from seqopt.sequence.steps import Step
 from seqopt.sequence.three_robots import modified_sequential, three_robot_loop
 from seqopt.sequence.two_robots import cantilever, sequential
 
 __all__ = [
-    "Move",
     "Schedule",
     "Step",
     "cantilever",
     "modified_sequential",
     "read_plan",
+    "read_schedule",
     "sequential",
     "three_robot_loop",
 ]

@@ -78,21 +78,8 @@ def parse_plan(scene: Scene, text: str, source: str) -> tuple[Step, ...]:
     StepError
         If the text is not such a table or a step is impossible.
     """
-    try:
-        return _steps(scene, csv.DictReader(io.StringIO(text), restval=""), source)
-    except csv.Error as error:
-        raise StepError(f"plan {source}: no CSV that can be read: {error}") from error
-
-
-def _steps(scene: Scene, reader: csv.DictReader[str], source: str) -> tuple[Step, ...]:
-    wanted = ["step", "type", "bricks", *(f"{robot.name}_node" for robot in scene.robots)]
-    missing = [column for column in wanted if column not in (reader.fieldnames or ())]
-    if missing:
-        raise StepError(f"plan {source}: column {missing[0]} is missing; give {', '.join(wanted)}")
-    twice = [column for column in wanted if (reader.fieldnames or ()).count(column) > 1]
-    if twice:
-        raise StepError(f"plan {source}: column {twice[0]} stands there twice; keep one")
-    steps = [_step(scene, row, f"plan {source}, line {reader.line_num}") for row in reader]
+    rows = read_rows(scene, text, f"plan {source}")
+    steps = [_step(scene, row, f"plan {source}, line {line}") for line, row in rows]
     for expected, step in enumerate(steps, start=1):
         if step.number != expected:
             raise StepError(
@@ -101,20 +88,100 @@ def _steps(scene: Scene, reader: csv.DictReader[str], source: str) -> tuple[Step
     return check_sequence(scene, steps)
 
 
+def read_rows(scene: Scene, text: str, what: str) -> list[tuple[int, Row]]:
+    """Return the rows of a table of steps.
+
+    Parameters
+    ----------
+    scene : Scene
+        Whose robots have a column each.
+    text : str
+        CSV, as in `parse_plan`.
+    what : str
+        What to call the table in messages.
+
+    Returns
+    -------
+    list of (int, dict of str to str)
+        The number of the line, and its cells by column.
+
+    Raises
+    ------
+    StepError
+        If a column is missing or stands there twice, or the text is no CSV.
+    """
+    try:
+        return _rows(scene, csv.DictReader(io.StringIO(text), restval=""), what)
+    except csv.Error as error:
+        raise StepError(f"{what}: no CSV that can be read: {error}") from error
+
+
+def _rows(scene: Scene, reader: csv.DictReader[str], what: str) -> list[tuple[int, Row]]:
+    wanted = ["step", "type", "bricks", *(f"{robot.name}_node" for robot in scene.robots)]
+    missing = [column for column in wanted if column not in (reader.fieldnames or ())]
+    if missing:
+        raise StepError(f"{what}: column {missing[0]} is missing; give {', '.join(wanted)}")
+    twice = [column for column in wanted if (reader.fieldnames or ()).count(column) > 1]
+    if twice:
+        raise StepError(f"{what}: column {twice[0]} stands there twice; keep one")
+    return [(reader.line_num, row) for row in reader]
+
+
 def _step(scene: Scene, row: Row, where: str) -> Step:
+    number, kind, bricks = read_cells(row, where)
+    grips = tuple(read_grip(scene, robot, row, where) for robot in scene.robots)
+    return Step(number, kind, bricks, grips)
+
+
+def read_cells(row: Row, where: str) -> tuple[int, StepKind, int]:
+    """Return what a row says beside its grips.
+
+    Parameters
+    ----------
+    row : dict of str to str
+        Cells by column.
+    where : str
+        What to call the row in messages.
+
+    Returns
+    -------
+    number : int
+    kind : StepKind
+    bricks : int
+
+    Raises
+    ------
+    StepError
+        If a cell is not a whole number, or there is no such type.
+    """
     kinds = {kind.value: kind for kind in StepKind}
     if row["type"] not in kinds:
         raise StepError(f"{where}: type is {short(row['type'])}; give one of {', '.join(kinds)}")
-    return Step(
-        number=_integer(row, "step", where),
-        kind=kinds[row["type"]],
-        bricks=_integer(row, "bricks", where),
-        grips=tuple(_grip(scene, robot, row, where) for robot in scene.robots),
-    )
+    number, bricks = _integer(row, "step", where), _integer(row, "bricks", where)
+    return number, kinds[row["type"]], bricks
 
 
-def _grip(scene: Scene, robot: Robot, row: Row, where: str) -> int | None:
-    """Return the node a robot holds; its brick, if named, must be the node's."""
+def read_grip(scene: Scene, robot: Robot, row: Row, where: str) -> int | None:
+    """Return the node a robot holds; its brick, if named, must be the node's.
+
+    Parameters
+    ----------
+    scene : Scene
+    robot : Robot
+    row : dict of str to str
+        Cells by column.
+    where : str
+        What to call the row in messages.
+
+    Returns
+    -------
+    int or None
+
+    Raises
+    ------
+    StepError
+        If a cell is not a whole number, or the node is on another brick.
+    """
     if not row[f"{robot.name}_node"].strip():
         return None
     node = _integer(row, f"{robot.name}_node", where)

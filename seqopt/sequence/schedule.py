@@ -22,6 +22,9 @@ class OpenGrip:
 
     move: int
 
+    def __str__(self) -> str:
+        return f"?{self.move + 1}"
+
 
 ScheduledGrips = tuple[int | OpenGrip | None, ...]
 

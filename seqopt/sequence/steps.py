@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import Enum
+from numbers import Integral
+from typing import Protocol
 
 from seqopt.errors import StepError
 from seqopt.scene.parts import Robot
@@ -56,6 +58,51 @@ class Step:
     def held(self) -> tuple[int, ...]:
         """The nodes held, in the order of the robots."""
         return tuple(node for node in self.grips if node is not None)
+
+
+class AnyStep(Protocol):
+    """A step, or one with grips that are still open: anything but a node or None."""
+
+    @property
+    def number(self) -> int:
+        """From 1."""
+
+    @property
+    def kind(self) -> StepKind:
+        """What the step does."""
+
+    @property
+    def bricks(self) -> int:
+        """How many bricks stand, in build order."""
+
+    @property
+    def grips(self) -> tuple[object, ...]:
+        """What each of the scene's robots holds."""
+
+
+def idle_robots(scene: Scene, steps: Iterable[AnyStep]) -> tuple[str, ...]:
+    """Return the robots of a scene that never grip.
+
+    Parameters
+    ----------
+    scene : Scene
+    steps : iterable of AnyStep
+        Of a sequence, a schedule or a plan.
+
+    Returns
+    -------
+    tuple of str
+        Names, in the order of the scene.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> scene = seqopt.load_scene("arch25")
+    >>> idle_robots(scene, seqopt.sequential(seqopt.build_network(scene)))
+    ('rob3',)
+    """
+    busy = {i for step in steps for i, grip in enumerate(step.grips) if grip is not None}
+    return tuple(robot.name for i, robot in enumerate(scene.robots) if i not in busy)
 
 
 def require_steps(steps: Sequence[Step]) -> Sequence[Step]:
@@ -130,15 +177,33 @@ def check_sequence(scene: Scene, steps: Sequence[Step]) -> tuple[Step, ...]:
     """
     if not steps:
         raise StepError("the sequence has no steps; give at least one")
-    before = Step(0, StepKind.RELEASE, 0, (None,) * len(scene.robots))
+    before = None
     for step in steps:
-        _check_state(scene, step)
-        _check_change(scene, before, step)
+        check_step(scene, before, step)
         before = step
     return tuple(steps)
 
 
-def _check_state(scene: Scene, step: Step) -> None:
+def check_step(scene: Scene, before: AnyStep | None, step: AnyStep) -> None:
+    """Require that a step is possible after the one before, whatever its open grips become.
+
+    Parameters
+    ----------
+    scene : Scene
+    before : AnyStep or None
+        None for the first step.
+    step : AnyStep
+
+    Raises
+    ------
+    StepError
+        As `check_sequence` does.
+    """
+    _check_state(scene, step)
+    _check_change(scene, before or Step(0, StepKind.RELEASE, 0, (None,) * len(scene.robots)), step)
+
+
+def _check_state(scene: Scene, step: AnyStep) -> None:
     """Require grips that are possible whatever came before."""
     where = f"step {step.number}"
     if len(step.grips) != len(scene.robots):
@@ -148,9 +213,10 @@ def _check_state(scene: Scene, step: Step) -> None:
     if not 1 <= step.bricks <= len(scene.bricks):
         raise StepError(f"{where}: {step.bricks} bricks; the scene has 1 to {len(scene.bricks)}")
     holder: dict[int, str] = {}
-    for robot, node in zip(scene.robots, step.grips, strict=True):
-        if node is None:
+    for robot, grip in zip(scene.robots, step.grips, strict=True):
+        if not isinstance(grip, Integral):  # none, or open
             continue
+        node = int(grip)
         if node in holder:
             raise StepError(
                 f"{where}: {robot.name} at node {node}: {holder[node]} holds it; hold another"
@@ -159,7 +225,7 @@ def _check_state(scene: Scene, step: Step) -> None:
         holder[node] = robot.name
 
 
-def _check_grip(scene: Scene, step: Step, robot: Robot, node: int) -> None:
+def _check_grip(scene: Scene, step: AnyStep, robot: Robot, node: int) -> None:
     """Require a node that exists, is free and stands within reach."""
     placed = {n for brick in scene.placed[: step.bricks] for n in brick.nodes}
     possible = reachable(scene, robot, step.bricks)
@@ -178,7 +244,7 @@ def _check_grip(scene: Scene, step: Step, robot: Robot, node: int) -> None:
     )
 
 
-def _check_change(scene: Scene, before: Step, step: Step) -> None:
+def _check_change(scene: Scene, before: AnyStep, step: AnyStep) -> None:
     """Require that a step does what its kind says, and nothing else."""
     where = f"step {step.number} ({step.kind.value})"
     expected = before.bricks + (step.kind is StepKind.PLACE)
@@ -202,14 +268,20 @@ def _check_change(scene: Scene, before: Step, step: Step) -> None:
     )
     if (len(taken), not dropped) != ((0, False) if step.kind is StepKind.RELEASE else (1, True)):
         raise StepError(
-            f"{where}: it takes grips {taken} and drops {dropped}; such a step {wanted}"
+            f"{where}: it takes grips {_bracketed(taken)} and drops {_bracketed(dropped)}; "
+            f"such a step {wanted}"
         )
     brick = scene.placed[step.bricks - 1]
-    if step.kind is StepKind.PLACE and taken[0] not in brick.nodes:
+    given = step.kind is StepKind.PLACE and isinstance(taken[0], Integral)
+    if given and taken[0] not in brick.nodes:
         raise StepError(
             f"{where}: its new grip is on node {taken[0]}; "
             f"hold brick {brick.name} at one of {list(brick.nodes)}"
         )
+
+
+def _bracketed(grips: Iterable[object]) -> str:
+    return f"[{', '.join(map(str, grips))}]"
 
 
 def _list(nodes: Iterable[int]) -> str:

@@ -1,21 +1,41 @@
-"""Methods with a third robot: schedules whose open grips an optimization chooses."""
+"""Methods with a third robot, and all methods whose open grips an optimization chooses."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
+from typing import Protocol
 
 from seqopt.errors import StepError
 from seqopt.network.build import network_of
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
-from seqopt.sequence.schedule import Move, OpenGrip, OpenStep, Schedule
-from seqopt.sequence.steps import Grips, StepKind, reachable
-from seqopt.sequence.two_robots import placing_node, sequential
+from seqopt.sequence.loops import robot_loop, two_robot_loop
+from seqopt.sequence.moves import open_schedule
+from seqopt.sequence.roles import find_robots
+from seqopt.sequence.schedule import OpenGrip, OpenStep, Schedule
+from seqopt.sequence.steps import Step, StepKind, reachable
+from seqopt.sequence.two_robots import sequential
 
-ScheduleMethod = Callable[[Network], Schedule]
+
+class ScheduleMethod(Protocol):
+    """A rule that makes a schedule."""
+
+    def __call__(self, network: Network | Scene, robots: Sequence[str] = ()) -> Schedule:
+        """Return the schedule of the build.
+
+        Parameters
+        ----------
+        network : Network or Scene
+        robots : sequence of str, optional
+            Names of the robots in the order of their roles; found from their reach by default.
+
+        Returns
+        -------
+        Schedule
+        """
 
 
-def three_robot_loop(network: Network | Scene) -> Schedule:
+def three_robot_loop(network: Network | Scene, robots: Sequence[str] = ()) -> Schedule:
     """Return the four-step loop of three robots whose roles rotate.
 
     The first three robots place a brick each. Then, once per brick: the robot whose grip was chosen
@@ -27,6 +47,9 @@ def three_robot_loop(network: Network | Scene) -> Schedule:
     ----------
     network : Network or Scene
         Of a scene with at least three robots and four bricks.
+    robots : sequence of str, optional
+        Names of three robots in the order in which they place the first bricks; by default the
+        first three of the scene whose reach allows the build.
 
     Returns
     -------
@@ -48,50 +71,12 @@ def three_robot_loop(network: Network | Scene) -> Schedule:
     [('release', (0,)), ('reposition', (0, 1)), ('release', (1,))]
     """
     network = network_of(network)
-    scene = network.scene
-    total = len(scene.placed)
-    if len(scene.robots) < 3 or total < 4:
-        raise StepError(
-            f"scene {scene.name}: {len(scene.robots)} robots and {total} bricks; "
-            "this method needs three robots and four bricks"
-        )
-    return _schedule("three-robot", network, *_loop(network))
+    if robots:
+        find_robots(network.scene, robots, "three-robot", 3)
+    return robot_loop(network, robots or 3)
 
 
-def _loop(network: Network) -> tuple[list[OpenStep], list[int]]:
-    """Return the steps of the loop, and which robot makes each move."""
-    scene = network.scene
-    total = len(scene.placed)
-    grips: list[int | OpenGrip | None] = [None] * len(scene.robots)
-    steps: list[OpenStep] = []
-
-    def add(kind: StepKind, bricks: int) -> None:
-        steps.append(OpenStep(len(steps) + 1, kind, bricks, tuple(grips)))
-
-    def place(robot: int, bricks: int) -> int:
-        return placing_node(network, scene.robots[robot], scene.placed[bricks - 1])
-
-    moving, placer, newest = 2, 0, 1
-    for robot, bricks in ((0, 1), (1, 2)):
-        grips[robot] = place(robot, bricks)
-        add(StepKind.PLACE, bricks)
-    robots = []
-    for move in range(total - 3):
-        bricks = move + 3
-        robots.append(moving)
-        grips[moving] = OpenGrip(move)
-        add(StepKind.PLACE if move == 0 else StepKind.REPOSITION, bricks)
-        grips[placer] = None
-        add(StepKind.RELEASE, bricks)
-        grips[placer] = place(placer, bricks + 1)
-        add(StepKind.PLACE, bricks + 1)
-        grips[newest] = None
-        add(StepKind.RELEASE, bricks + 1)
-        moving, placer, newest = newest, moving, placer
-    return steps, robots
-
-
-def modified_sequential(network: Network | Scene) -> Schedule:
+def modified_sequential(network: Network | Scene, robots: Sequence[str] = ()) -> Schedule:
     """Return the sequential method with a third support, chosen anew after every placed brick.
 
     Once two robots hold the arch, the third takes a grip for three steps: its own reposition, the
@@ -102,6 +87,9 @@ def modified_sequential(network: Network | Scene) -> Schedule:
     ----------
     network : Network or Scene
         Of a scene with at least three robots.
+    robots : sequence of str, optional
+        Names of the two that take turns, and of the one that supports. By default the first two are
+        those of `seqopt.sequential`, and the first robot that is free supports, as long as it can.
 
     Returns
     -------
@@ -111,7 +99,8 @@ def modified_sequential(network: Network | Scene) -> Schedule:
     Raises
     ------
     StepError
-        If there are fewer robots, or one does not reach the brick that it is to place.
+        If there are fewer robots, one does not reach the brick that it is to place, or none is free
+        to support.
 
     Examples
     --------
@@ -122,62 +111,66 @@ def modified_sequential(network: Network | Scene) -> Schedule:
     (95, 23, 'rob3')
     """
     network = network_of(network)
-    scene = network.scene
-    if len(scene.robots) < 3:
-        raise StepError(f"scene {scene.name}: {len(scene.robots)} robots; this method needs three")
-    return _schedule("modified-sequential", network, *_supported(network))
+    chosen = find_robots(network.scene, robots, "modified-sequential", 3)
+    plain = sequential(network, robots[:2])
+    steps = _supported(network.scene, plain, chosen[2:] if robots else chosen)
+    return open_schedule("modified-sequential", network, steps)
 
 
-def _supported(network: Network) -> tuple[list[OpenStep], list[int]]:
-    """Return the sequential method's steps with the third grip, and which robot makes each move."""
+def _supported(scene: Scene, plain: Sequence[Step], helpers: Sequence[int]) -> list[OpenStep]:
+    """Return the steps of the sequential method with the grip of a helper."""
     steps: list[OpenStep] = []
-    robots: list[int] = []
+    moves, helper = 0, helpers[0]
 
-    def add(kind: StepKind, bricks: int, grips: Grips, support: OpenGrip | None) -> None:
-        steps.append(OpenStep(len(steps) + 1, kind, bricks, (*grips[:2], support, *grips[3:])))
+    def add(kind: StepKind, step: Step, support: OpenGrip | None) -> None:
+        grips = [support if i == helper and support else g for i, g in enumerate(step.grips)]
+        steps.append(OpenStep(len(steps) + 1, kind, step.bricks, tuple(grips)))
 
-    for step in sequential(network):
-        support = OpenGrip(len(robots) - 1) if robots and step.held else None
-        add(step.kind, step.bricks, step.grips, support)
+    for k, step in enumerate(plain):
+        support = OpenGrip(moves - 1) if moves and step.held else None
+        add(step.kind, step, support)
         if step.kind is StepKind.RELEASE:
             continue
         if support is not None:
-            add(StepKind.RELEASE, step.bricks, step.grips, None)
-        if 1 < step.bricks < len(network.scene.placed):
-            robots.append(2)
-            add(StepKind.REPOSITION, step.bricks, step.grips, OpenGrip(len(robots) - 1))
-    return steps, robots
+            add(StepKind.RELEASE, step, None)
+        if 1 < step.bricks < len(scene.placed):
+            moves += 1
+            helper = _free(scene, plain[k : k + 3], [helper, *helpers])
+            add(StepKind.REPOSITION, step, OpenGrip(moves - 1))
+    return steps
 
 
-def _schedule(method: str, network: Network, steps: list[OpenStep], robots: list[int]) -> Schedule:
-    """Return the schedule with the candidates of every move."""
-    moves = []
-    for number, robot in enumerate(robots):
-        present = [step for step in steps if number in step.moves]
-        first = present[0]
-        held = {g for step in present for g in step.grips if isinstance(g, int)}
-        nodes = reachable(network.scene, network.scene.robots[robot], first.bricks)
-        if first.kind is StepKind.PLACE:  # what places a brick holds it
-            nodes = tuple(n for n in nodes if n in network.scene.placed[first.bricks - 1].nodes)
-        free = tuple(node for node in nodes if node not in held)
-        moves.append(Move(network.scene.robots[robot].name, first.number, first.bricks, free))
-    return Schedule(method, network.scene, tuple(steps), tuple(moves))
+def _free(scene: Scene, window: Sequence[Step], helpers: Sequence[int]) -> int:
+    """Return the first helper that holds nothing in some steps and reaches a node held by none."""
+    held = {node for step in window for node in step.held}
+    for robot in helpers:
+        idle = all(step.grips[robot] is None for step in window)
+        if idle and {*reachable(scene, scene.robots[robot], window[0].bricks)} - held:
+            return robot
+    raise StepError(
+        f"brick {scene.placed[window[0].bricks - 1].name}: no robot is left that reaches a node to "
+        "support; extend a reach, or name who takes turns and who supports"
+    )
 
 
 SCHEDULES: dict[str, ScheduleMethod] = {
     "three-robot": three_robot_loop,
     "modified-sequential": modified_sequential,
+    "two-robot": two_robot_loop,
+    "loop": robot_loop,
 }
 
 
-def make_schedule(name: str, network: Network | Scene) -> Schedule:
+def make_schedule(name: str, network: Network | Scene, robots: Sequence[str] = ()) -> Schedule:
     """Return a schedule by name.
 
     Parameters
     ----------
     name : str
-        A key of `SCHEDULES`.
+        A key of `SCHEDULES`; ``"loop"`` is the loop of all robots of the scene.
     network : Network or Scene
+    robots : sequence of str, optional
+        Names of the robots in the order of their roles; found from their reach by default.
 
     Returns
     -------
@@ -190,4 +183,4 @@ def make_schedule(name: str, network: Network | Scene) -> Schedule:
     """
     if name not in SCHEDULES:
         raise StepError(f"schedule {name!r}: there is no such; give one of {', '.join(SCHEDULES)}")
-    return SCHEDULES[name](network_of(network))
+    return SCHEDULES[name](network, robots)

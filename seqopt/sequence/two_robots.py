@@ -2,40 +2,42 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Set
+from collections.abc import Callable, Iterator, Sequence, Set
+from typing import Protocol, TypeVar
 
 import numpy as np
 
 from seqopt.errors import StepError
 from seqopt.network.build import network_of
-from seqopt.network.network import Network, PartKind
+from seqopt.network.network import Network
 from seqopt.scene.parts import Brick, Robot
 from seqopt.scene.reach import Side
 from seqopt.scene.scene import Scene
-from seqopt.sequence.steps import Step, StepKind, check_sequence, reachable
+from seqopt.sequence.roles import Pair, find_robots, take_turns
+from seqopt.sequence.steps import Step, StepKind, check_sequence
+from seqopt.sequence.stretches import begins_elsewhere, lies_along
+from seqopt.sequence.support import check_support
 
-Method = Callable[[Network], tuple[Step, ...]]
+Grip = TypeVar("Grip")
 
 
-def lies_along(network: Network) -> frozenset[int]:
-    """Return the bricks that lie along the structure: joints meet both of their inner nodes.
+class Method(Protocol):
+    """A rule that makes a sequence of steps."""
 
-    Parameters
-    ----------
-    network : Network
+    def __call__(self, network: Network, robots: Sequence[str] = ()) -> tuple[Step, ...]:
+        """Return the steps of the build.
 
-    Returns
-    -------
-    frozenset of int
-        Names of the bricks.
-    """
-    half = network.edge_kind == PartKind.JOINT
-    touched = set(network.edge_nodes[half, 0].tolist())
-    return frozenset(
-        brick.name
-        for brick, (first, second) in zip(network.scene.placed, network.inner, strict=True)
-        if first in touched and second in touched
-    )
+        Parameters
+        ----------
+        network : Network
+        robots : sequence of str, optional
+            Names of the robots in the order of their roles; found from their reach by default.
+
+        Returns
+        -------
+        tuple of Step
+            Checked; every grip is given.
+        """
 
 
 def placing_node(network: Network, robot: Robot, brick: Brick) -> int:
@@ -62,8 +64,11 @@ def placing_node(network: Network, robot: Robot, brick: Brick) -> int:
     StepError
         If the robot reaches no free node of the brick.
     """
-    scene = network.scene
-    free = [node for node in reachable(scene, robot, len(scene.placed)) if node in brick.nodes]
+    free = [
+        node
+        for node in brick.nodes
+        if node not in network.scene.blocked_nodes and robot.reach.covers(brick.node_position(node))
+    ]
     if not free:
         raise StepError(
             f"brick {brick.name}: {robot.name} reaches none of its free nodes {list(brick.nodes)}; "
@@ -75,7 +80,7 @@ def placing_node(network: Network, robot: Robot, brick: Brick) -> int:
     return brick.placing_node if brick.placing_node in free else free[0]
 
 
-def sequential(network: Network | Scene) -> tuple[Step, ...]:
+def sequential(network: Network | Scene, robots: Sequence[str] = ()) -> tuple[Step, ...]:
     """Two robots take turns: one places the next brick while the other holds the last one.
 
     Source: section 4.1 of Bruun et al.
@@ -83,17 +88,21 @@ def sequential(network: Network | Scene) -> tuple[Step, ...]:
     Parameters
     ----------
     network : Network or Scene
-        Of a scene with at least two robots; the first two build.
+        Of a scene with at least two robots.
+    robots : sequence of str, optional
+        Names of the one that places the first brick and of the other. By default the first two of
+        the scene whose reach allows the build; a third robot steps in where no two are enough.
 
     Returns
     -------
     tuple of Step
-        Checked; every grip is given.
+        Checked; every grip is given, the newest brick held until the next one is placed.
 
     Raises
     ------
     StepError
-        If there are fewer robots, or one does not reach the brick that it is to place.
+        If there are fewer robots, none is left that reaches the next brick, or bricks that no joint
+        ties to a ground end would be held by nobody.
 
     Examples
     --------
@@ -101,21 +110,27 @@ def sequential(network: Network | Scene) -> tuple[Step, ...]:
     >>> network = seqopt.build_network(seqopt.load_scene("arch25"))
     >>> [(step.kind.value, step.held) for step in seqopt.sequential(network)[:3]]
     [('place', (1,)), ('place', (1, 2)), ('release', (2,))]
+    >>> seqopt.sequential(network, robots=("rob3", "rob2"))[1].grips
+    (None, 2, 1)
     """
     network = network_of(network)
-    return _two_robots(network, swap_after={brick.name for brick in network.scene.bricks})
+    every = {brick.name for brick in network.scene.bricks}
+    return _two_robots(network, "sequential", every, robots)
 
 
-def cantilever(network: Network | Scene) -> tuple[Step, ...]:
+def cantilever(network: Network | Scene, robots: Sequence[str] = ()) -> tuple[Step, ...]:
     """One robot holds while the other places bricks, up to one that lies along; then they swap.
 
-    A brick lies along the structure if joints meet both of its inner nodes. Source: section 4.2 of
-    Bruun et al.
+    A brick lies along the structure if joints meet both of its inner nodes. They also swap after a
+    brick that no joint ties to the stretch being built, so that what is held is always where the
+    build goes on: in a chain this is the first brick alone. Source: section 4.2 of Bruun et al.
 
     Parameters
     ----------
     network : Network or Scene
-        Of a scene with at least two robots; the first two build.
+        Of a scene with at least two robots.
+    robots : sequence of str, optional
+        As in `sequential`.
 
     Returns
     -------
@@ -125,7 +140,7 @@ def cantilever(network: Network | Scene) -> tuple[Step, ...]:
     Raises
     ------
     StepError
-        If there are fewer robots, or one does not reach the brick that it is to place.
+        As in `sequential`.
 
     Examples
     --------
@@ -135,31 +150,67 @@ def cantilever(network: Network | Scene) -> tuple[Step, ...]:
     [('place', (1, 7)), ('release', (7,)), ('place', (8, 7))]
     """
     network = network_of(network)
-    return _two_robots(network, swap_after=lies_along(network))
+    swaps = lies_along(network) | begins_elsewhere(network)
+    return _two_robots(network, "cantilever", swaps, robots)
 
 
 METHODS: dict[str, Method] = {"sequential": sequential, "cantilever": cantilever}
 
 
-def _two_robots(network: Network, swap_after: Set[int]) -> tuple[Step, ...]:
-    """Return the sequence in which holder and placer swap after placing some of the bricks.
+def alternate(
+    network: Network,
+    swap_after: Set[int],
+    pairs: Sequence[Pair],
+    grip: Callable[[int, int], Grip],
+) -> Iterator[tuple[StepKind, int, tuple[Grip | None, ...]]]:
+    """Yield the steps in which two robots place and hold.
 
-    After each brick the robot that places next releases, if it holds anything.
+    After each brick one of the two releases, if it holds anything; after the last one both do.
+
+    Parameters
+    ----------
+    network : Network
+    swap_after : set of int
+        Names of the bricks after which who placed stays and holds.
+    pairs : sequence of (int, int)
+        Who places and who holds, for every brick; see `seqopt.sequence.roles.take_turns`.
+    grip : callable
+        What a robot holds of the brick that it places, from the robot's index and the brick count.
+
+    Yields
+    ------
+    kind : StepKind
+    bricks : int
+    grips : tuple
+        By robot of the scene.
     """
     scene = network.scene
-    if len(scene.robots) < 2:
-        raise StepError(f"scene {scene.name}: {len(scene.robots)} robots; this method needs two")
-    holder, placer = 1, 0
-    grips: list[int | None] = [None] * len(scene.robots)
-    steps: list[Step] = []
-    for count, brick in enumerate(scene.placed, start=1):
-        grips[placer] = placing_node(network, scene.robots[placer], brick)
-        steps.append(Step(len(steps) + 1, StepKind.PLACE, count, tuple(grips)))
-        if count == 1 or brick.name in swap_after:
-            holder, placer = placer, holder
-        grips[placer] = None
-        if count == len(scene.placed):
-            grips[holder] = None
-        if tuple(grips) != steps[-1].grips:
-            steps.append(Step(len(steps) + 1, StepKind.RELEASE, count, tuple(grips)))
+    grips: list[Grip | None] = [None] * len(scene.robots)
+    for count, (brick, pair) in enumerate(zip(scene.placed, pairs, strict=True), start=1):
+        placer, holder = pair
+        grips[placer] = grip(placer, count)
+        placed = tuple(grips)
+        yield StepKind.PLACE, count, placed
+        stays = placer if count == 1 or brick.name in swap_after else holder
+        last = count == len(scene.placed)
+        grips = [None if last or i != stays else held for i, held in enumerate(grips)]
+        if tuple(grips) != placed:
+            yield StepKind.RELEASE, count, tuple(grips)
+
+
+def _two_robots(
+    network: Network, method: str, swap_after: Set[int], robots: Sequence[str]
+) -> tuple[Step, ...]:
+    """Return the sequence in which holder and placer swap after placing some of the bricks."""
+    scene = network.scene
+    chosen = find_robots(scene, robots, method, 2)
+    starts = [(chosen[0], chosen[1])] if robots else []
+    pairs = take_turns(network, swap_after, chosen, starts)
+
+    def node(robot: int, count: int) -> int:
+        return placing_node(network, scene.robots[robot], scene.placed[count - 1])
+
+    parts = alternate(network, swap_after, pairs, node)
+    steps = [Step(number, *part) for number, part in enumerate(parts, start=1)]
+    check_support(network, steps)
     return check_sequence(scene, steps)

@@ -44,6 +44,14 @@ def assess_steps(
     ------
     SceneError
         If bricks that share a joint do not touch.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> network = seqopt.build_network(seqopt.load_scene("arch25"))
+    >>> steps = seqopt.sequential(network)[:2]
+    >>> [stability.verdict.value for stability in seqopt.assess_steps(network, steps, seqopt.EPOXY)]
+    ['stands', 'stands']
     """
     network, mortar = network_of(network), find_mortar(mortar)
     out = []

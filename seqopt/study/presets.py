@@ -3,8 +3,15 @@
 from __future__ import annotations
 
 from seqopt.engines.discrete.system import BedStiffness
-from seqopt.placement.criteria import RankSum, WeightedSum, WorstRatio, equal
+from seqopt.placement.criteria import (
+    OVER_METHODS,
+    WORST_OVER_METHODS,
+    RankSum,
+    WeightedSum,
+    WorstRatio,
+)
 from seqopt.placement.requirements import Criterion
+from seqopt.placement.terms import equal
 from seqopt.scene.parts import Robot
 from seqopt.scene.reach import Anywhere, Side
 
@@ -20,31 +27,46 @@ STUDY_BED = BedStiffness(normal=100e9, tangential=10e9)
 STUDY_PADS = BedStiffness(normal=1e12, tangential=1e11)
 """Of a robot's grip: stiffer "by an order of magnitude"; how large its pads are is not printed."""
 
-CROWN = 13  # bricks of the reference arch up to its crown
+RESOLUTION = (("F", 1.0), ("T", 1.0), ("C", 1.0), ("M", 1.0), ("D", 1e-6))
+"""Rounding (N, N, N m, m) with which ranks explain most of the choices in the published plan."""
 
 EQUATIONS = RankSum(
     "equations-2-3",
     before=equal("T_max", "M_sup", "F_each"),
     after=equal("T_max", "M_sup", "F_move", "D_max"),
-    crown=CROWN,
 )
 CLOSEST = RankSum(  # of the variants tried, the one that names the published plan most often
     "closest-to-plan",
     before=equal("T_max", "M_sup", "F_move", "F_largest"),
     after=equal("T_max", "F_move"),
-    crown=CROWN + 1,
+    delay=1,
 )
 PUBLISHED_BEST = (("F_largest", 270.0), ("M_sup", 21.5), ("T_max", 87.7), ("D_max", 15.9e-6))
-WEIGHTED = WeightedSum("weighted", tuple((name, 1.0, limit) for name, limit in PUBLISHED_BEST))
-WORST_RATIO = WorstRatio("worst-ratio", PUBLISHED_BEST)
+WEIGHTED = WeightedSum(
+    "weighted-published", tuple((name, 1.0, limit) for name, limit in PUBLISHED_BEST)
+)
+WORST_RATIO = WorstRatio("worst-ratio-published", PUBLISHED_BEST)
 
-CRITERIA: dict[str, Criterion] = {c.name: c for c in (EQUATIONS, CLOSEST, WEIGHTED, WORST_RATIO)}
+CRITERIA: dict[str, Criterion] = {
+    criterion.name: criterion
+    for criterion in (
+        EQUATIONS,
+        CLOSEST,
+        OVER_METHODS,
+        WORST_OVER_METHODS,
+        WEIGHTED,
+        WORST_RATIO,
+    )
+}
 """What a step may cost, by name.
 
-``equations-2-3`` ranks responses as equations (2) and (3) of Bruun et al. say; ``closest-to-plan``
-is the variant of it that chooses the nodes of the published plan most often. ``weighted`` adds
-the responses, each over its best published value of 270 N (grip force), 21.5 N m (``M_sup``),
-87.7 N (``T_max``) and 15.9e-6 m (``D_max``); ``worst-ratio`` takes the largest of these ratios.
+``equations-2-3`` ranks responses as equations (2) and (3) of Bruun et al. say, (2) before the
+scene's crown and (3) from it on; ``closest-to-plan`` is the variant of it that chooses the nodes of
+the published plan most often. ``weighted`` adds the responses, each over the least that a fixed
+method of the scene reaches of it; ``worst-ratio`` takes the largest of these ratios. The same over
+the best published values of the arch of Bruun et al., 270 N (grip force), 21.5 N m (``M_sup``),
+87.7 N (``T_max``) and 15.9e-6 m (``D_max``), are ``weighted-published`` and
+``worst-ratio-published``.
 
 Examples
 --------

@@ -22,7 +22,7 @@ from seqopt.sequence.two_robots import METHODS
 from seqopt.study.presets import WEIGHTED
 from seqopt.study.published import published_plan
 from tests.builders import hinged, scaled, six_bricks, small_arch
-from tests.strategies import arches, states, walls
+from tests.strategies import arches, both_sided, states, walls
 
 FIELDS = ("edge_force", "displacement", "grip_force", "support", "joint_wrench", "brick_twist")
 
@@ -72,7 +72,7 @@ def test_published_states_agree_with_the_direct_solve(engine25, published):
         assert max(gap(direct, fast, name) for name in FIELDS[:4]) <= 1e-9
 
 
-@given(state=states(st.one_of(arches(), walls())))
+@given(state=states(st.one_of(arches(), walls(), both_sided())))
 def test_three_routes_agree(state):
     scene, bricks, grips = state
     net = build_network(scene)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given, reject, settings
 from hypothesis import strategies as st
 
 from seqopt.contact.mortar import DRY, Mortar
@@ -12,18 +12,18 @@ from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.interface import Want
 from seqopt.engines.planar import PlanarEngine
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.errors import MechanismError, SolverError
+from seqopt.errors import MechanismError, SceneError, SolverError
 from seqopt.network.build import build_network
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.two_robots import METHODS
 from seqopt.stability.assessment import Verdict
 from seqopt.stability.steps import assess_steps
 from tests.builders import largest_difference
-from tests.strategies import arches, flat_arches, states, walls
+from tests.strategies import arches, both_sided, flat_arches, states, walls
 
 
 @settings(max_examples=25)
-@given(states(scenes=st.one_of(flat_arches(), walls())))
+@given(states(scenes=st.one_of(flat_arches(), walls(), both_sided("V"))))
 def test_in_a_plane_three_unknowns_say_what_six_do(state):
     scene, bricks, grips = state
     net = build_network(scene)
@@ -33,12 +33,15 @@ def test_in_a_plane_three_unknowns_say_what_six_do(state):
 
 
 @settings(max_examples=15)
-@given(states(scenes=st.one_of(arches(max_bricks=5), walls())))
+@given(states(scenes=st.one_of(arches(max_bricks=5), walls(), both_sided())))
 def test_within_the_elastic_limits_discrete_elements_are_rigid_bricks(state):
     scene, bricks, grips = state
     net = build_network(scene)
     strong = Mortar(friction=1.0, tensile_strength=1e12, cohesion=1e12)
-    found = DiscreteEngine(net, strong).solve(bricks, grips, Want.ALL)
+    try:
+        found = DiscreteEngine(net, strong).solve(bricks, grips, Want.ALL)
+    except SceneError:  # bent so far that bricks interpenetrate
+        reject()
     exact = ComplianceEngine(net).solve(bricks, grips, Want.ALL)
     assert largest_difference(found, exact, net) <= 1e-7
 
@@ -58,6 +61,6 @@ def test_what_comes_to_rest_is_proven_to_stand(number):
             engine.solve(step.bricks, [list(step.held)])
     else:
         fields = engine.solve(step.bricks, [list(step.held)])
-        total = fields.grip_force[0].sum(axis=0) + fields.support[0, :3]
+        total = fields.grip_force[0].sum(axis=0) + fields.support[0, :, :3].sum(axis=0)
         weight = -net.weight[: step.bricks].sum(axis=0)
         assert total == pytest.approx(weight, abs=1e-6 * np.abs(weight).max())

@@ -14,7 +14,7 @@ from seqopt.sequence.two_robots import METHODS
 
 
 def test_bricks_touch_where_their_faces_overlap(arch25):
-    """The study's joints are 116 × 53 mm; tilted bricks meet a little off."""
+    """The paper's joints are 116 × 53 mm; tilted bricks meet a little off."""
     net = build_network(arch25)
     last = METHODS["sequential"](net)[-1]
     whole = step_assembly(net, last.bricks, last.grips)

@@ -12,7 +12,7 @@ from seqopt.engines.registry import ENGINES
 from seqopt.errors import GripError, MechanismError
 from seqopt.network.build import build_network
 from seqopt.scene.arch import ArchShape, arch_scene
-from tests.builders import six_bricks
+from tests.builders import from_both_sides, six_bricks
 
 
 def pattern(name):
@@ -31,7 +31,7 @@ def test_shapes(engine):
     assert fields.edge_force.shape == (3, net.count_edges(4))
     assert fields.displacement.shape == (3, net.count_nodes(4), 3)
     assert fields.grip_force.shape == (3, 2, 3)
-    assert fields.support.shape == (3, 6)
+    assert fields.support.shape == (3, 2, 6)
     assert fields.joint_wrench.shape == (3, len(net.springs.since), 6)
     assert fields.brick_twist.shape == (3, 4, 6)
     for name in ("edge_force", "displacement", "grip_force", "support", "joint_wrench"):
@@ -96,10 +96,27 @@ def test_an_end_that_closes_late(name):
     at_once = replace(scene, grounds=(near, early))
     free = replace(scene, grounds=(near,))
     forces = [
-        ENGINES[name](build_network(s)).solve(3, [[3]]).support[0, :3]
+        ENGINES[name](build_network(s)).solve(3, [[3]]).support[0, :, :3]
         for s in (late, at_once, free)
     ]
-    assert forces[0] == pytest.approx(forces[2], rel=1e-5)
-    assert np.abs(forces[0] - forces[1]).max() > 1
-    closed = ENGINES[name](build_network(late)).solve(4, [[3]]).support[0, :3]
-    assert np.abs(closed - forces[0]).max() > 1
+    assert forces[0][:1] == pytest.approx(forces[2], rel=1e-5)
+    assert not forces[0][1].any()
+    assert np.abs(forces[0] - forces[1]).max(axis=1).min() > 1
+    closed = ENGINES[name](build_network(late)).solve(4, [[3]]).support[0, :, :3]
+    assert np.abs(closed - forces[0]).max(axis=1).min() > 1
+
+
+@pytest.mark.parametrize("name", ENGINES)
+def test_ends_come_in_the_scenes_order(name):
+    """Not in that in which they begin to act, nor in that of their bricks."""
+    scene = from_both_sides(7, pattern(name))
+    turned = replace(scene, grounds=scene.grounds[::-1])
+    one, other = (
+        ENGINES[name](build_network(s)).solve(5, [[5]], Want.ALL) for s in (scene, turned)
+    )
+    scale = np.abs(one.support).max()
+    assert np.abs(one.support - other.support[:, ::-1]).max() <= 1e-4 * scale
+    assert np.abs(one.support[:, 0] - one.support[:, 1]).max() > 0.1 * scale
+    first = ENGINES[name](build_network(turned)).solve(1, [[1]]).support[0]
+    assert not first[0].any()  # of brick 7, which does not stand yet
+    assert first[1].any()

@@ -24,7 +24,7 @@ def test_beds_alone_are_other_joints_and_pads_let_a_brick_turn():
     pinch = Pinch(Across.WIDTH, STUDY_PADS, side=0.03)
     third = DiscreteEngine(net, bed=STUDY_BED, pinch=pinch).solve(10, [[19]], Want.ALL)
     assert np.abs(third.brick_twist[0, 9]).max() > 0
-    total = third.grip_force[0].sum(axis=0) + third.support[0, :3]
+    total = third.grip_force[0].sum(axis=0) + third.support[0, :, :3].sum(axis=0)
     weight = -net.weight[:10].sum(axis=0)
     assert total == pytest.approx(weight, abs=1e-6 * np.abs(weight).max())
     with pytest.raises(SceneError, match="bed: normal is 0"):

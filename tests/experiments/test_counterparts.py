@@ -1,4 +1,4 @@
-"""Counterparts of the study's figures and tables: none is missing, the page says what is stored."""
+"""Counterparts of the paper's figures and tables: none is missing, the page says what is stored."""
 
 from __future__ import annotations
 

@@ -19,9 +19,16 @@ from experiments.harness.claim import Claim, ClaimError, Extra, Finding, Option,
 from experiments.harness.profiles import data_profile, pareto, performance_profile, shifted_mean
 from experiments.harness.runs import ENGINES, NO_PROOF, REFERENCE, rows
 from experiments.placement.parts.speed_charts import headline, profile_charts
-from experiments.placement.speed_accuracy import KEY, collect, holds, measure, specs, summarize
+from experiments.placement.speed_accuracy import (
+    COMPARED,
+    KEY,
+    collect,
+    holds,
+    measure,
+    specs,
+    summarize,
+)
 from seqopt.placement.formulation import formulations
-from seqopt.study.presets import CRITERIA
 from tests.builders import ROOT
 
 STAGES = ["assemble", "respond", "rank", "compile", "solve", "verify"]
@@ -31,7 +38,7 @@ STAGES = ["assemble", "respond", "rank", "compile", "solve", "verify"]
 def smoke():
     """Every engine with every formulation and criterion on the smallest arch."""
     table = pd.concat(
-        [pd.DataFrame(rows("chain7", engine, c, repeats=1)) for engine in ENGINES for c in CRITERIA]
+        [pd.DataFrame(rows("chain7", engine, c, repeats=1)) for engine in ENGINES for c in COMPARED]
     )
     return table.reset_index(drop=True)
 
@@ -39,7 +46,7 @@ def smoke():
 @pytest.mark.slow
 @pytest.mark.xdist_group("smoke")
 def test_everything_runs_and_is_a_row(smoke):
-    assert len(smoke) == len(ENGINES) * len(CRITERIA) * (len(formulations()) + 1)
+    assert len(smoke) == len(ENGINES) * len(COMPARED) * (len(formulations()) + 1)
     assert smoke[[*STAGES, "gap", "error", "objective", "models"]].notna().all(axis=None)
     assert smoke["total"].to_numpy() == pytest.approx(smoke[STAGES].sum(axis=1).to_numpy())
     exact = smoke[(smoke["engine"] == REFERENCE) & (smoke["formulation"] == "overlap_dp")]
@@ -65,7 +72,7 @@ def test_stored_runs_are_not_repeated(smoke, monkeypatch):
         "experiments.placement.speed_accuracy.measure",
         lambda spec: calls.append(spec) or measured(smoke, spec),
     )
-    wanted = [("chain7", REFERENCE, c, 1) for c in CRITERIA]
+    wanted = [("chain7", REFERENCE, c, 1) for c in COMPARED]
     first = collect(wanted[:2], pd.DataFrame())
     again = collect(wanted, first)
     assert calls == [*wanted[:2], *wanted[2:]]
@@ -81,11 +88,11 @@ def measured(smoke, spec):
 
 @pytest.mark.slow
 def test_a_run_out_of_time_is_charged_its_limit():
-    charged = pd.DataFrame(measure(("chain7", REFERENCE, "weighted", 1), limit=0.01))
+    charged = pd.DataFrame(measure(("chain7", REFERENCE, "weighted-published", 1), limit=0.01))
     assert (charged["status"] == "time limit").all()
     assert (charged["total"] == 0.01).all()
     assert (charged["gap"] == 1.0).all()
-    failed = pd.DataFrame(measure(("chain7", "no such engine", "weighted", 1)))
+    failed = pd.DataFrame(measure(("chain7", "no such engine", "weighted-published", 1)))
     assert (failed["status"] == "failed").all()
 
 
@@ -122,8 +129,10 @@ def test_charts_and_table_come_from_rows(smoke, monkeypatch):
     for _, figure in saved:
         figure.canvas.draw()
     means = summarize(smoke).set_index("formulation")
-    assert means.loc["overlap_dp", "optimal"] == means.loc["overlap_dp", "runs"] == len(CRITERIA)
-    assert set(specs(quick=True)) < {(s, e, "weighted", 1) for s in ("chain7",) for e in ENGINES}
+    assert means.loc["overlap_dp", "optimal"] == means.loc["overlap_dp", "runs"] == len(COMPARED)
+    assert set(specs(quick=True)) < {
+        (s, e, "weighted-published", 1) for s in ("chain7",) for e in ENGINES
+    }
 
 
 def test_pareto_front():

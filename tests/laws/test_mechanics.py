@@ -17,9 +17,9 @@ from seqopt.engines.rigid.spanning_tree import grow_tree
 from seqopt.network.build import build_network
 from seqopt.responses.quantities import responses_of
 from tests.builders import about_vertical, moved, scaled, solve
-from tests.strategies import arches, states, walls
+from tests.strategies import arches, both_sided, states, walls
 
-any_scene = st.one_of(arches(), walls())
+any_scene = st.one_of(arches(), walls(), both_sided())
 NAMES = [f"F_{k}" for k in ("rob", "sup", "min", "max", "avg")] + [
     "M_sup",
     "D_max",

@@ -17,7 +17,7 @@ from seqopt.placement.solving import solve
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.sequence.two_robots import cantilever
 from seqopt.stability.assessment import assess
-from seqopt.study.presets import CLOSEST, EQUATIONS
+from seqopt.study.presets import CLOSEST, EQUATIONS, RESOLUTION
 from tests.builders import rescaled
 
 SCALES = [(1e3, 1, 1), (1, 1e3, 1), (1, 1, 1e3), (1e3, 1e-3, 1e3)]
@@ -50,15 +50,9 @@ def verdicts(arch25):
 @pytest.mark.parametrize("criterion", [EQUATIONS, CLOSEST], ids=lambda c: c.name)
 @pytest.mark.parametrize("scales", SCALES)
 def test_ranks_and_choices_do_not_know_units(arch25, plain, criterion, scales):
-    """Where responses are rounded for ranks, the resolution is given in the same units."""
-    length, force, softness = scales
-    shift = force * softness
-    units = {"F": force, "T": force, "M": force * length, "D": shift}
-    same = replace(
-        criterion, resolution=tuple((n, units[n] * size) for n, size in criterion.resolution)
-    )
+    """Responses are rounded for ranks in the scene's own units."""
     own, nodes, certificate = plain[criterion]
-    other, others, certified = solved(rescaled(arch25, length, force, softness), same)
+    other, others, certified = solved(rescaled(arch25, *scales), criterion)
     assert others == nodes
     assert certified.objective == pytest.approx(certificate.objective, rel=1e-9)
     for a, b in zip(own.sums.shared, other.sums.shared, strict=True):
@@ -82,5 +76,7 @@ def test_verdicts_do_not_know_units(arch25, verdicts, scales):
 def test_a_resolution_in_other_units_is_another_criterion(arch25, plain):
     """The control: forces in kN rounded to 1 kN decide nothing."""
     _, nodes, _ = plain[EQUATIONS]
-    _, others, _ = solved(rescaled(arch25, 1, 1e-3, 1), EQUATIONS)
+    absolute = replace(EQUATIONS, resolution=RESOLUTION)
+    assert solved(arch25, absolute)[1] == nodes
+    _, others, _ = solved(rescaled(arch25, 1, 1e-3, 1), absolute)
     assert others != nodes

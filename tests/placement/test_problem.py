@@ -12,6 +12,7 @@ from seqopt.placement.problem import pose
 from seqopt.placement.ranking import move_costs, rank_moves
 from seqopt.placement.ranks import mean_ranks, scaled_ranks
 from seqopt.placement.requirements import payload_limits
+from seqopt.placement.scales import SceneFacts
 from seqopt.placement.solving import solve
 from seqopt.sequence.three_robots import modified_sequential
 from seqopt.study.presets import CRITERIA, EQUATIONS, WEIGHTED, WORST_RATIO
@@ -27,7 +28,7 @@ def test_a_third_support_ends_twisting(engine25):
 
 
 def test_models(problem25):
-    """The study counts 2,576 and 22,724; reach, occupancy and equal models leave fewer."""
+    """The paper counts 2,576 and 22,724; reach, occupancy and equal models leave fewer."""
     assert paper_models(problem25.schedule) == (2576, 22724)
     choices = sum(next(iter(s.responses.values())).size for s in problem25.evaluation.steps)
     assert problem25.evaluation.models < choices < 22724
@@ -64,7 +65,8 @@ def test_shared_ranks_weigh_as_much_as_single_ones(values):
 
 
 @pytest.mark.parametrize("criterion", CRITERIA.values(), ids=CRITERIA)
-def test_better_responses_never_cost_more(criterion):
+def test_better_responses_never_cost_more(engine25, criterion):
+    criterion = criterion.for_scene(SceneFacts(engine25))
     rng = np.random.default_rng(0)
     names = criterion.wanted(20)
     scale = {"F": 400.0, "T": 100.0, "M": 40.0, "D": 3e-5}

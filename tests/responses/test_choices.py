@@ -10,8 +10,9 @@ import pytest
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import ProblemError
 from seqopt.network.build import build_network
-from seqopt.placement.criteria import RankSum, equal
+from seqopt.placement.criteria import RankSum
 from seqopt.placement.problem import pose
+from seqopt.placement.terms import equal
 from seqopt.responses import choices as evaluation
 from seqopt.responses.choices import CHOICE_RESPONSES, evaluate_choices
 from seqopt.responses.quantities import responses_of
@@ -19,12 +20,14 @@ from seqopt.responses.table import step_fields
 from seqopt.sequence.three_robots import SCHEDULES, three_robot_loop
 from seqopt.study.presets import EQUATIONS
 
+COMPARED = ("T_max", "M_sup", "D_max")
+
 
 @pytest.mark.parametrize("method", SCHEDULES)
 def test_states_hold_the_responses_of_their_steps(engine25, method):
     """Every response of a random filled schedule is found again in the problem's steps."""
     schedule = SCHEDULES[method](engine25.network)
-    also = ("F_largest", "F_move", "F_rob1", "F_rob2", "F_rob3", "T_max", "M_sup", "D_max")
+    also = ("F_largest", "F_move", "F_rob1", "F_rob2", "F_rob3", *COMPARED, "C_max")
     problem = pose(engine25, schedule, EQUATIONS, also=also)
     rng = np.random.default_rng(1)
     choice: list[int] = []
@@ -37,8 +40,10 @@ def test_states_hold_the_responses_of_their_steps(engine25, method):
         chosen = tuple(choice[m] for m in choices.moves)
         step = steps[choices.step.number]
         want = responses_of(engine25.network, step_fields(engine25, step))
-        for name in ("T_max", "M_sup", "D_max"):
+        for name in COMPARED:
             assert choices.responses[name][chosen] == pytest.approx(want[name][0])
+        compressed = choices.responses["C_max"][chosen]
+        assert compressed == pytest.approx(max(0.0, -want["F_min"][0]))
         forces = iter(np.abs(want["F_rob"][0]))
         for i, node in enumerate(step.grips):
             found = choices.responses[f"F_rob{i + 1}"][chosen]
@@ -46,7 +51,7 @@ def test_states_hold_the_responses_of_their_steps(engine25, method):
 
 
 def test_unknown_responses_are_refused(engine25, loop25):
-    with pytest.raises(ProblemError, match="response F_rob9: there is no such; give D_max"):
+    with pytest.raises(ProblemError, match="response F_rob9: there is no such; give C_max, D_max"):
         pose(engine25, loop25, RankSum("x", equal("F_rob9"), equal("F_rob9")))
 
 

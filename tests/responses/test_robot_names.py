@@ -28,7 +28,21 @@ from seqopt.sequence.two_robots import sequential
 from seqopt.study.presets import EQUATIONS, WORST_RATIO
 from tests.builders import six_bricks
 
-NAMES = ["sup", "max", "min", "avg", "move", "largest", "each", "rob", "[sup]", "a,b", "a=b", "]"]
+NAMES = [
+    "sup",
+    "sup_6",
+    "max",
+    "min",
+    "avg",
+    "move",
+    "largest",
+    "each",
+    "rob",
+    "[sup]",
+    "a,b",
+    "a=b",
+    "]",
+]
 EVERY = replace(EQUATIONS, before=(("F_each", 1.0),), after=(("F_each", 1.0),))
 
 

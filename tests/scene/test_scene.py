@@ -47,7 +47,7 @@ def test_every_reach_survives_a_round_trip(arch25):
 
 
 def test_the_reference_arch(arch25):
-    """Section 3.1 of the study: 25 bricks of 246 x 116 x 53 mm and 2420 kg/m3, 40 kg robots."""
+    """Section 3.1 of the paper: 25 bricks of 246 x 116 x 53 mm and 2420 kg/m3, 40 kg robots."""
     assert [b.name for b in arch25.placed] == list(range(1, 26))
     assert {b.dimensions for b in arch25.bricks} == {(0.246, 0.116, 0.053)}
     assert {b.density for b in arch25.bricks} == {2420.0}

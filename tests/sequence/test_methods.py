@@ -47,7 +47,7 @@ def test_methods_say_what_they_lack(arch25):
         sequential(build_network(replace(arch25, robots=arch25.robots[:1])))
     near = Sphere(center=(0.0, 0.0, 0.0), radius=0.5)
     short = tuple(Robot(name=f"rob{i}", payload=300.0, reach=near) for i in (1, 2))
-    with pytest.raises(StepError, match="brick 4: rob2 reaches none of its free nodes"):
+    with pytest.raises(StepError, match="brick 4: rob1 and rob2 reach none of its free nodes"):
         sequential(build_network(replace(arch25, robots=short)))
 
 

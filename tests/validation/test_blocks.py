@@ -27,7 +27,7 @@ def test_a_block_slides_beyond_the_angle_of_friction(angle):
         with pytest.raises(MechanismError, match="1 bricks: joints part or slip and brick 1 goes"):
             engine.solve(1, HERE)
     else:
-        force = engine.solve(1, HERE).support[0, :3]
+        force = engine.solve(1, HERE).support[0, 0, :3]
         assert force == pytest.approx([0, 0, scene.bricks[0].mass * 9.81], abs=1e-6)
 
 
@@ -78,7 +78,7 @@ NORMAL, TANGENTIAL = STUDY_BED.normal, STUDY_BED.tangential
 
 
 def twist_of(scene, kind=DiscreteEngine):
-    """How a block moves and turns on the study's bed, and its weight."""
+    """How a block moves and turns on the paper's bed, and its weight."""
     net = build_network(scene)
     return kind(net, bed=STUDY_BED).solve(1, HERE, Want.ALL).brick_twist[0, 0], -net.weight[0, 2]
 

@@ -42,9 +42,9 @@ def test_cantilever_closed_form(count):
     sink = (weight * beyond / 1e8 + moment * (tip - np.arange(count) * length) / 1e6).sum()
     node = engine.network.index_of_node[2 * count - 1]
     assert fields.displacement[0, node, 2] == pytest.approx(-sink, rel=1e-12)
-    assert fields.support[0, 2] == pytest.approx(count * weight, rel=1e-12)
+    assert fields.support[0, 0, 2] == pytest.approx(count * weight, rel=1e-12)
     about_anchor = moment[0] + count * weight * 0.05
-    assert np.linalg.norm(fields.support[0, 3:]) == pytest.approx(about_anchor, rel=1e-12)
+    assert np.linalg.norm(fields.support[0, 0, 3:]) == pytest.approx(about_anchor, rel=1e-12)
 
 
 def test_propped_cantilever_closed_form():
@@ -69,7 +69,7 @@ def test_a_brick_hanging_from_its_upper_half():
     fields = ComplianceEngine(build_network(scene)).solve(1, [[1]])
     half = scene.bricks[0].mass * 9.81 / 2
     assert half == pytest.approx(17.95, abs=0.01)
-    joint = np.abs(fields.support[0, :3]).max()
+    joint = np.abs(fields.support[0, 0, :3]).max()
     assert fields.edge_force.max() == pytest.approx(half * np.cos(lean), abs=0.1 * joint + 1e-9)
     assert round(fields.edge_force.max(), 1) == pytest.approx(17.6)
 
@@ -92,6 +92,7 @@ def test_robots_carry_a_level_beam_by_symmetry():
     net = build_network(replace(scene, grounds=(last, other)))
     fields = ComplianceEngine(net).solve(count, np.zeros((1, 0), dtype=int))
     weight = count * scene.bricks[0].mass * 9.81
-    assert fields.support[0, 2] == pytest.approx(weight / 2, rel=1e-9)
+    assert fields.support[0, :, 2] == pytest.approx(weight / 2, rel=1e-9)
+    assert np.ptp(np.abs(fields.support[0]), axis=0) == pytest.approx(0, abs=1e-9 * weight)
     motion = fields.displacement[0, net.inner.ravel(), 2]
     assert motion == pytest.approx(motion[::-1], rel=1e-9)

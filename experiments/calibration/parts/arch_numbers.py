@@ -83,9 +83,9 @@ def scene_of(numbers: Floats, groups: Sequence[Free]) -> Scene:
         np.exp(part[f"log_{kind}_stiffness"]) for kind in ("translational", "rotational")
     )
     shape = ArchShape(
-        pitch=pitch.tolist(),
-        roll=roll.tolist(),
-        yaw=yaw.tolist(),
+        pitch=_within_a_turn(pitch),
+        roll=_within_a_turn(roll),
+        yaw=_within_a_turn(yaw),
         offset=part.get("offset", np.zeros(BRICKS)).tolist(),
         gap=float(part["gap"][0]),
         overhang=float(part["overhang"][0]),
@@ -96,6 +96,12 @@ def scene_of(numbers: Floats, groups: Sequence[Free]) -> Scene:
     return arch_scene(shape, "arch25", robots=ROBOTS, line_nodes=LINE_NODES, provenance=PROVENANCE)
 
 
+def _within_a_turn(angles: Floats) -> list[float]:
+    """Return the same directions by the smallest angles, for a search may step beyond a turn."""
+    turns: list[float] = (angles - 2 * np.pi * np.round(angles / (2 * np.pi))).tolist()
+    return turns
+
+
 def starting_guess() -> Floats:
     """Return a catenary over the stated span and height, nominal joints, no tilt and no yaw."""
     half = SPAN / 2
@@ -104,7 +110,7 @@ def starting_guess() -> Floats:
     middle = np.cumsum(length) - length / 2
     along = (middle / length.sum() - 0.5) * 2 * a * np.sinh(half / a)
     pitch = np.arctan(-along / a)
-    area = 0.116 * 0.053  # contact, m²; the study prints stiffness per area, two springs in series
+    area = 0.116 * 0.053  # contact, m²; the paper prints stiffness per area, two springs in series
     stiffness = np.log([100e9 * area / 2, 0.9e9 * area / 2])
     return np.concatenate([pitch, [0.0], np.zeros(len(ALONG)), [0.014, 0.0615, 0.09], stiffness])
 

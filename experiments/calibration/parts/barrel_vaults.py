@@ -30,7 +30,7 @@ from seqopt.study.tables import SOURCE, printed
 
 @dataclass(frozen=True, kw_only=True)
 class Vault:
-    """One tested vault: as printed, with measured and the study's stiffness in N/m."""
+    """One tested vault: as printed, with measured and the paper's stiffness in N/m."""
 
     test: int
     reference: str

@@ -14,8 +14,8 @@ TEXTS = {"b t": "$b\\,t$", "b t2": "$b\\,t^2$", "b t3/12": "$b\\,t^3/12$"}
 MARKS = {"absolute": ("o", "tab:blue"), "squares": ("s", "tab:red")}
 Pairs = dict[str, list[tuple[float, float]]]
 SERIES = {
-    "study_percent": ("study", "0.6"),
-    "fit_percent": ("fit", "tab:blue"),
+    "paper_percent": ("paper", "0.6"),
+    "fit_percent": ("fit, its mean minimized", "tab:blue"),
     "left_out_percent": ("fitted without this test", "tab:cyan"),
 }
 
@@ -45,7 +45,7 @@ def _stiffness(axes: Axes, table: pd.DataFrame) -> None:
     line = np.array([low, high])
     axes.fill_between(line, line / 1.2, line * 1.2, color="0.93", label="within 20 %")
     axes.loglog(line, line, color="k", lw=0.8)
-    axes.loglog(table["k_e"], table["k_m"], "s", color="0.55", ms=6, label="study")
+    axes.loglog(table["k_e"], table["k_m"], "s", color="0.55", ms=6, label="paper")
     axes.loglog(table["k_e"], table["k_fit"], "o", color="tab:blue", ms=6, label="fit")
     for row in table.to_dict("records"):
         ends = sorted([float(row["k_m"]), float(row["k_fit"])])
@@ -81,7 +81,8 @@ def _bars(axes: Axes, table: pd.DataFrame) -> None:
     axes.set_xticks(place)
     axes.set_ylim(top=52)
     axes.set(xlabel="test", ylabel="error of stiffness [%]")
-    axes.set_title("Error, least mean absolute error", loc="left", fontsize=10)
+    title = "Error, its mean size minimized: two tests are met exactly"
+    axes.set_title(title, loc="left", fontsize=10)
     axes.grid(visible=True, axis="y", lw=0.2)
     axes.legend(frameon=False, fontsize=8, loc="upper right")
 
@@ -146,7 +147,7 @@ def _profiles(axes: Axes, profiles: dict[str, tuple[Floats, Floats]], level: flo
     axes.set_xlabel("rotational stiffness of a joint 215 mm thick [MN m/rad per m]")
     axes.set_ylabel("least sum of squared relative errors")
     axes.set_title(
-        "Profile: best $k_t$ for each; dashed: 95 % limit of each law", loc="left", fontsize=10
+        "Profile of squares; dashed: 95 % limit, its upper end not firm", loc="left", fontsize=10
     )
     axes.grid(visible=True, lw=0.2)
     axes.legend(frameon=False, fontsize=8, loc="upper right")

@@ -1,4 +1,4 @@
-"""Which readings of the printed vault tests reproduce the study's stiffness column.
+"""Which readings of the printed vault tests reproduce the paper's stiffness column.
 
 Part of `experiments.calibration.calibration`. Every reading says what span and rise measure, where
 the load acts and over which width, how many bricks there are, how stiff joints are across, and what
@@ -47,7 +47,7 @@ def section(vault: Vault, law: str) -> float:
 
 
 def against_study(tests: tuple[Vault, ...], parts: list[Parts], law: str, k: Floats) -> Floats:
-    """Return stiffnesses over the study's (T, R) for rows (R, 2) of k_t and k_r."""
+    """Return stiffnesses over the paper's (T, R) for rows (R, 2) of k_t and k_r."""
     rows = []
     for vault, part in zip(tests, parts, strict=True):
         slide, turn = k[:, 0] * vault.width * vault.thickness, k[:, 1] * section(vault, law)
@@ -124,9 +124,9 @@ def summary(scan: pd.DataFrame) -> str:
 
 
 def entries() -> pd.DataFrame:
-    """Return by what factor one printed entry would have to change to give the study's stiffness.
+    """Return by what factor one printed entry would have to change to give the paper's stiffness.
 
-    Joint stiffnesses in proportion to the area, fitted to tests 3 to 8 of the study's column.
+    Joint stiffnesses in proportion to the area, fitted to tests 3 to 8 of the paper's column.
     """
     tests = vaults()
     parts = [planar_parts(chain(vault)) for vault in tests]
@@ -145,7 +145,7 @@ def entries() -> pd.DataFrame:
 
 
 def needed(vault: Vault, name: str, pair: Floats) -> float:
-    """Return the factor nearest to 1 on one entry that gives the study's stiffness, or NaN."""
+    """Return the factor nearest to 1 on one entry that gives the paper's stiffness, or NaN."""
     factors, logs = [], []
     for factor in np.geomspace(0.2, 5.0, 401):
         value = getattr(vault, name) * factor

@@ -36,7 +36,7 @@ SPREADS = ("corners", "even")
 
 
 class AtCorners(DiscreteEngine):
-    """Discrete elements on the study's bed, all of it at the corners of the faces."""
+    """Discrete elements on the paper's bed, all of it at the corners of the faces."""
 
     def solve(self, bricks: int, grips: ArrayLike, want: Want = Want.RESPONSES) -> Fields:
         """Return the fields; see `DiscreteEngine.solve`."""

@@ -1,4 +1,4 @@
-"""The study's four partial arches on elastic joints, by LMGC90: an outside witness for our engine.
+"""The paper's four partial arches on elastic joints, by LMGC90: an outside witness for our engine.
 
 `witness` puts a partial arch, its last brick between two pads (``arch_pads.py``), to LMGC90
 (``springs_lmgc90.py``, in another Python), to the same springs at corners by a linear solve and to
@@ -130,7 +130,7 @@ def on_ground(result: dict[str, Any], blocks: int) -> Floats:
 
 
 def inner_nodes(network: Network, step: Step) -> list[int]:
-    """Return the inner nodes that no robot holds: as many as the study compares (table 3)."""
+    """Return the inner nodes that no robot holds: as many as the paper compares (table 3)."""
     inner = network.inner[: step.bricks].ravel()
     return [int(i) for i in inner if network.node_name[i] not in step.held]
 
@@ -150,7 +150,7 @@ def moved_by_twists(network: Network, step: Step, twist: Floats) -> Floats:
 
 
 def error(own: Floats, other: Floats) -> float:
-    """Return the mean difference of displacements from others, as the study's, %."""
+    """Return the mean difference of displacements from others, as the paper's, %."""
     return 100 * float(np.mean((own - other) / other))
 
 
@@ -212,7 +212,7 @@ def _reactions(
 
 
 def stresses(result: dict[str, Any], blocks: int, factor: float) -> tuple[float, float]:
-    """Return the largest tension (Pa) and shear over what the study's epoxy allows, by LMGC90.
+    """Return the largest tension (Pa) and shear over what the paper's epoxy allows, by LMGC90.
 
     In all joints but those of the pads. The factor says how many times a face was made smaller.
     """

@@ -25,7 +25,7 @@ STEPS = {17: 33, 18: 35, 23: 45, 24: 47}  # steps of the sequential method, by b
 
 @dataclass(frozen=True)
 class Reading:
-    """One way to read the study's model: how the robot holds, and what a joint is."""
+    """One way to read the paper's model: how the robot holds, and what a joint is."""
 
     joint: str = "as printed"
     pinch: Pinch | None = None

@@ -56,6 +56,6 @@ def _widths(net: Network, case: Case, setting: str) -> list[int]:
     sizes = (
         (Want.EDGES, net.count_edges(case.bricks)),
         (Want.DISPLACEMENTS, 3 * net.count_nodes(case.bricks)),
-        (Want.SUPPORT, 6),
+        (Want.SUPPORT, 6 * len(net.springs.support)),
     )
     return [size for flag, size in sizes if case.asked(setting) & flag]

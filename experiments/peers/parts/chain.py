@@ -14,7 +14,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from scipy import sparse
 
-from seqopt.arrays import Floats, Ints, skew
+from seqopt.arrays import Bools, Floats, Ints, skew
 from seqopt.engines.interface import Want
 from seqopt.network.network import GROUND, Network, PartKind
 
@@ -61,8 +61,10 @@ class Chain:
         Forces of half-edges for the joints' forces on their second bodies.
     inner : (b,) int
         Edges along the bricks.
-    support : int
-        Joint at the first ground end.
+    acts : (G,) bool
+        Which of the scene's ground ends act.
+    support : (A,) int
+        Joints at those A that do.
     """
 
     bricks: int
@@ -77,7 +79,8 @@ class Chain:
     motion: sparse.csr_array
     half: sparse.csr_array
     inner: Ints
-    support: int
+    acts: Bools
+    support: Ints
 
     @property
     def length(self) -> float:
@@ -93,11 +96,16 @@ class Chain:
     def answer(
         self, state: Floats, force: Floats, bars: Floats, held: Floats, base: Floats
     ) -> Answer:
-        """Return the answer from displacements (2b, 6), forces of joints and bars, reactions."""
+        """Return the answer from displacements (2b, 6), forces of joints and bars, reactions.
+
+        Those at the fixed points, (A, 6), are of the ground ends that act.
+        """
         edge = self.half @ force.ravel() if force.size else np.zeros(0)
         edge[self.inner[: len(bars)]] = bars
         moved = (self.motion @ state.ravel()).reshape(-1, 3) if state.size else np.zeros((0, 3))
-        return Answer(edge, moved, held, base)
+        support = np.zeros((len(self.acts), 6))
+        support[self.acts] = base
+        return Answer(edge, moved, held, support)
 
 
 def chain_of(network: Network, bricks: int) -> Chain:
@@ -133,7 +141,8 @@ def chain_of(network: Network, bricks: int) -> Chain:
         motion=_motion(network, bricks),
         half=_half(network, bricks, sides, len(acting)),
         inner=np.flatnonzero(network.edge_spring[: network.count_edges(bricks)] < 0),
-        support=row[springs.support],
+        acts=np.isin(springs.support, acting),
+        support=np.array([row[s] for s in springs.support.tolist() if s in row], dtype=np.int64),
     )
 
 
@@ -176,7 +185,7 @@ class Beams(NamedTuple):
     pairs: Ints
     factor: Floats
     fixed: Ints
-    support: int
+    support: Ints
 
     def sections(self, chain: Chain) -> Floats:
         """Return EA and EI = GJ of every beam, (B, 2)."""
@@ -204,11 +213,12 @@ def beams(chain: Chain) -> Beams:
         pairs=np.vstack([along, ends, half]),
         factor=factor,
         fixed=ends[~real],
-        support=int(ends[chain.support, 0]),
+        support=ends[chain.support, 0],
     )
 
 
 def about_anchor(chain: Chain, reaction: Floats) -> Floats:
-    """Return force and moment about the fixed point from those about the beam's end."""
+    """Return forces and moments (A, 6) about the fixed points from those about the beams' ends."""
     arm = chain.ends[chain.support, 0] - chain.anchor[chain.support]
-    return np.concatenate([reaction[:3], reaction[3:] + np.cross(arm, reaction[:3])])
+    force, moment = reaction[:, :3], reaction[:, 3:]
+    return np.hstack([force, moment + np.cross(arm, force)])

@@ -58,7 +58,7 @@ class OpenSees:
                 "Linear", tag, *_aside(chain.across[s]), "-jntOffset", *offsets.ravel().tolist()
             )
             self._beam(tag, int(first), int(j) + 1, 1.0, chain.length)
-        self.base = count + 1 + chain.support
+        self.bases = (count + 1 + chain.support).tolist()
         self._load_and_analysis()
 
     def _beam(self, tag: int, first: int, second: int, factor: float, length: float) -> None:
@@ -93,7 +93,7 @@ class OpenSees:
             raise ArithmeticError("OpenSees: analysis failed")
         ops.reactions()
         held = np.array([ops.nodeReaction(n)[:3] for n in self.held.tolist()]).reshape(-1, 3)
-        base = np.array(ops.nodeReaction(self.base))
+        base = np.array([ops.nodeReaction(node) for node in self.bases])
         force = bars = state = NOTHING
         if want & Want.EDGES:
             force = -np.array([ops.eleForce(tag)[6:9] for tag in self.joints])
@@ -149,8 +149,8 @@ class PyNite:
         self.held = grips
         model.analyze_linear(check_stability=False)
         held = np.array([self._read("RxnF", n) for n in grips.tolist()]).reshape(-1, 3)
-        base = self.beams.support
-        reaction = np.array([*self._read("RxnF", base), *self._read("RxnM", base)])
+        bases = self.beams.support.tolist()
+        reaction = np.array([[*self._read("RxnF", n), *self._read("RxnM", n)] for n in bases])
         force = bars = state = NOTHING
         if want & Want.EDGES:
             bricks, members = chain.bricks, model.members
@@ -205,7 +205,7 @@ class Conmech:
         _, moved, reaction, ends = frame.get_solved_results()
         at = {int(row[0]): row[1:] for row in reaction}
         held = np.array([at[n][:3] for n in grips.tolist()]).reshape(-1, 3)
-        base = about_anchor(chain, at[self.beams.support])
+        base = about_anchor(chain, np.array([at[n] for n in self.beams.support.tolist()]))
         bricks = chain.bricks
         force = bars = state = NOTHING
         if want & Want.EDGES:

@@ -32,7 +32,7 @@ class Kept:
     rigid : bool
     matrix : (n, n) float
     load : (n,) float
-    edge, displacement, support : (E, n), (3N, n), (6, n) sparse
+    edge, displacement, support : (E, n), (3N, n), (6A, n) sparse
         Fields for unit displacements.
     edge_of_load : (E, 6b) sparse
         Edge forces for unit forces on the inner nodes; rigid bricks only.
@@ -115,7 +115,7 @@ def kept(network: Network, bricks: int, *, rigid: bool, factor: float = 1.0) -> 
         edge[chain.inner] = along
     base = force[chain.support]
     arm = chain.point[chain.support] - chain.anchor[chain.support]
-    base = np.vstack([base[:3], base[3:] + skew(arm) @ base[:3]])
+    base[:, 3:] += skew(arm) @ base[:, :3]
     return Kept(
         chain=chain,
         rigid=rigid,
@@ -123,7 +123,7 @@ def kept(network: Network, bricks: int, *, rigid: bool, factor: float = 1.0) -> 
         load=node.reshape(nodes, 6, -1)[:, :3].reshape(-1, node.shape[1]).T @ chain.load.ravel(),
         edge=sparse.csr_array(edge),
         displacement=sparse.csr_array(chain.motion @ node),
-        support=sparse.csr_array(base),
+        support=sparse.csr_array(base.reshape(-1, matrix.shape[0])),
         edge_of_load=sparse.csr_array(onto),
         dead=chain.load.ravel(),
     )
@@ -183,7 +183,9 @@ class Loop:
             edge = self._edges(grips, state, force)
         if want & Want.DISPLACEMENTS:
             moved = (parts.displacement @ state).reshape(-1, 3)
-        return Answer(edge, moved, force, parts.support @ state)
+        support = np.zeros((len(parts.chain.acts), 6))
+        support[parts.chain.acts] = (parts.support @ state).reshape(-1, 6)
+        return Answer(edge, moved, force, support)
 
     def _factor_and_solve(self, matrix: Floats, load: Floats) -> Floats:
         values = matrix[self.take]

@@ -16,12 +16,12 @@ from seqopt.engines.interface import Engine, Fields, Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.network import Network
 from seqopt.placement.costs import Budget, LayeredCosts
-from seqopt.placement.criteria import RESOLUTION, WorstRatio
+from seqopt.placement.criteria import WorstRatio
 from seqopt.placement.interface import Aim, CostProblem, PlacementProblem
 from seqopt.placement.problem import Problem, pose
 from seqopt.placement.requirements import Criterion, Limit
 from seqopt.sequence.three_robots import three_robot_loop
-from seqopt.study.presets import EQUATIONS
+from seqopt.study.presets import EQUATIONS, RESOLUTION
 
 COARSE = replace(
     EQUATIONS, name="coarse", resolution=tuple((name, 100 * size) for name, size in RESOLUTION)

@@ -39,7 +39,7 @@ def chart(steps: pd.DataFrame, scale: pd.DataFrame) -> None:
             high = axes is bond or value > ORDINARY
             axes.text(1 if high else 5, (1.1 if high else 0.7) * value / 1e3, text, fontsize=8)
     shift.axhline(LIMITS["D_max_1e-3mm"], color="k", lw=0.8, ls=":")
-    shift.text(1, LIMITS["D_max_1e-3mm"] * 1.1, "the study's limit", fontsize=8)
+    shift.text(1, LIMITS["D_max_1e-3mm"] * 1.1, "the paper's limit", fontsize=8)
     force.axhline(LIMITS["F_largest_N"], color="k", lw=0.8, ls=":")
     force.text(1, LIMITS["F_largest_N"] * 1.02, "payload", fontsize=8)
     bond.set(xlabel="bricks placed", ylabel="bond needed [kPa]", ylim=(0.7 * NONE / 1e3, 8e3))

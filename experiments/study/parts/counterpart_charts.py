@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure, SubFigure
 
 from experiments.calibration.parts.barrel_vaults import Vault, chain, vaults
 from experiments.discrete.parts.pad_readings import STEPS
@@ -69,16 +69,16 @@ def vault_tests(figure: Figure, table: pd.DataFrame, _own: Ours) -> None:
     outline.set_aspect("equal")
     outline.set(xlabel="m", title="Joints and load of the eight tests")
     study = printed("arch_stiffness")
-    slopes = {"measured": study["k_e_kN_mm"][0], "study": study["k_m_kN_mm"][0]}
+    slopes = {"measured": study["k_e_kN_mm"][0], "paper": study["k_m_kN_mm"][0]}
     slopes["here"] = of(table, "fig:secant_stiff")["ours"].iloc[0]
-    marks = {"measured": ("k", "-", 2.5), "study": ("0.5", "--", 1.5), "here": (OURS, ":", 2)}
+    marks = {"measured": ("k", "-", 2.5), "paper": ("0.5", "--", 1.5), "here": (OURS, ":", 2)}
     for name, slope in slopes.items():
         color, style, width = marks[name]
         label = f"{name}: {slope:.1f} kN/mm"
         secants.plot([0, 0.5], [0, 0.5 * slope], color=color, ls=style, lw=width, label=label)
     secants.set(xlabel="displacement [mm]", ylabel="load [kN]", title="Secants of test 1")
     at = study["test"].to_numpy(float)
-    shown = {"measured": study["k_e_kN_mm"], "study": study["k_m_kN_mm"], "here": bed_of_springs()}
+    shown = {"measured": study["k_e_kN_mm"], "paper": study["k_m_kN_mm"], "here": bed_of_springs()}
     for i, (name, values) in enumerate(shown.items()):
         bars.bar(at + 0.27 * (i - 1), values, 0.25, color=("k", "0.6", OURS)[i], label=name)
     bars.set(yscale="log", xlabel="test", ylabel="stiffness [kN/mm]", title="Stiffness")
@@ -138,15 +138,24 @@ def grid(axes: Axes, rows: pd.DataFrame, title: str) -> None:
     axes.set_title(title, fontsize=9)
 
 
-def sequences(figure: Figure, table: pd.DataFrame, own: Ours) -> None:
-    left, middle, right = figure.subfigures(1, 3, width_ratios=[1, 1, 1.6])
+def sequences(figure: Figure, table: pd.DataFrame, _own: Ours) -> None:
+    left, right = figure.subfigures(1, 2)
     first, second = left.subplots(2, 1, height_ratios=[12, 9])
     both = of(table, "fig:2rob_methods")
     grid(first, both[both["quantity"] != "steps shared [%]"], "Figure 9: two robots")
     grid(second, of(table, "table:optimization1"), "Table 8: modified sequential")
-    grid(middle.subplots(), of(table, "table:optimization2"), "Table 9: cascade")
-    axes = right.subplots()
-    rows = of(table, "table:experimental_data3")
+    grid(right.subplots(), of(table, "table:optimization2"), "Table 9: cascade")
+
+
+def plan(figure: Figure, table: pd.DataFrame, own: Ours) -> None:
+    """Draw the grips of the published plan above its responses."""
+    above, below = figure.subfigures(2, 1, height_ratios=[1, 2.4])
+    grips_of_plan(above.subplots(), of(table, "table:experimental_data3"), own)
+    along_steps("table:experimental_data3")(below, table, own)
+
+
+def grips_of_plan(axes: Axes, rows: pd.DataFrame, own: Ours) -> None:
+    """Draw which node every robot holds, printed and ours, and where grips are optimized."""
     moves = {(move.robot, move.step) for move in own.problem.schedule.moves}
     for i, color in enumerate(ROBOT_COLORS[:3], start=1):
         part = rows[(rows["quantity"] == f"node of rob{i}")].reset_index(drop=True)
@@ -158,9 +167,8 @@ def sequences(figure: Figure, table: pd.DataFrame, own: Ours) -> None:
         axes.plot(taken, part["ours"][[s - 1 for s in taken]], "*", color=color, ms=9)
     axes.plot([], [], "o", ms=4, mfc="none", color="k", label="printed")
     axes.plot([], [], "*", color="k", ms=9, label="optimized grip taken")
-    axes.legend(frameon=False, fontsize=7)
-    axes.set(xlabel="step", ylabel="node", title="Table B.1: three-robot plan")
-    axes.title.set_fontsize(9)
+    axes.legend(frameon=False, fontsize=7, ncols=5)
+    axes.set(xlabel="step", ylabel="node", ylim=(0, 60))
     tidy(axes)
 
 
@@ -236,9 +244,10 @@ def loop(figure: Figure, table: pd.DataFrame, own: Ours) -> None:
 def along_steps(label: str) -> Draw:
     """Return the drawing of every response of a table over its steps."""
 
-    def draw(figure: Figure, table: pd.DataFrame, _own: Ours) -> None:
-        panels = figure.subplots(3, 4).ravel()
-        for axes, name in zip(panels, RESPONSES.values(), strict=False):
+    def draw(figure: Figure | SubFigure, table: pd.DataFrame, _own: Ours) -> None:
+        names = [name for name in RESPONSES.values() if len(of(table, label, name))]
+        panels = figure.subplots(3, 4 + (len(names) > 11)).ravel()
+        for axes, name in zip(panels, names, strict=False):
             rows = of(table, label, name)
             step, off = number(rows), rows["error_pct"] > NEAR
             axes.plot(step, rows["ours"], "-", color=OURS, lw=1.2, label="here")
@@ -249,7 +258,8 @@ def along_steps(label: str) -> Draw:
             axes.set_title(name, fontsize=8)
             tidy(axes)
         handles, texts = panels[0].get_legend_handles_labels()
-        panels[-1].set_axis_off()
+        for axes in panels[len(names) :]:
+            axes.set_axis_off()
         panels[-1].legend(handles, texts, frameon=False, fontsize=8, loc="center")
 
     return draw
@@ -259,12 +269,13 @@ PICTURES: dict[str, tuple[Draw, tuple[float, float]]] = {
     "geometry": (geometry, (9, 4.6)),
     "vaults": (vault_tests, (11, 4.6)),
     "discrete": (discrete, (12, 4)),
-    "sequences": (sequences, (12, 7.5)),
+    "sequences": (sequences, (9, 7.5)),
     "twisting": (twisting, (11, 7.5)),
     "maxima": (maxima, (8, 7.5)),
     "loop": (loop, (12, 4.2)),
     "sequential": (along_steps("table:experimental_data1"), (11, 7.5)),
     "cantilever": (along_steps("table:experimental_data2"), (11, 7.5)),
+    "plan": (plan, (12, 10)),
 }
 
 

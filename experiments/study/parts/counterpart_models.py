@@ -1,4 +1,4 @@
-"""Printed and computed values of the study's arch, vault tests and discrete elements.
+"""Printed and computed values of the paper's arch, vault tests and discrete elements.
 
 The first half of `experiments.study.parts.counterpart_rows`: what the model rests on.
 """
@@ -28,6 +28,7 @@ from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.sequence.two_robots import METHODS
 from seqopt.study.presets import EQUATIONS
+from seqopt.study.published import as_printed
 from seqopt.study.tables import printed
 
 Rows = Iterator["Row"]
@@ -54,12 +55,12 @@ class Ours:
 
     @property
     def scene(self) -> Scene:
-        """The study's arch as it ships."""
+        """The paper's arch as it ships."""
         return self.engine.network.scene
 
     def steps(self, method: str) -> pd.DataFrame:
-        """Return the responses of a method by step."""
-        return self.methods.tables[method].set_index("step")
+        """Return the responses of a method by step, the support's as the paper prints them."""
+        return as_printed(self.scene, self.methods.tables[method]).set_index("step")
 
 
 def ours() -> Ours:

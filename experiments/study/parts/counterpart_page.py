@@ -9,7 +9,7 @@ import textwrap
 
 import pandas as pd
 
-from experiments.study.parts.paper_items import ITEMS, Item
+from experiments.study.parts.paper_items import ITEMS, STEPS, Item
 
 NEAR = 5.0  # percent beyond rounding, relative to the printed size or 1
 AGREES, PARTLY, DISAGREES = "agrees", "agrees in part", "disagrees"
@@ -23,11 +23,12 @@ TITLES = {
     "loop": "Steps 59 to 62 of the three-robot plan",
     "sequential": "Responses of the sequential method",
     "cantilever": "Responses of the cantilever method",
+    "plan": "Grips and responses of the published three-robot plan",
 }
 INTRODUCTION = """\
-# Counterparts of the study's figures and tables
+# Counterparts of the paper's figures and tables
 
-Every figure and table of the [study](paper.md) that has numbers, and what seqopt gives in its
+Every figure and table of the [paper](paper.md) that has numbers, and what seqopt gives in its
 place. `python -m experiments.study.paper_counterparts` computes all of it anew in a few seconds,
 draws the pictures and writes this page; `experiments/results/paper_counterparts.csv` holds every
 value. Photographs, sketches and definitions have no numbers. Where another experiment goes deeper,
@@ -40,8 +41,8 @@ otherwise.
 """
 CONVENTIONS = """\
 In the CSV a grip is its node, no grip is -1, and an optimized grip O3 is 1003. Forces of robots and
-of the support are compared by size, `T_pct` to within two edges. Figures and tables are numbered in
-the order of the study's source.
+of the support, the first ground end, are compared by size, `T_pct` to within two edges. Figures and
+tables are numbered in the order of the paper's source.
 
 """
 
@@ -70,9 +71,18 @@ def statement(item: Item, rows: pd.DataFrame) -> str:
         return f"{count} within rounding."
     median = f", median error {float(f'{error.median():.2g}'):.10g} %" if len(rows) > 2 else ""
     text = f"{count} within 5 %{median}; worst {beside(rows.loc[error.idxmax()])}"
+    if item.counted == STEPS:
+        text += f"; of the responses alone {yardstick(rows)}"
     if item.key:
         text += f"; {beside(rows[rows['quantity'] == item.key].iloc[0])}"
     return f"{text}."
+
+
+def yardstick(rows: pd.DataFrame) -> str:
+    """Return median, 90th and 95th percentile of the errors of responses, shares of edges aside."""
+    error = rows["error_pct"][rows["quantity"].str.match("F_|M_sup|T_max|D_")]
+    shares = error.quantile([0.5, 0.9, 0.95])
+    return "median {:.2f} %, 90th percentile {:.2f} %, 95th {:.2f} %".format(*shares)
 
 
 def caption(picture: str, table: pd.DataFrame) -> str:
@@ -101,7 +111,7 @@ def page(table: pd.DataFrame) -> str:
         f"{words.count(PARTLY)} agree in part, {words.count(DISAGREES)} disagree.\n"
     )
     head = (
-        "| in the study | shows | numbers | command (`python -m experiments.`) | picture "
+        "| in the paper | shows | numbers | command (`python -m experiments.`) | picture "
         "| agreement |\n|---|---|---|---|---|---|"
     )
     lines = [line(item, table) for item in ITEMS]

@@ -1,4 +1,4 @@
-"""Printed and computed values, side by side, of every figure and table of the study.
+"""Printed and computed values, side by side, of every figure and table of the paper.
 
 Every function yields the rows of one item of `experiments.study.parts.paper_items`, named by its
 label in `COUNTERPARTS`.
@@ -40,6 +40,7 @@ LOOP = (59, 60, 61, 62)
 RESPONSES = {
     "F_rob1_N": "F_rob1 [N]",
     "F_rob2_N": "F_rob2 [N]",
+    "F_rob3_N": "F_rob3 [N]",
     "F_sup_N": "F_sup [N]",
     "M_sup_Nm": "M_sup [N m]",
     "F_min_N": "F_min [N]",
@@ -104,7 +105,7 @@ def lever_arm(own: Ours) -> Rows:
 
 
 def cantilever_over_sequential(own: Ours) -> Rows:
-    """Compare both methods; ratios are those of values rounded to print, as the study's are."""
+    """Compare both methods; ratios are those of values rounded to print, as the paper's are."""
     sides = {"C": own.steps("cantilever"), "S": own.steps("sequential")}
     columns = {"M": "M_sup_Nm", "D": "D_max_1e-3mm", "T": "F_max_N"}
     for want in read(COMPARED).to_dict("records"):
@@ -196,12 +197,13 @@ def loop(own: Ours) -> Rows:
 def plan(own: Ours) -> Rows:
     study, steps, ranks = plan_rows(own)
     yield from scheme(study, steps)
+    yield from steps_of(own, "published")
     first = int((ranks["rank_in_window"] == 1).sum())
     yield Row("chosen nodes in first place by the printed equations", "plan", len(ranks), first)
 
 
 def steps_of(own: Ours, method: str) -> Rows:
-    """Compare a table of Appendix A; sizes of forces at robots and support, T_pct by two edges."""
+    """Compare a table of all steps; forces at robots and support by size, T_pct by two edges."""
     study, table = printed_steps(method).set_index("step"), own.steps(method)
     for step, column in product(study.index, (*VALUES, "T_pct")):
         want, got = float(study.loc[step, column]), float(table.loc[step, column])

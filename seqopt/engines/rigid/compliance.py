@@ -150,7 +150,7 @@ def solve_batch(
         edge_force=answer(operator.edge_force, Want.EDGES),
         displacement=answer(operator.displacement, Want.DISPLACEMENTS, 3),
         grip_force=force.reshape(sets, held, operator.directions),
-        support=answer(operator.support, Want.SUPPORT),
+        support=answer(operator.support, Want.SUPPORT, 6),
         joint_wrench=answer(operator.joint_wrench, Want.JOINTS, 6),
         brick_twist=answer(operator.brick_twist, Want.BRICKS, 6),
     )

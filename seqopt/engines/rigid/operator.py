@@ -38,8 +38,8 @@ class ComplianceOperator(FrozenValue):
         Displacements of the inner nodes under the weight with no grip, m.
     edge_force : (l + 1, E) float
     displacement : (l + 1, 3N) float
-    support : (l + 1, 6) float
-        Force and moment at the first ground end.
+    support : (l + 1, 6G) float
+        Force and moment at every ground end of the scene; zero where it does not act.
     joint_wrench : (l + 1, 6S) float
     brick_twist : (l + 1, 6b) float
     axis : (b, d) float
@@ -132,7 +132,7 @@ class OperatorBuilder:
         edge_force = self.statics.edge_of_spring[:edges] @ force[:, :3].reshape(-1, loads)
         edge_force += self.edge_of_load[:edges, :loads].toarray()
         displacement = node_motion(network, bricks) @ motion.reshape(-1, loads)
-        support = self.statics.support_of_spring @ force[network.springs.support]
+        supports = zip(self.statics.support_of_spring, network.springs.support, strict=True)
         inner = displacement.reshape(-1, 3, loads)[network.inner[:bricks].ravel()]
         flexibility = (basis.force @ inner).reshape(loads, loads)
         inner_edge = np.flatnonzero(network.edge_spring[:edges] < 0)
@@ -142,7 +142,7 @@ class OperatorBuilder:
             dead_displacement=flexibility @ weight,
             edge_force=_with_weight(edge_force, weight),
             displacement=_with_weight(displacement, weight),
-            support=_with_weight(support, weight),
+            support=np.hstack([_with_weight(at_end @ force[s], weight) for at_end, s in supports]),
             joint_wrench=_with_weight(force.reshape(-1, loads), weight),
             brick_twist=_with_weight(motion.reshape(-1, loads), weight),
             axis=network.edge_axis[inner_edge] @ basis.force.T,

@@ -69,10 +69,16 @@ def respond(
         edge_force=carried[None],
         displacement=(motion @ twist).reshape(1, -1, 3),
         grip_force=force[None],
-        support=(statics.support_of_spring @ wrench[network.springs.support])[None],
+        support=_reactions(network, statics, wrench)[None],
         joint_wrench=wrench[None],
         brick_twist=twist.reshape(1, -1, 6),
     )
+
+
+def _reactions(network: Network, statics: Statics, wrench: Floats) -> Floats:
+    """Return force and moment (G, 6) of every ground end about its fixed point."""
+    at_spring = wrench[network.springs.support]
+    return np.array([a @ b for a, b in zip(statics.support_of_spring, at_spring, strict=True)])
 
 
 def _split_pairs(network: Network, grips: Ints, force: Floats, carried: Floats) -> None:

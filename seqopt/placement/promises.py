@@ -1,0 +1,155 @@
+"""What is promised of every step of a plan, also where nothing is chosen: payloads and limits."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pandas as pd
+
+from seqopt.errors import InfeasibleError
+from seqopt.placement.problem import Problem
+from seqopt.placement.requirements import Limit, payload_limits
+from seqopt.responses.quantities import RESPONSES, robot_response
+from seqopt.responses.table import analyze, force_column
+from seqopt.scene.scene import Scene
+from seqopt.sequence.schedule import OpenStep
+from seqopt.sequence.steps import Step
+
+
+@dataclass(frozen=True)
+class Excess:
+    """A limit that some steps of a build exceed.
+
+    Attributes
+    ----------
+    limit : Limit
+    steps : tuple of int
+        Numbers of the steps.
+    largest : float
+        The largest value in them, SI units.
+    robot : str
+        Whose payload it is; empty for other limits.
+    """
+
+    limit: Limit
+    steps: tuple[int, ...]
+    largest: float
+    robot: str = ""
+
+    def __str__(self) -> str:
+        listed = ", ".join(map(str, self.steps))
+        where = f"step{'s' * (len(self.steps) > 1)} {listed}"
+        if self.robot:
+            return (
+                f"{self.robot} holds up to {self.largest:.1f} N, more than its payload of "
+                f"{self.limit.bound:g} N ({where})"
+            )
+        return (
+            f"{self.limit.response} is up to {self.largest:.6g} of {self.limit.bound:.6g} ({where})"
+        )
+
+
+def excesses(scene: Scene, table: pd.DataFrame, limits: Sequence[Limit]) -> tuple[Excess, ...]:
+    """Return the limits that steps exceed.
+
+    Parameters
+    ----------
+    scene : Scene
+    table : pandas.DataFrame
+        Responses of the steps, from `seqopt.analyze`.
+    limits : sequence of Limit
+        One on ``F_move``, which only open steps have, is left out.
+
+    Returns
+    -------
+    tuple of Excess
+        In the order of the limits.
+    """
+    out = []
+    for limit in limits:
+        if limit.response == "F_move":
+            continue
+        values = response_along(scene, table, limit.response)
+        over = limit.exceeded(values)
+        if over.any():
+            steps = tuple(int(number) for number in table["step"][over])
+            out.append(Excess(limit, steps, float(values[over].max())))
+    return tuple(out)
+
+
+def overloads(scene: Scene, table: pd.DataFrame) -> tuple[Excess, ...]:
+    """Return the payloads that steps exceed; see `excesses`.
+
+    Parameters
+    ----------
+    scene : Scene
+    table : pandas.DataFrame
+        From `seqopt.analyze`.
+
+    Returns
+    -------
+    tuple of Excess
+        In the order of the robots.
+    """
+    names = {robot_response(robot.name): robot.name for robot in scene.robots}
+    found = excesses(scene, table, payload_limits(scene))
+    return tuple(replace(excess, robot=names[excess.limit.response]) for excess in found)
+
+
+def response_along(scene: Scene, table: pd.DataFrame, name: str) -> np.ndarray:
+    """Return a response of every step as limits name it.
+
+    Parameters
+    ----------
+    scene : Scene
+    table : pandas.DataFrame
+        From `seqopt.analyze`.
+    name : str
+        ``T_max``, ``C_max``, ``M_sup``, ``D_max``, ``F_largest`` or ``F_`` and a robot's name.
+
+    Returns
+    -------
+    (steps,) float
+        SI units, sizes without sign; NaN where the robot does not grip.
+    """
+    if name == "C_max":
+        return np.asarray(np.maximum(-table[RESPONSES["F_min"].column].to_numpy(float), 0.0))
+    if name in RESPONSES:
+        response = RESPONSES[name]
+        return table[response.column].to_numpy(float) / response.scale
+    forces = {
+        robot_response(robot.name): table[force_column(robot)].abs() for robot in scene.robots
+    }
+    if name == "F_largest":
+        return pd.DataFrame(forces).max(axis=1).to_numpy(float)
+    return forces[name].to_numpy(float)
+
+
+def require_possible(problem: Problem) -> None:
+    """Raise an error if a step without an open grip exceeds a limit: no choice can keep it.
+
+    Parameters
+    ----------
+    problem : Problem
+
+    Raises
+    ------
+    InfeasibleError
+        Naming the limit, the value and the steps.
+    """
+    fixed = [_closed(step) for step in problem.schedule.steps if not step.moves]
+    if not (problem.limits and fixed):
+        return
+    table = analyze(problem.engine, fixed)
+    for excess in excesses(problem.schedule.scene, table, problem.limits):
+        raise InfeasibleError(
+            f"{excess}, where nothing is left to choose; relax the limit or change the schedule"
+        )
+
+
+def _closed(step: OpenStep) -> Step:
+    """Return an open step in which no grip is open."""
+    grips = tuple(grip if isinstance(grip, int) else None for grip in step.grips)
+    return Step(step.number, step.kind, step.bricks, grips)

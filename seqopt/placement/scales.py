@@ -1,0 +1,178 @@
+"""What criteria take from a scene where the user gives no number: its crown, units and scales."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from seqopt.engines.interface import Engine
+from seqopt.errors import ProblemError, StepError
+from seqopt.network.network import Network
+from seqopt.responses.quantities import RESPONSES, robot_response
+from seqopt.responses.table import analyze, force_column
+from seqopt.scene.scene import Scene
+from seqopt.sequence.steps import Step
+from seqopt.sequence.two_robots import METHODS
+
+LEVEL = 1e-9  # heights this close, over the height of the structure, are equal
+NEVER = math.inf  # the brick count of a crown that is never reached
+ROUNDED = (
+    ("F", 0.0278513762761887),
+    ("T", 0.0278513762761887),
+    ("C", 0.0278513762761887),
+    ("M", 0.11321697673247444),
+    ("D", 8.531988813508194),
+)
+"""What ranks round responses to, by first letter, in the units of `Units`.
+
+About a thirty-sixth of a brick's weight, a ninth of it at a brick's length, and eight times
+what a joint gives way under it: 1 N, 1 N m and 1e-6 m on the arch of Bruun et al., whose published
+choices speak for such a rounding.
+"""
+
+
+@dataclass(frozen=True)
+class Units:
+    """A force (N), a moment (N m) and a displacement (m) that grow as a scene's responses do.
+
+    Attributes
+    ----------
+    force : float
+        The mean weight of a brick.
+    moment : float
+        That weight at the mean length of a brick.
+    displacement : float
+        That weight over the median stiffness of the joints against translation.
+    """
+
+    force: float
+    moment: float
+    displacement: float
+
+    def of(self, response: str) -> float:
+        """Return the unit of a response, by its first letter.
+
+        Parameters
+        ----------
+        response : str
+
+        Returns
+        -------
+        float
+            N, N m or m.
+        """
+        units = {
+            "F": self.force,
+            "T": self.force,
+            "C": self.force,
+            "M": self.moment,
+            "D": self.displacement,
+        }
+        return units[response[0]]
+
+
+def scene_units(network: Network) -> Units:
+    """Return the units of a scene.
+
+    Parameters
+    ----------
+    network : Network
+
+    Returns
+    -------
+    Units
+        Each 1 where the scene has no weight or no stiffness.
+    """
+    weight = float(np.linalg.norm(network.weight, axis=1).mean()) or 1.0
+    length = float(np.mean([max(brick.dimensions) for brick in network.scene.bricks]))
+    stiffness = network.springs.translational_stiffness
+    middle = float(np.median(stiffness[stiffness > 0])) if stiffness.any() else 1.0
+    return Units(weight, weight * length, weight / middle)
+
+
+def crown(scene: Scene) -> float:
+    """Return how many bricks are placed when a build reaches its crown.
+
+    The crown is the first of the highest bricks, by their centroids, if the build rises to it and
+    comes down again after it.
+
+    Parameters
+    ----------
+    scene : Scene
+
+    Returns
+    -------
+    float
+        `NEVER` where the build ends at its highest level, as that of a wall.
+    """
+    height = np.array([brick.position for brick in scene.placed]) @ np.array(scene.up)
+    level = LEVEL * max(float(np.ptp(height)), *scene.placed[0].dimensions)
+    top = int(np.argmax(height >= height.max() - level))
+    low = height < height.max() - level
+    return top + 1 if low[0] and low[top:].any() else NEVER
+
+
+@dataclass(frozen=True)
+class SceneFacts:
+    """What criteria may ask of a scene, each computed when it is first asked for.
+
+    Parameters
+    ----------
+    engine : Engine
+        Computes the responses of the scene's fixed methods.
+    """
+
+    engine: Engine
+
+    @property
+    def robots(self) -> tuple[str, ...]:
+        """Names of the scene's robots."""
+        return tuple(robot.name for robot in self.engine.network.scene.robots)
+
+    @cached_property
+    def crown(self) -> float:
+        """See `crown`."""
+        return crown(self.engine.network.scene)
+
+    @cached_property
+    def units(self) -> Units:
+        """See `scene_units`."""
+        return scene_units(self.engine.network)
+
+    @cached_property
+    def reference(self) -> Mapping[str, float]:
+        """The least that any fixed method reaches of each response's largest value, SI units.
+
+        Raises
+        ------
+        ProblemError
+            If no fixed method can build the scene.
+        """
+        found: list[dict[str, float]] = []
+        for method in METHODS.values():
+            try:
+                found.append(self._largest(method(self.engine.network)))
+            except StepError as error:
+                refused = error
+        if not found:
+            raise ProblemError(
+                f"no fixed method gives scales for this scene ({refused}); give your own"
+            )
+        return {name: min(values[name] for values in found) for name in found[0]}
+
+    def _largest(self, steps: tuple[Step, ...]) -> dict[str, float]:
+        """Return the largest responses of a method's steps, SI units."""
+        table = analyze(self.engine, steps)
+        forces = {
+            robot_response(robot.name): float(table[force_column(robot)].abs().max())
+            for robot in self.engine.network.scene.robots
+        }
+        out = {"F_largest": float(np.nanmax([*forces.values()]))}
+        for name in ("T_max", "M_sup", "D_max"):
+            response = RESPONSES[name]
+            out[name] = float(table[response.column].max()) / response.scale
+        return out

@@ -1,0 +1,117 @@
+"""Terms of criteria: names of responses with weights and scales."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, TypeVar
+
+import numpy as np
+
+from seqopt.arrays import Floats
+from seqopt.errors import ProblemError
+from seqopt.placement.scales import SceneFacts
+from seqopt.responses.quantities import robot_response
+
+Term = tuple[Any, ...]  # a name and its numbers
+Number = TypeVar("Number")
+
+
+def scale_of(facts: SceneFacts, response: str, given: float | None) -> float:
+    """Return the scale of a response: that which is given, or the scene's.
+
+    Parameters
+    ----------
+    facts : SceneFacts
+    response : str
+    given : float or None
+
+    Returns
+    -------
+    float
+        SI units.
+
+    Raises
+    ------
+    ProblemError
+        If none is given and the scene's methods give none.
+    """
+    if given is not None:
+        return given
+    scales = facts.reference
+    if response not in scales:
+        raise ProblemError(f"{response} has no scale of its own; give one, or take F_largest")
+    return scales[response] or 1.0  # what every method keeps at zero
+
+
+def known(number: Number | None, criterion: str) -> Number:
+    """Return a number that must not be open any more.
+
+    Parameters
+    ----------
+    number : object or None
+    criterion : str
+        Whose number it is.
+
+    Returns
+    -------
+    object
+        The number.
+
+    Raises
+    ------
+    ProblemError
+        If it is None: the criterion was not posed for a scene.
+    """
+    if number is None:
+        raise ProblemError(f"criterion {criterion}: it is not posed for a scene; use seqopt.pose")
+    return number
+
+
+def present(values: Floats) -> Floats:
+    """Return the values, or zeros where the robot does not grip in any choice.
+
+    Parameters
+    ----------
+    values : (C,) or (C, D) float
+
+    Returns
+    -------
+    (C,) or (C, D) float
+    """
+    return np.zeros_like(values) if np.isnan(values).all() else values
+
+
+def spell_out(terms: tuple[Term, ...], robots: Sequence[str]) -> tuple[Term, ...]:
+    """Return terms in which ``F_each`` stands once for every robot.
+
+    Parameters
+    ----------
+    terms : tuple of Term
+    robots : sequence of str
+        Their names.
+
+    Returns
+    -------
+    tuple of Term
+    """
+    out: list[Term] = []
+    for term in terms:
+        names = [robot_response(robot) for robot in robots] if term[0] == "F_each" else [term[0]]
+        out += [(name, *term[1:]) for name in names]
+    return tuple(out)
+
+
+def equal(*names: str) -> tuple[tuple[str, float], ...]:
+    """Return equally weighted terms of a `RankSum`.
+
+    Parameters
+    ----------
+    *names : str
+        Responses.
+
+    Returns
+    -------
+    tuple of (str, float)
+        Each with weight 1.
+    """
+    return tuple((name, 1.0) for name in names)

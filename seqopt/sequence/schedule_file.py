@@ -1,0 +1,242 @@
+"""Schedules of one's own: CSV tables of steps in which open grips are marked."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+from seqopt.errors import StepError
+from seqopt.files import read_text
+from seqopt.network.build import build_network
+from seqopt.network.network import Network
+from seqopt.scene.scene import Scene
+from seqopt.sequence.moves import open_schedule
+from seqopt.sequence.plan_file import Row, read_cells, read_grip, read_rows
+from seqopt.sequence.schedule import OpenGrip, OpenStep, Schedule, ScheduledGrips
+from seqopt.sequence.steps import check_step
+from seqopt.sequence.three_robots import SCHEDULES, make_schedule
+
+MARK = re.compile(r"\?\s*(\d*)")  # an open grip, and the number of its move if it is given
+
+
+def read_schedule(where: Network | Scene, path: Path) -> Schedule:
+    r"""Return the checked schedule of a file.
+
+    Parameters
+    ----------
+    where : Network or Scene
+        In which every step must be possible.
+    path : pathlib.Path
+        CSV; see `parse_schedule` for its columns.
+
+    Returns
+    -------
+    Schedule
+        Called as the file is, without its suffix.
+
+    Raises
+    ------
+    FileError
+        If the file cannot be read.
+    StepError
+        If it is no such table or a step is impossible.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> import seqopt
+    >>> text = "step,type,bricks,rob1_node,rob2_node,rob3_node\n1,place,1,1,,\n2,place,2,1,?,\n"
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = Path(folder) / "mine.csv"
+    ...     _ = path.write_text(text)
+    ...     schedule = seqopt.read_schedule(seqopt.load_scene("arch25"), path)
+    >>> schedule.method, schedule.moves[0].robot, schedule.moves[0].candidates
+    ('mine', 'rob2', (2,))
+    """
+    return parse_schedule(where, read_text(path), str(path))
+
+
+def parse_schedule(where: Network | Scene, text: str, source: str) -> Schedule:
+    """Return the checked schedule of a table.
+
+    Parameters
+    ----------
+    where : Network or Scene
+        In which every step must be possible.
+    text : str
+        CSV with the columns of a plan (`seqopt.sequence.plan_file.parse_plan`). A cell of a robot
+        is empty where it does not grip, the number of a node where this is given, and ``?`` where
+        the grip is open; in the rows that follow, ``?`` is the same grip, until the robot lets go.
+        Open grips may carry the number of their move, ``?1``, ``?2``, in the order in which they
+        are taken; it must be right.
+    source : str
+        What to call the table in messages; its last part without suffix names the schedule.
+
+    Returns
+    -------
+    Schedule
+
+    Raises
+    ------
+    StepError
+        If the text is not such a table or a step is impossible.
+    """
+    network = where if isinstance(where, Network) else build_network(where)
+    scene, what = network.scene, f"schedule {source}"
+    rows = read_rows(scene, text, what)
+    if not rows:
+        raise StepError(f"{what}: it has no steps; give at least one")
+    _check_columns(scene, text, what)
+    steps: list[OpenStep] = []
+    for line, row in rows:
+        steps.append(_step(scene, row, steps, f"{what}, line {line}"))
+    try:
+        return open_schedule(Path(source).stem, network, steps)
+    except StepError as error:
+        raise StepError(f"{what}: {error}") from error
+
+
+def schedule_text(schedule: Schedule) -> str:
+    """Return a schedule as the table that `parse_schedule` reads.
+
+    Parameters
+    ----------
+    schedule : Schedule
+
+    Returns
+    -------
+    str
+        CSV; open grips are marked with the numbers of their moves, from 1.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> schedule = seqopt.three_robot_loop(seqopt.build_network(seqopt.load_scene("arch25")))
+    >>> print(*schedule_text(schedule).splitlines()[:4], sep=chr(10))
+    step,type,bricks,rob1_node,rob2_node,rob3_node
+    1,place,1,1,,
+    2,place,2,1,2,
+    3,place,3,1,2,?1
+    """
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    names = [f"{robot.name}_node" for robot in schedule.scene.robots]
+    writer.writerow(["step", "type", "bricks", *names])
+    for step in schedule.steps:
+        cells = [f"?{g.move + 1}" if isinstance(g, OpenGrip) else g for g in step.grips]
+        writer.writerow([step.number, step.kind.value, step.bricks, *cells])
+    return out.getvalue()
+
+
+def find_schedule(
+    network: Network, schedule: Schedule | Path | str, robots: Sequence[str] = ()
+) -> Schedule:
+    """Return a schedule by name, from a file, or itself.
+
+    Parameters
+    ----------
+    network : Network
+    schedule : Schedule, pathlib.Path or str
+        A schedule of the same scene, a file, or a key of `SCHEDULES`.
+    robots : sequence of str, optional
+        Of a schedule by name: robots in the order of their roles.
+
+    Returns
+    -------
+    Schedule
+
+    Raises
+    ------
+    FileError
+        If the file cannot be read.
+    StepError
+        If there is no such schedule, it is impossible in the scene or belongs to another one.
+    """
+    if isinstance(schedule, str) and schedule in SCHEDULES:
+        return make_schedule(schedule, network, robots)
+    if robots:
+        raise StepError(
+            f"robots {', '.join(robots)}: only a schedule by name takes them "
+            f"({', '.join(SCHEDULES)}); one of your own says itself who holds; leave them out"
+        )
+    if isinstance(schedule, Schedule):
+        if schedule.scene != network.scene:
+            raise StepError(
+                f"schedule {schedule.method}: it is of scene {schedule.scene.name}, not of this "
+                f"{network.scene.name}; make it from the network of this scene"
+            )
+        return schedule
+    path = Path(schedule)
+    if isinstance(schedule, str) and not path.suffix and not path.exists():
+        raise StepError(
+            f"schedule {schedule!r}: there is no such; give one of {', '.join(SCHEDULES)}, "
+            "or a CSV file"
+        )
+    return read_schedule(network, path)
+
+
+def _check_columns(scene: Scene, text: str, what: str) -> None:
+    """Require that no column belongs to a robot which the scene does not have."""
+    known = [f"{robot.name}_node" for robot in scene.robots]
+    for column in next(csv.reader(io.StringIO(text))):
+        if column.endswith("_node") and column not in known:
+            raise StepError(
+                f"{what}: column {column}: no robot of scene {scene.name} is called so; "
+                f"give {', '.join(known)}"
+            )
+
+
+def _step(scene: Scene, row: Row, before: Sequence[OpenStep], where: str) -> OpenStep:
+    """Return the step of a row, which must be possible after those before."""
+    number, kind, bricks = read_cells(row, where)
+    if number != len(before) + 1:
+        raise StepError(
+            f"{where}: step {number} stands where {len(before) + 1} should; number from 1"
+        )
+    if None in row:
+        raise StepError(f"{where}: it has more cells than there are columns; leave out the rest")
+    step = OpenStep(number, kind, bricks, _grips(scene, row, before, where))
+    try:
+        check_step(scene, before[-1] if before else None, step)
+    except StepError as error:
+        raise StepError(f"{where}: {error}") from error
+    return step
+
+
+def _grips(scene: Scene, row: Row, before: Sequence[OpenStep], where: str) -> ScheduledGrips:
+    """Return what the robots hold in a row: a mark goes on, or is a new move."""
+    last = before[-1].grips if before else (None,) * len(scene.robots)
+    count = len({move for step in before for move in step.moves})
+    grips: list[int | OpenGrip | None] = []
+    for robot, held in zip(scene.robots, last, strict=True):
+        column = f"{robot.name}_node"
+        cell = row[column].strip()
+        mark = MARK.fullmatch(cell)
+        if mark is None:
+            grips.append(_given(scene, row, column, where))
+            continue
+        grip = held if isinstance(held, OpenGrip) else OpenGrip(count)
+        count += grip is not held
+        if mark[1] and int(mark[1]) != grip.move + 1:
+            raise StepError(
+                f"{where}: {column} is {cell!r}, but this is open grip {grip}: open grips are "
+                f"numbered as they are taken, and last until the robot lets go; give {grip}, or "
+                f"let {robot.name} release first"
+            )
+        grips.append(grip)
+    return tuple(grips)
+
+
+def _given(scene: Scene, row: Row, column: str, where: str) -> int | None:
+    """Return the node of a cell that has no mark."""
+    cell = row[column].strip()
+    if cell and not re.fullmatch(r"[+-]?\d+", cell):
+        raise StepError(
+            f"{where}: {column} is {cell!r}; give a node, ? for an open grip, or nothing"
+        )
+    robot = next(robot for robot in scene.robots if f"{robot.name}_node" == column)
+    return read_grip(scene, robot, row, where)

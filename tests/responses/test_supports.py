@@ -1,0 +1,151 @@
+"""The largest over the ground ends is what tables, criteria and limits see."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from experiments.harness.walls import running_bond
+from seqopt.engines.interface import Want
+from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.network.build import build_network
+from seqopt.placement.criteria import WeightedSum
+from seqopt.placement.problem import pose
+from seqopt.placement.requirements import Limit
+from seqopt.responses.quantities import (
+    RESPONSES,
+    responses_of,
+    support_forces,
+    support_moments,
+)
+from seqopt.responses.table import analyze, support_columns
+from seqopt.sequence.schedule import Move, OpenGrip, OpenStep, Schedule
+from seqopt.sequence.steps import Step, StepKind
+from tests.builders import from_both_sides, small_arch
+
+MOMENT = WeightedSum("moment", (("M_sup", 1.0, 1.0),))
+
+
+@pytest.fixture(scope="module")
+def arch():
+    return ComplianceEngine(build_network(from_both_sides(9, "VLR")))
+
+
+def one_move(engine, bricks, held=None):
+    """Return one move of the scene's last robot at a brick count; its first may hold a node."""
+    scene = engine.network.scene
+    taken = {*scene.blocked_nodes, held}
+    nodes = tuple(n for b in scene.placed[:bricks] for n in b.nodes if n not in taken)
+    idle = (None,) * (len(scene.robots) - 2)
+    step = OpenStep(1, StepKind.REPOSITION, bricks, (held, *idle, OpenGrip(0)))
+    return Schedule("one move", scene, (step,), (Move(scene.robots[-1].name, 1, bricks, nodes),))
+
+
+def moments(engine, schedule):
+    """Return the moment at each end for every candidate, taken from the fields by hand."""
+    (move,), (step,) = schedule.moves, schedule.steps
+    fixed = [node for node in step.grips if isinstance(node, int)]
+    grips = [[*fixed, node] for node in move.candidates]
+    fields = engine.solve(move.bricks, grips, Want.SUPPORT)
+    return np.linalg.norm(fields.support[:, :, 3:], axis=2)
+
+
+def test_an_arch_built_from_both_sides_reports_its_worse_support(arch25):
+    """The fault: a robot relieves one end, and the other, which bears four times as much, hid."""
+    inward = zip(range(1, 26), range(25, 0, -1), strict=True)
+    order = tuple(itertools.chain.from_iterable(inward))[:25]
+    engine = ComplianceEngine(build_network(replace(arch25, build_order=order)))
+    answers = engine.solve(16, [[15], [36]])
+    each, seen = support_moments(answers), responses_of(engine.network, answers)["M_sup"]
+    assert (each.argmax(axis=1) == [1, 0]).all()
+    assert (each.max(axis=1) > 4 * each.min(axis=1)).all()
+    assert (seen == each.max(axis=1)).all()
+
+
+@pytest.mark.parametrize("bricks", [2, 6, 9])
+def test_criteria_see_the_largest(arch, bricks):
+    schedule = one_move(arch, bricks)
+    each = moments(arch, schedule)
+    problem = pose(arch, schedule, MOMENT)
+    assert problem.sums.single[0] == pytest.approx(each.max(axis=1), rel=1e-12)
+    assert len(set(each.argmax(axis=1))) == 2  # each end is the worse one for some candidate
+
+
+def test_limits_see_the_largest(arch):
+    """One robot relieves the first end, so that only what relieves the other is allowed."""
+    schedule = one_move(arch, 6, held=5)
+    each = moments(arch, schedule)
+    bound = 0.9 * float(each.max())
+    assert (each[:, 0] <= bound).all()
+    problem = pose(arch, schedule, MOMENT, (Limit("M_sup", bound),))
+    allowed = np.isfinite(problem.sums.single[0])
+    assert (allowed == (each[:, 1] <= bound)).all()
+    assert 0 < allowed.sum() < len(allowed)
+
+
+def test_the_order_of_the_ends_changes_no_criterion(arch):
+    scene = arch.network.scene
+    turned = ComplianceEngine(build_network(replace(scene, grounds=scene.grounds[::-1])))
+    one, other = (pose(e, one_move(e, 6), MOMENT).sums.single[0] for e in (arch, turned))
+    assert other == pytest.approx(one, rel=1e-9)
+
+
+def test_the_largest_force_keeps_its_sign():
+    """Also where it points down, and the other end's is smaller or none."""
+    net = build_network(from_both_sides(7))
+    fields = ComplianceEngine(net).solve(5, np.zeros((1, 0), dtype=np.int64))
+    for forces, wanted in (
+        ([[0, 0, -3.0], [0, 0, 2.0]], -3.0),
+        ([[0, 0, -3.0], [4.0, 0, 0]], 4.0),
+        ([[0, 0, 0.0], [0, 3.0, -4.0]], -5.0),
+        ([[0, 0, -2.0], [0, 0, 2.0]], 2.0),
+        ([[0, 0, 2.0], [0, 0, -2.0]], 2.0),
+        ([[0, 0, 0.0], [0, 0, 0.0]], 0.0),
+    ):
+        support = np.zeros((1, 2, 6))
+        support[0, :, :3] = forces
+        known = replace(fields, support=support)
+        assert RESPONSES["F_sup"].of(net, known) == pytest.approx([wanted])
+        assert np.abs(support_forces(net, known)).max() == abs(wanted)
+
+
+def test_tables_have_columns_per_end(arch):
+    steps = [Step(1, StepKind.PLACE, 1, (1, None, None)), Step(2, StepKind.PLACE, 8, (2, 3, None))]
+    table = analyze(arch, steps)
+    assert support_columns(arch.network.scene) == [
+        ("F_sup_1_N", "M_sup_1_Nm"),
+        ("F_sup_9_N", "M_sup_9_Nm"),
+    ]
+    assert list(table)[-5:] == [
+        "D_std_1e-3mm",
+        *itertools.chain.from_iterable(support_columns(arch.network.scene)),
+    ]
+    assert table.loc[0, ["F_sup_9_N", "M_sup_9_Nm"]].isna().all()  # brick 9 does not stand yet
+    assert table.loc[0, "M_sup_Nm"] == table.loc[0, "M_sup_1_Nm"] > 0
+    assert table.loc[1, "M_sup_Nm"] == max(table.loc[1, ["M_sup_1_Nm", "M_sup_9_Nm"]])
+    assert abs(table.loc[1, "F_sup_N"]) == table.loc[1, ["F_sup_1_N", "F_sup_9_N"]].abs().max()
+
+
+def test_one_end_needs_no_columns_of_its_own():
+    arch = small_arch(3)
+    free = replace(arch, grounds=arch.grounds[:1])
+    table = analyze(
+        ComplianceEngine(build_network(free)), [Step(1, StepKind.PLACE, 1, (1, None, None))]
+    )
+    assert list(table)[-1] == "D_std_1e-3mm"
+
+
+def test_ends_of_one_brick_are_counted():
+    wall = running_bond(2, 1)
+    twice = replace(wall, grounds=(wall.grounds[0], *wall.grounds))
+    assert [moment for _, moment in support_columns(twice)] == [
+        "M_sup_1_Nm",
+        "M_sup_1_2_Nm",
+        "M_sup_2_Nm",
+    ]
+    support = ComplianceEngine(build_network(twice)).solve(2, [[2]], Want.SUPPORT).support[0]
+    assert support[0] == pytest.approx(support[1], rel=1e-9)  # one spring, given twice
+    assert np.abs(support[2] - support[0]).max() > 1

@@ -1,0 +1,116 @@
+"""Loops of two robots and more: who grips when, and that an optimization can fill them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+import seqopt
+from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.errors import StepError
+from seqopt.network.build import build_network
+from seqopt.placement.problem import pose
+from seqopt.placement.solving import solve
+from seqopt.sequence.loops import robot_loop, two_robot_loop
+from seqopt.sequence.steps import StepKind, idle_robots
+from seqopt.sequence.three_robots import SCHEDULES, three_robot_loop
+from seqopt.sequence.two_robots import placing_node, sequential
+from seqopt.study.presets import EQUATIONS, WEIGHTED
+from tests.builders import anywhere, small_arch
+
+
+def test_three_robots_of_any_scene_make_the_loop_of_the_paper(engine25):
+    loop, own = three_robot_loop(engine25.network), robot_loop(engine25.network)
+    assert own == loop == robot_loop(engine25.network, 3)
+    assert own.method == "three-robot"
+
+
+@pytest.mark.parametrize(("count", "word"), [(3, "three"), (4, "four"), (5, "five")])
+def test_the_roles_of_any_number_of_robots_rotate(count, word):
+    scene = replace(small_arch(11), robots=anywhere(count))
+    schedule = robot_loop(build_network(scene))
+    assert schedule.method == f"{word}-robot"
+    assert len(schedule.moves) == 11 - count
+    assert idle_robots(scene, schedule.steps) == ()
+    for step in schedule.steps[count - 1 :]:
+        held = [grip for grip in step.grips if grip is not None]
+        assert len(held) >= count - 1
+        newest = {scene.brick_of_node[g].name for g in held if isinstance(g, int)}
+        recent = scene.build_order[step.bricks - count + 2 : step.bricks]
+        assert {*recent} - newest <= {scene.build_order[count - 1]}  # the first open grip's brick
+    whole = {frozenset(m.robot for m in schedule.moves)}
+    assert len(schedule.moves) < count or whole == {frozenset(r.name for r in scene.robots)}
+
+
+def test_two_robots_filled_with_placing_nodes_are_the_sequential_method(engine25, arch25):
+    network = engine25.network
+    schedule = two_robot_loop(network)
+    robots = {robot.name: robot for robot in arch25.robots}
+    nodes = [
+        placing_node(network, robots[move.robot], brick)
+        for move, brick in zip(schedule.moves, arch25.placed, strict=True)
+    ]
+    assert schedule.fill(nodes) == sequential(network)
+
+
+def test_a_move_of_two_robots_lasts_until_the_next_brick_is_held(engine25):
+    schedule = two_robot_loop(engine25.network)
+    assert len(schedule.moves) == 25
+    assert idle_robots(schedule.scene, schedule.steps) == ("rob3",)
+    for k, move in enumerate(schedule.moves[1:-1], start=1):
+        window = [step for step in schedule.steps if k in step.moves]
+        kinds = [StepKind.PLACE, StepKind.RELEASE, StepKind.PLACE]
+        assert [step.kind for step in window] == kinds
+        assert [step.moves for step in window] == [(k - 1, k), (k,), (k, k + 1)]
+        assert {schedule.scene.brick_of_node[n].name for n in move.candidates} == {k + 1}
+
+
+def test_two_robots_hold_better_where_the_best_nodes_are_chosen(engine25):
+    """The sequential method is one of the choices; the best is better, and proven so."""
+    schedule = two_robot_loop(engine25.network)
+    problem = pose(engine25, schedule, WEIGHTED)
+    plan = solve(problem, "overlap_dp")
+    steps = sequential(engine25.network)
+    held = {(s.bricks, n) for s in steps if s.kind is StepKind.PLACE for n in s.held}
+    own = tuple(
+        next(c for c, node in enumerate(m.candidates) if (m.bricks, node) in held)
+        for m in schedule.moves
+    )
+    assert plan.certificate.gap <= 1e-9
+    assert plan.certificate.objective < problem.sums.cost(own)
+
+
+@pytest.mark.parametrize("count", [2, 3, 4, 5])
+@pytest.mark.parametrize("criterion", [EQUATIONS, WEIGHTED], ids=lambda c: c.name)
+def test_any_loop_can_be_optimized(count, criterion):
+    scene = replace(small_arch(9), robots=anywhere(count))
+    plan = seqopt.optimize(scene, "loop", criterion)
+    assert plan.certificate.gap <= 1e-9
+    assert plan.summary()["idle_robots"] == []
+    exact = seqopt.optimize(scene, "loop", criterion, "overlap_lp")
+    assert exact.certificate.objective == pytest.approx(plan.certificate.objective, rel=1e-6)
+
+
+def test_the_more_robots_hold_the_less_the_arch_moves():
+    largest = []
+    for count in (2, 3, 4, 5):
+        plan = seqopt.optimize(replace(small_arch(12), robots=anywhere(count)), "loop", "weighted")
+        largest.append(plan.responses()["D_max_1e-3mm"].max())
+    assert largest == sorted(largest, reverse=True)
+    assert largest[-1] < 0.7 * largest[0]
+
+
+def test_too_few_robots_or_bricks_are_counted():
+    for bricks, robots, wanted in ((5, 5, "five robots and six"), (2, 3, "three robots and four")):
+        scene = replace(small_arch(bricks), robots=anywhere(robots))
+        with pytest.raises(StepError, match=f"{robots} robots and {bricks} bricks; .* {wanted}"):
+            SCHEDULES["loop"](build_network(scene))
+    with pytest.raises(StepError, match="3 robots and 7 bricks; this method needs four robots"):
+        robot_loop(build_network(replace(small_arch(7), robots=anywhere(3))), 4)
+
+
+def test_the_engine_answers_a_loop_of_five():
+    engine = ComplianceEngine(build_network(replace(small_arch(8), robots=anywhere(5))))
+    plan = solve(pose(engine, robot_loop(engine.network), EQUATIONS), "cascade", proof=False)
+    assert max(len(step.held) for step in plan.steps) == 5

@@ -1,0 +1,183 @@
+"""Who places and who holds: from reach, or by name."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from seqopt.errors import StepError
+from seqopt.network.build import build_network
+from seqopt.scene.parts import Robot
+from seqopt.scene.reach import Sphere
+from seqopt.sequence.loops import robot_loop, two_robot_loop
+from seqopt.sequence.roles import cast, take_turns
+from seqopt.sequence.steps import StepKind, idle_robots
+from seqopt.sequence.three_robots import SCHEDULES, modified_sequential, three_robot_loop
+from seqopt.sequence.two_robots import METHODS, sequential
+from tests.builders import anywhere, from_both_ends, small_arch
+
+
+def placers(scene, steps):
+    """Return who places every brick."""
+    found = []
+    for before, step in zip((None, *steps), steps, strict=False):
+        if step.kind is StepKind.PLACE:
+            taken = [
+                robot.name
+                for i, robot in enumerate(scene.robots)
+                if step.grips[i] is not None and (before is None or before.grips[i] is None)
+            ]
+            found += taken
+    return found
+
+
+def near(scene, name, *bricks):
+    """A robot that reaches some neighboring bricks and no others."""
+    nodes = {n: np.array(b.node_position(n)) for b in scene.bricks for n in b.nodes}
+    own = [nodes[n] for b in scene.bricks if b.name in bricks for n in b.nodes]
+    center = np.mean(own, axis=0)
+    radius = max(np.linalg.norm(p - center) for p in own) + 1e-6
+    robot = Robot(name=name, payload=400.0, reach=Sphere(center=tuple(center), radius=radius))
+    reached = {b.name for b in scene.bricks if robot.reach.covers(b.node_position(b.nodes[0]))}
+    assert set(bricks) <= reached
+    return robot
+
+
+def with_robots(scene, *robots):
+    return build_network(replace(scene, robots=robots))
+
+
+def test_the_first_two_that_reach_build():
+    """A robot that reaches nothing comes first, and is left out."""
+    scene = small_arch(5)
+    far = Robot(name="far", payload=1.0, reach=Sphere(center=(50.0, 0.0, 0.0), radius=1.0))
+    net = with_robots(scene, far, *anywhere(2))
+    for method in METHODS.values():
+        steps = method(net)
+        assert placers(net.scene, steps)[:2] == ["rob1", "rob2"]
+        assert idle_robots(net.scene, steps) == ("far",)
+    three = with_robots(scene, far, *anywhere(3))
+    for name in ("three-robot", "modified-sequential"):
+        assert idle_robots(three.scene, SCHEDULES[name](three).steps) == ("far",)
+    with pytest.raises(
+        StepError, match="one places bricks 1, 5, all within reach of rob1, rob2, rob3;"
+    ):
+        robot_loop(with_robots(scene, far, *anywhere(3)))
+
+
+def test_a_third_robot_steps_in_where_no_two_are_enough():
+    """Robots beside the ends of a chain reach their end; the mobile one helps as little as can."""
+    scene = small_arch(8)
+    left, right = near(scene, "left", 1, 2, 3, 4), near(scene, "right", 5, 6, 7, 8)
+    net = with_robots(scene, left, right, *anywhere(1))
+    assert placers(net.scene, sequential(net)) == (
+        ["left", "rob1", "left", "rob1", "right", "rob1", "right", "rob1"]
+    )
+
+
+def test_from_both_ends_the_robot_beside_each_end_places_it():
+    scene = from_both_ends(9, "V")
+    left, right = near(scene, "left", 1, 2, 3, 4, 5), near(scene, "right", 5, 6, 7, 8, 9)
+    net = with_robots(scene, right, left)
+    steps = sequential(net)
+    who = dict(zip(scene.build_order, placers(net.scene, steps), strict=True))
+    assert all(who[name] == ("left" if name < 5 else "right") for name in who if name != 5)
+    assert two_robot_loop(net).fill(filled(net)) == steps
+
+
+def filled(net):
+    """Return the node by which the sequential method places every brick."""
+    steps = sequential(net)
+    return [
+        next(n for n in s.held if n in net.scene.placed[s.bricks - 1].nodes)
+        for s in steps
+        if s.kind is StepKind.PLACE
+    ]
+
+
+def test_robots_by_name_take_the_roles_in_their_order():
+    net = build_network(replace(small_arch(7), robots=anywhere(5)))
+    for method in (*METHODS.values(), two_robot_loop):
+        made = method(net, ("rob4", "rob2"))
+        steps = made if isinstance(made, tuple) else made.steps
+        assert placers(net.scene, steps)[:2] == ["rob4", "rob2"]
+        assert idle_robots(net.scene, steps) == ("rob1", "rob3", "rob5")
+    for method in (three_robot_loop, robot_loop, modified_sequential):
+        schedule = method(net, ("rob5", "rob1", "rob3"))
+        assert placers(net.scene, schedule.steps)[:2] == ["rob5", "rob1"]
+        assert schedule.moves[0].robot == "rob3"
+        assert idle_robots(net.scene, schedule.steps) == ("rob2", "rob4")
+    assert robot_loop(net, ("rob5", "rob1", "rob3", "rob2")).method == "four-robot"
+
+
+@pytest.mark.parametrize(
+    ("method", "names", "named"),
+    [
+        (
+            "sequential",
+            ("rob1", "robot"),
+            "robot 'robot': there is no such; give some of rob1, rob2",
+        ),
+        ("sequential", ("rob1", "rob1"), "robots rob1, rob1: one occurs twice"),
+        ("cantilever", ("rob1",), "robots rob1: 1 named; cantilever takes two"),
+        ("two-robot", ("rob1", "rob2", "rob3"), "3 named; two-robot takes two"),
+        ("three-robot", ("rob1", "rob2"), "2 named; three-robot takes three"),
+        ("modified-sequential", ("rob1", "rob2"), "2 named; modified-sequential takes three"),
+        ("loop", ("rob1",), "1 named; two-robot takes two"),
+    ],
+)
+def test_wrong_names_get_one_line(arch25, method, names, named):
+    with pytest.raises(StepError, match=named) as caught:
+        (METHODS | SCHEDULES)[method](build_network(arch25), names)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("method", [*METHODS, *SCHEDULES])
+@pytest.mark.parametrize(
+    ("bricks", "robots"), [(1, 1), (2, 1), (6, 1), (1, 2), (2, 2), (1, 5), (2, 5)]
+)
+def test_few_bricks_and_few_robots_work_or_get_one_line(method, bricks, robots):
+    net = build_network(replace(small_arch(bricks), robots=anywhere(robots)))
+    enough = {"three-robot": (3, 4), "loop": (robots, robots + 1), "modified-sequential": (3, 1)}
+    most, least = enough.get(method, (2, 1))
+    most, least = (2, 1) if method == "loop" and robots < 3 else (most, least)
+    if robots >= most and bricks >= least:
+        made = (METHODS | SCHEDULES)[method](net)
+        assert (made if isinstance(made, tuple) else made.steps)[-1].bricks == bricks
+        return
+    with pytest.raises(StepError, match="this method needs") as caught:
+        (METHODS | SCHEDULES)[method](net)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_brick_that_nobody_reaches_is_named():
+    scene = small_arch(5)
+    net = with_robots(scene, near(scene, "a", 1, 2), near(scene, "b", 1, 2))
+    with pytest.raises(
+        StepError, match=r"brick 3: a and b reach none of its free nodes \[4, 5\]; extend"
+    ):
+        sequential(net)
+    mixed = with_robots(scene, near(scene, "a", 1, 2), *anywhere(1))
+    with pytest.raises(
+        StepError, match=r"a reaches none .*; rob1 does, and holds the brick before"
+    ):
+        sequential(mixed)
+
+
+def test_casting_takes_the_first_robots_that_fit():
+    scene = small_arch(4)
+    robots = (*anywhere(1), near(scene, "low", 1, 2), Robot(name="any", payload=1.0))
+    cast_of = replace(scene, robots=robots)
+    assert cast(cast_of, [{0}, {3}, {1}], [0, 1, 2]) == [0, 2, 1]
+    assert cast(cast_of, [{0}, {3}], [2, 1, 0]) == [2, 0]
+    with pytest.raises(StepError, match="one places bricks 4, all within reach of rob1, any;"):
+        cast(cast_of, [{3}, {3}, {3}], [0, 1, 2])
+
+
+def test_turns_change_as_seldom_as_can_be():
+    scene = small_arch(6)
+    net = with_robots(scene, near(scene, "low", 1, 2, 3), *anywhere(2))
+    every = set(scene.build_order)
+    assert take_turns(net, every, [0, 1, 2]) == [(1, 2), (2, 1)] * 3

@@ -1,0 +1,177 @@
+"""Schedules of one's own, from files."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import pytest
+
+import seqopt
+from seqopt.errors import FileError, StepError
+from seqopt.network.build import build_network
+from seqopt.sequence.schedule_file import (
+    find_schedule,
+    parse_schedule,
+    read_schedule,
+    schedule_text,
+)
+from seqopt.sequence.three_robots import SCHEDULES
+from tests.builders import anywhere, from_both_ends, small_arch
+
+HEADER = "step,type,bricks,rob1_node,rob2_node,rob3_node\n"
+START = HEADER + "1,place,1,1,,\n2,place,2,1,2,\n"
+
+
+@pytest.mark.parametrize("name", SCHEDULES)
+def test_what_is_written_can_be_read(engine25, name):
+    schedule = SCHEDULES[name](engine25.network)
+    text = schedule_text(schedule)
+    assert parse_schedule(engine25.network, text, "x.csv") == replace(schedule, method="x")
+    bare = re.sub(r"\?\d+", "?", text)  # numbers may be left out
+    assert parse_schedule(engine25.network, bare, "x.csv") == replace(schedule, method="x")
+    assert schedule_text(parse_schedule(engine25.network, bare, "x.csv")) == text
+
+
+def test_a_move_lasts_until_its_robot_lets_go(arch25):
+    text = START + "3,reposition,2,1,2,?\n4,release,2,,2,?\n5,place,3,?,2,?\n6,release,3,?,2,\n"
+    schedule = parse_schedule(arch25, text + "7,reposition,3,?,2,?\n", "mine.csv")
+    assert schedule.method == "mine"
+    assert [step.moves for step in schedule.steps] == [
+        (), (), (0,), (0,), (0, 1), (1,), (1, 2)
+    ]  # fmt: skip
+    assert [(m.robot, m.step, m.candidates) for m in schedule.moves] == [
+        ("rob3", 3, (3,)),
+        ("rob1", 5, (4,)),
+        ("rob3", 7, (1, 3, 4, 5)),
+    ]
+
+
+def test_spaces_and_other_columns_do_not_matter(arch25):
+    text = "step,type,bricks,rob1_brick,rob1_node,rob2_node,note,rob3_node\n"
+    text += "1,place,1,1, 1 ,,first, \n2,place,2,1,1,2,, \n3,reposition,2,1,1,2,, ? 1 \n"
+    assert parse_schedule(arch25, text, "x.csv").moves[0].candidates == (3,)
+
+
+@pytest.mark.parametrize(
+    ("text", "named"),
+    [
+        ("", "schedule s.csv: column step is missing; give step, type"),
+        ("step,type,bricks,rob1_node,rob3_node\n", "column rob2_node is missing"),
+        (HEADER, "schedule s.csv: it has no steps; give at least one"),
+        (
+            HEADER.replace("rob3_node", "rob3_node,rob4_node") + "1,place,1,1,,,\n",
+            "column rob4_node: no robot of scene arch25 is called so; give rob1_node",
+        ),
+        (HEADER.replace("rob3", "rob1") + "1,place,1,1,,\n", "column rob3_node is missing"),
+        (
+            HEADER.replace("rob3_node", "rob3_node,rob1_node") + "1,place,1,1,,,\n",
+            "column rob1_node stands there twice",
+        ),
+        (HEADER + "1,put,1,1,,\n", "line 2: type is 'put'; give one of place"),
+        (HEADER + "1,place,one,1,,\n", "line 2: bricks is 'one'; give a whole number"),
+        (HEADER + "1,place,1,1,,,5\n", "line 2: it has more cells than there are columns"),
+        (HEADER + "2,place,1,1,,\n", "line 2: step 2 stands where 1 should"),
+        (START + "3,place,26,1,2,?\n", "line 4: step 3: 26 bricks; the scene has 1 to 25"),
+        (START + "3,place,3,1,2,!\n", "line 4: rob3_node is '!'; give a node, \\? for an open"),
+        (START + "3,place,3,1,2,?x\n", "line 4: rob3_node is '\\?x'; give a node"),
+        (START + "3,place,3,1,2,99\n", "line 4: step 3: rob3 at node 99: there is no such node"),
+        (START + "3,place,3,1,2,1\n", "rob3 at node 1: rob1 holds it; hold another"),
+        (START + "3,place,3,1,2,?2\n", "rob3_node is '\\?2', but this is open grip \\?1"),
+        (
+            START + "3,place,3,1,2,?1\n4,release,3,,2,?1\n5,reposition,3,?1,2,?1\n",
+            "line 6: rob1_node is '\\?1', but this is open grip \\?2",
+        ),
+        (
+            START + "3,place,3,1,2,?1\n4,release,3,,2,?2\n",
+            "line 5: rob3_node is '\\?2', but this is open grip \\?1: .* let rob3 release first",
+        ),
+        (START + "3,place,3,1,?,4\n", "line 4: step 3 .*: rob2 goes from node 2 to \\?1; let it"),
+        (
+            START + "3,place,3,1,2,?\n4,release,3,,2,4\n",
+            "line 5: step 4 .*: rob3 goes from node \\?1 to 4; let it release first",
+        ),
+        (
+            START + "3,release,2,,2,\n4,reposition,2,?,2,?\n",
+            "line 5: step 4 .*: it takes grips \\[\\?1, \\?2\\] and drops \\[\\]",
+        ),
+        (START + "3,release,2,1,2,?\n", "line 4: step 3 .*: it takes grips \\[\\?1\\]"),
+        (
+            START + "3,place,3,1,2,?\n4,release,3,,2,?\n5,reposition,3,?,2,?\n"
+            "6,release,3,?,,?\n7,reposition,3,?,?,?\n",
+            "schedule s.csv: step 7: moves \\[1, 2, 3\\] are open at once",
+        ),
+        (
+            START + "3,release,2,,2,\n4,place,3,1,2,\n",
+            "line 5: step 4 .*: its new grip is on node 1; hold brick 3 at one of",
+        ),
+    ],
+)
+def test_schedule_files_are_checked(arch25, text, named):
+    with pytest.raises(StepError, match=named) as caught:
+        parse_schedule(arch25, text, "s.csv")
+    assert "\n" not in str(caught.value)
+    assert str(caught.value).startswith("schedule s.csv")
+
+
+def test_a_move_to_which_nothing_is_open_is_named(arch25):
+    text = HEADER + "1,place,1,1,,\n2,reposition,1,1,?,\n"
+    with pytest.raises(
+        StepError, match=r"step 2 \(reposition\): no node is open to rob2"
+    ) as caught:
+        parse_schedule(arch25, text, "s.csv")
+    assert str(caught.value).startswith("schedule s.csv: step 2")
+
+
+def test_a_part_that_nobody_is_sure_to_hold_is_named():
+    scene = replace(small_arch(5), build_order=(1, 3, 2, 4, 5))
+    text = HEADER + "1,place,1,1,,\n2,place,2,1,?,\n3,release,2,1,,\n"
+    with pytest.raises(StepError, match=r"s.csv: step 3 \(release\): brick 3 hangs free"):
+        parse_schedule(scene, text, "s.csv")
+
+
+def test_schedules_are_found_by_name_file_and_value(engine25, loop25, tmp_path):
+    network, path = engine25.network, tmp_path / "own.csv"
+    path.write_text(schedule_text(loop25), encoding="utf-8")
+    own = replace(loop25, method="own")
+    assert read_schedule(network.scene, path) == read_schedule(network, path) == own
+    assert find_schedule(network, path) == find_schedule(network, str(path)) == own
+    assert find_schedule(network, "three-robot") == find_schedule(network, loop25) == loop25
+    named = find_schedule(network, "two-robot", ("rob3", "rob1"))
+    assert [move.robot for move in named.moves[:2]] == ["rob3", "rob1"]
+
+
+def test_what_cannot_be_found_gets_one_line(engine25, loop25, tmp_path):
+    network = engine25.network
+    with pytest.raises(StepError, match=r"schedule 'ring': .* three-robot, .*loop, or a CSV file"):
+        find_schedule(network, "ring")
+    with pytest.raises(FileError, match=r"cannot read .*none.csv"):
+        find_schedule(network, tmp_path / "none.csv")
+    with pytest.raises(StepError, match="schedule three-robot: it is of scene arch25, not of this"):
+        find_schedule(build_network(small_arch(5)), loop25)
+    with pytest.raises(StepError, match="robots rob1, rob2: only a schedule by name takes them"):
+        find_schedule(network, loop25, ("rob1", "rob2"))
+
+
+def test_a_schedule_of_ones_own_is_optimized(arch25, loop25, tmp_path):
+    """From a file, given whole and by name it is the same problem."""
+    path = tmp_path / "own.csv"
+    path.write_text(schedule_text(loop25), encoding="utf-8")
+    plans = [seqopt.optimize(arch25, schedule) for schedule in ("three-robot", loop25, path)]
+    assert len({plan.nodes for plan in plans}) == 1
+    assert plans[2].summary()["schedule"] == "own"
+
+
+def test_two_teams_build_from_both_ends_by_a_file():
+    """What no method writes: two robots at each end, one of them free to hold where it is best."""
+    scene = replace(from_both_ends(5, "V"), robots=anywhere(4))
+    assert scene.build_order == (1, 5, 2, 4, 3)
+    text = "step,type,bricks,rob1_node,rob2_node,rob3_node,rob4_node\n"
+    rows = ["place,1,1,,,", "place,2,1,,9,", "place,3,1,2,9,", "release,3,,2,9,"]
+    rows += ["reposition,3,?,2,9,", "place,4,?,2,9,7", "release,4,?,2,,7", "reposition,4,?,2,?,7"]
+    rows += ["release,4,,2,?,7", "place,5,5,2,?,7"]
+    text += "".join(f"{k},{row}\n" for k, row in enumerate(rows, start=1))
+    plan = seqopt.optimize(scene, parse_schedule(scene, text, "both.csv"), "weighted")
+    assert plan.certificate.gap <= 1e-9
+    assert len(plan.nodes) == 2
+    assert plan.summary()["idle_robots"] == []

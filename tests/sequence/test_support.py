@@ -1,0 +1,188 @@
+"""What stands by itself: islands, and methods on builds that are not chains."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from experiments.harness.walls import running_bond
+from seqopt.errors import StepError
+from seqopt.network.build import build_network
+from seqopt.scene.arch import ArchShape, arch_scene
+from seqopt.sequence.moves import open_schedule
+from seqopt.sequence.roles import take_turns
+from seqopt.sequence.schedule import OpenGrip, OpenStep
+from seqopt.sequence.steps import Step, StepKind
+from seqopt.sequence.stretches import begins_elsewhere, degeneration, lies_along
+from seqopt.sequence.support import check_support, islands
+from seqopt.sequence.three_robots import three_robot_loop
+from seqopt.sequence.two_robots import alternate, cantilever, placing_node, sequential
+from tests.builders import anywhere, branch, from_both_ends, small_arch
+
+
+def ordered(scene, *names):
+    return build_network(replace(scene, build_order=names))
+
+
+def test_islands_are_the_parts_that_no_joint_ties_to_the_ground():
+    network = ordered(small_arch(6), 1, 3, 5, 4, 6, 2)
+    found = [[sorted(part) for part in islands(network, count)] for count in range(1, 7)]
+    assert found == [[], [[3]], [[3], [5]], [[3, 4, 5]], [], []]  # brick 6 stands on the far end
+
+
+def test_a_joint_that_resists_nothing_ties_nothing():
+    scene = replace(small_arch(3), grounds=small_arch(3).grounds[:1])
+    turning = replace(scene.joints[0], translational_stiffness=(0.0,) * 3)
+    nothing = replace(turning, rotational_stiffness=(0.0,) * 3)
+    for joint, found in ((turning, ()), (nothing, (frozenset({2, 3}),))):
+        network = build_network(replace(scene, joints=(joint, scene.joints[1])))
+        assert islands(network, 3) == found
+
+
+def test_a_brick_set_ahead_is_held_until_it_is_tied():
+    network = ordered(small_arch(4), 1, 3, 2, 4)
+    for method in (sequential, cantilever):
+        steps = method(network)
+        for step in steps:
+            if step.bricks == 2:
+                assert set(step.held) & set(network.scene.placed[1].nodes)
+
+
+@pytest.mark.parametrize("method", [sequential, cantilever])
+def test_two_islands_are_too_many_for_two_robots(method):
+    network = ordered(small_arch(6), 1, 3, 5, 2, 4, 6)
+    with pytest.raises(StepError, match=r"step 5 \(release\): brick 3 hangs free"):
+        method(network)
+
+
+def test_an_open_grip_holds_an_island_only_if_every_candidate_is_on_it():
+    network = ordered(small_arch(5), 1, 3, 2, 4, 5)
+    first = OpenStep(1, StepKind.PLACE, 1, (1, None, None))
+    second = OpenStep(2, StepKind.PLACE, 2, (1, OpenGrip(0), None))
+    assert len(open_schedule("x", network, [first, second]).moves[0].candidates) == 2
+    held = replace(second, grips=(1, 4, None))
+    let_go = OpenStep(3, StepKind.RELEASE, 2, (None, 4, None))
+    third = OpenStep(4, StepKind.REPOSITION, 2, (None, 4, OpenGrip(0)))
+    loose = OpenStep(5, StepKind.RELEASE, 2, (None, None, OpenGrip(0)))
+    steps = [first, held, let_go, third]
+    assert open_schedule("x", network, steps).moves[0].candidates == (1, 5)
+    with pytest.raises(StepError, match=r"step 5 \(release\): brick 3 hangs free"):
+        open_schedule("x", network, [*steps, loose])
+
+
+def test_support_is_checked_step_by_step():
+    network = ordered(small_arch(5), 1, 3, 2, 4, 5)
+    good = [Step(1, StepKind.PLACE, 1, (1, None)), Step(2, StepKind.PLACE, 2, (1, 4))]
+    check_support(network, good)
+    with pytest.raises(StepError, match=r"step 3 \(release\): brick 3 hangs free"):
+        check_support(network, [*good, Step(3, StepKind.RELEASE, 2, (1, None))])
+
+
+def grows_from_what_is_held(network, steps):
+    """Return at which steps the newest brick extends no held one.
+
+    It must be reached from a held brick over joints between bricks placed since that one.
+    """
+    scene = network.scene
+    index = {brick.name: k for k, brick in enumerate(scene.placed)}
+    pairs = [{index[b] for b in joint.bricks} for joint in scene.joints]
+    out = []
+    for step in steps:
+        if not step.held:
+            continue
+        newest = step.bricks - 1
+        held = {index[scene.brick_of_node[node].name] for node in step.held}
+        if not any(newest in _since(pairs, start, newest) for start in held):
+            out.append(step.number)
+    return out
+
+
+def _since(pairs, start, newest):
+    found = {start}
+    for _ in range(start, newest + 1):
+        found |= {b for pair in pairs if pair & found for b in pair if start <= b <= newest}
+    return found
+
+
+CROSS = [*range(1, 7), *range(12, 6, -1)]  # one side of an arch, then the other
+
+
+@pytest.mark.parametrize(
+    "scene",
+    [
+        small_arch(12),
+        from_both_ends(11),
+        from_both_ends(12, order=CROSS),
+        running_bond(3, 3),
+        running_bond(4, 2),
+        branch(),
+        replace(branch(), build_order=(1, 2, 3, 5, 4, 6)),
+    ],
+    ids=lambda s: s.name,
+)
+def test_the_cantilever_method_holds_where_the_build_goes_on(scene):
+    network = build_network(replace(scene, robots=anywhere(2)))
+    assert grows_from_what_is_held(network, cantilever(network)) == []
+    assert grows_from_what_is_held(network, sequential(network)) == []
+
+
+def test_that_bricks_lie_along_is_not_enough_where_ends_take_turns():
+    """Held only after bricks that lie along, one end was placed while the other was held."""
+    network = build_network(replace(from_both_ends(11), robots=anywhere(2)))
+    scene, along = network.scene, lies_along(network)
+    pairs = take_turns(network, along, [0, 1])
+
+    def node(robot, count):
+        return placing_node(network, scene.robots[robot], scene.placed[count - 1])
+
+    parts = alternate(network, along, pairs, node)
+    steps = [Step(number, *part) for number, part in enumerate(parts, start=1)]
+    assert grows_from_what_is_held(network, steps)
+
+
+def test_in_a_chain_only_the_first_brick_begins_elsewhere(engine25):
+    assert begins_elsewhere(engine25.network) == {1}
+    assert degeneration(engine25.network, "cantilever") == ""
+    assert degeneration(engine25.network, "sequential") == ""
+
+
+@pytest.mark.parametrize(
+    ("scene", "reason"),
+    [
+        (running_bond(3, 1), "no brick extends one that is held"),
+        (running_bond(4, 3), "it is the sequential method here"),
+        (branch(), "no brick extends one that is held"),
+        (from_both_ends(9), "no brick extends one that is held"),
+        (from_both_ends(9, "V"), "every brick lies along"),
+        (small_arch(2), "no bricks lie between"),
+    ],
+    ids=lambda value: getattr(value, "name", ""),
+)
+def test_where_the_cantilever_method_is_the_sequential_one_it_says_so(scene, reason):
+    network = build_network(replace(scene, robots=anywhere(2)))
+    assert reason in degeneration(network, "cantilever")
+    assert cantilever(network) == sequential(network)
+
+
+def test_where_nothing_lies_along_the_first_brick_is_held_until_the_end():
+    network = build_network(arch_scene(ArchShape(pitch=(1.2, 0.7, 0.2, -0.3), pattern="LR")))
+    text = "no brick lies along the structure: brick 1 is held until the end"
+    assert degeneration(network, "cantilever") == text
+    first = set(network.scene.placed[0].nodes)
+    assert all(set(step.held) & first for step in cantilever(network)[:-1])
+
+
+def test_it_is_itself_where_one_side_is_built_after_the_other():
+    network = build_network(replace(from_both_ends(12, order=CROSS), robots=anywhere(2)))
+    assert degeneration(network, "cantilever") == ""
+    assert begins_elsewhere(network) == {1, 12}
+    assert cantilever(network) != sequential(network)
+
+
+def test_three_robots_hold_an_island_while_they_can():
+    ahead = ordered(replace(small_arch(6), robots=anywhere(3)), 1, 3, 2, 4, 5, 6)
+    assert three_robot_loop(ahead).steps
+    one_end = replace(small_arch(6), grounds=small_arch(6).grounds[:1], robots=anywhere(3))
+    with pytest.raises(StepError, match="free: no joint leads to a ground end"):
+        three_robot_loop(ordered(one_end, 1, 3, 5, 6, 2, 4))
