@@ -20,10 +20,11 @@ import pandas as pd
 from experiments.robustness.parts.mutations import Case, write_case
 from seqopt.cli.main import main
 from seqopt.cli.status import Status
-from seqopt.responses.quantities import RESPONSES
+from seqopt.responses.quantities import RESPONSES, robot_response
 
 LONGEST = 60.0  # s; a case that takes longer hangs
 ENDS = {status.value for status in Status} - {Status.INTERRUPTED.value}
+STARTS = ("seqopt", "engine: ", "robots: ", "payload: ")  # of lines on standard error
 SET = {"plan.csv", "selection.csv", "responses.csv", "summary.json"}
 
 
@@ -85,7 +86,7 @@ def _fault(case: Case, folder: Path, status: int, said: tuple[str, str]) -> str:
     lines = said[1].splitlines()
     if status >= Status.BAD_INPUT and not (lines and lines[-1].startswith("seqopt")):
         return f"status {status} without a reason: {said[1][:200]!r}"
-    if any(not line.startswith(("seqopt", "engine: ")) for line in lines):
+    if any(not line.startswith(STARTS) for line in lines):
         return f"more than lines of its own on standard error: {said[1][:300]!r}"
     if "\x1b" in said[0] + said[1]:
         return "a sign that steers a terminal"
@@ -149,9 +150,8 @@ def _fault_of_table(text: str) -> str:
     columns = [r.column for r in RESPONSES.values()]
     if not np.isfinite(table[columns].to_numpy(float)).all():
         return "a response is not finite"
-    held = [c for c in table if c.endswith("_node")]
-    forces = [c for c in table if c.startswith("F_") and c.endswith("_N") and c not in columns]
-    for node, force in zip(held, forces, strict=True):
+    for node in (column for column in table if column.endswith("_node")):
+        force = f"{robot_response(node.removesuffix('_node'))}_N"
         if not (table[node].notna() == np.isfinite(table[force].astype(float))).all():
             return f"{force}: a robot that grips has no force"
     return ""

@@ -1,4 +1,4 @@
-"""Scenes, plans and words of the command line, changed at random from some that are right."""
+"""Scenes, plans and words, changed at random from some that are right."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from experiments.harness.walls import running_bond
+from experiments.robustness.parts.wording import pick, right_words, wrong_words
 from seqopt.network.build import build_network
-from seqopt.placement.formulation import formulation_names
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import dump_scene
@@ -54,8 +54,6 @@ ODD_WORDS = (
 ODD_VALUES = (*ODD_NUMBERS, *ODD_WORDS, None, True, [], {}, [1, 2, 3], float("nan"), float("inf"))
 NESTED = "[" * 5000 + "]" * 5000
 SIGNS = '{}[]",:.-+eE0123456789 \n\t\x00abc\ufeff'
-COMMANDS = ("scene", "analyze", "optimize", "assess", "compare")
-SHARES = (0.3, 0.3, 0.25, 0.1, 0.05)  # of the commands
 
 
 @dataclass(frozen=True)
@@ -114,14 +112,14 @@ class Mutator:
         rng = np.random.default_rng(number)
         document, plan = self._base[rng.integers(len(self._base))]
         kind = str(rng.choice(["scene", "scene", "scene", "plan", "words", "nothing"]))
-        words = _words(rng, plan=kind == "plan")
+        words = right_words(rng, plan=kind == "plan")
         scene = json.dumps(document)
         if kind == "scene":
             scene = _changed_scene(rng, document)
         elif kind == "plan":
             plan = _changed_plan(rng, plan)
         elif kind == "words":
-            words = _changed_words(rng, words)
+            words = wrong_words(rng, words)
         return Case(kind, words, scene.encode(errors="surrogatepass"), plan.encode())
 
 
@@ -131,17 +129,13 @@ def write_case(case: Case, folder: Path) -> None:
     (folder / "plan.csv").write_bytes(case.plan)
 
 
-def _pick(rng: np.random.Generator, things: Sequence[Any]) -> Any:
-    return things[int(rng.integers(len(things)))]
-
-
 # scenes
 
 
 def _changed_scene(rng: np.random.Generator, document: dict[str, Any]) -> str:
     out = copy.deepcopy(document)
     for _ in range(int(rng.integers(1, 4))):
-        _pick(rng, CHANGES)(rng, out)
+        pick(rng, CHANGES)(rng, out)
     text = json.dumps(out)
     return _noise(rng, text) if rng.random() < 0.1 else text
 
@@ -157,32 +151,32 @@ def _places(value: Any) -> list[tuple[Any, Any]]:
 
 
 def _replaced(rng: np.random.Generator, document: dict[str, Any]) -> None:
-    holder, key = _pick(rng, _places(document))
-    holder[key] = _pick(rng, ODD_VALUES)
+    holder, key = pick(rng, _places(document))
+    holder[key] = pick(rng, ODD_VALUES)
 
 
 def _scaled(rng: np.random.Generator, document: dict[str, Any]) -> None:
     numbers = [(h, k) for h, k in _places(document) if type(h[k]) is float]
     if numbers:
-        holder, key = _pick(rng, numbers)
-        holder[key] *= _pick(rng, (-1, 0, 1.001, 0.999, 10, 1e-3, 1e3, 1e9, 1e-12, 1e150))
+        holder, key = pick(rng, numbers)
+        holder[key] *= pick(rng, (-1, 0, 1.001, 0.999, 10, 1e-3, 1e3, 1e9, 1e-12, 1e150))
 
 
 def _removed(rng: np.random.Generator, document: dict[str, Any]) -> None:
-    holder, key = _pick(rng, _places(document))
+    holder, key = pick(rng, _places(document))
     del holder[key]
 
 
 def _doubled(rng: np.random.Generator, document: dict[str, Any]) -> None:
     lists = [(h, k) for h, k in _places(document) if isinstance(h[k], list) and h[k]]
     if lists:
-        holder, key = _pick(rng, lists)
-        holder[key].append(copy.deepcopy(_pick(rng, holder[key])))
+        holder, key = pick(rng, lists)
+        holder[key].append(copy.deepcopy(pick(rng, holder[key])))
 
 
 def _swapped(rng: np.random.Generator, document: dict[str, Any]) -> None:
     places = _places(document)
-    (first, i), (second, j) = _pick(rng, places), _pick(rng, places)
+    (first, i), (second, j) = pick(rng, places), pick(rng, places)
     try:
         first[i], second[j] = copy.deepcopy(second[j]), copy.deepcopy(first[i])
     except (KeyError, IndexError):
@@ -194,21 +188,21 @@ def _plausible(rng: np.random.Generator, document: dict[str, Any]) -> None:
     springs = [*_list(document, "joints"), *_list(document, "grounds")]
     bricks, robots = _list(document, "bricks"), _list(document, "robots")
     what = int(rng.integers(6))
-    value = _pick(rng, ODD_NUMBERS)
+    value = pick(rng, ODD_NUMBERS)
     if what == 0 and springs:
-        _pick(rng, springs)[_pick(rng, ("translational_stiffness", "rotational_stiffness"))] = (
+        pick(rng, springs)[pick(rng, ("translational_stiffness", "rotational_stiffness"))] = (
             rng.permutation([value, 1e8, 0.0]).tolist() if value != 10**400 else [value] * 3
         )
     elif what == 1 and springs and bricks:
-        _pick(rng, springs)["position"] = copy.deepcopy(_pick(rng, bricks).get("position"))
+        pick(rng, springs)["position"] = copy.deepcopy(pick(rng, bricks).get("position"))
     elif what == 2 and bricks:
-        _pick(rng, bricks)[_pick(rng, ("density", "position", "dimensions"))] = _pick(
+        pick(rng, bricks)[pick(rng, ("density", "position", "dimensions"))] = pick(
             rng, (value, [value] * 3, [0.2, 0.1, 0.05])
         )
     elif what == 3:
         document["gravity"] = [0.0, 0.0, value]
     elif what == 4 and robots:
-        _pick(rng, robots).update(name=_pick(rng, ODD_WORDS), payload=value)
+        pick(rng, robots).update(name=pick(rng, ODD_WORDS), payload=value)
     elif isinstance(document.get("build_order"), list):
         document["build_order"] = rng.permutation(len(document["build_order"]) + 1).tolist()[1:]
 
@@ -239,7 +233,7 @@ def _noise(rng: np.random.Generator, text: str) -> str:
     if what == 1:
         return text[:at] + text[at + 1 :]
     if what == 2:
-        return text[:at] + _pick(rng, SIGNS) + text[at:]
+        return text[:at] + pick(rng, SIGNS) + text[at:]
     if what == 3:
         return text[:at] + text[at // 2 :]
     return text[:at] + NESTED + text[at:]
@@ -251,95 +245,18 @@ def _noise(rng: np.random.Generator, text: str) -> str:
 def _changed_plan(rng: np.random.Generator, plan: str) -> str:
     rows = [line.split(",") for line in plan.strip().split("\n")]
     for _ in range(int(rng.integers(1, 4))):
-        row = _pick(rng, rows)
+        row = pick(rng, rows)
         what = int(rng.integers(5))
         if what == 0 and row:
-            row[int(rng.integers(len(row)))] = str(_pick(rng, ODD_VALUES))
+            row[int(rng.integers(len(row)))] = str(pick(rng, ODD_VALUES))
         elif what == 1 and len(rows) > 1:
             rows.remove(row)
         elif what == 2:
             rows.insert(int(rng.integers(len(rows) + 1)), list(row))
         elif what == 3:
-            row.append(_pick(rng, ("", "1", "step", "rob1_node")))
+            row.append(pick(rng, ("", "1", "step", "rob1_node")))
         else:
             row[-1:] = [str(int(rng.integers(-2, 14)))]
     text = "\n".join(",".join(row) for row in rows) + "\n"
     text = _noise(rng, text) if rng.random() < 0.2 else text
     return text.encode(errors="replace").decode()
-
-
-# words
-
-
-def _words(rng: np.random.Generator, *, plan: bool) -> tuple[str, ...]:
-    """Return a command that is right."""
-    steps = ["analyze", "assess"]
-    command = str(rng.choice(steps if plan else COMMANDS, p=(0.85, 0.15) if plan else SHARES))
-    return (command, "scene.json", *MORE[command](rng, plan))
-
-
-def _engine(rng: np.random.Generator) -> list[str]:
-    engine = str(rng.choice(["compliance", "frame", "planar", "auto", "discrete"]))
-    mortar = ["--mortar", "dry"] if engine in ("auto", "discrete") and rng.random() < 0.3 else []
-    return ["--engine", engine, *mortar] if rng.random() < 0.5 else []
-
-
-def _steps(rng: np.random.Generator, plan: bool) -> list[str]:  # noqa: FBT001  # one of two
-    return ["--plan", "plan.csv"] if plan else ["--method", _pick(rng, tuple(METHODS))]
-
-
-def _out(rng: np.random.Generator, name: str) -> list[str]:
-    return ["--out", name] if rng.random() < 0.7 else []
-
-
-def _strict(rng: np.random.Generator) -> list[str]:
-    return ["--strict"] if rng.random() < 0.2 else []
-
-
-def _optimize(rng: np.random.Generator, _: object) -> list[str]:
-    schedule = _pick(rng, ("three-robot", "modified-sequential"))
-    criterion = _pick(rng, ("equations-2-3", "worst-ratio", "T_max,M_sup=2", "F_each", "D_max"))
-    limit = _pick(rng, ([], [], ["--limit", "payload"], ["--limit", "T_max=1e3"]))
-    formulation = _pick(rng, formulation_names())
-    return [
-        *("--formulation", formulation, "--schedule", schedule, "--criteria", criterion),
-        *(*limit, "--out", "out", *_engine(rng), *_strict(rng)),
-    ]
-
-
-MORE: dict[str, Callable[[np.random.Generator, bool], list[str]]] = {
-    "scene": lambda rng, _: ["--export", "out.json"] if rng.random() < 0.5 else [],
-    "analyze": lambda rng, plan: [
-        *(*_steps(rng, plan), *_engine(rng), *_out(rng, "out.csv"), *_strict(rng)),
-        *(["--fields", "out.npz"] if rng.random() < 0.2 else []),
-    ],
-    "optimize": _optimize,
-    "assess": lambda rng, plan: [
-        *(*_steps(rng, plan), *_out(rng, "out.csv")),
-        *(["--mortar", "dry"] if rng.random() < 0.5 else []),
-    ],
-    "compare": lambda rng, _: _strict(rng),
-}
-WRONG_WORDS = (
-    *("--out", "--plan", "--limit", "--option", "--criteria", "--export", "--fields", "--no-proof"),
-    *("scene.json", "plan.csv", "out/deep/er", "/dev/null", "/dev/full", "/nowhere/out", ".", ""),
-    *("width=0", "width=-3", "width=10000000", "horizon=2", "charge=later", "F_rob1=1", "F_sup=1"),
-    *("T_max=nan", "T_max=1e-320", "payload", "1e400", "-1", "\udcff", "\x1b[31m", "x" * 5000),
-    *("--friction", "--cohesion", "--tensile-strength", "1e-300", "1e300", "--strict", "--help"),
-)
-
-
-def _changed_words(rng: np.random.Generator, words: tuple[str, ...]) -> tuple[str, ...]:
-    out = list(words)
-    for _ in range(int(rng.integers(1, 4))):
-        at = int(rng.integers(len(out) + 1))
-        what = int(rng.integers(3))
-        if what == 0 and at < len(out):
-            out[at] = _pick(rng, WRONG_WORDS)
-        elif what == 1 and at < len(out):
-            del out[at]
-        else:
-            out.insert(at, _pick(rng, WRONG_WORDS))
-        if not out:
-            return ("scene",)
-    return tuple(out)
