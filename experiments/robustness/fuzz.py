@@ -16,6 +16,8 @@ Then programs are ended from outside at 50 random moments (SIGKILL, SIGTERM and 
 half while they optimize, half while they do nothing but write. They must leave nothing or whole
 folders. After SIGKILL, which no program can answer, a hidden folder may be left beside them.
 
+Optimizing is not drawn with discrete elements, which take minutes for hundreds of grip sets.
+
 Inputs: five small scenes. Command: ``python -m experiments.robustness.fuzz [--quick] [--cases N]``.
 Writes ``experiments/results/fuzz.csv`` and ``fuzz_kills.csv``.
 """
