@@ -86,7 +86,7 @@ def test_degrees_are_noticed(name):
     ("change", "status"),
     [
         (lambda d: d.update(gravity=[0, 0, -1e160]), 2),
-        (lambda d: [j.update(rotational_stiffness=[1e-160] * 3) for j in d["joints"]], 3),
+        (lambda d: [j.update(rotational_stiffness=[1e-160] * 3) for j in d["joints"]], 2),
         (lambda d: d["joints"][1].update(position=[1e308, 0, 0]), 2),
     ],
 )

@@ -18,6 +18,7 @@ from scipy import sparse
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.engines.basis import SPACE, Basis
+from seqopt.engines.failures import failing_in_a_line
 from seqopt.engines.interface import (
     Fields,
     Want,
@@ -70,6 +71,7 @@ class ComplianceEngine:
         """The network whose nodes and edges the fields follow."""
         return self._network
 
+    @failing_in_a_line
     def solve(self, bricks: int, grips: ArrayLike, want: Want = Want.RESPONSES) -> Fields:
         """Return the fields of a partial structure for many grip sets.
 
