@@ -128,9 +128,10 @@ class AutoEngine:
         sets = np.asarray(grips).reshape(columns.shape)
         asked = want if self._limits is None else want | Want.JOINTS
         flat = self._flat(columns)
-        fields = self._rigid.solve(bricks, sets[~flat], asked)
+        fields = keep_wanted(self._rigid.solve(bricks, sets[~flat], asked), asked)
         if self._planar is not None and flat.any():
-            fields = merge_sets(flat, self._planar.solve(bricks, sets[flat], asked), fields)
+            found = keep_wanted(self._planar.solve(bricks, sets[flat], asked), asked)
+            fields = merge_sets(flat, found, fields)
         beyond = np.zeros(len(sets), dtype=bool)
         if self._limits is not None:
             beyond = self._limits.exceeded(fields.joint_wrench)

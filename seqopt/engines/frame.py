@@ -19,6 +19,7 @@ from scipy import sparse
 from scipy.sparse.linalg import SuperLU, splu
 
 from seqopt.arrays import Floats, Ints
+from seqopt.engines.failures import failing_in_a_line
 from seqopt.engines.interface import (
     Fields,
     Want,
@@ -60,6 +61,7 @@ class FrameEngine:
         """The network whose nodes and edges the fields follow."""
         return self._network
 
+    @failing_in_a_line
     def solve(self, bricks: int, grips: ArrayLike, want: Want = Want.RESPONSES) -> Fields:
         """Return the fields of a partial structure for many grip sets.
 

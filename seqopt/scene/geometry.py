@@ -82,9 +82,14 @@ def check_springs(springs: Sequence[Joint | Ground], bricks: Mapping[int, Brick]
         for name, point in points.items():
             if max(map(abs, point)) > farthest:
                 raise SceneError(f"{where}: {name} is {list(point)}; move it to its bricks")
-        stiffest = max(*spring.translational_stiffness, *spring.rotational_stiffness)
-        if stiffest > HEAVY:
-            raise SceneError(f"{where}: a stiffness is {stiffest:g}; give at most {HEAVY:g}")
+        stiffness = (*spring.translational_stiffness, *spring.rotational_stiffness)
+        stiffest = max(stiffness)
+        softest = min(filter(None, stiffness), default=1.0)
+        if stiffest > HEAVY or softest < 1 / HEAVY:
+            wrong = stiffest if stiffest > HEAVY else softest
+            raise SceneError(
+                f"{where}: a stiffness is {wrong:g}; give 0, or from {1 / HEAVY:g} to {HEAVY:g}"
+            )
         for brick in (bricks[end] for end in ends):
             _check_edges(where, spring, brick)
 

@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from experiments.harness.walls import running_bond
 from seqopt.contact.elastic_limits import find_elastic_limits
-from seqopt.contact.mortar import EPOXY, Mortar
+from seqopt.contact.mortar import DRY, EPOXY, Mortar
 from seqopt.engines.auto import BEYOND, IN_PLANE, AutoEngine, Level
 from seqopt.engines.interface import Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
@@ -44,3 +45,17 @@ def test_contact_is_modeled_where_a_joint_would_leave_its_limits(share):
     (choice,) = engine.tally
     assert choice.level is (Level.DISCRETE if share < 1 else Level.RIGID)
     assert (choice == BEYOND) == (share < 1)
+
+
+@pytest.mark.parametrize("mortar", [EPOXY, DRY], ids=["epoxy", "dry"])
+def test_levels_join_where_a_joint_has_no_stiffness(mortar):
+    """Rigid bricks then answer with more than was asked for."""
+    wall = running_bond(2, 2)
+    loose = replace(wall.grounds[1], translational_stiffness=(1e8, 0.0, 0.0))
+    net = build_network(replace(wall, grounds=(wall.grounds[0], loose)))
+    engine = AutoEngine(net, mortar)
+    found = engine.solve(2, np.array([[2, 4], [4, 2], [3, 5]]), Want.RESPONSES)
+    assert found.brick_twist.shape == (3, 0, 6)
+    exact = ComplianceEngine(net).solve(2, np.array([[2, 4], [4, 2], [3, 5]]), Want.RESPONSES)
+    assert found.displacement.shape == exact.displacement.shape
+    assert np.isfinite(found.displacement).all()

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
+from experiments.harness.walls import running_bond
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import Engine, Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
@@ -54,6 +55,16 @@ def test_an_engine_of_ones_own_is_held_to_finite_numbers(field, value, named):
             analyze(engine, sequential(network))
         with pytest.raises(SolverError, match=f"({named}) is not finite"):
             _ = problem.sums
+
+
+def test_what_a_library_raises_is_an_error_of_ours():
+    """A stiffness whose inverse is no number, past the scene's own check."""
+    network = build_network(running_bond(2, 2))
+    springs = network.springs
+    soft = np.full_like(springs.translational_stiffness, 1e-320)
+    weak = replace(network, springs=replace(springs, translational_stiffness=soft))
+    with np.errstate(all="ignore"), pytest.raises(SolverError, match="beyond all bounds"):
+        ComplianceEngine(weak).solve(4, np.array([[2]]))
 
 
 @pytest.mark.parametrize("engine", [ComplianceEngine, FrameEngine])

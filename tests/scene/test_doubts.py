@@ -86,13 +86,13 @@ def test_degrees_are_noticed(name):
     ("change", "status"),
     [
         (lambda d: d.update(gravity=[0, 0, -1e160]), 2),
-        (lambda d: [j.update(rotational_stiffness=[1e-160] * 3) for j in d["joints"]], 4),
+        (lambda d: [j.update(rotational_stiffness=[1e-160] * 3) for j in d["joints"]], 2),
         (lambda d: d["joints"][1].update(position=[1e308, 0, 0]), 2),
     ],
 )
 @pytest.mark.parametrize("engine", ["compliance", "frame"])
 def test_an_infinite_result_is_none(capsys, tmp_path, change, status, engine):
-    """They ended with status 0 and infinite or empty columns; soft joints fail the solver."""
+    """They ended with status 0 and infinite or empty columns."""
     document = json.loads(dump_scene(SCENE))
     change(document)
     path = tmp_path / "scene.json"
@@ -101,4 +101,4 @@ def test_an_infinite_result_is_none(capsys, tmp_path, change, status, engine):
     assert main(words) == status
     out, err = capsys.readouterr()
     assert out == ""
-    assert ("seqopt: solver failed:" if status == 4 else "seqopt: error:") in err
+    assert "seqopt: error:" in err

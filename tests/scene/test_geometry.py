@@ -44,6 +44,12 @@ NODE = SCENE.node_position(3)
             {"translational_stiffness": (1e300,) * 3},
             r"joint \(2, 3\): a stiffness is 1e\+300",
         ),
+        (
+            "joints",
+            1,
+            {"rotational_stiffness": (1e-160, 1e6, 1e6)},
+            r"joint \(2, 3\): a stiffness is 1e-160; give 0",
+        ),
     ],
 )
 def test_what_leaves_nothing_to_compute_is_refused(kind, index, change, named):

@@ -22,6 +22,7 @@ from seqopt.contact.mortar import EPOXY, Mortar
 from seqopt.engines.discrete.equilibrium_path import Held, Settled, settle
 from seqopt.engines.discrete.pads import Pinch, pad_stiffness
 from seqopt.engines.discrete.system import BedStiffness, System, build_system
+from seqopt.engines.failures import failing_in_a_line
 from seqopt.engines.interface import (
     Fields,
     Want,
@@ -72,6 +73,7 @@ class DiscreteEngine:
         """The network whose nodes and edges the fields follow."""
         return self._network
 
+    @failing_in_a_line
     def solve(self, bricks: int, grips: ArrayLike, want: Want = Want.RESPONSES) -> Fields:
         """Return the fields of a partial structure for many grip sets.
 

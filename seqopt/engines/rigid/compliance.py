@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.engines.basis import SPACE, Basis
+from seqopt.engines.failures import failing_in_a_line
 from seqopt.engines.interface import (
     NAMES,
     Fields,
@@ -66,6 +67,7 @@ class ComplianceEngine:
         """The network whose nodes and edges the fields follow."""
         return self._network
 
+    @failing_in_a_line
     def solve(self, bricks: int, grips: ArrayLike, want: Want = Want.RESPONSES) -> Fields:
         """Return the fields of a partial structure for many grip sets.
 
