@@ -1,0 +1,283 @@
+"""Domes of any size, in running bond or in herringbone."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from seqopt.arrays import Floats
+from seqopt.errors import SceneError
+from seqopt.scene.boxes import require_apart
+from seqopt.scene.checks import positive, short
+from seqopt.scene.library.herringbone import REPEAT, tiles
+from seqopt.scene.library.joints import (
+    MASONRY,
+    JointLaw,
+    as_vector,
+    ground_under,
+    joints_between,
+)
+from seqopt.scene.library.laying import joint_width, mobile_robots, touching_order, whole_number
+from seqopt.scene.parts import Brick, Robot
+from seqopt.scene.scene import Scene
+
+BONDS = ("running", "herringbone")
+LEAST_SHARE = 0.25  # of the shorter brick: what lies less far on another has no joint with it
+TURN = 2 * math.pi
+
+
+@dataclass(frozen=True, kw_only=True)
+class DomeShape:
+    """The numbers that shape a dome, a cap of a sphere with an opening; lengths in m.
+
+    Parameters
+    ----------
+    courses : int
+        Rows from the ground to the opening, equally high.
+    around : int
+        Bricks in the lowest course. In running bond courses have fewer the higher they are; in
+        herringbone all have as many cells, twice this number, and it must be even.
+    bond : str
+        ``running`` or ``herringbone``.
+    span, rise : float
+        Diameter at the ground and height over it, of the surface through the bricks' middles,
+        before the opening is cut.
+    opening : float
+        Diameter of the opening.
+    thickness : float
+        Of the bricks, at right angles to the surface.
+    gap : float
+        Least width of the joints, on the inside; boxes on a sphere leave more elsewhere.
+    density : float
+        kg/m³.
+    law : JointLaw
+        How stiff joints are.
+
+    Raises
+    ------
+    SceneError
+        Naming the number that cannot be.
+
+    Examples
+    --------
+    >>> DomeShape(courses=8, around=24).rise
+    1.0
+    """
+
+    courses: int
+    around: int
+    bond: str = "running"
+    span: float = 2.0
+    rise: float = 1.0
+    opening: float = 0.5
+    thickness: float = 0.08
+    gap: float = 0.005
+    density: float = 2000.0
+    law: JointLaw = MASONRY
+
+    def __post_init__(self) -> None:
+        _set(self, "courses", whole_number("dome: courses", self.courses, 1))
+        _set(self, "around", whole_number("dome: around", self.around, 3))
+        for field in fields(self)[3:7]:
+            _set(self, field.name, positive(f"dome: {field.name}", getattr(self, field.name), "m"))
+        _set(self, "gap", joint_width("dome: gap", self.gap))
+        if self.bond not in BONDS:
+            raise SceneError(f"dome: bond is {short(self.bond)}; give one of {', '.join(BONDS)}")
+        if self.bond == "herringbone" and 2 * self.around % REPEAT:
+            raise SceneError(
+                f"dome: around is {self.around}; give an even number, so that herringbone closes"
+            )
+        if self.rise > 0.5 * self.span:
+            raise SceneError(
+                f"dome: rise is {self.rise:g} m; give at most half of the span, {0.5 * self.span:g}"
+            )
+        if self.opening >= self.span:
+            raise SceneError(
+                f"dome: opening is {self.opening:g} m; give less than the span, {self.span:g}"
+            )
+
+    @property
+    def radius(self) -> float:
+        """Radius of the sphere, m."""
+        return (0.25 * self.span**2 + self.rise**2) / (2 * self.rise)
+
+    def latitude(self, row: float) -> float:
+        """Return the angle above the horizontal at which a row begins, seen from the center.
+
+        Parameters
+        ----------
+        row : float
+            From 0 at the ground.
+
+        Returns
+        -------
+        float
+            rad.
+        """
+        first, last = (math.acos(0.5 * d / self.radius) for d in (self.span, self.opening))
+        return first + (last - first) * row / self.courses
+
+
+@dataclass(frozen=True)
+class _Place:
+    """Where a brick goes: from one row to another, and how far around either side of a direction.
+
+    Attributes
+    ----------
+    low, high : int
+        Rows.
+    azimuth, half : float
+        rad.
+    """
+
+    low: int
+    high: int
+    azimuth: float
+    half: float
+
+
+def dome(shape: DomeShape, name: str = "", *, robots: Sequence[Robot] | None = None) -> Scene:
+    """Return the scene of a dome that is built from the ground up, course by course.
+
+    Its axis is z and its bricks stand on z = 0. Bricks are boxes cut to the room that their place
+    in the dome leaves: shorter the higher they are, unless a course has fewer of them.
+
+    Parameters
+    ----------
+    shape : DomeShape
+    name : str, optional
+        By default the kind and the number of bricks.
+    robots : sequence of Robot, optional
+        Three that reach everything by default.
+
+    Returns
+    -------
+    Scene
+
+    Raises
+    ------
+    SceneError
+        If a place leaves no room for a brick, or bricks interpenetrate.
+
+    Examples
+    --------
+    >>> dome(DomeShape(courses=4, around=12, bond="herringbone"))
+    <Scene dome 36: 36 bricks, 78 joints, 12 ground ends, 3 robots>
+    """
+    places = _running(shape) if shape.bond == "running" else _herringbone(shape)
+    pairs = _touching(places)
+    order = touching_order(len(places), pairs, [i for i, p in enumerate(places) if not p.low])
+    if len(order) < len(places):
+        raise SceneError(f"dome: {len(places) - len(order)} bricks touch no other; give more around")
+    rank = {old: new for new, old in enumerate(order)}
+    bricks = [_brick(shape, places[old], new + 1) for new, old in enumerate(order)]
+    require_apart("dome", bricks, "give more around, a wider gap or thinner bricks")
+    linked = sorted((max(rank[a], rank[b]), min(rank[a], rank[b])) for a, b in pairs)
+    down = np.array([0.0, 0.0, -1.0])
+    return Scene(
+        name=name or f"dome {len(bricks)}",
+        provenance="Generated by seqopt.scene.library.dome.",
+        bricks=tuple(bricks),
+        joints=joints_between(bricks, [pair[::-1] for pair in linked], shape.law),
+        grounds=tuple(
+            ground_under(brick, down, shape.law)
+            for brick, old in zip(bricks, order, strict=True)
+            if places[old].low == 0
+        ),
+        build_order=tuple(brick.name for brick in bricks),
+        robots=mobile_robots(bricks) if robots is None else tuple(robots),
+    )
+
+
+def _running(shape: DomeShape) -> list[_Place]:
+    """Return courses of bricks as long as the lowest ones, each shifted by half a brick."""
+    out = []
+    for row in range(shape.courses):
+        size = math.cos(shape.latitude(row)) / math.cos(shape.latitude(0))
+        count = max(3, round(shape.around * size))
+        half = 0.5 * TURN / count
+        shift = half * (row % 2)
+        out += [_Place(row, row + 1, 2 * half * i + shift, half) for i in range(count)]
+    return out
+
+
+def _herringbone(shape: DomeShape) -> list[_Place]:
+    """Return the tiles of a herringbone that closes around the dome, from the ground up."""
+    cell = 0.5 * TURN / shape.around
+    out = []
+    for tile in tiles(shape.courses, range(2 * shape.around)):
+        rows, columns = (2, 1) if tile.along else (1, 2)
+        middle = cell * tile.middle[1]
+        out.append(_Place(tile.row, tile.row + rows, middle, 0.5 * columns * cell))
+    return sorted(out, key=lambda place: (place.low, place.azimuth))
+
+
+def _touching(places: Sequence[_Place]) -> list[tuple[int, int]]:
+    """Return which places share an edge that is long enough for a joint."""
+    low, high = (np.array([getattr(p, name) for p in places]) for name in ("low", "high"))
+    azimuth, half = (np.array([getattr(p, name) for p in places]) for name in ("azimuth", "half"))
+    away = np.abs((azimuth[:, None] - azimuth + 0.5 * TURN) % TURN - 0.5 * TURN)
+    shared = half[:, None] + half - away
+    least = 2 * LEAST_SHARE * np.minimum(half[:, None], half)
+    above = (high[:, None] == low) & (shared > least)
+    level = (low[:, None] < high) & (low < high[:, None])
+    beside = level & (np.abs(shared) < 1e-6 * half)
+    a, b = np.nonzero(above | above.T | beside)
+    return [(int(i), int(j)) for i, j in zip(a, b, strict=True) if i < j]
+
+
+def _brick(shape: DomeShape, place: _Place, name: int) -> Brick:
+    """Return the largest box in its place, as far as joints leave room.
+
+    Its side faces keep off the planes through the axis that bound the place, its upper and lower
+    ones off the cones from the center; of these the lower one would dip below its cone at the ends.
+    """
+    low, high = (shape.latitude(row) for row in (place.low, place.high))
+    middle, half = 0.5 * (low + high), 0.5 * (high - low)
+    inner = shape.radius - 0.5 * shape.thickness
+    room = inner * math.tan(half) - 0.5 * shape.gap
+    dip = shape.radius * 0.5 * place.half**2 * math.sin(low) * math.cos(low) if place.low else 0.0
+    start, end = dip - room if place.low else -inner * math.tan(half), room
+    nearest = inner * math.cos(middle) - end * math.sin(middle)
+    wide = 2 * nearest * math.tan(place.half) - shape.gap / math.cos(place.half)
+    tall = end - start
+    if min(wide, tall) <= shape.gap:
+        raise SceneError(
+            f"dome: a brick in course {place.low + 1} would be {1e3 * wide:.3g} mm long and "
+            f"{1e3 * tall:.3g} mm high; give fewer around, fewer courses or a larger opening"
+        )
+    around, up, out = _directions(middle, place.azimuth)
+    flat = wide >= tall
+    return Brick(
+        name=name,
+        position=as_vector(_center(shape) + shape.radius * out + 0.5 * (start + end) * up),
+        length_axis=as_vector(around if flat else up),
+        width_axis=as_vector(up if flat else around),
+        dimensions=(max(wide, tall), min(wide, tall), shape.thickness),
+        density=shape.density,
+        nodes=(2 * name - 2, 2 * name - 1),
+        placing_node=2 * name - 1,
+    )
+
+
+def _center(shape: DomeShape) -> Floats:
+    """Return the center of the sphere; the outer edges of the lowest bricks stand on z = 0."""
+    return np.array([0.0, 0.0, shape.rise - shape.radius])
+
+
+def _directions(latitude: float, azimuth: float) -> tuple[Floats, Floats, Floats]:
+    """Return the unit vectors around the axis, up along the surface, and outward."""
+    c, s = math.cos(azimuth), math.sin(azimuth)
+    across, rises = math.cos(latitude), math.sin(latitude)
+    return (
+        np.array([-s, c, 0.0]),
+        np.array([-rises * c, -rises * s, across]),
+        np.array([across * c, across * s, rises]),
+    )
+
+
+def _set(value: object, name: str, content: object) -> None:
+    object.__setattr__(value, name, content)

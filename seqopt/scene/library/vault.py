@@ -1,0 +1,298 @@
+"""Herringbone vaults around a central arch, over a skewed plan.
+
+The arch stands in the columns' middle. Its line, moved along rulings that are turned in plan and
+spread toward the free edges, is the surface; the pattern continues on it from the arch's own
+bricks. Of all places on it those are filled that lie nearest to a middle line, which runs at an
+angle from one foot of the vault to the other: so the plan is skewed, and every brick has its
+neighbors.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from seqopt.arrays import Floats
+from seqopt.errors import SceneError
+from seqopt.scene.boxes import require_apart
+from seqopt.scene.checks import finite, positive
+from seqopt.scene.library.arch_line import ArchLine, arch_line
+from seqopt.scene.library.herringbone import Tile, neighbors, tiles
+from seqopt.scene.library.joints import as_vector, ground_under, joints_between
+from seqopt.scene.library.laying import mobile_robots, touching_order, whole_number
+from seqopt.scene.parts import Brick, Ground, Joint, Robot
+from seqopt.scene.scene import Scene
+
+
+@dataclass(frozen=True, kw_only=True)
+class VaultShape:
+    """The numbers that shape a herringbone vault; lengths in m, angles in rad.
+
+    Parameters
+    ----------
+    bricks : int
+        How many, those of the arch included.
+    spacing : float
+        Distance of the columns from each other.
+    plan_angle : float
+        From the left of the arch to the rulings, seen from above; positive turns their left ends
+        forward.
+    skew : float
+        How far the middle of the second foot lies to the left of that of the first.
+    widening : float
+        By which share the span grows, over the square of the distance from the arch, 1/m².
+    drift : float
+        Over how many columns beside the arch its rows keep at right angles to it; farther out they
+        follow the rulings.
+
+    Raises
+    ------
+    SceneError
+        Naming the number that cannot be.
+
+    Examples
+    --------
+    >>> VaultShape(bricks=100).spacing
+    0.1327
+    """
+
+    bricks: int
+    spacing: float = 0.1327
+    plan_angle: float = 0.0
+    skew: float = 0.0
+    widening: float = 0.0
+    drift: float = 1.3
+
+    def __post_init__(self) -> None:
+        _set(self, "bricks", whole_number("vault: bricks", self.bricks, 1))
+        positive("vault: spacing", self.spacing, "m")
+        for name in ("plan_angle", "skew", "widening", "drift"):
+            _set(self, name, finite(f"vault: {name}", getattr(self, name)))
+        if abs(self.plan_angle) > 0.25 * math.pi:
+            raise SceneError(
+                f"vault: plan_angle is {self.plan_angle:g} rad; give at most 0.785, half a right "
+                "angle"
+            )
+
+
+def herringbone_vault(
+    arch: Scene,
+    shape: VaultShape,
+    name: str = "",
+    *,
+    robots: Sequence[Robot] | None = None,
+    provenance: str = "",
+) -> Scene:
+    """Return the scene of a vault whose first phase is an arch that stands in its middle.
+
+    The bricks, joints and ground ends of the arch are kept as they are, and built in its order.
+    Layers follow, to the left and to the right in turn. A layer is a column of bricks that lie
+    along, and those that reach from it into the next column; it begins at the foot that the skew
+    leaves on its side. Every brick touches what stands before it, or the ground.
+
+    Parameters
+    ----------
+    arch : Scene
+        A closed chain as `seqopt.scene.arch.arch_scene` makes it of the pattern ``VLR``, whose
+        first and last bricks lie along.
+    shape : VaultShape
+    name : str, optional
+        By default the kind and the number of bricks.
+    robots : sequence of Robot, optional
+        Three that reach everything by default, with the largest payload at the arch.
+    provenance : str, optional
+        Where the numbers come from.
+
+    Returns
+    -------
+    Scene
+
+    Raises
+    ------
+    SceneError
+        If the arch is of another kind, bricks interpenetrate, or do not touch.
+
+    Examples
+    --------
+    >>> from seqopt.scene.scene_file import load_scene
+    >>> herringbone_vault(load_scene("arch25"), VaultShape(bricks=60))
+    <Scene vault 60: 60 bricks, 143 joints, 5 ground ends, 3 robots>
+    """
+    line = arch_line(arch)
+    if shape.bricks < len(arch.bricks):
+        raise SceneError(
+            f"vault: {shape.bricks} bricks, and its arch {arch.name} has {len(arch.bricks)}; "
+            "give at least as many"
+        )
+    chosen = _chosen(line, shape)
+    bricks = _bricks(line, shape, chosen)
+    require_apart("vault", bricks, "give a wider spacing or a smaller plan_angle")
+    payload = max((robot.payload for robot in arch.robots), default=0.0)
+    movers = mobile_robots(bricks)
+    if payload:
+        movers = tuple(replace(robot, payload=payload) for robot in movers)
+    return Scene(
+        name=name or f"vault {shape.bricks}",
+        provenance=provenance or "Generated by seqopt.scene.library.vault.",
+        bricks=tuple(bricks),
+        joints=_joints(line, chosen, bricks),
+        grounds=_grounds(line, chosen, bricks),
+        build_order=tuple(brick.name for brick in bricks),
+        robots=movers if robots is None else tuple(robots),
+        blocked_nodes=arch.blocked_nodes,
+        gravity=arch.gravity,
+    )
+
+
+def _chosen(line: ArchLine, shape: VaultShape) -> list[Tile]:
+    """Return the tiles of the vault in the order of building."""
+    rest = shape.bricks - len(line.tiles)
+    half = math.ceil(shape.bricks / line.rows + 0.5 * abs(shape.skew) / shape.spacing) + 2
+    own = {*line.tiles}
+    places = [t for t in tiles(line.rows, range(-half, half + 1)) if t not in own]
+
+    def aside(tile: Tile) -> float:  # rounded, so that equal ones are equal on every machine
+        row, column = tile.middle
+        return round(abs(column * shape.spacing - shape.skew * line.share(row)), 9)
+
+    def turn(tile: Tile) -> tuple[int, bool, float]:
+        layer, left = _layer(tile)
+        forward = left == (shape.skew < 0)
+        return layer, not left, tile.middle[0] if forward else -tile.middle[0]
+
+    layered = [*line.tiles, *sorted(sorted(places, key=aside)[:rest], key=turn)]
+    grounded = [i for i, t in enumerate(layered) if _feet(line, t) and i >= len(own)]
+    order = touching_order(len(layered), neighbors(layered), [0, *grounded])
+    if len(order) < len(layered):
+        lost = len(layered) - len(order)
+        raise SceneError(
+            f"vault: {lost} of {len(layered)} bricks would touch nothing that stands; give a "
+            f"smaller skew than {shape.skew:g} m or more bricks"
+        )
+    return [layered[i] for i in order]
+
+
+def _layer(tile: Tile) -> tuple[int, bool]:
+    """Return which layer a tile belongs to, counted from the arch, and whether on the left."""
+    reaches_back = not tile.along and tile.column < 0
+    column = tile.column + reaches_back
+    return abs(column), tile.column >= 0
+
+
+def _feet(line: ArchLine, tile: Tile) -> int:
+    """Return on which ground a tile stands: -1 at the first foot, 1 at the second, 0 on none."""
+    last = tile.cells[1][0] if tile.along else tile.row
+    return -1 if tile.row == 0 else int(last == line.rows - 1)
+
+
+def _bricks(line: ArchLine, shape: VaultShape, chosen: Sequence[Tile]) -> list[Brick]:
+    """Return the bricks of the arch and those on the other tiles."""
+    own = {tile: brick for tile, brick in zip(line.tiles, line.bricks, strict=True)}
+    places = [tile for tile in chosen if tile not in own]
+    name = max(brick.name for brick in line.bricks)
+    node = max(node for brick in line.bricks for node in brick.nodes)
+    new = {}
+    for tile, pose in zip(places, _poses(line, shape, places), strict=True):
+        center, forward, left = pose
+        outward = _layer(tile)[1]
+        upward = outward == (shape.skew < 0)
+        axes = (forward if upward else -forward, left) if tile.along else (left, forward)
+        if not tile.along and not outward:
+            axes = (-left, forward)
+        name, node = name + 1, node + 2
+        new[tile] = replace(
+            line.bricks[0],
+            name=name,
+            position=as_vector(center),
+            length_axis=as_vector(axes[0]),
+            width_axis=as_vector(axes[1]),
+            nodes=(node - 1, node),
+            placing_node=node,
+        )
+    return [own.get(tile) or new[tile] for tile in chosen]
+
+
+def _poses(
+    line: ArchLine, shape: VaultShape, places: Sequence[Tile]
+) -> list[tuple[Floats, Floats, Floats]]:
+    """Return where bricks lie: middle, direction along the arch, and direction to the left."""
+    if not places:
+        return []
+    row, column = np.array([tile.middle for tile in places]).T
+    along = np.array([tile.along for tile in places])
+    beside = column * shape.spacing
+    half = np.where(along, 1.0, 0.5)
+    start, end, middle = (
+        _surface(line, shape, row + step, beside) for step in (-half, half, 0.0 * half)
+    )
+    step = 1e-3 * shape.spacing
+    turned = row + _drift(line, shape, row, beside)
+    ruling = _moved(line, shape, turned, beside + step) - _moved(line, shape, turned, beside - step)
+    forward = _unit(end - start)
+    left = _unit(ruling)
+    flush = along[:, None]  # a brick along keeps to its column, one across to the ruling
+    forward, left = (
+        np.where(flush, forward, _unit(forward - left * _dot(forward, left))),
+        np.where(flush, _unit(left - forward * _dot(forward, left)), left),
+    )
+    center = np.where(flush, middle, 0.5 * (start + end))
+    return list(zip(center, forward, left, strict=True))
+
+
+def _surface(line: ArchLine, shape: VaultShape, row: Floats, beside: Floats) -> Floats:
+    """Return points (n, 3) of the surface at rows of columns."""
+    return _moved(line, shape, row + _drift(line, shape, row, beside), beside)
+
+
+def _moved(line: ArchLine, shape: VaultShape, row: Floats, beside: Floats) -> Floats:
+    """Return points (n, 3) of the arch's line, moved along the rulings."""
+    point = line.point(row)
+    middle = line.point(np.array([0.0, float(line.rows)]))[:, 0].mean()
+    wider = (point[:, 0] - middle) * shape.widening * beside**2
+    ahead = math.tan(shape.plan_angle) * beside
+    return point + np.stack([wider + ahead, beside, np.zeros_like(beside)], axis=1)
+
+
+def _drift(line: ArchLine, shape: VaultShape, row: Floats, beside: Floats) -> Floats:
+    """Return by how many rows columns lag, so that rows leave the arch at right angles."""
+    speed = line.speed(row)
+    size = np.linalg.norm(speed, axis=1)
+    columns = np.clip(beside / shape.spacing, -shape.drift, shape.drift)
+    shift = columns * shape.spacing * math.tan(shape.plan_angle) * speed[:, 0] / size
+    return np.asarray(-shift / size)
+
+
+def _joints(line: ArchLine, chosen: Sequence[Tile], bricks: Sequence[Brick]) -> tuple[Joint, ...]:
+    """Return the joints of the arch, and one wherever other bricks touch."""
+    own = len(line.bricks)
+    pairs = [pair for pair in neighbors(chosen) if pair[1] >= own]
+    pairs.sort(key=lambda pair: pair[::-1])
+    return (*line.joints, *joints_between(bricks, pairs, line.law))
+
+
+def _grounds(line: ArchLine, chosen: Sequence[Tile], bricks: Sequence[Brick]) -> tuple[Ground, ...]:
+    """Return the ground ends of the arch, and one under every other brick that stands on ground."""
+    out = [*line.grounds]
+    for tile, brick in zip(chosen[len(line.bricks) :], bricks[len(line.bricks) :], strict=True):
+        foot = _feet(line, tile)
+        if foot:
+            frame = np.array([brick.length_axis, brick.width_axis])
+            forward = frame[0 if tile.along else 1]
+            forward = forward * np.sign(forward @ line.speed(np.array([tile.middle[0]]))[0])
+            out.append(ground_under(brick, foot * forward, line.law, line.stub))
+    return tuple(out)
+
+
+def _unit(vectors: Floats) -> Floats:
+    return np.asarray(vectors / np.linalg.norm(vectors, axis=1, keepdims=True))
+
+
+def _dot(first: Floats, second: Floats) -> Floats:
+    return np.asarray((first * second).sum(axis=1, keepdims=True))
+
+
+def _set(value: object, name: str, content: object) -> None:
+    object.__setattr__(value, name, content)
