@@ -253,5 +253,12 @@ def _add_scene(commands: Commands, parents: list[_Parser]) -> None:
         parents=parents,
         help="check, describe and export a scene",
         description="Check a scene, say what is in it, and write it as JSON if asked.",
+        epilog="example: seqopt scene vault338 --export my.json",
     )
-    command.add_argument("--export", type=Path, metavar="FILE", help="JSON file to write")
+    what = command.add_mutually_exclusive_group()
+    what.add_argument(
+        "--list",
+        action="store_true",
+        help="name all built-in scenes, a line each: bricks, joints, what it is",
+    )
+    what.add_argument("--export", type=Path, metavar="FILE", help="JSON file to write")

@@ -51,7 +51,7 @@ from seqopt.report.comparison import compare
 from seqopt.report.text import format_comparison
 from seqopt.responses.table import analyze, fields_archive
 from seqopt.scene.scene import Scene
-from seqopt.scene.scene_file import dump_scene, load_scene
+from seqopt.scene.scene_file import about, builtin_scenes, dump_scene, load_scene
 from seqopt.sequence.plan_file import read_plan
 from seqopt.sequence.schedule_file import find_schedule
 from seqopt.sequence.steps import AnyStep, Step, idle_robots
@@ -254,6 +254,11 @@ def _steps(scene: Scene, options: argparse.Namespace) -> tuple[Step, ...]:
 
 
 def _scene(options: argparse.Namespace) -> None:
+    if options.list:
+        for name in builtin_scenes():
+            scene = load_scene(name)
+            _line(f"{name}: {len(scene.bricks)} bricks, {len(scene.joints)} joints; {about(name)}")
+        return
     keep_apart(options, options.export)
     scene = load_scene(options.scene)
     parts = build_network(scene)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -17,6 +17,7 @@ from seqopt.network.network import Network, PartKind
 
 FACES = ((0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (1, 3, 7, 5))
 CLAY = np.array([0.80, 0.52, 0.38])
+MARKED = np.array([0.46, 0.63, 0.76])
 INK, TENSION, COMPRESSION = "#2b2b2b", "#c8102e", "#1f5fa8"
 ROBOT_COLORS = ("#0b7a75", "#7b2d8b", "#d17a00", "#444444")
 
@@ -59,6 +60,7 @@ def draw_bricks(  # noqa: PLR0913  # what is drawn, and how, each by its name
     twist: Floats | None = None,
     magnify: float = 1.0,
     alpha: float = 1.0,
+    marked: Collection[int] = (),
 ) -> None:
     """Draw the first bricks as shaded boxes, in place or moved.
 
@@ -78,9 +80,12 @@ def draw_bricks(  # noqa: PLR0913  # what is drawn, and how, each by its name
         How many times larger the motion is drawn.
     alpha : float
         Opacity, from 0 to 1.
+    marked : collection of int
+        Names of bricks that are drawn in another color.
     """
     polygons, depths, colors = [], [], []
     for b in range(bricks):
+        own = MARKED if network.scene.placed[b].name in marked else CLAY
         corners = _corners(network, b)
         if twist is not None:
             turn = np.cross(twist[b, 3:], corners - corners.mean(axis=0))
@@ -89,7 +94,7 @@ def draw_bricks(  # noqa: PLR0913  # what is drawn, and how, each by its name
         for face in FACES:
             polygons.append(seen[list(face), :2])
             depths.append(seen[list(face), 2].mean())
-            colors.append((*(_light(corners, face) * CLAY), alpha))
+            colors.append((*(_light(corners, face) * own), alpha))
     order = np.argsort(depths)
     axes.add_collection(
         PolyCollection(

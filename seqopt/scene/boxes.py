@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
@@ -37,6 +38,17 @@ class Boxes(FrozenValue):
     place: Floats
     frame: Floats
     half: Floats
+
+    def corners(self) -> Floats:
+        """Return where the corners are.
+
+        Returns
+        -------
+        (n, 8, 3) float
+            m.
+        """
+        signs = np.array(list(product((-1.0, 1.0), repeat=3)))
+        return np.asarray(self.place[:, None] + (signs * self.half[:, None]) @ self.frame)
 
 
 def boxes(bricks: Sequence[Brick]) -> Boxes:
@@ -99,7 +111,9 @@ def separations(bricks: Sequence[Brick]) -> tuple[Ints, Floats]:
     return pairs, np.where(real, apart, -np.inf).max(axis=1, initial=-np.inf)
 
 
-def require_apart(where: str, bricks: Sequence[Brick], remedy: str) -> None:
+def require_apart(
+    where: str, bricks: Sequence[Brick], remedy: str, deepest: float = DEEPEST
+) -> None:
     """Require bricks of which no two interpenetrate.
 
     Parameters
@@ -109,6 +123,8 @@ def require_apart(where: str, bricks: Sequence[Brick], remedy: str) -> None:
     bricks : sequence of Brick
     remedy : str
         What to change, for the message.
+    deepest : float, optional
+        By how much they may, over the smallest dimension.
 
     Raises
     ------
@@ -117,7 +133,7 @@ def require_apart(where: str, bricks: Sequence[Brick], remedy: str) -> None:
     """
     pairs, distance = separations(bricks)
     thin = min(min(brick.dimensions) for brick in bricks)
-    if distance.min(initial=0.0) < -DEEPEST * thin:
+    if distance.min(initial=0.0) < -deepest * thin:
         i, j = pairs[distance.argmin()]
         raise SceneError(
             f"{where}: bricks {bricks[i].name} and {bricks[j].name} interpenetrate by "

@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from seqopt.arrays import Floats
 from seqopt.errors import SceneError
@@ -15,6 +16,9 @@ from seqopt.scene.library.herringbone import Tile
 from seqopt.scene.library.joints import JointLaw
 from seqopt.scene.parts import Brick, Ground, Joint
 from seqopt.scene.scene import Scene
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline
 
 TILES = ((2, 0, True), (1, 0, False), (1, -1, False))  # rows, column, along: the pattern VLR
 
@@ -46,6 +50,8 @@ class ArchLine:
 
     @cached_property
     def _curve(self) -> CubicSpline:
+        from scipy.interpolate import CubicSpline  # noqa: PLC0415  # slow to import, for vaults only
+
         points = [self.grounds[0], *self.joints, self.grounds[1]]
         row = [tile.row for tile in self.tiles]
         return CubicSpline([*row, self.rows], [point.position for point in points])
@@ -129,7 +135,7 @@ def arch_line(arch: Scene) -> ArchLine:
         raise SceneError(f"vault: a {type(arch).__name__} is no arch; give a Scene")
     bricks = arch.placed
     names = [brick.name for brick in bricks]
-    linked = [joint.bricks for joint in arch.joints] == list(zip(names[:-1], names[1:], strict=True))
+    linked = [joint.bricks for joint in arch.joints] == [*pairwise(names)]
     stands = [ground.brick for ground in arch.grounds] == [names[0], names[-1]]
     alike = len({(brick.dimensions, brick.density) for brick in bricks}) == 1
     if len(bricks) < 4 or len(bricks) % 3 != 1 or not (linked and stands and alike):

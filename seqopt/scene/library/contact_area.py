@@ -13,6 +13,7 @@ import numpy as np
 from seqopt.arrays import Floats, FrozenValue
 
 ON_EDGE = 1e-12  # distance that is none, over the size of the faces
+PARALLEL = 1e-12  # sine of an angle between edges that is none
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -83,12 +84,13 @@ def _inside(polygon: Floats, other: Floats, slack: float) -> tuple[Floats, Float
     start, step = polygon, np.roll(polygon, -1, axis=1) - polygon
     side = np.roll(other, -1, axis=1) - other
     side = side / np.linalg.norm(side, axis=2, keepdims=True)
-    height = _cross(side[:, None], start[:, :, None] - other[:, None]) + slack  # (P, m, m)
+    height = _cross(side[:, None], start[:, :, None] - other[:, None])  # (P, m, m)
     slope = _cross(side[:, None], step[:, :, None])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        crossing = -height / slope
-    enters = np.where(slope > 0, crossing, np.where((slope == 0) & (height < 0), np.inf, 0.0))
-    leaves = np.where(slope < 0, crossing, 1.0)
+    flat = np.abs(slope) <= PARALLEL * np.linalg.norm(step, axis=2)[:, :, None]
+    crossing = -height / np.where(flat, 1.0, slope)
+    outside = flat & (height + slack < 0)
+    enters = np.where(outside, np.inf, np.where(flat | (slope < 0), 0.0, crossing))
+    leaves = np.where(flat | (slope > 0), 1.0, crossing)
     low = np.maximum(enters.max(axis=2), 0.0)
     high = np.maximum(np.minimum(leaves.min(axis=2), 1.0), 0.0)
     low = np.minimum(low, high)

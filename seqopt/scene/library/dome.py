@@ -171,7 +171,9 @@ def dome(shape: DomeShape, name: str = "", *, robots: Sequence[Robot] | None = N
     pairs = _touching(places)
     order = touching_order(len(places), pairs, [i for i, p in enumerate(places) if not p.low])
     if len(order) < len(places):
-        raise SceneError(f"dome: {len(places) - len(order)} bricks touch no other; give more around")
+        raise SceneError(
+            f"dome: {len(places) - len(order)} bricks touch no other; give more around"
+        )
     rank = {old: new for new, old in enumerate(order)}
     bricks = [_brick(shape, places[old], new + 1) for new, old in enumerate(order)]
     require_apart("dome", bricks, "give more around, a wider gap or thinner bricks")

@@ -11,11 +11,10 @@ from seqopt.arrays import Floats, Ints, Vector
 from seqopt.errors import SceneError
 from seqopt.scene.boxes import Boxes, boxes
 from seqopt.scene.checks import vector
-from seqopt.scene.library.contact_area import contact_areas
+from seqopt.scene.library.contact_area import ContactAreas, contact_areas
 from seqopt.scene.parts import THICKEST, Brick, Ground, Joint
 
 STUB = 0.05  # m; of a ground end that does not say
-NEARLY = 0.8  # a joint says how thick it is before it must: faces are not quite parallel
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,7 +74,9 @@ class JointLaw:
         return (area * normal, area * one, area * other), turning
 
 
-MASONRY = JointLaw(translational=(1.5e9, 1.5e8, 1.5e8))  # of the domes that Bruun et al. built later
+MASONRY = JointLaw(
+    translational=(1.5e9, 1.5e8, 1.5e8)
+)  # of the domes that Bruun et al. built later
 
 
 @dataclass(frozen=True)
@@ -104,7 +105,8 @@ def joints_between(
     tuple of Joint
         Each in the middle of the overlap and halfway between the faces; its axes are the mean
         normal of the faces, from the first brick to the second, and that edge of the first that is
-        most nearly at right angles to it.
+        most nearly at right angles to it. One that is thick where the faces are farthest apart says
+        so.
 
     Raises
     ------
@@ -114,7 +116,7 @@ def joints_between(
     if not pairs:
         return ()
     shapes, (a, b) = boxes(bricks), np.array(pairs, dtype=np.int64).T
-    one, other = _facing(shapes, a, b), _facing(shapes, b, a)
+    one, other = _facing(shapes, a, b)
     along = _unit(one.out - other.out)
     across = shapes.frame[a, (one.axis + 1) % 3]
     across = _unit(across - along * (along * across).sum(axis=1, keepdims=True))
@@ -131,7 +133,8 @@ def joints_between(
     start, end = _height(shapes, one, along, middle), _height(shapes, other, along, middle)
     place = middle + 0.5 * (start + end)[:, None] * along
     thin = 2 * np.minimum(shapes.half[a].min(axis=1), shapes.half[b].min(axis=1))
-    thick = np.where(end - start > NEARLY * THICKEST * thin, end - start, 0.0).tolist()
+    widest = end - start + _taper(one, other, along, sides, faces)
+    thick = np.where(widest > THICKEST * thin, widest, 0.0).tolist()
     stiff = [
         law.stiffness(area, (about, across))
         for area, (about, across) in zip(faces.area.tolist(), faces.moments.tolist(), strict=True)
@@ -202,19 +205,38 @@ def as_vector(values: Floats) -> Vector:
     return x, y, z
 
 
-def _facing(shapes: Boxes, which: Ints, other: Ints) -> _Faces:
-    """Return the face of each box that looks at another one.
+def _facing(shapes: Boxes, a: Ints, b: Ints) -> tuple[_Faces, _Faces]:
+    """Return the faces of first and second boxes that look at each other.
 
-    Of boxes that touch these are the faces that part them, not those across the line between the
-    centroids.
+    Of the three faces of the first that look at the second, each with the one of the second that is
+    most nearly parallel to it, it is those beyond which the other box lies farthest, in its size.
     """
-    frame, half = shapes.frame[which], shapes.half[which]
-    along = (frame @ (shapes.place[other] - shapes.place[which])[:, :, None])[:, :, 0]
+    step = shapes.place[b] - shapes.place[a]
+    turned = shapes.frame[a] @ shapes.frame[b].transpose(0, 2, 1)
+    partner = np.abs(turned).argmax(axis=2)
+    first = _beyond(shapes, a, b)
+    second = np.take_along_axis(_beyond(shapes, b, a), partner, axis=1)
+    axis = (first + second).argmax(axis=1)
+    row = np.arange(len(a))
+    return (
+        _towards(shapes, a, axis, step),
+        _towards(shapes, b, partner[row, axis], -step),
+    )
+
+
+def _beyond(shapes: Boxes, which: Ints, other: Ints) -> Floats:
+    """Return how far other boxes lie along the axes of some, (P, 3), over where they touch."""
+    frame = shapes.frame[which]
+    away = (frame @ (shapes.place[other] - shapes.place[which])[:, :, None])[:, :, 0]
     turned = np.abs(frame @ shapes.frame[other].transpose(0, 2, 1))
     reach = (turned @ shapes.half[other][:, :, None])[:, :, 0]
-    axis = (np.abs(along) / (half + reach)).argmax(axis=1)
-    row = np.arange(len(which))
-    return _Faces(which, axis, np.sign(along[row, axis])[:, None] * frame[row, axis])
+    return np.asarray(np.abs(away) / (shapes.half[which] + reach))
+
+
+def _towards(shapes: Boxes, which: Ints, axis: Ints, step: Floats) -> _Faces:
+    """Return the faces across some axes that look along steps (P, 3)."""
+    normal = shapes.frame[which, axis]
+    return _Faces(which, axis, np.sign((normal * step).sum(axis=1))[:, None] * normal)
 
 
 def _corners(shapes: Boxes, face: _Faces, sides: Floats) -> Floats:
@@ -237,6 +259,16 @@ def _height(shapes: Boxes, face: _Faces, along: Floats, point: Floats) -> Floats
     half = shapes.half[face.which, face.axis]
     away = ((shapes.place[face.which] - point) * face.out).sum(axis=1) + half
     return np.asarray(away / (along * face.out).sum(axis=1))
+
+
+def _taper(one: _Faces, other: _Faces, along: Floats, sides: Floats, faces: ContactAreas) -> Floats:
+    """Return how much wider joints are at their ends than in the middle, (P,), at most."""
+    slopes = [
+        (sides @ face.out[:, :, None])[:, :, 0] / (along * face.out).sum(axis=1)[:, None]
+        for face in (one, other)
+    ]
+    reach = np.sqrt(3 * faces.moments[:, ::-1] / faces.area[:, None])  # of a rectangle
+    return np.asarray((np.abs(slopes[1] - slopes[0]) * reach).sum(axis=1))
 
 
 def _unit(vectors: Floats) -> Floats:

@@ -31,7 +31,9 @@ def mobile_robots(bricks: Sequence[Brick], count: int = 3) -> tuple[Robot, ...]:
     return tuple(Robot(name=f"rob{i}", payload=weight) for i in range(1, count + 1))
 
 
-def touching_order(count: int, pairs: Iterable[tuple[int, int]], starts: Iterable[int]) -> list[int]:
+def touching_order(
+    count: int, pairs: Iterable[tuple[int, int]], starts: Iterable[int]
+) -> list[int]:
     """Return an order in which everything touches what stands before it, or the ground.
 
     Parameters

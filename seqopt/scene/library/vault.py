@@ -11,71 +11,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from seqopt.arrays import Floats
 from seqopt.errors import SceneError
 from seqopt.scene.boxes import require_apart
-from seqopt.scene.checks import finite, positive
 from seqopt.scene.library.arch_line import ArchLine, arch_line
 from seqopt.scene.library.herringbone import Tile, neighbors, tiles
 from seqopt.scene.library.joints import as_vector, ground_under, joints_between
-from seqopt.scene.library.laying import mobile_robots, touching_order, whole_number
+from seqopt.scene.library.laying import mobile_robots, touching_order
+from seqopt.scene.library.vault_surface import VaultShape, poses
 from seqopt.scene.parts import Brick, Ground, Joint, Robot
 from seqopt.scene.scene import Scene
-
-
-@dataclass(frozen=True, kw_only=True)
-class VaultShape:
-    """The numbers that shape a herringbone vault; lengths in m, angles in rad.
-
-    Parameters
-    ----------
-    bricks : int
-        How many, those of the arch included.
-    spacing : float
-        Distance of the columns from each other.
-    plan_angle : float
-        From the left of the arch to the rulings, seen from above; positive turns their left ends
-        forward.
-    skew : float
-        How far the middle of the second foot lies to the left of that of the first.
-    widening : float
-        By which share the span grows, over the square of the distance from the arch, 1/m².
-    drift : float
-        Over how many columns beside the arch its rows keep at right angles to it; farther out they
-        follow the rulings.
-
-    Raises
-    ------
-    SceneError
-        Naming the number that cannot be.
-
-    Examples
-    --------
-    >>> VaultShape(bricks=100).spacing
-    0.1327
-    """
-
-    bricks: int
-    spacing: float = 0.1327
-    plan_angle: float = 0.0
-    skew: float = 0.0
-    widening: float = 0.0
-    drift: float = 1.3
-
-    def __post_init__(self) -> None:
-        _set(self, "bricks", whole_number("vault: bricks", self.bricks, 1))
-        positive("vault: spacing", self.spacing, "m")
-        for name in ("plan_angle", "skew", "widening", "drift"):
-            _set(self, name, finite(f"vault: {name}", getattr(self, name)))
-        if abs(self.plan_angle) > 0.25 * math.pi:
-            raise SceneError(
-                f"vault: plan_angle is {self.plan_angle:g} rad; give at most 0.785, half a right "
-                "angle"
-            )
 
 
 def herringbone_vault(
@@ -190,79 +138,28 @@ def _feet(line: ArchLine, tile: Tile) -> int:
 
 def _bricks(line: ArchLine, shape: VaultShape, chosen: Sequence[Tile]) -> list[Brick]:
     """Return the bricks of the arch and those on the other tiles."""
-    own = {tile: brick for tile, brick in zip(line.tiles, line.bricks, strict=True)}
+    own = dict(zip(line.tiles, line.bricks, strict=True))
     places = [tile for tile in chosen if tile not in own]
     name = max(brick.name for brick in line.bricks)
     node = max(node for brick in line.bricks for node in brick.nodes)
     new = {}
-    for tile, pose in zip(places, _poses(line, shape, places), strict=True):
-        center, forward, left = pose
+    for tile, pose in zip(places, poses(line, shape, places), strict=True):
         outward = _layer(tile)[1]
         upward = outward == (shape.skew < 0)
-        axes = (forward if upward else -forward, left) if tile.along else (left, forward)
-        if not tile.along and not outward:
-            axes = (-left, forward)
+        axes = (pose.forward if upward else -pose.forward, pose.left)
+        if not tile.along:
+            axes = (pose.left if outward else -pose.left, pose.forward)
         name, node = name + 1, node + 2
         new[tile] = replace(
             line.bricks[0],
             name=name,
-            position=as_vector(center),
+            position=as_vector(pose.center),
             length_axis=as_vector(axes[0]),
             width_axis=as_vector(axes[1]),
             nodes=(node - 1, node),
             placing_node=node,
         )
     return [own.get(tile) or new[tile] for tile in chosen]
-
-
-def _poses(
-    line: ArchLine, shape: VaultShape, places: Sequence[Tile]
-) -> list[tuple[Floats, Floats, Floats]]:
-    """Return where bricks lie: middle, direction along the arch, and direction to the left."""
-    if not places:
-        return []
-    row, column = np.array([tile.middle for tile in places]).T
-    along = np.array([tile.along for tile in places])
-    beside = column * shape.spacing
-    half = np.where(along, 1.0, 0.5)
-    start, end, middle = (
-        _surface(line, shape, row + step, beside) for step in (-half, half, 0.0 * half)
-    )
-    step = 1e-3 * shape.spacing
-    turned = row + _drift(line, shape, row, beside)
-    ruling = _moved(line, shape, turned, beside + step) - _moved(line, shape, turned, beside - step)
-    forward = _unit(end - start)
-    left = _unit(ruling)
-    flush = along[:, None]  # a brick along keeps to its column, one across to the ruling
-    forward, left = (
-        np.where(flush, forward, _unit(forward - left * _dot(forward, left))),
-        np.where(flush, _unit(left - forward * _dot(forward, left)), left),
-    )
-    center = np.where(flush, middle, 0.5 * (start + end))
-    return list(zip(center, forward, left, strict=True))
-
-
-def _surface(line: ArchLine, shape: VaultShape, row: Floats, beside: Floats) -> Floats:
-    """Return points (n, 3) of the surface at rows of columns."""
-    return _moved(line, shape, row + _drift(line, shape, row, beside), beside)
-
-
-def _moved(line: ArchLine, shape: VaultShape, row: Floats, beside: Floats) -> Floats:
-    """Return points (n, 3) of the arch's line, moved along the rulings."""
-    point = line.point(row)
-    middle = line.point(np.array([0.0, float(line.rows)]))[:, 0].mean()
-    wider = (point[:, 0] - middle) * shape.widening * beside**2
-    ahead = math.tan(shape.plan_angle) * beside
-    return point + np.stack([wider + ahead, beside, np.zeros_like(beside)], axis=1)
-
-
-def _drift(line: ArchLine, shape: VaultShape, row: Floats, beside: Floats) -> Floats:
-    """Return by how many rows columns lag, so that rows leave the arch at right angles."""
-    speed = line.speed(row)
-    size = np.linalg.norm(speed, axis=1)
-    columns = np.clip(beside / shape.spacing, -shape.drift, shape.drift)
-    shift = columns * shape.spacing * math.tan(shape.plan_angle) * speed[:, 0] / size
-    return np.asarray(-shift / size)
 
 
 def _joints(line: ArchLine, chosen: Sequence[Tile], bricks: Sequence[Brick]) -> tuple[Joint, ...]:
@@ -284,15 +181,3 @@ def _grounds(line: ArchLine, chosen: Sequence[Tile], bricks: Sequence[Brick]) ->
             forward = forward * np.sign(forward @ line.speed(np.array([tile.middle[0]]))[0])
             out.append(ground_under(brick, foot * forward, line.law, line.stub))
     return tuple(out)
-
-
-def _unit(vectors: Floats) -> Floats:
-    return np.asarray(vectors / np.linalg.norm(vectors, axis=1, keepdims=True))
-
-
-def _dot(first: Floats, second: Floats) -> Floats:
-    return np.asarray((first * second).sum(axis=1, keepdims=True))
-
-
-def _set(value: object, name: str, content: object) -> None:
-    object.__setattr__(value, name, content)
