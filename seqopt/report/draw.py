@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import product
 
 import numpy as np
 import pandas as pd
@@ -14,6 +13,8 @@ from matplotlib.patheffects import withStroke
 
 from seqopt.arrays import Floats, Ints
 from seqopt.network.network import Network, PartKind
+from seqopt.report.occlusion import drawing_order
+from seqopt.scene.boxes import boxes
 
 FACES = ((0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (1, 3, 7, 5))
 CLAY = np.array([0.80, 0.52, 0.38])
@@ -83,23 +84,22 @@ def draw_bricks(  # noqa: PLR0913  # what is drawn, and how, each by its name
     marked : collection of int
         Names of bricks that are drawn in another color.
     """
-    polygons, depths, colors = [], [], []
-    for b in range(bricks):
+    corners = boxes(network.scene.placed[:bricks]).corners()
+    if twist is not None:
+        arm = corners - corners.mean(axis=1, keepdims=True)
+        turned = np.cross(twist[:bricks, None, 3:], arm)
+        corners = corners + magnify * (twist[:bricks, None, :3] + turned)
+    seen = corners @ view.axes().T
+    polygons, colors = [], []
+    for b in drawing_order(corners, view.axes()):
         own = MARKED if network.scene.placed[b].name in marked else CLAY
-        corners = _corners(network, b)
-        if twist is not None:
-            turn = np.cross(twist[b, 3:], corners - corners.mean(axis=0))
-            corners = corners + magnify * (twist[b, :3] + turn)
-        seen = corners @ view.axes().T
-        for face in FACES:
-            polygons.append(seen[list(face), :2])
-            depths.append(seen[list(face), 2].mean())
-            colors.append((*(_light(corners, face) * own), alpha))
-    order = np.argsort(depths)
+        for face in sorted(FACES, key=lambda face: float(seen[b, list(face), 2].mean())):
+            polygons.append(seen[b, list(face), :2])
+            colors.append((*(_light(corners[b], face) * own), alpha))
     axes.add_collection(
         PolyCollection(
-            [polygons[i] for i in order],
-            facecolors=[colors[i] for i in order],
+            polygons,
+            facecolors=colors,
             edgecolors=(0.25, 0.15, 0.1, alpha),
             linewidths=0.4,
         )
@@ -241,15 +241,6 @@ def draw_responses(
         axis.grid(visible=True, lw=0.3)
     axes[-1].set_xlabel("bricks placed")
     axes[0].legend(frameon=False, ncols=len(tables), fontsize=8)
-
-
-def _corners(network: Network, b: int) -> Floats:
-    """Return the corners of a brick, (8, 3), m."""
-    brick = network.scene.placed[b]
-    first, second = np.array(brick.length_axis), np.array(brick.width_axis)
-    frame = np.stack([first, second, np.cross(first, second)]) * np.array(brick.dimensions)[:, None]
-    signs = np.array(list(product((-0.5, 0.5), repeat=3)))
-    return np.asarray(np.array(brick.position) + signs @ frame)
 
 
 def _light(corners: Floats, face: tuple[int, ...]) -> float:
