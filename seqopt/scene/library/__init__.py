@@ -16,14 +16,15 @@ A vault grows in herringbone from an arch that stands in its middle:
 >>> from seqopt.scene import load_scene
 >>> from seqopt.scene.library import VaultShape, herringbone_vault
 >>> herringbone_vault(load_scene("arch25"), VaultShape(bricks=100))
-<Scene vault 100: 100 bricks, 259 joints, 7 ground ends, 3 robots>
+<Scene vault 100: 100 bricks, 241 joints, 6 ground ends, 3 robots>
 
 Arches of other shapes come from `seqopt.scene.arch_scene`.
 """
 
 from seqopt.scene.library.chain import chain
-from seqopt.scene.library.dome import DomeShape, dome
-from seqopt.scene.library.joints import JointLaw
+from seqopt.scene.library.dome import dome
+from seqopt.scene.library.dome_shape import DomeShape
+from seqopt.scene.library.law import JointLaw
 from seqopt.scene.library.vault import herringbone_vault
 from seqopt.scene.library.vault_surface import VaultShape
 from seqopt.scene.library.wall import WallShape, wall

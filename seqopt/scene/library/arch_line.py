@@ -13,7 +13,7 @@ import numpy as np
 from seqopt.arrays import Floats
 from seqopt.errors import SceneError
 from seqopt.scene.library.herringbone import Tile
-from seqopt.scene.library.joints import JointLaw
+from seqopt.scene.library.law import JointLaw
 from seqopt.scene.parts import Brick, Ground, Joint
 from seqopt.scene.scene import Scene
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from seqopt.scene.library.dome import DomeShape, dome
+from seqopt.scene.library.dome import dome
+from seqopt.scene.library.dome_shape import DomeShape
 from seqopt.scene.library.vault import herringbone_vault
 from seqopt.scene.library.vault_surface import VaultShape
 from seqopt.scene.scene import Scene

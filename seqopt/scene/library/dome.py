@@ -4,121 +4,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
 from seqopt.arrays import Floats
 from seqopt.errors import SceneError
 from seqopt.scene.boxes import require_apart
-from seqopt.scene.checks import positive, short
-from seqopt.scene.library.herringbone import REPEAT, tiles
-from seqopt.scene.library.joints import (
-    MASONRY,
-    JointLaw,
-    as_vector,
-    ground_under,
-    joints_between,
-)
-from seqopt.scene.library.laying import joint_width, mobile_robots, touching_order, whole_number
+from seqopt.scene.library.dome_shape import DomeShape
+from seqopt.scene.library.herringbone import tiles
+from seqopt.scene.library.joints import as_vector, ground_under, joints_between
+from seqopt.scene.library.laying import mobile_robots, touching_order
+from seqopt.scene.library.meeting import shares
 from seqopt.scene.parts import Brick, Robot
 from seqopt.scene.scene import Scene
 
-BONDS = ("running", "herringbone")
-LEAST_SHARE = 0.25  # of the shorter brick: what lies less far on another has no joint with it
+LEAST_SHARE = 0.1  # of the smaller face: bricks that share less have no joint
+NO_SHARE = 1e-6  # of an angle: places that share less only meet at a corner
 TURN = 2 * math.pi
-
-
-@dataclass(frozen=True, kw_only=True)
-class DomeShape:
-    """The numbers that shape a dome, a cap of a sphere with an opening; lengths in m.
-
-    Parameters
-    ----------
-    courses : int
-        Rows from the ground to the opening, equally high.
-    around : int
-        Bricks in the lowest course. In running bond courses have fewer the higher they are; in
-        herringbone all have as many cells, twice this number, and it must be even.
-    bond : str
-        ``running`` or ``herringbone``.
-    span, rise : float
-        Diameter at the ground and height over it, of the surface through the bricks' middles,
-        before the opening is cut.
-    opening : float
-        Diameter of the opening.
-    thickness : float
-        Of the bricks, at right angles to the surface.
-    gap : float
-        Least width of the joints, on the inside; boxes on a sphere leave more elsewhere.
-    density : float
-        kg/m³.
-    law : JointLaw
-        How stiff joints are.
-
-    Raises
-    ------
-    SceneError
-        Naming the number that cannot be.
-
-    Examples
-    --------
-    >>> DomeShape(courses=8, around=24).rise
-    1.0
-    """
-
-    courses: int
-    around: int
-    bond: str = "running"
-    span: float = 2.0
-    rise: float = 1.0
-    opening: float = 0.5
-    thickness: float = 0.08
-    gap: float = 0.005
-    density: float = 2000.0
-    law: JointLaw = MASONRY
-
-    def __post_init__(self) -> None:
-        _set(self, "courses", whole_number("dome: courses", self.courses, 1))
-        _set(self, "around", whole_number("dome: around", self.around, 3))
-        for field in fields(self)[3:7]:
-            _set(self, field.name, positive(f"dome: {field.name}", getattr(self, field.name), "m"))
-        _set(self, "gap", joint_width("dome: gap", self.gap))
-        if self.bond not in BONDS:
-            raise SceneError(f"dome: bond is {short(self.bond)}; give one of {', '.join(BONDS)}")
-        if self.bond == "herringbone" and 2 * self.around % REPEAT:
-            raise SceneError(
-                f"dome: around is {self.around}; give an even number, so that herringbone closes"
-            )
-        if self.rise > 0.5 * self.span:
-            raise SceneError(
-                f"dome: rise is {self.rise:g} m; give at most half of the span, {0.5 * self.span:g}"
-            )
-        if self.opening >= self.span:
-            raise SceneError(
-                f"dome: opening is {self.opening:g} m; give less than the span, {self.span:g}"
-            )
-
-    @property
-    def radius(self) -> float:
-        """Radius of the sphere, m."""
-        return (0.25 * self.span**2 + self.rise**2) / (2 * self.rise)
-
-    def latitude(self, row: float) -> float:
-        """Return the angle above the horizontal at which a row begins, seen from the center.
-
-        Parameters
-        ----------
-        row : float
-            From 0 at the ground.
-
-        Returns
-        -------
-        float
-            rad.
-        """
-        first, last = (math.acos(0.5 * d / self.radius) for d in (self.span, self.opening))
-        return first + (last - first) * row / self.courses
 
 
 @dataclass(frozen=True)
@@ -165,25 +68,30 @@ def dome(shape: DomeShape, name: str = "", *, robots: Sequence[Robot] | None = N
     Examples
     --------
     >>> dome(DomeShape(courses=4, around=12, bond="herringbone"))
-    <Scene dome 36: 36 bricks, 78 joints, 12 ground ends, 3 robots>
+    <Scene dome 42: 42 bricks, 90 joints, 12 ground ends, 3 robots>
     """
     places = _running(shape) if shape.bond == "running" else _herringbone(shape)
-    pairs = _touching(places)
+    loose = [_brick(shape, place, i) for i, place in enumerate(places)]
+    pairs, normals = _beside(shape, places)
+    kept = np.flatnonzero(shares(loose, pairs, normals) >= LEAST_SHARE)
+    pairs, normals = [pairs[k] for k in kept], normals[kept]
     order = touching_order(len(places), pairs, [i for i, p in enumerate(places) if not p.low])
     if len(order) < len(places):
         raise SceneError(
-            f"dome: {len(places) - len(order)} bricks touch no other; give more around"
+            f"dome: {len(places) - len(order)} of {len(places)} bricks lie on no other; "
+            "give more around or more courses"
         )
-    rank = {old: new for new, old in enumerate(order)}
     bricks = [_brick(shape, places[old], new + 1) for new, old in enumerate(order)]
     require_apart("dome", bricks, "give more around, a wider gap or thinner bricks")
-    linked = sorted((max(rank[a], rank[b]), min(rank[a], rank[b])) for a, b in pairs)
+    rank = {old: new for new, old in enumerate(order)}
+    ends = [(min(rank[a], rank[b]), max(rank[a], rank[b])) for a, b in pairs]
+    turn = sorted(range(len(ends)), key=lambda k: ends[k][::-1])
     down = np.array([0.0, 0.0, -1.0])
     return Scene(
         name=name or f"dome {len(bricks)}",
         provenance="Generated by seqopt.scene.library.dome.",
         bricks=tuple(bricks),
-        joints=joints_between(bricks, [pair[::-1] for pair in linked], shape.law),
+        joints=joints_between(bricks, [ends[k] for k in turn], shape.law, normals[turn]),
         grounds=tuple(
             ground_under(brick, down, shape.law)
             for brick, old in zip(bricks, order, strict=True)
@@ -217,18 +125,20 @@ def _herringbone(shape: DomeShape) -> list[_Place]:
     return sorted(out, key=lambda place: (place.low, place.azimuth))
 
 
-def _touching(places: Sequence[_Place]) -> list[tuple[int, int]]:
-    """Return which places share an edge that is long enough for a joint."""
+def _beside(shape: DomeShape, places: Sequence[_Place]) -> tuple[list[tuple[int, int]], Floats]:
+    """Return which places share an edge, and directions across these, (P, 3)."""
     low, high = (np.array([getattr(p, name) for p in places]) for name in ("low", "high"))
     azimuth, half = (np.array([getattr(p, name) for p in places]) for name in ("azimuth", "half"))
     away = np.abs((azimuth[:, None] - azimuth + 0.5 * TURN) % TURN - 0.5 * TURN)
     shared = half[:, None] + half - away
-    least = 2 * LEAST_SHARE * np.minimum(half[:, None], half)
-    above = (high[:, None] == low) & (shared > least)
+    above = (high[:, None] == low) & (shared > NO_SHARE * half)
     level = (low[:, None] < high) & (low < high[:, None])
-    beside = level & (np.abs(shared) < 1e-6 * half)
-    a, b = np.nonzero(above | above.T | beside)
-    return [(int(i), int(j)) for i, j in zip(a, b, strict=True) if i < j]
+    beside = level & (np.abs(shared) <= NO_SHARE * half)
+    a, b = np.nonzero(np.triu(above | above.T | beside, 1))
+    middle = [_directions(shape.latitude(0.5 * (p.low + p.high)), p.azimuth) for p in places]
+    axes = np.array(middle)[:, :2]
+    which = np.where(beside[a, b], 0, 1)
+    return list(zip(a.tolist(), b.tolist(), strict=True)), axes[a, which] + axes[b, which]
 
 
 def _brick(shape: DomeShape, place: _Place, name: int) -> Brick:
@@ -279,7 +189,3 @@ def _directions(latitude: float, azimuth: float) -> tuple[Floats, Floats, Floats
         np.array([-rises * c, -rises * s, across]),
         np.array([across * c, across * s, rises]),
     )
-
-
-def _set(value: object, name: str, content: object) -> None:
-    object.__setattr__(value, name, content)

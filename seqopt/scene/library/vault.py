@@ -67,7 +67,7 @@ def herringbone_vault(
     --------
     >>> from seqopt.scene.scene_file import load_scene
     >>> herringbone_vault(load_scene("arch25"), VaultShape(bricks=60))
-    <Scene vault 60: 60 bricks, 143 joints, 5 ground ends, 3 robots>
+    <Scene vault 60: 60 bricks, 125 joints, 4 ground ends, 3 robots>
     """
     line = arch_line(arch)
     if shape.bricks < len(arch.bricks):

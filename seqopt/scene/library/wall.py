@@ -10,7 +10,8 @@ import numpy as np
 from seqopt.arrays import Vector
 from seqopt.errors import SceneError
 from seqopt.scene.checks import positive, vector
-from seqopt.scene.library.joints import MASONRY, JointLaw, ground_under, joints_between
+from seqopt.scene.library.joints import ground_under, joints_between
+from seqopt.scene.library.law import MASONRY, JointLaw
 from seqopt.scene.library.laying import joint_width, mobile_robots, whole_number
 from seqopt.scene.parts import Brick, Robot
 from seqopt.scene.scene import Scene
