@@ -84,11 +84,7 @@ def draw_bricks(  # noqa: PLR0913  # what is drawn, and how, each by its name
     marked : collection of int
         Names of bricks that are drawn in another color.
     """
-    corners = boxes(network.scene.placed[:bricks]).corners()
-    if twist is not None:
-        arm = corners - corners.mean(axis=1, keepdims=True)
-        turned = np.cross(twist[:bricks, None, 3:], arm)
-        corners = corners + magnify * (twist[:bricks, None, :3] + turned)
+    corners = _moved(network, bricks, twist, magnify)
     seen = corners @ view.axes().T
     polygons, colors = [], []
     for b in drawing_order(corners, view.axes()):
@@ -241,6 +237,16 @@ def draw_responses(
         axis.grid(visible=True, lw=0.3)
     axes[-1].set_xlabel("bricks placed")
     axes[0].legend(frameon=False, ncols=len(tables), fontsize=8)
+
+
+def _moved(network: Network, bricks: int, twist: Floats | None, magnify: float) -> Floats:
+    """Return the corners of the first bricks, (b, 8, 3), m, moved by twists (b, 6) if given."""
+    corners = boxes(network.scene.placed[:bricks]).corners()
+    if twist is None:
+        return corners
+    arm = corners - corners.mean(axis=1, keepdims=True)
+    turned = np.cross(twist[:bricks, None, 3:], arm)
+    return np.asarray(corners + magnify * (twist[:bricks, None, :3] + turned))
 
 
 def _light(corners: Floats, face: tuple[int, ...]) -> float:
