@@ -47,6 +47,8 @@ def killed(program: str, number: int) -> dict[str, object]:
         "write": (writing, BLOCKS, 2.0),
     }[program]
     how = SIGNALS[number % len(SIGNALS)]
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # in the background of a shell, and it
+        signal.signal(signal.SIGINT, signal.default_int_handler)  # would be so in what is started
     with tempfile.TemporaryDirectory() as name:
         out = Path(name) / "out"
         process = subprocess.Popen(
