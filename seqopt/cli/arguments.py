@@ -104,6 +104,7 @@ def _add_compare(commands: Commands, parents: list[_Parser]) -> None:
         description="Analyze every method on a scene; show the largest responses side by side, for "
         "the reference arch beside the printed ones, and list the inconsistencies in print.",
     )
+    _robots_argument(command, "all methods, which take as many as they need: the")
     _criterion_argument(command)
     command.add_argument("--out", type=Path, metavar="DIR", help="write tables and figures there")
     _strict_argument(command)
