@@ -14,7 +14,7 @@ import time
 from collections import deque
 from collections.abc import Generator, Iterator, Sequence
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -30,7 +30,6 @@ from seqopt.responses.alike import (
     combinations,
     distinct,
     no_node_twice,
-    robots_holding,
     steps_alike,
 )
 from seqopt.responses.division import answer_blocks
@@ -253,10 +252,10 @@ def window_models(schedule: Schedule, choice: Sequence[int]) -> int:
 
 def _window_states(schedule: Schedule, step: OpenStep, choice: Sequence[int]) -> np.ndarray:
     """Return the nodes held (S, r), ascending, for what is open once the earlier move is made."""
-    rows = combinations(schedule, step)
     if len(step.moves) == 2:
         first = step.moves[0]
         node = schedule.moves[first].candidates[choice[first]]
-        at = robots_holding(step).index(step.grips.index(OpenGrip(first)))
-        rows = rows[rows[:, at] == node]
+        grips = tuple(node if grip == OpenGrip(first) else grip for grip in step.grips)
+        step = replace(step, grips=grips)
+    rows = combinations(schedule, step)
     return np.sort(rows[no_node_twice(rows)], axis=1)
