@@ -42,7 +42,7 @@ def status_of(error: BaseException) -> Status:
         return Status.INTERRUPTED
     if isinstance(error, MemoryError):
         advice = "" if isinstance(error, SeqoptError) else f"; {LESS}"
-        complain(f"seqopt: out of memory: {error or 'no more is to be had'}{advice}")
+        complain(f"seqopt: out of memory: {str(error) or 'no more is to be had'}{advice}")
         return Status.FAILED
     if isinstance(error, SolverError):
         complain(f"seqopt: solver failed: {error}")

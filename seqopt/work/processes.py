@@ -99,6 +99,7 @@ def _deaf() -> Iterator[None]:
 def _follow(end: Connection) -> None:
     """Let a process of ours live no longer than its leash, and leave interrupts to its master."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 2)  # errors are sent; what dies is replaced
     warnings.simplefilter("ignore", RuntimeWarning)
     np.seterr(all="ignore")  # what is not finite is an error of its own
     threading.Thread(target=_wait_and_end, args=(end,), daemon=True).start()
