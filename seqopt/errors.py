@@ -69,5 +69,9 @@ class MemoryShortError(SeqoptError, MemoryError):
     """There is not the memory for what is asked; the text says how much it takes."""
 
 
+class WorkerError(SeqoptError, RuntimeError):
+    """Processes or machines that work was given to end without an answer, again and again."""
+
+
 class SceneWarning(UserWarning):
     """Something in a scene can be, and probably is not meant."""

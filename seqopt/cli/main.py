@@ -26,6 +26,7 @@ from seqopt.cli.values import (
     parse_limits,
     parse_mortar,
     parse_options,
+    parse_resources,
     parse_robots,
 )
 from seqopt.contact.mortar import MORTARS
@@ -150,6 +151,7 @@ def _optimize(options: argparse.Namespace) -> Status:
     criterion = parse_criterion(options.criteria, options.crown)
     scene = load_scene(options.scene)
     limits = parse_limits(options.limit, scene)
+    resources = parse_resources(options, progress)
     require_folder(options.out)
     start = time.perf_counter()
     network = build_network(scene)
@@ -158,8 +160,9 @@ def _optimize(options: argparse.Namespace) -> Status:
         find_schedule(network, options.schedule, parse_robots(options.robots)),
     )
     assemble = time.perf_counter() - start
-    problem = pose(engine, schedule, criterion, limits)
+    problem = pose(engine, schedule, criterion, limits, (), resources)
     plan = solve(problem, formulation, proof=not options.no_proof, **chosen)
+    progress("")
     _say_levels(engine)
     report = plan.summary() | {
         "models_paper_count": _paper_count(schedule),
