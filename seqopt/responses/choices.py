@@ -251,7 +251,7 @@ def _answers(
 ) -> tuple[dict[str, Floats], Floats]:
     """Return the wanted responses of grip sets (S, r) and the sizes (S, r) of their forces."""
     asked = [CHOSEN_BY[name] for name in sorted(names & CHOSEN_BY.keys())]
-    want = reduce(or_, (response.needs for response in asked), Want(0))
+    want = reduce(or_, (response.needs for response in asked), Want.SCREEN)
     found: dict[str, list[Floats]] = {response.name: [] for response in asked}
     forces = []
     for start in range(0, max(len(grips), 1), BLOCK):
