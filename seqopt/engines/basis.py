@@ -55,10 +55,13 @@ class Basis(FrozenValue):
         (..., m, d) float
             m.
         """
-        turns = np.cross(self.force[None], self.moment[:, None])  # (r × f) · n = r · (f × n)
-        return np.asarray(
-            (arms @ turns.reshape(-1, 3).T).reshape(*arms.shape[:-1], *turns.shape[:2])
-        )
+        sizes = len(self.moment), len(self.force)
+        return np.asarray((arms @ self._turns.T).reshape(*arms.shape[:-1], *sizes))
+
+    @cached_property
+    def _turns(self) -> Floats:
+        """What arms are multiplied by, (md, 3): (r × f) · n = r · (f × n)."""
+        return frozen(np.cross(self.force[None], self.moment[:, None]).reshape(-1, 3))
 
 
 SPACE = Basis(np.eye(3), np.eye(3))
