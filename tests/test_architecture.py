@@ -14,7 +14,7 @@ ROOT = Path(__file__).resolve().parent.parent
 
 ROOMS = (
     {"arrays", "errors"},
-    {"files"},
+    {"files", "work"},
     {"scene"},
     {"network"},
     {"sequence", "contact"},

@@ -104,6 +104,7 @@ def _add_compare(commands: Commands, parents: list[_Parser]) -> None:
         description="Analyze every method on a scene; show the largest responses side by side, for "
         "the reference arch beside the printed ones, and list the inconsistencies in print.",
     )
+    _robots_argument(command, "all methods, which take as many as they need: the")
     _criterion_argument(command)
     command.add_argument("--out", type=Path, metavar="DIR", help="write tables and figures there")
     _strict_argument(command)
@@ -243,8 +244,31 @@ def _add_optimize(commands: Commands, parents: list[_Parser]) -> None:
         help="with cascade or rank_search: solve only the models that the search meets, a fifth "
         "or so; how far the choice is from the optimum stays unknown",
     )
+    _resources_arguments(command)
     command.add_argument("--out", type=Path, metavar="DIR", required=True, help="folder to write")
     _strict_argument(command)
+
+
+def _resources_arguments(command: argparse.ArgumentParser) -> None:
+    """Add the arguments that say what a computation may use; results do not depend on them."""
+    command.add_argument(
+        "--workers",
+        default="1",
+        metavar="N",
+        help="processes to share the work among; pays from some ten seconds (default: %(default)s)",
+    )
+    command.add_argument(
+        "--cache",
+        type=Path,
+        metavar="DIR",
+        help="keep answers there and use what is there: a run that was ended goes on",
+    )
+    command.add_argument(
+        "--max-memory",
+        metavar="SIZE",
+        help="what responses and costs may take, as 500MB or 2GB (default: four fifths of what is "
+        "free)",
+    )
 
 
 def _add_scene(commands: Commands, parents: list[_Parser]) -> None:
@@ -253,5 +277,12 @@ def _add_scene(commands: Commands, parents: list[_Parser]) -> None:
         parents=parents,
         help="check, describe and export a scene",
         description="Check a scene, say what is in it, and write it as JSON if asked.",
+        epilog="example: seqopt scene vault338 --export my.json",
     )
-    command.add_argument("--export", type=Path, metavar="FILE", help="JSON file to write")
+    what = command.add_mutually_exclusive_group()
+    what.add_argument(
+        "--list",
+        action="store_true",
+        help="name all built-in scenes, a line each: bricks, joints, what it is",
+    )
+    what.add_argument("--export", type=Path, metavar="FILE", help="JSON file to write")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -21,7 +21,7 @@ from seqopt.placement.problem import Problem
 from seqopt.placement.promises import Excess, overloads
 from seqopt.placement.ranking import move_costs, rank_of
 from seqopt.placement.window_search import WindowSearch
-from seqopt.responses.choices import window_models
+from seqopt.responses.choices import StepChoices, window_models
 from seqopt.responses.table import analyze
 from seqopt.sequence.steps import Step, idle_robots
 
@@ -185,17 +185,32 @@ class Plan:
         Returns
         -------
         pandas.DataFrame
-            A row per choice, by step; ``second_node`` where two moves are open. SI units.
+            A row per choice, by step; ``second_node`` where two moves are open. SI units. Where
+            the responses of all choices are not kept, those that go with the plan's choices before.
         """
         parts = []
-        for problem in self.explored:
-            for choices in problem.evaluation.steps:
-                table = problem.table(choices)
-                columns = ["node", "second_node"][: len(choices.moves)]
-                nodes = pd.DataFrame(table.index.to_frame(index=False).to_numpy(), columns=columns)
-                nodes.insert(0, "step", choices.step.number)
-                parts.append(pd.concat([nodes, table.reset_index(drop=True)], axis=1))
+        for problem, choices, before in self._looked_at():
+            table = problem.table(choices)
+            columns = ["node", "second_node"][: table.index.nlevels]
+            nodes = pd.DataFrame(table.index.to_frame(index=False).to_numpy(), columns=columns)
+            if before is not None:
+                nodes = nodes.rename(columns={"node": "second_node"})
+                nodes.insert(0, "node", before)
+            nodes.insert(0, "step", choices.step.number)
+            parts.append(pd.concat([nodes, table.reset_index(drop=True)], axis=1))
         return pd.concat(parts).sort_values("step", kind="stable", ignore_index=True)
+
+    def _looked_at(self) -> Iterator[tuple[Problem, StepChoices, int | None]]:
+        """Yield steps and, where only one choice before is kept, the node of that choice."""
+        if self.search is not None or not self._posed.evaluation.streams:
+            for problem in self.explored:
+                for choices in problem.evaluation.steps:
+                    yield problem, choices, None
+            return
+        before = (0, *self.selection.choice)
+        for k in range(len(self._posed.schedule.moves)):
+            for choices in self._posed.window_choices(k, before[k]):
+                yield self._posed, choices, self.nodes[k - 1] if len(choices.moves) == 2 else None
 
     def summary(self) -> dict[str, object]:
         """Return what there is to say about the plan, ready for JSON.

@@ -38,11 +38,8 @@ def move_costs(problem: Problem, move: int, before: int, without: int | None = N
     (C_k,) float
     """
     total = np.zeros(len(problem.schedule.moves[move].candidates))
-    for choices in problem.evaluation.steps:
-        if choices.moves[-1] != move:
-            continue
-        rows = slice(None) if len(choices.moves) == 1 else before
-        total += problem.step_costs(_without(choices, without), rows)
+    for choices in problem.window_choices(move, before):
+        total += problem.step_costs(_without(choices, without))
     if without is not None:
         total[without] = np.inf
     return total

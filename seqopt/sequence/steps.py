@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import Enum
+from itertools import chain
 from numbers import Integral
 from typing import Protocol
 
@@ -147,12 +148,7 @@ def reachable(scene: Scene, robot: Robot, bricks: int) -> tuple[int, ...]:
     tuple of int
         In build order; neither blocked nor out of reach.
     """
-    return tuple(
-        node
-        for brick in scene.placed[:bricks]
-        for node in brick.nodes
-        if node not in scene.blocked_nodes and robot.reach.covers(brick.node_position(node))
-    )
+    return tuple(chain.from_iterable(scene.within_reach(robot)[:bricks]))
 
 
 def check_sequence(scene: Scene, steps: Sequence[Step]) -> tuple[Step, ...]:
