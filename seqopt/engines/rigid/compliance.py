@@ -30,12 +30,14 @@ from seqopt.engines.interface import (
     require_finite,
 )
 from seqopt.engines.rigid.grip_equations import grip_forces, share_pairs
+from seqopt.engines.rigid.kept import Kept
 from seqopt.engines.rigid.operator import ComplianceOperator, OperatorBuilder
 from seqopt.engines.rigid.refinement import Refinement
 from seqopt.engines.rigid.spanning_tree import grow_tree
 from seqopt.engines.threads import one_thread
 from seqopt.network.build import network_of
 from seqopt.network.network import Network
+from seqopt.network.statics import Statics, build_statics
 from seqopt.scene.scene import Scene
 
 KEPT = 32e6  # bytes of operators that may stay when another is made
@@ -67,7 +69,7 @@ class ComplianceEngine:
         self._network = network
         self._basis, self._accuracy = basis, accuracy
         self._tree = grow_tree(network)
-        self._operators: dict[int, ComplianceOperator] = {}
+        self._kept = Kept(KEPT)
         self._even = _count_even(network)
         self._refinement: Refinement | None = None  # of the brick count that was asked last
 
@@ -115,23 +117,22 @@ class ComplianceEngine:
     def _operator(self, bricks: int, columns: Ints) -> ComplianceOperator:
         """Return an operator that answers grip sets: one that is kept, or else a new one."""
         held = np.unique(columns // 2)
-        known = self._operators.pop(bricks, None)
+        known = self._kept.take(bricks)
         if known is None or not known.covers(held):
             if known is not None:
                 held = np.union1d(held, known.held)
             if 2 * len(held) >= bricks:
                 held = np.arange(bricks)
-            self._forget()
+            self._kept.make_room()
             with one_thread():
                 known = self._builder.operator(bricks, held)
-        self._operators[bricks] = known  # the last of all
+        self._kept.put(bricks, known)
         return known
 
-    def _forget(self) -> None:
-        """Drop operators that were not asked for longest, until the rest takes little memory."""
-        total = sum(operator.nbytes for operator in self._operators.values())
-        while total > KEPT:
-            total -= self._operators.pop(next(iter(self._operators))).nbytes
+    @cached_property
+    def _statics(self) -> Statics:
+        """What edges and supports carry, shared by the corrections of all brick counts."""
+        return build_statics(self._network)
 
     @cached_property
     def _builder(self) -> OperatorBuilder:
@@ -145,7 +146,7 @@ class ComplianceEngine:
             operator = self._operator(bricks, columns)
         with one_thread():
             if self._refinement is None or self._refinement.bricks != bricks:
-                self._refinement = Refinement(self._network, bricks)
+                self._refinement = Refinement(self._network, bricks, self._statics)
             return self._refinement.solve(columns, operator)
 
 

@@ -26,6 +26,7 @@ from seqopt.engines.rigid.mixed_system import rescaled, ungripped_system, unscal
 from seqopt.engines.rigid.operator import ComplianceOperator
 from seqopt.engines.rigid.recovery import Solution, respond
 from seqopt.network.network import Network
+from seqopt.network.statics import Statics
 
 TOGETHER = 256  # grip sets per pass: their unknowns stay in the processor's cache
 STEPS = 5  # corrections, after which a set is solved on its own
@@ -40,11 +41,13 @@ class Refinement:
     network : Network
     bricks : int
         How many bricks stand.
+    statics : Statics, optional
+        Of the network, if they are known.
     """
 
-    def __init__(self, network: Network, bricks: int) -> None:
+    def __init__(self, network: Network, bricks: int, statics: Statics | None = None) -> None:
         self.network, self.bricks = network, bricks
-        self.parts = ungripped_system(network, bricks)
+        self.parts = ungripped_system(network, bricks, statics)
         self.held: HeldSystem = hold_loose(self.parts)
         self.inner = inner_motion(self.parts)
         weighed = sparse.csr_array(self.parts.load[None])
