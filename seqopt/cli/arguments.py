@@ -11,6 +11,7 @@ from seqopt.cli.terminal import complain, show
 from seqopt.contact.mortar import MORTARS
 from seqopt.engines.registry import ENGINES
 from seqopt.placement.formulation import formulation_names
+from seqopt.placement.ranks import Among, Ranked
 from seqopt.scene.scene_file import builtin_scenes
 from seqopt.sequence.three_robots import SCHEDULES
 from seqopt.sequence.two_robots import METHODS
@@ -196,6 +197,19 @@ def _criterion_argument(command: argparse.ArgumentParser) -> None:
         metavar="NAME",
         help=f"what a step costs: {', '.join(CRITERIA)}, or responses to rank with weights, as "
         "T_max,M_sup=2,F_move; equations (2) and (3) of Bruun et al. by default",
+    )
+
+    command.add_argument(
+        "--ranked",
+        choices=[ranked.value for ranked in Ranked],
+        help="for criteria of ranks: those of a step that two moves share run over all pairs, or "
+        "are conditional on the earlier choice (default: pairs)",
+    )
+    command.add_argument(
+        "--among",
+        choices=[among.value for among in Among],
+        help="for criteria of ranks: candidates of a move are ranked among all, or among those "
+        "possible after the choice before (default: all)",
     )
 
 

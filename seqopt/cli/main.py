@@ -22,7 +22,7 @@ from seqopt.cli.outputs import (
 from seqopt.cli.status import Status, status_of
 from seqopt.cli.terminal import complain, flush, progress, quiet_numbers, say, show, silence
 from seqopt.cli.values import (
-    parse_criterion,
+    asked_criterion,
     parse_limits,
     parse_mortar,
     parse_options,
@@ -100,7 +100,7 @@ def _run(arguments: Sequence[str] | None) -> int:
 def _compare(options: argparse.Namespace) -> Status:
     scene = load_scene(options.scene)
     engine = _engine(options, build_network(scene))
-    criterion = parse_criterion(options.criteria, options.crown)
+    criterion = asked_criterion(options)
     if options.out is not None:
         require_matplotlib(options.out)
         require_folder(options.out)
@@ -147,7 +147,7 @@ def _say_idle(scene: Scene, steps: Sequence[AnyStep]) -> None:
 def _optimize(options: argparse.Namespace) -> Status:
     formulation = find_formulation(options.formulation)
     chosen = parse_options(formulation, options.option)
-    criterion = parse_criterion(options.criteria, options.crown)
+    criterion = asked_criterion(options)
     scene = load_scene(options.scene)
     limits = parse_limits(options.limit, scene)
     require_folder(options.out)

@@ -11,6 +11,7 @@ from seqopt.contact.mortar import MORTARS, Mortar
 from seqopt.errors import ProblemError
 from seqopt.placement.criteria import RankSum
 from seqopt.placement.formulation import Formulation, as_formulation
+from seqopt.placement.ranks import Among, Ranked
 from seqopt.placement.requirements import Criterion, Limit, payload_limits
 from seqopt.placement.scales import NEVER
 from seqopt.responses.choices import CHOICE_RESPONSES
@@ -20,6 +21,22 @@ from seqopt.study.presets import CRITERIA
 BETWEEN = re.compile(r",(?![^\[]*\])")  # a comma that is not in brackets
 LARGEST = 1e100  # number: products of larger ones overflow
 RESPONSES = (*CHOICE_RESPONSES, "F_each")
+
+
+def asked_criterion(options: argparse.Namespace) -> Criterion:
+    """Return the criterion that a command is asked for.
+
+    Parameters
+    ----------
+    options : argparse.Namespace
+        With ``criteria``, ``crown``, ``ranked`` and ``among``.
+
+    Returns
+    -------
+    Criterion
+    """
+    criterion = parse_criterion(options.criteria, options.crown)
+    return rank_otherwise(criterion, options.ranked, options.among)
 
 
 def parse_criterion(text: str, crown: str | None = None) -> Criterion:
@@ -54,6 +71,36 @@ def parse_criterion(text: str, crown: str | None = None) -> Criterion:
         name, weight = _split(part)
         terms.append((_response(name, "--criteria"), _number(weight or "1", f"--criteria {part}")))
     return RankSum(text, tuple(terms), tuple(terms))
+
+
+def rank_otherwise(criterion: Criterion, ranked: str | None, among: str | None) -> Criterion:
+    """Return a criterion of ranks with what it ranks among.
+
+    Parameters
+    ----------
+    criterion : Criterion
+    ranked, among : str, optional
+        Values of `seqopt.placement.ranks.Ranked` and `seqopt.placement.ranks.Among`.
+
+    Returns
+    -------
+    Criterion
+
+    Raises
+    ------
+    ProblemError
+        If either is given and the criterion has no ranks.
+    """
+    if ranked is None and among is None:
+        return criterion
+    if not isinstance(criterion, RankSum):
+        flag = f"--ranked {ranked}" if ranked else f"--among {among}"
+        raise ProblemError(f"{flag}: {criterion.name} has no ranks; leave it out")
+    return replace(
+        criterion,
+        ranked=criterion.ranked if ranked is None else Ranked(ranked),
+        among=criterion.among if among is None else Among(among),
+    )
 
 
 def parse_robots(text: str) -> tuple[str, ...]:

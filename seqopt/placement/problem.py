@@ -16,6 +16,7 @@ from seqopt.errors import ProblemError
 from seqopt.network.network import Network
 from seqopt.placement.costs import Budget, LayeredCosts
 from seqopt.placement.interface import Aim
+from seqopt.placement.possible import compared, spread_over_pairs
 from seqopt.placement.requirements import Criterion, Limit, ResponsesAsked
 from seqopt.placement.scales import SceneFacts
 from seqopt.responses.choices import CHOICE_RESPONSES, Evaluation, StepChoices
@@ -87,7 +88,8 @@ class Problem:
         """Return the costs of all choices, steps of the same moves joined, and the seconds."""
         steps = self.evaluation.steps
         start = time.perf_counter()
-        costs = [(choices.moves, self.step_costs(choices)) for choices in steps]
+        faced = [compared(choices, self.schedule, self.criterion) for choices in steps]
+        costs = [(choices.moves, self.step_costs(choices)) for choices in faced]
         known = [c[np.isfinite(c)].min() for _, c in costs if np.isfinite(c).any()]
         least = 0.0 if join is np.add else min(known, default=0.0)  # where no step is open
         sizes = [len(move.candidates) for move in self.schedule.moves]
@@ -131,9 +133,15 @@ class Problem:
         """
         out = np.zeros(len(self.schedule.moves[move].candidates))
         for choices in self.evaluation.steps:
+            choices = compared(choices, self.schedule, self.criterion)  # noqa: PLW2901
             if len(choices.moves) == 2 and choices.moves[1] == move:
                 out = out + self.step_costs(choices, before)
         return out
+
+    @cached_property
+    def others(self) -> dict[Criterion, Problem]:
+        """The same problem under other criteria that need the same responses, as they are met."""
+        return {}
 
     def step_costs(self, choices: StepChoices, rows: slice | int = slice(None)) -> Floats:
         """Return the costs of a step's choices, infinite where they are not allowed.
@@ -151,7 +159,8 @@ class Problem:
         """
         responses = {name: values[rows] for name, values in choices.responses.items()}
         move = self.schedule.moves[choices.moves[-1]]
-        costs = self.criterion.costs(responses, move.bricks, len(move.candidates))
+        criterion = spread_over_pairs(choices, self.criterion)
+        costs = criterion.costs(responses, move.bricks, len(move.candidates))
         costs = np.where(np.isfinite(costs), costs, np.inf)
         for limit in self.limits:
             costs[limit.exceeded(responses[limit.response])] = np.inf

@@ -11,6 +11,7 @@ import pandas as pd
 from seqopt.arrays import Floats
 from seqopt.placement.costs import LayeredCosts
 from seqopt.placement.criteria import RankSum, WeightedSum, WorstRatio
+from seqopt.placement.possible import compared
 from seqopt.placement.problem import Problem
 from seqopt.placement.requirements import Criterion
 from seqopt.responses.choices import StepChoices
@@ -41,6 +42,7 @@ def move_costs(problem: Problem, move: int, before: int, without: int | None = N
     for choices in problem.evaluation.steps:
         if choices.moves[-1] != move:
             continue
+        choices = compared(choices, problem.schedule, problem.criterion)  # noqa: PLW2901
         rows = slice(None) if len(choices.moves) == 1 else before
         total += problem.step_costs(_without(choices, without), rows)
     if without is not None:

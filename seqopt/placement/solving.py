@@ -23,6 +23,7 @@ from seqopt.placement.interface import Handed, PlacementProblem
 from seqopt.placement.plan import Plan
 from seqopt.placement.problem import Problem
 from seqopt.placement.promises import require_possible
+from seqopt.placement.ranks import Among
 from seqopt.placement.window_search import search_windows
 
 
@@ -138,6 +139,10 @@ def _solve_windows(
         )
     if not isinstance(problem, Problem):
         raise ProblemError("the costs of all choices are given; ask for the proof, it is free")
+    if getattr(problem.criterion, "among", Among.ALL) is not Among.ALL:
+        raise ProblemError(
+            "ranks among possible candidates need all models: rank among all, or ask for the proof"
+        )
     seconds: dict[str, float] = {}
     with _timed(seconds, "search"):
         found = search_windows(problem)

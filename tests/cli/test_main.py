@@ -486,3 +486,17 @@ def test_the_command_line_says_why(capsys):
     assert "use the compliance engine" in capsys.readouterr().err
     assert main(["analyze", "--method", "sequential", "--mortar", "dry"]) == 2
     assert "engine compliance: its joints hold anything" in capsys.readouterr().err
+
+
+def test_ranks_are_taken_as_asked(tmp_path):
+    words = ("--formulation", "overlap_dp", "--ranked", "conditional")
+    assert main(["optimize", "arch25", *words, "--out", str(tmp_path / "a")]) == 0
+    found = json.loads((tmp_path / "a" / "summary.json").read_text(encoding="utf-8"))
+    assert (found["ranked"], found["among"]) == ("conditional", "all")
+    assert found["objective"] == found["objectives"]["conditional"] == pytest.approx(656.025)
+
+
+def test_ranks_are_not_asked_of_what_has_none(tmp_path, capsys):
+    words = ("--formulation", "overlap_dp", "--criteria", "weighted", "--among", "possible")
+    assert main(["optimize", "arch25", *words, "--out", str(tmp_path / "a")]) == 2
+    assert "--among possible: weighted has no ranks; leave it out" in capsys.readouterr().err
