@@ -238,13 +238,7 @@ def _add_optimize(commands: Commands, parents: list[_Parser]) -> None:
     )
     _robots_argument(command, "a schedule by name: the")
     _criterion_argument(command)
-    command.add_argument(
-        "--limit",
-        action="append",
-        default=[],
-        metavar="LIMIT",
-        help="no open step may exceed it: payload, or as F_largest=300 (SI units); may be repeated",
-    )
+    _caps_arguments(command)
     command.add_argument(
         "--option",
         action="append",
@@ -260,6 +254,27 @@ def _add_optimize(commands: Commands, parents: list[_Parser]) -> None:
     )
     command.add_argument("--out", type=Path, metavar="DIR", required=True, help="folder to write")
     _strict_argument(command)
+
+
+def _caps_arguments(command: argparse.ArgumentParser) -> None:
+    """Add the arguments that forbid choices."""
+    command.add_argument(
+        "--limit",
+        action="append",
+        default=[],
+        metavar="LIMIT",
+        help="no open step may exceed it: payload, or as F_largest=300 (SI units); may be repeated",
+    )
+    command.add_argument(
+        "--budget",
+        action="append",
+        default=[],
+        metavar="BUDGET",
+        help="cap on a total over the build, with labels, lagrangian, overlap_mip or overlap_lp: "
+        "travel=0.8 (of what the optimum without budgets travels), travel=3.5m, "
+        "steps_over:F_largest=250:10 (at most 10 open steps over 250 N), robot_use:rob1=100:5; "
+        "may be repeated",
+    )
 
 
 def _add_scene(commands: Commands, parents: list[_Parser]) -> None:

@@ -13,6 +13,7 @@ import numpy as np
 import pandas as pd
 
 from seqopt.cli.arguments import parser
+from seqopt.cli.budgets import parse_budgets, with_budgets
 from seqopt.cli.outputs import (
     comparison_files,
     keep_apart,
@@ -150,6 +151,7 @@ def _optimize(options: argparse.Namespace) -> Status:
     criterion = asked_criterion(options)
     scene = load_scene(options.scene)
     limits = parse_limits(options.limit, scene)
+    budgets = parse_budgets(options.budget)
     require_folder(options.out)
     start = time.perf_counter()
     network = build_network(scene)
@@ -158,7 +160,8 @@ def _optimize(options: argparse.Namespace) -> Status:
         find_schedule(network, options.schedule, parse_robots(options.robots)),
     )
     assemble = time.perf_counter() - start
-    problem = pose(engine, schedule, criterion, limits)
+    counted = [budget.response for budget in budgets if budget.response]
+    problem = with_budgets(pose(engine, schedule, criterion, limits, counted), budgets)
     plan = solve(problem, formulation, proof=not options.no_proof, **chosen)
     _say_levels(engine)
     report = plan.summary() | {

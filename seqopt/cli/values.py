@@ -6,6 +6,7 @@ import argparse
 import re
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 from seqopt.contact.mortar import MORTARS, Mortar
 from seqopt.errors import ProblemError
@@ -147,7 +148,7 @@ def parse_limits(texts: Sequence[str], scene: Scene) -> tuple[Limit, ...]:
     return tuple(out)
 
 
-def parse_options(formulation: Formulation | str, texts: Sequence[str]) -> dict[str, int | str]:
+def parse_options(formulation: Formulation | str, texts: Sequence[str]) -> dict[str, Any]:
     """Return the options of a formulation from words.
 
     Parameters
@@ -168,7 +169,7 @@ def parse_options(formulation: Formulation | str, texts: Sequence[str]) -> dict[
     """
     formulation = as_formulation(formulation)
     known = formulation.options
-    out: dict[str, int | str] = {}
+    out: dict[str, Any] = {}
     for text in texts:
         name, _, value = text.partition("=")
         if name not in known:

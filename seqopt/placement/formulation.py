@@ -15,8 +15,10 @@ import numpy as np
 from seqopt.arrays import FrozenValue
 from seqopt.errors import ProblemError, SeqoptError, SolverError
 from seqopt.placement.interface import Aim, PlacementProblem
+from seqopt.placement.watch import Finding, Watch
 
 GROUP = "seqopt.formulations"
+WATCH = "watch"  # the name by which a formulation takes a watch
 
 
 class FormulationKind(Enum):
@@ -32,6 +34,13 @@ class Reads(Enum):
 
     ALL = "all"  # every pair in every shared step
     WINDOW = "window"  # by default, shared steps only for choices already made
+
+
+class End(Enum):
+    """How a formulation ended."""
+
+    DONE = "done"
+    STOPPED = "stopped"  # before it could keep what it promises; its choice and bound stand
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -50,6 +59,10 @@ class Selection(FrozenValue):
         Dual value of each budget: the rate at which one more unit would lower the bound.
     compile_seconds : float
         Part of the time to solve that went into writing the program down for a solver, s.
+    end : End
+        Whether it ended early.
+    trace : tuple of Finding
+        What it knew at which time: choices and bounds.
     """
 
     choice: tuple[int, ...]
@@ -57,6 +70,8 @@ class Selection(FrozenValue):
     bound: float = -np.inf
     prices: Mapping[str, float] = field(default_factory=dict)
     compile_seconds: float = 0.0
+    end: End = End.DONE
+    trace: tuple[Finding, ...] = field(default=(), compare=False)
 
 
 @dataclass(frozen=True)
@@ -100,8 +115,13 @@ class Formulation:
         return {
             name: parameter.default
             for name, parameter in inspect.signature(self.solve).parameters.items()
-            if parameter.kind is inspect.Parameter.KEYWORD_ONLY
+            if parameter.kind is inspect.Parameter.KEYWORD_ONLY and name != WATCH
         }
+
+    @property
+    def watched(self) -> bool:
+        """Whether ``solve`` takes a `Watch`, and so a time limit."""
+        return WATCH in inspect.signature(self.solve).parameters
 
 
 def formulation_names() -> tuple[str, ...]:
@@ -127,7 +147,7 @@ def formulations() -> dict[str, Formulation]:
     --------
     >>> import seqopt
     >>> [name for name, f in seqopt.formulations().items() if f.takes_budgets]
-    ['overlap_lp', 'overlap_mip']
+    ['labels', 'lagrangian', 'overlap_lp', 'overlap_mip']
     """
     found = {entry.name: _load(entry) for entry in entry_points(group=GROUP)}
     return dict(sorted(found.items()))
@@ -196,13 +216,17 @@ def as_formulation(given: Formulation | str) -> Formulation:
     raise ProblemError(f"a {type(given).__name__} is no formulation; give one of {known}")
 
 
-def select(formulation: Formulation, problem: PlacementProblem, **options: Any) -> Selection:
+def select(
+    formulation: Formulation, problem: PlacementProblem, watch: Watch | None = None, **options: Any
+) -> Selection:
     """Return the selection of a formulation, with numbers where numbers belong.
 
     Parameters
     ----------
     formulation : Formulation
     problem : PlacementProblem
+    watch : Watch, optional
+        Handed to the formulation if it takes one; the trace is read from it.
     **options
         Of the formulation.
 
@@ -217,8 +241,10 @@ def select(formulation: Formulation, problem: PlacementProblem, **options: Any) 
         As the formulation does; a `SolverError` also if it raises anything else, or returns
         something that is no selection.
     """
+    watch = watch or Watch()
+    told = {WATCH: watch} if formulation.watched else {}
     try:
-        found: object = formulation.solve(problem, **options)
+        found: object = formulation.solve(problem, **told, **options)
     except (SeqoptError, MemoryError):
         raise
     except Exception as error:  # whatever a formulation of others may raise
@@ -236,11 +262,19 @@ def select(formulation: Formulation, problem: PlacementProblem, **options: Any) 
             bound=float(found.bound),
             prices={str(name): float(price) for name, price in found.prices.items()},
             compile_seconds=seconds,
+            end=End(found.end),
+            trace=_traced(watch, float(found.objective), float(found.bound)),
         )
     except (TypeError, ValueError, AttributeError, OverflowError) as error:
         raise SolverError(
             f"formulation {formulation.name} returned a Selection that is none: {_said(error)}"
         ) from error
+
+
+def _traced(watch: Watch, objective: float, bound: float) -> tuple[Finding, ...]:
+    """Return what was told, ending with what is claimed."""
+    watch.tell(objective, bound)
+    return watch.trace
 
 
 def _said(error: Exception) -> str:

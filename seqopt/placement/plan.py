@@ -199,6 +199,18 @@ class Plan:
                 parts.append(pd.concat([nodes, table.reset_index(drop=True)], axis=1))
         return pd.concat(parts).sort_values("step", kind="stable", ignore_index=True)
 
+    def _budgets(self) -> dict[str, dict[str, float | None]]:
+        """Return what there is of every budget, what is spent, and its price."""
+        prices = self.selection.prices
+        return {
+            budget.name: {
+                "bound": budget.bound if np.isfinite(budget.bound) else None,
+                "spent": budget.spent(self.selection.choice),
+                "price": prices.get(budget.name),
+            }
+            for budget in self.problem.budgets
+        }
+
     def objectives(self) -> dict[str, dict[str, float | None] | None]:
         """Return the sum of ranks under both objectives, and the two parts of a heuristic's gap.
 
@@ -228,10 +240,12 @@ class Plan:
         -------
         dict
             Names of scene, schedule, formulation and criterion; ``status`` (``optimal``,
-            ``claimed optimal`` where budgets leave the proof to the solver, ``feasible`` or
+            ``claimed optimal`` where the proof is left to a solver, ``feasible`` or
             ``unproven``), ``objective``, ``bound``, ``gap``, ``claimed_gap``; of criteria of
             ranks the sums under both ``objectives`` and of heuristics the two ``gap_parts`` (see
-            `seqopt.placement.objectives`), null without proof; the payloads that are exceeded;
+            `seqopt.placement.objectives`), null without proof; of every one of the ``budgets`` what
+            is there, spent and what one more unit would save; whether it ``ended`` ``done`` or was
+            ``stopped``; the payloads that are exceeded;
             ``idle_robots``, which never grip; ``models_evaluated`` and ``seconds``.
         """
         schedule, proof = self._posed.schedule, self.certificate
@@ -253,6 +267,8 @@ class Plan:
             "gap": None if proof is None else proof.gap,
             "claimed_gap": None if proof is None else proof.claimed_gap,
             **self.objectives(),
+            "budgets": self._budgets(),
+            "ended": self.selection.end.value,
             "idle_robots": list(idle_robots(schedule.scene, self.steps)),
             "payload_exceeded": [str(excess) for excess in self.overloads],
             "models_evaluated": self.models,

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import math
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass
+from numbers import Real
 from typing import Any
 
 import numpy as np
 
-from seqopt.errors import ProblemError
-from seqopt.placement.certificate import judge
+from seqopt.errors import InfeasibleError, ProblemError
+from seqopt.placement.certificate import judge, least_sum
+from seqopt.placement.conflicts import refusal
 from seqopt.placement.formulation import (
     Formulation,
     Reads,
@@ -24,11 +28,27 @@ from seqopt.placement.plan import Plan
 from seqopt.placement.problem import Problem
 from seqopt.placement.promises import require_possible
 from seqopt.placement.ranks import Among
+from seqopt.placement.watch import Finding, Watch
 from seqopt.placement.window_search import search_windows
+from seqopt.scene.checks import short
+
+
+@dataclass(frozen=True)
+class _Run:
+    """How long a formulation may take, and who is told what it finds."""
+
+    time_limit: float
+    progress: Callable[[Finding], object] | None
 
 
 def solve(
-    problem: PlacementProblem, formulation: Formulation | str, *, proof: bool = True, **options: Any
+    problem: PlacementProblem,
+    formulation: Formulation | str,
+    *,
+    proof: bool = True,
+    time_limit: float = math.inf,
+    progress: Callable[[Finding], object] | None = None,
+    **options: Any,
 ) -> Plan:
     """Solve a problem by a formulation and check the answer from the problem's own data.
 
@@ -41,6 +61,11 @@ def solve(
     proof : bool, optional
         False lets a formulation that looks at one window after the other solve only the models that
         it meets; how far its choice is from the optimum then stays unknown.
+    time_limit : float, optional
+        After which it stops with the best choice so far and a bound, s. Posing the problem, which
+        computes all costs, and checking the answer are not counted.
+    progress : callable, optional
+        Told every better choice and bound as it is found, a `seqopt.placement.watch.Finding`.
     **options
         Of the formulation.
 
@@ -73,9 +98,12 @@ def solve(
             f"a {type(problem).__name__} is no problem; give one that seqopt.pose made"
         )
     require_fit(problem, formulation, options)
+    _require_time(formulation, time_limit)
     if isinstance(problem, Problem):
         require_possible(problem)
-    return (_solve_all if proof else _solve_windows)(problem, formulation, options)
+    if not proof:
+        return _solve_windows(problem, formulation, options)
+    return _solve_all(problem, formulation, _Run(time_limit, progress), options)
 
 
 def require_fit(
@@ -107,14 +135,26 @@ def require_fit(
             raise ProblemError(f"option {name}: {formulation.name} has {known}")
 
 
+def _require_time(formulation: Formulation, time_limit: float) -> None:
+    """Raise an error unless a time limit is one, and the formulation can keep it."""
+    if not isinstance(time_limit, Real) or not time_limit >= 0:
+        raise ProblemError(f"time_limit is {short(time_limit)}; give seconds from 0")
+    if np.isfinite(time_limit) and not formulation.watched:
+        raise ProblemError(f"{formulation.name} takes no time limit; leave it out")
+
+
 def _solve_all(
-    problem: PlacementProblem, formulation: Formulation, options: Mapping[str, Any]
+    problem: PlacementProblem,
+    formulation: Formulation,
+    run: _Run,
+    options: Mapping[str, Any],
 ) -> Plan:
     """Return the certified plan of a formulation that is given the costs of all choices."""
     seconds: dict[str, float] = {}
     stages = problem.seconds(formulation.aim)  # computes the costs: solving is timed alone
-    with _timed(seconds, "solve"):
-        selection = select(formulation, Handed(problem), **options)  # the judge has the originals
+    with _timed(seconds, "solve"), _conflicts_named(problem):
+        handed = Handed(problem)  # the judge has the originals
+        selection = select(formulation, handed, Watch(run.time_limit, run.progress), **options)
     seconds["compile"] = selection.compile_seconds
     seconds["solve"] -= selection.compile_seconds
     with _timed(seconds, "verify"):
@@ -151,6 +191,17 @@ def _solve_windows(
         steps = problem.steps(found.choice)
     stages = {"respond": respond, "rank": seconds["search"] - respond, "verify": seconds["verify"]}
     return Plan(problem, formulation, Selection(found.choice, np.nan), None, steps, stages, found)
+
+
+@contextmanager
+def _conflicts_named(problem: PlacementProblem) -> Iterator[None]:
+    """Name the budgets that conflict where a formulation says that none can be kept together."""
+    try:
+        yield
+    except InfeasibleError:
+        if not problem.budgets or not np.isfinite(least_sum(problem.sums)):
+            raise
+        raise refusal(problem) from None
 
 
 @contextmanager

@@ -500,3 +500,42 @@ def test_ranks_are_not_asked_of_what_has_none(tmp_path, capsys):
     words = ("--formulation", "overlap_dp", "--criteria", "weighted", "--among", "possible")
     assert main(["optimize", "arch25", *words, "--out", str(tmp_path / "a")]) == 2
     assert "--among possible: weighted has no ranks; leave it out" in capsys.readouterr().err
+
+
+def test_budgets_are_kept_as_asked(tmp_path):
+    words = ("--formulation", "labels", "--budget", "travel=0.8", "--budget")
+    words += ("steps_over:F_largest=300:3", "--out", str(tmp_path / "a"))
+    assert main(["optimize", "arch25", *words]) == 0
+    found = json.loads((tmp_path / "a" / "summary.json").read_text(encoding="utf-8"))
+    way, steps = found["budgets"].values()
+    assert way["bound"] == pytest.approx(0.8 * 24.006771, rel=1e-6)
+    assert way["spent"] <= way["bound"]
+    assert way["price"] > 0
+    assert steps["spent"] <= steps["bound"] == 3
+    assert found["status"] == "optimal"
+    assert found["ended"] == "done"
+
+
+@pytest.mark.parametrize(
+    ("budget", "status", "said"),
+    [
+        ("travel=2m", 3, "any takes at least 10.8316 of 'robot travel [m]', more than 2"),
+        ("travel=few", 2, "'few' is not a number from 0"),
+        ("travel=-1m", 2, "'-1' is not a number from 0"),
+        ("travel=250:3", 2, "there is no such; give travel=0.8"),
+        ("steps_over:T_max=3", 2, "there is no such; give travel=0.8"),
+        ("steps_over:T_max=80:3m", 2, "steps have no meters"),
+        ("robot_use:rob9=80:3", 2, "response F_rob9: there is no such"),
+    ],
+)
+def test_budgets_that_cannot_be_get_one_line(tmp_path, capsys, budget, status, said):
+    words = ("--formulation", "labels", "--budget", budget, "--out", str(tmp_path / "a"))
+    assert main(["optimize", "arch25", *words]) == status
+    assert said in capsys.readouterr().err
+    assert not (tmp_path / "a").exists()
+
+
+def test_a_budget_is_given_once(tmp_path, capsys):
+    words = ("--formulation", "labels", "--budget", "travel=2m", "--budget", "travel=0.5")
+    assert main(["optimize", "arch25", *words, "--out", str(tmp_path / "a")]) == 2
+    assert "--budget travel=0.5: it stands there twice" in capsys.readouterr().err

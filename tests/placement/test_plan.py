@@ -124,7 +124,7 @@ def test_budgets_are_refused_by_those_that_do_not_take_them(engine25, name):
     if formulation.takes_budgets:
         assert seqopt.solve(problem, name).certificate.spent
         return
-    with pytest.raises(ProblemError, match="couples all moves; use overlap_lp or overlap_mip"):
+    with pytest.raises(ProblemError, match="couples all moves; use labels or lagrangian"):
         seqopt.solve(problem, name)
 
 
