@@ -32,7 +32,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
-from seqopt.errors import InfeasibleError, ProblemError, SolverError
+from seqopt.errors import InfeasibleError, ProblemError
+from seqopt.placement.first_choice import stopped
 from seqopt.placement.formulation import End, Formulation, FormulationKind, Selection
 from seqopt.placement.interface import Aim, PlacementProblem
 from seqopt.placement.priced_paths import ROUNDING, Path, PricedPaths, priced_paths
@@ -110,10 +111,8 @@ def solve(
     if best is None and bound == np.inf:
         raise InfeasibleError("no choice is within all budgets; raise a bound")
     if best is None:
-        raise SolverError(
-            f"labels met no choice within all budgets (none is below {bound * paths.scale:.6g}); "
-            "give it more time, or more labels by its option most"
-        )
+        said = f"labels was stopped (no choice is below {bound * paths.scale:.6g})"
+        return stopped(problem, bound=bound * paths.scale, why=said)
     value = problem.sums.cost(best.choice)
     proven = bound >= best.cost
     bound = value if proven else min(bound * paths.scale, value)

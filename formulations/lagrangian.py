@@ -30,7 +30,7 @@ from itertools import permutations
 import numpy as np
 
 from seqopt.arrays import Floats
-from seqopt.errors import SolverError
+from seqopt.placement.first_choice import stopped
 from seqopt.placement.formulation import End, Formulation, FormulationKind, Selection
 from seqopt.placement.interface import Aim, PlacementProblem
 from seqopt.placement.priced_paths import Path, PricedPaths, priced_paths
@@ -71,10 +71,8 @@ def solve(problem: PlacementProblem, *, watch: Watch | None = None) -> Selection
         best = min((p for p in met if p.within), key=lambda path: path.cost, default=None)
     bound = priced.bound * paths.scale
     if best is None:
-        raise SolverError(
-            f"lagrangian met no choice within all budgets (none is below {bound:.6g}); let labels "
-            "look at all, or give it more time"
-        )
+        said = f"lagrangian looked at few choices (none is below {bound:.6g}); labels looks at all;"
+        return stopped(problem, bound=bound, why=f"{said} it ended")
     value = problem.sums.cost(best.choice)
     watch.tell(value, bound)
     end = End.STOPPED if watch.over else End.DONE

@@ -16,19 +16,23 @@ from __future__ import annotations
 import cvxpy as cp
 import numpy as np
 
-from formulations.solvers import minimize
+from formulations.solvers import minimize_whole
+from seqopt.placement.first_choice import stopped
 from seqopt.placement.flow import layered_flow
-from seqopt.placement.formulation import Formulation, FormulationKind, Selection
+from seqopt.placement.formulation import End, Formulation, FormulationKind, Selection
 from seqopt.placement.interface import Aim, PlacementProblem
+from seqopt.placement.watch import Watch
 
 
-def solve(problem: PlacementProblem) -> Selection:
+def solve(problem: PlacementProblem, *, watch: Watch | None = None) -> Selection:
     """Return the exact optimum within the budgets.
 
     Parameters
     ----------
     problem : PlacementProblem
         Its sums and budgets are used.
+    watch : Watch, optional
+        Says when to stop, and is told what is found.
 
     Returns
     -------
@@ -40,8 +44,9 @@ def solve(problem: PlacementProblem) -> Selection:
     InfeasibleError
         If no choice is allowed, or none is within all budgets.
     SolverError
-        If the solver ends without an optimum.
+        If the solver ends without an optimum, or stops and no choice is at hand.
     """
+    watch = watch or Watch()
     flow = layered_flow(problem)
     arcs = cp.Variable(len(flow.cost), boolean=True)
     conserve = cp.Zero(flow.balance @ arcs - flow.source)
@@ -49,11 +54,14 @@ def solve(problem: PlacementProblem) -> Selection:
         cp.NonNeg(cap - amount @ arcs) for cap, amount in zip(flow.caps, flow.amounts, strict=True)
     ]
     program = cp.Problem(cp.Minimize(flow.cost @ arcs), [conserve, *caps])
-    optimum = minimize(program, cp.HIGHS, feasible=flow.feasible)
+    optimum = minimize_whole(program, feasible=flow.feasible, watch=watch, told=flow.bound)
+    if not np.isfinite(optimum.value):
+        return stopped(problem, bound=flow.bound(optimum.bound))
     choice = flow.choice(np.asarray(arcs.value))
     objective = problem.sums.cost(choice)
-    bound = flow.bound(optimum.value)
-    return Selection(choice, objective, bound, compile_seconds=optimum.compile_seconds)
+    bound = flow.bound(optimum.bound if optimum.stopped else optimum.value)
+    end = End.STOPPED if optimum.stopped else End.DONE
+    return Selection(choice, objective, bound, {}, optimum.compile_seconds, end)
 
 
 FORMULATION = Formulation(

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import inspect
-import operator
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from importlib.metadata import EntryPoint, entry_points
-from typing import Any
 
 import numpy as np
 
 from seqopt.arrays import FrozenValue
-from seqopt.errors import ProblemError, SeqoptError, SolverError
-from seqopt.placement.interface import Aim, PlacementProblem
-from seqopt.placement.watch import Finding, Watch
+from seqopt.errors import ProblemError
+from seqopt.placement.interface import Aim
+from seqopt.placement.watch import Finding
 
 GROUP = "seqopt.formulations"
 WATCH = "watch"  # the name by which a formulation takes a watch
@@ -92,6 +90,8 @@ class Formulation:
         Which steps it looks at with its default options.
     takes_budgets : bool
         Whether it can keep totals over the build within budgets.
+    windowed : tuple of (str, int or str), optional
+        Options with which it looks at one window after the other, if it does so with some only.
 
     Examples
     --------
@@ -108,6 +108,14 @@ class Formulation:
     solve: Callable[..., Selection]
     reads: Reads = Reads.ALL
     takes_budgets: bool = False
+    windowed: tuple[tuple[str, int | str], ...] | None = None
+
+    @property
+    def window_options(self) -> dict[str, int | str] | None:
+        """Options with which it looks at one window after the other; None if it never does."""
+        if self.windowed is None:
+            return {} if self.reads is Reads.WINDOW else None
+        return dict(self.windowed)
 
     @property
     def options(self) -> dict[str, int | str]:
@@ -158,7 +166,7 @@ def _load(entry: EntryPoint) -> Formulation:
         found = entry.load()
     except Exception as error:  # whatever a package of others may raise
         raise ProblemError(
-            f"formulation {entry.name!r}: {entry.value} cannot be loaded: {_said(error)}; "
+            f"formulation {entry.name!r}: {entry.value} cannot be loaded: {said(error)}; "
             "install it anew or remove it"
         ) from error
     if not isinstance(found, Formulation):
@@ -216,67 +224,15 @@ def as_formulation(given: Formulation | str) -> Formulation:
     raise ProblemError(f"a {type(given).__name__} is no formulation; give one of {known}")
 
 
-def select(
-    formulation: Formulation, problem: PlacementProblem, watch: Watch | None = None, **options: Any
-) -> Selection:
-    """Return the selection of a formulation, with numbers where numbers belong.
+def said(error: Exception) -> str:
+    """Return what an error of others says, in a line.
 
     Parameters
     ----------
-    formulation : Formulation
-    problem : PlacementProblem
-    watch : Watch, optional
-        Handed to the formulation if it takes one; the trace is read from it.
-    **options
-        Of the formulation.
+    error : Exception
 
     Returns
     -------
-    Selection
-        Claimed, not proven.
-
-    Raises
-    ------
-    ProblemError, SolverError
-        As the formulation does; a `SolverError` also if it raises anything else, or returns
-        something that is no selection.
+    str
     """
-    watch = watch or Watch()
-    told = {WATCH: watch} if formulation.watched else {}
-    try:
-        found: object = formulation.solve(problem, **told, **options)
-    except (SeqoptError, MemoryError):
-        raise
-    except Exception as error:  # whatever a formulation of others may raise
-        raise SolverError(f"formulation {formulation.name} failed: {_said(error)}") from error
-    if not isinstance(found, Selection):
-        kind = type(found).__name__
-        raise SolverError(f"formulation {formulation.name} returned a {kind}, not a Selection")
-    try:
-        seconds = float(found.compile_seconds)
-        if not 0 <= seconds < np.inf:
-            raise ValueError(f"compile_seconds is {seconds}")
-        return Selection(
-            choice=tuple(operator.index(index) for index in found.choice),
-            objective=float(found.objective),
-            bound=float(found.bound),
-            prices={str(name): float(price) for name, price in found.prices.items()},
-            compile_seconds=seconds,
-            end=End(found.end),
-            trace=_traced(watch, float(found.objective), float(found.bound)),
-        )
-    except (TypeError, ValueError, AttributeError, OverflowError) as error:
-        raise SolverError(
-            f"formulation {formulation.name} returned a Selection that is none: {_said(error)}"
-        ) from error
-
-
-def _traced(watch: Watch, objective: float, bound: float) -> tuple[Finding, ...]:
-    """Return what was told, ending with what is claimed."""
-    watch.tell(objective, bound)
-    return watch.trace
-
-
-def _said(error: Exception) -> str:
-    """Return what an error of others says, in a line."""
     return " ".join(f"{type(error).__name__}: {error}".split())

@@ -17,17 +17,16 @@ from seqopt.placement.certificate import judge, least_sum
 from seqopt.placement.conflicts import refusal
 from seqopt.placement.formulation import (
     Formulation,
-    Reads,
     Selection,
     as_formulation,
     formulations,
-    select,
 )
 from seqopt.placement.interface import Handed, PlacementProblem
 from seqopt.placement.plan import Plan
 from seqopt.placement.problem import Problem
 from seqopt.placement.promises import require_possible
 from seqopt.placement.ranks import Among
+from seqopt.placement.selecting import select
 from seqopt.placement.watch import Finding, Watch
 from seqopt.placement.window_search import search_windows
 from seqopt.scene.checks import short
@@ -59,8 +58,9 @@ def solve(
     formulation : Formulation or str
         One of `seqopt.formulations`, or its name.
     proof : bool, optional
-        False lets a formulation that looks at one window after the other solve only the models that
-        it meets; how far its choice is from the optimum then stays unknown.
+        False lets a formulation that can look at one window after the other (``rank_search`` with a
+        horizon of 1) solve only the models that it meets; how far its choice is from the optimum
+        then stays unknown.
     time_limit : float, optional
         After which it stops with the best choice so far and a bound, s. Posing the problem, which
         computes all costs, and checking the answer are not counted.
@@ -168,8 +168,9 @@ def _solve_windows(
     problem: PlacementProblem, formulation: Formulation, options: Mapping[str, Any]
 ) -> Plan:
     """Return the plan of a search that solves only the models it meets."""
-    if formulation.reads is not Reads.WINDOW or options:
-        able = [name for name, other in formulations().items() if other.reads is Reads.WINDOW]
+    alone = formulation.window_options
+    if alone is None or options not in ({}, alone):
+        able = [n for n, other in formulations().items() if other.window_options is not None]
         asked = " ".join(
             [formulation.name, *(f"{name}={value}" for name, value in options.items())]
         )
