@@ -137,23 +137,20 @@ def minimize_whole(
 
     Raises
     ------
-    InfeasibleError
-        If the solver proves that nothing is allowed within all budgets.
-    SolverError
-        If it ends in any other way than with an optimum or at its limit, or calls a program
-        infeasible that is not.
+    InfeasibleError, SolverError
+        As `minimize`.
     """
     watch = watch or Watch()
     start = time.perf_counter()
     try:
         data, chain, inverse = program.get_problem_data(cp.HIGHS)
         solver = _loaded(data, whole=True)
+        seconds = time.perf_counter() - start
+        offset = float(inverse[-1].get("offset", 0.0))
+        _listen(solver, watch, lambda value: told(value + offset))
+        status = _end(solver, watch.left)
     except cp.SolverError as error:
         raise SolverError(f"{cp.HIGHS} failed: {error}; rescale the costs") from error
-    seconds = time.perf_counter() - start
-    offset = float(inverse[-1].get("offset", 0.0))
-    _listen(solver, watch, lambda value: told(value + offset))
-    status = _end(solver, watch.left)
     info = solver.getInfo()
     stopped = status == "kTimeLimit"
     bound = float(info.mip_dual_bound) + offset

@@ -252,6 +252,11 @@ def _add_optimize(commands: Commands, parents: list[_Parser]) -> None:
         help="with cascade or rank_search: solve only the models that the search meets, a fifth "
         "or so; how far the choice is from the optimum stays unknown",
     )
+    command.add_argument(
+        "--time-limit",
+        metavar="SECONDS",
+        help="stop choosing after it, with the best choice so far and a bound",
+    )
     command.add_argument("--out", type=Path, metavar="DIR", required=True, help="folder to write")
     _strict_argument(command)
 

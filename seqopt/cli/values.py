@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import re
 from collections.abc import Sequence
 from dataclasses import replace
@@ -146,6 +147,26 @@ def parse_limits(texts: Sequence[str], scene: Scene) -> tuple[Limit, ...]:
         else:
             out.append(Limit(_response(name, "--limit"), _number(value, f"--limit {text}")))
     return tuple(out)
+
+
+def parse_time_limit(text: str | None) -> float:
+    """Return seconds from words.
+
+    Parameters
+    ----------
+    text : str, optional
+
+    Returns
+    -------
+    float
+        Infinite where none are given.
+
+    Raises
+    ------
+    ProblemError
+        If it is no number from 0.
+    """
+    return math.inf if text is None else _number(text, "--time-limit", zero="allowed")
 
 
 def parse_options(formulation: Formulation | str, texts: Sequence[str]) -> dict[str, Any]:

@@ -16,6 +16,7 @@ from seqopt.placement.interface import Aim
 from seqopt.placement.watch import Finding
 
 GROUP = "seqopt.formulations"
+EXHIBITS = "seqopt.exhibits"
 WATCH = "watch"  # the name by which a formulation takes a watch
 
 
@@ -161,6 +162,21 @@ def formulations() -> dict[str, Formulation]:
     return dict(sorted(found.items()))
 
 
+def exhibits() -> dict[str, Formulation]:
+    """Return the exhibits: entry points of the group ``seqopt.exhibits``.
+
+    They solve what `formulations` solve, by programs that are there to be looked at. Comparisons
+    leave them out.
+
+    Returns
+    -------
+    dict of str to Formulation
+        By name, in alphabetical order.
+    """
+    found = {entry.name: _load(entry) for entry in entry_points(group=EXHIBITS)}
+    return dict(sorted(found.items()))
+
+
 def _load(entry: EntryPoint) -> Formulation:
     try:
         found = entry.load()
@@ -183,7 +199,7 @@ def find_formulation(name: str) -> Formulation:
     Parameters
     ----------
     name : str
-        One of `formulation_names`.
+        One of `formulation_names`, or of an exhibit.
 
     Returns
     -------
@@ -194,10 +210,11 @@ def find_formulation(name: str) -> Formulation:
     ProblemError
         If there is none of that name; the message lists those there are.
     """
-    if name not in formulation_names():
+    found = [e for group in (GROUP, EXHIBITS) for e in entry_points(group=group) if e.name == name]
+    if not found:
         known = ", ".join(formulation_names())
         raise ProblemError(f"formulation {name!r}: there is no such; give one of {known}")
-    return _load(next(entry for entry in entry_points(group=GROUP) if entry.name == name))
+    return _load(found[0])
 
 
 def as_formulation(given: Formulation | str) -> Formulation:

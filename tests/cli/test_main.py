@@ -288,7 +288,7 @@ def test_optimize_with_words_of_ones_own(capsys, tmp_path):
 
 def test_optimize_without_proof(capsys, tmp_path):
     chosen = ("--formulation", "rank_search", "--engine", "auto")
-    for folder, words in (("with", ()), ("without", ("--no-proof",))):
+    for folder, words in (("with", ("--option", "horizon=1")), ("without", ("--no-proof",))):
         status, out, _ = run(capsys, "optimize", *chosen, *words, "--out", str(tmp_path / folder))
         assert (status, out.count("\n")) == (0, 1)
         assert ("not compared with the optimum" in out) == (folder == "without")
@@ -539,3 +539,16 @@ def test_a_budget_is_given_once(tmp_path, capsys):
     words = ("--formulation", "labels", "--budget", "travel=2m", "--budget", "travel=0.5")
     assert main(["optimize", "arch25", *words, "--out", str(tmp_path / "a")]) == 2
     assert "--budget travel=0.5: it stands there twice" in capsys.readouterr().err
+
+
+def test_a_time_limit_ends_with_a_choice_and_a_trace(tmp_path, capsys):
+    words = ("--formulation", "overlap_dp", "--time-limit", "0", "--out", str(tmp_path / "a"))
+    assert main(["optimize", "arch25", *words]) == 0
+    found = json.loads((tmp_path / "a" / "summary.json").read_text(encoding="utf-8"))
+    assert (found["ended"], found["status"]) == ("stopped", "feasible")
+    trace = pd.read_csv(tmp_path / "a" / "trace.csv")
+    assert list(trace.columns) == ["seconds", "objective", "bound", "gap"]
+    assert trace["objective"].iloc[-1] == pytest.approx(found["objective"])
+    assert trace["bound"].iloc[-1] <= found["bound"]
+    assert main(["optimize", "arch25", *words[:2], "--time-limit", "soon", *words[4:]]) == 2
+    assert "--time-limit: 'soon' is not a positive number or zero" in capsys.readouterr().err

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import product
+from itertools import pairwise, product
 
 import numpy as np
 import pytest
@@ -15,7 +15,13 @@ from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.network.build import build_network
 from seqopt.placement.budgets import robot_use, steps_over, travel
 from seqopt.placement.costs import Budget, LayeredCosts
-from seqopt.placement.formulation import FormulationKind, find_formulation, formulations
+from seqopt.placement.formulation import (
+    End,
+    FormulationKind,
+    exhibits,
+    find_formulation,
+    formulations,
+)
 from seqopt.placement.interface import Aim, CostProblem
 from seqopt.placement.problem import pose
 from seqopt.placement.requirements import Limit
@@ -25,13 +31,25 @@ from seqopt.study.presets import CRITERIA, EQUATIONS, WORST_RATIO
 from tests.builders import small_arch
 from tests.strategies import budgeted, problems
 
-ALL = formulations()
+SHOWN = formulations()  # what comparisons have
+ALL = SHOWN | exhibits()
 EXACT_SUMS = [
-    n for n, f in ALL.items() if f.aim is Aim.SUM and f.kind is not FormulationKind.HEURISTIC
+    n for n, f in SHOWN.items() if f.aim is Aim.SUM and f.kind is not FormulationKind.HEURISTIC
 ]
 HEURISTICS = [n for n, f in ALL.items() if f.kind is FormulationKind.HEURISTIC]
 every = pytest.mark.parametrize("name", ALL)
 takers = pytest.mark.parametrize("name", [n for n, f in ALL.items() if f.takes_budgets])
+
+
+class Clock:
+    """A clock that moves on by a second whenever it is looked at."""
+
+    def __init__(self):
+        self.now = 0.0
+
+    def perf_counter(self):
+        self.now += 1.0
+        return self.now
 
 
 def brute_force(problem, aim):
@@ -99,7 +117,7 @@ def test_renumbering_candidates_keeps_the_value_of_exact_ones(name, problem, dat
     assert a == pytest.approx(b, abs=1e-6)
 
 
-@every
+@pytest.mark.parametrize("name", SHOWN)
 def test_it_is_repeatable(name, problem25):
     assert ALL[name].solve(problem25).choice == ALL[name].solve(problem25).choice
 
@@ -140,6 +158,52 @@ def test_budgets_are_kept_or_refused(name):
     else:
         with pytest.raises(ProblemError, match="budget 'use' couples all moves"):
             solve(capped, name)
+
+
+@every
+@given(problem=st.one_of(problems(), budgeted()), limit=st.integers(0, 60))
+@settings(max_examples=30)
+def test_an_answer_stopped_early_is_allowed_and_its_bound_holds(name, problem, limit):
+    """On a clock that moves on whenever it is looked at."""
+    formulation = ALL[name]
+    if problem.budgets and not formulation.takes_budgets:
+        problem = replace(problem, budgets=())
+    best = brute_force(problem, formulation.aim)
+    told = []
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("seqopt.placement.watch.time", Clock())
+        plan, wrongly_refused = None, False
+        try:
+            plan = solve(problem, formulation, time_limit=float(limit), progress=told.append)
+        except InfeasibleError:
+            wrongly_refused = np.isfinite(best)
+        except SolverError:  # no choice within the budgets was at hand
+            wrongly_refused = not problem.budgets
+    assert not wrongly_refused
+    if plan is None:
+        return
+    aim = formulation.aim
+    worth = aim.worth(aim.costs(problem), plan.selection.choice)
+    assert plan.certificate.objective == pytest.approx(worth)
+    assert all(b.spent(plan.selection.choice) <= b.bound + 1e-6 for b in problem.budgets)
+    assert plan.selection.bound <= best + 1e-6 <= worth + 2e-6
+    trace = plan.selection.trace
+    assert tuple(told) == trace
+    assert trace[-1].objective == pytest.approx(worth, abs=1e-6)
+    for before, after in pairwise(trace):
+        assert before.seconds <= after.seconds
+        assert before.objective >= after.objective
+        assert before.bound <= after.bound <= best + 1e-6
+    if plan.selection.end is End.DONE and formulation.kind is FormulationKind.EXACT:
+        assert worth == pytest.approx(best, abs=1e-6)
+
+
+@every
+def test_no_time_is_enough_for_an_allowed_choice(name, problem25):
+    plan = solve(problem25, ALL[name], time_limit=0)
+    assert plan.selection.end is End.STOPPED
+    assert plan.certificate.gap < 0.3
+    assert plan.selection.bound <= plan.certificate.bound + 1e-6
 
 
 @takers

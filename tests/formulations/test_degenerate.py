@@ -10,6 +10,7 @@ import pytest
 
 from experiments.placement.degenerate_placement import MALFORMED, judge, outcomes
 from experiments.placement.parts.degenerate_cases import CASES, Size, capped, costs, opposed, whole
+from formulations import solvers
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.placement.certificate import certify
 from seqopt.placement.costs import Budget, LayeredCosts
@@ -219,8 +220,14 @@ def test_a_solver_that_fails_never_calls_the_problem_infeasible(monkeypatch, nam
         if isinstance(status, Exception):
             raise status
 
+    def end(*_):
+        if isinstance(status, Exception):
+            raise status
+        return "kInfeasible" if status == cp.INFEASIBLE else str(status)
+
     monkeypatch.setattr(cp.Problem, "solve", solve)
     monkeypatch.setattr(cp.Problem, "status", status, raising=False)
+    monkeypatch.setattr(solvers, "_end", end)
     for problem in (small(), capped(SMALL, np.random.default_rng(0), 1.0, 0.6)):
         with pytest.raises(SolverError, match=named):
             ALL[name].solve(problem)
