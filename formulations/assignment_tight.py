@@ -46,6 +46,20 @@ class Written:
     picks: cp.Variable
     flow: LayeredFlow
 
+    def bound(self, value: float) -> float:
+        """Return a lower bound in the unit of the costs, lower by what the solver may be off.
+
+        Parameters
+        ----------
+        value : float
+            Of the scaled program.
+
+        Returns
+        -------
+        float
+        """
+        return self.flow.bound(value)
+
 
 def write(problem: PlacementProblem) -> Written:
     """Return the program of a problem.
@@ -115,13 +129,12 @@ def solve(problem: PlacementProblem, *, watch: Watch | None = None) -> Selection
     """
     watch = watch or Watch()
     written = write(problem)
-    flow = written.flow
-    optimum = minimize_whole(written.program, feasible=True, watch=watch, told=flow.bound)
+    optimum = minimize_whole(written.program, feasible=True, watch=watch, told=written.bound)
     if not np.isfinite(optimum.value):
-        return stopped(problem, bound=flow.bound(optimum.bound))
+        return stopped(problem, bound=written.bound(optimum.bound))
     ends = np.cumsum(problem.sums.sizes)[:-1]
     choice = tuple(int(np.argmax(part)) for part in np.split(np.asarray(written.picks.value), ends))
-    bound = flow.bound(optimum.bound if optimum.stopped else optimum.value)
+    bound = written.bound(optimum.bound if optimum.stopped else optimum.value)
     end = End.STOPPED if optimum.stopped else End.DONE
     return Selection(choice, problem.sums.cost(choice), bound, {}, optimum.compile_seconds, end)
 

@@ -58,14 +58,13 @@ def solve(
     formulation : Formulation or str
         One of `seqopt.formulations`, or its name.
     proof : bool, optional
-        False lets a formulation that can look at one window after the other (``rank_search`` with a
-        horizon of 1) solve only the models that it meets; how far its choice is from the optimum
-        then stays unknown.
+        False lets ``cascade`` or ``rank_search`` solve only the models that they meet, one window
+        after the other; how far the choice is from the optimum then stays unknown.
     time_limit : float, optional
-        After which it stops with the best choice so far and a bound, s. Posing the problem, which
-        computes all costs, and checking the answer are not counted.
+        After which it stops with the best choice so far and a bound, s; computing all costs before
+        and checking the answer are not counted.
     progress : callable, optional
-        Told every better choice and bound as it is found, a `seqopt.placement.watch.Finding`.
+        Told every better choice and bound as it is found.
     **options
         Of the formulation.
 
@@ -75,35 +74,42 @@ def solve(
 
     Raises
     ------
-    InfeasibleError
-        If no choice is allowed.
-    ProblemError
-        If the formulation is not for such a problem, or does not know an option.
-    SolverError
-        If a solver fails, or the answer is not what its formulation claims.
+    InfeasibleError, ProblemError, SolverError
+        If no choice is allowed; if problem, formulation and options do not go together; if a solver
+        fails, or the answer is not what its formulation claims.
 
     Examples
     --------
     >>> import seqopt
     >>> network = seqopt.build_network(seqopt.load_scene("arch25"))
-    >>> engine = seqopt.make_engine("compliance", network)
-    >>> schedule = seqopt.three_robot_loop(network)
+    >>> engine, schedule = seqopt.make_engine("auto", network), seqopt.three_robot_loop(network)
     >>> problem = seqopt.pose(engine, schedule, seqopt.CRITERIA["equations-2-3"])
     >>> seqopt.solve(problem, "cascade").certificate.gap > 0.009
     True
     """
-    formulation = as_formulation(formulation)
+    found = _fitting(problem, formulation, time_limit, options)
+    if not proof:
+        return _solve_windows(problem, found, options)
+    return _solve_all(problem, found, _Run(time_limit, progress), options)
+
+
+def _fitting(
+    problem: PlacementProblem,
+    formulation: Formulation | str,
+    time_limit: float,
+    options: Mapping[str, object],
+) -> Formulation:
+    """Return the formulation if it, the problem and the options go together."""
+    found = as_formulation(formulation)
     if not isinstance(getattr(problem, "budgets", None), tuple):
         raise ProblemError(
             f"a {type(problem).__name__} is no problem; give one that seqopt.pose made"
         )
-    require_fit(problem, formulation, options)
-    _require_time(formulation, time_limit)
+    require_fit(problem, found, options)
+    _require_time(found, time_limit)
     if isinstance(problem, Problem):
         require_possible(problem)
-    if not proof:
-        return _solve_windows(problem, formulation, options)
-    return _solve_all(problem, formulation, _Run(time_limit, progress), options)
+    return found
 
 
 def require_fit(
