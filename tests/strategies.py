@@ -8,7 +8,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 from experiments.harness.walls import running_bond
-from seqopt.placement.costs import LayeredCosts
+from seqopt.placement.costs import Budget, LayeredCosts
 from seqopt.placement.interface import CostProblem
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.parts import Robot
@@ -158,3 +158,26 @@ def problems(draw, most_moves=5, most_candidates=4):
     single = tuple(array(size) for size in sizes)
     shared = tuple(array(a, b) for a, b in zip([1, *sizes[:-1]], sizes, strict=True))
     return CostProblem(LayeredCosts(single, shared))
+
+
+@st.composite
+def budgeted(draw, most_budgets=3):
+    """A problem with budgets on whole amounts, some negative, of choices and of pairs."""
+    problem = draw(problems())
+
+    def arrays(parts):
+        sizes = [part.size for part in parts]
+        flat = draw(st.lists(st.integers(-1, 3), min_size=sum(sizes), max_size=sum(sizes)))
+        cuts = np.split(np.array(flat, float), np.cumsum(sizes)[:-1])
+        return tuple(cut.reshape(part.shape) for cut, part in zip(cuts, parts, strict=True))
+
+    budgets = tuple(
+        Budget(
+            f"use {i}",
+            arrays(problem.sums.single),
+            arrays(problem.sums.shared),
+            float(draw(st.integers(-2, 10))),
+        )
+        for i in range(draw(st.integers(1, most_budgets)))
+    )
+    return replace(problem, budgets=budgets)

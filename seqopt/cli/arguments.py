@@ -11,6 +11,7 @@ from seqopt.cli.terminal import complain, show
 from seqopt.contact.mortar import MORTARS
 from seqopt.engines.registry import ENGINES
 from seqopt.placement.formulation import formulation_names
+from seqopt.placement.ranks import Among, Ranked
 from seqopt.scene.scene_file import builtin_scenes
 from seqopt.sequence.three_robots import SCHEDULES
 from seqopt.sequence.two_robots import METHODS
@@ -198,6 +199,19 @@ def _criterion_argument(command: argparse.ArgumentParser) -> None:
         "T_max,M_sup=2,F_move; equations (2) and (3) of Bruun et al. by default",
     )
 
+    command.add_argument(
+        "--ranked",
+        choices=[ranked.value for ranked in Ranked],
+        help="for criteria of ranks: those of a step that two moves share run over all pairs, or "
+        "are conditional on the earlier choice (default: pairs)",
+    )
+    command.add_argument(
+        "--among",
+        choices=[among.value for among in Among],
+        help="for criteria of ranks: candidates of a move are ranked among all, or among those "
+        "possible after the choice before (default: all)",
+    )
+
 
 def _add_optimize(commands: Commands, parents: list[_Parser]) -> None:
     command = commands.add_parser(
@@ -224,13 +238,7 @@ def _add_optimize(commands: Commands, parents: list[_Parser]) -> None:
     )
     _robots_argument(command, "a schedule by name: the")
     _criterion_argument(command)
-    command.add_argument(
-        "--limit",
-        action="append",
-        default=[],
-        metavar="LIMIT",
-        help="no open step may exceed it: payload, or as F_largest=300 (SI units); may be repeated",
-    )
+    _caps_arguments(command)
     command.add_argument(
         "--option",
         action="append",
@@ -245,6 +253,11 @@ def _add_optimize(commands: Commands, parents: list[_Parser]) -> None:
         "or so; how far the choice is from the optimum stays unknown",
     )
     _resources_arguments(command)
+    command.add_argument(
+        "--time-limit",
+        metavar="SECONDS",
+        help="stop choosing after it, with the best choice so far and a bound",
+    )
     command.add_argument("--out", type=Path, metavar="DIR", required=True, help="folder to write")
     _strict_argument(command)
 
@@ -268,6 +281,27 @@ def _resources_arguments(command: argparse.ArgumentParser) -> None:
         metavar="SIZE",
         help="what responses and costs may take, as 500MB or 2GB (default: four fifths of what is "
         "free)",
+    )
+
+
+def _caps_arguments(command: argparse.ArgumentParser) -> None:
+    """Add the arguments that forbid choices."""
+    command.add_argument(
+        "--limit",
+        action="append",
+        default=[],
+        metavar="LIMIT",
+        help="no open step may exceed it: payload, or as F_largest=300 (SI units); may be repeated",
+    )
+    command.add_argument(
+        "--budget",
+        action="append",
+        default=[],
+        metavar="BUDGET",
+        help="cap on a total over the build, with labels, lagrangian, overlap_mip or overlap_lp: "
+        "travel=0.8 (of what the optimum without budgets travels), travel=3.5m, "
+        "steps_over:F_largest=250:10 (at most 10 open steps over 250 N), robot_use:rob1=100:5; "
+        "may be repeated",
     )
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -13,21 +12,34 @@ import numpy as np
 import pandas as pd
 
 from seqopt.cli.arguments import parser
+from seqopt.cli.budgets import parse_budgets, with_budgets
 from seqopt.cli.outputs import (
     comparison_files,
     keep_apart,
+    plan_files,
     require_matplotlib,
+    worth,
     write_outputs,
 )
 from seqopt.cli.status import Status, status_of
-from seqopt.cli.terminal import complain, flush, progress, quiet_numbers, say, show, silence
+from seqopt.cli.terminal import (
+    complain,
+    flush,
+    progress,
+    quiet_numbers,
+    say,
+    show,
+    silence,
+    tell,
+)
 from seqopt.cli.values import (
-    parse_criterion,
+    asked_criterion,
     parse_limits,
     parse_mortar,
     parse_options,
     parse_resources,
     parse_robots,
+    parse_time_limit,
 )
 from seqopt.contact.mortar import MORTARS
 from seqopt.engines.auto import AutoEngine
@@ -44,7 +56,6 @@ from seqopt.files import (
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.placement.formulation import find_formulation
-from seqopt.placement.plan import Plan
 from seqopt.placement.problem import pose
 from seqopt.placement.promises import overloads
 from seqopt.placement.solving import solve
@@ -101,7 +112,7 @@ def _run(arguments: Sequence[str] | None) -> int:
 def _compare(options: argparse.Namespace) -> Status:
     scene = load_scene(options.scene)
     engine = _engine(options, build_network(scene))
-    criterion = parse_criterion(options.criteria, options.crown)
+    criterion = asked_criterion(options)
     if options.out is not None:
         require_matplotlib(options.out)
         require_folder(options.out)
@@ -148,10 +159,11 @@ def _say_idle(scene: Scene, steps: Sequence[AnyStep]) -> None:
 def _optimize(options: argparse.Namespace) -> Status:
     formulation = find_formulation(options.formulation)
     chosen = parse_options(formulation, options.option)
-    criterion = parse_criterion(options.criteria, options.crown)
+    criterion = asked_criterion(options)
     scene = load_scene(options.scene)
     limits = parse_limits(options.limit, scene)
     resources = parse_resources(options, progress)
+    budgets = parse_budgets(options.budget)
     require_folder(options.out)
     start = time.perf_counter()
     network = build_network(scene)
@@ -160,8 +172,18 @@ def _optimize(options: argparse.Namespace) -> Status:
         find_schedule(network, options.schedule, parse_robots(options.robots)),
     )
     assemble = time.perf_counter() - start
-    problem = pose(engine, schedule, criterion, limits, (), resources)
-    plan = solve(problem, formulation, proof=not options.no_proof, **chosen)
+    counted = [budget.response for budget in budgets if budget.response]
+    posed = pose(engine, schedule, criterion, limits, counted, resources)
+    limit = parse_time_limit(options.time_limit)
+    proof = not options.no_proof
+    plan = solve(
+        with_budgets(posed, budgets),
+        formulation,
+        proof=proof,
+        time_limit=limit,
+        progress=tell,
+        **chosen,
+    )
     progress("")
     _say_levels(engine)
     report = plan.summary() | {
@@ -169,15 +191,9 @@ def _optimize(options: argparse.Namespace) -> Status:
         "seconds": {"assemble": assemble, **plan.seconds},
     }
     table = plan.responses()
-    files = {
-        "plan.csv": csv_text(table),
-        "selection.csv": csv_text(plan.table()),
-        "responses.csv": csv_text(plan.alternatives()),
-        "summary.json": json.dumps(report, indent=2) + "\n",
-    }
-    write_outputs(options, files)
+    write_outputs(options, plan_files(plan, report))
     say(
-        f"{formulation.name} ({formulation.kind.value}): {_worth(plan)}, "
+        f"{formulation.name} ({formulation.kind.value}): {worth(plan)}, "
         f"{plan.models} models; written to {options.out}"
     )
     for excess in plan.overloads:
@@ -193,12 +209,6 @@ def _payloads_hold(options: argparse.Namespace, scene: Scene, *tables: pd.DataFr
         return Status.DONE
     complain(f"seqopt: payload exceeded: {'; '.join(over)}")
     return Status.DOES_NOT_HOLD
-
-
-def _worth(plan: Plan) -> str:
-    if plan.certificate is None:
-        return "not compared with the optimum"
-    return f"objective {plan.certificate.objective:.6g}, gap {100 * plan.certificate.gap:.3g} %"
 
 
 def _analyze(options: argparse.Namespace) -> Status:

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import argparse
+import math
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Any
 
 from seqopt.contact.mortar import MORTARS, Mortar
 from seqopt.errors import ProblemError
 from seqopt.placement.criteria import RankSum
 from seqopt.placement.formulation import Formulation, as_formulation
+from seqopt.placement.ranks import Among, Ranked
 from seqopt.placement.requirements import Criterion, Limit, payload_limits
 from seqopt.placement.scales import NEVER
 from seqopt.responses.choices import CHOICE_RESPONSES
@@ -23,6 +26,22 @@ SIZE = re.compile(r"([0-9]*\.?[0-9]+(?:e[0-9]+)?) *((?:[kmgt]i?)?b?)", re.IGNORE
 MOST_WORKERS = 1024
 LARGEST = 1e100  # number: products of larger ones overflow
 RESPONSES = (*CHOICE_RESPONSES, "F_each")
+
+
+def asked_criterion(options: argparse.Namespace) -> Criterion:
+    """Return the criterion that a command is asked for.
+
+    Parameters
+    ----------
+    options : argparse.Namespace
+        With ``criteria``, ``crown``, ``ranked`` and ``among``.
+
+    Returns
+    -------
+    Criterion
+    """
+    criterion = parse_criterion(options.criteria, options.crown)
+    return rank_otherwise(criterion, options.ranked, options.among)
 
 
 def parse_criterion(text: str, crown: str | None = None) -> Criterion:
@@ -118,6 +137,36 @@ def parse_size(text: str) -> float:
     return float(found[1]) * float(1024 if "I" in unit else 1000) ** power
 
 
+def rank_otherwise(criterion: Criterion, ranked: str | None, among: str | None) -> Criterion:
+    """Return a criterion of ranks with what it ranks among.
+
+    Parameters
+    ----------
+    criterion : Criterion
+    ranked, among : str, optional
+        Values of `seqopt.placement.ranks.Ranked` and `seqopt.placement.ranks.Among`.
+
+    Returns
+    -------
+    Criterion
+
+    Raises
+    ------
+    ProblemError
+        If either is given and the criterion has no ranks.
+    """
+    if ranked is None and among is None:
+        return criterion
+    if not isinstance(criterion, RankSum):
+        flag = f"--ranked {ranked}" if ranked else f"--among {among}"
+        raise ProblemError(f"{flag}: {criterion.name} has no ranks; leave it out")
+    return replace(
+        criterion,
+        ranked=criterion.ranked if ranked is None else Ranked(ranked),
+        among=criterion.among if among is None else Among(among),
+    )
+
+
 def parse_robots(text: str) -> tuple[str, ...]:
     """Return names of robots from words.
 
@@ -162,7 +211,27 @@ def parse_limits(texts: Sequence[str], scene: Scene) -> tuple[Limit, ...]:
     return tuple(out)
 
 
-def parse_options(formulation: Formulation | str, texts: Sequence[str]) -> dict[str, int | str]:
+def parse_time_limit(text: str | None) -> float:
+    """Return seconds from words.
+
+    Parameters
+    ----------
+    text : str, optional
+
+    Returns
+    -------
+    float
+        Infinite where none are given.
+
+    Raises
+    ------
+    ProblemError
+        If it is no number from 0.
+    """
+    return math.inf if text is None else _number(text, "--time-limit", zero="allowed")
+
+
+def parse_options(formulation: Formulation | str, texts: Sequence[str]) -> dict[str, Any]:
     """Return the options of a formulation from words.
 
     Parameters
@@ -183,7 +252,7 @@ def parse_options(formulation: Formulation | str, texts: Sequence[str]) -> dict[
     """
     formulation = as_formulation(formulation)
     known = formulation.options
-    out: dict[str, int | str] = {}
+    out: dict[str, Any] = {}
     for text in texts:
         name, _, value = text.partition("=")
         if name not in known:

@@ -23,6 +23,7 @@ from experiments.placement import (
     degenerate_placement,
     formulation_cost,
     heuristic_gaps,
+    program_shapes,
     speed_accuracy,
 )
 from experiments.robustness import fuzz
@@ -130,6 +131,7 @@ def checks() -> dict[str, tuple[Check, Tables, Callable[..., Iterator[tuple[Any,
             spoil_counterparts,
         ),
         "peers": (peers.judge, tuple(parts), spoil_peers),
+        "program_shapes": (program_shapes.holds, (rows("program_shapes"),), spoil_shapes),
         "speed_accuracy": (
             lambda table: all(speed_accuracy.holds(table).values()),
             (rows("runs"),),
@@ -234,6 +236,16 @@ def spoil_contrast(table):
     ),)  # fmt: skip
     flat = table.assign(**dict.fromkeys(frame_contrast.FIELDS, 1e-07), refused=0)
     yield (flat,)  # no contrast is better than another
+
+
+def spoil_shapes(table):
+    yield (spoiled(table, "relaxed", 650.0, formulation="assignment_tight"),)
+    yield (spoiled(table, "relaxed", 640.0, formulation="assignment_loose"),)
+    yield (spoiled(table, "relaxed", 0.9, formulation="minimax_arc"),)
+    yield (spoiled(table, "relaxed", 0.2, formulation="minimax_big_m"),)
+    yield (spoiled(table, "nodes", 1000.0, formulation="overlap_mip"),)
+    yield (table.assign(proven=True),)
+    yield (spoiled(table, "value", 1.2, formulation="minimax_layer"),)
 
 
 def spoil_gaps(table):
