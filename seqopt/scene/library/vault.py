@@ -27,11 +27,7 @@ from seqopt.scene.scene import Scene
 
 
 def herringbone_vault(
-    arch: Scene,
-    shape: VaultShape,
-    name: str = "",
-    *,
-    robots: Sequence[Robot] | None = None,
+    arch: Scene, shape: VaultShape, name: str = "", *, robots: Sequence[Robot] | None = None
 ) -> Scene:
     """Return the scene of a vault whose first phase is an arch that stands in its middle.
 
@@ -93,8 +89,8 @@ def _chosen(line: ArchLine, shape: VaultShape) -> list[Tile]:
     rest = shape.bricks - len(line.tiles)
     if rest < 0:
         raise SceneError(
-            f"vault: bricks is {shape.bricks}, and its arch has {len(line.tiles)}; give at least as "
-            "many"
+            f"vault: bricks is {shape.bricks}, and its arch has {len(line.tiles)}; "
+            "give at least as many"
         )
     half = math.ceil(shape.bricks / line.rows + 0.5 * abs(shape.skew) / shape.spacing) + 2
     own = {*line.tiles}
