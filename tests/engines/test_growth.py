@@ -23,7 +23,7 @@ from tests.strategies import arches, both_sided, walls
 
 PER_PAIR = (
     8 * 36 * 8
-)  # bytes: arrays of bricks by bricks (3) and by springs (2 × 2), and a rest  # bytes of two arrays and an operator, of bricks and twice the springs
+)  # bytes: arrays of bricks by bricks (3) and by springs (2 × 2), and a rest
 
 
 def error(fields, exact):
