@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import SupportsIndex
 
 import numpy as np
 from scipy import linalg
@@ -23,6 +24,10 @@ class Basis(FrozenValue):
 
     force: Floats
     moment: Floats
+
+    def __reduce_ex__(self, protocol: SupportsIndex) -> str | tuple[object, ...]:
+        # where a copy arrives, all of space must be the one that others are compared with
+        return "SPACE" if self is SPACE else super().__reduce_ex__(protocol)
 
     @cached_property
     def wrench(self) -> Floats:
