@@ -26,10 +26,11 @@ from seqopt.engines.rigid.spanning_tree import SpanningTree, compliances
 from seqopt.network.network import GROUND, Network
 
 TINY, ROUNDING = np.finfo(float).tiny, np.finfo(float).eps
-ROWS = 256  # of a correction at a time: its temporary stays in the processor's cache
+AT_ONCE = 2**17  # numbers changed at a time: they stay in the processor's cache
 TAKEN = 1e3  # times less a brick moves in closed loops: rounding of what is gone would show
+WORSE = 10.0  # times the rounding that was left when they were summed anew
 SAMPLE = 600  # motions that are compared with each other, about
-MOST = 0.9  # share of all pairs of motions whose asymmetry counts as rounding
+MOST = 0.95  # share of all pairs of motions whose asymmetry counts as rounding
 
 
 class Growth:
@@ -78,6 +79,7 @@ class Growth:
         self.bricks = self._closed = 0
         self._weighed: list[tuple[Floats, Floats]] = []
         self._ties: dict[int, dict[int, int]] = {}
+        self._left = 1.0  # rounding when the twists were summed anew
         self._start()
 
     def reach(self, bricks: int) -> None:
@@ -125,6 +127,7 @@ class Growth:
 
     def _start(self) -> None:
         self.bricks = self._closed = 0
+        self._left = 1.0
         self._weighed = [(np.empty(0), np.empty(0))]
         self._tie(np.arange(0))
         self.twist[0], self.wrench[0] = 0.0, 0.0
@@ -178,16 +181,14 @@ class Growth:
         closing -= linalg.lu_solve(factors, (gaps + closing @ system).T).T
         moved = np.ascontiguousarray(gaps[1:].T)
         stressed, before = self._stressed(rows), self._own().copy()
-        for start in range(0, 1 + self._moves, ROWS):
-            part = slice(start, min(start + ROWS, 1 + self._moves))
-            self.twist[part, : self._moves] += closing[part] @ moved
-            stressed[part] += closing[part] @ pulled
+        _add_product(self.twist[rows, : self._moves], closing, moved)
+        _add_product(stressed, closing, pulled)
         for i, spring in enumerate(springs.tolist()):
             self.wrench[rows, k * spring : k * spring + k] = closing[:, k * i : k * i + k]
         self._tie(springs, self._ties)
         lost = (before / np.maximum(self._own(), TINY)).reshape(self.bricks, k).max(axis=1)
         self.loss[: self.bricks] *= np.maximum(lost, 1.0)
-        if self.loss[: self.bricks].max() > TAKEN:
+        if self.loss[: self.bricks].max() > max(TAKEN, WORSE * self._left):
             self._sum_again()
 
     def _own(self) -> Floats:
@@ -204,19 +205,20 @@ class Growth:
             )
             arm = center[brick] - center[parent] if parent != GROUND else np.zeros(3)
             ways.append((brick, parent, spring, -sign * given, self._carried(arm).T))
-        for start in range(0, 1 + self._moves, ROWS):
-            part = slice(start, min(start + ROWS, 1 + self._moves))
+        step = max(1, AT_ONCE // self._moves)
+        for start in range(0, 1 + self._moves, step):
+            part = slice(start, min(start + step, 1 + self._moves))
             twist = self.twist[part].reshape(part.stop - start, -1, k)
             wrench = self.wrench[part].reshape(part.stop - start, -1, k)
             for brick, parent, spring, given, along in ways:
                 twist[:, brick] = wrench[:, spring] @ given
                 if parent != GROUND:
                     twist[:, brick] += twist[:, parent] @ along
-        self.loss[: self.bricks] = self._asymmetry()
+        self.loss[: self.bricks] = self._left = self._asymmetry()
 
     def _asymmetry(self) -> float:
         """Return by how many last digits what should be symmetric is not: that is rounding."""
-        some = np.arange(self._moves)[:: max(1, self._moves // SAMPLE)]
+        some = np.linspace(0, self._moves - 1, min(self._moves, SAMPLE)).astype(int)
         matrix, root = self.twist[np.ix_(1 + some, some)], np.sqrt(np.abs(self._own()[some]))
         apart = np.abs(matrix - matrix.T) / np.maximum(root * root[:, None], TINY)
         return max(1.0, float(np.quantile(apart, MOST)) / ROUNDING)
@@ -280,3 +282,12 @@ class Growth:
         out[...] = np.eye(self._size)
         out[..., :forces, forces:] = self._basis.levers(arm).swapaxes(-1, -2)
         return out
+
+
+def _add_product(target: Floats, left: Floats, right: Floats) -> None:
+    """Add the product of matrices (n, p) and (p, m) to one (n, m), a few rows at a time."""
+    step = max(1, AT_ONCE // target.shape[1])
+    room = np.empty((step, target.shape[1]))
+    for start in range(0, len(target), step):
+        part = target[start : start + step]
+        part += np.matmul(left[start : start + step], right, out=room[: len(part)])

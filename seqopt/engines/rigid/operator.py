@@ -126,8 +126,8 @@ class ComplianceOperator(FrozenValue):
     def answer(self, name: str, index: Ints, force: Floats) -> Floats:
         """Return a field of sets of forces beside the weight.
 
-        Where there are fewer sets than loads, their twists and wrenches are summed and mapped;
-        else those of the loads are mapped, once, and then summed.
+        Where there are fewer sets than loads of all bricks, their twists and wrenches are summed
+        and mapped; else those of the loads are mapped, once, and then summed.
 
         Parameters
         ----------
@@ -142,8 +142,8 @@ class ComplianceOperator(FrozenValue):
         -------
         (S, Q) float
         """
-        loads = len(self.twist) - 1
-        if len(index) >= loads or loads <= FEW or name in vars(self):
+        loads, every = len(self.twist) - 1, 2 * self.axis.size
+        if every <= max(FEW, len(index)):  # whatever was asked before: answers do not depend on it
             return np.asarray(load_matrix(index, force, loads) @ getattr(self, name))
         states = self.twist if name in OF_TWISTS else self.wrench
         out = np.empty((len(index), self.maps.count(name)))
