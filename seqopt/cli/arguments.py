@@ -243,6 +243,12 @@ def _add_optimize(commands: Commands, parents: list[_Parser]) -> None:
         help="with cascade or rank_search: solve only the models that the search meets, a fifth "
         "or so; how far the choice is from the optimum stays unknown",
     )
+    command.add_argument(
+        "--candidates",
+        metavar="RULE",
+        help="look at fewer: near:12 for nodes at most 12 joints from the newest bricks, "
+        "within:1.5 for nodes at most 1.5 m from them; a heuristic",
+    )
     _resources_arguments(command)
     command.add_argument("--out", type=Path, metavar="DIR", required=True, help="folder to write")
     _strict_argument(command)

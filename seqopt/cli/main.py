@@ -56,6 +56,7 @@ from seqopt.scene.scene_file import dump_scene, load_scene
 from seqopt.sequence.plan_file import read_plan
 from seqopt.sequence.schedule_file import find_schedule
 from seqopt.sequence.steps import AnyStep, Step, idle_robots
+from seqopt.sequence.thinning import thin
 from seqopt.sequence.two_robots import METHODS
 from seqopt.stability.assessment import Verdict
 from seqopt.stability.steps import assess_steps, format_verdicts, stability_table
@@ -151,6 +152,8 @@ def _optimize(options: argparse.Namespace) -> Status:
         _engine(options, network),
         find_schedule(network, options.schedule, parse_robots(options.robots)),
     )
+    if options.candidates is not None:
+        schedule = thin(schedule, options.candidates)
     assemble = time.perf_counter() - start
     problem = pose(engine, schedule, criterion, limits, (), resources)
     plan = solve(problem, formulation, proof=not options.no_proof, **chosen)
@@ -189,8 +192,11 @@ def _payloads_hold(options: argparse.Namespace, scene: Scene, *tables: pd.DataFr
 
 
 def _worth(plan: Plan) -> str:
+    among = plan.summary()["candidates"]
     if plan.certificate is None:
         return "not compared with the optimum"
+    if among != "all":
+        return f"objective {plan.certificate.objective:.6g}, {among}"
     return f"objective {plan.certificate.objective:.6g}, gap {100 * plan.certificate.gap:.3g} %"
 
 
