@@ -243,19 +243,19 @@ def _add_optimize(commands: Commands, parents: list[_Parser]) -> None:
         help="with cascade or rank_search: solve only the models that the search meets, a fifth "
         "or so; how far the choice is from the optimum stays unknown",
     )
-    command.add_argument(
-        "--candidates",
-        metavar="RULE",
-        help="look at fewer: near:12 for nodes at most 12 joints from the newest bricks, "
-        "within:1.5 for nodes at most 1.5 m from them; a heuristic",
-    )
     _resources_arguments(command)
     command.add_argument("--out", type=Path, metavar="DIR", required=True, help="folder to write")
     _strict_argument(command)
 
 
 def _resources_arguments(command: argparse.ArgumentParser) -> None:
-    """Add the arguments that say what a computation may use; results do not depend on them."""
+    """Add the arguments that say how much is looked at, and what a computation may use."""
+    command.add_argument(
+        "--candidates",
+        metavar="RULE",
+        help="look at fewer: near:12 for nodes at most 12 joints from the newest bricks, "
+        "within:1.5 for nodes at most 1.5 m from them; a heuristic",
+    )
     command.add_argument(
         "--workers",
         default="1",
