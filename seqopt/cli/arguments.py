@@ -263,7 +263,13 @@ def _add_optimize(commands: Commands, parents: list[_Parser]) -> None:
 
 
 def _resources_arguments(command: argparse.ArgumentParser) -> None:
-    """Add the arguments that say what a computation may use; results do not depend on them."""
+    """Add the arguments that say how much is looked at, and what a computation may use."""
+    command.add_argument(
+        "--candidates",
+        metavar="RULE",
+        help="look at fewer: near:12 for nodes at most 12 joints from the newest bricks, "
+        "within:1.5 for nodes at most 1.5 m from them; a heuristic",
+    )
     command.add_argument(
         "--workers",
         default="1",

@@ -68,6 +68,7 @@ from seqopt.sequence.plan_file import read_plan
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.schedule_file import find_schedule
 from seqopt.sequence.steps import AnyStep, Step, idle_robots
+from seqopt.sequence.thinning import thin
 from seqopt.sequence.two_robots import METHODS
 from seqopt.stability.assessment import Verdict
 from seqopt.stability.steps import assess_steps, format_verdicts, stability_table
@@ -171,6 +172,8 @@ def _optimize(options: argparse.Namespace) -> Status:
         _engine(options, network),
         find_schedule(network, options.schedule, parse_robots(options.robots)),
     )
+    if options.candidates is not None:
+        schedule = thin(schedule, options.candidates)
     assemble = time.perf_counter() - start
     counted = [budget.response for budget in budgets if budget.response]
     posed = pose(engine, schedule, criterion, limits, counted, resources)

@@ -98,8 +98,11 @@ def worth(plan: Plan) -> str:
     -------
     str
     """
+    among = plan.summary()["candidates"]
     if plan.certificate is None:
         return "not compared with the optimum"
+    if among != "all":
+        return f"objective {plan.certificate.objective:.6g}, {among}"
     return f"objective {plan.certificate.objective:.6g}, gap {100 * plan.certificate.gap:.3g} %"
 
 

@@ -254,26 +254,30 @@ class Plan:
         Returns
         -------
         dict
-            Names of scene, schedule, formulation and criterion; ``status`` (``optimal``,
-            ``claimed optimal`` where the proof is left to a solver, ``feasible`` or
+            Names of scene, schedule, formulation and criterion; ``candidates``, all or a heuristic
+            choice of them; ``status`` (``optimal``, ``claimed optimal`` where the proof is left to
+            a solver, both ``among these`` where candidates were left out, ``feasible`` or
             ``unproven``), ``objective``, ``bound``, ``gap``, ``claimed_gap``; of criteria of
             ranks the sums under both ``objectives`` and of heuristics the two ``gap_parts`` (see
             `seqopt.placement.objectives`), null without proof; of every one of the ``budgets`` what
             is there, spent and what one more unit would save; whether it ``ended`` ``done`` or was
-            ``stopped``; the payloads that are exceeded;
-            ``idle_robots``, which never grip; ``models_evaluated`` and ``seconds``.
+            ``stopped``; the payloads that are exceeded; ``idle_robots``, which never grip;
+            ``models_evaluated`` and ``seconds``.
         """
         schedule, proof = self._posed.schedule, self.certificate
         status = "unproven"
         if proof is not None:
             proven, claimed = proof.gap <= TOLERANCE, proof.claimed_gap <= TOLERANCE
             status = "optimal" if proven else "claimed optimal" if claimed else "feasible"
+        among = f"heuristic: {schedule.left_out}" if schedule.left_out else "all"
+        status += " among these" if schedule.left_out and status.endswith("optimal") else ""
         return {
             "scene": schedule.scene.name,
             "schedule": schedule.method,
             "formulation": self.formulation.name,
             "kind": self.formulation.kind.value,
             "aim": self.formulation.aim.value,
+            "candidates": among,
             "criterion": self._posed.criterion.name,
             **self._posed.criterion.settings,
             "status": status,

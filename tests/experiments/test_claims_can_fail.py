@@ -14,7 +14,13 @@ from experiments.__main__ import STORE
 from experiments.calibration import calibration
 from experiments.calibration.parts import arch_scores, calibration_spread
 from experiments.discrete import contact_steps, discrete_arches
-from experiments.engines import engine_limits, engine_speed, fidelity_ladder, frame_contrast
+from experiments.engines import (
+    engine_limits,
+    engine_speed,
+    fidelity_ladder,
+    frame_contrast,
+    parallel,
+)
 from experiments.harness.catalog import claims
 from experiments.harness.plotting import RESULTS
 from experiments.peers import peers
@@ -130,6 +136,7 @@ def checks() -> dict[str, tuple[Check, Tables, Callable[..., Iterator[tuple[Any,
             (rows("paper_counterparts"),),
             spoil_counterparts,
         ),
+        "parallel": (parallel.holds, (rows("parallel"),), spoil_parallel),
         "peers": (peers.judge, tuple(parts), spoil_peers),
         "program_shapes": (program_shapes.holds, (rows("program_shapes"),), spoil_shapes),
         "speed_accuracy": (
@@ -174,6 +181,12 @@ def spoil_degenerate(table):
     yield (spoiled(table, "status", "wrong", case=table["case"].iloc[40], seed=3),)
     for status in ("infeasible", "refused", "rejected"):
         yield (spoiled(table, "message", "", status=status),)
+
+
+def spoil_parallel(table):
+    yield (spoiled(table, "times_as_fast_by_cpu", 1.5, way="two processes"),)
+    yield (table.assign(same=table["way"] != "two processes"),)
+    yield (table[table["way"] != "two processes"],)
 
 
 def spoil_discrete(table):
