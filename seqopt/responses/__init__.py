@@ -1,8 +1,8 @@
 """Responses: the few numbers that say how a partial structure bears its weight and its grips.
 
 An engine gives forces and displacements everywhere; a response is one number of these, such as the
-largest tension. Responses come as a table of given steps, or over all choices of steps with open
-grips.
+largest tension. Responses come as a table of given steps, each from scratch or with what the steps
+before it lock in (`analyze_staged`), or over all choices of steps with open grips.
 
 >>> from seqopt.engines.registry import make_engine
 >>> from seqopt.network.build import build_network
@@ -23,6 +23,16 @@ array([17.6, 17.6])
 
 from seqopt.responses.choices import Evaluation, StepChoices
 from seqopt.responses.quantities import RESPONSES, Response, responses_of
+from seqopt.responses.staged import Placing, analyze_staged
 from seqopt.responses.table import analyze
 
-__all__ = ["RESPONSES", "Evaluation", "Response", "StepChoices", "analyze", "responses_of"]
+__all__ = [
+    "RESPONSES",
+    "Evaluation",
+    "Placing",
+    "Response",
+    "StepChoices",
+    "analyze",
+    "analyze_staged",
+    "responses_of",
+]
