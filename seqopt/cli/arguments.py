@@ -12,6 +12,7 @@ from seqopt.contact.mortar import MORTARS
 from seqopt.engines.registry import ENGINES
 from seqopt.placement.formulation import formulation_names
 from seqopt.placement.ranks import Among, Ranked
+from seqopt.responses.staged import Placing
 from seqopt.scene.scene_file import builtin_scenes
 from seqopt.sequence.three_robots import SCHEDULES
 from seqopt.sequence.two_robots import METHODS
@@ -129,6 +130,13 @@ def _add_analyze(commands: Commands, parents: list[_Parser]) -> None:
         type=Path,
         metavar="FILE",
         help="NumPy archive (.npz) to write: every edge force, node displacement and reaction",
+    )
+    command.add_argument(
+        "--staged",
+        choices=tuple(way.value for way in Placing),
+        help="staged construction analysis instead of every step from scratch: bricks come without "
+        "stress, set down fitted to the deformed structure or where they are planned, and grips "
+        "close where they find their nodes",
     )
     _strict_argument(command)
 

@@ -40,6 +40,7 @@ from seqopt.cli.values import (
     parse_resources,
     parse_robots,
     parse_time_limit,
+    step_answers,
 )
 from seqopt.contact.mortar import MORTARS
 from seqopt.engines.auto import AutoEngine
@@ -61,7 +62,7 @@ from seqopt.placement.promises import overloads
 from seqopt.placement.solving import solve
 from seqopt.report.comparison import compare
 from seqopt.report.text import format_comparison
-from seqopt.responses.table import analyze, fields_archive
+from seqopt.responses.table import archive, response_table
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import about, builtin_scenes, dump_scene, load_scene
 from seqopt.sequence.plan_file import read_plan
@@ -217,12 +218,12 @@ def _payloads_hold(options: argparse.Namespace, scene: Scene, *tables: pd.DataFr
 def _analyze(options: argparse.Namespace) -> Status:
     keep_apart(options, options.out, options.fields)
     scene = load_scene(options.scene)
-    engine = _engine(options, build_network(scene))
-    steps = _steps(scene, options)
-    table = analyze(engine, steps)
+    network = build_network(scene)
+    engine, steps = _engine(options, network), _steps(scene, options)
+    table = response_table(network, step_answers(options, engine, steps))
     _say_levels(engine)
     if options.fields is not None:
-        write_bytes(options.fields, fields_archive(engine, steps))
+        write_bytes(options.fields, archive(network, step_answers(options, engine, steps)))
     if options.out is None:
         show(csv_text(table))
     else:

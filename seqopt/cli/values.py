@@ -1,16 +1,17 @@
-"""What the words of the command line stand for: criteria, limits, options, mortars."""
+"""What the words of the command line stand for: criteria, limits, options, mortars, analyses."""
 
 from __future__ import annotations
 
 import argparse
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
 from seqopt.contact.mortar import MORTARS, Mortar
-from seqopt.errors import ProblemError
+from seqopt.engines.interface import Engine, Fields
+from seqopt.errors import ProblemError, SceneError
 from seqopt.placement.criteria import RankSum
 from seqopt.placement.formulation import Formulation, as_formulation
 from seqopt.placement.ranks import Among, Ranked
@@ -18,7 +19,10 @@ from seqopt.placement.requirements import Criterion, Limit, payload_limits
 from seqopt.placement.scales import NEVER
 from seqopt.responses.choices import CHOICE_RESPONSES
 from seqopt.responses.resources import Resources
+from seqopt.responses.staged import staged_fields
+from seqopt.responses.table import step_fields
 from seqopt.scene.scene import Scene
+from seqopt.sequence.steps import Step
 from seqopt.study.presets import CRITERIA
 
 BETWEEN = re.compile(r",(?![^\[]*\])")  # a comma that is not in brackets
@@ -323,3 +327,34 @@ def _number(text: str, where: str, zero: str = "") -> float:
             + (f" up to {LARGEST:g}" if value > LARGEST else "")
         )
     return value
+
+
+def step_answers(
+    options: argparse.Namespace, engine: Engine, steps: Sequence[Step]
+) -> Iterator[tuple[Step, Fields]]:
+    """Return steps with their fields, each from scratch or with what earlier ones lock in.
+
+    Parameters
+    ----------
+    options : argparse.Namespace
+        With ``staged``, where bricks are set down or None, and ``engine``.
+    engine : Engine
+    steps : sequence of Step
+
+    Returns
+    -------
+    iterator of (Step, Fields)
+
+    Raises
+    ------
+    SceneError
+        If a staged analysis is asked of another engine than the one of rigid bricks.
+    """
+    if options.staged is None:
+        return ((step, step_fields(engine, step)) for step in steps)
+    if options.engine != "compliance":
+        raise SceneError(
+            f"--engine {options.engine}: --staged goes with exactly rigid bricks alone; "
+            "give --engine compliance"
+        )
+    return zip(steps, staged_fields(engine.network, steps, options.staged), strict=True)

@@ -31,9 +31,10 @@ from experiments.placement import (
     heuristic_gaps,
     program_shapes,
     speed_accuracy,
+    staged_construction,
 )
 from experiments.robustness import fuzz
-from experiments.stability import failing_steps, witnesses
+from experiments.stability import dry_grips, failing_steps, witnesses
 from experiments.study import criteria_variants, paper_counterparts
 from experiments.study.parts.paper_items import ITEMS
 from seqopt.study.tables import printed
@@ -94,6 +95,7 @@ def checks() -> dict[str, tuple[Check, Tables, Callable[..., Iterator[tuple[Any,
             (rows("discrete_arches"),),
             spoil_discrete,
         ),
+        "dry_grips": (dry_grips.holds, (rows("dry_grips"), rows("dry_grips_build")), spoil_dry),
         "engine_limits": (
             lambda table: all(engine_limits.judge(table).values()),
             (rows("engine_limits"),),
@@ -143,6 +145,11 @@ def checks() -> dict[str, tuple[Check, Tables, Callable[..., Iterator[tuple[Any,
             lambda table: all(speed_accuracy.holds(table).values()),
             (rows("runs"),),
             spoil_runs,
+        ),
+        "staged_construction": (
+            lambda *tables: all(staged_construction.holds(*tables).values()),
+            (rows("staged_construction"), rows("staged_choice")),
+            spoil_staged,
         ),
         "witnesses": (
             lambda table: not witnesses.faults(table, ["rbe", "lmgc90"], largest(table)),
@@ -195,6 +202,24 @@ def spoil_discrete(table):
     yield (table.assign(error_pct=table["error_pct"].where(~one, table["bricks"].map(nearly))),)
     yield (spoiled(table, "tension_MPa", 3.5, bricks=24),)
     yield (spoiled(table, "shear_used", 1.2, bricks=17),)
+
+
+def spoil_dry(table, built):
+    yield spoiled(table, "open", 1, bricks=24, case="dry"), built
+    yield spoiled(table, "contradicted", 1, bricks=17, case="bond 3 kPa"), built
+    yield spoiled(table, "solved", 2000, bricks=25, case="dry"), built
+    yield table, spoiled(built, "placed", 25, robots=2)
+    yield table, spoiled(built, "placed", 24, robots=3)
+
+
+def spoil_staged(table, chosen):
+    published = {"method": staged_construction.PUBLISHED, "analysis": "fitted"}
+    yield spoiled(table, "F_largest_N", 270.0, **published), chosen
+    yield spoiled(table, "F_largest_N", 650.0, method="cantilever", analysis="fitted"), chosen
+    yield spoiled(table, "T_max_N", 120.0, method="sequential", analysis="fitted"), chosen
+    yield spoiled(table, "imbalance_N", 1e-3, step=40), chosen
+    yield table, chosen.assign(fitted=chosen["scratch"])
+    yield table, chosen.assign(scratch_worst_fitted=1.0)
 
 
 def spoil_fuzz(cases, kills):
