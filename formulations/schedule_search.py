@@ -30,9 +30,10 @@ import numpy as np
 
 from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.placement.formulation import FormulationKind
+from seqopt.placement.free_goals import Measure
 from seqopt.placement.free_graph import StateGraph, explore
 from seqopt.placement.free_paths import keep_best, least_from_start, shortest
-from seqopt.placement.free_problem import FreeProblem, Measure, ScheduleSelection
+from seqopt.placement.free_problem import FreeProblem, ScheduleSelection
 from seqopt.placement.schedule_formulation import ScheduleFormulation
 
 

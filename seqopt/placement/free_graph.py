@@ -13,7 +13,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
-from seqopt.placement.free_problem import FreeProblem, Measure
+from seqopt.placement.free_goals import Measure
+from seqopt.placement.free_problem import FreeProblem
 from seqopt.sequence.free_space import Moves
 
 

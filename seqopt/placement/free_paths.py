@@ -7,8 +7,8 @@ from collections.abc import Callable
 import numpy as np
 
 from seqopt.arrays import Bools, Floats
+from seqopt.placement.free_goals import Measure
 from seqopt.placement.free_graph import Arcs, Level, StateGraph
-from seqopt.placement.free_problem import Measure
 
 TIGHT = 1e-12  # of the least sum: by how much a path may exceed it and still be one of the best
 Join = Callable[[Floats, Floats], Floats]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, overload
 
 import numpy as np
 
@@ -19,24 +19,48 @@ from seqopt.placement.formulation import (
     formulations,
     select,
 )
+from seqopt.placement.free_plan import FreePlan, solve_free
+from seqopt.placement.free_problem import FreeProblem
 from seqopt.placement.interface import Handed, PlacementProblem
 from seqopt.placement.plan import Plan
 from seqopt.placement.problem import Problem
 from seqopt.placement.promises import require_possible
+from seqopt.placement.schedule_formulation import ScheduleFormulation
 from seqopt.placement.window_search import search_windows
 
 
+@overload
 def solve(
     problem: PlacementProblem, formulation: Formulation | str, *, proof: bool = True, **options: Any
-) -> Plan:
+) -> Plan: ...
+
+
+@overload
+def solve(
+    problem: FreeProblem,
+    formulation: ScheduleFormulation | str,
+    *,
+    proof: bool = True,
+    **options: Any,
+) -> FreePlan: ...
+
+
+def solve(
+    problem: PlacementProblem | FreeProblem,
+    formulation: Formulation | ScheduleFormulation | str,
+    *,
+    proof: bool = True,
+    **options: Any,
+) -> Plan | FreePlan:
     """Solve a problem by a formulation and check the answer from the problem's own data.
 
     Parameters
     ----------
-    problem : PlacementProblem
-        From `seqopt.pose`, or a `seqopt.placement.CostProblem`.
-    formulation : Formulation or str
-        One of `seqopt.formulations`, or its name.
+    problem : PlacementProblem or FreeProblem
+        From `seqopt.pose`, a `seqopt.placement.CostProblem`, or of the free schedule, from
+        `seqopt.placement.free_problem.pose_free`.
+    formulation : Formulation, ScheduleFormulation or str
+        One of `seqopt.formulations`, or its name; ``schedule_search`` for the free schedule.
     proof : bool, optional
         False lets a formulation that looks at one window after the other solve only the models that
         it meets; how far its choice is from the optimum then stays unknown.
@@ -45,7 +69,7 @@ def solve(
 
     Returns
     -------
-    Plan
+    Plan or FreePlan
 
     Raises
     ------
@@ -66,6 +90,14 @@ def solve(
     >>> seqopt.solve(problem, "cascade").certificate.gap > 0.009
     True
     """
+    if isinstance(problem, FreeProblem):
+        if isinstance(formulation, Formulation):
+            raise ProblemError(
+                f"{formulation.name}: a free schedule has no moves to choose; use schedule_search"
+            )
+        return solve_free(problem, formulation, proof=proof, **options)
+    if isinstance(formulation, ScheduleFormulation):
+        raise ProblemError(f"{formulation.name} is for free schedules; pose one with pose_free")
     formulation = as_formulation(formulation)
     if not isinstance(getattr(problem, "budgets", None), tuple):
         raise ProblemError(

@@ -127,6 +127,29 @@ class FreeRules:
             )
         return team
 
+    def described(self, scene: Scene) -> dict[str, object]:
+        """Return the rules with their values, ready for JSON.
+
+        Parameters
+        ----------
+        scene : Scene
+
+        Returns
+        -------
+        dict
+            By name.
+        """
+        names = [scene.robots[i].name for i in self.team(scene)]
+        return {
+            "robots": names,
+            "placers": list(self.placers) or names,
+            "least_grips": self.least_grips,
+            "newest": self.newest.value,
+            "payload": self.payload.value,
+            "regrips": "any" if self.regrips is None else self.regrips,
+            "ending": self.ending.value,
+        }
+
     def loosened(self) -> Iterator[tuple[str, FreeRules]]:
         """Yield the rules with one of them loosened, and how a user says so.
 
