@@ -181,3 +181,55 @@ def _reduced(
             )
         levels.append(Level(level.states[nodes[b]], level.values[nodes[b]], inner, onward))
     return StateGraph(graph.problem, levels)
+
+
+def below(graph: StateGraph, bounds: Floats) -> StateGraph | None:
+    """Return the states all of whose values are below bounds, and the moves among them.
+
+    Parameters
+    ----------
+    graph : StateGraph
+    bounds : (g,) float
+        By goal.
+
+    Returns
+    -------
+    StateGraph or None
+        None where a level has no such state.
+    """
+    nodes = [(level.values < bounds).all(axis=1) for level in graph.levels]
+    nodes[0][:] = True  # the empty site has no values
+    if not all(kept.any() for kept in nodes):
+        return None
+    arcs = []
+    for b, level in enumerate(graph.levels):
+        inner, onward = level.inner, level.onward
+        kept = nodes[b][inner.source] & nodes[b][inner.target]
+        if b + 1 < len(graph.levels):
+            onward = onward.only(nodes[b][onward.source] & nodes[b + 1][onward.target])
+        arcs.append((inner.only(kept), onward))
+    return _reduced(graph, nodes, arcs)
+
+
+def reaches_end(graph: StateGraph) -> bool:
+    """Return whether some path leads from the empty site to an end.
+
+    Parameters
+    ----------
+    graph : StateGraph
+
+    Returns
+    -------
+    bool
+    """
+    reached = np.ones(1, dtype=bool)
+    for before, level in zip(graph.levels, graph.levels[1:], strict=False):
+        now = np.zeros(len(level.states), dtype=bool)
+        now[before.onward.target[reached[before.onward.source]]] = True
+        count = 0
+        while count < (count := int(now.sum())):
+            now[level.inner.target[now[level.inner.source]]] = True
+        if not count:
+            return False
+        reached = now
+    return bool((reached & graph.ends()).any())

@@ -15,7 +15,7 @@ from seqopt.placement.free_problem import FreeProblem
 from seqopt.placement.requirements import LIMIT_TOLERANCE
 from seqopt.responses.quantities import CHOSEN_BY, lengths
 from seqopt.sequence.free_check import RuleBook
-from seqopt.sequence.free_rules import Payload
+from seqopt.sequence.free_rules import Ending, Payload
 from seqopt.sequence.steps import Grips, StepKind
 
 BELOW = 1e-9  # by how much a plan must be better, over the size of the value
@@ -105,10 +105,17 @@ class Proof:
                 total = taken + (kind is StepKind.REPOSITION)
             elif goal.measure is Measure.TRAVEL:
                 total = taken + self._way(before, after)
-            if total > bound:
+            if total + (self._to_go(after) if goal.measure is Measure.STEPS else 0) > bound:
                 return None
             out.append(0.0 if goal.measure is Measure.PEAK else total)
         return tuple(out)
+
+    def _to_go(self, state: State) -> int:
+        """Return the least steps after a state: to place each brick left takes a robot that is free."""
+        left = len(self._problem.network.inner) - state[0]
+        held = sum(node is not None for node in state[1])
+        ends = self._problem.rules.ending is not Ending.HELD and (held > 0 or left > 0)
+        return left + max(0, held + left - len(self._book.team)) + ends
 
     def _after(self, state: State) -> list[tuple[StepKind, State]]:
         """Return the steps that are possible from a state, alike ones once."""

@@ -6,10 +6,10 @@ import inspect
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.metadata import entry_points
+from typing import Any
 
 from seqopt.errors import ProblemError
 from seqopt.placement.formulation import FormulationKind
-from seqopt.placement.free_problem import ScheduleSelection
 
 GROUP = "seqopt.schedule_formulations"
 
@@ -25,13 +25,14 @@ class ScheduleFormulation:
     kind : FormulationKind
         What it promises.
     solve : callable
-        Takes the problem and named options, returns a `ScheduleSelection`.
+        Takes the problem and named options, returns a `ScheduleSelection`, or of a Pareto set a
+        `seqopt.placement.front.FrontSelection`.
     """
 
     name: str
     summary: str
     kind: FormulationKind
-    solve: Callable[..., ScheduleSelection]
+    solve: Callable[..., Any]
 
     @property
     def options(self) -> dict[str, int | float]:
