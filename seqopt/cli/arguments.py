@@ -6,6 +6,8 @@ import argparse
 from pathlib import Path
 from typing import NoReturn, TypeAlias
 
+from seqopt.cli.free import FREE
+from seqopt.cli.free_arguments import add_pareto, add_rules
 from seqopt.cli.status import Status
 from seqopt.cli.terminal import complain, show
 from seqopt.contact.mortar import MORTARS
@@ -14,7 +16,7 @@ from seqopt.placement.formulation import formulation_names
 from seqopt.scene.scene_file import builtin_scenes
 from seqopt.sequence.three_robots import SCHEDULES
 from seqopt.sequence.two_robots import METHODS
-from seqopt.study.presets import CRITERIA, EQUATIONS
+from seqopt.study.presets import CRITERIA
 from seqopt.study.published import PUBLISHED
 
 
@@ -50,6 +52,7 @@ def parser() -> argparse.ArgumentParser:
     _add_compare(commands, [scene, engine])
     _add_analyze(commands, [scene, engine])
     _add_optimize(commands, [scene, engine])
+    add_pareto(commands, [scene, engine], _limit_argument)
     _add_assess(commands, [scene])
     _add_scene(commands, [scene])
     return whole
@@ -191,10 +194,19 @@ def _criterion_argument(command: argparse.ArgumentParser) -> None:
     )
     command.add_argument(
         "--criteria",
-        default=EQUATIONS.name,
         metavar="NAME",
         help=f"what a step costs: {', '.join(CRITERIA)}, or responses to rank with weights, as "
         "T_max,M_sup=2,F_move; equations (2) and (3) of Bruun et al. by default",
+    )
+
+
+def _limit_argument(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "--limit",
+        action="append",
+        default=[],
+        metavar="LIMIT",
+        help="no open step may exceed it: payload, or as F_largest=300 (SI units); may be repeated",
     )
 
 
@@ -210,26 +222,28 @@ def _add_optimize(commands: Commands, parents: list[_Parser]) -> None:
     )
     command.add_argument(
         "--formulation",
-        required=True,
         metavar="NAME",
-        help=f"one of {', '.join(formulation_names())}",
+        help=f"one of {', '.join(formulation_names())}; the free schedule has its own",
     )
     command.add_argument(
         "--schedule",
         default=next(iter(SCHEDULES)),
         metavar="NAME|FILE",
         help=f"which build has the open grips: {', '.join(SCHEDULES)} (of all robots), or a CSV "
-        "file of steps in which open grips are marked ? (default: %(default)s)",
+        "file of steps in which open grips are marked ? (default: %(default)s); or "
+        f"{FREE}: any robot may release, hold or place next",
     )
     _robots_argument(command, "a schedule by name: the")
     _criterion_argument(command)
     command.add_argument(
-        "--limit",
-        action="append",
-        default=[],
-        metavar="LIMIT",
-        help="no open step may exceed it: payload, or as F_largest=300 (SI units); may be repeated",
+        "--aim",
+        metavar="NAME,NAME",
+        help="with --schedule free, what is to be least, the most important first: minmax (of the "
+        "criterion, worst-ratio by default), sum, steps, regrips, travel, a response or "
+        "sum(RESPONSE) (default: minmax)",
     )
+    add_rules(command)
+    _limit_argument(command)
     command.add_argument(
         "--option",
         action="append",

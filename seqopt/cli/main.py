@@ -1,4 +1,4 @@
-"""The command line: ``seqopt compare | optimize | analyze | assess | scene``."""
+"""The command line: ``seqopt compare | optimize | pareto | analyze | assess | scene``."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ import numpy as np
 import pandas as pd
 
 from seqopt.cli.arguments import parser
+from seqopt.cli.free import FREE, optimize_free, pareto, require_loop
 from seqopt.cli.outputs import (
     comparison_files,
     keep_apart,
@@ -58,6 +59,7 @@ from seqopt.sequence.steps import AnyStep, Step, idle_robots
 from seqopt.sequence.two_robots import METHODS
 from seqopt.stability.assessment import Verdict
 from seqopt.stability.steps import assess_steps, format_verdicts, stability_table
+from seqopt.study.presets import EQUATIONS
 from seqopt.study.published import PUBLISHED, is_reference_arch, paper_models, published_plan
 
 
@@ -99,7 +101,7 @@ def _run(arguments: Sequence[str] | None) -> int:
 def _compare(options: argparse.Namespace) -> Status:
     scene = load_scene(options.scene)
     engine = _engine(options, build_network(scene))
-    criterion = parse_criterion(options.criteria, options.crown)
+    criterion = parse_criterion(options.criteria or EQUATIONS.name, options.crown)
     if options.out is not None:
         require_matplotlib(options.out)
         require_folder(options.out)
@@ -137,9 +139,12 @@ def _say_idle(scene: Scene, steps: Sequence[AnyStep]) -> None:
 
 
 def _optimize(options: argparse.Namespace) -> Status:
+    if options.schedule == FREE:
+        return optimize_free(options, _engine)
+    require_loop(options)
     formulation = find_formulation(options.formulation)
     chosen = parse_options(formulation, options.option)
-    criterion = parse_criterion(options.criteria, options.crown)
+    criterion = parse_criterion(options.criteria or EQUATIONS.name, options.crown)
     scene = load_scene(options.scene)
     limits = parse_limits(options.limit, scene)
     require_folder(options.out)
@@ -282,6 +287,7 @@ COMMANDS: dict[str, Callable[[argparse.Namespace], int | None]] = {
     "compare": _compare,
     "analyze": _analyze,
     "optimize": _optimize,
+    "pareto": lambda options: pareto(options, _engine),
     "assess": _assess,
     "scene": _scene,
 }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from seqopt.contact.mortar import MORTARS, Mortar
@@ -98,6 +98,38 @@ def parse_limits(texts: Sequence[str], scene: Scene) -> tuple[Limit, ...]:
         else:
             out.append(Limit(_response(name, "--limit"), _number(value, f"--limit {text}")))
     return tuple(out)
+
+
+def parse_numbers(
+    where: str, texts: Sequence[str], known: Mapping[str, object] | None = None
+) -> dict[str, float]:
+    """Return positive numbers by name from words.
+
+    Parameters
+    ----------
+    where : str
+        The argument, for messages.
+    texts : sequence of str
+        Each ``NAME=VALUE``.
+    known : mapping of str to object, optional
+        Names that there are; any by default.
+
+    Returns
+    -------
+    dict of str to float
+
+    Raises
+    ------
+    ProblemError
+        If there is no such name, or a value is not positive.
+    """
+    out: dict[str, float] = {}
+    for text in texts:
+        name, value = _split(text)
+        if known is not None and name not in known:
+            raise ProblemError(f"{where} {text}: there is no such; give one of {', '.join(known)}")
+        out[name] = _number(value, f"{where} {text}")
+    return out
 
 
 def parse_options(formulation: Formulation | str, texts: Sequence[str]) -> dict[str, int | str]:
