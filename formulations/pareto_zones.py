@@ -1,7 +1,7 @@
 r"""All plans that no other plan beats in every response: exact, by search zones.
 
-A plan has a vector :math:`z` of numbers that are to be small, the worst of each response, say. It is
-dominated by one that is nowhere larger and somewhere less. What is not dominated by any of the
+A plan has a vector :math:`z` of numbers that are to be small, say the worst of each response. It
+is dominated by one that is nowhere larger and somewhere less. What is not dominated by any of the
 points found so far lies in one of finitely many *search zones*,
 
 .. math::
@@ -10,9 +10,9 @@ points found so far lies in one of finitely many *search zones*,
 
 A zone is empty if no path of states that are all below :math:`u` leads to an end. Else the least of
 the first number in it, of the second among these, and so on, is a new point :math:`z`; every zone
-that holds it is split, once for each number, with :math:`z_k` in the place of :math:`u_k`, and zones
-inside others are dropped. When no zone is left the set is complete. Source: Klamroth, Lacour and
-Vanderpooten, On the representation of the search region in multi-objective optimization (2015).
+that holds it is split, once for each number, with :math:`z_k` in the place of :math:`u_k`, and
+zones inside others are dropped. When no zone is left the set is complete. Source: Klamroth, Lacour
+and Vanderpooten, On the representation of the search region in multi-objective optimization (2015).
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from seqopt.arrays import Floats
+from seqopt.arrays import Bools, Floats
 from seqopt.placement.formulation import FormulationKind
 from seqopt.placement.front import FrontProblem, FrontSelection
 from seqopt.placement.schedule_formulation import ScheduleFormulation
@@ -99,9 +99,10 @@ def split(zones: Floats, point: Floats) -> Floats:
     return np.vstack([kept, fresh[alone]])
 
 
-def _within(zones: Floats, others: Floats) -> Floats:
+def _within(zones: Floats, others: Floats) -> Bools:
     """Return which zones lie in one of others, (n,) bool."""
-    return np.asarray((zones[:, None] <= others[None]).all(axis=2).any(axis=1))
+    inside = np.asarray((zones[:, None] <= others[None]).all(axis=2))
+    return np.asarray(inside.any(axis=1))
 
 
 FORMULATION = ScheduleFormulation(

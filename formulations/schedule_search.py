@@ -14,11 +14,12 @@ in their order,
    g(s_1, \dots, s_N) = \sum_i c(s_{i-1}, s_i),
 
 with :math:`v` what a state is worth and :math:`c` what a step costs. A narrow search without
-regrips, which keeps the best states of every brick count, gives a first plan. Then a threshold rises until states below it
-connect the empty site to an end; responses are computed only for states next to those that are
-reached below it. Among these every goal is a shortest path, with the maximum in the place of the sum for a
-peak; what is not on a best path of one goal is left out before the next. The certificate proves every
-value anew: below it no path connects the empty site to an end.
+regrips, which keeps the best states of every brick count, gives a first plan. Then a threshold
+rises until states below it connect the empty site to an end; responses are computed only for states
+next to those that are reached below it. Among these every goal is a shortest path, with the maximum
+in the place of the sum for a peak; what is not on a best path of one goal is left out before the
+next. The certificate proves every value anew: below it no path connects the empty site to an
+end.
 """
 
 from __future__ import annotations
@@ -35,7 +36,6 @@ from seqopt.placement.free_graph import StateGraph, explore
 from seqopt.placement.free_paths import keep_best, least_from_start, shortest
 from seqopt.placement.free_problem import FreeProblem, ScheduleSelection
 from seqopt.placement.schedule_formulation import ScheduleFormulation
-
 
 STEPS_BELOW = 3  # the first threshold lies so many rises below what the narrow search finds
 
@@ -136,9 +136,7 @@ def _selection(graph: StateGraph) -> ScheduleSelection:
     return ScheduleSelection(states, tuple(values), tuple(values))
 
 
-def _unproven(
-    found: ScheduleSelection, reached: StateGraph, why: str
-) -> ScheduleSelection:
+def _unproven(found: ScheduleSelection, reached: StateGraph, why: str) -> ScheduleSelection:
     """Return the first plan, and what the levels that were reached prove of the first goal."""
     bound = float(least_from_start(reached, 0)[-1].min())
     if reached.problem.goals[0].measure is Measure.PEAK:

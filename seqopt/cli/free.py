@@ -18,12 +18,14 @@ from seqopt.errors import ProblemError, StepError
 from seqopt.files import csv_text, require_folder
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
+from seqopt.placement.criteria import WORST_OVER_METHODS
 from seqopt.placement.formulation import formulation_names
 from seqopt.placement.free_front import FreeFront
 from seqopt.placement.free_problem import FreeProblem, pose_free
 from seqopt.placement.front import Front, FrontProblem, find_front, pick
 from seqopt.placement.loop_front import LoopFront
 from seqopt.placement.promises import overloads
+from seqopt.placement.requirements import Criterion
 from seqopt.placement.schedule_formulation import find_schedule_formulation
 from seqopt.placement.solving import solve
 from seqopt.report.comparison import method_tables
@@ -34,7 +36,6 @@ from seqopt.scene.scene_file import dump_scene, load_scene
 from seqopt.sequence.free_rules import FreeRules, with_robots
 from seqopt.sequence.schedule_file import find_schedule
 from seqopt.sequence.steps import Step, idle_robots
-from seqopt.placement.criteria import WORST_OVER_METHODS
 
 FREE = "free"  # the schedule that is no list of steps
 Make = Callable[[argparse.Namespace, Network], Engine]
@@ -140,9 +141,7 @@ def require_loop(options: argparse.Namespace) -> None:
         raise ProblemError(f"--formulation: it is missing; give one of {known}")
 
 
-def _posed(
-    options: argparse.Namespace, make: Make, aim: str
-) -> tuple[Scene, FreeProblem]:
+def _posed(options: argparse.Namespace, make: Make, aim: str) -> tuple[Scene, FreeProblem]:
     """Return the scene with its robots, and the problem of its free schedule."""
     scene = load_scene(options.scene)
     names = parse_robots(options.robots)
@@ -151,7 +150,7 @@ def _posed(
     if options.schedule != FREE and (options.rule or options.robots.isdecimal()):
         raise StepError(f"--schedule {options.schedule}: rules and a count of robots go with free")
     rules = parse_rules(options.rule, names if options.schedule == FREE else ())
-    criterion = WORST_OVER_METHODS
+    criterion: Criterion = WORST_OVER_METHODS
     if options.criteria is not None:
         criterion = parse_criterion(options.criteria, options.crown)
     engine = make(options, build_network(scene))

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 from seqopt.cli.free import FREE
 from seqopt.sequence.three_robots import SCHEDULES
@@ -34,8 +35,8 @@ def add_rules(command: argparse.ArgumentParser) -> None:
 
 
 def add_pareto(
-    commands: argparse._SubParsersAction[argparse.ArgumentParser],
-    parents: list[argparse.ArgumentParser],
+    commands: argparse._SubParsersAction[Any],
+    parents: Sequence[argparse.ArgumentParser],
     limit: Callable[[argparse.ArgumentParser], None],
 ) -> None:
     """Add the command ``pareto``.
@@ -43,17 +44,17 @@ def add_pareto(
     Parameters
     ----------
     commands : argparse._SubParsersAction
-    parents : list of argparse.ArgumentParser
+    parents : sequence of argparse.ArgumentParser
         Whose arguments it has.
     limit : callable
         Adds the argument ``--limit``.
     """
     command = commands.add_parser(
         "pareto",
-        parents=parents,
+        parents=[*parents],
         help="all plans that no other beats in every response",
         description="Find every plan of the free schedule, or of a schedule with open grips, that "
-        "no other one beats in all responses at once; check each, and write table, plans and chart.",
+        "no other one beats in all responses at once; check each; write table, plans and chart.",
         epilog="example: seqopt pareto arch25 --pick D_max --under F_largest=250 --out front",
     )
     command.add_argument(

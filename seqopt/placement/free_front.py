@@ -86,7 +86,7 @@ class FreeFront:
         if graph is None or not reaches_end(graph):
             return None
         point = np.zeros(len(bounds))
-        order = range(len(bounds))
+        order = [*range(len(bounds))]
         if self._counted is not None:  # a count is bounded along a path, not state by state
             order = sorted(order, key=lambda k: k != self._counted)
         for k in order:
@@ -114,7 +114,7 @@ class FreeFront:
         bool
         """
         source, target, regrip, values, ends = self._flat
-        ok = (values < self._peaks(bounds)).all(axis=1)
+        ok = np.asarray((values < self._peaks(bounds)).all(axis=1))
         ok[0] = True
         kept = ok[source] & ok[target]
         if self._counted is None:

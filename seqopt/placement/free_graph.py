@@ -1,8 +1,8 @@
 """The states of a free schedule that a search reaches, level by level, and the moves between them.
 
-A level holds the states of one brick count. Responses are asked for once a state is reached, all new
-states of a round together; a state above the ceiling is left out, and nothing is reached through
-it.
+A level holds the states of one brick count. Responses are asked for once a state is reached, all
+new states of a round together; a state above the ceiling is left out, and nothing is reached
+through it.
 """
 
 from __future__ import annotations
@@ -11,11 +11,14 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.placement.free_goals import Measure
 from seqopt.placement.free_problem import FreeProblem
 from seqopt.sequence.free_space import Moves
+
+Rows = NDArray[np.int32]
 
 
 @dataclass(eq=False)
@@ -32,8 +35,8 @@ class Arcs:
         How far it goes, m; empty where ways do not count.
     """
 
-    source: Ints
-    target: Ints
+    source: Rows
+    target: Rows
     regrip: Bools
     way: Floats
 
@@ -200,9 +203,7 @@ def _close(
     rank = np.empty_like(order)
     rank[order] = np.arange(len(order))
     states, values = states[order], values[order]
-    arcs = [
-        _arcs(problem, Moves(rank[m.source], *m[1:]), states, regrip=hold) for m, hold in parts
-    ]
+    arcs = [_arcs(problem, Moves(rank[m.source], *m[1:]), states, regrip=hold) for m, hold in parts]
     return Level(states, values, _joined(arcs), _no_arcs()), excluded
 
 

@@ -26,8 +26,8 @@ def why_impossible(problem: FreeProblem) -> str:
     Returns
     -------
     str
-        Naming the brick at which it stops and what opens a way: a rule to loosen, or how far a limit
-        has to be raised.
+        Naming the brick at which it stops and what opens a way: a rule to loosen, or how far a
+        limit has to be raised.
     """
     graph = explore(replace(problem, goals=STEPS))
     placed = problem.network.scene.placed
@@ -37,9 +37,11 @@ def why_impossible(problem: FreeProblem) -> str:
         where = f"brick {placed[stops].name} ({stops + 1} of {len(placed)}) is never placed"
     ways = list(_opening(problem))
     if not ways:
+        ways = [both] if (both := _pair(problem)) else []
+    if not ways:
         return (
-            f"free schedule: {where}, whatever single rule or limit is loosened; extend a reach, "
-            "add a robot, or loosen several"
+            f"free schedule: {where}, whatever two rules or limits are loosened; extend a reach or "
+            "add a robot"
         )
     ways = [_enough(problem, way) for way in ways]
     return f"free schedule: {where}; a way opens with {' or '.join(ways)}"
@@ -58,6 +60,15 @@ def _opening(problem: FreeProblem) -> Iterator[str]:
         rest = tuple(other for other in problem.limits if other is not limit)
         if explore(replace(problem, limits=rest)).whole:
             yield limit.response
+
+
+def _pair(problem: FreeProblem) -> str:
+    """Return the first two that open a way together: rules, or a rule and a limit; or nothing."""
+    for text, rules in problem.rules.loosened():
+        other = next(_opening(replace(problem, rules=rules)), "")
+        if other:
+            return f"{text} together with {other}"
+    return ""
 
 
 def _enough(problem: FreeProblem, way: str) -> str:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import pandas as pd
@@ -173,9 +174,9 @@ def travel_of(problem: FreeProblem, steps: Sequence[Step]) -> float:
     for robot in range(len(scene.robots)):
         nodes = [step.grips[robot] for step in steps]
         held = [node for node in nodes if node is not None]
-        for first, second in zip(held, held[1:], strict=False):
+        for first, second in pairwise(held):
             ends = [scene.node_position(node) for node in (first, second)]
-            total += float(np.linalg.norm(np.subtract(*ends)))
+            total += float(np.linalg.norm(np.array(ends[0]) - np.array(ends[1])))
     return total
 
 

@@ -167,18 +167,16 @@ def _settle(least: Floats, arcs: Arcs, costs: Floats, join: Join) -> Floats:
     return least
 
 
-def _reduced(
-    graph: StateGraph, nodes: list[Bools], arcs: list[tuple[Arcs, Arcs]]
-) -> StateGraph:
+def _reduced(graph: StateGraph, nodes: list[Bools], arcs: list[tuple[Arcs, Arcs]]) -> StateGraph:
     """Return the part of a graph with some states and moves."""
     rank = [np.cumsum(kept, dtype=np.int32) - 1 for kept in nodes]
     levels = []
-    for b, (level, (inner, onward)) in enumerate(zip(graph.levels, arcs, strict=True)):
-        inner = Arcs(rank[b][inner.source], rank[b][inner.target], inner.regrip, inner.way)
-        if len(onward.source):
-            onward = Arcs(
-                rank[b][onward.source], rank[b + 1][onward.target], onward.regrip, onward.way
-            )
+    for b, (level, (within, further)) in enumerate(zip(graph.levels, arcs, strict=True)):
+        inner = Arcs(rank[b][within.source], rank[b][within.target], within.regrip, within.way)
+        onward = further
+        if len(further.source):
+            ends = rank[b][further.source], rank[b + 1][further.target]
+            onward = Arcs(*ends, further.regrip, further.way)
         levels.append(Level(level.states[nodes[b]], level.values[nodes[b]], inner, onward))
     return StateGraph(graph.problem, levels)
 
@@ -197,7 +195,7 @@ def below(graph: StateGraph, bounds: Floats) -> StateGraph | None:
     StateGraph or None
         None where a level has no such state.
     """
-    nodes = [(level.values < bounds).all(axis=1) for level in graph.levels]
+    nodes = [np.asarray((level.values < bounds).all(axis=1)) for level in graph.levels]
     nodes[0][:] = True  # the empty site has no values
     if not all(kept.any() for kept in nodes):
         return None

@@ -22,6 +22,7 @@ from seqopt.scene.checks import short
 from seqopt.sequence.free_rules import FreeRules
 from seqopt.sequence.free_space import FreeSpace, free_space
 
+
 @dataclass(frozen=True, eq=False, repr=False)
 class ScheduleSelection(FrozenValue):
     """A free schedule, and what its formulation claims of it.

@@ -1,4 +1,4 @@
-"""The proof that no free schedule is better: all states that a better one could pass, one by one."""
+"""The proof that no free schedule is better: states that a better one could pass, one by one."""
 
 from __future__ import annotations
 
@@ -65,7 +65,8 @@ class Proof:
         bool
         """
         most = [value + BELOW * abs(value) for value in values[:k]]
-        most.append(values[k] - BELOW * abs(values[k]))
+        less = float(np.nextafter(values[k], -np.inf))  # of none there is no share
+        most.append(min(less, values[k] - BELOW * abs(values[k])))
         none: Grips = (None,) * len(self._problem.network.scene.robots)
         known: Known = {(0, none, 0, none): [(0.0,) * (k + 1)]}
         for bricks in range(len(self._problem.network.inner) + 1):
@@ -77,7 +78,9 @@ class Proof:
                 work = []
                 for state, label, kind, after in moves:
                     new = self._add(label, state, kind, after, most)
-                    if new is None or not _keep(following if after[0] > bricks else known, after, new):
+                    if new is None or not _keep(
+                        following if after[0] > bricks else known, after, new
+                    ):
                         continue
                     if self._book.ends(after[0], after[1]):
                         return True
@@ -111,7 +114,7 @@ class Proof:
         return tuple(out)
 
     def _to_go(self, state: State) -> int:
-        """Return the least steps after a state: to place each brick left takes a robot that is free."""
+        """Return the least steps after a state: each brick left takes a robot that is free."""
         left = len(self._problem.network.inner) - state[0]
         held = sum(node is not None for node in state[1])
         ends = self._problem.rules.ending is not Ending.HELD and (held > 0 or left > 0)
@@ -182,7 +185,7 @@ class Proof:
         if stayed[0] is None:
             return 0.0
         ends = [scene.node_position(node) for node in (stayed[0], fresh[0])]
-        return float(np.linalg.norm(np.subtract(*ends)))
+        return float(np.linalg.norm(np.array(ends[0]) - np.array(ends[1])))
 
     def _solve(self, asked: Iterable[tuple[int, GripSet]]) -> None:
         """Ask the engine for the grip sets that are not known yet."""

@@ -33,7 +33,7 @@ def steps_of(space: FreeSpace, states: Sequence[Sequence[int]]) -> tuple[Step, .
     numbers = [None, *node_numbers(space.network)]
     grips: list[int | None] = [None] * len(space.network.scene.robots)
     stays: dict[int, int] = {}  # where a robot was last, as a place from 1
-    before, out = 0, []
+    before, out = 0, list[Step]()
     for bricks, *entries in states:
         if len(entries) < space.robots or not all(abs(n) < len(numbers) for n in entries):
             raise SolverError(f"the state {[bricks, *entries]} is none of this free schedule")

@@ -129,7 +129,7 @@ def find_front(
     seconds: float = np.inf,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Front:
-    """Return the Pareto set of a problem, every point of it recomputed, and its completeness judged.
+    """Return the Pareto set of a problem, its points recomputed and its completeness judged.
 
     Parameters
     ----------
@@ -190,10 +190,10 @@ def _require_complete(
 
 
 def upper_bounds(points: Floats) -> Floats:
-    """Return the corners below which lies all that no point dominates: by the last number, then less.
+    """Return the corners below which lies all that no point dominates.
 
-    Points are taken by their last number, ascending; up to the next one only those before it count,
-    so that the corners are those of sets with one number less.
+    Points are taken by their last number, ascending; up to the next one only those before it
+    count, so that the corners are those of sets with one number less.
 
     Parameters
     ----------
@@ -222,9 +222,7 @@ def upper_bounds(points: Floats) -> Floats:
     return np.array(kept)
 
 
-def _table(
-    problem: FrontProblem, points: Floats, plans: Sequence[Sequence[Step]]
-) -> pd.DataFrame:
+def _table(problem: FrontProblem, points: Floats, plans: Sequence[Sequence[Step]]) -> pd.DataFrame:
     table = pd.DataFrame(points, columns=[*problem.names])
     counts = {
         "steps": [len(steps) for steps in plans],
@@ -268,6 +266,8 @@ def pick(table: pd.DataFrame, least: str, under: Mapping[str, float] | None = No
         rows &= table[name].to_numpy(float) < bound
     if not rows.any():
         closest = ", ".join(f"{name} from {table[name].min():.6g}" for name in under)
-        raise ProblemError(f"pick {least}: no plan of the set is below all bounds; it has {closest}")
+        raise ProblemError(
+            f"pick {least}: no plan of the set is below all bounds; it has {closest}"
+        )
     values = np.where(rows, table[least].to_numpy(float), np.inf)
     return int(values.argmin())

@@ -105,8 +105,8 @@ class LoopFront:
         if not (self._floor < bounds).all():
             return None
         single, shared = self._costs
-        allowed = [(s < bounds).all(axis=-1) for s in single]
-        paired = [(s < bounds).all(axis=-1) for s in shared]
+        allowed = [np.asarray((s < bounds).all(axis=-1)) for s in single]
+        paired = [np.asarray((s < bounds).all(axis=-1)) for s in shared]
         point = np.zeros(len(bounds))
         for k in range(len(bounds)):
             least = self._least(k, allowed, paired)

@@ -24,6 +24,7 @@ LABELS = {
     "regrips": "regrips",
 }
 MARKERS = "sD^vP*"
+FAR = 2.5  # a method so much worse than the set makes an axis logarithmic
 
 
 def worst_of(table: pd.DataFrame) -> dict[str, float]:
@@ -63,9 +64,8 @@ def front_figure(front: Front, methods: Mapping[str, pd.DataFrame]) -> Figure:
     from matplotlib.figure import Figure  # noqa: PLC0415  # an extra
 
     table = front.table
-    names = [str(name) for name in table.columns if name not in ("steps", "regrips")]
-    names += [name for name in ("steps", "regrips") if len(names) < 2 or name == table.columns[-2]]
-    first, others = names[0], [name for name in names[1:] if name != "regrips"] or ["steps"]
+    names = [str(name) for name in table.columns if name not in ("steps", "regrips")] + ["steps"]
+    first, others = names[0], names[1:] or ["regrips"]
     figure = Figure(figsize=(3.6 * len(others), 3.9), layout="constrained")
     axes = figure.subplots(1, len(others), squeeze=False)[0]
     marks = {name: worst_of(rows) | {"steps": len(rows)} for name, rows in methods.items()}
@@ -78,7 +78,9 @@ def front_figure(front: Front, methods: Mapping[str, pd.DataFrame]) -> Figure:
                 axis.plot(*at, marker, color="tab:red", ms=7, label=method, zorder=3, ls="none")
         axis.set_xlabel(LABELS.get(first, first))
         axis.set_ylabel(LABELS.get(name, name))
-        axis.grid(visible=True, lw=0.3)
+        if axis.get_ylim()[1] > FAR * float(pd.Series(y).max()):
+            axis.set_yscale("log")
+        axis.grid(visible=True, which="both", lw=0.3)
     if marks:
         axes[0].legend(frameon=False, fontsize=8)
     figure.colorbar(dots, ax=list(axes), label="steps of the plan")

@@ -1,7 +1,7 @@
 """The rules of a free schedule, one state after the other, in plain words.
 
-A second route to what `seqopt.sequence.free_space` does for many states at a time: it shares nothing
-with it, and judges what was found there.
+A second route to what `seqopt.sequence.free_space` does for many states at a time: it shares
+nothing with it, and judges what was found there.
 """
 
 from __future__ import annotations
@@ -38,6 +38,7 @@ class RuleBook:
 
     @cached_property
     def reached(self) -> dict[tuple[int, int], tuple[int, ...]]:
+        """By robot and brick count, the nodes that it may hold."""
         scene = self.network.scene
         counts = range(len(scene.placed) + 1)
         return {(r, b): reachable(scene, scene.robots[r], b) for r in self.team for b in counts}
@@ -109,29 +110,42 @@ class RuleBook:
         last = len(self.network.scene.placed)
         keeps = bricks > 0 and not self.fault(bricks, grips)
         if keeps and (self.rules.regrips is None or regrips < self.rules.regrips):
-            for robot in self.team:
-                for node in self.reached[robot, bricks] if grips[robot] is None else ():
-                    if node not in grips:  # one grip more breaks no rule
-                        yield StepKind.REPOSITION, bricks, _with(grips, robot, node), regrips + 1
+            for after in self._held(bricks, grips):
+                yield StepKind.REPOSITION, bricks, after, regrips + 1
+        for after in self._released(bricks, grips):
+            yield StepKind.RELEASE, bricks, after, regrips
+        if bricks < last and (keeps or not bricks):
+            for after in self._placed(bricks + 1, grips):
+                yield StepKind.PLACE, bricks + 1, after, 0
+
+    def _held(self, bricks: int, grips: Grips) -> Iterator[Grips]:
+        """Yield the grips after one more is taken, which breaks no rule."""
+        for robot in self.team:
+            for node in self.reached[robot, bricks] if grips[robot] is None else ():
+                if node not in grips:
+                    yield _with(grips, robot, node)
+
+    def _released(self, bricks: int, grips: Grips) -> Iterator[Grips]:
+        """Yield the grips after one is let go, or at the end all."""
+        ends = bricks == len(self.network.scene.placed)
+        letting_go = ends and self.rules.ending is Ending.ONE_BY_ONE
         for robot in self.team:
             if grips[robot] is not None:
                 after = _with(grips, robot, None)
-                letting_go = bricks == last and self.rules.ending is Ending.ONE_BY_ONE
                 if letting_go or not self.fault(bricks, after):
-                    yield StepKind.RELEASE, bricks, after, regrips
-        if bricks == last and self.rules.ending is Ending.RELEASED and any(n for n in grips):
-            yield StepKind.RELEASE, bricks, (None,) * len(grips), regrips
-        if bricks < last and (keeps or not bricks):
-            yield from self._placed(bricks + 1, grips)
+                    yield after
+        if ends and self.rules.ending is Ending.RELEASED and any(n is not None for n in grips):
+            yield (None,) * len(grips)
 
-    def _placed(self, bricks: int, grips: Grips) -> Iterator[tuple[StepKind, int, Grips, int]]:
+    def _placed(self, bricks: int, grips: Grips) -> Iterator[Grips]:
+        """Yield the grips after the next brick is placed."""
         names = [robot.name for robot in self.network.scene.robots]
         for robot in self.team:
-            if grips[robot] is None and (not self.rules.placers or names[robot] in self.rules.placers):
-                for node in self.newest_nodes[robot, bricks]:
-                    after = _with(grips, robot, node)
-                    if not self.fault(bricks, after):
-                        yield StepKind.PLACE, bricks, after, 0
+            able = not self.rules.placers or names[robot] in self.rules.placers
+            for node in self.newest_nodes[robot, bricks] if able and grips[robot] is None else ():
+                after = _with(grips, robot, node)
+                if not self.fault(bricks, after):
+                    yield after
 
     def ends(self, bricks: int, grips: Grips) -> bool:
         """Return whether a state ends the build.

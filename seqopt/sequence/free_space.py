@@ -170,7 +170,7 @@ class FreeSpace:
             To lawful states, as many of them as rules allow.
         """
         able = self.lawful(bricks, states)
-        if self._counts:
+        if self.rules.regrips is not None:
             able &= states[:, -1] < self.rules.regrips
         rows = np.flatnonzero(able)
         parts = []
@@ -311,7 +311,7 @@ class FreeSpace:
 
     def _lawful_only(self, bricks: int, moves: Moves) -> Moves:
         ok = self.lawful(bricks, moves.states)
-        return Moves(*(part[ok] for part in moves))
+        return Moves(moves.source[ok], moves.states[ok], moves.way[ok])
 
 
 def free_space(
@@ -353,7 +353,7 @@ def free_space(
     """
     space = FreeSpace(network, rules, sort_robots(network, rules, caps), parks)
     base = 1 + (2 if parks else 1) * 2 * space.bricks
-    if base ** space.robots * (1 + (rules.regrips or 0)) >= 2**62:
+    if base**space.robots * (1 + (rules.regrips or 0)) >= 2**62:
         raise StepError(
             f"scene {network.scene.name}: {space.bricks} bricks and {space.robots} robots have "
             "more states than can be numbered; let fewer robots take part"
