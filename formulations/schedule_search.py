@@ -40,6 +40,9 @@ from seqopt.placement.schedule_formulation import ScheduleFormulation
 STEPS_BELOW = 3  # the first threshold lies so many rises below what the narrow search finds
 
 
+Tell = Callable[[StateGraph], None]
+
+
 class _TimeUpError(Exception):
     """The time that was given is used up."""
 
@@ -92,17 +95,24 @@ def solve(
         if time.perf_counter() > end:
             raise _TimeUpError
 
+    return _search(problem, (width, growth), tell, reached)
+
+
+def _search(
+    problem: FreeProblem, options: tuple[int, float], tell: Tell, reached: list[StateGraph]
+) -> ScheduleSelection:
+    """Return the best free schedule, or the first one found where the search is stopped."""
     found = None
     try:
-        narrow = explore(problem, width=width, tell=tell)
+        narrow = explore(problem, width=options[0], tell=tell)
         found = _selection(narrow) if narrow.whole else None
-        graph = _below(problem, found.objective[0] if found else np.inf, growth, tell)
+        graph = _below(problem, found.objective[0] if found else np.inf, options[1], tell)
     except (_TimeUpError, KeyboardInterrupt) as stop:
+        if found is None and isinstance(stop, KeyboardInterrupt):
+            raise
         if found is None:
-            if isinstance(stop, KeyboardInterrupt):
-                raise
             raise ProblemError(
-                f"option seconds: {seconds:g} s are too few to find a plan; give more"
+                "option seconds: they are too few to find a plan; give more"
             ) from None
         why = "time" if isinstance(stop, _TimeUpError) else "interrupt"
         return _unproven(found, reached[-1], why)
@@ -111,9 +121,7 @@ def solve(
     return _selection(graph)
 
 
-def _below(
-    problem: FreeProblem, ceiling: float, growth: float, tell: Callable[[StateGraph], None]
-) -> StateGraph:
+def _below(problem: FreeProblem, ceiling: float, growth: float, tell: Tell) -> StateGraph:
     """Return the states below the lowest threshold of a rising row that connects start to end."""
     threshold = -np.inf
     if np.isfinite(ceiling) or problem.goals[0].measure is not Measure.PEAK:

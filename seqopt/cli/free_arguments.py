@@ -78,6 +78,13 @@ def add_pareto(
     )
     add_rules(command)
     limit(command)
+    _add_choice(command)
+    command.add_argument("--out", type=Path, metavar="DIR", required=True, help="folder to write")
+    command.set_defaults(criteria=None, crown=None)
+
+
+def _add_choice(command: argparse.ArgumentParser) -> None:
+    """Add what says how finely plans are told apart, and which of them is picked."""
     command.add_argument(
         "--round",
         action="append",
@@ -99,5 +106,3 @@ def add_pareto(
     command.add_argument(
         "--seconds", default="inf", type=float, metavar="S", help="end the search after so long"
     )
-    command.add_argument("--out", type=Path, metavar="DIR", required=True, help="folder to write")
-    command.set_defaults(criteria=None, crown=None)

@@ -20,6 +20,7 @@ from seqopt.placement.free_problem import FreeProblem
 from seqopt.placement.free_steps import steps_of
 from seqopt.sequence.steps import Step
 
+DIGITS = 9  # after the first
 EDGE = 1e-9  # of a rounding step: how far above a multiple a value still counts as it
 
 
@@ -198,17 +199,22 @@ def rounding_steps(names: Sequence[str], rounding: Mapping[str, float] | None) -
 
 
 def rounded_up(values: Floats, steps: Floats) -> Floats:
-    """Return values rounded up to multiples of steps.
+    """Return values rounded up to multiples of steps, others rounded to ten digits.
+
+    What differs by less than ten digits is the same: no plan is better by an error of rounding.
 
     Parameters
     ----------
     values : (..., k) float
     steps : (k,) float
-        Zero where nothing is rounded.
+        Zero where no step is given.
 
     Returns
     -------
     (..., k) float
     """
     safe = np.where(steps > 0, steps, 1.0)
-    return np.where(steps > 0, np.ceil(values / safe - EDGE) * safe, values)
+    size = np.abs(np.where((values != 0) & np.isfinite(values), values, 1.0))
+    digit = 10.0 ** (np.floor(np.log10(size)) - DIGITS)
+    plain = np.where(np.isfinite(values), np.round(values / digit) * digit, values)
+    return np.where(steps > 0, np.ceil(values / safe - EDGE) * safe, plain)

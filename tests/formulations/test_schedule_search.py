@@ -327,5 +327,7 @@ def test_the_front_of_the_loop_holds_its_best_peak(engine25):
 
 def test_formulations_are_found_by_name():
     assert find_schedule_formulation("pareto_zones").kind.value == "exact"
-    with pytest.raises(ProblemError, match="no formulation of the free schedule; give pareto_zones"):
+    with pytest.raises(
+        ProblemError, match="no formulation of the free schedule; give pareto_zones"
+    ):
         find_schedule_formulation("overlap_dp")

@@ -73,9 +73,7 @@ def named(space, bricks, states):
     """States as a plain value: by kind the set of nodes held, and the regrips."""
     numbers = np.array([0, *node_numbers(space.network)])
     for row in states.tolist():
-        held = tuple(
-            frozenset(int(numbers[n]) for n in row[a:b] if n > 0) for a, b in space.slots
-        )
+        held = tuple(frozenset(int(numbers[n]) for n in row[a:b] if n > 0) for a, b in space.slots)
         yield bricks, held, row[-1] if space.rules.regrips is not None else 0
 
 
@@ -163,9 +161,7 @@ def test_a_sequence_that_breaks_a_rule_is_seen():
     first, second = (brick.nodes for brick in network.scene.placed[:2])
     begun = [(place, 1, (first[1], None, None)), (place, 2, (first[1], second[0], None))]
     with pytest.raises(StepError, match="1 grips, fewer than least_grips=2"):
-        check_free(
-            network, FreeRules(), steps_of(*begun, (release, 2, (None, second[0], None)))
-        )
+        check_free(network, FreeRules(), steps_of(*begun, (release, 2, (None, second[0], None))))
     with pytest.raises(StepError, match="nobody holds the newest brick"):
         check_free(
             network,
