@@ -37,7 +37,7 @@ from seqopt.placement.free_paths import keep_best, least_from_start, shortest
 from seqopt.placement.free_problem import FreeProblem, ScheduleSelection
 from seqopt.placement.schedule_formulation import ScheduleFormulation
 
-STEPS_BELOW = 3  # the first threshold lies so many rises below what the narrow search finds
+FAR_BELOW = 4.0  # what the narrow search finds, over the first threshold
 
 
 Tell = Callable[[StateGraph], None]
@@ -50,7 +50,7 @@ class _TimeUpError(Exception):
 def solve(
     problem: FreeProblem,
     *,
-    width: int = 20,
+    width: int = 50,
     growth: float = 1.1,
     seconds: float = np.inf,
     progress: Callable[[str], None] = lambda _: None,
@@ -125,7 +125,7 @@ def _below(problem: FreeProblem, ceiling: float, growth: float, tell: Tell) -> S
     """Return the states below the lowest threshold of a rising row that connects start to end."""
     threshold = -np.inf
     if np.isfinite(ceiling) or problem.goals[0].measure is not Measure.PEAK:
-        threshold = ceiling / growth**STEPS_BELOW
+        threshold = ceiling / FAR_BELOW
     while True:
         graph = explore(problem, threshold, tell=tell)
         if graph.whole or threshold >= ceiling or graph.excluded == np.inf:

@@ -11,6 +11,7 @@ from typing import Any
 import pandas as pd
 
 from seqopt.errors import InfeasibleError, ProblemError
+from seqopt.placement.formulation import Formulation
 from seqopt.placement.free_infeasible import why_impossible
 from seqopt.placement.free_judge import TOLERANCE, ScheduleCertificate, judge_schedule
 from seqopt.placement.free_problem import FreeProblem, ScheduleSelection
@@ -142,7 +143,7 @@ class FreePlan:
 
 def solve_free(
     problem: FreeProblem,
-    formulation: ScheduleFormulation | str = "schedule_search",
+    formulation: ScheduleFormulation | Formulation | str = "schedule_search",
     *,
     proof: bool = True,
     **options: Any,
@@ -153,6 +154,7 @@ def solve_free(
     ----------
     problem : FreeProblem
     formulation : ScheduleFormulation or str
+        One of another kind is refused.
     proof : bool, optional
         False leaves out the proof that no plan is better; the plan's own values are not checked.
     **options

@@ -224,15 +224,20 @@ def pose_free(
     for limit in limits:
         _require(limit.response, {*STATE_RESPONSES, *robots}, "limit")
     if any(goal.of_states and not goal.response for goal in goals):
-        if isinstance(criterion, RankSum):
-            raise ProblemError(
-                f"criterion {criterion.name}: it ranks the choices of a move, and a free schedule "
-                "has none; take worst-ratio, weighted or another one of responses"
-            )
-        for name in criterion.wanted(1):
-            _require(name, {*STATE_RESPONSES}, f"criterion {criterion.name}")
-        criterion = criterion.for_scene(SceneFacts(engine))
+        criterion = _of_states(engine, criterion)
     return FreeProblem(engine, rules, criterion, goals, limits)
+
+
+def _of_states(engine: Engine, criterion: Criterion) -> Criterion:
+    """Return a criterion posed for a scene, if it is about states alone."""
+    if isinstance(criterion, RankSum):
+        raise ProblemError(
+            f"criterion {criterion.name}: it ranks the choices of a move, and a free schedule "
+            "has none; take worst-ratio, weighted or another one of responses"
+        )
+    for name in criterion.wanted(1):
+        _require(name, {*STATE_RESPONSES}, f"criterion {criterion.name}")
+    return criterion.for_scene(SceneFacts(engine))
 
 
 def _require(name: str, known: set[str], where: str) -> None:

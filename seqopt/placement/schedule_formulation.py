@@ -9,7 +9,7 @@ from importlib.metadata import entry_points
 from typing import Any
 
 from seqopt.errors import ProblemError
-from seqopt.placement.formulation import FormulationKind
+from seqopt.placement.formulation import Formulation, FormulationKind
 
 GROUP = "seqopt.schedule_formulations"
 
@@ -45,13 +45,14 @@ class ScheduleFormulation:
 
 
 def find_schedule_formulation(
-    given: ScheduleFormulation | str,
+    given: ScheduleFormulation | Formulation | str,
 ) -> ScheduleFormulation:
     """Return a formulation of the free schedule, by name or itself.
 
     Parameters
     ----------
     given : ScheduleFormulation or str
+        A formulation of another kind is refused.
 
     Returns
     -------
@@ -69,6 +70,10 @@ def find_schedule_formulation(
     """
     if isinstance(given, ScheduleFormulation):
         return given
+    if isinstance(given, Formulation):
+        raise ProblemError(
+            f"{given.name}: a free schedule has no moves to choose; use schedule_search"
+        )
     entries = {entry.name: entry for entry in entry_points(group=GROUP)}
     if not isinstance(given, str) or given not in entries:
         known = ", ".join(sorted(entries))

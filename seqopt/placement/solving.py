@@ -91,11 +91,17 @@ def solve(
     True
     """
     if isinstance(problem, FreeProblem):
-        if isinstance(formulation, Formulation):
-            raise ProblemError(
-                f"{formulation.name}: a free schedule has no moves to choose; use schedule_search"
-            )
         return solve_free(problem, formulation, proof=proof, **options)
+    return _solve_choices(problem, formulation, proof, options)
+
+
+def _solve_choices(
+    problem: PlacementProblem,
+    formulation: Formulation | ScheduleFormulation | str,
+    proof: bool,  # noqa: FBT001  # as it was given by name
+    options: Mapping[str, Any],
+) -> Plan:
+    """Return the plan of a problem that chooses candidates of moves."""
     if isinstance(formulation, ScheduleFormulation):
         raise ProblemError(f"{formulation.name} is for free schedules; pose one with pose_free")
     formulation = as_formulation(formulation)

@@ -48,7 +48,11 @@ def worst_of(table: pd.DataFrame) -> dict[str, float]:
     return out
 
 
-def front_figure(front: Front, methods: Mapping[str, pd.DataFrame]) -> Figure:
+def front_figure(
+    front: Front,
+    methods: Mapping[str, pd.DataFrame],
+    beside: Mapping[str, pd.DataFrame] | None = None,
+) -> Figure:
     """Return the chart of a Pareto set: its first number against each of the others.
 
     Parameters
@@ -56,6 +60,8 @@ def front_figure(front: Front, methods: Mapping[str, pd.DataFrame]) -> Figure:
     front : Front
     methods : mapping of str to pandas.DataFrame
         Tables of methods to mark, by name; see `seqopt.analyze`.
+    beside : mapping of str to pandas.DataFrame, optional
+        Tables of other Pareto sets, by name: hollow circles.
 
     Returns
     -------
@@ -71,6 +77,9 @@ def front_figure(front: Front, methods: Mapping[str, pd.DataFrame]) -> Figure:
     marks = {name: worst_of(rows) | {"steps": len(rows)} for name, rows in methods.items()}
     for axis, name in zip(axes, others, strict=True):
         x, y = (_shown(table[c], c) for c in (first, name))
+        for label, other in (beside or {}).items():
+            ways = (_shown(other[c], c) for c in (first, name))
+            axis.plot(*ways, "o", ms=3.5, mfc="none", mec="0.6", ls="none", label=label, zorder=1)
         dots = axis.scatter(x, y, c=table["steps"], cmap="viridis", s=18, zorder=2)
         for marker, (method, worst) in zip(MARKERS, marks.items(), strict=False):
             if first in worst and name in worst:
@@ -81,7 +90,7 @@ def front_figure(front: Front, methods: Mapping[str, pd.DataFrame]) -> Figure:
         if axis.get_ylim()[1] > FAR * float(pd.Series(y).max()):
             axis.set_yscale("log")
         axis.grid(visible=True, which="both", lw=0.3)
-    if marks:
+    if marks or beside:
         axes[0].legend(frameon=False, fontsize=8)
     figure.colorbar(dots, ax=list(axes), label="steps of the plan")
     return figure

@@ -37,10 +37,11 @@ class GripSets:
 
     Examples
     --------
+    >>> import numpy as np
     >>> import seqopt
     >>> network = seqopt.build_network(seqopt.load_scene("arch25"))
     >>> sets = GripSets(seqopt.make_engine("compliance", network), ["T_max"])
-    >>> responses, forces = sets.answers(2, np.array([[0, 3], [1, 3]]))  # as places, zero: no grip
+    >>> responses, forces = sets.answers(2, np.array([[0, 3], [2, 3]]))  # zero: no grip
     >>> responses.shape, forces.shape, sets.solved
     ((2, 1), (2, 2), 2)
     """

@@ -47,45 +47,40 @@ def responses(engine, bricks, grips):
     return np.array([max(forces, default=0.0), *worst]), dict(zip(held, forces, strict=True))
 
 
-def whole_graph(engine, rules, limits=()):
-    """Every labeled state with its four responses, the steps between them, start and ends."""
-    network = engine.network
-    robots, book = network.scene.robots, RuleBook(network, rules)
-    graph, known = nx.DiGraph(), {}
-    start = (0, (None,) * len(robots), 0)
-    graph.add_node(start, worst=np.zeros(4))
-    work, ends = [start], []
-
-    def allowed(bricks, grips):
-        key = bricks, frozenset(n for n in grips if n is not None)
-        if key not in known:
-            known[key] = responses(engine, bricks, grips)
-        if known[key] is None:
+def allowed(engine, rules, bricks, grips):
+    """The four worst responses of a state; None where it is loose or a payload is exceeded."""
+    found = responses(engine, bricks, grips)
+    if found is None:
+        return None
+    worst, forces = found
+    for robot, node in zip(engine.network.scene.robots, grips, strict=True):
+        kept = rules.payload is Payload.KEPT and node is not None
+        if kept and forces[node] > robot.payload * (1 + LIMIT_TOLERANCE):
             return None
-        worst, forces = known[key]
-        for robot, node in zip(robots, grips, strict=True):
-            kept = rules.payload is Payload.KEPT and node is not None
-            if kept and forces[node] > robot.payload * (1 + LIMIT_TOLERANCE):
-                return None
-        over = [lim for lim in limits if worst[FOUR.index(lim.response)] > lim.bound * (1 + 1e-9)]
-        return None if over else worst
+    return worst
 
+
+def whole_graph(engine, rules):
+    """Every labeled state with its four responses, the steps between them, start and ends."""
+    book = RuleBook(engine.network, rules)
+    start = (0, (None,) * len(engine.network.scene.robots), 0)
+    graph = nx.DiGraph([("ends", "end")], regrip=0.0)
+    graph.add_node(start, worst=np.zeros(4))
+    work = [start]
     while work:
         state = work.pop()
         for kind, bricks, grips, regrips in book.follow(*state):
-            counted = regrips if rules.regrips is not None else 0
-            after = (bricks, grips, counted)
+            after = (bricks, grips, regrips if rules.regrips is not None else 0)
             if after not in graph:
-                worst = allowed(bricks, grips)
+                worst = allowed(engine, rules, bricks, grips)
                 if worst is None:
                     continue
                 graph.add_node(after, worst=worst)
                 work.append(after)
                 if book.ends(bricks, grips):
-                    ends.append(after)
+                    graph.add_edge(after, "end", regrip=0.0)
             graph.add_edge(state, after, regrip=float(kind is StepKind.REPOSITION))
-    graph.add_node("end")
-    graph.add_edges_from((state, "end", {"regrip": 0.0}) for state in ends)
+    graph.remove_node("ends")
     return graph, start
 
 
