@@ -1,8 +1,8 @@
 """Claim: the documentation's pictures of the reference arch are those of the shipped scene.
 
 Method: draw `arch25` with its network; the twisting step 35 of the sequential method beside the
-cantilever method at the same step; responses along all methods; printed against computed ones; the Pareto sets of the free schedule and
-of the loop.
+cantilever method at the same step; responses along all methods; printed against computed ones; the
+Pareto sets of the free schedule and of the loop.
 Every picture is held against the stored one before it takes its place: gray means over squares of
 16 pixels, so that fonts do not count, may differ by a fifth of what tells the stored picture from a
 blank one.

@@ -68,6 +68,7 @@ def front_figure(
     matplotlib.figure.Figure
     """
     from matplotlib.figure import Figure  # noqa: PLC0415  # an extra
+    from matplotlib.ticker import LogFormatter  # noqa: PLC0415
 
     table = front.table
     names = [str(name) for name in table.columns if name not in ("steps", "regrips")] + ["steps"]
@@ -89,6 +90,8 @@ def front_figure(
         axis.set_ylabel(LABELS.get(name, name))
         if axis.get_ylim()[1] > FAR * float(pd.Series(y).max()):
             axis.set_yscale("log")
+            axis.yaxis.set_major_formatter(LogFormatter())
+            axis.yaxis.set_minor_formatter(LogFormatter(minor_thresholds=(2, 0.5)))
         axis.grid(visible=True, which="both", lw=0.3)
     if marks or beside:
         axes[0].legend(frameon=False, fontsize=8)
