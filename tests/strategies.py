@@ -13,6 +13,7 @@ from seqopt.placement.interface import CostProblem
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.parts import Robot
 from seqopt.scene.reach import Anywhere, Side, Sphere
+from seqopt.sequence.free_rules import FreeRules
 from seqopt.study.presets import ROBOTS
 from tests.builders import about_vertical, from_both_sides, moved
 
@@ -181,3 +182,23 @@ def budgeted(draw, most_budgets=3):
         for i in range(draw(st.integers(1, most_budgets)))
     )
     return replace(problem, budgets=budgets)
+
+
+@st.composite
+def free_builds(draw, most_bricks=5, most_robots=4):
+    """A small arch or wall with a few robots, and rules of the free schedule."""
+    scene = draw(st.one_of(arches(max_bricks=most_bricks, min_bricks=2), both_sided()))
+    if len(scene.bricks) > most_bricks:
+        scene = draw(arches(max_bricks=most_bricks, min_bricks=2))
+    scene = draw(teams(scene))
+    scene = replace(scene, robots=scene.robots[:most_robots])
+    names = [robot.name for robot in scene.robots]
+    rules = FreeRules(
+        least_grips=draw(st.integers(0, 2)),
+        newest=draw(st.sampled_from(["either", "placing", "free"])),
+        regrips=draw(st.sampled_from([None, 0, 1])),
+        ending=draw(st.sampled_from(["held", "released", "one-by-one"])),
+        placers=tuple(names[: draw(st.sampled_from([0, len(names) - 1]))]),
+        payload=draw(st.sampled_from(["kept", "ignored"])),
+    )
+    return scene, rules

@@ -1,51 +1,38 @@
-"""The command line: ``seqopt compare | optimize | analyze | assess | scene``."""
+"""The command line: ``seqopt compare | optimize | pareto | analyze | assess | scene``."""
 
 from __future__ import annotations
 
 import argparse
 import sys
-import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 
 import numpy as np
-import pandas as pd
 
 from seqopt.cli.arguments import parser
-from seqopt.cli.budgets import parse_budgets, with_budgets
+from seqopt.cli.asked import asked_engine, payloads_hold, say_idle, say_levels, step_answers
+from seqopt.cli.criteria import asked_criterion
+from seqopt.cli.free import pareto
+from seqopt.cli.optimize import optimize
 from seqopt.cli.outputs import (
     comparison_files,
     keep_apart,
-    plan_files,
     require_matplotlib,
-    worth,
     write_outputs,
 )
 from seqopt.cli.status import Status, status_of
 from seqopt.cli.terminal import (
-    complain,
     flush,
     progress,
     quiet_numbers,
     say,
     show,
     silence,
-    tell,
 )
 from seqopt.cli.values import (
-    asked_criterion,
-    parse_limits,
     parse_mortar,
-    parse_options,
-    parse_resources,
     parse_robots,
-    parse_time_limit,
-    step_answers,
 )
-from seqopt.contact.mortar import MORTARS
-from seqopt.engines.auto import AutoEngine
-from seqopt.engines.interface import Engine
-from seqopt.engines.registry import make_engine
 from seqopt.errors import SceneError, SeqoptError, SolverError, StepError
 from seqopt.files import (
     csv_text,
@@ -55,25 +42,17 @@ from seqopt.files import (
     write_text,
 )
 from seqopt.network.build import build_network
-from seqopt.network.network import Network
-from seqopt.placement.formulation import find_formulation
-from seqopt.placement.problem import pose
-from seqopt.placement.promises import overloads
-from seqopt.placement.solving import solve
 from seqopt.report.comparison import compare
 from seqopt.report.text import format_comparison
 from seqopt.responses.table import archive, response_table
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import about, builtin_scenes, dump_scene, load_scene
 from seqopt.sequence.plan_file import read_plan
-from seqopt.sequence.schedule import Schedule
-from seqopt.sequence.schedule_file import find_schedule
-from seqopt.sequence.steps import AnyStep, Step, idle_robots
-from seqopt.sequence.thinning import thin
+from seqopt.sequence.steps import Step
 from seqopt.sequence.two_robots import METHODS
 from seqopt.stability.assessment import Verdict
 from seqopt.stability.steps import assess_steps, format_verdicts, stability_table
-from seqopt.study.published import PUBLISHED, is_reference_arch, paper_models, published_plan
+from seqopt.study.published import PUBLISHED, is_reference_arch, published_plan
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -113,115 +92,27 @@ def _run(arguments: Sequence[str] | None) -> int:
 
 def _compare(options: argparse.Namespace) -> Status:
     scene = load_scene(options.scene)
-    engine = _engine(options, build_network(scene))
+    engine = asked_engine(options, build_network(scene))
     criterion = asked_criterion(options)
     if options.out is not None:
         require_matplotlib(options.out)
         require_folder(options.out)
     result = compare(engine, criterion, progress, parse_robots(options.robots))
-    _say_levels(engine)
+    say_levels(engine)
     show(format_comparison(result, scene, criterion) + "\n")
     if options.out is not None and result.loop is not None:
         write_outputs(options, comparison_files(result))
         say(f"tables and figures written to {options.out}")
-    return _payloads_hold(options, scene, *result.tables.values())
-
-
-def _engine(options: argparse.Namespace, network: Network) -> Engine:
-    mortar = None if options.mortar is None else MORTARS[options.mortar]
-    try:
-        return make_engine(options.engine, network, mortar)
-    except SceneError as error:
-        raise SceneError(f"--engine {options.engine}: {error}") from error
-
-
-def _say_levels(engine: Engine) -> None:
-    """Say which levels an engine that picks them took, and why."""
-    if not isinstance(engine, AutoEngine):
-        return
-    for choice, sets in engine.tally.items():
-        complain(f"engine: {choice.level.value} for {sets} grip sets: {choice.reason}")
-    if engine.unchecked:
-        complain(f"engine: {engine.unchecked}")
-
-
-def _paper_count(schedule: Schedule) -> dict[str, int] | None:
-    """Return how many models the paper counts for the loop of three robots; none for others."""
-    if schedule.method != "three-robot":
-        return None
-    return dict(zip(("cascading", "overlap"), paper_models(schedule), strict=True))
-
-
-def _say_idle(scene: Scene, steps: Sequence[AnyStep]) -> None:
-    """Name the robots that never grip."""
-    if idle := idle_robots(scene, steps):
-        complain(f"robots: {', '.join(idle)} never grip{'s' * (len(idle) == 1)}")
-
-
-def _optimize(options: argparse.Namespace) -> Status:
-    formulation = find_formulation(options.formulation)
-    chosen = parse_options(formulation, options.option)
-    criterion = asked_criterion(options)
-    scene = load_scene(options.scene)
-    limits = parse_limits(options.limit, scene)
-    resources = parse_resources(options, progress)
-    budgets = parse_budgets(options.budget)
-    require_folder(options.out)
-    start = time.perf_counter()
-    network = build_network(scene)
-    engine, schedule = (
-        _engine(options, network),
-        find_schedule(network, options.schedule, parse_robots(options.robots)),
-    )
-    if options.candidates is not None:
-        schedule = thin(schedule, options.candidates)
-    assemble = time.perf_counter() - start
-    counted = [budget.response for budget in budgets if budget.response]
-    posed = pose(engine, schedule, criterion, limits, counted, resources)
-    limit = parse_time_limit(options.time_limit)
-    proof = not options.no_proof
-    plan = solve(
-        with_budgets(posed, budgets),
-        formulation,
-        proof=proof,
-        time_limit=limit,
-        progress=tell,
-        **chosen,
-    )
-    progress("")
-    _say_levels(engine)
-    report = plan.summary() | {
-        "models_paper_count": _paper_count(schedule),
-        "seconds": {"assemble": assemble, **plan.seconds},
-    }
-    table = plan.responses()
-    write_outputs(options, plan_files(plan, report))
-    say(
-        f"{formulation.name} ({formulation.kind.value}): {worth(plan)}, "
-        f"{plan.models} models; written to {options.out}"
-    )
-    for excess in plan.overloads:
-        say(f"payload exceeded: {excess}")
-    _say_idle(scene, plan.steps)
-    return _payloads_hold(options, scene, table)
-
-
-def _payloads_hold(options: argparse.Namespace, scene: Scene, *tables: pd.DataFrame) -> Status:
-    """Return the status that ``--strict`` asks for."""
-    over = [str(excess) for table in tables for excess in overloads(scene, table)]
-    if not options.strict or not over:
-        return Status.DONE
-    complain(f"seqopt: payload exceeded: {'; '.join(over)}")
-    return Status.DOES_NOT_HOLD
+    return payloads_hold(options, scene, *result.tables.values())
 
 
 def _analyze(options: argparse.Namespace) -> Status:
     keep_apart(options, options.out, options.fields)
     scene = load_scene(options.scene)
     network = build_network(scene)
-    engine, steps = _engine(options, network), _steps(scene, options)
+    engine, steps = asked_engine(options, network), _steps(scene, options)
     table = response_table(network, step_answers(options, engine, steps))
-    _say_levels(engine)
+    say_levels(engine)
     if options.fields is not None:
         write_bytes(options.fields, archive(network, step_answers(options, engine, steps)))
     if options.out is None:
@@ -229,8 +120,8 @@ def _analyze(options: argparse.Namespace) -> Status:
     else:
         write_csv(options.out, table)
         say(f"{len(table)} steps written to {options.out}")
-    _say_idle(scene, steps)
-    return _payloads_hold(options, scene, table)
+    say_idle(scene, steps)
+    return payloads_hold(options, scene, table)
 
 
 def _assess(options: argparse.Namespace) -> Status:
@@ -310,7 +201,8 @@ def _line(text: str) -> None:
 COMMANDS: dict[str, Callable[[argparse.Namespace], int | None]] = {
     "compare": _compare,
     "analyze": _analyze,
-    "optimize": _optimize,
+    "optimize": optimize,
+    "pareto": pareto,
     "assess": _assess,
     "scene": _scene,
 }

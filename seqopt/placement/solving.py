@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from numbers import Real
-from typing import Any
+from typing import Any, overload
 
 import numpy as np
 
@@ -21,11 +21,14 @@ from seqopt.placement.formulation import (
     as_formulation,
     formulations,
 )
+from seqopt.placement.free_plan import FreePlan, solve_free
+from seqopt.placement.free_problem import FreeProblem
 from seqopt.placement.interface import Handed, PlacementProblem
 from seqopt.placement.plan import Plan
 from seqopt.placement.problem import Problem
 from seqopt.placement.promises import require_possible
 from seqopt.placement.ranks import Among
+from seqopt.placement.schedule_formulation import ScheduleFormulation
 from seqopt.placement.selecting import select
 from seqopt.placement.watch import Finding, Watch
 from seqopt.placement.window_search import search_windows
@@ -40,6 +43,7 @@ class _Run:
     progress: Callable[[Finding], object] | None
 
 
+@overload
 def solve(
     problem: PlacementProblem,
     formulation: Formulation | str,
@@ -48,15 +52,39 @@ def solve(
     time_limit: float = math.inf,
     progress: Callable[[Finding], object] | None = None,
     **options: Any,
-) -> Plan:
+) -> Plan: ...
+
+
+@overload
+def solve(
+    problem: FreeProblem,
+    formulation: ScheduleFormulation | str,
+    *,
+    proof: bool = True,
+    time_limit: float = math.inf,
+    progress: Callable[[str], object] | None = None,
+    **options: Any,
+) -> FreePlan: ...
+
+
+def solve(
+    problem: PlacementProblem | FreeProblem,
+    formulation: Formulation | ScheduleFormulation | str,
+    *,
+    proof: bool = True,
+    time_limit: float = math.inf,
+    progress: Callable[[Any], object] | None = None,
+    **options: Any,
+) -> Plan | FreePlan:
     """Solve a problem by a formulation and check the answer from the problem's own data.
 
     Parameters
     ----------
-    problem : PlacementProblem
-        From `seqopt.pose`, or a `seqopt.placement.CostProblem`.
-    formulation : Formulation or str
-        One of `seqopt.formulations`, or its name.
+    problem : PlacementProblem or FreeProblem
+        From `seqopt.pose`, a `seqopt.placement.CostProblem`, or of the free schedule, from
+        `seqopt.placement.free_problem.pose_free`.
+    formulation : Formulation, ScheduleFormulation or str
+        One of `seqopt.formulations`, or its name; ``schedule_search`` for the free schedule.
     proof : bool, optional
         False lets ``cascade`` or ``rank_search`` solve only the models that they meet, one window
         after the other; how far the choice is from the optimum then stays unknown.
@@ -70,7 +98,7 @@ def solve(
 
     Returns
     -------
-    Plan
+    Plan or FreePlan
 
     Raises
     ------
@@ -87,6 +115,12 @@ def solve(
     >>> seqopt.solve(problem, "cascade").certificate.gap > 0.009
     True
     """
+    if isinstance(problem, FreeProblem):
+        told = {} if progress is None else {"progress": progress}
+        timed = {} if math.isinf(time_limit) else {"seconds": time_limit}
+        return solve_free(problem, formulation, proof=proof, **told, **timed, **options)
+    if isinstance(formulation, ScheduleFormulation):
+        raise ProblemError(f"{formulation.name} is for free schedules; pose one with pose_free")
     found = _fitting(problem, formulation, time_limit, options)
     if not proof:
         return _solve_windows(problem, found, options)

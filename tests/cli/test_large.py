@@ -14,7 +14,7 @@ from functools import partial
 import pytest
 
 from seqopt.cli.main import main
-from seqopt.cli.values import parse_size
+from seqopt.cli.means import parse_size
 from seqopt.errors import ProblemError
 from seqopt.scene.scene_file import save_scene
 from tests.builders import ROOT, small_arch
