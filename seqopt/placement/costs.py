@@ -224,5 +224,5 @@ class Budget(FrozenValue):
         taken = LayeredCosts(self.single, self.shared).parts(choice)
         left = self.bound - sum(taken)
         if left in (0, np.inf):
-            return float(left > 0)
+            return min(left, 1.0)
         return left / max(abs(self.bound), sum(map(abs, taken)))

@@ -49,10 +49,10 @@ def test_grips_on_both_sides_of_a_joint_that_hardly_turns(monkeypatch):
         exact = solve_exactly(net, 16, grips)
         size = np.abs(exact.displacement).max()
         nodes = net.inner.ravel()
-        assert np.abs(better.displacement[row, nodes] - exact.displacement).max() <= 1e-12 * size
+        assert np.abs(better.displacement[row, nodes] - exact.displacement).max() <= 1e-9 * size
         gap = np.abs(plain.displacement[row, nodes] - exact.displacement).max()
         worse = max(worse, gap / size)
-    assert worse > 1e-9
+    assert worse > 5e-9
     assert not solve_batch(operator, columns, even=False)[1].all()
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import product
+from itertools import pairwise, product
 
 import numpy as np
 import pytest
@@ -84,8 +84,7 @@ def searched(problem, horizon):
             if total is None or not all(later(costs, k + n, i) for n, i in enumerate(ahead)):
                 continue
             total += sum(costs.single[k + n][i] for n, i in enumerate(ahead))
-            pairs = zip(ahead[:-1], ahead[1:], strict=True)
-            total += sum(costs.shared[k + n + 1][pair] for n, pair in enumerate(pairs))
+            total += sum(costs.shared[k + n + 1][p] for n, p in enumerate(pairwise(ahead)))
             if np.isfinite(total):
                 worth[ahead] = total
         best = min(worth, key=lambda ahead: (worth[ahead], ahead))

@@ -137,7 +137,7 @@ def test_gaps_are_shares_of_what_the_choice_meets():
 
 def test_with_budgets_a_bound_may_lie_above_the_least_but_not_above_the_value():
     claimed = Selection((1, 1), 3.0, bound=2.5)
-    with pytest.raises(SolverError, match="bound 2.5 exceeds -2"):
+    with pytest.raises(SolverError, match=r"bound 2\.5 exceeds -2"):
         certify(signed(), claimed, Aim.SUM)
     proof = certify(signed(1.0, 2.0), claimed, Aim.SUM)
     assert (proof.gap, proof.claimed_gap) == (5 / 3, 0.5 / 3)
@@ -149,7 +149,7 @@ def test_with_budgets_a_bound_may_lie_above_the_least_but_not_above_the_value():
 def test_how_far_a_budget_may_be_exceeded():
     selection = Selection(BEST, -2.0)
     certify(signed(9.0, 1 - 0.99 * TOLERANCE), selection, Aim.SUM)
-    with pytest.raises(SolverError, match="the choice takes 1 of use 0.9"):
+    with pytest.raises(SolverError, match=r"the choice takes 1 of use 0\.9"):
         certify(signed(9.0, 1 - 2 * TOLERANCE), selection, Aim.SUM)
 
 
@@ -163,6 +163,27 @@ def test_a_least_value_above_the_value_of_the_choice(monkeypatch, share, good):
     else:
         with pytest.raises(SolverError, match="lies above that of the choice"):
             certify(signed(), Selection(BEST, -2.0), Aim.SUM)
+
+
+def level(*amounts):
+    """A choice worth 0 of costs 0.5 and -0.5, and one worth less by the tolerance."""
+    single = (np.array([0.5, 0.0]), np.array([-0.5, -TOLERANCE]))
+    pairs = (np.zeros((1, 2)), np.array([[0.0, 9.0], [9.0, 0.0]]))
+    budgets = tuple(Budget("use", single, pairs, amount) for amount in amounts)
+    return CostProblem(LayeredCosts(single, pairs), budgets)
+
+
+@pytest.mark.parametrize("sign", [-1, 1])
+def test_what_is_off_by_the_tolerance_itself_is_kept(monkeypatch, sign):
+    certify(level(), Selection((0, 0), sign * TOLERANCE), Aim.SUM)
+    certify(level(-TOLERANCE), Selection((0, 0), 0.0), Aim.SUM)
+    high = Selection((0, 0), 0.0, bound=TOLERANCE)
+    formulation = replace(ALL["overlap_dp"], solve=lambda problem: None)
+    assert judge(level(), replace(high, bound=-1.0), formulation).gap == TOLERANCE
+    monkeypatch.setattr("seqopt.placement.certificate.least", lambda *_: 0.0)
+    certify(level(), high, Aim.SUM)
+    monkeypatch.setattr("seqopt.placement.certificate.least", lambda *_: TOLERANCE)
+    certify(level(), high, Aim.SUM)
 
 
 def test_choices_that_cost_nothing_have_no_gap():

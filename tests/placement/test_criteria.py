@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import FrozenInstanceError, dataclass, field, replace
 
 import numpy as np
 import pytest
@@ -93,6 +93,8 @@ def test_what_ranks_take_from_a_scene():
     assert same.crown == NEVER
     assert same.settings["crown"] is None
     assert open_one.settings == {"crown": None, "resolution": {}}
+    prompt = RankSum("own", equal("T_max"), equal("M_sup")).for_scene(Facts())
+    assert prompt.crown == 5
 
 
 def test_a_weighted_sum_divides_by_its_scales():
@@ -139,5 +141,11 @@ def test_only_a_robot_that_never_grips_counts_as_nothing():
 
 def test_equal_terms_weigh_one():
     assert equal("T_max", "M_sup") == (("T_max", 1.0), ("M_sup", 1.0))
-    with pytest.raises(AttributeError):
-        ranked(equal("T_max")).crown = 3
+
+
+@pytest.mark.parametrize("criterion", [ranked(equal("T_max")), OVER_METHODS, WORST_OVER_METHODS])
+def test_criteria_are_values(criterion):
+    assert replace(criterion) == criterion
+    assert hash(replace(criterion)) == hash(criterion)
+    with pytest.raises(FrozenInstanceError):
+        criterion.name = "other"

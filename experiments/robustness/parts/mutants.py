@@ -59,15 +59,18 @@ class SwapForOpposite(Operator):
     """Swap a function of arrays for its opposite, wherever it is called."""
 
     def mutation_positions(self, node: NodeOrLeaf) -> Iterator[tuple[object, object]]:
+        """Yield where a call of such a function stands."""
         if isinstance(node, Name) and node.value in SWAPPED and node.get_next_leaf().value == "(":
             yield node.start_pos, node.end_pos
 
     def mutate(self, node: NodeOrLeaf, index: int) -> NodeOrLeaf:
+        """Return the name of the other one."""
         node.value = SWAPPED[node.value]
         return node
 
     @classmethod
     def examples(cls) -> tuple[Example, ...]:
+        """Return an example."""
         return (Example("x.any()", "x.all()"),)
 
 

@@ -1,0 +1,79 @@
+"""Mutants that no test can kill, since nothing changes that is promised, each with its reason."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fnmatch import fnmatch
+
+from experiments.robustness.parts.mutants import Mutant
+
+
+@dataclass(frozen=True)
+class Equivalent:
+    """A change that changes nothing.
+
+    Attributes
+    ----------
+    module : str
+        Dotted; may have a ``*``.
+    line : str
+        What the line holds, beside what is changed.
+    old, new : str
+        What becomes what.
+    reason : str
+        Why nothing changes.
+    """
+
+    module: str
+    line: str
+    old: str
+    new: str
+    reason: str
+
+    def covers(self, mutant: Mutant) -> bool:
+        """Return whether a mutant is this change at one place, whatever the spaces."""
+        if not (fnmatch(mutant.module, self.module) and self.line in mutant.before):
+            return False
+        before, after, old, new = (
+            text.replace(" ", "") for text in (mutant.before, mutant.after, self.old, self.new)
+        )
+        places = (i for i in range(len(before)) if before.startswith(old, i))
+        return any(before[:i] + new + before[i + len(old) :] == after for i in places)
+
+
+COMPLIANCE = "seqopt.engines.rigid.compliance"
+COSTS, CERTIFICATE = "seqopt.placement.costs", "seqopt.placement.certificate"
+CRITERIA, RANKS = "seqopt.placement.criteria", "seqopt.placement.ranks"
+LENGTHS = "both have a length: costs that have not are refused when they are made"
+EQUIVALENT = (
+    Equivalent("*", "zip(", "strict=True", "strict=False", LENGTHS),
+    Equivalent(COSTS, "== np.inf", "==", ">=", "nothing is larger than infinity"),
+    Equivalent(COSTS, "== -np.inf", "==", "<=", "nothing is smaller than minus infinity"),
+    Equivalent(COSTS, "out, before", "0", "-1", "of one row the first is the last"),
+    *(
+        Equivalent(COSTS, "initial", "0.0", size, "whether sums overflow is not a matter of 1")
+        for size in ("1.0", "-1.0")
+    ),
+    *(
+        Equivalent(COMPLIANCE, "CHUNK", "2048", size, "the size of a pass changes no answer")
+        for size in ("2047", "2049")
+    ),
+    *(
+        Equivalent(COMPLIANCE, "CANCEL", "10.0", size, "where one way of two that agree ends")
+        for size in ("9.0", "11.0")
+    ),
+    Equivalent(CRITERIA, "zeros_like", "[0][0]", "[-1][0]", "responses of a step have one shape"),
+    Equivalent(CRITERIA, "zeros_like", "[0][0]", "[1][0]", "responses of a step have one shape"),
+    Equivalent(RANKS, "ndim", "==", "<=", "a step has one open move or two: one axis or two"),
+    Equivalent(CERTIFICATE, "np.zeros(", "1", "2", "two equal ways to the first move are one"),
+    Equivalent(COMPLIANCE, "pivot >= TRUSTED", ">=", ">", "no pivot is 1e-5 to the last bit"),
+    *(
+        Equivalent(COMPLIANCE, "force[~trusted]", "0.0", size, "these sets are answered anew")
+        for size in ("1.0", "-1.0")
+    ),
+)
+
+
+def reason(mutant: Mutant) -> str:
+    """Return why a mutant is equivalent, empty where it is not said to be."""
+    return next((known.reason for known in EQUIVALENT if known.covers(mutant)), "")
