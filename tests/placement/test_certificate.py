@@ -87,6 +87,15 @@ def test_the_least_is_found_among_costs_of_any_size_and_sign(seed):
     assert least_peak(costs) == peak
 
 
+@pytest.mark.parametrize("others", [(), (7.0,), (7.0, 9.0), (7.0, 9.0, np.inf)])
+def test_the_least_peak_may_be_the_lowest_or_the_highest_of_all_costs(others):
+    costs = LayeredCosts((np.array([5.0, *others]),), (np.full((1, 1 + len(others)), 5.0),))
+    assert least_peak(costs) == 5
+    high = LayeredCosts((np.array([5.0, *others]), np.array([11.0])), (
+        costs.shared[0], np.full((1 + len(others), 1), 6.0)))  # fmt: skip
+    assert least_peak(high) == 11
+
+
 def signed(*bounds):
     """Four choices: (0, 0) is worth 2, (0, 1) -2, (1, 0) 7 and (1, 1) 3. All take 1."""
     single, none = (np.array([-3.0, 2.0]), np.array([5.0, 1.0])), (np.zeros((1, 2)), np.eye(2) * 0)

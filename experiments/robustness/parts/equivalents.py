@@ -63,9 +63,11 @@ EQUIVALENT = (
         for size in ("9.0", "11.0")
     ),
     Equivalent(CRITERIA, "zeros_like", "[0][0]", "[-1][0]", "responses of a step have one shape"),
-    Equivalent(CRITERIA, "zeros_like", "[0][0]", "[1][0]", "responses of a step have one shape"),
     Equivalent(RANKS, "ndim", "==", "<=", "a step has one open move or two: one axis or two"),
     Equivalent(CERTIFICATE, "np.zeros(", "1", "2", "two equal ways to the first move are one"),
+    Equivalent(
+        CERTIFICATE, "low, high", "- 1", "* 1", "the largest of all costs is never looked at"
+    ),
     Equivalent(COMPLIANCE, "pivot >= TRUSTED", ">=", ">", "no pivot is 1e-5 to the last bit"),
     *(
         Equivalent(COMPLIANCE, "force[~trusted]", "0.0", size, "these sets are answered anew")
