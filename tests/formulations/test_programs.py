@@ -6,14 +6,15 @@ from itertools import pairwise, product
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import formulations.rank_search
 from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.placement.costs import LayeredCosts
+from seqopt.placement.formulation import FormulationKind, Reads
 from seqopt.placement.formulation import formulations as registered
-from seqopt.placement.interface import CostProblem
+from seqopt.placement.interface import Aim, CostProblem
 from tests.strategies import problems
 
 ALL = registered()
@@ -110,6 +111,7 @@ def beamed(problem, width):
 
 
 @given(problem=problems(), data=st.data())
+@settings(max_examples=150)
 def test_heuristics_do_what_they_display(problem, data):
     """Also where the shared step, once the choice before is made, is ranked otherwise."""
     own = ranked(problem)
@@ -125,6 +127,26 @@ def test_heuristics_do_what_they_display(problem, data):
         found = ALL[name].solve(own, **options)
         assert (name, found.choice) == (name, choice)
         assert (found.objective, found.bound) == (own.sums.cost(choice), -INF)
+
+
+def test_what_each_promises():
+    exact, bound, heuristic = (
+        FormulationKind.EXACT,
+        FormulationKind.BOUND,
+        FormulationKind.HEURISTIC,
+    )
+    promised = {
+        name: (own.kind, own.aim, own.reads, own.takes_budgets) for name, own in ALL.items()
+    }
+    assert promised == {
+        "beam": (heuristic, Aim.SUM, Reads.ALL, False),
+        "cascade": (heuristic, Aim.SUM, Reads.WINDOW, False),
+        "minimax": (exact, Aim.PEAK, Reads.ALL, False),
+        "overlap_dp": (exact, Aim.SUM, Reads.ALL, False),
+        "overlap_lp": (bound, Aim.SUM, Reads.ALL, True),
+        "overlap_mip": (exact, Aim.SUM, Reads.ALL, True),
+        "rank_search": (heuristic, Aim.SUM, Reads.WINDOW, False),
+    }
 
 
 @given(problem=problems())

@@ -46,7 +46,23 @@ COSTS, CERTIFICATE = "seqopt.placement.costs", "seqopt.placement.certificate"
 CRITERIA, RANKS = "seqopt.placement.criteria", "seqopt.placement.ranks"
 LENGTHS = "both have a length: costs that have not are refused when they are made"
 EQUIVALENT = (
-    Equivalent("*", "zip(", "strict=True", "strict=False", LENGTHS),
+    *(
+        Equivalent(module, line, "strict=True", "strict=False", LENGTHS)
+        for module, line in (
+            ("formulations.*", "zip("),
+            ("seqopt.engines.*", "zip("),
+            ("seqopt.placement.flow", "zip("),
+            (CERTIFICATE, "zip("),
+            (COSTS, "enumerate(zip("),
+            (COSTS, "zip(self.single[-2::-1]"),
+        )
+    ),
+    *(
+        Equivalent(module, f"np.{made}(", "1", "2", "two equal ways to the first move are one")
+        for module, made in ((CERTIFICATE, "zeros"), ("formulations.*", "zeros"))
+    ),
+    Equivalent("formulations.*", "if ", "else 0", "else -1", "of one row the first is the last"),
+    Equivalent("formulations.minimax", "np.full(", "1", "2", "two equal ways are one"),
     Equivalent(COSTS, "== np.inf", "==", ">=", "nothing is larger than infinity"),
     Equivalent(COSTS, "== -np.inf", "==", "<=", "nothing is smaller than minus infinity"),
     Equivalent(COSTS, "out, before", "0", "-1", "of one row the first is the last"),
@@ -64,7 +80,6 @@ EQUIVALENT = (
     ),
     Equivalent(CRITERIA, "zeros_like", "[0][0]", "[-1][0]", "responses of a step have one shape"),
     Equivalent(RANKS, "ndim", "==", "<=", "a step has one open move or two: one axis or two"),
-    Equivalent(CERTIFICATE, "np.zeros(", "1", "2", "two equal ways to the first move are one"),
     Equivalent(
         CERTIFICATE, "low, high", "- 1", "* 1", "the largest of all costs is never looked at"
     ),
