@@ -63,7 +63,7 @@ def solve(problem: PlacementProblem, *, horizon: int = 1) -> Selection:
         count = math.prod(sizes[k : k + horizon])
         if count > MOST:
             raise ProblemError(
-                f"rank_search: {count:.2g} combinations of {min(horizon, len(sizes) - k)} moves; "
+                f"rank_search: {count:.2g} combinations of {min(horizon, len(sizes))} moves; "
                 f"lower the horizon (at most {MOST:.0e} are enumerated)"
             )
         row = problem.conditional(k, choice[-1]) if choice else costs.shared[0][0]

@@ -30,7 +30,7 @@ import numpy as np
 import pandas as pd
 from scipy.stats import binomtest
 
-from experiments.harness.claim import Claim, Extra, Finding, Option, Options
+from experiments.harness.claim import Claim, ClaimError, Extra, Finding, Option, Options
 from experiments.harness.plotting import RESULTS
 
 if TYPE_CHECKING:
@@ -112,7 +112,7 @@ def tried(module: str, chosen: list[Mutant]) -> tuple[pd.DataFrame, dict[str, st
     return pd.DataFrame(rows, columns=["line", *KEY, "outcome", "reason"]), controls
 
 
-def counted(rows: pd.DataFrame, mutants: int) -> dict[str, object]:
+def counted(rows: pd.DataFrame, mutants: int) -> dict[str, int]:
     """Return how many mutants of a module ended in which way."""
     survived, named = rows["outcome"] == "survived", rows["reason"] != ""
     return {
@@ -159,16 +159,23 @@ def store(row: pd.DataFrame, survivors: pd.DataFrame) -> None:
 
 def measured_again(module: str) -> tuple[pd.DataFrame, pd.DataFrame]:
     """Return a module's stored row and survivors, the survivors being tried anew."""
+    from experiments.robustness.parts.equivalents import reason  # noqa: PLC0415
+
     table, before = stored()
     row = table[table["module"] == module].reset_index(drop=True)
-    keys = set(before.loc[before["module"] == module, KEY].itertuples(index=False, name=None))
-    chosen = [m for m in drawn(module, 10**9)[0] if tuple(getattr(m, k) for k in KEY) in keys]
-    rows, controls = tried(module, chosen)
-    counts = counted(rows, 0)
-    surviving = {name: counts[name] for name in ("equivalent", "survived")}
+    keys = {*before.loc[before["module"] == module, KEY].itertuples(index=False, name=None)}
+    parts: dict[bool, list[Mutant]] = {True: [], False: []}
+    for mutant in drawn(module, int(row.loc[0, "tried"]))[0]:
+        parts[tuple(getattr(mutant, name) for name in KEY) in keys].append(mutant)
+    if len(parts[True]) != (before["module"] == module).sum():
+        raise ClaimError(f"{module} is not what it was; run it without --again")
+    rows, controls = tried(module, parts[True])
+    fresh = counted(rows, 0)
+    surviving = {name: fresh[name] for name in ("equivalent", "survived")}
     killed = int(row.loc[0, "tried"]) - sum(surviving.values())
-    wrong = {"equivalent_but_killed": counts["equivalent_but_killed"]}
-    return row.assign(**surviving, killed=killed, **wrong, **controls), left(rows)
+    wrong = fresh["equivalent_but_killed"] + sum(reason(mutant) != "" for mutant in parts[False])
+    again = row.assign(**surviving, killed=killed, equivalent_but_killed=wrong, **controls)
+    return again, left(rows)
 
 
 def share(table: pd.DataFrame) -> tuple[float, float]:

@@ -129,6 +129,15 @@ def test_heuristics_do_what_they_display(problem, data):
         assert (found.objective, found.bound) == (own.sums.cost(choice), -INF)
 
 
+@pytest.mark.parametrize(("name", "option"), [("beam", "width"), ("rank_search", "horizon")])
+def test_numbers_start_at_one(name, option):
+    problem = CostProblem(LayeredCosts((np.zeros(2),), (np.zeros((1, 2)),)))
+    assert ALL[name].solve(problem, **{option: 1}).choice == (0,)
+    for number in (0, -1):
+        with pytest.raises(ProblemError, match=f"{name}: {option} is {number}; give a whole"):
+            ALL[name].solve(problem, **{option: number})
+
+
 def test_what_each_promises():
     exact, bound, heuristic = (
         FormulationKind.EXACT,

@@ -58,10 +58,24 @@ EQUIVALENT = (
         )
     ),
     *(
-        Equivalent(module, f"np.{made}(", "1", "2", "two equal ways to the first move are one")
-        for module, made in ((CERTIFICATE, "zeros"), ("formulations.*", "zeros"))
+        Equivalent(module, "", "np.zeros(1)", "np.zeros(2)", "two equal ways are one")
+        for module in (CERTIFICATE, "formulations.*")
     ),
     Equivalent("formulations.*", "if ", "else 0", "else -1", "of one row the first is the last"),
+    Equivalent(
+        "formulations.*", "if ", "shared[0][0]", "shared[0][-1]", "of one row the first is the last"
+    ),
+    Equivalent(
+        "formulations.rank_search", "while len(", "<", "!=", "no choice is longer than all moves"
+    ),
+    *(
+        Equivalent(
+            "formulations.rank_search", "MOST", "20_000_000", size, "a bound on memory alone"
+        )
+        for size in ("20000001", "19999999")
+    ),
+    Equivalent("formulations.cascade", "charge", "==", ">=", "it is later or earlier"),
+    Equivalent("formulations.cascade", "len(shared)", "<", "!=", "no move is beyond the last"),
     Equivalent("formulations.minimax", "np.full(", "1", "2", "two equal ways are one"),
     Equivalent(COSTS, "== np.inf", "==", ">=", "nothing is larger than infinity"),
     Equivalent(COSTS, "== -np.inf", "==", "<=", "nothing is smaller than minus infinity"),
