@@ -170,6 +170,15 @@ def test_how_a_solver_says_that_it_ended(monkeypatch, status):
     assert len({str(options) for options in CONE_OPTIONS}) == len(CONE_OPTIONS)
 
 
+def test_the_first_attempt_is_the_first(monkeypatch):
+    given = []
+    monkeypatch.setattr("formulations.limit_analysis.end_of", lambda _, n: given.append(n))
+    program = compile_equilibrium(CUBE)
+    for attempts in ((), (0,), (1,)):
+        program(case(Sense.LARGEST), *attempts)
+    assert given == [0, 0, 1]
+
+
 def test_a_solver_that_fails_has_stalled(monkeypatch):
     def fails(*_, **__):
         raise cp.SolverError("no")

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from seqopt.errors import InfeasibleError
+from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.placement.certificate import TOLERANCE
 from seqopt.placement.costs import Budget, LayeredCosts
 from seqopt.placement.flow import ACCURACY, layered_flow
@@ -123,6 +123,16 @@ def test_when_a_choice_is_known_to_be_within_the_budgets():
     assert layered_flow(problem(least)).feasible
     assert not layered_flow(problem(least - 1e-9)).feasible  # within what solvers leave
     assert not layered_flow(problem(99.0, 99.0)).feasible
+
+
+@pytest.mark.parametrize(
+    "sizes", [(3, 2), (3, 2, 3), (3, 2, 1), (4, 2, 2), (2, 2, 2), (3, 2, 2, 1)]
+)
+def test_a_budget_is_for_the_moves_and_candidates_of_the_problem(sizes):
+    single = tuple(np.ones(size) for size in sizes)
+    shared = tuple(np.ones(pair) for pair in zip((1, *sizes[:-1]), sizes, strict=True))
+    with pytest.raises(ProblemError, match="budget 'other' is for other moves or candidates"):
+        layered_flow(replace(problem(), budgets=(Budget("other", single, shared, 99.0),)))
 
 
 @pytest.mark.parametrize(("share", "hopeless"), [(0.99, False), (1.01, True)])

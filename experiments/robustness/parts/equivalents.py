@@ -44,6 +44,7 @@ class Equivalent:
 COMPLIANCE = "seqopt.engines.rigid.compliance"
 COSTS, CERTIFICATE = "seqopt.placement.costs", "seqopt.placement.certificate"
 CRITERIA, RANKS = "seqopt.placement.criteria", "seqopt.placement.ranks"
+UNUSED = "without any no constraint has this variable, and faces have three corners or more"
 LENGTHS = "both have a length: costs that have not are refused when they are made"
 EQUIVALENT = (
     *(
@@ -96,6 +97,11 @@ EQUIVALENT = (
     Equivalent(RANKS, "ndim", "==", "<=", "a step has one open move or two: one axis or two"),
     Equivalent(
         CERTIFICATE, "low, high", "- 1", "* 1", "the largest of all costs is never looked at"
+    ),
+    Equivalent("seqopt.placement.flow", "known and", "== 1", "<= 1", "there is this one at least"),
+    *(
+        Equivalent("formulations.limit_analysis", "cp.Variable", f"{old}1", f"{old}{size}", UNUSED)
+        for old, size in (("corners,", 0), ("corners,", 2), ("grips,", 0))
     ),
     Equivalent(COMPLIANCE, "pivot >= TRUSTED", ">=", ">", "no pivot is 1e-5 to the last bit"),
     *(
