@@ -71,7 +71,7 @@ def solve(problem: PlacementProblem, *, watch: Watch | None = None, horizon: int
         count = math.prod(sizes[k : k + horizon])
         if count > MOST:
             raise ProblemError(
-                f"rank_search: {count:.2g} combinations of {min(horizon, len(sizes) - k)} moves; "
+                f"rank_search: {count:.2g} combinations of {min(horizon, len(sizes))} moves; "
                 f"lower the horizon (at most {MOST:.0e} are enumerated)"
             )
         row = problem.conditional(k, choice[-1]) if choice else costs.shared[0][0]

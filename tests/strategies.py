@@ -150,7 +150,7 @@ def flat_arches(draw):
 def problems(draw, most_moves=5, most_candidates=4):
     """Costs with many ties and some choices not allowed."""
     sizes = draw(st.lists(st.integers(1, most_candidates), min_size=1, max_size=most_moves))
-    cost = st.one_of(st.integers(0, 3).map(float), st.just(np.inf))
+    cost = st.sampled_from([0.0, 1.0, 2.0, 3.0] * 3 + [np.inf])  # with more, hardly any is solvable
 
     def array(*shape):
         count = int(np.prod(shape))

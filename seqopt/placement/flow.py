@@ -198,7 +198,7 @@ def within_each(problem: PlacementProblem) -> bool:
         )
         least = least_sum(LayeredCosts(single, shared))
         sizes = sum(float(np.abs(a).max()) for a in (*budget.single, *budget.shared))
-        if least > budget.bound + TOLERANCE * max(abs(budget.bound), sizes):
+        if least > budget.bound + TOLERANCE * sizes:
             raise InfeasibleError(
                 f"no choice is within all budgets: any takes at least {least:.6g} of "
                 f"{budget.name!r}, more than {budget.bound:.6g}; raise that bound"

@@ -33,7 +33,7 @@ from experiments.placement import (
     speed_accuracy,
     staged_construction,
 )
-from experiments.robustness import fuzz
+from experiments.robustness import fuzz, mutation_testing
 from experiments.stability import dry_grips, failing_steps, witnesses
 from experiments.study import criteria_variants, paper_counterparts
 from experiments.study.parts.paper_items import ITEMS
@@ -133,6 +133,14 @@ def checks() -> dict[str, tuple[Check, Tables, Callable[..., Iterator[tuple[Any,
             (rows("identify_arch25_refit"),),
             spoil_identified,
         ),
+        "mutation_testing": (
+            mutation_testing.holds,
+            (
+                rows("mutation_testing"),
+                pd.read_csv(RESULTS / "mutation_survivors.csv", keep_default_na=False),
+            ),
+            spoil_mutation,
+        ),
         "paper_counterparts": (
             lambda table: not paper_counterparts.faults(numbered, table),
             (rows("paper_counterparts"),),
@@ -226,6 +234,17 @@ def spoil_fuzz(cases, kills):
     yield spoiled(cases, "faults", 1, kind="scene", command="analyze"), kills
     yield cases, spoiled(kills, "left", "a part", signal="SIGKILL")
     yield cases, spoiled(kills, "left", "whole, and a hidden folder", signal="SIGTERM")
+
+
+def spoil_mutation(table, survivors):
+    last = table["module"].iloc[-1]
+    named = survivors[survivors["reason"] != ""]
+    yield spoiled(table, "as_it_is", "killed", module=last), survivors
+    yield spoiled(table, "with_a_broken_line", "survived", module=last), survivors
+    yield spoiled(table, "equivalent_but_killed", 1, module=last), survivors
+    yield table, survivors.assign(reason="none could")
+    yield table, survivors.drop(index=named.index[0])
+    yield table.assign(survived=table["killed"] // 10), survivors
 
 
 def spoil_limits(table):
