@@ -13,7 +13,7 @@ class SeqoptError(Exception):
     ...     seqopt.load_scene("arch26")
     ... except seqopt.SeqoptError as error:
     ...     print(error)
-    scene arch26: no such built-in scene or file; built in: arch25
+    scene arch26: no such built-in scene or file; built in: arch25, dome163, vault338
     """
 
 

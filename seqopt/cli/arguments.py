@@ -104,6 +104,7 @@ def _add_compare(commands: Commands, parents: list[_Parser]) -> None:
         description="Analyze every method on a scene; show the largest responses side by side, for "
         "the reference arch beside the printed ones, and list the inconsistencies in print.",
     )
+    _robots_argument(command, "all methods, which take as many as they need: the")
     _criterion_argument(command)
     command.add_argument("--out", type=Path, metavar="DIR", help="write tables and figures there")
     _strict_argument(command)
@@ -282,5 +283,12 @@ def _add_scene(commands: Commands, parents: list[_Parser]) -> None:
         parents=parents,
         help="check, describe and export a scene",
         description="Check a scene, say what is in it, and write it as JSON if asked.",
+        epilog="example: seqopt scene vault338 --export my.json",
     )
-    command.add_argument("--export", type=Path, metavar="FILE", help="JSON file to write")
+    what = command.add_mutually_exclusive_group()
+    what.add_argument(
+        "--list",
+        action="store_true",
+        help="name all built-in scenes, a line each: bricks, joints, what it is",
+    )
+    what.add_argument("--export", type=Path, metavar="FILE", help="JSON file to write")

@@ -52,8 +52,9 @@ from seqopt.report.comparison import compare
 from seqopt.report.text import format_comparison
 from seqopt.responses.table import analyze, fields_archive
 from seqopt.scene.scene import Scene
-from seqopt.scene.scene_file import dump_scene, load_scene
+from seqopt.scene.scene_file import about, builtin_scenes, dump_scene, load_scene
 from seqopt.sequence.plan_file import read_plan
+from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.schedule_file import find_schedule
 from seqopt.sequence.steps import AnyStep, Step, idle_robots
 from seqopt.sequence.thinning import thin
@@ -105,10 +106,10 @@ def _compare(options: argparse.Namespace) -> Status:
     if options.out is not None:
         require_matplotlib(options.out)
         require_folder(options.out)
-    result = compare(engine, criterion, progress)
+    result = compare(engine, criterion, progress, parse_robots(options.robots))
     _say_levels(engine)
     show(format_comparison(result, scene, criterion) + "\n")
-    if options.out is not None and not result.refusal:
+    if options.out is not None and result.loop is not None:
         write_outputs(options, comparison_files(result))
         say(f"tables and figures written to {options.out}")
     return _payloads_hold(options, scene, *result.tables.values())
@@ -130,6 +131,13 @@ def _say_levels(engine: Engine) -> None:
         complain(f"engine: {choice.level.value} for {sets} grip sets: {choice.reason}")
     if engine.unchecked:
         complain(f"engine: {engine.unchecked}")
+
+
+def _paper_count(schedule: Schedule) -> dict[str, int] | None:
+    """Return how many models the paper counts for the loop of three robots; none for others."""
+    if schedule.method != "three-robot":
+        return None
+    return dict(zip(("cascading", "overlap"), paper_models(schedule), strict=True))
 
 
 def _say_idle(scene: Scene, steps: Sequence[AnyStep]) -> None:
@@ -159,9 +167,8 @@ def _optimize(options: argparse.Namespace) -> Status:
     plan = solve(problem, formulation, proof=not options.no_proof, **chosen)
     progress("")
     _say_levels(engine)
-    cascading, overlap = paper_models(schedule)
     report = plan.summary() | {
-        "models_paper_count": {"cascading": cascading, "overlap": overlap},
+        "models_paper_count": _paper_count(schedule),
         "seconds": {"assemble": assemble, **plan.seconds},
     }
     table = plan.responses()
@@ -263,6 +270,11 @@ def _steps(scene: Scene, options: argparse.Namespace) -> tuple[Step, ...]:
 
 
 def _scene(options: argparse.Namespace) -> None:
+    if options.list:
+        for name in builtin_scenes():
+            scene = load_scene(name)
+            _line(f"{name}: {len(scene.bricks)} bricks, {len(scene.joints)} joints; {about(name)}")
+        return
     keep_apart(options, options.export)
     scene = load_scene(options.scene)
     parts = build_network(scene)

@@ -48,8 +48,8 @@ def comparison_files(result: Comparison) -> dict[str, bytes | str]:
         "comparison.csv": result.table.to_csv(float_format="%.6g"),
         **{f"steps_{name}.csv": csv_text(table) for name, table in result.tables.items()},
     }
-    if result.ranks is not None:
-        files["published_ranks.csv"] = result.ranks.to_csv(index=False)
+    if result.loop is not None and result.loop.ranks is not None:
+        files["published_ranks.csv"] = result.loop.ranks.to_csv(index=False)
     for name, figure in comparison_figures(result).items():
         buffer = io.BytesIO()
         figure.savefig(buffer, dpi=130)

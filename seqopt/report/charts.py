@@ -21,7 +21,7 @@ def comparison_figures(result: Comparison) -> dict[str, Figure]:
     Parameters
     ----------
     result : Comparison
-        Of a scene that has the three-robot loop.
+        Of a scene that has a loop of its robots.
 
     Returns
     -------

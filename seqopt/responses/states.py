@@ -109,7 +109,7 @@ def answer(engine: Engine, block: Block) -> Answers:
         As the engine does.
     """
     asked = [CHOSEN_BY[name] for name in block.names]
-    want = reduce(or_, (response.needs for response in asked), Want(0))
+    want = reduce(or_, (response.needs for response in asked), Want.SCREEN)
     before = Counter(tally_of(engine))
     with one_thread():  # as many threads everywhere: sums in other orders differ in the last bit
         fields = engine.solve(block.bricks, block.grips, want)

@@ -224,19 +224,19 @@ def _check_state(scene: Scene, step: AnyStep) -> None:
 def _check_grip(scene: Scene, step: AnyStep, robot: Robot, node: int) -> None:
     """Require a node that exists, is free and stands within reach."""
     placed = {n for brick in scene.placed[: step.bricks] for n in brick.nodes}
-    possible = reachable(scene, robot, step.bricks)
     if node not in scene.brick_of_node:
         reason = "there is no such node"
     elif node in scene.blocked_nodes:
         reason = "the node is blocked"
     elif node not in placed:
         reason = f"brick {scene.brick_of_node[node].name} is not placed yet"
-    elif node not in possible:
+    elif not robot.reach.covers(scene.brick_of_node[node].node_position(node)):
         reason = "the node is out of its reach"
     else:
         return
+    possible = _list(reachable(scene, robot, step.bricks))
     raise StepError(
-        f"step {step.number}: {robot.name} at node {node}: {reason}; it can hold {_list(possible)}"
+        f"step {step.number}: {robot.name} at node {node}: {reason}; it can hold {possible}"
     )
 
 

@@ -53,11 +53,12 @@ def test_compare_of_another_scene_shows_no_study(capsys, tmp_path):
 
 
 def test_compare_says_what_is_not_possible(capsys, tmp_path):
-    path = scene_file(capsys, tmp_path, lambda d: d["robots"].pop())
+    path = tmp_path / "short.json"
+    save_scene(replace(from_both_ends(3), robots=anywhere(3)), path)
     status, out, _ = run(capsys, "compare", str(path))
     assert status == 0
     assert "cantilever" in out
-    assert "Three-robot loop: not possible here; " in out
+    assert "Loop of robots: not possible here; " in out
     path = scene_file(capsys, tmp_path, lambda d: d.update(robots=d["robots"][:1]))
     status, _, err = run(capsys, "compare", str(path))
     assert (status, err.count("\n")) == (2, 1)
@@ -181,6 +182,7 @@ def test_robots_by_name_and_those_that_never_grip(capsys, tmp_path):
     assert (status, err) == (0, "robots: rob2 never grips\n")
     report = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
     assert (report["schedule"], report["idle_robots"]) == ("two-robot", ["rob2"])
+    assert report["models_paper_count"] is None
     status, out, err = run(capsys, "analyze", "--method", "sequential", "--robots", "rob3, rob2")
     assert (status, err) == (0, "robots: rob1 never grips\n")
     first = pd.read_csv(io.StringIO(out)).iloc[0]
@@ -201,6 +203,29 @@ def test_compare_names_idle_robots_and_degenerate_methods(capsys, tmp_path):
     assert "- sequential: rob3, rob4 never grip\n" in out
     assert "- three-robot loop: rob4 never grips\n" in out
     assert "- cantilever: no brick extends one that is held" in out
+
+
+@pytest.mark.parametrize(
+    ("robots", "says"),
+    [
+        ("rob3,rob2", ["Two-robot loop, ", "- sequential: rob1 never grips"]),
+        ("rob3,rob1,rob2", ["Three-robot loop, ", "models counted as in the paper: 2,576"]),
+    ],
+)
+def test_compare_takes_the_robots_that_are_named(capsys, robots, says):
+    status, out, _ = run(capsys, "compare", "--robots", robots)
+    assert status == 0
+    assert [text for text in says if text not in out] == []
+    assert "nodes rank" not in out  # the published plan has roles of its own
+
+
+def test_the_loop_of_two_is_compared_where_there_is_no_third(capsys, tmp_path):
+    path = tmp_path / "two.json"
+    save_scene(replace(from_both_ends(7), robots=anywhere(2)), path)
+    status, out, _ = run(capsys, "compare", str(path))
+    assert status == 0
+    assert "Two-robot loop, " in out
+    assert "overlap_dp" in out
 
 
 @pytest.mark.parametrize(

@@ -230,4 +230,4 @@ def test_a_response_that_nobody_asks_for_is_neither_computed_nor_kept(loop25):
     engine = Asked(loop25.scene)
     forces = Evaluation(engine, loop25, lambda _: {"F_move"})
     assert {name for step in forces.steps for name in step.responses} == {"F_move"}
-    assert wants == {Want(0)}  # grip forces always come: no field beside them was evaluated
+    assert wants == {Want.SCREEN}  # grip forces always come: no field beside them was evaluated
