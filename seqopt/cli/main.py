@@ -17,6 +17,7 @@ from seqopt.cli.outputs import (
     comparison_files,
     keep_apart,
     require_matplotlib,
+    worth,
     write_outputs,
 )
 from seqopt.cli.status import Status, status_of
@@ -44,7 +45,6 @@ from seqopt.files import (
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.placement.formulation import find_formulation
-from seqopt.placement.plan import Plan
 from seqopt.placement.problem import pose
 from seqopt.placement.promises import overloads
 from seqopt.placement.solving import solve
@@ -180,7 +180,7 @@ def _optimize(options: argparse.Namespace) -> Status:
     }
     write_outputs(options, files)
     say(
-        f"{formulation.name} ({formulation.kind.value}): {_worth(plan)}, "
+        f"{formulation.name} ({formulation.kind.value}): {worth(plan)}, "
         f"{plan.models} models; written to {options.out}"
     )
     for excess in plan.overloads:
@@ -196,15 +196,6 @@ def _payloads_hold(options: argparse.Namespace, scene: Scene, *tables: pd.DataFr
         return Status.DONE
     complain(f"seqopt: payload exceeded: {'; '.join(over)}")
     return Status.DOES_NOT_HOLD
-
-
-def _worth(plan: Plan) -> str:
-    among = plan.summary()["candidates"]
-    if plan.certificate is None:
-        return "not compared with the optimum"
-    if among != "all":
-        return f"objective {plan.certificate.objective:.6g}, {among}"
-    return f"objective {plan.certificate.objective:.6g}, gap {100 * plan.certificate.gap:.3g} %"
 
 
 def _analyze(options: argparse.Namespace) -> Status:

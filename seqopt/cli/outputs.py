@@ -10,6 +10,7 @@ from pathlib import Path
 
 from seqopt.errors import FileError
 from seqopt.files import csv_text, require_apart, write_folder
+from seqopt.placement.plan import Plan
 from seqopt.report.comparison import Comparison
 from seqopt.scene.scene_file import builtin_scenes
 
@@ -29,6 +30,25 @@ def require_matplotlib(folder: Path) -> None:
     """
     if find_spec("matplotlib") is None:
         raise FileError(f"figures for {folder} need matplotlib: pip install matplotlib")
+
+
+def worth(plan: Plan) -> str:
+    """Return what a plan is worth, in a few words.
+
+    Parameters
+    ----------
+    plan : Plan
+
+    Returns
+    -------
+    str
+    """
+    among = plan.summary()["candidates"]
+    heuristic = "" if among == "all" else f", {among}"
+    if plan.certificate is None:
+        return f"not compared with the optimum{heuristic}"
+    gap = heuristic or f", gap {100 * plan.certificate.gap:.3g} %"
+    return f"objective {plan.certificate.objective:.6g}{gap}"
 
 
 def comparison_files(result: Comparison) -> dict[str, bytes | str]:
