@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.placement.free_goals import Measure
 from seqopt.placement.free_problem import FreeProblem
-from seqopt.sequence.free_space import Moves
+from seqopt.sequence.free_moves import Moves
 
 Rows = NDArray[np.int32]
 

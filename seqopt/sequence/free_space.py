@@ -10,39 +10,25 @@ the node that it held last, -n.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints, frozen
-from seqopt.errors import StepError
 from seqopt.network.network import Network
+from seqopt.sequence.free_moves import (
+    Moves,
+    grip_pairs,
+    join_moves,
+    number_rows,
+    sort_entries,
+)
 from seqopt.sequence.free_rules import Ending, FreeRules, Newest
-from seqopt.sequence.free_team import RobotKind, sort_robots
+from seqopt.sequence.free_team import RobotKind
 from seqopt.sequence.support import islands
 
 PAIRS = 4_000_000  # of states and nodes that are looked at together
-
-
-class Moves(NamedTuple):
-    """Moves from states of one brick count.
-
-    Attributes
-    ----------
-    source : (m,) int
-        Row of the state that each leads from.
-    states : (m, c) int
-        The states that they lead to.
-    way : (m,) float
-        How far the robot goes that takes a grip, m; zero where ways do not count.
-    """
-
-    source: Ints
-    states: Ints
-    way: Floats
 
 
 @dataclass(frozen=True)
@@ -112,12 +98,8 @@ class FreeSpace:
         -------
         (n,) int
         """
-        nodes = 2 * self.bricks
-        base = 1 + (2 if self.parks else 1) * nodes
-        out = states[:, -1].copy() if self._counts else np.zeros(len(states), dtype=np.int64)
-        for column in range(self.robots):
-            out = out * base + states[:, column] + (nodes if self.parks else 0)
-        return np.asarray(out)
+        last = 2 * self.bricks
+        return number_rows(states, self.robots, -last if self.parks else 0, last)
 
     def held(self, states: Ints) -> Ints:
         """Return which nodes are held, sorted, zeros for robots that are free first.
@@ -151,7 +133,7 @@ class FreeSpace:
         for k, kind in enumerate(self.kinds):
             if kind.places:
                 parts += self._take(k, states, nodes[kind.newest[nodes]])
-        moves = self._joined(parts)
+        moves = join_moves(parts, self.robots + self._counts)
         if self._counts:
             moves.states[:, -1] = 0
         return self._lawful_only(bricks + 1, moves)
@@ -176,7 +158,7 @@ class FreeSpace:
         parts = []
         for k, kind in enumerate(self.kinds):
             parts += self._take(k, states[rows], np.flatnonzero(kind.reach[: 2 * bricks]))
-        moves = self._joined(parts)
+        moves = join_moves(parts, self.robots + self._counts)
         if self._counts:
             moves.states[:, -1] += 1
         return Moves(rows[moves.source], moves.states, moves.way)
@@ -195,14 +177,14 @@ class FreeSpace:
             To lawful states, and at the last brick to those that the rules' ending allows.
         """
         parts = []
-        for k, (first, end) in enumerate(self.slots):
+        for first, end in self.slots:
             for slot in range(first, end):
                 rows = np.flatnonzero(states[:, slot] > 0)
                 new = states[rows]
                 new[:, slot] = -new[:, slot] if self.parks else 0
-                self._sort(k, new)
+                sort_entries(new, first, end)
                 parts.append(Moves(rows, new, np.zeros(len(rows))))
-        moves = self._joined(parts)
+        moves = join_moves(parts, self.robots + self._counts)
         if bricks < self.bricks or self.rules.ending is not Ending.ONE_BY_ONE:
             moves = self._lawful_only(bricks, moves)
         if bricks < self.bricks or self.rules.ending is Ending.HELD:
@@ -256,10 +238,15 @@ class FreeSpace:
             rows = np.flatnonzero((states[:, : self.robots] > 0).any(axis=1))
             none = np.zeros((len(rows), states.shape[1]), dtype=np.int64)
             parts = [moves, Moves(rows, none, np.zeros(len(rows)))]
-            moves = self._joined(parts)
+            moves = join_moves(parts, self.robots + self._counts)
         bare = (moves.states[:, : self.robots] <= 0).all(axis=1)
         moves.states[bare] = 0
         return moves
+
+    @property
+    def _free_grips(self) -> tuple[int, Floats | None]:
+        """How many columns are robots, and distances where ways count."""
+        return self.robots, self._distance if self.parks else None
 
     @cached_property
     def _loose(self) -> tuple[list[list[int]], ...]:
@@ -281,81 +268,12 @@ class FreeSpace:
                 free &= states[:, slot] != states[:, slot - 1]
             rows = np.flatnonzero(free)
             for start in range(0, len(rows), step):
-                parts.append(self._pairs(k, slot, rows[start : start + step], states, nodes))
+                block = rows[start : start + step]
+                moves = grip_pairs(states[block], slot, nodes, self._free_grips)
+                sort_entries(moves.states, first, end)
+                parts.append(Moves(block[moves.source], moves.states, moves.way))
         return parts
-
-    def _pairs(self, k: int, slot: int, rows: Ints, states: Ints, nodes: Ints) -> Moves:
-        """Return the moves from some states in which a free robot takes one of some nodes."""
-        taken = np.zeros((len(rows), 2 * self.bricks + 1), dtype=bool)
-        for column in range(self.robots):
-            taken[np.arange(len(rows)), states[rows, column].clip(min=0)] = True
-        which, node = np.nonzero(~taken[:, nodes + 1])
-        source, number = rows[which], nodes[node] + 1
-        new = states[source]
-        way = self._distance[-new[:, slot], number] if self.parks else np.zeros(len(new))
-        new[:, slot] = number
-        self._sort(k, new)
-        return Moves(source, new, way)
-
-    def _sort(self, k: int, states: Ints) -> None:
-        """Sort the entries of the robots of a kind, in place."""
-        first, end = self.slots[k]
-        if end - first > 1:
-            states[:, first:end] = -np.sort(-states[:, first:end], axis=1)
-
-    def _joined(self, parts: Sequence[Moves]) -> Moves:
-        if not parts:
-            none = np.zeros(0, dtype=np.int64)
-            return Moves(none, np.zeros((0, self.robots + self._counts), np.int64), np.zeros(0))
-        return Moves(*map(np.concatenate, zip(*parts, strict=True)))
 
     def _lawful_only(self, bricks: int, moves: Moves) -> Moves:
         ok = self.lawful(bricks, moves.states)
         return Moves(moves.source[ok], moves.states[ok], moves.way[ok])
-
-
-def free_space(
-    network: Network,
-    rules: FreeRules,
-    caps: Mapping[str, float] | None = None,
-    *,
-    parks: bool = False,
-) -> FreeSpace:
-    """Return the states of a free schedule in a scene.
-
-    Parameters
-    ----------
-    network : Network
-    rules : FreeRules
-    caps : mapping of str to float, optional
-        Largest force of a robot's grip beside its payload, by its name, N.
-    parks : bool, optional
-        Whether free robots stay where they were, for their travel.
-
-    Returns
-    -------
-    FreeSpace
-
-    Raises
-    ------
-    StepError
-        If robots do not fit the rules, or states cannot be numbered.
-
-    Examples
-    --------
-    >>> import seqopt
-    >>> network = seqopt.build_network(seqopt.load_scene("arch25"))
-    >>> space = free_space(network, FreeRules())
-    >>> space.places(0, space.start()).states  # node 0 of its first brick is blocked
-    array([[2, 0, 0],
-           [0, 2, 0],
-           [0, 0, 2]])
-    """
-    space = FreeSpace(network, rules, sort_robots(network, rules, caps), parks)
-    base = 1 + (2 if parks else 1) * 2 * space.bricks
-    if base**space.robots * (1 + (rules.regrips or 0)) >= 2**62:
-        raise StepError(
-            f"scene {network.scene.name}: {space.bricks} bricks and {space.robots} robots have "
-            "more states than can be numbered; let fewer robots take part"
-        )
-    return space
