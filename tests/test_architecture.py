@@ -253,7 +253,11 @@ def test_an_experiment_that_reaches_across_is_seen(a, b):
 
 def test_claims_that_read_the_clock_declare_it():
     modules = graph("experiments")
-    clocks = {dotted(path) for path in sources("experiments") if "time" in imports(path)}
+    clocks = {
+        dotted(path)
+        for path in sources("experiments")
+        if "time" in imports(path) or ".seconds" in path.read_text(encoding="utf-8")
+    }
     for name, claim in claims().items():
         reads = clocks & {claim.module, *nx.descendants(modules, claim.module)}
         assert bool(reads) == claim.takes_time, name
