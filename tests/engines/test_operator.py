@@ -14,11 +14,14 @@ from seqopt.engines.planar import PlanarEngine
 from seqopt.engines.rigid.compliance import ComplianceEngine, solve_batch
 from seqopt.engines.rigid.dense import solve_dense
 from seqopt.engines.rigid.grip_equations import grip_forces, still_forces
+from seqopt.engines.rigid.held_operator import held_operator
+from seqopt.engines.rigid.loose import hold_loose
+from seqopt.engines.rigid.mixed_system import ungripped_system
 from seqopt.engines.rigid.operator import OperatorBuilder, load_matrix
 from seqopt.engines.rigid.spanning_tree import grow_tree
 from seqopt.network.build import build_network
 from seqopt.scene.arch import ArchShape, arch_scene
-from tests.builders import branch, from_both_sides, small_arch
+from tests.builders import branch, from_both_sides, hinged, six_bricks, small_arch
 
 SCENES = {
     "arch": small_arch(5),
@@ -164,3 +167,35 @@ def test_forces_undo_what_they_are_asked_to(sets):
         axis = operator.axis[brick]
         pulls = [again[0].reshape(-1, 3)[place] @ axis for place in (first, second)]
         assert abs(pulls[0] - pulls[1]) <= 1e-6 * np.abs(again).max()  # no force between them
+
+
+def eliminated(matrix):
+    """The pivots of a matrix, from the first unknown to the last."""
+    left, pivots = matrix.copy(), []
+    while len(left):
+        pivots.append(left[0, 0])
+        left = left[1:, 1:] - np.outer(left[1:, 0], left[0, 1:]) / left[0, 0]
+    return np.array(pivots)
+
+
+@pytest.mark.parametrize("grips", [(6, 9), (9, 7), (2, 7, 9), (3, 8, 6), (8, 9, 1), (6, 8, 9)])
+def test_loose_motions_are_unknowns_of_the_grips(grips):
+    """They move until nothing pulls at them; pivots are measured by what they stand on."""
+    net = build_network(hinged(six_bricks(), 2))
+    operator = held_operator(hold_loose(ungripped_system(net, 5)))
+    assert operator.loose == 3
+    columns = np.array([grips])
+    index = operator.load_index(columns)
+    force, pivot = grip_forces(operator, columns, index)
+    part = operator.flexibility[np.ix_(index[0], index[0])]
+    moved = part @ force[0] + operator.dead_displacement[index[0]]
+    assert np.abs(moved[:-3]).max() <= 1e-9 * np.abs(operator.dead_displacement[:30]).max()
+    assert np.abs(moved[-3:]).max() <= 1e-9 * np.abs(net.inner_weight).max()
+    bricks = columns[0] // 2
+    if len(set(bricks)) == len(grips):
+        scale = np.append(np.diag(part)[:-3], [-1 / operator.softness] * 3)
+        assert pivot == pytest.approx([min(1.0, (eliminated(part) / scale).min())], rel=1e-6)
+    else:
+        weighed = load_matrix(index, force, len(operator.flexibility)) @ operator.edge_force
+        (brick,) = {b for b in bricks if (bricks == b).sum() == 2}
+        assert abs(weighed[0, operator.inner_edge[brick]]) <= 1e-9 * np.abs(weighed).max()

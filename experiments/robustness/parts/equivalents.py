@@ -42,6 +42,7 @@ class Equivalent:
 
 
 COMPLIANCE = "seqopt.engines.rigid.compliance"
+GRIPS = "seqopt.engines.rigid.grip_equations"
 COSTS, CERTIFICATE = "seqopt.placement.costs", "seqopt.placement.certificate"
 CRITERIA, RANKS = "seqopt.placement.criteria", "seqopt.placement.ranks"
 UNUSED = "without any no constraint has this variable, and faces have three corners or more"
@@ -103,6 +104,19 @@ EQUIVALENT = (
         Equivalent("formulations.limit_analysis", "cp.Variable", f"{old}1", f"{old}{size}", UNUSED)
         for old, size in (("corners,", 0), ("corners,", 2), ("grips,", 0))
     ),
+    *(
+        Equivalent("formulations.solvers", "SECONDS", "300.0", size, "when a solver has stalled")
+        for size in ("299.0", "301.0")
+    ),
+    Equivalent(
+        GRIPS, "softness", "else 1.0", "else 0.0", "without loose motions nothing is scaled"
+    ),
+    Equivalent(
+        GRIPS, "softness", "else 1.0", "else 2.0", "without loose motions nothing is scaled"
+    ),
+    Equivalent(GRIPS, "bricks[couples", "pair, 0", "pair, 1", "both grips hold this brick"),
+    Equivalent(GRIPS, "reshape(len(edge)", "-1", "-2", "any negative length is what is left"),
+    Equivalent(GRIPS, "reshape(len(force)", "-1", "-2", "any negative length is what is left"),
     Equivalent(COMPLIANCE, "pivot >= TRUSTED", ">=", ">", "no pivot is 1e-5 to the last bit"),
     *(
         Equivalent(COMPLIANCE, "force[~trusted]", "0.0", size, "these sets are answered anew")
