@@ -21,9 +21,7 @@ from seqopt.engines.rigid.spanning_tree import grow_tree
 from seqopt.network.build import build_network
 from tests.strategies import arches, both_sided, walls
 
-PER_PAIR = (
-    8 * 36 * 8
-)  # bytes: arrays of bricks by bricks (3) and by springs (2 × 2), and a rest
+PER_PAIR = 8 * 36 * 8  # bytes: arrays of bricks by bricks (3) and by springs (2 × 2), and a rest
 
 
 def error(fields, exact):

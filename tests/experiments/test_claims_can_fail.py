@@ -14,7 +14,13 @@ from experiments.__main__ import STORE
 from experiments.calibration import calibration
 from experiments.calibration.parts import arch_scores, calibration_spread
 from experiments.discrete import contact_steps, discrete_arches
-from experiments.engines import engine_limits, engine_speed, fidelity_ladder, frame_contrast
+from experiments.engines import (
+    engine_growth,
+    engine_limits,
+    engine_speed,
+    fidelity_ladder,
+    frame_contrast,
+)
 from experiments.harness.catalog import claims
 from experiments.harness.plotting import RESULTS
 from experiments.peers import peers
@@ -87,6 +93,7 @@ def checks() -> dict[str, tuple[Check, Tables, Callable[..., Iterator[tuple[Any,
             (rows("discrete_arches"),),
             spoil_discrete,
         ),
+        "engine_growth": (engine_growth.holds, (rows("engine_growth_runs"),), spoil_growth),
         "engine_limits": (
             lambda table: all(engine_limits.judge(table).values()),
             (rows("engine_limits"),),
@@ -186,6 +193,13 @@ def spoil_fuzz(cases, kills):
     yield spoiled(cases, "faults", 1, kind="scene", command="analyze"), kills
     yield cases, spoiled(kills, "left", "a part", signal="SIGKILL")
     yield cases, spoiled(kills, "left", "whole, and a hidden folder", signal="SIGTERM")
+
+
+def spoil_growth(table):
+    for column in ("seconds", "memory_MB"):  # as the cube, and a run without an end
+        cube = 1e-4 * table["bricks"] ** 3 + table["memory_MB"].min()
+        yield (table.assign(**{column: table[column].where(table["version"] != "this", cube)}),)
+    yield (spoiled(table, "seconds", np.nan, version="this", scene="vault338"),)
 
 
 def spoil_limits(table):
