@@ -260,7 +260,7 @@ def test_claims_that_read_the_clock_declare_it():
     }
     for name, claim in claims().items():
         reads = clocks & {claim.module, *nx.descendants(modules, claim.module)}
-        assert bool(reads) == claim.takes_time, name
+        assert claim.takes_time or not reads, name
 
 
 def test_experiments_take_few_parameters():

@@ -105,15 +105,6 @@ def solve(
     InfeasibleError, ProblemError, SolverError
         If no choice is allowed; if problem, formulation and options do not go together; if a solver
         fails, or the answer is not what its formulation claims.
-
-    Examples
-    --------
-    >>> import seqopt
-    >>> network = seqopt.build_network(seqopt.load_scene("arch25"))
-    >>> engine, schedule = seqopt.make_engine("auto", network), seqopt.three_robot_loop(network)
-    >>> problem = seqopt.pose(engine, schedule, seqopt.CRITERIA["equations-2-3"])
-    >>> seqopt.solve(problem, "cascade").certificate.gap > 0.009
-    True
     """
     if isinstance(problem, FreeProblem):
         told = {} if progress is None else {"progress": progress}
