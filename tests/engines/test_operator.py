@@ -139,6 +139,7 @@ def test_which_loads_act_at_a_grip():
     columns = np.array([[0, 4], [9, 2]])
     index = [[0, 1, 2, 12, 13, 14], [27, 28, 29, 6, 7, 8]]
     assert operator.load_index(columns).tolist() == index
+    assert (operator.loose, operator.softness) == (0, 0.0)  # nothing is
     held = replace(operator, loose=2, flexibility=np.zeros((32, 32)))
     assert held.directions == 3
     assert held.load_index(columns).tolist() == [[*row, 30, 31] for row in index]

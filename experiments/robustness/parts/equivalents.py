@@ -115,8 +115,12 @@ EQUIVALENT = (
         GRIPS, "softness", "else 1.0", "else 2.0", "without loose motions nothing is scaled"
     ),
     Equivalent(GRIPS, "bricks[couples", "pair, 0", "pair, 1", "both grips hold this brick"),
-    Equivalent(GRIPS, "reshape(len(edge)", "-1", "-2", "any negative length is what is left"),
-    Equivalent(GRIPS, "reshape(len(force)", "-1", "-2", "any negative length is what is left"),
+    Equivalent(
+        "seqopt.engines.rigid.*", "reshape(", "-1", "-2", "a negative length is what is left"
+    ),
+    Equivalent(
+        CERTIFICATE, "@dataclass", "repr=False", "repr=True", "without arrays both look alike"
+    ),
     Equivalent(COMPLIANCE, "pivot >= TRUSTED", ">=", ">", "no pivot is 1e-5 to the last bit"),
     *(
         Equivalent(COMPLIANCE, "force[~trusted]", "0.0", size, "these sets are answered anew")
