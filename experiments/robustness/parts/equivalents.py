@@ -49,14 +49,15 @@ UNUSED = "without any no constraint has this variable, and faces have three corn
 LENGTHS = "both have a length: costs that have not are refused when they are made"
 EQUIVALENT = (
     *(
-        Equivalent(module, line, "strict=True", "strict=False", LENGTHS)
-        for module, line in (
-            ("formulations.*", "zip("),
-            ("seqopt.engines.*", "zip("),
-            ("seqopt.placement.flow", "zip("),
-            (CERTIFICATE, "zip("),
-            (COSTS, "enumerate(zip("),
-            (COSTS, "zip(self.single[-2::-1]"),
+        Equivalent(module, line, "strict=True", "strict=False", why)
+        for module, line, why in (
+            ("formulations.*", "zip(", LENGTHS),
+            ("seqopt.placement.flow", "zip(", LENGTHS),
+            (COSTS, "enumerate(zip(", LENGTHS),
+            (COSTS, "zip(self.single[-2::-1]", LENGTHS),
+            (CERTIFICATE, "shared in zip(", LENGTHS),
+            (CERTIFICATE, "zip(choice, sizes", "lengths were compared before"),
+            ("seqopt.engines.rigid.operator", "zip(", "both are by ground end of one network"),
         )
     ),
     *(
