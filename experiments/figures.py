@@ -1,12 +1,14 @@
-"""Claim: the documentation's pictures of the reference arch are those of the shipped scene.
+"""Claim: the documentation's pictures of built-in scenes are those of the scenes that ship.
 
 Method: draw `arch25` with its network; the twisting step 35 of the sequential method beside the
-cantilever method at the same step; responses along all methods; printed against computed ones.
+cantilever method at the same step; responses along all methods; printed against computed ones;
+`vault338` while it grows and from above; a scene of each generator of the library; the Pareto sets
+of the free schedule and of the loop.
 Every picture is held against the stored one before it takes its place: gray means over squares of
 16 pixels, so that fonts do not count, may differ by a fifth of what tells the stored picture from a
 blank one.
 
-Inputs: the shipped scene and tables. Command: ``python -m experiments.figures [--quick]``. Writes
+Inputs: the shipped scenes and tables. Command: ``python -m experiments.figures [--quick]``. Writes
 ``docs/figures/*.png``.
 """
 
@@ -19,6 +21,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 from matplotlib.image import imread
+from matplotlib.patches import Rectangle
 
 from experiments.harness.claim import Claim, Finding, Options
 from experiments.harness.plotting import DPI, FIGURES, new_figure, save_figure
@@ -27,15 +30,26 @@ from seqopt.arrays import Floats
 from seqopt.engines.interface import Engine, Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network
+from seqopt.placement.free_front import FreeFront
+from seqopt.placement.free_problem import pose_free
+from seqopt.placement.front import find_front
+from seqopt.placement.loop_front import LoopFront
 from seqopt.report.comparison import method_tables
 from seqopt.report.draw import View, draw_bricks, draw_grips, draw_network, draw_responses
+from seqopt.report.fronts import front_figure
+from seqopt.scene.boxes import boxes
+from seqopt.scene.library import DomeShape, WallShape, chain, dome, wall
 from seqopt.scene.scene_file import load_scene
+from seqopt.sequence.free_rules import FreeRules
+from seqopt.sequence.three_robots import three_robot_loop
+from seqopt.study.presets import WORST_RATIO
 from seqopt.study.published import as_printed
 from seqopt.study.tables import printed_steps
 
 VIEW = View(azimuth=35, elevation=22)
 MAGNIFY = 2000.0
 SQUARE, ALIKE = 16, 0.2  # pixels; share of what the stored picture shows
+ROUNDED = {"F_largest": 5.0, "M_sup": 0.5, "T_max": 5.0, "D_max": 5e-7}
 COLUMNS = {
     "F_rob1_N": "F_rob1 [N]",
     "M_sup_Nm": "M_sup [N m]",
@@ -129,12 +143,67 @@ def printed_against_computed(engine: Engine) -> Figure:
     return figure
 
 
+def vault(_: Engine) -> Figure:
+    """Draw the vault in three phases, and its plan with the sides of the rectangle around it."""
+    net = build_network(load_scene("vault338"))
+    arch = range(1, 26)
+    figure = new_figure(10, 7.4)
+    panels = figure.subplots(2, 2).ravel()
+    for panel, bricks in zip(panels, (25, 120, 338), strict=False):
+        draw_bricks(panel, net, bricks, VIEW, marked=arch)
+        panel.set_title(f"{bricks} bricks", fontsize=9)
+    draw_bricks(panels[-1], net, 338, View(azimuth=0, elevation=90), marked=arch)
+    panels[-1].set_title("plan, mm", fontsize=9)
+    corner = boxes(net.scene.bricks).corners().reshape(-1, 3)
+    (left, front, _), (right, back, _) = corner.min(axis=0), corner.max(axis=0)
+    panels[-1].add_patch(Rectangle((left, front), right - left, back - front, fill=False, ls=":"))
+    text = {"fontsize": 8, "ha": "center", "va": "center"}
+    panels[-1].text((left + right) / 2, front - 0.15, f"{1e3 * (right - left):.0f}", **text)
+    panels[-1].text(
+        left - 0.15, (front + back) / 2, f"{1e3 * (back - front):.0f}", **text, rotation=90
+    )
+    return figure
+
+
+def library(_: Engine) -> Figure:
+    """Draw a chain, a wall, and a dome in either bond."""
+    figure = new_figure(10, 7.4)
+    scenes = (
+        chain(50),
+        wall(WallShape(columns=6, courses=8, gap=0.01)),
+        load_scene("dome163"),
+        dome(DomeShape(courses=10, around=24, bond="herringbone", thickness=0.06)),
+    )
+    for panel, scene in zip(figure.subplots(2, 2).ravel(), scenes, strict=True):
+        draw_bricks(panel, build_network(scene), len(scene.bricks), VIEW)
+        panel.set_title(scene.name, fontsize=9)
+    return figure
+
+
+def free_front(engine: Engine) -> Figure:
+    """Draw the Pareto sets of the free schedule and of the loop, and the methods of the paper."""
+    names = [*ROUNDED]
+    free = pose_free(engine, FreeRules(), WORST_RATIO, ",".join(names))
+    fronts = [
+        find_front(problem)
+        for problem in (
+            FreeFront(free, ROUNDED),
+            LoopFront(engine, three_robot_loop(engine.network), names, rounding=ROUNDED),
+        )
+    ]
+    methods = method_tables(engine)[0]
+    return front_figure(fronts[0], methods, {"three-robot loop": fronts[1].table})
+
+
 PICTURES: dict[str, Callable[[Engine], Figure]] = {
     "twisting_step.png": twisting_step,
     "network.png": network_picture,
     "axial_forces.png": axial_forces,
     "responses.png": responses_along_the_build,
     "agreement.png": printed_against_computed,
+    "vault338.png": vault,
+    "library.png": library,
+    "free_front.png": free_front,
 }
 
 

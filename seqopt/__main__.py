@@ -8,7 +8,8 @@ import os
 import signal
 import sys
 
-INTERRUPTED = 130  # as seqopt.cli.status has it, which may not be there yet
+INTERRUPTED, FAILED = 130, 4  # as seqopt.cli.status has it, which may not be there yet
+LEAST = 340e6  # bytes of addresses with which a program starts
 
 
 def run() -> int:
@@ -22,6 +23,7 @@ def run() -> int:
     try:
         _take_signals()
         _open_streams()
+        _require_room()
         from seqopt.cli.main import main  # noqa: PLC0415  # what an interrupt may meet
 
         status = main()
@@ -29,6 +31,13 @@ def run() -> int:
         with contextlib.suppress(OSError, AttributeError):
             sys.stderr.write("seqopt: interrupted\n")
         status = INTERRUPTED
+    except (ImportError, MemoryError) as error:  # as where a limit of memory lets nothing be loaded
+        with contextlib.suppress(OSError, AttributeError):
+            said = " ".join(f"{type(error).__name__} {error}".split())
+            sys.stderr.write(
+                f"seqopt: cannot start: {said}; give it more memory, or install anew\n"
+            )
+        return FAILED
     if status == INTERRUPTED:  # else Python may end by the signal, where it met an exec of text
         for stream in (sys.stdout, sys.stderr):
             with contextlib.suppress(OSError, AttributeError):
@@ -42,6 +51,16 @@ def _take_signals() -> None:
     for name in ("SIGTERM", "SIGHUP"):
         if hasattr(signal, name) and signal.getsignal(getattr(signal, name)) is signal.SIG_DFL:
             signal.signal(getattr(signal, name), signal.default_int_handler)
+
+
+def _require_room() -> None:
+    """Refuse a limit of memory under which libraries wait without end for what they do not get."""
+    if os.name == "posix":
+        import resource  # noqa: PLC0415  # POSIX has it alone
+
+        limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+        if limit != resource.RLIM_INFINITY and limit < LEAST:
+            raise MemoryError(f"{limit / 1e6:.0f} MB may be used, and it takes {LEAST / 1e6:.0f}")
 
 
 def _open_streams() -> None:

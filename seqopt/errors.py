@@ -13,7 +13,7 @@ class SeqoptError(Exception):
     ...     seqopt.load_scene("arch26")
     ... except seqopt.SeqoptError as error:
     ...     print(error)
-    scene arch26: no such built-in scene or file; built in: arch25
+    scene arch26: no such built-in scene or file; built in: arch25, dome163, vault338
     """
 
 
@@ -67,6 +67,10 @@ class SolverError(SeqoptError, ArithmeticError):
 
 class MemoryShortError(SeqoptError, MemoryError):
     """There is not the memory for what is asked; the text says how much it takes."""
+
+
+class WorkerError(SeqoptError, RuntimeError):
+    """Processes or machines that work was given to end without an answer, again and again."""
 
 
 class SceneWarning(UserWarning):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,7 @@ from seqopt.placement.plan import Plan
 from seqopt.placement.problem import pose
 from seqopt.placement.requirements import Criterion, Limit
 from seqopt.placement.solving import solve
+from seqopt.responses.resources import Resources
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.schedule import Schedule
@@ -50,7 +51,7 @@ def optimize(
     limits : sequence of Limit
         What no open step may exceed.
     **options
-        Of `seqopt.solve` and of the formulation.
+        Of `seqopt.responses.Resources` (as ``workers=2``), `seqopt.solve` and the formulation.
 
     Returns
     -------
@@ -69,10 +70,16 @@ def optimize(
     1.185
     """
     start = time.perf_counter()
-    solver, opened = _assemble(scene, schedule, engine)
+    parts = *_assemble(scene, schedule, engine), find_criterion(criterion), limits, ()
     assemble = time.perf_counter() - start
-    plan = solve(pose(solver, opened, find_criterion(criterion), limits), formulation, **options)
+    plan = solve(pose(*parts, _resources(options)), formulation, **options)
     return replace(plan, seconds={"assemble": assemble, **plan.seconds})
+
+
+def _resources(options: dict[str, Any]) -> Resources:
+    """Take out of options what they say of resources."""
+    given = {field.name for field in fields(Resources)} & options.keys()
+    return Resources(**{name: options.pop(name) for name in given})
 
 
 def _assemble(

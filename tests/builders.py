@@ -274,3 +274,16 @@ def held(assembly, payload, *points):
         grip_position=np.array(points, float).reshape(-1, 3),
         payload=np.full(len(points), payload),
     )
+
+
+def first(scene, count):
+    """The scene of the first bricks that are placed, with the joints and ground ends between."""
+    bricks = scene.placed[:count]
+    names = {brick.name for brick in bricks}
+    return replace(
+        scene,
+        bricks=bricks,
+        joints=tuple(joint for joint in scene.joints if {*joint.bricks} <= names),
+        grounds=tuple(ground for ground in scene.grounds if ground.brick in names),
+        build_order=scene.build_order[:count],
+    )

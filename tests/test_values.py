@@ -27,10 +27,15 @@ from seqopt.engines.rigid.mechanism import rigid_structure
 from seqopt.engines.rigid.mixed import mixed_system, ungripped_system
 from seqopt.engines.rigid.operator import OperatorBuilder
 from seqopt.engines.rigid.recovery import Solution
+from seqopt.engines.rigid.response_maps import ResponseMaps, scene_maps
 from seqopt.engines.rigid.spanning_tree import grow_tree
 from seqopt.network.build import build_network
 from seqopt.network.statics import build_statics
+from seqopt.scene.boxes import boxes
+from seqopt.scene.library.meeting import meeting
 from seqopt.stability.assessment import assess, bonded
+from seqopt.stability.directions import first_directions
+from seqopt.stability.known import HoldingForces, Known
 from seqopt.stability.prover import Prover
 
 COMPRESSED = (sparse.csr_array, sparse.csc_array)
@@ -48,7 +53,12 @@ def values(arch25):
     parts = ungripped_system(network, 2)
     proven = Prover(assembly, _compiled())(bonded(assembly, EPOXY))
     plane = Plane(np.zeros(3), np.array([0.0, 1.0, 0.0]), np.eye(3)[[0, 2]])
+    maps = scene_maps(network)
+    shapes = boxes(arch25.bricks)
+    joined = meeting(shapes, [(0, 1)])
     every = (
+        *(maps, ResponseMaps(maps, 2)),
+        *(shapes, joined, joined.shared, joined.faces[0]),
         *(network, network.springs, build_statics(network)),
         *(assembly, face_quadrature(assembly), find_elastic_limits(network, EPOXY)),
         *(SPACE, plane, tree, OperatorBuilder(network, tree).operator(2), parts),
@@ -56,6 +66,8 @@ def values(arch25):
         *(Solution(np.zeros(6), np.zeros((1, 6)), np.zeros((0, 3))), system, system.points, held),
         *(settle(held), ComplianceEngine(network).solve(2, [[2]], Want.ALL)),
         *(diagnose(network, 2, [2]), proven, proven.answer, assess(assembly, EPOXY)),
+        *Known(assembly, bonded(assembly, EPOXY)).motions_of(np.ones((2, 6))),
+        *(HoldingForces(0.0, np.zeros(1)), first_directions(4, 1)),
     )
     return {type(value).__name__: value for value in every}
 

@@ -9,15 +9,14 @@ import numpy as np
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.scene.arch import ArchShape, arch_scene
+from seqopt.scene.library.chain import chain
 from seqopt.scene.scene import Scene
 from seqopt.study.presets import ROBOTS
 
 
 def half_circle(count: int) -> Network:
     """Return the network of an arch that turns from upright to upright."""
-    pitch = np.linspace(1.4, -1.4, count).tolist()
-    shape = ArchShape(pitch=pitch)
-    return build_network(arch_scene(shape, robots=ROBOTS))
+    return build_network(chain(count, robots=ROBOTS))
 
 
 def longer(scene: Scene, times: float) -> Scene:

@@ -5,7 +5,13 @@ from __future__ import annotations
 from enum import IntEnum
 
 from seqopt.cli.terminal import complain
-from seqopt.errors import InfeasibleError, MechanismError, SeqoptError, SolverError
+from seqopt.errors import (
+    InfeasibleError,
+    MechanismError,
+    SeqoptError,
+    SolverError,
+    WorkerError,
+)
 
 
 class Status(IntEnum):
@@ -15,7 +21,7 @@ class Status(IntEnum):
     DOES_NOT_HOLD = 1  # done, and something asked for does not hold
     BAD_INPUT = 2
     NO_ANSWER = 3  # infeasible, or a mechanism
-    FAILED = 4  # a solver, or memory; says nothing about the structure
+    FAILED = 4  # a solver, workers, or memory; says nothing about the structure
     INTERRUPTED = 130
 
 
@@ -32,11 +38,11 @@ def status_of(error: BaseException) -> Status:
     Status
     """
     if isinstance(error, KeyboardInterrupt):
-        complain("seqopt: interrupted")
+        complain(f"seqopt: interrupted{f'; {error}' if str(error) else ''}")
         return Status.INTERRUPTED
     if isinstance(error, MemoryError):
         advice = "" if isinstance(error, SeqoptError) else f"; {LESS}"
-        complain(f"seqopt: out of memory: {error or 'no more is to be had'}{advice}")
+        complain(f"seqopt: out of memory: {str(error) or 'no more is to be had'}{advice}")
         return Status.FAILED
     if isinstance(error, SolverError):
         complain(f"seqopt: solver failed: {error}")
@@ -45,6 +51,8 @@ def status_of(error: BaseException) -> Status:
         complain(f"seqopt: error: cannot write standard output: {error.strerror or error}")
         return Status.BAD_INPUT
     complain(f"seqopt: error: {error}")
+    if isinstance(error, WorkerError):
+        return Status.FAILED
     none = isinstance(error, MechanismError | InfeasibleError)
     return Status.NO_ANSWER if none else Status.BAD_INPUT
 

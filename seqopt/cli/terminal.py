@@ -94,10 +94,21 @@ def progress(stage: str) -> None:
     Parameters
     ----------
     stage : str
-        In a few words.
+        In a few words; empty once it is done.
     """
     if sys.stderr is not None and sys.stderr.isatty():
-        print(f"\r\033[K{harmless(stage)} …", end="\r", file=sys.stderr, flush=True)
+        text = f"{harmless(stage)} …" if stage else ""
+        print(f"\r\033[K{text}", end="\r", file=sys.stderr, flush=True)
+
+
+def tell(finding: object) -> None:
+    """Say what a formulation has found so far where a person watches.
+
+    Parameters
+    ----------
+    finding : seqopt.placement.watch.Finding
+    """
+    progress(str(finding))
 
 
 def flush() -> None:

@@ -1,59 +1,27 @@
-"""What the words of the command line stand for: criteria, limits, options, mortars."""
+"""What the words of the command line stand for: robots, limits, numbers, options, mortars."""
 
 from __future__ import annotations
 
 import argparse
+import math
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 from seqopt.contact.mortar import MORTARS, Mortar
 from seqopt.errors import ProblemError
-from seqopt.placement.criteria import RankSum
 from seqopt.placement.formulation import Formulation, as_formulation
-from seqopt.placement.requirements import Criterion, Limit, payload_limits
-from seqopt.placement.scales import NEVER
+from seqopt.placement.requirements import Limit, payload_limits
 from seqopt.responses.choices import CHOICE_RESPONSES
 from seqopt.scene.scene import Scene
 from seqopt.study.presets import CRITERIA
 
 BETWEEN = re.compile(r",(?![^\[]*\])")  # a comma that is not in brackets
+SIZE = re.compile(r"([0-9]*\.?[0-9]+(?:e[0-9]+)?) *((?:[kmgt]i?)?b?)", re.IGNORECASE)
+MOST_WORKERS = 1024
 LARGEST = 1e100  # number: products of larger ones overflow
 RESPONSES = (*CHOICE_RESPONSES, "F_each")
-
-
-def parse_criterion(text: str, crown: str | None = None) -> Criterion:
-    """Return a criterion by name, or a rank sum of named responses with weights.
-
-    Parameters
-    ----------
-    text : str
-        A name of `seqopt.CRITERIA`, or responses as ``T_max,M_sup=2``; a weight is 1 by default.
-    crown : str, optional
-        Bricks placed at the crown, or ``none``.
-
-    Returns
-    -------
-    Criterion
-
-    Raises
-    ------
-    ProblemError
-        If there is no such criterion or response, a weight is not positive, or the criterion has
-        no crown.
-    """
-    if crown is not None:
-        named = CRITERIA.get(text)
-        if not isinstance(named, RankSum):
-            raise ProblemError(f"--crown {crown}: {text} has none; leave it out")
-        return replace(named, crown=NEVER if crown == "none" else _number(crown, "--crown"))
-    if text in CRITERIA:
-        return CRITERIA[text]
-    terms = []
-    for part in BETWEEN.split(text):
-        name, weight = _split(part)
-        terms.append((_response(name, "--criteria"), _number(weight or "1", f"--criteria {part}")))
-    return RankSum(text, tuple(terms), tuple(terms))
 
 
 def parse_robots(text: str) -> tuple[str, ...]:
@@ -92,15 +60,67 @@ def parse_limits(texts: Sequence[str], scene: Scene) -> tuple[Limit, ...]:
     """
     out: list[Limit] = []
     for text in texts:
-        name, value = _split(text)
+        name, value = split_word(text)
         if text == "payload":
             out += payload_limits(scene)
         else:
-            out.append(Limit(_response(name, "--limit"), _number(value, f"--limit {text}")))
+            out.append(Limit(response_word(name, "--limit"), number_word(value, f"--limit {text}")))
     return tuple(out)
 
 
-def parse_options(formulation: Formulation | str, texts: Sequence[str]) -> dict[str, int | str]:
+def parse_time_limit(text: str | None) -> float:
+    """Return seconds from words.
+
+    Parameters
+    ----------
+    text : str, optional
+
+    Returns
+    -------
+    float
+        Infinite where none are given.
+
+    Raises
+    ------
+    ProblemError
+        If it is no number from 0.
+    """
+    return math.inf if text is None else number_word(text, "--time-limit", zero="allowed")
+
+
+def parse_numbers(
+    where: str, texts: Sequence[str], known: Mapping[str, object] | None = None
+) -> dict[str, float]:
+    """Return positive numbers by name from words.
+
+    Parameters
+    ----------
+    where : str
+        The argument, for messages.
+    texts : sequence of str
+        Each ``NAME=VALUE``.
+    known : mapping of str to object, optional
+        Names that there are; any by default.
+
+    Returns
+    -------
+    dict of str to float
+
+    Raises
+    ------
+    ProblemError
+        If there is no such name, or a value is not positive.
+    """
+    out: dict[str, float] = {}
+    for text in texts:
+        name, value = split_word(text)
+        if known is not None and name not in known:
+            raise ProblemError(f"{where} {text}: there is no such; give one of {', '.join(known)}")
+        out[name] = number_word(value, f"{where} {text}")
+    return out
+
+
+def parse_options(formulation: Formulation | str, texts: Sequence[str]) -> dict[str, Any]:
     """Return the options of a formulation from words.
 
     Parameters
@@ -121,7 +141,7 @@ def parse_options(formulation: Formulation | str, texts: Sequence[str]) -> dict[
     """
     formulation = as_formulation(formulation)
     known = formulation.options
-    out: dict[str, int | str] = {}
+    out: dict[str, Any] = {}
     for text in texts:
         name, _, value = text.partition("=")
         if name not in known:
@@ -158,21 +178,48 @@ def parse_mortar(options: argparse.Namespace) -> Mortar:
     """
     base = MORTARS[options.mortar]
     given = {
-        name: _number(text, f"--{name.replace('_', '-')}", zero="allowed")
+        name: number_word(text, f"--{name.replace('_', '-')}", zero="allowed")
         for name in ("friction", "tensile_strength", "cohesion")
         if (text := getattr(options, name)) is not None
     }
     return replace(base, **given)
 
 
-def _split(text: str) -> tuple[str, str]:
-    """Return a response, whose brackets may hold anything, and the number after it."""
+def split_word(text: str) -> tuple[str, str]:
+    """Return a response, whose brackets may hold anything, and the number after it.
+
+    Parameters
+    ----------
+    text : str
+        As ``NAME=VALUE``, or a name alone.
+
+    Returns
+    -------
+    (str, str)
+    """
     end = text.rfind("]") + 1
     name, _, number = text[end:].partition("=")
     return text[:end] + name, number
 
 
-def _response(name: str, where: str) -> str:
+def response_word(name: str, where: str) -> str:
+    """Return the name of a response if there is one of it.
+
+    Parameters
+    ----------
+    name : str
+    where : str
+        The argument, for messages.
+
+    Returns
+    -------
+    str
+
+    Raises
+    ------
+    ProblemError
+        If there is none.
+    """
     if name not in RESPONSES and not name.startswith("F_"):
         names = (*CRITERIA, *RESPONSES) if where == "--criteria" else ("payload", *CHOICE_RESPONSES)
         known = ", ".join((*names, "F_ROBOT"))
@@ -180,7 +227,25 @@ def _response(name: str, where: str) -> str:
     return name
 
 
-def _number(text: str, where: str, zero: str = "") -> float:
+def number_word(text: str, where: str, zero: str = "") -> float:
+    """Return a positive number from a word.
+
+    Parameters
+    ----------
+    text, where : str
+        The word; the argument, for messages.
+    zero : str, optional
+        Anything where zero is a number too.
+
+    Returns
+    -------
+    float
+
+    Raises
+    ------
+    ProblemError
+        If it is none.
+    """
     try:
         value = float(text)
     except ValueError:

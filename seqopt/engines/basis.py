@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import SupportsIndex
 
 import numpy as np
 from scipy import linalg
@@ -23,6 +24,10 @@ class Basis(FrozenValue):
 
     force: Floats
     moment: Floats
+
+    def __reduce_ex__(self, protocol: SupportsIndex) -> str | tuple[object, ...]:
+        # where a copy arrives, all of space must be the one that others are compared with
+        return "SPACE" if self is SPACE else super().__reduce_ex__(protocol)
 
     @cached_property
     def wrench(self) -> Floats:
@@ -55,10 +60,13 @@ class Basis(FrozenValue):
         (..., m, d) float
             m.
         """
-        turns = np.cross(self.force[None], self.moment[:, None])  # (r × f) · n = r · (f × n)
-        return np.asarray(
-            (arms @ turns.reshape(-1, 3).T).reshape(*arms.shape[:-1], *turns.shape[:2])
-        )
+        sizes = len(self.moment), len(self.force)
+        return np.asarray((arms @ self._turns.T).reshape(*arms.shape[:-1], *sizes))
+
+    @cached_property
+    def _turns(self) -> Floats:
+        """What arms are multiplied by, (md, 3): (r × f) · n = r · (f × n)."""
+        return frozen(np.cross(self.force[None], self.moment[:, None]).reshape(-1, 3))
 
 
 SPACE = Basis(np.eye(3), np.eye(3))

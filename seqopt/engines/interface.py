@@ -24,6 +24,7 @@ class Want(Flag):
     SUPPORT = auto()
     JOINTS = auto()
     BRICKS = auto()
+    SCREEN = auto()  # six digits are enough, to choose by; an engine may give more
     RESPONSES = EDGES | DISPLACEMENTS | SUPPORT  # what T_max, M_sup, F_rob, D_max and kin need
     ALL = RESPONSES | JOINTS | BRICKS
 

@@ -10,6 +10,7 @@ from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import Engine
 from seqopt.engines.planar import PlanarEngine
+from seqopt.engines.recipe import Recipe
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import SceneError
 from seqopt.network.build import network_of
@@ -62,10 +63,19 @@ def make_engine(name: str, network: Network | Scene, mortar: Mortar | str | None
         raise SceneError(f"engine {name}: there is none; known are {', '.join(ENGINES)}")
     network = network_of(network)
     if mortar is None:
-        return ENGINES[name](network)
+        return _known_by(ENGINES[name](network), Recipe(name, network.scene))
     if name not in LIMITED:
         raise SceneError(
             f"engine {name}: its joints hold anything, so that a mortar changes nothing; "
             f"take the engine {' or '.join(LIMITED)}"
         )
-    return LIMITED[name](network, find_mortar(mortar))
+    mortar = find_mortar(mortar)
+    return _known_by(
+        LIMITED[name](network, mortar), Recipe(name, network.scene, {"mortar": mortar})
+    )
+
+
+def _known_by(engine: Engine, recipe: Recipe) -> Engine:
+    """Return an engine that says how it was made, so that others can make it again."""
+    vars(engine)["recipe"] = recipe
+    return engine

@@ -5,7 +5,15 @@ from __future__ import annotations
 from contextlib import AbstractContextManager
 from functools import cache
 
+import numpy as np
+from scipy.linalg import blas
 from threadpoolctl import ThreadpoolController
+
+from seqopt.errors import MemoryShortError
+from seqopt.work.memory import free_memory
+
+BUFFERS = 100e6  # bytes; taken at once: OpenBLAS waits without end for buffers it does not get
+SOME = 100  # rows of a matrix whose product needs them
 
 
 def one_thread() -> AbstractContextManager[object]:
@@ -26,4 +34,15 @@ def one_thread() -> AbstractContextManager[object]:
 @cache
 def _libraries() -> ThreadpoolController:
     """Return the handle to the linear algebra of the process; finding it takes milliseconds."""
-    return ThreadpoolController()
+    free = free_memory()
+    if free < BUFFERS:
+        raise MemoryShortError(
+            f"linear algebra takes buffers of {BUFFERS / 1e6:.0f} MB, and {free / 1e6:.0f} MB are "
+            "free; raise the limit"
+        )
+    found = ThreadpoolController()
+    with found.limit(limits=1, user_api="blas"):
+        some = np.ones((SOME, SOME))
+        _ = some @ some  # of NumPy's library, and
+        blas.dgemm(1.0, some, some)  # of SciPy's
+    return found

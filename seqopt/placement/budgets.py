@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import chain
 
 import numpy as np
 
@@ -39,7 +40,7 @@ def steps_over(problem: Problem, response: str, level: float, bound: float) -> B
         If the problem does not evaluate the response.
     """
     single, shared = _empty(problem)
-    for choices in problem.evaluation.steps:
+    for choices in chain.from_iterable(problem.evaluation.levels()):
         if response not in choices.responses:
             raise ProblemError(
                 f"budget on {response}: step {choices.step.number} has only "

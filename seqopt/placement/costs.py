@@ -41,7 +41,7 @@ class LayeredCosts(FrozenValue):
 
     def __post_init__(self) -> None:
         for name in ("single", "shared"):
-            copied = tuple(np.array(costs, dtype=float) for costs in getattr(self, name))
+            copied = tuple(_copied(costs) for costs in getattr(self, name))
             object.__setattr__(self, name, copied)
         if not self.single:
             raise ProblemError("the problem has no moves; give at least one")
@@ -63,7 +63,8 @@ class LayeredCosts(FrozenValue):
                 f"move {k + 1}: shared costs {self.shared[k].shape}; give them for {shape}"
             )
         for name, costs in (("single", self.single[k]), ("shared", self.shared[k])):
-            if np.isnan(costs).any() or (costs == -np.inf).any():
+            some = _values(costs)
+            if np.isnan(some).any() or (some == -np.inf).any():
                 raise ProblemError(
                     f"move {k + 1}: a {name} cost is NaN or -inf; mark what is not allowed as inf"
                 )
@@ -149,9 +150,23 @@ class LayeredCosts(FrozenValue):
         return tuple(good)
 
 
+def _copied(costs: Floats) -> Floats:
+    """Return a copy; one number for all choices stays one number."""
+    given = np.asarray(costs)
+    if given.size and not any(given.strides):
+        return np.broadcast_to(np.array(given.flat[0], dtype=float), given.shape)
+    return np.array(given, dtype=float)
+
+
 def _largest(costs: Floats) -> float:
     """Return the largest size of a cost, those that are not allowed aside."""
-    return float(np.abs(costs[np.isfinite(costs)]).max(initial=0.0))
+    some = _values(costs)
+    return float(np.abs(some[np.isfinite(some)]).max(initial=0.0))
+
+
+def _values(costs: Floats) -> Floats:
+    """Return the costs, or the one number that they all are, (1,)."""
+    return costs if any(costs.strides) or not costs.size else np.array([costs.flat[0]])
 
 
 @dataclass(frozen=True, eq=False, repr=False)

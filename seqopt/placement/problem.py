@@ -13,14 +13,17 @@ import pandas as pd
 from seqopt.arrays import Floats
 from seqopt.engines.interface import Engine
 from seqopt.errors import ProblemError
-from seqopt.network.network import Network
 from seqopt.placement.costs import Budget, LayeredCosts
 from seqopt.placement.interface import Aim
+from seqopt.placement.joining import Joined
+from seqopt.placement.kinds import robots_of
+from seqopt.placement.possible import compared, spread_over_pairs
 from seqopt.placement.requirements import Criterion, Limit, ResponsesAsked
 from seqopt.placement.scales import SceneFacts
+from seqopt.placement.windows import by_move, window_anew, window_kept
 from seqopt.responses.choices import CHOICE_RESPONSES, Evaluation, StepChoices
 from seqopt.responses.quantities import robot_response
-from seqopt.scene.checks import short
+from seqopt.responses.resources import HERE, Resources
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import Step
 
@@ -76,28 +79,31 @@ class Problem:
         return self._peaks[0]
 
     @cached_property
+    def singles(self) -> tuple[Floats, ...]:
+        """The sums of costs in the steps in which one move alone is open, by move."""
+        return self._joined(np.add)[0].singles()
+
+    @cached_property
     def _sums(self) -> tuple[LayeredCosts, float]:
-        return self._layered(np.add)
+        joined, seconds = self._joined(np.add)
+        return joined.layered(), seconds
 
     @cached_property
     def _peaks(self) -> tuple[LayeredCosts, float]:
-        return self._layered(np.maximum)
+        joined, seconds = self._joined(np.maximum)
+        return joined.layered(), seconds
 
-    def _layered(self, join: np.ufunc) -> tuple[LayeredCosts, float]:
+    def _joined(self, join: np.ufunc) -> tuple[Joined, float]:
         """Return the costs of all choices, steps of the same moves joined, and the seconds."""
-        steps = self.evaluation.steps
-        start = time.perf_counter()
-        costs = [(choices.moves, self.step_costs(choices)) for choices in steps]
-        known = [c[np.isfinite(c)].min() for _, c in costs if np.isfinite(c).any()]
-        least = 0.0 if join is np.add else min(known, default=0.0)  # where no step is open
-        sizes = [len(move.candidates) for move in self.schedule.moves]
-        single = [np.full(size, least) for size in sizes]
-        shared = [np.full(pair, least) for pair in zip([1, *sizes[:-1]], sizes, strict=True)]
-        for moves, cost in costs:
-            target = single if len(moves) == 1 else shared
-            target[moves[-1]] = join(target[moves[-1]], cost)
-        layered = LayeredCosts(tuple(single), tuple(shared))
-        return layered, time.perf_counter() - start
+        joined = Joined([len(move.candidates) for move in self.schedule.moves], join)
+        seconds = 0.0
+        for steps in self.evaluation.levels():
+            start = time.perf_counter()
+            for choices in steps:
+                faced = compared(choices, self.schedule, self.criterion)
+                joined.add(faced.moves, self.step_costs(faced))
+            seconds += time.perf_counter() - start
+        return joined, seconds
 
     def seconds(self, aim: Aim) -> Mapping[str, float]:
         """Return what computing the costs of an aim took.
@@ -130,10 +136,38 @@ class Problem:
         (C_k,) float
         """
         out = np.zeros(len(self.schedule.moves[move].candidates))
-        for choices in self.evaluation.steps:
-            if len(choices.moves) == 2 and choices.moves[1] == move:
-                out = out + self.step_costs(choices, before)
+        for choices in self.window_choices(move, before):
+            faced = compared(choices, self.schedule, self.criterion, before)
+            if len(faced.moves) == 2:
+                out = out + self.step_costs(faced)
         return out
+
+    def window_choices(self, move: int, before: int) -> tuple[StepChoices, ...]:
+        """Return the steps that a move decides, for its candidates alone.
+
+        Parameters
+        ----------
+        move, before : int
+            A move, and the candidate chosen for the move before it.
+
+        Returns
+        -------
+        tuple of StepChoices
+            In order, with responses (C_k,); those of steps shared with the move before are of that
+            choice. Computed anew where the responses of all choices are not kept.
+        """
+        if self.evaluation.streams:
+            return window_anew(self.evaluation, move, before)
+        return window_kept(self._decided.get(move, ()), before)
+
+    @cached_property
+    def _decided(self) -> Mapping[int, Sequence[StepChoices]]:
+        return by_move(self.evaluation.steps)
+
+    @cached_property
+    def others(self) -> dict[Criterion, Problem]:
+        """The same problem under other criteria that need the same responses, as they are met."""
+        return {}
 
     def step_costs(self, choices: StepChoices, rows: slice | int = slice(None)) -> Floats:
         """Return the costs of a step's choices, infinite where they are not allowed.
@@ -151,7 +185,8 @@ class Problem:
         """
         responses = {name: values[rows] for name, values in choices.responses.items()}
         move = self.schedule.moves[choices.moves[-1]]
-        costs = self.criterion.costs(responses, move.bricks, len(move.candidates))
+        criterion = spread_over_pairs(choices, self.criterion)
+        costs = criterion.costs(responses, move.bricks, len(move.candidates))
         costs = np.where(np.isfinite(costs), costs, np.inf)
         for limit in self.limits:
             costs[limit.exceeded(responses[limit.response])] = np.inf
@@ -170,7 +205,8 @@ class Problem:
         pandas.DataFrame
             A row per choice, labeled by its nodes; SI units.
         """
-        moves = [self.schedule.moves[m] for m in choices.moves]
+        axes = next(iter(choices.responses.values())).ndim
+        moves = [self.schedule.moves[m] for m in choices.moves[-axes:]]
         names = [f"{move.robot}_node" for move in moves]
         index = pd.MultiIndex.from_product([move.candidates for move in moves], names=names)
         columns: Mapping[str, Floats] = {**choices.responses, "cost": self.step_costs(choices)}
@@ -216,6 +252,7 @@ def pose(
     criterion: Criterion,
     limits: Sequence[Limit] = (),
     also: Sequence[str] = (),
+    resources: Resources = HERE,
 ) -> Problem:
     """Return the problem of filling a schedule's open grips.
 
@@ -230,7 +267,9 @@ def pose(
     limits : sequence of Limit
         What no open step may exceed.
     also : sequence of str
-        Responses to evaluate beside those that criterion and limits name; no others are.
+        Responses to evaluate beside those that these name.
+    resources : Resources, optional
+        Processes, memory, a folder for answers; by default this process alone.
 
     Returns
     -------
@@ -247,39 +286,13 @@ def pose(
     >>> import seqopt
     >>> network = seqopt.build_network(seqopt.load_scene("arch25"))
     >>> engine, schedule = seqopt.make_engine("auto", network), seqopt.three_robot_loop(network)
-    >>> problem = seqopt.pose(engine, schedule, seqopt.CRITERIA["worst-ratio"])
-    >>> len(problem.schedule.moves), problem.criterion.name, problem.limits
-    (22, 'worst-ratio', ())
+    >>> seqopt.pose(engine, schedule, seqopt.CRITERIA["equations-2-3"])  # doctest: +ELLIPSIS
+    Problem('arch25', 'three-robot': 90 steps, 22 moves, criterion 'equations-2-3', ...
     """
-    robots = _robots(engine, schedule, criterion)
+    known = {*CHOICE_RESPONSES, *map(robot_response, robots_of(engine, schedule, criterion))}
     limits = (limits,) if isinstance(limits, Limit) else limits
     asked = ResponsesAsked(criterion.for_scene(SceneFacts(engine)), tuple(limits), tuple(also))
-    known = {*CHOICE_RESPONSES, *map(robot_response, robots)}
-    for move in schedule.moves:
-        if unknown := asked(move.bricks) - known:
-            listed = ", ".join(sorted(known))
-            raise ProblemError(f"response {min(unknown)}: there is no such; give {listed}")
-    return Problem(asked.criterion, asked.limits, Evaluation(engine, schedule, asked))
-
-
-def _robots(engine: Engine, schedule: Schedule, criterion: Criterion) -> list[str]:
-    """Return the names of a schedule's robots if all is what it should be, and grips are open."""
-    _require_kinds(engine, schedule, criterion)
-    if not schedule.moves:
-        raise ProblemError(
-            f"schedule {schedule.method}: with {len(schedule.scene.bricks)} bricks it leaves no "
-            "grip open; there is nothing to choose, analyze its steps"
-        )
-    return [robot.name for robot in schedule.scene.robots]
-
-
-def _require_kinds(engine: Engine, schedule: Schedule, criterion: Criterion) -> None:
-    """Say what is wanted where something else is given."""
-    wanted = (
-        (engine, isinstance(getattr(engine, "network", None), Network), "engine", "make_engine"),
-        (schedule, isinstance(schedule, Schedule), "schedule", "three_robot_loop"),
-        (criterion, hasattr(criterion, "for_scene"), "criterion", "CRITERIA"),
-    )
-    for given, right, what, source in wanted:
-        if not right:
-            raise ProblemError(f"{short(given)} is no {what}; take one of seqopt.{source}")
+    if unknown := {name for move in schedule.moves for name in asked(move.bricks)} - known:
+        listed = ", ".join(sorted(known))
+        raise ProblemError(f"response {min(unknown)}: there is no such; give {listed}")
+    return Problem(asked.criterion, asked.limits, Evaluation(engine, schedule, asked, resources))

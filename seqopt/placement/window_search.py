@@ -9,16 +9,21 @@ window after the other, and knows nothing of what it misses.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from contextlib import closing
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from seqopt.arrays import Floats
-from seqopt.errors import SolverError
+from seqopt.errors import MemoryShortError, SolverError
+from seqopt.placement.joining import Joined
 from seqopt.placement.problem import Problem
-from seqopt.responses.choices import Evaluation
-from seqopt.sequence.schedule import OpenGrip, Schedule
+from seqopt.placement.windows import window
+from seqopt.responses.choices import StepChoices
+from seqopt.responses.resources import Resources
+from seqopt.sequence.schedule import Schedule
 
 
 @dataclass(frozen=True)
@@ -56,11 +61,13 @@ class WindowSearch:
         -------
         (C_k,) float
         """
-        return np.asarray(self.alone.sums.single[move] + self.shared[move].sums.single[0])
+        return np.asarray(self.alone.singles[move] + self.shared[move].singles[0])
 
 
 def search_windows(problem: Problem) -> WindowSearch:
     """Choose every open grip of a build, one move after the other.
+
+    Brick counts come in ascending order, each move being chosen as soon as its own steps are known.
 
     Parameters
     ----------
@@ -76,57 +83,88 @@ def search_windows(problem: Problem) -> WindowSearch:
     ------
     SolverError
         If a move has no candidate left after the choices before it. Others may have led on.
+    MemoryShortError
+        If there is not the memory for what it looks at.
+    KeyboardInterrupt
+        With the nodes that were chosen so far as its text.
     """
-    schedule = problem.schedule
-    single = replace(schedule, steps=tuple(s for s in schedule.steps if len(s.moves) == 1))
-    found = WindowSearch(_of(problem, single), (), ())
-    nodes: list[int] = []
-    for k, move in enumerate(schedule.moves):
-        shared = _of(problem, window(schedule, k, nodes))
-        found = replace(found, shared=(*found.shared, shared))
-        costs = found.costs(k)
+    walk = _Walk(problem)
+    try:
+        with closing(walk.alone.evaluation.levels()) as levels:
+            for steps in levels:
+                walk.look(steps)
+                walk.choose(known=steps[-1].step.bricks)
+        walk.choose(known=math.inf)
+    except KeyboardInterrupt as stop:
+        raise KeyboardInterrupt(walk.so_far()) from stop
+    return WindowSearch(walk.alone, tuple(walk.shared), tuple(walk.choice))
+
+
+class _Walk:
+    """A search on its way: what was looked at, and what is chosen."""
+
+    def __init__(self, problem: Problem) -> None:
+        self._problem, self._schedule = problem, problem.schedule
+        single = tuple(step for step in self._schedule.steps if len(step.moves) == 1)
+        self.alone = _of(
+            problem, replace(self._schedule, steps=single), problem.evaluation.resources
+        )
+        if self.alone.evaluation.streams:
+            raise MemoryShortError(
+                "the responses of steps with one open grip do not fit into the memory that may be "
+                "used; take near candidates only, or raise max_memory"
+            )
+        self._own = Joined([len(move.candidates) for move in self._schedule.moves], np.add)
+        self.shared: list[Problem] = []
+        self.choice: list[int] = []
+
+    def look(self, steps: Sequence[StepChoices]) -> None:
+        """Take what steps with one open move cost."""
+        for choices in steps:
+            self._own.add(choices.moves, self.alone.step_costs(choices))
+
+    def choose(self, known: float) -> None:
+        """Choose the moves whose steps have at most so many bricks."""
+        while len(self.choice) < len(self._schedule.moves):
+            k = len(self.choice)
+            if len(self.shared) == k and self._last((k - 1, k)) <= known:
+                self._ask(k)
+            if len(self.shared) == k or self._last((k,)) > known:
+                return
+            self._choose(k)
+
+    def _last(self, moves: tuple[int, ...]) -> int:
+        """Return the largest brick count of steps in which given moves are open."""
+        return max((step.bricks for step in self._schedule.steps_of.get(moves, ())), default=0)
+
+    def _ask(self, k: int) -> None:
+        """Look at the steps that a move shares with the one before, whose choice is made."""
+        nodes = {k - 1: self._node(k - 1)} if k else {}
+        few = self._problem.evaluation.resources.alone()
+        self.shared.append(_of(self._problem, window(self._schedule, k, nodes), few))
+        _ = self.shared[-1].singles
+
+    def _node(self, k: int) -> int:
+        return self._schedule.moves[k].candidates[self.choice[k]]
+
+    def _choose(self, k: int) -> None:
+        move = self._schedule.moves[k]
+        costs = self._own.single(k) + self.shared[k].singles[0]
         if not np.isfinite(costs).any():
             raise SolverError(
                 f"move {k + 1}, step {move.step}: {move.robot} has no allowed grip after the "
                 "choices before it; relax a limit, or let a formulation look at all choices"
             )
-        found = replace(found, choice=(*found.choice, int(np.argmin(costs))))
-        nodes.append(move.candidates[found.choice[-1]])
-    return found
+        self.choice.append(int(np.argmin(costs)))
+
+    def so_far(self) -> str:
+        """Return what is chosen, in a few words."""
+        chosen = " ".join(str(self._node(k)) for k in range(len(self.choice)))
+        moves = f"{len(self.choice)} of {len(self._schedule.moves)} moves"
+        return f"{moves} were chosen, at nodes {chosen}" if chosen else "no move was chosen yet"
 
 
-def window(schedule: Schedule, move: int, nodes: Sequence[int]) -> Schedule:
-    """Return the steps that a move shares with the one before, as a schedule of that move alone.
-
-    Parameters
-    ----------
-    schedule : Schedule
-        With all moves open.
-    move : int
-        Index of a move.
-    nodes : sequence of int
-        Chosen for the moves before.
-
-    Returns
-    -------
-    Schedule
-        Of one move; without steps if it shares none.
-    """
-
-    def grip(held: int | OpenGrip | None) -> int | OpenGrip | None:
-        if not isinstance(held, OpenGrip):
-            return held
-        return OpenGrip(0) if held.move == move else nodes[held.move]
-
-    steps = [
-        replace(step, grips=tuple(grip(held) for held in step.grips))
-        for step in schedule.steps
-        if step.moves == (move - 1, move)
-    ]
-    return replace(schedule, steps=tuple(steps), moves=(schedule.moves[move],))
-
-
-def _of(problem: Problem, schedule: Schedule) -> Problem:
+def _of(problem: Problem, schedule: Schedule, resources: Resources) -> Problem:
     """Return the problem of another schedule, everything else being the same."""
-    evaluation = Evaluation(problem.engine, schedule, problem.evaluation.wanted)
+    evaluation = replace(problem.evaluation, schedule=schedule, resources=resources)
     return replace(problem, evaluation=evaluation)

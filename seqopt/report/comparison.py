@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,41 +13,65 @@ from seqopt.errors import ProblemError, StepError
 from seqopt.placement.certificate import least_sum
 from seqopt.placement.costs import TINY
 from seqopt.placement.formulation import formulations
+from seqopt.placement.interface import Aim
+from seqopt.placement.objectives import under_both
 from seqopt.placement.plan import Plan
 from seqopt.placement.problem import Problem, pose
 from seqopt.placement.promises import overloads
 from seqopt.placement.ranking import rank_choice
 from seqopt.placement.requirements import Criterion
 from seqopt.placement.solving import solve
+from seqopt.report.methods import idle_note, method_tables
 from seqopt.responses.quantities import RESPONSES, robot_response
-from seqopt.responses.table import analyze, force_column
+from seqopt.responses.table import force_column
 from seqopt.scene.scene import Scene
-from seqopt.sequence.steps import AnyStep, idle_robots
-from seqopt.sequence.stretches import degeneration
-from seqopt.sequence.three_robots import modified_sequential, three_robot_loop
-from seqopt.sequence.two_robots import METHODS
+from seqopt.sequence.loops import robot_loop
+from seqopt.sequence.three_robots import modified_sequential
 from seqopt.study.published import (
     IRREGULARITIES,
     PUBLISHED,
-    is_reference_arch,
     paper_models,
     printed_maxima,
     published_choice,
-    published_plan,
 )
 
 LARGEST = {"F_rob": "N", "M_sup": "N m", "T_max": "N", "D_max": "1e-3 mm"}
+RANKS = ["pairs", "conditional", "short_sight", "change_of_objective"]
 COLUMNS = [
     "problem",
     "objective",
     "gap",
+    *RANKS,
     *LARGEST,
     "overloaded",
     "models",
     "seconds",
     "solve_seconds",
 ]
+MOST = 3  # robots that take part where none are named: as many as in the paper's loop
 CLOSED = "no choice"  # the problem of a sequence without open grips
+
+
+@dataclass(frozen=True, eq=False)
+class LoopFacts:
+    """What the formulations of one loop have in common.
+
+    Attributes
+    ----------
+    method : str
+        Of the schedule, as ``three-robot``.
+    seconds : mapping of str to float
+        What all of them share: ``respond`` (computing responses) and ``rank`` (costs).
+    paper_models : tuple of int or None
+        Models that Bruun et al. count, for three robots: cascading, full overlap.
+    ranks : pandas.DataFrame or None
+        Where the published plan's nodes rank, move by move; see `rank_choice`.
+    """
+
+    method: str
+    seconds: Mapping[str, float]
+    paper_models: tuple[int, int] | None
+    ranks: pd.DataFrame | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,40 +87,41 @@ class Comparison:
         The same as the paper prints it, for its own arch only.
     table : pandas.DataFrame
         A row per method or formulation: the ``problem`` it solves (rows of different problems do
-        not compete), ``objective`` and ``gap`` to the exact optimum of its aim, the largest
+        not compete), ``objective`` and ``gap`` to the exact optimum of its aim, for criteria of
+        ranks the sums over ``pairs`` and ``conditional`` on the choice before, and of heuristics
+        the two parts of the gap, ``short_sight`` and ``change_of_objective``; the largest
         ``F_rob`` [N], ``M_sup`` [N m], ``T_max`` [N] and ``D_max`` [1e-3 mm] of any step, whether a
         robot is ``overloaded``, the distinct ``models`` it looks at, and the ``seconds`` that it
         took on its own, ``solve_seconds`` of them to choose.
     tables : mapping of str to pandas.DataFrame
         Responses of every step, by row of ``table``.
-    ranks : pandas.DataFrame or None
-        Where the published plan's nodes rank, move by move; see `rank_choice`.
-    paper_models : tuple of int or None
-        Models that Bruun et al. count: cascading, full overlap.
+    loop : LoopFacts or None
+        Of the loop whose open grips the formulations choose, if there is one.
     notes : tuple of str
         Methods that degenerate, robots that never grip, payloads exceeded, and inconsistencies in
         the paper's own numbers.
     refusal : str
-        Why the scene has no three-robot loop; empty if it has.
-    shared_seconds : mapping of str to float
-        What all formulations of the loop share: computing responses, and ranking them.
+        Why the scene has no loop of its robots; empty if it has.
     """
 
     maxima: pd.DataFrame
     printed: pd.DataFrame | None
     table: pd.DataFrame
     tables: Mapping[str, pd.DataFrame]
-    ranks: pd.DataFrame | None
-    paper_models: tuple[int, int] | None
+    loop: LoopFacts | None
     notes: tuple[str, ...]
     refusal: str
-    shared_seconds: Mapping[str, float]
 
 
 def compare(
-    engine: Engine, criterion: Criterion, progress: Callable[[str], None] = lambda _: None
+    engine: Engine,
+    criterion: Criterion,
+    progress: Callable[[str], None] = lambda _: None,
+    robots: Sequence[str] = (),
 ) -> Comparison:
     """Analyze every method on an engine's scene and solve its loop by every formulation.
+
+    The loop is that of three robots; of two, where the scene has no third; of those that are named.
 
     Parameters
     ----------
@@ -106,6 +131,9 @@ def compare(
         What a step costs.
     progress : callable, optional
         Told in a few words what is done next.
+    robots : sequence of str, optional
+        Names of the robots that take part, in the order of their roles, of which methods take as
+        many as they need; found from reach by default.
 
     Returns
     -------
@@ -117,98 +145,60 @@ def compare(
         If no method can build the scene.
     """
     scene = engine.network.scene
-    tables, notes = method_tables(engine)
+    tables, notes = method_tables(engine, robots)
     maxima = pd.DataFrame({name: _quantities(scene, table) for name, table in tables.items()})
     printed = printed_maxima().set_axis(maxima.index) if PUBLISHED in tables else None
     rows: dict[str, dict[str, object]] = {name: {"problem": CLOSED} for name in tables}
-    ranks, counted, refusal, shared = None, None, "", {}
-    try:
-        plans, problem = _plans(engine, criterion, progress)
-    except (StepError, ProblemError) as error:
-        refusal = str(error)
-    else:
-        for name, plan in plans.items():
-            tables[name] = plan.responses()
-            rows[name] = _row(plan)
-        counted = paper_models(problem.schedule)
-        notes += _idle(scene, "three-robot loop", problem.schedule.steps)
-        shared = {stage: plan.seconds[stage] for stage in ("respond", "rank")}
-        if PUBLISHED in tables:
-            ranks = rank_choice(problem, published_choice(problem))
-            rows[PUBLISHED] |= _worth(problem, published_choice(problem))
-    for name, steps in tables.items():
-        over = overloads(scene, steps)
-        rows[name] |= largest(scene, steps) | {"overloaded": bool(over)}
-        notes += [f"{name}: {excess}" for excess in over]
+    plans, problem, refusal = _plans(engine, criterion, progress, robots)
+    tables |= {name: plan.responses() for name, plan in plans.items()}
+    rows |= {name: _row(plan) for name, plan in plans.items()}
+    loop = None if problem is None else _facts(problem, rows, robots)
+    if problem is not None:
+        notes += idle_note(scene, f"{problem.schedule.method} loop", problem.schedule.steps)
+    notes += _add_largest(scene, rows, tables)
     notes += [f"In the paper: {text}" for text in IRREGULARITIES if printed is not None]
     table = pd.DataFrame.from_dict(rows, orient="index").reindex(columns=COLUMNS)
-    return Comparison(maxima, printed, table, tables, ranks, counted, tuple(notes), refusal, shared)
+    table[RANKS] = table[RANKS].astype(float)
+    return Comparison(maxima, printed, table, tables, loop, tuple(notes), refusal)
 
 
-def method_tables(engine: Engine) -> tuple[dict[str, pd.DataFrame], list[str]]:
-    """Return the responses of every method without open grips, and of the published plan.
-
-    Parameters
-    ----------
-    engine : Engine
-        What computes responses; it has the scene.
-
-    Returns
-    -------
-    tables : dict of str to pandas.DataFrame
-        By method, as `seqopt.analyze` makes them; the published plan for its own arch only.
-    notes : list of str
-        Why other methods cannot build the scene or are not what they are called, and which robots
-        never grip.
-
-    Raises
-    ------
-    StepError
-        If no method can build it.
-    """
-    scene = engine.network.scene
-    tables: dict[str, pd.DataFrame] = {}
-    refused: dict[str, StepError] = {}
+def _add_largest(
+    scene: Scene, rows: Mapping[str, dict[str, object]], tables: Mapping[str, pd.DataFrame]
+) -> list[str]:
+    """Add the largest responses to every row; return the payloads that are exceeded, in words."""
     notes: list[str] = []
-    for name, method in METHODS.items():
-        try:
-            steps = method(engine.network)
-        except StepError as error:
-            refused[name] = error
-            continue
-        tables[name] = analyze(engine, steps)
-        why = degeneration(engine.network, name)
-        notes += [f"{name}: {why}"] if why else []
-        notes += _idle(scene, name, steps)
-    if not tables:
-        raise next(iter(refused.values()))
-    if is_reference_arch(scene):
-        tables[PUBLISHED] = analyze(engine, published_plan(scene))
-    refusals = [f"{name}: not possible here; {error}" for name, error in refused.items()]
-    return tables, refusals + notes
-
-
-def _idle(scene: Scene, name: str, steps: Iterable[AnyStep]) -> list[str]:
-    """Return a note that names the robots which never grip, if there are any."""
-    idle = idle_robots(scene, steps)
-    return (
-        [f"{name}: {', '.join(idle)} never {'grips' if len(idle) == 1 else 'grip'}"] if idle else []
-    )
+    for name, steps in tables.items():
+        over = overloads(scene, steps)
+        rows[name].update(largest(scene, steps), overloaded=bool(over))
+        notes += [f"{name}: {excess}" for excess in over]
+    return notes
 
 
 def _plans(
-    engine: Engine, criterion: Criterion, progress: Callable[[str], None]
-) -> tuple[dict[str, Plan], Problem]:
-    """Return the plan of the modified sequential method and of every formulation on the loop."""
-    loop = three_robot_loop(engine.network)  # whose refusal says most
-    progress("modified sequential method")
-    modified = pose(engine, modified_sequential(engine.network), criterion)
-    plans = {"modified-sequential": solve(modified, "rank_search")}
-    problem = pose(engine, loop, criterion)
-    for name, formulation in formulations().items():
-        progress(f"three-robot loop by {name}")
-        plans[name] = solve(problem, formulation)
-    return plans, problem
+    engine: Engine,
+    criterion: Criterion,
+    progress: Callable[[str], None],
+    robots: Sequence[str],
+) -> tuple[dict[str, Plan], Problem | None, str]:
+    """Return the plan of the modified sequential method and of every formulation on the loop.
+
+    And the problem of the loop; none, and the reason, where the robots cannot build by it.
+    """
+    network, plans = engine.network, {}
+    count = len(robots) or min(len(network.scene.robots), MOST)
+    try:
+        loop = robot_loop(network, robots or count)  # whose refusal says most
+        if count >= MOST:
+            progress("modified sequential method")
+            modified = pose(engine, modified_sequential(network, robots[:3]), criterion)
+            plans["modified-sequential"] = solve(modified, "cascade")
+        problem = pose(engine, loop, criterion)
+        for name, formulation in formulations().items():
+            progress(f"{loop.method} loop by {name}")
+            plans[name] = solve(problem, formulation)
+    except (StepError, ProblemError) as error:
+        return {}, None, str(error)
+    return plans, problem, ""
 
 
 def largest(scene: Scene, table: pd.DataFrame) -> dict[str, float]:
@@ -247,18 +237,39 @@ def _quantities(scene: Scene, table: pd.DataFrame) -> pd.Series[float]:
 def _row(plan: Plan) -> dict[str, object]:
     """Return what a plan is worth, and the seconds that it alone took."""
     assert plan.certificate is not None  # asked for
+    found = plan.objectives()
+    parts = found["gap_parts"] or {}
     return {
         "problem": plan.summary()["schedule"],
         "objective": plan.certificate.objective,
         "gap": plan.certificate.gap,
+        **(found["objectives"] or {}),
+        "short_sight": parts.get("short_sight"),
+        "change_of_objective": parts.get("objective"),
         "models": plan.models_needed,
         "seconds": sum(plan.seconds[stage] for stage in ("compile", "solve", "verify")),
         "solve_seconds": plan.seconds["solve"],
     }
 
 
-def _worth(problem: Problem, choice: tuple[int, ...]) -> dict[str, object]:
-    """Return the value of a choice, and how far it lies above the optimum."""
+def _facts(
+    problem: Problem, rows: Mapping[str, dict[str, object]], robots: Sequence[str]
+) -> LoopFacts:
+    method = problem.schedule.method
+    counted = paper_models(problem.schedule) if method == "three-robot" else None
+    ranks = None if robots else _published_ranks(problem, rows)
+    return LoopFacts(method, problem.seconds(Aim.SUM), counted, ranks)
+
+
+def _published_ranks(
+    problem: Problem, rows: Mapping[str, dict[str, object]]
+) -> pd.DataFrame | None:
+    """Return where the published plan's nodes rank, and add to its row what it is worth."""
+    if PUBLISHED not in rows:
+        return None
+    choice = published_choice(problem)
     value = problem.sums.cost(choice)
     gap = (value - least_sum(problem.sums)) / max(abs(value), TINY)
-    return {"problem": problem.schedule.method, "objective": value, "gap": gap}
+    rows[PUBLISHED].update(problem=problem.schedule.method, objective=value, gap=gap)
+    rows[PUBLISHED].update(under_both(problem, choice))
+    return rank_choice(problem, choice)

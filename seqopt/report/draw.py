@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import product
 
 import numpy as np
 import pandas as pd
@@ -14,9 +13,12 @@ from matplotlib.patheffects import withStroke
 
 from seqopt.arrays import Floats, Ints
 from seqopt.network.network import Network, PartKind
+from seqopt.report.occlusion import drawing_order
+from seqopt.scene.boxes import boxes
 
 FACES = ((0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (1, 3, 7, 5))
 CLAY = np.array([0.80, 0.52, 0.38])
+MARKED = np.array([0.46, 0.63, 0.76])
 INK, TENSION, COMPRESSION = "#2b2b2b", "#c8102e", "#1f5fa8"
 ROBOT_COLORS = ("#0b7a75", "#7b2d8b", "#d17a00", "#444444")
 
@@ -59,6 +61,7 @@ def draw_bricks(  # noqa: PLR0913  # what is drawn, and how, each by its name
     twist: Floats | None = None,
     magnify: float = 1.0,
     alpha: float = 1.0,
+    marked: Collection[int] = (),
 ) -> None:
     """Draw the first bricks as shaded boxes, in place or moved.
 
@@ -78,23 +81,21 @@ def draw_bricks(  # noqa: PLR0913  # what is drawn, and how, each by its name
         How many times larger the motion is drawn.
     alpha : float
         Opacity, from 0 to 1.
+    marked : collection of int
+        Names of bricks that are drawn in another color.
     """
-    polygons, depths, colors = [], [], []
-    for b in range(bricks):
-        corners = _corners(network, b)
-        if twist is not None:
-            turn = np.cross(twist[b, 3:], corners - corners.mean(axis=0))
-            corners = corners + magnify * (twist[b, :3] + turn)
-        seen = corners @ view.axes().T
-        for face in FACES:
-            polygons.append(seen[list(face), :2])
-            depths.append(seen[list(face), 2].mean())
-            colors.append((*(_light(corners, face) * CLAY), alpha))
-    order = np.argsort(depths)
+    corners = _moved(network, bricks, twist, magnify)
+    seen = corners @ view.axes().T
+    polygons, colors = [], []
+    for b in drawing_order(corners, view.axes()):
+        own = MARKED if network.scene.placed[b].name in marked else CLAY
+        for face in sorted(FACES, key=lambda face: float(seen[b, list(face), 2].mean())):
+            polygons.append(seen[b, list(face), :2])
+            colors.append((*(_light(corners[b], face) * own), alpha))
     axes.add_collection(
         PolyCollection(
-            [polygons[i] for i in order],
-            facecolors=[colors[i] for i in order],
+            polygons,
+            facecolors=colors,
             edgecolors=(0.25, 0.15, 0.1, alpha),
             linewidths=0.4,
         )
@@ -238,13 +239,14 @@ def draw_responses(
     axes[0].legend(frameon=False, ncols=len(tables), fontsize=8)
 
 
-def _corners(network: Network, b: int) -> Floats:
-    """Return the corners of a brick, (8, 3), m."""
-    brick = network.scene.placed[b]
-    first, second = np.array(brick.length_axis), np.array(brick.width_axis)
-    frame = np.stack([first, second, np.cross(first, second)]) * np.array(brick.dimensions)[:, None]
-    signs = np.array(list(product((-0.5, 0.5), repeat=3)))
-    return np.asarray(np.array(brick.position) + signs @ frame)
+def _moved(network: Network, bricks: int, twist: Floats | None, magnify: float) -> Floats:
+    """Return the corners of the first bricks, (b, 8, 3), m, moved by twists (b, 6) if given."""
+    corners = boxes(network.scene.placed[:bricks]).corners()
+    if twist is None:
+        return corners
+    arm = corners - corners.mean(axis=1, keepdims=True)
+    turned = np.cross(twist[:bricks, None, 3:], arm)
+    return np.asarray(corners + magnify * (twist[:bricks, None, :3] + turned))
 
 
 def _light(corners: Floats, face: tuple[int, ...]) -> float:

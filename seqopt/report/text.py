@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from seqopt.placement.requirements import Criterion
-from seqopt.report.comparison import LARGEST, Comparison
+from seqopt.report.comparison import LARGEST, Comparison, LoopFacts
 from seqopt.scene.scene import Scene
 
 
@@ -30,12 +30,15 @@ def format_comparison(comparison: Comparison, scene: Scene, criterion: Criterion
         Of many lines.
     """
     blocks = [_methods(comparison, scene), _notes(comparison)]
-    if comparison.refusal:
-        blocks.append(f"Three-robot loop: not possible here; {comparison.refusal}")
+    loop = comparison.loop
+    if loop is None:
+        blocks.append(f"Loop of robots: not possible here; {comparison.refusal}")
     else:
-        blocks.append(_formulations(comparison, criterion))
-    if comparison.ranks is not None:
-        blocks.append(_ranks(comparison.ranks))
+        blocks.append(_formulations(comparison.table, loop, criterion))
+    if comparison.table["conditional"].notna().any():
+        blocks.append(_objectives(comparison.table))
+    if loop is not None and loop.ranks is not None:
+        blocks.append(_ranks(loop.ranks))
     return "\n\n".join(blocks)
 
 
@@ -62,25 +65,33 @@ def _notes(comparison: Comparison) -> str:
     return "\n".join(["Notes", *(f"- {note}" for note in comparison.notes or ["none"])])
 
 
-def _formulations(comparison: Comparison, criterion: Criterion) -> str:
+def _formulations(table: pd.DataFrame, loop: LoopFacts, criterion: Criterion) -> str:
     """Return a line for every method and formulation."""
-    cascading, overlap = comparison.paper_models or (0, 0)
-    shared = comparison.shared_seconds
     lines = [
-        f"Three-robot loop, criterion {criterion.name}; models counted as in the paper: "
-        f"{cascading:,} cascading,",
-        f"{overlap:,} with the full overlap; below, the different ones that each looks at",
+        *_heading(loop, criterion),
         "",
         f"{'':22}{'objective':>11}{'gap':>8}"
         + "".join(f"{name:>8}" for name in LARGEST)
         + f"{'models':>8}{'seconds':>9}",
-        *_groups(comparison.table),
+        *_groups(table),
         "(N, N m, N, 1e-3 mm; ! a payload is exceeded; gap to the exact optimum of the same aim,",
         "minimax has its own; seconds to choose and to check: all formulations of the loop share",
-        f"{shared['respond']:.4f} s for the responses of all choices, {shared['rank']:.4f} s for "
-        "ranking them)",
+        f"{loop.seconds['respond']:.4f} s for the responses of all choices, "
+        f"{loop.seconds['rank']:.4f} s for ranking them)",
     ]
     return "\n".join(lines)
+
+
+def _heading(loop: LoopFacts, criterion: Criterion) -> list[str]:
+    """Return what was solved, and how many models the paper counts for it."""
+    title = f"{loop.method.capitalize()} loop, criterion {criterion.name}"
+    if loop.paper_models is None:
+        return [f"{title}; models: the different ones that each looks at"]
+    cascading, overlap = loop.paper_models
+    return [
+        f"{title}; models counted as in the paper: {cascading:,} cascading,",
+        f"{overlap:,} with the full overlap; below, the different ones that each looks at",
+    ]
 
 
 def _groups(table: pd.DataFrame) -> Iterator[str]:
@@ -105,6 +116,26 @@ def _line(name: str, row: pd.Series[float]) -> str:
     )
 
 
+def _objectives(table: pd.DataFrame) -> str:
+    """Return what every plan is worth under both objectives, and the parts of heuristics' gaps."""
+    lines = [
+        "Ranks over all pairs, and given the choice before; a heuristic's gap in two parts:",
+        "what it loses by not looking ahead, and what the change of objective costs",
+        f"{'':22}{'pairs':>11}{'given':>11}{'gap':>8}{'sight':>9}{'change':>9}",
+    ]
+    for problem, rows in table[table["conditional"].notna()].groupby("problem", sort=False):
+        lines.append(f"{problem}:")
+        for name, row in rows.iterrows():
+            line = f"{f'  {name}':22}{row['pairs']:11.2f}{row['conditional']:11.2f}"
+            if np.isfinite(row["short_sight"]):
+                line += f"{100 * row['gap']:7.2f}%"
+                line += "".join(
+                    f"{100 * row[part]:8.2f}%" for part in ("short_sight", "change_of_objective")
+                )
+            lines.append(line)
+    return "\n".join(lines)
+
+
 def _ranks(table: pd.DataFrame) -> str:
     """Return where the published plan's nodes rank, a line for each way to rank them."""
     return "\n".join(
@@ -114,7 +145,7 @@ def _ranks(table: pd.DataFrame) -> str:
 
 def _rank_lines(table: pd.DataFrame) -> Iterator[str]:
     for column, label in (
-        ("rank_in_window", "rank_search, cascade"),
+        ("rank_in_window", "cascade"),
         ("rank_overlap", "overlap"),
         ("rank_peak", "minimax"),
     ):

@@ -3,16 +3,26 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Callable, Set
-from pathlib import Path
+from enum import Enum
 
 from seqopt.errors import MemoryShortError
+from seqopt.responses.alike import choices_of
 from seqopt.sequence.schedule import Schedule
+from seqopt.work.memory import free_memory
 
 NUMBER = 8  # bytes
 BESIDE = 6  # numbers per choice beside its responses: nodes, order, costs
-MEMORY = Path("/proc/meminfo")
+COSTS = 4  # numbers per choice where costs alone are kept: as found, posed, handed over, solved
+AT_ONCE = 24  # numbers per choice of the brick count that is being evaluated
+SHARE = 0.8  # of the free memory that responses and costs may take
+
+
+class Keeping(Enum):
+    """What is kept of the choices of a schedule."""
+
+    RESPONSES = "responses"
+    COSTS = "costs"  # responses come step by step, and go
 
 
 def bytes_of_choices(schedule: Schedule, wanted: Callable[[int], Set[str]]) -> int:
@@ -38,46 +48,59 @@ def bytes_of_choices(schedule: Schedule, wanted: Callable[[int], Set[str]]) -> i
     return total
 
 
-def free_memory() -> float:
-    """Return how much memory can still be had.
+def bytes_of_costs(schedule: Schedule) -> int:
+    """Return what the costs of all choices take, about, while responses come step by step.
+
+    Parameters
+    ----------
+    schedule : Schedule
 
     Returns
     -------
-    float
-        Bytes; infinite where the system does not say.
+    int
+        Bytes.
     """
-    free = math.inf
-    if MEMORY.exists():
-        rows = (line.split() for line in MEMORY.read_text(encoding="ascii").splitlines())
-        free = next((1024.0 * int(row[1]) for row in rows if row[0] == "MemAvailable:"), free)
-    if os.name == "posix":
-        import resource  # noqa: PLC0415  # POSIX has it alone
-
-        limit = resource.getrlimit(resource.RLIMIT_AS)[0]
-        if limit != resource.RLIM_INFINITY:
-            free = min(free, float(limit))
-    return free
+    of_moves: dict[tuple[int, ...], int] = {}
+    of_bricks: dict[int, int] = {}
+    for step in schedule.steps:
+        if step.moves:
+            choices = choices_of(schedule, step)
+            of_moves[step.moves] = choices
+            of_bricks[step.bricks] = of_bricks.get(step.bricks, 0) + choices
+    return NUMBER * (COSTS * sum(of_moves.values()) + AT_ONCE * max(of_bricks.values(), default=0))
 
 
-def require_memory(schedule: Schedule, wanted: Callable[[int], Set[str]]) -> None:
-    """Raise an error if the responses of all choices do not fit into memory.
+def require_memory(
+    schedule: Schedule, wanted: Callable[[int], Set[str]], most: float | None = None
+) -> Keeping:
+    """Return what can be kept of all choices; raise an error if not even their costs can be.
 
     Parameters
     ----------
     schedule : Schedule
     wanted : callable
         Which responses every move needs.
+    most : float, optional
+        Bytes that may be used; by default `SHARE` of what is free.
+
+    Returns
+    -------
+    Keeping
 
     Raises
     ------
     MemoryShortError
         Saying what would be needed.
     """
-    needed, free = bytes_of_choices(schedule, wanted), free_memory()
-    if needed > free:
-        most = max(len(move.candidates) for move in schedule.moves)
-        raise MemoryShortError(
-            f"the responses of all choices take about {needed / 1e9:.3g} GB, and {free / 1e9:.3g} "
-            f"GB are free; let robots reach less (a move has up to {most} candidates), block "
-            "nodes, or search without proof"
-        )
+    most = SHARE * free_memory() if most is None else most
+    if bytes_of_choices(schedule, wanted) <= most:
+        return Keeping.RESPONSES
+    needed = bytes_of_costs(schedule)
+    if needed <= most:
+        return Keeping.COSTS
+    largest = max(len(move.candidates) for move in schedule.moves)
+    raise MemoryShortError(
+        f"the costs of all choices take about {needed / 1e9:.3g} GB, and {most / 1e9:.3g} GB may "
+        f"be used; let robots reach less (a move has up to {largest} candidates), block nodes, "
+        "take near candidates only, or search without proof"
+    )

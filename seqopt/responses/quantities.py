@@ -17,6 +17,7 @@ from seqopt.errors import SolverError
 from seqopt.network.network import Network
 
 SLACK = 1e-6  # an edge is in tension above this share of the mean weight of a brick
+LEVEL = 1e-9  # share of a force that may point down where it counts as level
 TO_1E_3MM = 1e6  # from m to the tables' unit of length, 1e-3 mm
 
 
@@ -177,7 +178,8 @@ def _squared(vectors: Floats) -> Floats:
 
 
 def _signed(network: Network, vectors: Floats) -> Floats:
-    return np.asarray(np.copysign(lengths(vectors), vectors @ np.array(network.scene.up)))
+    size = lengths(vectors)
+    return np.asarray(np.copysign(size, vectors @ np.array(network.scene.up) + LEVEL * size))
 
 
 def _largest_force(network: Network, fields: Fields) -> Floats:

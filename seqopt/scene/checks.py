@@ -249,3 +249,30 @@ def dot(a: Vector, b: Vector) -> float:
     float
     """
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def finite(where: str, value: float) -> float:
+    """Return a finite float.
+
+    Parameters
+    ----------
+    where : str
+        What the number is, for the message.
+    value : float
+
+    Returns
+    -------
+    float
+
+    Raises
+    ------
+    SceneError
+        If it is no number or not finite.
+    """
+    try:
+        number = float(value) if isinstance(value, int | float) else math.nan
+    except OverflowError:
+        number = math.inf
+    if not math.isfinite(number):
+        raise SceneError(f"{where} is {short(value)}; give a finite number")
+    return number

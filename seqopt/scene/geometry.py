@@ -17,7 +17,7 @@ from seqopt.scene.parts import Brick, Ground, Joint
 AT_NODE = 1e-6  # distance that is none, over the length of the brick
 FAR = 1e9  # of a position from the origin, over the smallest dimension: digits are lost beyond
 SIZES = (1e-9, 1e9)  # m; dimensions that a brick may have
-HEAVY = 1e100  # N, N/m, N m/rad; squares of what is beyond overflow
+HEAVY = 1e100  # N, N/m, N m/rad; squares of what is beyond overflow, of its inverse vanish
 
 
 def check_bricks(bricks: Sequence[Brick], gravity: Vector) -> None:
@@ -47,7 +47,7 @@ def check_bricks(bricks: Sequence[Brick], gravity: Vector) -> None:
                 f"{where}: position is {list(brick.position)}, so far out that its size is lost "
                 "to rounding; move the scene to the origin"
             )
-        if not brick.mass * pull <= HEAVY:
+        if pull and not 1 / HEAVY <= brick.mass * pull <= HEAVY:
             raise SceneError(
                 f"{where}: it weighs {brick.mass * pull:g} N; correct its density "
                 f"{brick.density:g} kg/m³ or the scene's gravity {pull:g} m/s²"

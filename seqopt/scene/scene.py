@@ -13,6 +13,7 @@ from seqopt.errors import SceneError
 from seqopt.scene.checks import parts, printable, vector, wholes
 from seqopt.scene.geometry import check_bricks, check_springs
 from seqopt.scene.parts import Brick, Ground, Joint, Robot
+from seqopt.scene.reach import Reach
 
 KINDS = {"bricks": Brick, "joints": Joint, "grounds": Ground, "robots": Robot}
 
@@ -132,6 +133,30 @@ class Scene:
             m.
         """
         return self.brick_of_node[node].node_position(node)
+
+    def within_reach(self, robot: Robot) -> tuple[tuple[int, ...], ...]:
+        """Return the nodes that a robot may hold, by brick.
+
+        Parameters
+        ----------
+        robot : Robot
+
+        Returns
+        -------
+        tuple of tuple of int
+            Bricks in build order; nodes neither blocked nor out of reach.
+        """
+        if robot.reach not in self._within_reach:
+            blocked, covers = {*self.blocked_nodes}, robot.reach.covers
+            self._within_reach[robot.reach] = tuple(
+                tuple(n for n in b.nodes if n not in blocked and covers(b.node_position(n)))
+                for b in self.placed
+            )
+        return self._within_reach[robot.reach]
+
+    @cached_property
+    def _within_reach(self) -> dict[Reach, tuple[tuple[int, ...], ...]]:
+        return {}
 
     @cached_property
     def placed(self) -> tuple[Brick, ...]:

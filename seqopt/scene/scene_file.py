@@ -14,6 +14,7 @@ from typing import Any
 from seqopt.errors import SceneError, SceneWarning
 from seqopt.files import read_text, write_text
 from seqopt.scene.doubts import doubts
+from seqopt.scene.library.builtin import ABOUT, GENERATED
 from seqopt.scene.parts import Brick, Ground, Joint, Robot
 from seqopt.scene.reach import Anywhere, Reach, Side, Sphere
 from seqopt.scene.scene import Scene
@@ -46,8 +47,35 @@ def builtin_scenes() -> tuple[str, ...]:
     tuple of str
         In alphabetical order.
     """
+    return tuple(sorted({*_stored(), *GENERATED}))
+
+
+def about(name: str) -> str:
+    """Return what a built-in scene is.
+
+    Parameters
+    ----------
+    name : str
+        One of `builtin_scenes`.
+
+    Returns
+    -------
+    str
+        A line.
+    """
+    return ABOUT[name]
+
+
+def _stored() -> tuple[str, ...]:
+    """Return the names of the scenes that ship as files."""
     folder = resources.files("seqopt").joinpath("data/scenes")
-    return tuple(sorted(item.name.removesuffix(".json") for item in folder.iterdir()))
+    return tuple(item.name.removesuffix(".json") for item in folder.iterdir())
+
+
+def _load_stored(name: str) -> Scene:
+    """Return a scene that ships as a file."""
+    source = resources.files("seqopt").joinpath(f"data/scenes/{name}.json")
+    return parse_scene(source.read_text(encoding="utf-8"), name)
 
 
 def load_scene(name: str | Path) -> Scene:
@@ -82,9 +110,10 @@ def load_scene(name: str | Path) -> Scene:
     if not isinstance(name, str | Path):
         raise SceneError(f"a {type(name).__name__} is no name of a scene; give text or a path")
     name = str(name)
-    if name in builtin_scenes():
-        source = resources.files("seqopt").joinpath(f"data/scenes/{name}.json")
-        return parse_scene(source.read_text(encoding="utf-8"), name)
+    if name in GENERATED:
+        return GENERATED[name](_load_stored)
+    if name in _stored():
+        return _load_stored(name)
     path = Path(name)
     if not path.suffix and not os.path.lexists(path):
         known = ", ".join(builtin_scenes())

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 from seqopt.errors import StepError
 from seqopt.scene.scene import Scene
@@ -92,6 +93,8 @@ class Schedule:
         Numbered from 1.
     moves : tuple of Move
         In the order in which they are made.
+    left_out : str, optional
+        What was done to look at fewer candidates than there are; empty where all are open.
 
     Raises
     ------
@@ -113,6 +116,7 @@ class Schedule:
     scene: Scene
     steps: tuple[OpenStep, ...]
     moves: tuple[Move, ...]
+    left_out: str = ""
 
     def __post_init__(self) -> None:
         for step in self.steps:
@@ -121,6 +125,14 @@ class Schedule:
                     f"step {step.number}: moves {[m + 1 for m in step.moves]} are open at once; "
                     "at most two neighboring ones can be"
                 )
+
+    @cached_property
+    def steps_of(self) -> Mapping[tuple[int, ...], tuple[OpenStep, ...]]:
+        """The steps by the moves that are open in them, in order."""
+        found: dict[tuple[int, ...], list[OpenStep]] = {}
+        for step in self.steps:
+            found.setdefault(step.moves, []).append(step)
+        return {moves: tuple(steps) for moves, steps in found.items()}
 
     def fill(self, nodes: Sequence[int]) -> tuple[Step, ...]:
         """Return the checked sequence in which every move takes the node chosen for it.

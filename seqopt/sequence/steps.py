@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import Enum
+from itertools import chain
 from numbers import Integral
 from typing import Protocol
 
@@ -147,12 +148,7 @@ def reachable(scene: Scene, robot: Robot, bricks: int) -> tuple[int, ...]:
     tuple of int
         In build order; neither blocked nor out of reach.
     """
-    return tuple(
-        node
-        for brick in scene.placed[:bricks]
-        for node in brick.nodes
-        if node not in scene.blocked_nodes and robot.reach.covers(brick.node_position(node))
-    )
+    return tuple(chain.from_iterable(scene.within_reach(robot)[:bricks]))
 
 
 def check_sequence(scene: Scene, steps: Sequence[Step]) -> tuple[Step, ...]:
@@ -228,19 +224,19 @@ def _check_state(scene: Scene, step: AnyStep) -> None:
 def _check_grip(scene: Scene, step: AnyStep, robot: Robot, node: int) -> None:
     """Require a node that exists, is free and stands within reach."""
     placed = {n for brick in scene.placed[: step.bricks] for n in brick.nodes}
-    possible = reachable(scene, robot, step.bricks)
     if node not in scene.brick_of_node:
         reason = "there is no such node"
     elif node in scene.blocked_nodes:
         reason = "the node is blocked"
     elif node not in placed:
         reason = f"brick {scene.brick_of_node[node].name} is not placed yet"
-    elif node not in possible:
+    elif not robot.reach.covers(scene.brick_of_node[node].node_position(node)):
         reason = "the node is out of its reach"
     else:
         return
+    possible = _list(reachable(scene, robot, step.bricks))
     raise StepError(
-        f"step {step.number}: {robot.name} at node {node}: {reason}; it can hold {_list(possible)}"
+        f"step {step.number}: {robot.name} at node {node}: {reason}; it can hold {possible}"
     )
 
 

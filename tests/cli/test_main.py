@@ -53,11 +53,12 @@ def test_compare_of_another_scene_shows_no_study(capsys, tmp_path):
 
 
 def test_compare_says_what_is_not_possible(capsys, tmp_path):
-    path = scene_file(capsys, tmp_path, lambda d: d["robots"].pop())
+    path = tmp_path / "short.json"
+    save_scene(replace(from_both_ends(3), robots=anywhere(3)), path)
     status, out, _ = run(capsys, "compare", str(path))
     assert status == 0
     assert "cantilever" in out
-    assert "Three-robot loop: not possible here; " in out
+    assert "Loop of robots: not possible here; " in out
     path = scene_file(capsys, tmp_path, lambda d: d.update(robots=d["robots"][:1]))
     status, _, err = run(capsys, "compare", str(path))
     assert (status, err.count("\n")) == (2, 1)
@@ -87,6 +88,25 @@ def test_analyze_writes_the_columns_of_table_a1(capsys, tmp_path, engine, engine
     for column in ("F_rob1_N", "M_sup_Nm", "D_max_1e-3mm"):
         close = 1e-5 * values[column].abs().max()
         assert (table[column] - values[column]).abs().max() <= close
+
+
+def test_a_staged_analysis_carries_what_is_locked_in(capsys, tmp_path, engine25):
+    tables = {}
+    for way in ("fitted", "planned"):
+        path, fields = tmp_path / f"{way}.csv", tmp_path / f"{way}.npz"
+        words = ("--staged", way, "--out", str(path), "--fields", str(fields))
+        assert run(capsys, "analyze", "--method", "cantilever", *words)[0] == 0
+        tables[way] = pd.read_csv(path)
+        last = np.load(fields)["step49_displacement"]
+        largest = 1e6 * np.linalg.norm(last, axis=1).max()
+        assert tables[way]["D_max_1e-3mm"].iloc[-1] == pytest.approx(largest, rel=1e-4)
+    once = analyze(engine25, cantilever(engine25.network))
+    fitted, planned = tables["fitted"], tables["planned"]
+    assert fitted["F_max_N"].max() == planned["F_max_N"].max() < 0.8 * once["F_max_N"].max()
+    assert fitted["D_max_1e-3mm"].max() > planned["D_max_1e-3mm"].max()
+    words = ("analyze", "--method", "cantilever", "--staged", "fitted", "--engine", "frame")
+    status, _, err = run(capsys, *words)
+    assert (status, "--engine compliance" in err) == (2, True)
 
 
 def test_analyze_prints_without_out(capsys):
@@ -181,6 +201,7 @@ def test_robots_by_name_and_those_that_never_grip(capsys, tmp_path):
     assert (status, err) == (0, "robots: rob2 never grips\n")
     report = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
     assert (report["schedule"], report["idle_robots"]) == ("two-robot", ["rob2"])
+    assert report["models_paper_count"] is None
     status, out, err = run(capsys, "analyze", "--method", "sequential", "--robots", "rob3, rob2")
     assert (status, err) == (0, "robots: rob1 never grips\n")
     first = pd.read_csv(io.StringIO(out)).iloc[0]
@@ -201,6 +222,29 @@ def test_compare_names_idle_robots_and_degenerate_methods(capsys, tmp_path):
     assert "- sequential: rob3, rob4 never grip\n" in out
     assert "- three-robot loop: rob4 never grips\n" in out
     assert "- cantilever: no brick extends one that is held" in out
+
+
+@pytest.mark.parametrize(
+    ("robots", "says"),
+    [
+        ("rob3,rob2", ["Two-robot loop, ", "- sequential: rob1 never grips"]),
+        ("rob3,rob1,rob2", ["Three-robot loop, ", "models counted as in the paper: 2,576"]),
+    ],
+)
+def test_compare_takes_the_robots_that_are_named(capsys, robots, says):
+    status, out, _ = run(capsys, "compare", "--robots", robots)
+    assert status == 0
+    assert [text for text in says if text not in out] == []
+    assert "nodes rank" not in out  # the published plan has roles of its own
+
+
+def test_the_loop_of_two_is_compared_where_there_is_no_third(capsys, tmp_path):
+    path = tmp_path / "two.json"
+    save_scene(replace(from_both_ends(7), robots=anywhere(2)), path)
+    status, out, _ = run(capsys, "compare", str(path))
+    assert status == 0
+    assert "Two-robot loop, " in out
+    assert "overlap_dp" in out
 
 
 @pytest.mark.parametrize(
@@ -263,7 +307,7 @@ def test_optimize_with_words_of_ones_own(capsys, tmp_path):
 
 def test_optimize_without_proof(capsys, tmp_path):
     chosen = ("--formulation", "rank_search", "--engine", "auto")
-    for folder, words in (("with", ()), ("without", ("--no-proof",))):
+    for folder, words in (("with", ("--option", "horizon=1")), ("without", ("--no-proof",))):
         status, out, _ = run(capsys, "optimize", *chosen, *words, "--out", str(tmp_path / folder))
         assert (status, out.count("\n")) == (0, 1)
         assert ("not compared with the optimum" in out) == (folder == "without")
@@ -461,3 +505,69 @@ def test_the_command_line_says_why(capsys):
     assert "use the compliance engine" in capsys.readouterr().err
     assert main(["analyze", "--method", "sequential", "--mortar", "dry"]) == 2
     assert "engine compliance: its joints hold anything" in capsys.readouterr().err
+
+
+def test_ranks_are_taken_as_asked(tmp_path):
+    words = ("--formulation", "overlap_dp", "--ranked", "conditional")
+    assert main(["optimize", "arch25", *words, "--out", str(tmp_path / "a")]) == 0
+    found = json.loads((tmp_path / "a" / "summary.json").read_text(encoding="utf-8"))
+    assert (found["ranked"], found["among"]) == ("conditional", "all")
+    assert found["objective"] == found["objectives"]["conditional"] == pytest.approx(656.025)
+
+
+def test_ranks_are_not_asked_of_what_has_none(tmp_path, capsys):
+    words = ("--formulation", "overlap_dp", "--criteria", "weighted", "--among", "possible")
+    assert main(["optimize", "arch25", *words, "--out", str(tmp_path / "a")]) == 2
+    assert "--among possible: weighted has no ranks; leave it out" in capsys.readouterr().err
+
+
+def test_budgets_are_kept_as_asked(tmp_path):
+    words = ("--formulation", "labels", "--budget", "travel=0.8", "--budget")
+    words += ("steps_over:F_largest=300:3", "--out", str(tmp_path / "a"))
+    assert main(["optimize", "arch25", *words]) == 0
+    found = json.loads((tmp_path / "a" / "summary.json").read_text(encoding="utf-8"))
+    way, steps = found["budgets"].values()
+    assert way["bound"] == pytest.approx(0.8 * 24.006771, rel=1e-6)
+    assert way["spent"] <= way["bound"]
+    assert way["price"] > 0
+    assert steps["spent"] <= steps["bound"] == 3
+    assert found["status"] == "optimal"
+    assert found["ended"] == "done"
+
+
+@pytest.mark.parametrize(
+    ("budget", "status", "said"),
+    [
+        ("travel=2m", 3, "any takes at least 10.8316 of 'robot travel [m]', more than 2"),
+        ("travel=few", 2, "'few' is not a number from 0"),
+        ("travel=-1m", 2, "'-1' is not a number from 0"),
+        ("travel=250:3", 2, "there is no such; give travel=0.8"),
+        ("steps_over:T_max=3", 2, "there is no such; give travel=0.8"),
+        ("steps_over:T_max=80:3m", 2, "steps have no meters"),
+        ("robot_use:rob9=80:3", 2, "response F_rob9: there is no such"),
+    ],
+)
+def test_budgets_that_cannot_be_get_one_line(tmp_path, capsys, budget, status, said):
+    words = ("--formulation", "labels", "--budget", budget, "--out", str(tmp_path / "a"))
+    assert main(["optimize", "arch25", *words]) == status
+    assert said in capsys.readouterr().err
+    assert not (tmp_path / "a").exists()
+
+
+def test_a_budget_is_given_once(tmp_path, capsys):
+    words = ("--formulation", "labels", "--budget", "travel=2m", "--budget", "travel=0.5")
+    assert main(["optimize", "arch25", *words, "--out", str(tmp_path / "a")]) == 2
+    assert "--budget travel=0.5: it stands there twice" in capsys.readouterr().err
+
+
+def test_a_time_limit_ends_with_a_choice_and_a_trace(tmp_path, capsys):
+    words = ("--formulation", "overlap_dp", "--time-limit", "0", "--out", str(tmp_path / "a"))
+    assert main(["optimize", "arch25", *words]) == 0
+    found = json.loads((tmp_path / "a" / "summary.json").read_text(encoding="utf-8"))
+    assert (found["ended"], found["status"]) == ("stopped", "feasible")
+    trace = pd.read_csv(tmp_path / "a" / "trace.csv")
+    assert list(trace.columns) == ["seconds", "objective", "bound", "gap"]
+    assert trace["objective"].iloc[-1] == pytest.approx(found["objective"])
+    assert trace["bound"].iloc[-1] <= found["bound"]
+    assert main(["optimize", "arch25", *words[:2], "--time-limit", "soon", *words[4:]]) == 2
+    assert "--time-limit: 'soon' is not a positive number or zero" in capsys.readouterr().err

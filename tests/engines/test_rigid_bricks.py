@@ -45,8 +45,12 @@ def test_grips_beyond_a_loose_joint(factor, only_turning):
         assert error(net, fields, row, grips) <= 1e-9
     operator = OperatorBuilder(net, grow_tree(net)).operator(25)
     columns = grip_columns(net, 25, np.array(sets))
-    _, trusted = solve_batch(operator, columns)
-    assert trusted.tolist() == [factor > 1e-5, factor > 1e-5, True]
+    for accuracy in (1e-9, 1e-6):
+        fields, trusted = solve_batch(operator, columns, Want.ALL, accuracy=accuracy)
+        assert trusted[2]
+        assert not trusted[:2].any() or factor >= 1e3 * np.finfo(float).eps / accuracy
+        for row in np.flatnonzero(trusted):
+            assert error(net, fields, row, sets[row]) <= accuracy
 
 
 @pytest.mark.parametrize("count", [1, 2, 6, 9])
@@ -60,7 +64,7 @@ def test_many_small_systems(count):
     assert np.abs(answer.T - expected).max() <= 1e-9 * np.abs(expected).max()
     diagonals = np.linalg.cholesky(matrix).diagonal(axis1=1, axis2=2) ** 2
     scaled = diagonals / matrix.diagonal(axis1=1, axis2=2)
-    assert pivot == pytest.approx(scaled.min(axis=1), rel=1e-6)
+    assert np.abs(pivot.T / scaled - 1).max() <= 1e-6
 
 
 @pytest.mark.parametrize("last", [-1.0, 0.0, 0.5, 1.0, 1.0 + 1e-9])
@@ -71,8 +75,8 @@ def test_a_system_that_is_not_positive_is_seen(last):
     system[:3, :, 1] = 2 * np.eye(3)
     system[3] = 1.0
     answer, pivot = solve_positive(system)
-    assert not pivot[0] >= 1e-8  # also where it is no number
-    assert pivot[1] == 1
+    assert not pivot[:, 0].min() >= 1e-8  # also where it is no number
+    assert (pivot[:, 1] == 1).all()
     assert answer[:, 1].tolist() == [0.5, 0.5, 0.5]
 
 
@@ -93,19 +97,20 @@ def test_loads_in_two_directions():
     assert not np.ptp(net.node_position[:, 1])
     space = OperatorBuilder(net, grow_tree(net)).operator(6)
     kept = np.flatnonzero(np.arange(36) % 3 != 1)
-    rows = ("edge_force", "displacement", "support", "joint_wrench", "brick_twist")
     plane = replace(
         space,
         flexibility=space.flexibility[np.ix_(kept, kept)],
         dead_displacement=space.dead_displacement[kept],
         axis=space.axis[:, [0, 2]],
-        **{name: getattr(space, name)[[*kept, 36]] for name in rows},
+        loss=space.loss[kept],
+        twist=space.twist[[*kept, 36]],
+        wrench=space.wrench[[*kept, 36]],
     )
     columns = np.array([(0, 7, 11), (6, 7, 2), (3, 9, 8), (4, 1, 10)])
     (more, sound), (less, trusted) = (solve_batch(o, columns, Want.ALL) for o in (space, plane))
     assert sound.all()
     assert trusted.all()
-    for name in rows[:3]:
+    for name in ("edge_force", "displacement", "support"):
         gap = np.abs(getattr(less, name) - getattr(more, name)).max()
         assert gap <= 1e-12 * np.abs(getattr(more, name)).max()
 

@@ -50,11 +50,31 @@ def test_promises_are_held(problem25):
         certify(problem25, replace(poor, bound=poor.objective), Aim.SUM)
 
 
-def test_a_budget_keeps_its_claimed_bound(problem25):
+def test_within_a_budget_the_certificate_proves_the_optimum_itself(problem25):
     capped = replace(problem25, budgets=(travel(problem25, 20.0),))
-    certificate = solve(capped, ALL["overlap_mip"]).certificate
-    assert certificate.gap > 0  # from the least value without the budget
-    assert certificate.claimed_gap <= 1e-6
+    for name in ("overlap_mip", "labels"):
+        certificate = solve(capped, ALL[name]).certificate
+        assert certificate.gap <= 1e-6
+        assert certificate.bound > solve(problem25, "overlap_dp").certificate.bound + 1.0
+
+
+def test_within_a_budget_a_poor_answer_is_seen_and_prices_need_not_be_believed(problem25):
+    capped = replace(problem25, budgets=(travel(problem25, 20.0),))
+    best = solve(capped, "labels")
+    poor = min(
+        (
+            (*best.selection.choice[:k], other, *best.selection.choice[k + 1 :])
+            for k, size in enumerate(problem25.sums.sizes)
+            for other in range(size)
+            if other != best.selection.choice[k]
+        ),
+        key=lambda c: (capped.budgets[0].spent(c) > 20.0, problem25.sums.cost(c)),
+    )
+    value = problem25.sums.cost(poor)
+    for prices in ({}, best.selection.prices, {"robot travel [m]": 1e9}, {"robot travel [m]": -1}):
+        proof = certify(capped, Selection(poor, value, prices=prices), Aim.SUM)
+        assert proof.gap == pytest.approx((value - best.certificate.objective) / value, abs=1e-9)
+        assert proof.gap > 1e-5
 
 
 def test_a_choice_that_is_not_allowed_is_caught():

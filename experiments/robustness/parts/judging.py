@@ -26,6 +26,7 @@ from seqopt.responses.quantities import RESPONSES, robot_response
 LONGEST = 60.0  # s; a case that takes longer hangs
 ENDS = {status.value for status in Status} - {Status.INTERRUPTED.value}
 STARTS = ("seqopt", "engine: ", "robots: ", "payload: ")  # of lines on standard error
+ARCHIVE, IMAGE = b"PK", b"\x89PNG"  # how files of fields and of pictures begin
 SET = {"plan.csv", "selection.csv", "responses.csv", "summary.json"}
 
 
@@ -121,17 +122,19 @@ def _fault_of_files(folder: Path, status: int) -> str:
 
 
 def _fault_of_content(path: Path) -> str:
-    if path.suffix == ".json":
-        document = json.loads(path.read_text(encoding="utf-8"))
-        numbers = [v for v in document.values() if isinstance(v, float)]
-        return "" if np.isfinite(numbers).all() else "a number is not finite"
-    if path.suffix == ".npz":
-        with np.load(path) as fields:
+    """Return what is not finite in a file, told by its content: names are drawn at random too."""
+    content = path.read_bytes()
+    if content.startswith(ARCHIVE):
+        with np.load(io.BytesIO(content)) as fields:
             floats = [fields[n] for n in fields.files if fields[n].dtype.kind == "f"]
         return "" if all(np.isfinite(a).all() for a in floats) else "a field is not finite"
-    if path.suffix == ".csv" or path.name.startswith("out"):
-        return _fault_of_table(path.read_text(encoding="utf-8"))
-    return ""
+    if content.startswith(IMAGE):
+        return ""
+    text = content.decode()
+    if text.startswith("{"):
+        numbers = [v for v in json.loads(text).values() if isinstance(v, float)]
+        return "" if np.isfinite(numbers).all() else "a number is not finite"
+    return _fault_of_table(text)
 
 
 def _fault_of_text(case: Case, status: int, text: str) -> str:

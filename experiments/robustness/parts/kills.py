@@ -19,8 +19,10 @@ SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
 OPTIMIZE = ("plan.csv", "selection.csv", "responses.csv", "summary.json")
 BLOCKS = tuple(f"block{i}" for i in range(24))
 WRITER = """
+import signal
 from pathlib import Path
 from seqopt.files import write_folder
+signal.signal(signal.SIGTERM, signal.default_int_handler)  # as the command line takes it
 for name in range(1000):
     write_folder(Path("{out}", str(name)), {{f"block{{i}}": "x" * 500_000 for i in range(24)}})
 """
@@ -45,6 +47,8 @@ def killed(program: str, number: int) -> dict[str, object]:
         "write": (writing, BLOCKS, 2.0),
     }[program]
     how = SIGNALS[number % len(SIGNALS)]
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # in the background of a shell, and it
+        signal.signal(signal.SIGINT, signal.default_int_handler)  # would be so in what is started
     with tempfile.TemporaryDirectory() as name:
         out = Path(name) / "out"
         process = subprocess.Popen(

@@ -1,11 +1,13 @@
-"""The fast engine: exactly rigid bricks, one compliance operator per brick count.
+"""The fast engine: exactly rigid bricks, one flexibility that grows with the build.
 
 With the flexibility ``G`` of the inner nodes and their displacements ``d`` under the weight, grips
 at the nodes ``S`` exert the forces ``λ`` that hold them still, ``G[S, S] λ = -d[S]``; every
 response is then the sum of the responses to the weight and to ``λ``. Where these nearly cancel
-(grips far out on a long chain and close together, or beyond a joint that is nearly loose), and
-where something is loose, grip sets are corrected by the residuals of wrenches and motions side by
-side (`seqopt.engines.rigid.refinement`).
+(grips far out on a long chain and close together, or beyond a joint that is nearly loose), so that
+more than the accepted error may be left, and where something is loose, grip sets are corrected by
+the residuals of wrenches and motions side by side (`seqopt.engines.rigid.refinement`).
+
+Brick counts are best asked in ascending order: what all of them share grows in place.
 """
 
 from __future__ import annotations
@@ -21,6 +23,7 @@ from seqopt.arrays import Bools, Floats, Ints
 from seqopt.engines.basis import SPACE, Basis
 from seqopt.engines.failures import failing_in_a_line
 from seqopt.engines.interface import (
+    FLAGS,
     NAMES,
     Fields,
     Want,
@@ -28,17 +31,22 @@ from seqopt.engines.interface import (
     keep_wanted,
     require_finite,
 )
-from seqopt.engines.rigid.grip_equations import grip_forces
-from seqopt.engines.rigid.operator import ComplianceOperator, OperatorBuilder, load_matrix
+from seqopt.engines.rigid.grip_equations import grip_forces, share_pairs
+from seqopt.engines.rigid.kept import Kept
+from seqopt.engines.rigid.operator import ComplianceOperator, OperatorBuilder
 from seqopt.engines.rigid.refinement import Refinement
 from seqopt.engines.rigid.spanning_tree import grow_tree
 from seqopt.engines.threads import one_thread
 from seqopt.network.build import network_of
 from seqopt.network.network import Network
+from seqopt.network.statics import Statics, build_statics
 from seqopt.scene.scene import Scene
 
+KEPT = 32e6  # bytes of operators that may stay when another is made
 CHUNK = 2048  # grip sets per pass: keeps the work arrays in the processor's cache
-TRUSTED = 1e-5  # smallest scaled pivot of the grips' equations that keeps errors below about 1e-9
+ACCURACY = 1e-9  # largest error of fields over the largest of each
+SCREEN = 1e-6  # the same, of what is only to be compared
+UNSEEN = 100 * np.finfo(float).eps  # largest error that was met over what is read off the equations
 EVEN = 5e-5  # softest over stiffest joint from which on pivots tell the whole error
 CANCEL = 10.0  # what the grips undo over what is left, where pivots do not
 
@@ -51,14 +59,19 @@ class ComplianceEngine:
     network : Network or Scene
     basis : Basis, optional
         The directions in which bricks are loaded and move; all by default, fewer in a plane.
+    accuracy : float, optional
+        Largest error of fields, over the largest entry of each, that is accepted; with
+        `Want.SCREEN`, `SCREEN` if that is larger. Sets that may err more are corrected.
     """
 
-    def __init__(self, network: Network | Scene, basis: Basis = SPACE) -> None:
+    def __init__(
+        self, network: Network | Scene, basis: Basis = SPACE, accuracy: float = ACCURACY
+    ) -> None:
         network = network_of(network)
         self._network = network
-        self._basis = basis
+        self._basis, self._accuracy = basis, accuracy
         self._tree = grow_tree(network)
-        self._operators: dict[int, ComplianceOperator] = {}
+        self._kept = Kept(KEPT)
         self._even = _count_even(network)
         self._refinement: Refinement | None = None  # of the brick count that was asked last
 
@@ -89,11 +102,13 @@ class ComplianceEngine:
             As of `seqopt.engines.interface.Engine`.
         """
         columns = grip_columns(self._network, bricks, grips)
-        operator = self._operator(bricks)
-        if operator is None:
+        if bricks > len(self._tree.spring):
             answer = keep_wanted(self._refined(bricks, columns), want)
             return require_finite(answer, bricks, grips)
-        fields, trusted = solve_batch(operator, columns, want, even=bricks <= self._even)
+        operator = self._operator(bricks, columns)
+        accuracy = max(SCREEN, self._accuracy) if want & Want.SCREEN else self._accuracy
+        even = bricks <= self._even
+        fields, trusted = solve_batch(operator, columns, want, even=even, accuracy=accuracy)
         if self._basis is not SPACE:
             fields = replace(fields, grip_force=fields.grip_force @ self._basis.force)
         if not trusted.all():
@@ -101,14 +116,25 @@ class ComplianceEngine:
             fields = _replaced(fields, ~trusted, better)
         return require_finite(fields, bricks, grips)
 
-    def _operator(self, bricks: int) -> ComplianceOperator | None:
-        """Return the operator of a partial structure, or None where something may be loose."""
-        if bricks > len(self._tree.spring):
-            return None
-        if bricks not in self._operators:
+    def _operator(self, bricks: int, columns: Ints) -> ComplianceOperator:
+        """Return an operator that answers grip sets: one that is kept, or else a new one."""
+        held = np.unique(columns // 2)
+        known = self._kept.take(bricks)
+        if known is None or not known.covers(held):
+            if known is not None:
+                held = np.union1d(held, known.held)
+            if 2 * len(held) >= bricks:
+                held = np.arange(bricks)
+            self._kept.make_room()
             with one_thread():
-                self._operators[bricks] = self._builder.operator(bricks)
-        return self._operators[bricks]
+                known = self._builder.operator(bricks, held)
+        self._kept.put(bricks, known)
+        return known
+
+    @cached_property
+    def _statics(self) -> Statics:
+        """What edges and supports carry, shared by the corrections of all brick counts."""
+        return build_statics(self._network)
 
     @cached_property
     def _builder(self) -> OperatorBuilder:
@@ -117,15 +143,22 @@ class ComplianceEngine:
 
     def _refined(self, bricks: int, columns: Ints) -> Fields:
         """Return the fields of grip sets that the operator alone does not answer well enough."""
-        operator = self._operator(bricks) if self._basis is SPACE else None
+        operator = None
+        if self._basis is SPACE and bricks <= len(self._tree.spring):
+            operator = self._operator(bricks, columns)
         with one_thread():
             if self._refinement is None or self._refinement.bricks != bricks:
-                self._refinement = Refinement(self._network, bricks, operator)
-            return self._refinement.solve(columns)
+                self._refinement = Refinement(self._network, bricks, self._statics)
+            return self._refinement.solve(columns, operator)
 
 
 def solve_batch(
-    operator: ComplianceOperator, columns: Ints, want: Want = Want.RESPONSES, *, even: bool = True
+    operator: ComplianceOperator,
+    columns: Ints,
+    want: Want = Want.RESPONSES,
+    *,
+    even: bool = True,
+    accuracy: float = ACCURACY,
 ) -> tuple[Fields, Bools]:
     """Return the fields of grip sets, and which of them are accurate.
 
@@ -137,6 +170,8 @@ def solve_batch(
     want : Want, optional
     even : bool, optional
         Whether the joints are about equally stiff: where not, pivots do not tell the whole error.
+    accuracy : float, optional
+        Largest error of fields, over the largest entry of each, that is accepted.
 
     Returns
     -------
@@ -144,32 +179,44 @@ def solve_batch(
         Grip forces in the directions of the operator.
     trusted : (S,) bool
     """
-    sets, held = columns.shape
+    sets = len(columns)
     index = operator.load_index(columns)
     force = np.empty(index.shape)
     trusted = np.empty(sets, dtype=bool)
     for start in range(0, sets, CHUNK):
         part = slice(start, start + CHUNK)
-        force[part], pivot = grip_forces(operator, columns[part], index[part])
-        trusted[part] = pivot >= TRUSTED
+        force[part], _, doubt = grip_forces(operator, columns[part], index[part])
+        trusted[part] = UNSEEN * doubt <= accuracy
     force[~trusted] = 0.0
     if not even:
         trusted &= ~cancels(operator, index, force)
-    load = load_matrix(index, force, len(operator.flexibility))
+    return _fields(operator, columns, index, force, want), trusted
 
-    def answer(rows: Floats, flag: Want, *shape: int) -> Floats:
-        wanted = load @ rows if want & flag else np.empty((sets, 0))
-        return np.asarray(wanted.reshape(sets, wanted.shape[1] // math.prod(shape), *shape))
 
-    fields = Fields(
-        edge_force=answer(operator.edge_force, Want.EDGES),
-        displacement=answer(operator.displacement, Want.DISPLACEMENTS, 3),
+def _fields(
+    operator: ComplianceOperator, columns: Ints, index: Ints, force: Floats, want: Want
+) -> Fields:
+    """Return the fields of grip sets whose grips exert forces (S, k)."""
+    empty = share_pairs(operator, columns, index, force)
+    sets, held = columns.shape
+
+    def answer(name: str, *shape: int) -> Floats:
+        if not want & FLAGS[name]:
+            return np.empty((sets, 0, *shape))
+        wanted = operator.answer(name, index, force)
+        return wanted.reshape(sets, wanted.shape[1] // math.prod(shape), *shape)
+
+    carried = answer("edge_force")
+    if want & Want.EDGES:
+        carried[empty] = 0.0
+    return Fields(
+        edge_force=carried,
+        displacement=answer("displacement", 3),
         grip_force=force[:, : held * operator.directions].reshape(sets, held, operator.directions),
-        support=answer(operator.support, Want.SUPPORT, 6),
-        joint_wrench=answer(operator.joint_wrench, Want.JOINTS, 6),
-        brick_twist=answer(operator.brick_twist, Want.BRICKS, 6),
+        support=answer("support", 6),
+        joint_wrench=answer("joint_wrench", 6),
+        brick_twist=answer("brick_twist", 6),
     )
-    return fields, trusted
 
 
 def _replaced(answer: Fields, which: Bools, better: Fields) -> Fields:
@@ -216,7 +263,6 @@ def cancels(operator: ComplianceOperator, index: Ints, force: Floats) -> Bools:
         rows, pull = index[start : start + CHUNK], force[start : start + CHUNK]
         held = rows[:, :, None], rows[:, None]
         parts = np.einsum("sij,sj->si", size[held], np.abs(pull)) + np.abs(dead[rows])
-        load = load_matrix(rows, pull, len(size))
-        left = np.abs(load @ operator.displacement).max(axis=1)
+        left = np.abs(operator.answer("displacement", rows, pull)).max(axis=1)
         out[start : start + CHUNK] = parts.max(axis=1) > CANCEL * left
     return out

@@ -11,13 +11,33 @@ from seqopt.arrays import Floats, Ints
 from seqopt.engines.rigid.ldlt import solve_positive
 from seqopt.engines.rigid.operator import ComplianceOperator
 
+TINY = np.finfo(float).tiny
 
-def grip_forces(operator: ComplianceOperator, columns: Ints, index: Ints) -> tuple[Floats, Floats]:
+
+class GripForces(NamedTuple):
+    """The forces of the grips of sets, and how far they can be trusted.
+
+    Attributes
+    ----------
+    force : (S, k) float
+        N.
+    pivot : (S,) float
+        The smallest scaled pivot of the equations.
+    doubt : (S,) float
+        What rounding of one part in one may change them by, over the largest; infinite where the
+        equations are not definite.
+    """
+
+    force: Floats
+    pivot: Floats
+    doubt: Floats
+
+
+def grip_forces(operator: ComplianceOperator, columns: Ints, index: Ints) -> GripForces:
     """Return the forces with which grips hold their nodes still.
 
-    Two grips on one rigid brick leave the force between them along the brick undetermined. Each
-    takes what reaches its own node, so that the inner edge between them carries nothing: the limit
-    of a stiff bar with both ends held.
+    Two grips on one rigid brick leave the force between them along the brick undetermined:
+    `share_pairs` says how they share it.
 
     Parameters
     ----------
@@ -29,16 +49,32 @@ def grip_forces(operator: ComplianceOperator, columns: Ints, index: Ints) -> tup
 
     Returns
     -------
-    force : (S, k) float
-        N.
-    pivot : (S,) float
-        The smallest scaled pivot of the equations: rounding over it bounds the error.
+    GripForces
     """
     dead = operator.dead_displacement.take(np.ascontiguousarray(index.T))
-    force, pivot, pairs = _solved(operator, columns, index, dead)
-    if len(pairs.sets):
-        _release(operator, index, force, pairs)
-    return force, pivot
+    force, pivots = _solved(operator, columns, index, dead)
+    pivot = pivots.min(axis=0, initial=1.0)
+    doubt = _doubt(operator, index, force, dead, pivots)
+    return GripForces(force, pivot, np.where(pivot > 0, doubt, np.inf))
+
+
+def _doubt(
+    operator: ComplianceOperator, index: Ints, force: Floats, dead: Floats, pivots: Floats
+) -> Floats:
+    """Return the error of forces (S, k) for rounding of one part in one, over the largest.
+
+    A displacement is known to a share of all that adds up in it; with ``|G_ij| ≤ √(G_ii G_jj)``
+    that is read off the diagonal. Over its pivot it is the force that it leaves undetermined.
+    """
+    rows = np.ascontiguousarray(index.T)
+    loss = operator.loss.take(rows)
+    own = operator.flexibility.diagonal().take(rows)
+    size = np.abs(force.T)
+    root = np.sqrt(np.abs(own) * loss)
+    parts = root * np.einsum("ks,ks->s", root, size) + np.abs(dead) * loss
+    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+        left = np.max(parts / (own * pivots), axis=0, initial=0.0)
+        return np.asarray(left / np.maximum(size.max(axis=0, initial=0.0), TINY))
 
 
 def still_forces(operator: ComplianceOperator, columns: Ints, index: Ints, moved: Floats) -> Floats:
@@ -60,10 +96,45 @@ def still_forces(operator: ComplianceOperator, columns: Ints, index: Ints, moved
     return _solved(operator, columns, index, np.ascontiguousarray(moved.T))[0]
 
 
+def share_pairs(
+    operator: ComplianceOperator, columns: Ints, index: Ints, force: Floats
+) -> tuple[Ints, Ints]:
+    """Let each of two grips on one brick take what reaches its own node.
+
+    Then the inner edge between them carries nothing: the limit of a stiff bar with both ends held.
+    Nothing else in the structure changes.
+
+    Parameters
+    ----------
+    operator : ComplianceOperator
+    columns, index : (S, r), (S, k) int
+        As of `grip_forces`.
+    force : (S, k) float
+        Changed in place, N.
+
+    Returns
+    -------
+    sets, edges : (p,) int
+        The inner edges that carry nothing.
+    """
+    pairs = _pairs(operator, columns)
+    edges = operator.inner_edge[pairs.brick]
+    if not len(edges):
+        return pairs.sets, edges
+    carried = operator.answer("edge_force", index[pairs.sets], force[pairs.sets])
+    shift = carried[np.arange(len(edges)), edges][:, None] * pairs.axis
+    shift[columns[pairs.sets, pairs.first] % 2 == 1] *= -1.0  # the axis leads to the second node
+    width = pairs.axis.shape[1]
+    nodes = force[:, : force.shape[1] - operator.loose].reshape(len(force), -1, width)
+    nodes[pairs.sets, pairs.first] += shift
+    nodes[pairs.sets, pairs.second] -= shift
+    return pairs.sets, edges
+
+
 def _solved(
     operator: ComplianceOperator, columns: Ints, index: Ints, dead: Floats
-) -> tuple[Floats, Floats, _Pairs]:
-    """Return forces (S, k) that undo displacements (k, S), smallest pivots, and pairs of grips."""
+) -> tuple[Floats, Floats]:
+    """Return forces (S, k) that undo displacements (k, S), and scaled pivots (k, S)."""
     sets, count = index.shape
     size = len(operator.flexibility)
     rows = np.ascontiguousarray(index.T)
@@ -80,7 +151,7 @@ def _solved(
         _brace(system[:nodes, :nodes], pairs)
     scale = 1 / operator.softness if operator.loose else 1.0
     answer, pivot = solve_positive(system, operator.loose, scale)
-    return np.ascontiguousarray(answer.T), pivot, pairs
+    return np.ascontiguousarray(answer.T), pivot
 
 
 class _Pairs(NamedTuple):
@@ -114,17 +185,3 @@ def _brace(system: Floats, pairs: _Pairs) -> None:
     rows = np.array([pairs.first, pairs.second, pairs.second])
     columns = np.array([pairs.first, pairs.second, pairs.first])
     blocks[rows, :, columns, :, pairs.sets] += np.array([block, block, -block])
-
-
-def _release(operator: ComplianceOperator, index: Ints, force: Floats, pairs: _Pairs) -> None:
-    """Shift the forces (S, k) of the pairs until their inner edges carry nothing."""
-    edge = operator.inner_edge[pairs.brick]
-    share = operator.edge_force[index[pairs.sets], edge[:, None]]
-    carried = operator.edge_force[-1, edge] + np.einsum("sk,sk->s", force[pairs.sets], share)
-    width = pairs.axis.shape[1]
-    nodes = force[:, : force.shape[1] - operator.loose].reshape(len(force), -1, width)
-    share = share[:, : nodes.shape[1] * width].reshape(len(edge), -1, width)
-    every = np.arange(len(edge))
-    between = share[every, pairs.first] - share[every, pairs.second]
-    shift = (carried / np.einsum("sk,sk->s", between, pairs.axis))[:, None] * pairs.axis
-    nodes[pairs.sets, [pairs.first, pairs.second]] += np.array([-shift, shift])

@@ -13,10 +13,11 @@ import numpy as np
 from scipy import sparse
 
 from seqopt.arrays import Floats
+from seqopt.engines.rigid.loads import inner_edges
 from seqopt.engines.rigid.loose import HeldSystem
 from seqopt.engines.rigid.mixed_system import Ungripped, unscaled
 from seqopt.engines.rigid.operator import ComplianceOperator
-from seqopt.engines.rigid.recovery import reactions
+from seqopt.engines.rigid.response_maps import ResponseMaps, scene_maps
 
 TIED = 0.1  # most that what resists loose motions may be of the springs that they stand on
 
@@ -88,29 +89,27 @@ def _operator(
     parts: Ungripped, states: Floats, flexibility: Floats, softness: float
 ) -> ComplianceOperator:
     """Return the operator whose loads and loose motions lead to scaled states (l + m, n)."""
-    network, bricks, statics = parts.network, parts.bricks, parts.statics
-    loads, edges = 6 * bricks, network.count_edges(bricks)
+    network, bricks = parts.network, parts.bricks
+    loads = 6 * bricks
     weight = np.zeros(len(states))
     weight[:loads] = network.inner_weight[: 2 * bricks].ravel()
     wrench, twist = unscaled(parts, states)
-    edge_force = (statics.edge_of_spring[:edges] @ wrench[:, :, :3].reshape(len(states), -1).T).T
-    edge_force[:loads] += statics.edge_of_load[:edges, :loads].toarray().T
-    inner_edge = np.flatnonzero(network.edge_spring[:edges] < 0)
+    inner_edge, axis, at_second = inner_edges(network, bricks)
 
     def with_weight(rows: Floats) -> Floats:
         return np.vstack([rows, weight @ rows])
 
     return ComplianceOperator(
-        bricks=bricks,
+        held=np.arange(bricks),
         flexibility=flexibility,
         dead_displacement=flexibility @ weight,
-        edge_force=with_weight(edge_force),
-        displacement=with_weight((parts.motion @ twist.T).T),
-        support=with_weight(reactions(network, statics, wrench).reshape(len(states), -1)),
-        joint_wrench=with_weight(wrench.reshape(len(states), -1)),
-        brick_twist=with_weight(twist),
-        axis=network.edge_axis[inner_edge],
+        twist=with_weight(twist),
+        wrench=with_weight(wrench[:, parts.acting].reshape(len(states), -1)),
+        maps=ResponseMaps(scene_maps(network), bricks),
+        at_second=at_second,
+        axis=axis,
         inner_edge=inner_edge,
+        loss=np.ones(len(states)),
         loose=len(states) - loads,
         softness=softness,
     )

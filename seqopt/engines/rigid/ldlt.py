@@ -30,8 +30,8 @@ def solve_positive(system: Floats, negative: int = 0, scale: float = 1.0) -> tup
     -------
     answer : (k, S) float
         Not finite where a matrix is not positive definite.
-    pivot : (S,) float
-        Smallest pivot over its diagonal entry: small where the equations nearly repeat each other.
+    pivot : (k, S) float
+        Pivots over their diagonal entries: small where equations nearly repeat those before them.
     """
     size = system.shape[1]
     every = np.arange(size)
@@ -48,5 +48,5 @@ def solve_positive(system: Floats, negative: int = 0, scale: float = 1.0) -> tup
         answer = system[size]
         for j in range(size - 1, 0, -1):
             answer[:j] -= system[j, :j] * answer[j]
-        pivot = np.min(pivots / diagonal, axis=0, initial=1.0)
-    return answer, pivot
+        pivots /= diagonal
+    return answer, pivots

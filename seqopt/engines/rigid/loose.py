@@ -22,6 +22,7 @@ from seqopt.errors import SolverError
 from seqopt.network.kinematics import point_motion
 from seqopt.network.network import GROUND
 
+NEAR = 0.1  # of the largest: a pivot that large is taken if it fills less, and corrected after
 SOFT = 1e-7  # stiffness over the typical one below which a direction ties nothing
 
 
@@ -92,7 +93,7 @@ def hold_loose(parts: Ungripped) -> HeldSystem:
         )
         matrix = sparse.block_array([[matrix, -wide.T], [wide, None]], format="csr")
     try:
-        factors = splu(sparse.csc_array(matrix))
+        factors = splu(sparse.csc_array(matrix), diag_pivot_thresh=NEAR)
     except RuntimeError as error:  # SuperLU met an exactly zero pivot
         raise SolverError(
             f"{parts.bricks} bricks: exactly singular in double precision; stiffen what is soft"

@@ -82,7 +82,7 @@ class MixedSystem(FrozenValue):
     force: Floats
 
 
-def ungripped_system(network: Network, bricks: int) -> Ungripped:
+def ungripped_system(network: Network, bricks: int, statics: Statics | None = None) -> Ungripped:
     """Return what all systems of a partial structure have in common.
 
     Parameters
@@ -90,6 +90,8 @@ def ungripped_system(network: Network, bricks: int) -> Ungripped:
     network : Network
     bricks : int
         How many bricks stand.
+    statics : Statics, optional
+        Of the network; made anew by default.
 
     Returns
     -------
@@ -104,12 +106,7 @@ def ungripped_system(network: Network, bricks: int) -> Ungripped:
     unit = float(np.median(raw[raw > 0])) if raw.any() else 1.0
     stiffness = raw / unit
     twist_unit = np.tile(1 / lever, bricks)
-    center = network.centroid[:bricks]
-    gap = deformation(
-        springs.bodies[acting], springs.position[acting], center, springs.axes[acting]
-    )
-    gap = sparse.diags_array(np.tile(lever, len(acting))) @ gap
-    gap = gap @ sparse.diags_array(twist_unit)
+    gap = _scaled_gap(network, bricks, lever)
     row = 1 / np.maximum(1.0, stiffness)  # keeps a stiff joint's equation of order one
     blocks = [
         [sparse.diags_array(row), sparse.diags_array(row * stiffness) @ gap],
@@ -122,7 +119,7 @@ def ungripped_system(network: Network, bricks: int) -> Ungripped:
         network=network,
         bricks=bricks,
         motion=motion,
-        statics=build_statics(network),
+        statics=build_statics(network) if statics is None else statics,
         deformation=gap,
         stiffness=stiffness,
         matrix=sparse.csr_array(sparse.block_array(blocks)),
@@ -132,6 +129,16 @@ def ungripped_system(network: Network, bricks: int) -> Ungripped:
         wrench_unit=unit * np.tile(lever, len(acting)),
         unit=unit,
     )
+
+
+def _scaled_gap(network: Network, bricks: int, lever: Floats) -> sparse.csr_array:
+    """Return the deformation (6s, 6b) of the acting springs, all components made lengths."""
+    springs = network.springs
+    mine, center = springs.acting(bricks), network.centroid[:bricks]
+    gap = deformation(springs.bodies[mine], springs.position[mine], center, springs.axes[mine])
+    gap.data *= np.repeat(np.tile(lever, len(mine)), np.diff(gap.indptr))
+    gap.data /= np.tile(lever, bricks)[gap.indices]
+    return gap
 
 
 def mixed_system(parts: Ungripped, grips: Ints, shift: Floats | None = None) -> MixedSystem:

@@ -3,49 +3,53 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
-from scipy import linalg, sparse
 
-from seqopt.arrays import Floats, FrozenValue, Ints
+from seqopt.arrays import Floats, FrozenValue, Ints, frozen
 from seqopt.engines.basis import SPACE, Basis
-from seqopt.engines.rigid.spanning_tree import (
-    SpanningTree,
-    closure_wrenches,
-    compliances,
-    node_wrenches,
-    twists,
-)
-from seqopt.network.kinematics import node_motion
+from seqopt.engines.interface import FLAGS
+from seqopt.engines.rigid.growth import Growth
+from seqopt.engines.rigid.loads import inner_edges, load_matrix
+from seqopt.engines.rigid.response_maps import AT_ONCE, ResponseMaps, scene_maps
+from seqopt.engines.rigid.spanning_tree import SpanningTree
 from seqopt.network.network import Network
-from seqopt.network.statics import build_statics
+
+OF_TWISTS = ("displacement", "brick_twist")  # the other fields follow from wrenches
+FEW = 200  # loads whose responses take little, and are always made once for all
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ComplianceOperator(FrozenValue):
-    """Responses of the first ``bricks`` bricks; rows of all arrays but the first are loads.
+    """What loads on a partial structure of b bricks move and stress; rows of arrays are loads.
 
     Row ``dm + i`` is a unit force in direction ``i`` of d at the ``m``-th inner node
-    (`Network.inner`), l = 2db loads in all: d = 3 in space, 2 in a plane. One more row at the end
-    of the response arrays is the weight of the bricks.
+    (`Network.inner`) of the h bricks that are loaded, l = 2dh loads in all: d = 3 in space, 2 in a
+    plane. One more row at the end of all but the first two arrays is the weight of the b bricks.
 
     Attributes
     ----------
-    bricks : int
+    held : (h,) int
+        The bricks that are loaded, ascending.
     flexibility : (l, l) float
-        Displacements of the inner nodes, m/N.
+        Displacements of their inner nodes, m/N.
     dead_displacement : (l,) float
-        Displacements of the inner nodes under the weight with no grip, m.
-    edge_force : (l + 1, E) float
-    displacement : (l + 1, 3N) float
-    support : (l + 1, 6G) float
-        Force and moment at every ground end of the scene; zero where it does not act.
-    joint_wrench : (l + 1, 6S) float
-    brick_twist : (l + 1, 6b) float
+        Displacements of these under the weight with no grip, m.
+    twist : (l + 1, kb) float
+        Of the bricks, in k directions.
+    wrench : (l + 1, ks) float
+        Of the s springs that act on their second bodies.
+    maps : ResponseMaps
+        What these mean.
+    at_second : (b,) float
+        Along every brick's inner edge, the weight at its second node, N.
     axis : (b, d) float
         Unit vectors along the inner edges, in the directions of the loads.
     inner_edge : (b,) int
         The inner edge of each brick.
+    loss : (l,) float
+        How many last digits of the flexibility of each load are rounding.
     loose : int
         How many loose motions come after the loads, as further rows and unknowns; see
         `seqopt.engines.rigid.held_operator`.
@@ -53,23 +57,50 @@ class ComplianceOperator(FrozenValue):
         Of the springs that they stand on, m/N.
     """
 
-    bricks: int
+    held: Ints
     flexibility: Floats
     dead_displacement: Floats
-    edge_force: Floats
-    displacement: Floats
-    support: Floats
-    joint_wrench: Floats
-    brick_twist: Floats
+    twist: Floats
+    wrench: Floats
+    maps: ResponseMaps
+    at_second: Floats
     axis: Floats
     inner_edge: Ints
+    loss: Floats
     loose: int = 0
     softness: float = 0.0
 
     @property
     def directions(self) -> int:
         """In how many directions a node is loaded and held, d."""
-        return (len(self.flexibility) - self.loose) // (2 * self.bricks)
+        return int(self.axis.shape[1])
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the arrays that there are by now."""
+        names = ("flexibility", "twist", "wrench", *FLAGS)
+        own = sum(int(vars(self)[name].nbytes) for name in names if name in vars(self))
+        return own + self.maps.nbytes
+
+    @cached_property
+    def place(self) -> Ints:
+        """Which of the bricks that are loaded each is, (b,); -1 of one that is not."""
+        out = np.full(len(self.axis), -1)
+        out[self.held] = np.arange(len(self.held))
+        return frozen(out)
+
+    def covers(self, held: Ints) -> bool:
+        """Return whether loads act at the nodes of bricks.
+
+        Parameters
+        ----------
+        held : (h,) int
+
+        Returns
+        -------
+        bool
+        """
+        return bool((self.place[held] >= 0).all())
 
     def load_index(self, columns: Ints) -> Ints:
         """Return which loads act at every grip, and after them all loose motions.
@@ -84,48 +115,94 @@ class ComplianceOperator(FrozenValue):
         (S, rd + m) int
             Rows of the operator.
         """
-        rows = self.directions * columns[:, :, None] + np.arange(self.directions)
+        nodes = 2 * self.place[columns // 2] + columns % 2
+        rows = self.directions * nodes[:, :, None] + np.arange(self.directions)
         rows = rows.reshape(len(columns), self.directions * columns.shape[1])
         if self.loose:
             after = len(self.flexibility) - self.loose + np.arange(self.loose)
             rows = np.hstack([rows, np.tile(after, (len(rows), 1))])
         return np.asarray(rows)
 
+    def answer(self, name: str, index: Ints, force: Floats) -> Floats:
+        """Return a field of sets of forces beside the weight.
 
-def load_matrix(index: Ints, force: Floats, size: int, weight: float = 1.0) -> sparse.csr_array:
-    """Return forces at the loads of an operator, and the weight, as rows of a matrix.
+        Where there are fewer sets than loads of all bricks, their twists and wrenches are summed
+        and mapped; else those of the loads are mapped, once, and then summed.
 
-    A few entries of hundreds: multiplying only these takes half the time of a dense product.
+        Parameters
+        ----------
+        name : str
+            Of a field.
+        index : (S, k) int
+            Loads that act.
+        force : (S, k) float
+            By how much, N.
 
-    Parameters
-    ----------
-    index : (S, k) int
-        Rows of the operator that are loaded.
-    force : (S, k) float
-        By how much, N.
-    size : int
-        How many rows there are before that of the weight.
-    weight : float, optional
-        Share of the weight.
+        Returns
+        -------
+        (S, Q) float
+        """
+        loads, every = len(self.twist) - 1, 2 * self.axis.size
+        if every <= max(FEW, len(index)):  # whatever was asked before: answers do not depend on it
+            return np.asarray(load_matrix(index, force, loads) @ getattr(self, name))
+        states = self.twist if name in OF_TWISTS else self.wrench
+        out = np.empty((len(index), self.maps.count(name)))
+        step = max(16, AT_ONCE // states.shape[1])
+        for start in range(0, len(index), step):
+            part = slice(start, start + step)
+            load = load_matrix(index[part], force[part], loads)
+            self.maps.apply(name, load @ states, out[part])
+        if name == "edge_force":
+            out[:, self.inner_edge] += self.at_second
+            self._add_grips(index, force, out)
+        return out
 
-    Returns
-    -------
-    (S, size + 1) sparse
-    """
-    sets, count = index.shape
-    column = np.full((sets, count + 1), size, dtype=np.int32)
-    column[:, :-1] = index
-    value = np.full((sets, count + 1), weight)
-    value[:, :-1] = force
-    first = np.arange(0, column.size + 1, count + 1, dtype=np.int32)
-    return sparse.csr_array((value.ravel(), column.ravel(), first), shape=(sets, size + 1))
+    def _add_grips(self, index: Ints, force: Floats, out: Floats) -> None:
+        """Add to edge forces (S, E) what forces (S, k) at second nodes send into inner edges."""
+        width = self.directions
+        nodes = (index.shape[1] - self.loose) // width
+        at = index[:, : nodes * width : width] // width
+        brick, own = self.held[at // 2], force[:, : nodes * width].reshape(len(index), nodes, width)
+        along = np.einsum("snd,snd->sn", own, self.axis[brick]) * (at % 2)
+        every = np.arange(len(index))
+        for i in range(nodes):  # two may share an edge
+            out[every, self.inner_edge[brick[:, i]]] += along[:, i]
+
+    def _rows(self, name: str) -> Floats:
+        return self.maps.apply(name, self.twist if name in OF_TWISTS else self.wrench)
+
+    @cached_property
+    def edge_force(self) -> Floats:
+        """Axial forces of all edges under every load, (l + 1, E)."""
+        out, width = self._rows("edge_force"), self.directions
+        out[-1, self.inner_edge] += self.at_second
+        rows = 2 * width * np.arange(len(self.held))[:, None] + width + np.arange(width)
+        out[rows, self.inner_edge[self.held][:, None]] += self.axis[self.held]
+        return frozen(out)
+
+    @cached_property
+    def displacement(self) -> Floats:
+        """Displacements of all nodes, (l + 1, 3n)."""
+        return frozen(self._rows("displacement"))
+
+    @cached_property
+    def support(self) -> Floats:
+        """Force and moment at every ground end of the scene, (l + 1, 6G)."""
+        return frozen(self._rows("support"))
+
+    @cached_property
+    def joint_wrench(self) -> Floats:
+        """Wrenches of all springs of the network, (l + 1, 6S)."""
+        return frozen(self._rows("joint_wrench"))
+
+    @cached_property
+    def brick_twist(self) -> Floats:
+        """Twists of all bricks, (l + 1, 6b)."""
+        return frozen(self._rows("brick_twist"))
 
 
 class OperatorBuilder:
-    """Makes the operator of any brick count of a tree from arrays computed once for all of them.
-
-    Adding a brick with a free end only borders these arrays, so a smaller count is a slice of
-    them; the springs that close loops enter as unknown wrenches.
+    """Makes the operator of any brick count of a tree from what grows with it.
 
     Parameters
     ----------
@@ -137,88 +214,71 @@ class OperatorBuilder:
     """
 
     def __init__(self, network: Network, tree: SpanningTree, basis: Basis = SPACE) -> None:
-        self.network, self.tree, self.basis = network, tree, basis
-        self.statics = build_statics(network)
-        count, size = len(tree.spring), len(basis.wrench)
-        turned = sparse.kron(sparse.eye_array(2 * count), basis.force.T, format="csr")
-        self.edge_of_load = self.statics.edge_of_load[:, : 6 * count] @ turned
-        loads = node_wrenches(network, tree, basis).reshape(count, size, -1)
-        closing = closure_wrenches(network, tree, basis).reshape(count, size, -1)
-        self.wrench = np.concatenate([loads, closing], axis=2)
-        self.strain = compliances(network, tree.spring, basis) @ self.wrench
-        self.twist = twists(network, tree, self.strain, basis)
+        self.network, self.basis = network, basis
+        self.growth = Growth(network, tree, basis)
+        self._maps = scene_maps(network, basis)
+        self._nodes = self._node_motion(np.arange(len(network.inner)))
 
-    def operator(self, bricks: int) -> ComplianceOperator:
+    def operator(self, bricks: int, held: Ints | None = None) -> ComplianceOperator:
         """Return the operator of a partial structure.
 
         Parameters
         ----------
         bricks : int
             How many bricks stand, at most as many as the tree has.
+        held : (h,) int, optional
+            The bricks at whose nodes loads act, ascending; all by default.
 
         Returns
         -------
         ComplianceOperator
         """
-        network, basis = self.network, self.basis
-        loads = len(basis.force) * 2 * bricks
-        closing, wrench, twist = self._closed(bricks)
-        weight = (network.inner_weight[: 2 * bricks] @ basis.force.T).ravel()
-        carried = np.zeros((len(network.springs.since), len(basis.wrench), loads))
-        carried[self.tree.spring[:bricks]] = -wrench
-        carried[self.tree.closures[: len(closing)]] = closing
-        force, motion = basis.embedded(carried), basis.embedded(twist)
-        edges = network.count_edges(bricks)
-        edge_force = self.statics.edge_of_spring[:edges] @ force[:, :3].reshape(-1, loads)
-        edge_force += self.edge_of_load[:edges, :loads].toarray()
-        displacement = node_motion(network, bricks) @ motion.reshape(-1, loads)
-        supports = zip(self.statics.support_of_spring, network.springs.support, strict=True)
-        inner = displacement.reshape(-1, 3, loads)[network.inner[:bricks].ravel()]
-        flexibility = (basis.force @ inner).reshape(loads, loads)
-        inner_edge = np.flatnonzero(network.edge_spring[:edges] < 0)
+        self.growth.reach(bricks)
+        held = np.arange(bricks) if held is None else held
+        which = slice(bricks) if len(held) == bricks else held
+        nodes = self._nodes[which]
+        twist, wrench = self._rows(bricks, which, nodes)
+        moved = _at_nodes(twist.reshape(len(twist), bricks, nodes.shape[2])[:, which], nodes)
+        inner_edge, axis, at_second = inner_edges(self.network, bricks)
         return ComplianceOperator(
-            bricks=bricks,
-            flexibility=flexibility,
-            dead_displacement=flexibility @ weight,
-            edge_force=_with_weight(edge_force, weight),
-            displacement=_with_weight(displacement, weight),
-            support=np.hstack([_with_weight(at_end @ force[s], weight) for at_end, s in supports]),
-            joint_wrench=_with_weight(force.reshape(-1, loads), weight),
-            brick_twist=_with_weight(motion.reshape(-1, loads), weight),
-            axis=network.edge_axis[inner_edge] @ basis.force.T,
+            held=held,
+            flexibility=moved[:-1],
+            dead_displacement=moved[-1],
+            twist=twist,
+            wrench=wrench,
+            maps=ResponseMaps(self._maps, bricks),
+            at_second=at_second,
+            axis=axis @ self.basis.force.T,
             inner_edge=inner_edge,
+            loss=np.repeat(self.growth.loss[held], nodes.shape[1]),
         )
 
-    def _closed(self, bricks: int) -> tuple[Floats, Floats, Floats]:
-        """Return wrenches of closures (c, k, l) and tree, and twists (b, k, l), of l unit loads."""
-        springs, closures = self.network.springs, self.tree.closures
-        each, every = len(self.basis.wrench), 2 * len(self.basis.force)
-        loads, first = every * bricks, every * len(self.tree.spring)
-        active = int(np.searchsorted(springs.since[closures], bricks, side="right"))
-        wrench, twist = self.wrench[:bricks, :, :loads], self.twist[:bricks, :, :loads]
-        if not active:
-            return np.zeros((0, each, loads)), wrench, twist
-        columns = slice(first, first + each * active)
-        strain = self.strain[:bricks, :, columns].reshape(each * bricks, -1)
-        through = self.wrench[:bricks, :, columns].reshape(each * bricks, -1)
-        own = linalg.block_diag(*compliances(self.network, closures[:active], self.basis))
-        factors = linalg.lu_factor(strain.T @ through + own)
-        unknown = -linalg.lu_solve(factors, strain.T @ wrench.reshape(-1, loads))
-        # what a loop leaves open, summed along it: its small difference survives rounding
-        strains = self.strain[:bricks, :, :loads].reshape(-1, loads) + strain @ unknown
-        unknown -= linalg.lu_solve(factors, through.T @ strains + own @ unknown)
-        return (
-            unknown.reshape(active, each, loads),
-            wrench + self.wrench[:bricks, :, columns] @ unknown,
-            twist + self.twist[:bricks, :, columns] @ unknown,
-        )
+    def _node_motion(self, held: Ints) -> Floats:
+        """Return the displacements (h, 2d, k) of the nodes of bricks for their unit twists."""
+        network, basis = self.network, self.basis
+        arms = network.node_position[network.inner[held]] - network.centroid[held][:, None]
+        forces = len(basis.force)
+        out = np.zeros((len(held), 2, forces, len(basis.wrench)))
+        out[..., :forces] = np.eye(forces)
+        out[..., forces:] = basis.levers(arms).swapaxes(-1, -2)
+        return out.reshape(len(held), 2 * forces, len(basis.wrench))
+
+    def _rows(self, bricks: int, which: Ints | slice, nodes: Floats) -> tuple[Floats, Floats]:
+        """Return the twists and wrenches under unit loads at nodes, and under the weight."""
+        k, loads = nodes.shape[2], nodes.shape[0] * nodes.shape[1]
+        springs = int(np.searchsorted(self.network.springs.since, bricks, side="right"))
+        out = []
+        for answers, width in ((self.growth.twist, k * bricks), (self.growth.wrench, k * springs)):
+            by_brick = answers[1 : 1 + k * bricks, :width].reshape(bricks, k, width)
+            rows = np.empty((loads + 1, width))
+            np.matmul(nodes, by_brick[which], out=rows[:-1].reshape(*nodes.shape[:2], width))
+            rows[-1] = answers[0, :width]
+            out.append(rows)
+        return out[0], out[1]
 
 
-def _with_weight(rows: Floats, weight: Floats) -> Floats:
-    """Return responses (Q, l) to unit loads transposed, with the response to the weight below.
-
-    The responses to one load lie side by side in memory: products with few loads read whole rows.
-    """
-    out = np.empty((rows.shape[1] + 1, rows.shape[0]))
-    out[:-1], out[-1] = rows.T, rows @ weight
-    return out
+def _at_nodes(twist: Floats, nodes: Floats) -> Floats:
+    """Return the displacements (L, 2dh) of nodes for rows of twists (L, h, k)."""
+    out = np.empty((len(twist), *nodes.shape[:2]))
+    np.matmul(twist.transpose(1, 0, 2), nodes.swapaxes(1, 2), out=out.transpose(1, 0, 2))
+    return out.reshape(len(twist), nodes.shape[0] * nodes.shape[1])

@@ -9,6 +9,7 @@ by which the operator itself is wrong; the next one is that share smaller.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy import sparse
@@ -17,13 +18,15 @@ from seqopt.arrays import Bools, Floats, Ints
 from seqopt.engines.interface import Fields, join_sets, merge_sets, no_sets
 from seqopt.engines.rigid.grip_equations import grip_forces, still_forces
 from seqopt.engines.rigid.held_operator import held_operator, inner_motion
+from seqopt.engines.rigid.loads import load_matrix
 from seqopt.engines.rigid.loose import HeldSystem, hold_loose
 from seqopt.engines.rigid.mechanism import require_resistance
 from seqopt.engines.rigid.mixed import solve_mixed, unchanged
 from seqopt.engines.rigid.mixed_system import rescaled, ungripped_system, unscaled
-from seqopt.engines.rigid.operator import ComplianceOperator, load_matrix
+from seqopt.engines.rigid.operator import ComplianceOperator
 from seqopt.engines.rigid.recovery import Solution, respond
 from seqopt.network.network import Network
+from seqopt.network.statics import Statics
 
 TOGETHER = 256  # grip sets per pass: their unknowns stay in the processor's cache
 STEPS = 5  # corrections, after which a set is solved on its own
@@ -38,33 +41,33 @@ class Refinement:
     network : Network
     bricks : int
         How many bricks stand.
-    operator : ComplianceOperator, optional
-        Of all directions of space, if there is one; it serves if nothing is loose.
+    statics : Statics, optional
+        Of the network, if they are known.
     """
 
-    def __init__(
-        self, network: Network, bricks: int, operator: ComplianceOperator | None = None
-    ) -> None:
+    def __init__(self, network: Network, bricks: int, statics: Statics | None = None) -> None:
         self.network, self.bricks = network, bricks
-        self.parts = ungripped_system(network, bricks)
+        self.parts = ungripped_system(network, bricks, statics)
         self.held: HeldSystem = hold_loose(self.parts)
-        if operator is None or self.held.loose:
-            operator = held_operator(self.held)
-        self.operator = operator
         self.inner = inner_motion(self.parts)
         weighed = sparse.csr_array(self.parts.load[None])
         self.pulls = sparse.vstack([self.inner / self.parts.unit, weighed], format="csr")
-        springs, rows = len(network.springs.since), len(operator.brick_twist)
-        wrench = operator.joint_wrench.reshape(rows, springs, 6)
-        self.states = rescaled(self.parts, wrench, operator.brick_twist)
 
-    def solve(self, columns: Ints) -> Fields:
+    @cached_property
+    def own(self) -> ComplianceOperator:
+        """Of all nodes and directions, from the factored system; for where something is loose."""
+        return held_operator(self.held)
+
+    def solve(self, columns: Ints, operator: ComplianceOperator | None = None) -> Fields:
         """Return all fields of grip sets.
 
         Parameters
         ----------
         columns : (S, r) int
             Grips as indices into ``network.inner.ravel()``.
+        operator : ComplianceOperator, optional
+            Of all directions of space, with wrenches and twists, if there is one for these grips;
+            it serves if nothing is loose.
 
         Returns
         -------
@@ -77,13 +80,41 @@ class Refinement:
         """
         empty = no_sets(self.network, self.bricks, columns.shape[1])
         starts = range(0, len(columns), TOGETHER)
-        return join_sets([empty, *(self._together(columns[i : i + TOGETHER]) for i in starts)])
+        corrector = Corrector(self, self.own if operator is None or self.held.loose else operator)
+        parts = (corrector.together(columns[i : i + TOGETHER]) for i in starts)
+        return join_sets([empty, *parts])
 
-    def _together(self, columns: Ints) -> Fields:
-        """Return the fields of a few sets."""
+
+class Corrector:
+    """Corrects what an operator answers.
+
+    Parameters
+    ----------
+    system : Refinement
+    operator : ComplianceOperator
+        Of all directions of space.
+    """
+
+    def __init__(self, system: Refinement, operator: ComplianceOperator) -> None:
+        self.network, self.bricks, self.parts = system.network, system.bricks, system.parts
+        self.held, self.inner, self.pulls = system.held, system.inner, system.pulls
+        self.operator = operator
+
+    def together(self, columns: Ints) -> Fields:
+        """Return the fields of a few sets.
+
+        Parameters
+        ----------
+        columns : (S, r) int
+            Grips as indices into ``network.inner.ravel()``.
+
+        Returns
+        -------
+        Fields
+        """
         operator, parts, bricks = self.operator, self.parts, self.bricks
         index = operator.load_index(columns)
-        force, pivot = grip_forces(operator, columns, index)
+        force, pivot, _ = grip_forces(operator, columns, index)
         if operator.loose:
             for row in columns[~(pivot >= HARDLY_HELD)]:
                 require_resistance(self.network, bricks, row)
@@ -99,7 +130,9 @@ class Refinement:
 
     def _states(self, index: Ints, force: Floats, weight: float = 1.0) -> Floats:
         """Return the scaled answers (S, n) to forces (S, k) at loads, and the weight or none."""
-        return np.asarray(load_matrix(index, force, len(self.states) - 1, weight) @ self.states)
+        load = load_matrix(index, force, len(self.operator.twist) - 1, weight)
+        wrench = (load @ self.operator.wrench).reshape(len(index), -1, 6)
+        return rescaled(self.parts, wrench, load @ self.operator.twist)
 
     def _correct(self, columns: Ints, index: Ints, answers: _Answers) -> Bools:
         """Correct answers until they no longer change; return which have come so far, (S,)."""
@@ -122,14 +155,16 @@ class Refinement:
         """Return what must be added to scaled answers (S, n) and grip forces (S, 3r)."""
         operator, parts = self.operator, self.parts
         joints, nodes = len(parts.wrench_unit), force.shape[1]
-        pulled = load_matrix(index[:, :nodes], force, 6 * self.bricks, 1.0) @ self.pulls
+        at = (3 * columns[:, :, None] + np.arange(3)).reshape(force.shape)
+        pulled = load_matrix(at, force, 6 * self.bricks, 1.0) @ self.pulls
         missing = -(parts.matrix @ states.T).T
         missing[:, joints:] += pulled
         answer, pull = self.held.solve(missing)
         moved = (self.inner @ (states + answer)[:, joints:].T).T
         loose = -operator.softness * pull  # how far what is missing moves loose parts
-        moved += loose @ operator.flexibility[6 * self.bricks :, : 6 * self.bricks]
-        moved = np.hstack([np.take_along_axis(moved, index[:, :nodes], axis=1), -pull])
+        if operator.loose:
+            moved += loose @ operator.flexibility[-operator.loose :, : -operator.loose]
+        moved = np.hstack([np.take_along_axis(moved, at, axis=1), -pull])
         change = still_forces(operator, columns, index, moved)
         more = change[:, :nodes].copy()
         change[:, nodes:] += loose

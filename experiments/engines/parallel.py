@@ -1,0 +1,190 @@
+"""Claim: two processes answer a large scene's states at least 1.6 times as fast as one.
+
+That is by the time that they compute, with a core each: on a shared machine the clock says more of
+others. The answers are the same to the last bit, on Dask's local cluster too.
+
+Method: the states of the three-robot loop's steps with one open grip, those that a search without
+proof needs, of the vault of 338 bricks (``--scene`` takes another: ``chain338``, ``wall``, or a
+name of `seqopt.load_scene`; ``--pairs`` takes all steps). One process, two, and Dask's local
+cluster of two take turns in one run, each from a new engine; starting the processes counts, the
+cluster is started before. Per way the medians of: seconds by the clock, time that all processes
+computed (CPU), how many times as fast as one process that is by the clock, and by that time with a
+core each; and what sending a call that does nothing takes. Load is what waited for the cores of the
+machine when the run began.
+
+Inputs: none. Command: ``python -m experiments.engines.parallel [--quick] [--scene NAME]
+[--pairs]``. Writes ``experiments/results/parallel.csv``; rows of other scenes stay.
+"""
+
+from __future__ import annotations
+
+import os
+import resource
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, replace
+from importlib.util import find_spec
+
+import numpy as np
+import pandas as pd
+
+from experiments.harness.arches import half_circle
+from experiments.harness.claim import Claim, Finding, Option, Options, Times, on_this_run
+from experiments.harness.plotting import RESULTS
+from experiments.harness.walls import running_bond
+from seqopt.engines.registry import make_engine
+from seqopt.network.build import build_network
+from seqopt.network.network import Network
+from seqopt.responses.alike import StepChoices
+from seqopt.responses.choices import Evaluation
+from seqopt.responses.resources import Resources
+from seqopt.scene.scene_file import load_scene
+from seqopt.sequence.schedule import Schedule
+from seqopt.sequence.three_robots import three_robot_loop
+from seqopt.work.crew import hire
+from seqopt.work.ordered import map_ordered
+
+TWO = 1.6  # times as fast as one process that two have to be
+WANTED = frozenset({"T_max", "M_sup", "D_max", "F_largest"})
+ROUNDS = 1
+STORE = RESULTS / "parallel.csv"
+
+
+@dataclass(frozen=True)
+class Run:
+    """One way's answers, and what they took, s."""
+
+    steps: tuple[StepChoices, ...]
+    models: int
+    seconds: float
+    cpu: float
+
+
+def network_of(name: str) -> Network:
+    """Return the network of a scene by name; ``chain`` and a number is a half circle."""
+    if name.startswith("chain"):
+        return half_circle(int(name.removeprefix("chain")))
+    return build_network(running_bond(12, 8) if name == "wall" else load_scene(name))
+
+
+def schedule_of(network: Network, *, single: bool) -> Schedule:
+    """Return the three-robot loop, or its steps in which one grip is open."""
+    schedule = three_robot_loop(network)
+    most = 1 if single else 2
+    return replace(schedule, steps=tuple(s for s in schedule.steps if len(s.moves) <= most))
+
+
+def cpu() -> float:
+    """Return the time that this process and its ended children computed, s."""
+    used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return sum(each.ru_utime + each.ru_stime for each in used)
+
+
+def run(network: Network, schedule: Schedule, resources: Resources) -> Run:
+    """Return the answers of a new engine and what they took."""
+    start, before = time.perf_counter(), cpu()
+    engine = make_engine("compliance", network)
+    found = Evaluation(engine, schedule, lambda _: WANTED, resources)
+    return Run(found.steps, found.models, time.perf_counter() - start, cpu() - before)
+
+
+@contextmanager
+def ways() -> Iterator[dict[str, Resources]]:
+    """Have the ways to share the work: one process, two, and Dask's where it is installed."""
+    with ExitStack() as stack:
+        out = {"one process": Resources(), "two processes": Resources(workers=2)}
+        if find_spec("distributed") is not None:
+            from distributed import Client, LocalCluster  # noqa: PLC0415  # an extra
+
+            options = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": None}
+            cluster = stack.enter_context(LocalCluster(processes=True, **options))
+            client = stack.enter_context(Client(cluster))
+            out["dask, two processes"] = Resources(2, client.get_executor())
+        yield out
+
+
+def overhead(resources: Resources, calls: int = 64) -> float:
+    """Return what sending one call that does nothing, and its answer, takes, s."""
+    with hire(resources.executor, resources.workers) as crew:
+        list(map_ordered(abs, range(2), crew))  # the processes are there
+        start = time.perf_counter()
+        list(map_ordered(abs, range(calls), crew))
+        return (time.perf_counter() - start) / calls
+
+
+def measured(name: str, rounds: int, *, single: bool) -> pd.DataFrame:
+    """Return a row per way, the ways having taken turns."""
+    network, load = network_of(name), os.getloadavg()[0]
+    schedule = schedule_of(network, single=single)
+    with ways() as found:
+        runs = {way: [] for way in found}
+        for _ in range(rounds):
+            for way, resources in found.items():
+                runs[way].append(run(network, schedule, resources))
+        sent = {way: overhead(resources) for way, resources in found.items()}
+    alone = runs["one process"]
+    rows = []
+    for way, mine in runs.items():
+        pairs = list(zip(alone, mine, strict=True))
+        rows.append(
+            {
+                "scene": name,
+                "states": "single moves" if single else "all",
+                "way": way,
+                "models": mine[0].models,
+                "seconds": np.median([each.seconds for each in mine]),
+                "cpu_s": np.median([each.cpu for each in mine]) if "dask" not in way else np.nan,
+                "times_as_fast_by_clock": np.median(
+                    [one.seconds / own.seconds for one, own in pairs]
+                ),
+                "times_as_fast_by_cpu": np.median([core_each(way, *pair) for pair in pairs]),
+                "call_s": sent[way],
+                "same": all(own.steps == alone[0].steps for own in mine),
+                "load": load,
+                "cores": os.cpu_count(),
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def core_each(way: str, one: Run, own: Run) -> float:
+    """Return how many times as fast as one process a way is by the time computed, a core each.
+
+    Dask's processes go on, so that what they computed is not known.
+    """
+    if "dask" in way:
+        return np.nan
+    return (2 if way == "two processes" else 1) * one.cpu / own.cpu
+
+
+def holds(table: pd.DataFrame) -> bool:
+    """Return whether the claim holds on the rows of every scene."""
+    two = table[table["way"] == "two processes"]
+    return bool(table["same"].all() and len(two) and (two["times_as_fast_by_cpu"] >= TWO).all())
+
+
+def experiment(options: Options) -> Finding:
+    name = "chain30" if options.quick else options.scene
+    table = measured(name, 1 if options.quick else ROUNDS, single=not options.pairs)
+    print(table.to_string(index=False, float_format="%.4g"))
+    if not options.quick:
+        old = pd.read_csv(STORE) if STORE.exists() else table[:0]
+        same = (old["scene"] == name) & (old["states"] == table["states"][0])
+        merged = pd.concat([old[~same], table]) if len(old[~same]) else table
+        merged.to_csv(STORE, index=False, float_format="%.4g", lineterminator="\n")
+    return on_this_run(holds=holds(table))
+
+
+CLAIM = Claim(
+    experiment,
+    quick="a chain of 30 bricks in one round, too few to gain; nothing written",
+    times=Times.JUDGED,
+    options=(
+        Option("--scene", "which scene", "vault338"),
+        Option("--pairs", "all steps"),
+    ),
+)
+
+if __name__ == "__main__":
+    CLAIM.main()

@@ -1,0 +1,293 @@
+r"""What a unit wrench on any brick moves and stresses, grown brick by brick in one pair of arrays.
+
+A new brick hangs on the tree by one spring: it moves as its parent does, and by what the spring
+gives. That only borders the arrays. Every other spring that begins to act with it closes a loop;
+all of them together change what stands by a correction of rank :math:`6m`,
+
+.. math:: S = C + \Gamma B, \qquad X = -\Gamma S^{-1}, \qquad G \leftarrow G + X \Gamma^T
+
+with the gaps :math:`\Gamma` at these springs under each load, their own compliances :math:`C` and
+the loads :math:`B` that their wrenches :math:`X` are. A gap is summed along the shortest way
+through springs that act already, from what each transmits: the small difference of two large
+motions would lose digits.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator
+
+import numpy as np
+from scipy import linalg
+
+from seqopt.arrays import Floats, Ints
+from seqopt.engines.basis import SPACE, Basis
+from seqopt.engines.rigid.spanning_tree import SpanningTree, compliances
+from seqopt.network.network import GROUND, Network
+
+TINY, ROUNDING = np.finfo(float).tiny, np.finfo(float).eps
+AT_ONCE = 2**17  # numbers changed at a time: they stay in the processor's cache
+TAKEN = 1e3  # times less a brick moves in closed loops: rounding of what is gone would show
+WORSE = 10.0  # times the rounding that was left when they were summed anew
+SAMPLE = 600  # motions that are compared with each other, about
+MOST = 0.95  # share of all pairs of motions whose asymmetry counts as rounding
+
+
+class Growth:
+    """The answers of a growing structure to its weight and to unit wrenches on its bricks.
+
+    Row 0 is the weight of the bricks that stand, row ``1 + kb + i`` a unit of component ``i`` of k
+    on brick b at its centroid. Of the arrays, which have room for all bricks of the tree, the rows
+    and columns of bricks and springs that are there count.
+
+    Parameters
+    ----------
+    network : Network
+    tree : SpanningTree
+        On which the bricks hang.
+    basis : Basis, optional
+        k directions in which bricks are loaded and move; all by default.
+
+    Attributes
+    ----------
+    bricks : int
+        How many stand.
+    twist : (1 + kB, kB) float
+        Of the bricks, m and rad.
+    wrench : (1 + kB, kS) float
+        Of every spring on its second body, N and N m.
+    loss : (B,) float
+        How much more than the last digit of a brick's motions is rounding, as what moved it further
+        before is gone.
+    """
+
+    def __init__(self, network: Network, tree: SpanningTree, basis: Basis = SPACE) -> None:
+        self._network, self._tree, self._basis = network, tree, basis
+        self._size = len(basis.wrench)
+        most = self._size * len(tree.spring)
+        self._acting = np.searchsorted(
+            network.springs.since, np.arange(1, len(tree.spring) + 1), side="right"
+        )
+        springs = int(self._acting[-1]) if len(self._acting) else 0
+        self._compliance = compliances(network, np.arange(springs), basis)
+        center = network.centroid[: len(tree.spring)]
+        self._own_arm = self._carried(center - network.springs.position[tree.spring])
+        self._along = self._carried(center - center[tree.parent])
+        self.loss = np.ones(len(tree.spring))
+        self.twist = np.empty((1 + most, most))
+        self.wrench = np.empty((1 + most, self._size * springs))
+        self.bricks = self._closed = 0
+        self._weighed: list[tuple[Floats, Floats]] = []
+        self._ties: dict[int, dict[int, int]] = {}
+        self._left = 1.0  # rounding when the twists were summed anew
+        self._start()
+
+    def reach(self, bricks: int) -> None:
+        """Let a number of bricks stand.
+
+        More than stand are added. Fewer: if no loop was closed since, rows and columns of the
+        others are left out; else all begins anew.
+
+        Parameters
+        ----------
+        bricks : int
+            At most as many as the tree has.
+        """
+        if bricks < self._closed:
+            self._start()
+        if bricks < self.bricks:
+            self.bricks = bricks
+            self._tie(np.arange(self._count(bricks)))
+            del self._weighed[bricks - self._closed + 1 :]
+            twist, wrench = self._weighed[-1]
+            self.twist[0, : len(twist)], self.wrench[0, : len(wrench)] = twist, wrench
+        while self.bricks < bricks:
+            self._add()
+            if self._others(self.bricks - 1).size:
+                self._close(self._others(self.bricks - 1))
+                self._closed, self._weighed = self.bricks, []
+            self._weighed.append((self.twist[0, : self._moves].copy(), self._stressed(0).copy()))
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the arrays for all bricks."""
+        return self.twist.nbytes + self.wrench.nbytes
+
+    @property
+    def _moves(self) -> int:
+        return self._size * self.bricks
+
+    def _count(self, bricks: int) -> int:
+        """Return how many springs act on a number of bricks."""
+        return int(self._acting[bricks - 1]) if bricks else 0
+
+    def _stressed(self, rows: slice | int) -> Floats:
+        """Return the wrenches of the springs that act, of some rows."""
+        return self.wrench[rows, : self._size * self._count(self.bricks)]
+
+    def _start(self) -> None:
+        self.bricks = self._closed = 0
+        self._left = 1.0
+        self._weighed = [(np.empty(0), np.empty(0))]
+        self._tie(np.arange(0))
+        self.twist[0], self.wrench[0] = 0.0, 0.0
+
+    def _others(self, brick: int) -> Ints:
+        """Return the springs beside that of the tree that begin to act with a brick."""
+        mine = np.arange(self._count(brick), self._count(brick + 1))
+        return np.asarray(mine[mine != self._tree.spring[brick]])
+
+    def _add(self) -> None:
+        """Hang the next brick on its spring."""
+        tree, k, brick = self._tree, self._size, self.bricks
+        spring, parent = int(tree.spring[brick]), int(tree.parent[brick])
+        old, after = slice(0, 1 + k * brick), 1 + k * brick
+        mine, rows = slice(k * brick, k * brick + k), slice(after, after + k)
+        self.bricks += 1
+        self._stressed(old)[:, k * self._count(brick) :] = 0.0
+        self._stressed(rows)[:] = 0.0
+        self.twist[rows, : k * brick], self.twist[old, mine] = 0.0, 0.0
+        own, along = self._own_arm[brick], self._along[brick]
+        flexibility = own @ self._compliance[spring] @ own.T
+        if parent != GROUND:
+            theirs, moved = (
+                slice(1 + k * parent, 1 + k * parent + k),
+                slice(k * parent, k * parent + k),
+            )
+            self.twist[rows, : k * brick] = along @ self.twist[theirs, : k * brick]
+            self.twist[old, mine] = self.twist[old, moved] @ along.T
+            self._stressed(rows)[:] = along @ self._stressed(theirs)
+            flexibility = flexibility + along @ self.twist[theirs, moved] @ along.T
+            self.loss[brick] = self.loss[parent]
+        else:
+            self.loss[brick] = 1.0
+        self.twist[rows, mine] = flexibility
+        self.wrench[rows, k * spring : k * spring + k] = -own
+        weight = self._basis.force @ self._network.weight[brick]
+        forces = slice(after, after + len(weight))
+        self.twist[0, : k * brick + k] += weight @ self.twist[forces, : k * brick + k]
+        self._stressed(0)[:] += weight @ self._stressed(forces)
+        self._tie(np.array([spring]), self._ties)
+
+    def _close(self, springs: Ints) -> None:
+        """Let springs act that close loops."""
+        k, rows = self._size, slice(0, 1 + self._moves)
+        gaps = np.concatenate([self._gap(s) for s in springs], axis=1)
+        pulled = np.concatenate([self._pulled(self._stressed(rows), s) for s in springs])
+        own = linalg.block_diag(*self._compliance[springs])
+        system = own + np.concatenate([self._pulled(gaps, s) for s in springs])
+        factors = linalg.lu_factor(0.5 * (system + system.T))
+        closing = -linalg.lu_solve(factors, gaps.T).T
+        closing -= linalg.lu_solve(factors, (gaps + closing @ system).T).T
+        moved = np.ascontiguousarray(gaps[1:].T)
+        stressed, before = self._stressed(rows), self._own().copy()
+        _add_product(self.twist[rows, : self._moves], closing, moved)
+        _add_product(stressed, closing, pulled)
+        for i, spring in enumerate(springs.tolist()):
+            self.wrench[rows, k * spring : k * spring + k] = closing[:, k * i : k * i + k]
+        self._tie(springs, self._ties)
+        lost = (before / np.maximum(self._own(), TINY)).reshape(self.bricks, k).max(axis=1)
+        self.loss[: self.bricks] *= np.maximum(lost, 1.0)
+        if self.loss[: self.bricks].max() > max(TAKEN, WORSE * self._left):
+            self._sum_again()
+
+    def _own(self) -> Floats:
+        """Return how far unit wrenches move their own bricks, (kb,)."""
+        return self.twist[1 : 1 + self._moves, : self._moves].diagonal()
+
+    def _sum_again(self) -> None:
+        """Sum all twists anew, from what springs give on the shortest way from the ground."""
+        k, springs, center = self._size, self._network.springs, self._network.centroid
+        ways = []
+        for parent, brick, spring, sign in self._ways(GROUND):
+            given = (
+                self._compliance[spring] @ self._carried(center[brick] - springs.position[spring]).T
+            )
+            arm = center[brick] - center[parent] if parent != GROUND else np.zeros(3)
+            ways.append((brick, parent, spring, -sign * given, self._carried(arm).T))
+        step = max(1, AT_ONCE // self._moves)
+        for start in range(0, 1 + self._moves, step):
+            part = slice(start, min(start + step, 1 + self._moves))
+            twist = self.twist[part].reshape(part.stop - start, -1, k)
+            wrench = self.wrench[part].reshape(part.stop - start, -1, k)
+            for brick, parent, spring, given, along in ways:
+                twist[:, brick] = wrench[:, spring] @ given
+                if parent != GROUND:
+                    twist[:, brick] += twist[:, parent] @ along
+        self.loss[: self.bricks] = self._left = self._asymmetry()
+
+    def _asymmetry(self) -> float:
+        """Return by how many last digits what should be symmetric is not: that is rounding."""
+        some = np.linspace(0, self._moves - 1, min(self._moves, SAMPLE)).astype(int)
+        matrix, root = self.twist[np.ix_(1 + some, some)], np.sqrt(np.abs(self._own()[some]))
+        apart = np.abs(matrix - matrix.T) / np.maximum(root * root[:, None], TINY)
+        return max(1.0, float(np.quantile(apart, MOST)) / ROUNDING)
+
+    def _gap(self, spring: int) -> Floats:
+        """Return how far the bodies of a spring part at it under every load, (1 + kb, k)."""
+        springs, k = self._network.springs, self._size
+        at, out = springs.position[spring], np.zeros((1 + self._moves, self._size))
+        first, body = springs.bodies[spring].tolist()
+        trail = {}
+        for before, after, s, sign in self._ways(first):
+            trail[after] = before, s, sign
+            if after == body:
+                break
+        while body != first:
+            body, s, sign = trail[body]
+            turn = self._compliance[s] @ self._carried(at - springs.position[s]).T
+            out -= self.wrench[: len(out), k * s : k * s + k] @ (sign * turn)
+        return out
+
+    def _tie(self, springs: Ints, ties: dict[int, dict[int, int]] | None = None) -> None:
+        """Let ways lead through springs, beside those that do or alone."""
+        self._ties = {GROUND: {}} if ties is None else ties
+        for spring, (first, second) in zip(
+            springs.tolist(), self._network.springs.bodies[springs].tolist(), strict=True
+        ):
+            self._ties.setdefault(first, {})[second] = spring
+            self._ties.setdefault(second, {})[first] = spring
+
+    def _ways(self, start: int) -> Iterator[tuple[int, int, int, float]]:
+        """Yield the bodies before and after a spring on ways from one, it, and its sign.
+
+        Nearest first; the sign is negative where its second body comes before.
+        """
+        seen, queue = {start}, deque([start])
+        while queue:
+            body = queue.popleft()
+            for other, spring in self._ties[body].items():
+                if other not in seen:
+                    seen.add(other)
+                    queue.append(other)
+                    second = self._network.springs.bodies[spring, 1]
+                    yield body, other, spring, 1.0 if second == other else -1.0
+
+    def _pulled(self, answers: Floats, spring: int) -> Floats:
+        """Return what a spring's unit wrenches on both its bodies do, of the answers' rows."""
+        k, springs, out = (
+            self._size,
+            self._network.springs,
+            np.zeros((self._size, answers.shape[1])),
+        )
+        for body, sign in zip(springs.bodies[spring].tolist(), (-1.0, 1.0), strict=True):
+            if body != GROUND:
+                arm = springs.position[spring] - self._network.centroid[body]
+                out += sign * self._carried(arm) @ answers[1 + k * body : 1 + k * body + k]
+        return out
+
+    def _carried(self, arm: Floats) -> Floats:
+        """Return the twists (.., k, k) at the ends of arms (.., 3) for unit twists at its start."""
+        out, forces = np.zeros((*arm.shape[:-1], self._size, self._size)), len(self._basis.force)
+        out[...] = np.eye(self._size)
+        out[..., :forces, forces:] = self._basis.levers(arm).swapaxes(-1, -2)
+        return out
+
+
+def _add_product(target: Floats, left: Floats, right: Floats) -> None:
+    """Add the product of matrices (n, p) and (p, m) to one (n, m), a few rows at a time."""
+    step = max(1, AT_ONCE // target.shape[1])
+    room = np.empty((step, target.shape[1]))
+    for start in range(0, len(target), step):
+        part = target[start : start + step]
+        part += np.matmul(left[start : start + step], right, out=room[: len(part)])

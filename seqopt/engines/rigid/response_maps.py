@@ -1,0 +1,189 @@
+"""Which responses the twists of bricks and the wrenches of springs mean."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy import sparse
+
+from seqopt.arrays import Floats, FrozenValue, Ints, frozen
+from seqopt.engines.basis import SPACE, Basis
+from seqopt.network.kinematics import node_motion
+from seqopt.network.network import Network
+from seqopt.network.statics import build_statics
+
+AT_ONCE = 2**18  # numbers mapped at a time: they stay in the processor's cache
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SceneMaps(FrozenValue):
+    """What twists and wrenches of all bricks and springs of a scene mean, once all springs act.
+
+    Attributes
+    ----------
+    network : Network
+    basis : Basis
+        k directions of twists and wrenches.
+    edge : (E, kS) sparse
+        What edges carry of wrenches.
+    motion : (3N, kB) sparse
+        How twists move nodes.
+    since : (m,) int
+        Of the entries of ``motion``, from which brick count on they hold; before, where its spring
+        does not act yet, a joint node follows the brick that is there alone.
+    support : (G, k, 6) float
+        Force and moment at every ground end for the wrench of its spring.
+    """
+
+    network: Network
+    basis: Basis
+    edge: sparse.csr_array
+    motion: sparse.csr_array
+    since: Ints
+    support: Floats
+
+
+def scene_maps(network: Network, basis: Basis = SPACE) -> SceneMaps:
+    """Return the maps of a scene.
+
+    Parameters
+    ----------
+    network : Network
+    basis : Basis, optional
+        All directions by default.
+
+    Returns
+    -------
+    SceneMaps
+    """
+    statics, springs = build_statics(network), network.springs
+    pick = np.zeros((3, len(basis.wrench)))
+    pick[:, : len(basis.force)] = basis.force.T
+    every = sparse.eye_array(len(springs.since))
+    motion = node_motion(network, len(network.inner))
+    if basis is not SPACE:
+        each = sparse.eye_array(len(network.inner))
+        motion = sparse.csr_array(motion @ sparse.kron(each, basis.wrench.T))
+    since = np.where(network.node_spring >= 0, springs.since[network.node_spring], 0)
+    return SceneMaps(
+        network=network,
+        basis=basis,
+        edge=sparse.csr_array(statics.edge_of_spring @ sparse.kron(every, pick)),
+        motion=motion,
+        since=np.repeat(np.repeat(since, 3), np.diff(motion.indptr)),
+        support=basis.wrench @ statics.support_of_spring.transpose(0, 2, 1),
+    )
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ResponseMaps(FrozenValue):
+    """What twists (.., kb) and wrenches (.., ks) of the first b bricks and s springs mean.
+
+    Attributes
+    ----------
+    scene : SceneMaps
+    bricks : int
+        How many stand.
+    """
+
+    scene: SceneMaps
+    bricks: int
+
+    @cached_property
+    def edge(self) -> sparse.csr_array:
+        """What edges carry of wrenches, (E, ks)."""
+        network = self.scene.network
+        acting = int(np.searchsorted(network.springs.since, self.bricks, side="right"))
+        width = acting * len(self.scene.basis.wrench)
+        return frozen(_leading(self.scene.edge, network.count_edges(self.bricks), width))
+
+    @cached_property
+    def motion(self) -> sparse.csr_array:
+        """How twists move nodes, (3n, kb)."""
+        rows = 3 * self.scene.network.count_nodes(self.bricks)
+        width = self.bricks * len(self.scene.basis.wrench)
+        alone = np.where(self.scene.since > self.bricks, 2.0, 1.0)
+        return frozen(_leading(self.scene.motion, rows, width, alone))
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the maps that were made."""
+        made = [vars(self)[name] for name in ("edge", "motion") if name in vars(self)]
+        parts = [(found.data, found.indices, found.indptr) for found in made]
+        return sum(array.nbytes for arrays in parts for array in arrays)
+
+    def count(self, name: str) -> int:
+        """Return how many numbers a field has.
+
+        Parameters
+        ----------
+        name : str
+
+        Returns
+        -------
+        int
+        """
+        network, bricks = self.scene.network, self.bricks
+        return {
+            "edge_force": network.count_edges(bricks),
+            "displacement": 3 * network.count_nodes(bricks),
+            "support": 6 * len(network.springs.support),
+            "joint_wrench": 6 * len(network.springs.since),
+            "brick_twist": 6 * bricks,
+        }[name]
+
+    def apply(self, name: str, states: Floats, out: Floats | None = None) -> Floats:
+        """Return a field of states.
+
+        Parameters
+        ----------
+        name : str
+            Of the field.
+        states : (S, n) float
+            Wrenches; of displacements and brick twists, twists.
+        out : (S, Q) float, optional
+            Where to put it.
+
+        Returns
+        -------
+        (S, Q) float
+            Of edge forces, without what loads on the bricks' nodes add to the inner edges.
+        """
+        out = np.empty((len(states), self.count(name))) if out is None else out
+        if name == "support":
+            self._support(states, out)
+        elif name in ("joint_wrench", "brick_twist"):
+            basis = self.scene.basis
+            own = states.reshape(len(states), -1, len(basis.wrench))
+            whole = own if basis is SPACE else own @ basis.wrench
+            out[:, 6 * own.shape[1] :] = 0.0
+            out[:, : 6 * own.shape[1]] = whole.reshape(len(states), 6 * own.shape[1])
+        else:
+            maps = self.edge if name == "edge_force" else self.motion
+            step = max(16, AT_ONCE // max(1, *maps.shape))
+            for start in range(0, len(states), step):
+                part = slice(start, start + step)
+                out[part] = (maps @ states[part].T).T
+        return out
+
+    def _support(self, states: Floats, out: Floats) -> None:
+        """Put force and moment at every ground end of the scene; zero where it does not act."""
+        k = len(self.scene.basis.wrench)
+        for g, spring in enumerate(self.scene.network.springs.support.tolist()):
+            mine = states[:, k * spring : k * spring + k]
+            there = mine.shape[1] > 0
+            out[:, 6 * g : 6 * g + 6] = mine @ self.scene.support[g] if there else 0.0
+
+
+def _leading(
+    maps: sparse.csr_array, rows: int, width: int, scale: Floats | None = None
+) -> sparse.csr_array:
+    """Return the first rows and columns of a map, scaled; ten times as fast as SciPy."""
+    stop = int(maps.indptr[rows])
+    kept = maps.indices[:stop] < width
+    data = maps.data[:stop] if scale is None else maps.data[:stop] * scale[:stop]
+    before = np.concatenate([[0], np.cumsum(kept)])
+    entries = data[kept], maps.indices[:stop][kept], before[maps.indptr[: rows + 1]]
+    return sparse.csr_array(entries, shape=(rows, width))

@@ -1,0 +1,111 @@
+"""Windows of a schedule: the steps that one move decides once the move before is made."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from seqopt.responses.choices import Evaluation, StepChoices
+from seqopt.sequence.schedule import OpenGrip, Schedule
+
+
+def window(
+    schedule: Schedule, move: int, nodes: Sequence[int] | Mapping[int, int], *, alone: bool = False
+) -> Schedule:
+    """Return the steps that a move shares with the one before, as a schedule of that move alone.
+
+    Parameters
+    ----------
+    schedule : Schedule
+        With all moves open.
+    move : int
+        Index of a move.
+    nodes : sequence of int, or mapping of int to int
+        Chosen for the moves before; that of the last of them is asked for.
+    alone : bool, optional
+        Whether the steps in which the move alone is open belong to it too.
+
+    Returns
+    -------
+    Schedule
+        Of one move; without steps if it shares none.
+    """
+
+    def grip(held: int | OpenGrip | None) -> int | OpenGrip | None:
+        if not isinstance(held, OpenGrip):
+            return held
+        return OpenGrip(0) if held.move == move else nodes[held.move]
+
+    found = schedule.steps_of.get((move - 1, move), ())
+    if alone:
+        found = (*found, *schedule.steps_of.get((move,), ()))
+    steps = [
+        replace(step, grips=tuple(grip(held) for held in step.grips))
+        for step in sorted(found, key=lambda step: step.number)
+    ]
+    return replace(schedule, steps=tuple(steps), moves=(schedule.moves[move],))
+
+
+def window_anew(evaluation: Evaluation, move: int, before: int) -> tuple[StepChoices, ...]:
+    """Return the steps that a move decides, solved for its candidates alone.
+
+    Parameters
+    ----------
+    evaluation : Evaluation
+        Whose responses are not kept.
+    move, before : int
+        A move, and the candidate chosen for the move before it.
+
+    Returns
+    -------
+    tuple of StepChoices
+        In order.
+    """
+    schedule = evaluation.schedule
+    nodes = {move - 1: schedule.moves[move - 1].candidates[before]} if move else {}
+    found = replace(
+        evaluation,
+        schedule=window(schedule, move, nodes, alone=True),
+        resources=evaluation.resources.alone(),
+    )
+    moves = {step.number: step.moves for step in schedule.steps}
+    return tuple(replace(each, moves=moves[each.step.number]) for each in found.steps)
+
+
+def by_move(steps: Sequence[StepChoices]) -> Mapping[int, Sequence[StepChoices]]:
+    """Return the steps that each move decides: those in which it is the last that is open.
+
+    Parameters
+    ----------
+    steps : sequence of StepChoices
+
+    Returns
+    -------
+    mapping of int to sequence of StepChoices
+    """
+    found: dict[int, list[StepChoices]] = {}
+    for choices in steps:
+        found.setdefault(choices.moves[-1], []).append(choices)
+    return found
+
+
+def window_kept(decided: Sequence[StepChoices], before: int) -> tuple[StepChoices, ...]:
+    """Return the steps that a move decides, for its candidates alone, from those of all choices.
+
+    Parameters
+    ----------
+    decided : sequence of StepChoices
+    before : int
+        The candidate chosen for the move before it.
+
+    Returns
+    -------
+    tuple of StepChoices
+        In order.
+    """
+    out = []
+    for choices in decided:
+        row = before if len(choices.moves) == 2 else slice(None)
+        responses = {name: values[row] for name, values in choices.responses.items()}
+        out.append(StepChoices(choices.step, choices.moves, responses))
+    return tuple(out)

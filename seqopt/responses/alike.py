@@ -1,0 +1,287 @@
+"""Open steps with as many bricks and as many grips: their choices, and the states in them, once.
+
+Different choices in different steps are often one state: a brick count and the nodes held.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence, Set
+from dataclasses import dataclass
+from itertools import groupby
+from typing import Protocol
+
+import numpy as np
+
+from seqopt.arrays import Bools, Floats, FrozenValue, Ints
+from seqopt.responses.quantities import CHOSEN_BY, robot_response
+from seqopt.responses.states import Answers, Block
+from seqopt.sequence.schedule import OpenGrip, OpenStep, Schedule
+
+BLOCK = 2048  # grip sets whose fields are held at once: few enough to stay in the cache
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class StepChoices(FrozenValue):
+    """One open step of a schedule and what every choice in it leads to.
+
+    Attributes
+    ----------
+    step : OpenStep
+        Which step of the schedule it is.
+    moves : tuple of int
+        Index of every open move: one, or two neighboring ones.
+    responses : mapping of str to (C,) or (C, D) float
+        Over the candidates of the moves; SI units, sizes without sign; NaN where two robots would
+        hold one node, all NaN for a robot that does not grip.
+    """
+
+    step: OpenStep
+    moves: tuple[int, ...]
+    responses: Mapping[str, Floats]
+
+
+class Wanted(Protocol):
+    """Which responses a move needs."""
+
+    def __call__(self, bricks: int) -> Set[str]:
+        """Return the names of the responses that a move needs.
+
+        Parameters
+        ----------
+        bricks : int
+            Bricks placed when the move is made.
+
+        Returns
+        -------
+        set of str
+        """
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Alike(FrozenValue):
+    """Open steps with as many bricks and as many grips.
+
+    Attributes
+    ----------
+    schedule : Schedule
+    steps : tuple of OpenStep
+    names : tuple of frozenset of str
+        Responses that each step needs.
+    rows : (P, r) int
+        Nodes held, for all possible choices of one step after the other.
+    possible : tuple of (C,) bool
+        Which choices of each step leave no node held twice.
+    states : (S, r) int
+        The different sets of nodes in them, ascending.
+    state : (P,) int
+        Which of these each choice leads to.
+    """
+
+    schedule: Schedule
+    steps: tuple[OpenStep, ...]
+    names: tuple[frozenset[str], ...]
+    rows: Ints
+    possible: tuple[Bools, ...]
+    states: Ints
+    state: Ints
+
+    def blocks(self) -> Iterator[Block]:
+        """Yield the states in blocks, one at least.
+
+        Yields
+        ------
+        Block
+        """
+        names = tuple(sorted(frozenset().union(*self.names) & CHOSEN_BY.keys()))
+        for start in range(0, max(len(self.states), 1), BLOCK):
+            yield Block(self.steps[0].bricks, self.states[start : start + BLOCK].copy(), names)
+
+    @property
+    def count(self) -> int:
+        """How many blocks there are."""
+        return max(-(-len(self.states) // BLOCK), 1)
+
+    def choices(self, answers: Sequence[Answers]) -> list[StepChoices]:
+        """Return the responses of every step's choices.
+
+        Parameters
+        ----------
+        answers : sequence of Answers
+            To the blocks.
+
+        Returns
+        -------
+        list of StepChoices
+        """
+        values = {k: np.concatenate([a.values[k] for a in answers]) for k in answers[0].values}
+        forces = np.concatenate([a.forces for a in answers])
+        ends = np.cumsum([ok.sum() for ok in self.possible])
+        out = []
+        for step, mine, ok, end in zip(self.steps, self.names, self.possible, ends, strict=True):
+            part = slice(end - ok.sum(), end)
+            index = self.state[part]
+            by_robot = np.argsort(np.argsort(self.rows[part], axis=1), axis=1)
+            found = {name: answer[index] for name, answer in values.items() if name in mine}
+            held = np.take_along_axis(forces[index], by_robot, axis=1)
+            found |= _robot_forces(self.schedule, step, held)
+            spread = {name: _spread(found.get(name), ok) for name in sorted(mine)}
+            shape = tuple(len(self.schedule.moves[m].candidates) for m in step.moves)
+            shaped = {name: each.reshape(shape) for name, each in spread.items()}
+            out.append(StepChoices(step, step.moves, shaped))
+        return out
+
+
+def steps_alike(schedule: Schedule) -> list[list[list[OpenStep]]]:
+    """Return the open steps of a schedule by brick count and, within it, by how many grips.
+
+    Parameters
+    ----------
+    schedule : Schedule
+
+    Returns
+    -------
+    list of list of list of OpenStep
+        Ascending.
+    """
+    keyed = sorted(
+        (
+            (step.bricks, len(robots_holding(step)), step.number, step)
+            for step in schedule.steps
+            if step.moves
+        ),
+        key=lambda item: item[:3],
+    )
+    return [
+        [[item[3] for item in same] for _, same in groupby(level, key=lambda item: item[1])]
+        for _, level in groupby(keyed, key=lambda item: item[0])
+    ]
+
+
+def choices_of(schedule: Schedule, step: OpenStep) -> int:
+    """Return how many choices a step has, impossible ones among them.
+
+    Parameters
+    ----------
+    schedule : Schedule
+    step : OpenStep
+
+    Returns
+    -------
+    int
+    """
+    return math.prod(len(schedule.moves[m].candidates) for m in step.moves)
+
+
+def alike(schedule: Schedule, steps: Sequence[OpenStep], wanted: Wanted) -> Alike:
+    """Return what open steps with as many bricks and as many grips have in common.
+
+    Parameters
+    ----------
+    schedule : Schedule
+    steps : sequence of OpenStep
+    wanted : Wanted
+        Which responses every move needs.
+
+    Returns
+    -------
+    Alike
+    """
+    names = tuple(frozenset(wanted(schedule.moves[step.moves[-1]].bricks)) for step in steps)
+    choices = [combinations(schedule, step) for step in steps]
+    possible = tuple(no_node_twice(rows) for rows in choices)
+    rows = np.concatenate([rows[ok] for rows, ok in zip(choices, possible, strict=True)])
+    states, state = distinct(np.sort(rows, axis=1))
+    return Alike(schedule, tuple(steps), names, rows, possible, states, state)
+
+
+def _spread(values: Floats | None, possible: Bools) -> Floats:
+    """Return values over all choices, NaN for impossible ones and for a robot that holds none."""
+    out = np.full(possible.shape, np.nan)
+    if values is not None:
+        out[possible] = values
+    return out
+
+
+def distinct(rows: Ints) -> tuple[Ints, Ints]:
+    """Return the distinct rows, ascending, and which of them each row is.
+
+    Four times as fast as ``numpy.unique``, which sorts rows as if they were text.
+
+    Parameters
+    ----------
+    rows : (P, r) int
+
+    Returns
+    -------
+    rows : (S, r) int
+    which : (P,) int
+    """
+    order = np.lexsort(rows.T[::-1])
+    ranked = rows[order]
+    first = np.ones(len(rows), dtype=bool)
+    first[1:] = (ranked[1:] != ranked[:-1]).any(axis=1)
+    back = np.empty(len(rows), dtype=np.int64)
+    back[order] = np.cumsum(first) - 1
+    return ranked[first], back
+
+
+def robots_holding(step: OpenStep) -> list[int]:
+    """Return which of the scene's robots grip.
+
+    Parameters
+    ----------
+    step : OpenStep
+
+    Returns
+    -------
+    list of int
+    """
+    return [i for i, grip in enumerate(step.grips) if grip is not None]
+
+
+def combinations(schedule: Schedule, step: OpenStep) -> Ints:
+    """Return the nodes held for all combinations of the open moves of a step.
+
+    Parameters
+    ----------
+    schedule : Schedule
+    step : OpenStep
+
+    Returns
+    -------
+    (choices, grips) int
+    """
+    candidates = [np.array(schedule.moves[m].candidates, dtype=np.int64) for m in step.moves]
+    grid = np.meshgrid(*candidates, indexing="ij")
+    columns = []
+    for robot in robots_holding(step):
+        grip = step.grips[robot]
+        if isinstance(grip, OpenGrip):
+            columns.append(grid[step.moves.index(grip.move)].ravel())
+        else:
+            columns.append(np.full(grid[0].size, grip))
+    return np.stack(columns, axis=1).astype(np.int64)
+
+
+def no_node_twice(rows: Ints) -> Bools:
+    """Return which rows name no node twice.
+
+    Parameters
+    ----------
+    rows : (P, r) int
+
+    Returns
+    -------
+    (P,) bool
+    """
+    return np.asarray((np.diff(np.sort(rows, axis=1), axis=1) > 0).all(axis=1))
+
+
+def _robot_forces(schedule: Schedule, step: OpenStep, forces: Floats) -> dict[str, Floats]:
+    """Return the forces by robot, of the robot whose move decides the step, and the largest."""
+    robots = [schedule.scene.robots[i].name for i in robots_holding(step)]
+    out = {robot_response(name): forces[:, i] for i, name in enumerate(robots)}
+    out["F_move"] = out[robot_response(schedule.moves[step.moves[-1]].robot)]
+    out["F_largest"] = forces.max(axis=1)
+    return out

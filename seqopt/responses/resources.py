@@ -1,0 +1,75 @@
+"""What a computation may use: processes or other machines, a folder for answers, memory."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from concurrent.futures import Executor
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from seqopt.errors import ProblemError
+
+
+@dataclass(frozen=True)
+class Resources:
+    """What a computation may use; no result depends on it.
+
+    Parameters
+    ----------
+    workers : int, optional
+        Processes to share the work among; with an executor, how many tasks it works on at once.
+    executor : concurrent.futures.Executor, optional
+        Any executor in the place of processes of our own. It stays the caller's, who ends it.
+    cache : str or pathlib.Path, optional
+        A folder that keeps the answers to states by content; it is made if it is not there.
+    max_memory : float, optional
+        Bytes that responses and costs may take; by default four fifths of what is free.
+    progress : callable, optional
+        Told in a few words how far a computation is that takes more than a second.
+
+    Raises
+    ------
+    ProblemError
+        If a number is none that can be meant.
+
+    Examples
+    --------
+    >>> Resources(workers=2, max_memory=2e9).workers
+    2
+    """
+
+    workers: int = 1
+    executor: Executor | None = None
+    cache: Path | str | None = None
+    max_memory: float | None = None
+    progress: Callable[[str], None] | None = None
+
+    def __post_init__(self) -> None:
+        if isinstance(self.workers, bool) or not isinstance(self.workers, int) or self.workers < 1:
+            raise ProblemError(f"workers is {self.workers!r}; give a whole number from 1")
+        if not (self.executor is None or hasattr(self.executor, "submit")):
+            raise ProblemError(
+                f"executor: a {type(self.executor).__name__} is none; give one of "
+                "concurrent.futures, or workers"
+            )
+        most = self.max_memory
+        known = most is None or (
+            isinstance(most, int | float) and most > 0 and not math.isnan(most)
+        )
+        if not known:
+            raise ProblemError(f"max_memory is {most!r}; give a number of bytes above zero")
+
+    def alone(self) -> Resources:
+        """Return the same for what is too little to share.
+
+        Returns
+        -------
+        Resources
+            One process, and nobody told.
+        """
+        return replace(self, workers=1, executor=None, progress=None)
+
+
+HERE = Resources()
+"""This process alone, nothing kept, four fifths of the free memory."""

@@ -1,0 +1,148 @@
+"""Bricks as boxes: how far they are apart, and whether two of them are in one place.
+
+Two boxes are apart if a plane passes between them, and if one does, then one that is parallel to a
+face of either or to an edge of each. The largest distance over these 15 directions is negative for
+boxes that interpenetrate: the shortest way to part them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from seqopt.arrays import Floats, FrozenValue, Ints
+from seqopt.errors import SceneError
+from seqopt.scene.parts import Brick
+
+PARALLEL = 1e-9  # sine of an angle between edges that is none
+DEEPEST = 1e-6  # depth that is rounding, over the smallest dimension
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Boxes(FrozenValue):
+    """Where bricks are and how large, as arrays.
+
+    Attributes
+    ----------
+    place : (n, 3) float
+        Centroids, m.
+    frame : (n, 3, 3) float
+        Rows are unit vectors along length, width and thickness.
+    half : (n, 3) float
+        Half of each dimension, m.
+    """
+
+    place: Floats
+    frame: Floats
+    half: Floats
+
+    def corners(self) -> Floats:
+        """Return where the corners are.
+
+        Returns
+        -------
+        (n, 8, 3) float
+            m.
+        """
+        signs = np.array(list(product((-1.0, 1.0), repeat=3)))
+        return np.asarray(self.place[:, None] + (signs * self.half[:, None]) @ self.frame)
+
+
+def boxes(bricks: Sequence[Brick]) -> Boxes:
+    """Return bricks as boxes.
+
+    Parameters
+    ----------
+    bricks : sequence of Brick
+
+    Returns
+    -------
+    Boxes
+    """
+    length = np.array([brick.length_axis for brick in bricks]).reshape(-1, 3)
+    width = np.array([brick.width_axis for brick in bricks]).reshape(-1, 3)
+    return Boxes(
+        place=np.array([brick.position for brick in bricks]).reshape(-1, 3),
+        frame=np.stack([length, width, np.cross(length, width)], axis=1),
+        half=0.5 * np.array([brick.dimensions for brick in bricks]).reshape(-1, 3),
+    )
+
+
+def separations(bricks: Sequence[Brick]) -> tuple[Ints, Floats]:
+    """Return how far bricks are apart that are near each other.
+
+    Parameters
+    ----------
+    bricks : sequence of Brick
+
+    Returns
+    -------
+    pairs : (P, 2) int
+        Indices of the bricks whose centroids are no farther apart than the longest diagonal.
+    distance : (P,) float
+        m, along the direction in which they are farthest apart: no more than their distance, and
+        the same where faces look at each other; negative where they interpenetrate.
+
+    Examples
+    --------
+    >>> from seqopt.scene.scene_file import load_scene
+    >>> pairs, distance = separations(load_scene("arch25").bricks)
+    >>> bool((distance > 0).all())
+    True
+    """
+    from scipy.spatial import KDTree  # noqa: PLC0415  # slow to import, and not always needed
+
+    shapes = boxes(bricks)
+    longest = 2 * float(np.linalg.norm(shapes.half, axis=1).max(initial=0.0))
+    near = KDTree(shapes.place).query_pairs(longest, output_type="ndarray")
+    pairs = near[np.lexsort(near.T[::-1])].astype(np.int64)
+    a, b = pairs.T
+    first, second = shapes.frame[a], shapes.frame[b]
+    axes = np.concatenate([first, second, _edge_normals(first, second)], axis=1)
+    step = shapes.place[b] - shapes.place[a]
+    apart = np.abs(axes @ step[:, :, None])[:, :, 0]
+    for which in (a, b):
+        spread = np.abs(axes @ shapes.frame[which].transpose(0, 2, 1))
+        apart -= (spread @ shapes.half[which][:, :, None])[:, :, 0]
+    real = np.linalg.norm(axes, axis=2) > PARALLEL
+    return pairs, np.where(real, apart, -np.inf).max(axis=1, initial=-np.inf)
+
+
+def require_apart(
+    where: str, bricks: Sequence[Brick], remedy: str, deepest: float = DEEPEST
+) -> None:
+    """Require bricks of which no two interpenetrate.
+
+    Parameters
+    ----------
+    where : str
+        What they make, for the message.
+    bricks : sequence of Brick
+    remedy : str
+        What to change, for the message.
+    deepest : float, optional
+        By how much they may, over the smallest dimension.
+
+    Raises
+    ------
+    SceneError
+        Naming the two that interpenetrate most.
+    """
+    pairs, distance = separations(bricks)
+    thin = min(min(brick.dimensions) for brick in bricks)
+    if distance.min(initial=0.0) < -deepest * thin:
+        i, j = pairs[distance.argmin()]
+        raise SceneError(
+            f"{where}: bricks {bricks[i].name} and {bricks[j].name} interpenetrate by "
+            f"{-1e3 * distance.min():.3g} mm; {remedy}"
+        )
+
+
+def _edge_normals(first: Floats, second: Floats) -> Floats:
+    """Return unit vectors across an edge of each of two boxes, (P, 9, 3); zero if they agree."""
+    normal = np.cross(first[:, :, None], second[:, None, :]).reshape(len(first), 9, 3)
+    size = np.linalg.norm(normal, axis=2, keepdims=True)
+    return np.asarray(np.where(size > PARALLEL, normal / np.maximum(size, PARALLEL), 0.0))

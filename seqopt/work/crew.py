@@ -1,0 +1,131 @@
+"""Who works: processes of our own, or the executor of a caller."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor, Future
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from seqopt.work.processes import Processes
+
+UNKNOWN = 16  # workers of an executor that does not say how many it has
+
+
+class Crew(Protocol):
+    """Who works on tasks."""
+
+    @property
+    def workers(self) -> int:
+        """How many tasks are worked on at once."""
+
+    def submit(self, function: Callable[..., Any], *arguments: object) -> Future[Any]:
+        """Give a call out.
+
+        Parameters
+        ----------
+        function : callable
+            Of a module, so that it can be sent to another process.
+        *arguments : object
+
+        Returns
+        -------
+        concurrent.futures.Future
+        """
+
+    def replace(self, error: BaseException) -> bool:
+        """Take new workers for those that died.
+
+        Parameters
+        ----------
+        error : BaseException
+            What came in place of an answer.
+
+        Returns
+        -------
+        bool
+            Whether there are workers again.
+        """
+
+
+@dataclass(frozen=True)
+class Given:
+    """An executor of the caller, who also ends it.
+
+    Parameters
+    ----------
+    executor : concurrent.futures.Executor
+    workers : int
+        How many tasks it works on at once.
+    """
+
+    executor: Executor
+    workers: int
+
+    def submit(self, function: Callable[..., Any], *arguments: object) -> Future[Any]:
+        """Give a call out; see `Crew`.
+
+        Parameters
+        ----------
+        function : callable
+        *arguments : object
+
+        Returns
+        -------
+        concurrent.futures.Future
+        """
+        return self.executor.submit(function, *arguments)
+
+    def replace(self, error: BaseException) -> bool:
+        """Say whether the executor still takes work; its workers are its own matter.
+
+        Parameters
+        ----------
+        error : BaseException
+
+        Returns
+        -------
+        bool
+        """
+        try:
+            self.executor.submit(_nothing)
+        except Exception:  # whatever an executor of others may raise where it is broken
+            return False
+        return True
+
+
+@contextmanager
+def hire(executor: Executor | None = None, workers: int = 1) -> Iterator[Crew | None]:
+    """Have workers for a while.
+
+    Parameters
+    ----------
+    executor : concurrent.futures.Executor, optional
+        Any; by default processes of our own.
+    workers : int, optional
+        How many processes, or how many tasks the executor works on at once if it does not say.
+
+    Yields
+    ------
+    Crew or None
+        None where there is but this process.
+    """
+    if executor is not None:
+        known = getattr(executor, "_max_workers", None)
+        most = known if isinstance(known, int) else UNKNOWN
+        yield Given(executor, workers if workers > 1 else most)
+    elif workers > 1:
+        processes = Processes(workers)
+        try:
+            yield processes
+        except BaseException:
+            processes.end(now=True)
+            raise
+        processes.end(now=False)
+    else:
+        yield None
+
+
+def _nothing(*arguments: object) -> None:
+    """Do nothing."""

@@ -1,0 +1,196 @@
+"""Large problems from the command line: workers, little memory, interrupts; a line each."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from functools import partial
+
+import pytest
+
+from seqopt.cli.main import main
+from seqopt.cli.means import parse_size
+from seqopt.errors import ProblemError
+from seqopt.scene.scene_file import save_scene
+from tests.builders import ROOT, small_arch
+
+WORDS = ["optimize", "--formulation"]
+posix = pytest.mark.skipif(os.name != "posix", reason="signals and limits of POSIX")
+
+
+def start(*words, **more):
+    """Start the program in a session of its own."""
+    return subprocess.Popen(
+        [sys.executable, "-m", "seqopt", *map(str, words)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        cwd=ROOT,
+        start_new_session=True,
+        **more,
+    )
+
+
+def left(session):
+    """Return whether a process of a session is left."""
+    try:
+        os.killpg(session, 0)
+    except ProcessLookupError:
+        return False
+    return True
+
+
+def contents(folder):
+    """Return the files of a folder, times left out."""
+    out = {path.name: path.read_text("utf-8") for path in folder.iterdir()}
+    summary = json.loads(out["summary.json"])
+    del summary["seconds"]
+    return out | {"summary.json": summary}
+
+
+def test_results_do_not_depend_on_workers_cache_and_memory(tmp_path):
+    scene = tmp_path / "scene.json"
+    save_scene(small_arch(9), scene)
+    more = {
+        "plain": [],
+        "workers": ["--workers", "2"],
+        "cache": ["--cache", str(tmp_path / "answers")],
+        "again": ["--cache", str(tmp_path / "answers"), "--max-memory", "1 GB"],
+    }
+    for name, words in more.items():
+        out = ["--out", str(tmp_path / name)]
+        assert main([*WORDS, "overlap_dp", str(scene), *out, *words]) == 0
+    assert all(contents(tmp_path / name) == contents(tmp_path / "plain") for name in more)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--workers", "0"], "--workers 0: give a whole number from 1"),
+        (["--workers", "two"], "--workers two: give"),
+        (["--max-memory", "much"], "--max-memory much: give a size, as 500MB or 2GB"),
+        (["--max-memory", "0GB"], "--max-memory 0GB: give a size"),
+        (["--cache", "/dev/null/x"], "cannot make folder"),
+    ],
+)
+def test_what_cannot_be_meant_is_refused_in_a_line(capsys, tmp_path, words, said):
+    assert main([*WORDS, "cascade", "--out", str(tmp_path / "out"), *words]) == 2
+    err = capsys.readouterr().err
+    assert said in err
+    assert err.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("text", "size"),
+    [("2GB", 2e9), ("500 MB", 5e8), ("1.5GiB", 1.5 * 2**30), ("2e9", 2e9), ("7", 7), ("1k", 1000)],
+)
+def test_sizes(text, size):
+    assert parse_size(text) == size
+
+
+@pytest.mark.parametrize("text", ["", "GB", "-1GB", "1XB", "nan", "inf", "1GBs", "1e999"])
+def test_what_is_no_size(text):
+    with pytest.raises(ProblemError, match="give a size"):
+        parse_size(text)
+
+
+def test_what_does_not_fit_is_refused_before(capsys, tmp_path):
+    out = ["--out", str(tmp_path / "out")]
+    assert main([*WORDS, "overlap_dp", *out, "--max-memory", "100kB"]) == 4
+    err = capsys.readouterr().err
+    assert re.fullmatch(
+        r"seqopt: out of memory: the costs of all choices take about [0-9.e-]+ GB, and 0\.0001 GB "
+        r"may be used; .*search without proof\n",
+        err,
+    )
+    assert not (tmp_path / "out").exists()
+    assert main([*WORDS, "cascade", "--no-proof", *out, "--max-memory", "1kB"]) == 4
+    assert capsys.readouterr().err.count("\n") == 1
+
+
+@posix
+@pytest.mark.slow
+@pytest.mark.parametrize("workers", ["1", "2"])
+def test_a_run_under_a_memory_limit_ends_in_a_line(tmp_path, workers):
+    import resource  # noqa: PLC0415  # POSIX has it alone
+
+    scene = tmp_path / "scene.json"
+    save_scene(small_arch(45), scene)
+    words = [*WORDS, "overlap_dp", scene, "--workers", workers]
+    statuses = set()
+    for mebibytes in (60, 200, 300, 340, 370, 400, 420, 800):
+        limit = (mebibytes * 2**20,) * 2
+        out = tmp_path / str(mebibytes)
+        limited = partial(resource.setrlimit, resource.RLIMIT_AS, limit)
+        run = start(*words, "--out", out, preexec_fn=limited)
+        _, err = run.communicate(timeout=120)
+        statuses.add(run.returncode)
+        assert run.returncode in (0, 4), (mebibytes, err)
+        assert out.exists() == (run.returncode == 0)
+        assert err.count("\n") == bool(run.returncode), (mebibytes, err)
+    assert statuses == {0, 4}
+
+
+@posix
+@pytest.mark.parametrize("workers", ["1", "2"])
+def test_an_interrupt_names_what_was_chosen(tmp_path, workers):
+    """A search without proof by the slow engine, ended on its way; every process is interrupted."""
+    words = [*WORDS, "cascade", "--no-proof", "--engine", "frame", "--out", tmp_path / "out"]
+    run = start(*words, "--cache", tmp_path / "answers", "--workers", workers)
+    until = time.monotonic() + 60
+    while len(list(tmp_path.glob("answers/*/*.npz"))) < 6 and time.monotonic() < until:
+        time.sleep(0.02)
+    os.killpg(run.pid, signal.SIGINT)
+    out, err = run.communicate(timeout=60)
+    assert (run.returncode, out) == (130, "")
+    assert re.fullmatch(
+        r"seqopt: interrupted; (no move was chosen yet|[0-9]+ of 22 moves were chosen, at nodes "
+        r"[0-9 ]+)\n",
+        err,
+    )
+    assert not (tmp_path / "out").exists()
+    until = time.monotonic() + 20
+    while left(run.pid) and time.monotonic() < until:
+        time.sleep(0.05)
+    assert not left(run.pid)
+
+
+@posix
+def test_a_killed_worker_is_replaced(tmp_path):
+    words = [*WORDS, "overlap_dp", "--out", tmp_path / "out", "--workers", "2"]
+    run = start(*words, "--cache", tmp_path / "answers")
+    until = time.monotonic() + 60
+    while not list(tmp_path.glob("answers/*/*.npz")) and time.monotonic() < until:
+        time.sleep(0.002)
+    shown = subprocess.run(
+        ["ps", "-o", "pid,args", "--ppid", str(run.pid)], capture_output=True, text=True, check=True
+    )
+    workers = [line.split()[0] for line in shown.stdout.splitlines() if "spawn_main" in line]
+    assert len(workers) == 2
+    os.kill(int(workers[0]), signal.SIGKILL)
+    _, err = run.communicate(timeout=120)
+    assert (run.returncode, err) == (0, "")
+    assert main([*WORDS, "overlap_dp", "--out", str(tmp_path / "plain")]) == 0
+    assert contents(tmp_path / "out") == contents(tmp_path / "plain")
+
+
+def test_fewer_candidates_are_a_heuristic_that_says_so(capsys, tmp_path):
+    words = [*WORDS, "overlap_dp", "--criteria", "worst-ratio-published"]
+    whole, near = tmp_path / "whole", tmp_path / "near"
+    assert main([*words, "--out", str(whole)]) == 0
+    assert main([*words, "--out", str(near), "--candidates", "near:6"]) == 0
+    assert "heuristic: near:6 keeps" in capsys.readouterr().out
+    first, second = contents(whole)["summary.json"], contents(near)["summary.json"]
+    assert (first["status"], first["candidates"]) == ("optimal", "all")
+    assert second["status"] == "optimal among these"
+    assert second["candidates"].startswith("heuristic: near:6 keeps")
+    assert second["models_evaluated"] < 0.8 * first["models_evaluated"]
+    assert second["objective"] >= first["objective"]
+    assert main([*words, "--out", str(near), "--candidates", "far:6"]) == 2
+    assert "give near:JOINTS or within:METERS" in capsys.readouterr().err

@@ -1,0 +1,214 @@
+"""Flexibility that grows in place: order of asking, accuracy, what it keeps, and what it doubts."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from experiments.engines.parts.grip_sets import grip_sets
+from experiments.harness.arches import half_circle
+from experiments.harness.walls import running_bond
+from seqopt.engines.interface import NAMES, Want, grip_columns
+from seqopt.engines.rigid import compliance, growth
+from seqopt.engines.rigid.compliance import ComplianceEngine, solve_batch
+from seqopt.engines.rigid.kept import Kept
+from seqopt.engines.rigid.mixed import solve_mixed
+from seqopt.engines.rigid.operator import OperatorBuilder
+from seqopt.engines.rigid.refinement import Refinement
+from seqopt.engines.rigid.spanning_tree import grow_tree
+from seqopt.network.build import build_network
+from tests.strategies import arches, both_sided, walls
+
+PER_PAIR = 8 * 36 * 8  # bytes: arrays of bricks by bricks (3) and by springs (2 × 2), and a rest
+
+
+def error(fields, exact):
+    """The largest difference of each set in what tables show, relative to its largest entry."""
+    out = np.zeros(len(exact.grip_force))
+    for name in ("edge_force", "displacement", "support", "grip_force"):
+        a, b = (getattr(f, name).reshape(len(out), -1) for f in (fields, exact))
+        out = np.maximum(out, np.abs(a - b).max(axis=1) / np.abs(b).max(axis=1))
+    return out
+
+
+# order of asking
+
+
+@given(scene=st.one_of(arches(), walls(), both_sided()), data=st.data())
+def test_answers_do_not_depend_on_what_was_asked_before(scene, data):
+    net = build_network(scene)
+    engine = ComplianceEngine(net)
+    counts = st.integers(1, len(scene.bricks))
+    for bricks in data.draw(st.lists(counts, min_size=1, max_size=6)):
+        free = [n for b in scene.placed[:bricks] for n in b.nodes if n not in scene.blocked_nodes]
+        sets = [data.draw(st.permutations(free))[: min(2, len(free))]]
+        assert engine.solve(bricks, sets, Want.ALL) == ComplianceEngine(net).solve(
+            bricks, sets, Want.ALL
+        )
+
+
+@pytest.mark.parametrize("scene", [running_bond(4, 5), half_circle(40).scene])
+def test_brick_counts_backwards(scene, monkeypatch):
+    """Nothing is kept beside the arrays: each count starts anew, or leaves bricks out."""
+    monkeypatch.setattr(compliance, "KEPT", 0)
+    net = build_network(scene)
+    engine, total = ComplianceEngine(net), len(scene.bricks)
+    for bricks in (total, total - 1, total - 1, total // 2, total // 2 - 1, 3, total - 2):
+        sets = grip_sets(net, bricks, 5)
+        mine, fresh = (e.solve(bricks, sets, Want.ALL) for e in (engine, ComplianceEngine(net)))
+        assert mine == fresh
+
+
+def test_a_chain_without_loops_only_leaves_bricks_out(monkeypatch):
+    """Negative control of the test before: a wall does start anew."""
+    starts = []
+    start = growth.Growth._start
+    monkeypatch.setattr(growth.Growth, "_start", lambda self: starts.append(start(self)))
+    for scene, anew in ((half_circle(12).scene, 1), (running_bond(4, 3), 3)):
+        starts.clear()
+        net = build_network(scene)
+        grown = OperatorBuilder(net, grow_tree(net)).growth
+        for bricks in (11, 9, 10, 4):
+            grown.reach(bricks)
+        assert len(starts) == anew
+
+
+# accuracy
+
+
+@pytest.mark.parametrize("count", [60, 120])
+def test_an_arch_that_closes_keeps_its_digits(count, monkeypatch):
+    """What a loop takes away is a million times what it leaves; summed again it does not show."""
+
+    def worst(net):
+        operator = OperatorBuilder(net, grow_tree(net)).operator(count)
+        columns = np.array([[2 * count - 1, 2 * count - 3, i] for i in range(0, count, 5)])
+        fields, _ = solve_batch(operator, columns, Want.ALL)
+        return error(fields, solve_mixed(net, count, columns)).max()
+
+    net = half_circle(count)
+    assert worst(net) <= 1e-10
+    better = worst(net)
+    monkeypatch.setattr(growth, "TAKEN", np.inf)
+    assert worst(net) > 3 * better  # negative control
+
+
+@pytest.mark.parametrize(("columns", "courses"), [(2, 30), (9, 9), (30, 2)])
+def test_walls_agree_with_the_mixed_system(columns, courses):
+    net = build_network(running_bond(columns, courses))
+    total = columns * courses
+    for bricks in (total // 2 + 1, total):
+        sets = grip_sets(net, bricks, 12)
+        operator = OperatorBuilder(net, grow_tree(net)).operator(bricks)
+        places = grip_columns(net, bricks, sets)
+        fields, trusted = solve_batch(operator, places, Want.ALL)
+        assert trusted.all()
+        assert error(fields, solve_mixed(net, bricks, places)).max() <= 1e-11
+
+
+# what is doubted
+
+
+def hard_sets(bricks, rng, count=150):
+    """Three nodes anywhere, near each other, and at the tip with one anywhere."""
+    nodes = 2 * bricks
+    anywhere = [rng.choice(nodes, 3, replace=False) for _ in range(count)]
+    starts = rng.integers(0, nodes - 8, count)
+    near = [start + rng.choice(8, 3, replace=False) for start in starts]
+    tip = [[nodes - 1, nodes - 3, rng.integers(nodes - 4)] for _ in range(count)]
+    rows = np.array([*anywhere, *near, *tip])
+    return rows[(np.diff(np.sort(rows // 2, axis=1), axis=1) > 0).all(axis=1)]
+
+
+CASES = [
+    *((half_circle(n), n) for n in (25, 80, 160)),
+    *((half_circle(n), n - 1) for n in (25, 80, 160)),
+    (build_network(running_bond(6, 8)), 45),
+]
+
+
+@pytest.mark.parametrize(("net", "bricks"), CASES)
+def test_no_set_errs_unnoticed(net, bricks):
+    columns = hard_sets(bricks, np.random.default_rng(bricks))
+    operator = OperatorBuilder(net, grow_tree(net)).operator(bricks)
+    exact = Refinement(net, bricks).solve(columns, operator)
+    for accuracy in (1e-6, 1e-9, 1e-10):
+        fields, trusted = solve_batch(operator, columns, Want.ALL, accuracy=accuracy)
+        assert error(fields, exact)[trusted].max(initial=0) <= accuracy
+    _, easily = solve_batch(operator, columns, accuracy=1e-6)
+    assert easily.mean() >= 0.95  # few are doubted in vain where six digits are enough
+
+
+def test_sets_that_err_are_there_to_be_noticed(monkeypatch):
+    """Negative control: without doubt, the same sets err by more than was asked for."""
+    net, bricks = half_circle(160), 159
+    columns = hard_sets(bricks, np.random.default_rng(bricks))
+    operator = OperatorBuilder(net, grow_tree(net)).operator(bricks)
+    monkeypatch.setattr(compliance, "UNSEEN", 0.0)
+    fields, trusted = solve_batch(operator, columns, Want.ALL, accuracy=1e-10)
+    assert trusted.all()
+    assert error(fields, Refinement(net, bricks).solve(columns, operator)).max() > 1e-10
+
+
+def test_a_screen_is_not_corrected_where_six_digits_are_enough(monkeypatch):
+    net = half_circle(100)
+    tip = [[net.node_name[i] for i in net.inner.ravel()[[197, 195, 193]]]]
+    exact = ComplianceEngine(net).solve(99, tip)
+    strict = ComplianceEngine(net, accuracy=1e-13).solve(99, tip, Want.RESPONSES | Want.SCREEN)
+    monkeypatch.setattr(compliance, "Refinement", None)  # nothing is corrected
+    screened = ComplianceEngine(net).solve(99, tip, Want.RESPONSES | Want.SCREEN)
+    assert 0 < error(screened, exact).max() <= 1e-6
+    assert error(strict, exact).max() <= 1e-6
+    with pytest.raises(TypeError):
+        ComplianceEngine(net).solve(99, tip)
+
+
+# what is kept
+
+
+def kept_bytes(net, most=compliance.KEPT):
+    """The bytes of all arrays after every brick count was asked for grips at all its nodes."""
+    engine = ComplianceEngine(net)
+    engine._kept = Kept(most)
+    for bricks in range(1, len(net.inner) + 1):
+        known, index = net.index_of_grip
+        engine.solve(bricks, known[index < 2 * bricks][:, None], Want.EDGES)
+    operators = engine._kept._operators.values()
+    return engine._builder.growth.nbytes + sum(operator.nbytes for operator in operators)
+
+
+@pytest.mark.parametrize("make", [half_circle, lambda n: build_network(running_bond(n // 8, 8))])
+def test_memory_grows_as_the_square_of_the_bricks(make):
+    for count in (16, 32, 64):
+        assert kept_bytes(make(count), most=0) <= PER_PAIR * count**2 + 2e5
+
+
+def test_an_operator_per_brick_count_would_be_seen():
+    """Negative control: keeping all of them grows as the cube."""
+    assert kept_bytes(half_circle(64), most=np.inf) > PER_PAIR * 64**2 + 2e5
+
+
+def test_rows_of_gripped_bricks_alone():
+    net = half_circle(50)
+    some, every = (OperatorBuilder(net, grow_tree(net)).operator(50, h) for h in ([7, 30], None))
+    some_rows = [6 * 7 + i for i in range(6)] + [6 * 30 + i for i in range(6)]
+    assert some.flexibility.shape == (12, 12)
+    assert np.array_equal(some.flexibility, every.flexibility[np.ix_(some_rows, some_rows)])
+    for name in ("edge_force", "displacement", "support", "joint_wrench", "brick_twist"):
+        assert np.array_equal(getattr(some, name), getattr(every, name)[[*some_rows, -1]])
+
+
+def test_mapped_before_or_after_they_are_summed():
+    """A few sets of many loads and many sets of few take other ways to the same fields."""
+    net = half_circle(50)
+    columns = np.array([[14, 61, 99], [0, 1, 50], [15, 60, 98]])
+    few, _ = solve_batch(OperatorBuilder(net, grow_tree(net)).operator(50), columns, Want.ALL)
+    many, _ = solve_batch(
+        OperatorBuilder(net, grow_tree(net)).operator(50), np.tile(columns, (120, 1)), Want.ALL
+    )
+    for name in NAMES:
+        a, b = getattr(few, name), getattr(many, name)[:3]
+        assert np.abs(a - b).max() <= 1e-12 * np.abs(b).max()
+    assert not (few.edge_force == many.edge_force[:3]).all()  # they were other ways

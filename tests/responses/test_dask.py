@@ -1,0 +1,73 @@
+"""Dask's executor on a local cluster: the same results, also where a worker is killed."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+import time
+
+import pytest
+
+from seqopt.engines.registry import make_engine
+from seqopt.responses import alike
+from seqopt.responses.choices import CHOICE_RESPONSES, Evaluation
+from seqopt.responses.resources import HERE, Resources
+from seqopt.workflow import optimize
+
+distributed = pytest.importorskip("distributed", reason="extra dask")
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.filterwarnings("ignore"),  # what a cluster says as it starts, ends, loses workers
+    pytest.mark.xdist_group("dask"),
+]
+
+
+@pytest.fixture(scope="module")
+def client():
+    options = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": None}
+    with (
+        distributed.LocalCluster(processes=True, **options) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        yield client
+
+
+def evaluated(schedule, resources):
+    engine = make_engine("auto", schedule.scene)
+    found = Evaluation(engine, schedule, lambda _: {*CHOICE_RESPONSES}, resources)
+    return found.steps, engine.tally
+
+
+@pytest.fixture(scope="module")
+def expected(loop25):
+    return evaluated(loop25, HERE)
+
+
+def test_results_are_the_same_on_a_cluster(client, loop25, expected):
+    assert evaluated(loop25, Resources(executor=client.get_executor())) == expected
+
+
+def test_a_whole_optimization_runs_on_a_cluster(client):
+    plan = optimize("arch25", executor=client.get_executor())
+    assert plan.nodes == optimize("arch25").nodes
+
+
+def test_a_machine_that_is_lost_takes_nothing_with_it(client, loop25, expected, monkeypatch):
+    monkeypatch.setattr(alike, "BLOCK", 60)
+    blocks = evaluated(loop25, HERE)
+    before = client.run(os.getpid)
+    victim = next(iter(before.values()))
+
+    def kill():
+        while client.run_on_scheduler(lambda dask_scheduler: len(dask_scheduler.tasks)) < 2:
+            time.sleep(0.005)
+        os.kill(victim, signal.SIGKILL)
+
+    killer = threading.Thread(target=kill)
+    killer.start()
+    found = evaluated(loop25, Resources(executor=client.get_executor(retries=2), workers=2))
+    killer.join()
+    assert found == blocks
+    assert victim not in client.run(os.getpid).values()

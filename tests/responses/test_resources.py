@@ -1,0 +1,233 @@
+"""Processes, executors, stored answers and little memory: the same results to the last bit."""
+
+from __future__ import annotations
+
+import pickle
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from seqopt.engines.interface import Want
+from seqopt.engines.registry import ENGINES, make_engine
+from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.errors import MemoryShortError, ProblemError, SceneError
+from seqopt.network.build import build_network
+from seqopt.placement.problem import pose
+from seqopt.placement.solving import solve
+from seqopt.responses import alike, division, memory
+from seqopt.responses.choices import CHOICE_RESPONSES, Evaluation
+from seqopt.responses.resources import Resources
+from seqopt.responses.shipping import pack, worker_for
+from seqopt.responses.states import Block, answer
+from seqopt.scene.arch import ArchShape, arch_scene
+from seqopt.sequence.three_robots import three_robot_loop
+from seqopt.study.presets import CRITERIA, EQUATIONS
+
+
+def everything(_):
+    return {*CHOICE_RESPONSES, "F_rob1"}
+
+
+def evaluation(engine, schedule, **resources):
+    return Evaluation(engine, schedule, everything, Resources(**resources))
+
+
+@pytest.fixture
+def small_blocks(monkeypatch):
+    """Many blocks on a small scene."""
+    monkeypatch.setattr(alike, "BLOCK", 50)
+
+
+@pytest.mark.parametrize("name", ["compliance", "auto"])
+@pytest.mark.parametrize("workers", [2, 3])
+def test_results_are_the_same_whatever_the_workers(small_blocks, loop25, name, workers):
+    alone = make_engine(name, loop25.scene)
+    shared = make_engine(name, loop25.scene)
+    expected = evaluation(alone, loop25)
+    found = evaluation(shared, loop25, workers=workers)
+    assert found.steps == expected.steps
+    assert found.models == expected.models == 8642
+    assert getattr(shared, "tally", None) == getattr(alone, "tally", None)
+
+
+@pytest.mark.parametrize("portions", [1, 7, 1000])
+def test_results_are_the_same_however_work_is_shared(small_blocks, loop25, portions, monkeypatch):
+    monkeypatch.setattr(division, "PORTIONS", portions)
+    expected = evaluation(make_engine("auto", loop25.scene), loop25).steps
+    with ThreadPoolExecutor(3) as executor:
+        for workers in (1, 5):
+            engine = make_engine("auto", loop25.scene)
+            found = evaluation(engine, loop25, executor=executor, workers=workers)
+            assert found.steps == expected
+
+
+BUILT = arch_scene(ArchShape(pitch=np.linspace(1.3, -1.3, 7).tolist(), pattern="V"))  # in a plane
+STATES = three_robot_loop(BUILT)
+
+
+def blocks():
+    """Return blocks of all brick counts, in order."""
+    levels = alike.steps_alike(STATES)
+    groups = [alike.alike(STATES, steps, everything) for level in levels for steps in level]
+    return [block for group in groups for block in group.blocks()]
+
+
+@pytest.mark.parametrize("name", sorted(ENGINES))
+@settings(max_examples=5)
+@given(order=st.permutations(range(len(blocks()))))
+def test_an_answer_does_not_depend_on_what_was_asked_before(name, order):
+    """Blocks may come in any order: what an engine keeps between them changes no bit."""
+    few = [Block(b.bricks, b.grips[:3].copy(), b.names) for b in blocks()]
+    engine = make_engine(name, BUILT)
+    found = {i: answer(engine, few[i]) for i in order}
+    for i, block in enumerate(few):
+        expected = answer(make_engine(name, BUILT), block)
+        assert replace(found[i], tally=()) == replace(expected, tally=())
+
+
+class Dependent:
+    """An engine whose answers depend, in the last digits, on what it was asked before."""
+
+    def __init__(self, network):
+        self.engine, self.calls = ComplianceEngine(network), 0
+
+    @property
+    def network(self):
+        return self.engine.network
+
+    def solve(self, bricks, grips, want):
+        self.calls += 1
+        found = self.engine.solve(bricks, grips, want)
+        return replace(found, edge_force=found.edge_force * (1 + 1e-15 * self.calls))
+
+
+def test_an_engine_that_remembers_is_seen():
+    """The comparison above can fail."""
+    first, other = blocks()[:2]
+    engine = Dependent(build_network(BUILT))
+    answer(engine, other)
+    answer(engine, other)
+    assert answer(engine, first) != answer(Dependent(build_network(BUILT)), first)
+
+
+def test_the_scene_is_sent_and_no_operators(loop25):
+    engine = make_engine("compliance", loop25.scene)
+    before = len(pack(engine).content)
+    assert evaluation(engine, loop25).models == 8642  # operators of all brick counts
+    assert len(pack(engine).content) == before < 2 * len(pickle.dumps(loop25.scene))
+    assert len(pickle.dumps(engine)) > 20 * before
+
+
+def test_an_engine_is_made_once_for_a_worker(small_blocks, loop25, monkeypatch):
+    made = []
+    engine = make_engine("compliance", loop25.scene)
+    send = worker_for(engine, elsewhere=True)
+    monkeypatch.setattr(
+        "seqopt.responses.shipping.make_engine",
+        lambda *given, **named: made.append(given) or make_engine(*given, **named),
+    )
+    with ThreadPoolExecutor(1) as executor:
+        for block in blocks()[:3]:
+            sent = executor.submit(send, [Block(1, np.array([[1]]), block.names)]).result()
+            assert len(sent) == 1
+    assert len(made) == 1
+
+
+def test_an_engine_of_ones_own_is_sent_itself(loop25):
+    expected = evaluation(ComplianceEngine(loop25.scene), loop25)
+    found = evaluation(ComplianceEngine(loop25.scene), loop25, workers=2)
+    assert found.steps == expected.steps
+
+
+def test_an_engine_that_cannot_be_sent_is_refused_in_a_line(loop25):
+    engine = ComplianceEngine(loop25.scene)
+    engine.lock = lambda: None
+    with pytest.raises(SceneError, match="engine ComplianceEngine: it cannot be sent"):
+        _ = evaluation(engine, loop25, workers=2).steps
+
+
+def test_a_network_that_is_not_its_scenes_is_not_made_anew(loop25):
+    """A recipe would make another engine than this one."""
+    network = build_network(loop25.scene)
+    heavier = replace(network, weight=2 * network.weight)
+    engine = make_engine("compliance", heavier)
+    found = evaluation(engine, loop25, workers=2).steps
+    assert found == evaluation(make_engine("compliance", heavier), loop25).steps
+    assert found != evaluation(make_engine("compliance", network), loop25).steps
+    with pytest.raises(SceneError, match="does not say what its answers depend on"):
+        _ = evaluation(engine, loop25, cache="never made").steps
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"workers": 0},
+        {"workers": 1.5},
+        {"workers": True},
+        {"executor": 2},
+        {"max_memory": 0},
+        {"max_memory": float("nan")},
+        {"max_memory": "2GB"},
+    ],
+)
+def test_resources_that_cannot_be_meant_are_refused(wrong):
+    with pytest.raises(ProblemError, match=next(iter(wrong))):
+        Resources(**wrong)
+
+
+# memory
+
+
+@pytest.mark.parametrize("criterion", CRITERIA)
+def test_costs_are_the_same_where_responses_are_not_kept(engine25, loop25, criterion):
+    """Where there is memory for costs alone, responses come and go; nothing else changes."""
+    problem = pose(engine25, loop25, CRITERIA[criterion])
+    asked = problem.evaluation.wanted
+    costs, whole = memory.bytes_of_costs(loop25), memory.bytes_of_choices(loop25, asked)
+    assert costs < whole
+    few = Resources(max_memory=whole - 1)
+    streamed = pose(engine25, loop25, CRITERIA[criterion], resources=few)
+    assert streamed.evaluation.streams
+    assert streamed.sums == problem.sums
+    assert streamed.peaks == problem.peaks
+    assert streamed.evaluation.models == problem.evaluation.models
+    for name in ("cascade", "minimax", "beam"):
+        plan, other = solve(problem, name), solve(streamed, name)
+        assert plan.selection.choice == other.selection.choice
+        assert plan.table().equals(other.table())
+    with pytest.raises(MemoryShortError, match="do not fit into the memory"):
+        _ = streamed.evaluation.steps
+    with pytest.raises(MemoryShortError, match="search without proof"):
+        _ = pose(engine25, loop25, EQUATIONS, resources=Resources(max_memory=1e5)).sums
+
+
+def test_alternatives_are_those_that_go_with_the_choice_where_responses_are_not_kept(
+    engine25, loop25
+):
+    whole = pose(engine25, loop25, EQUATIONS)
+    kept = memory.bytes_of_choices(loop25, whole.evaluation.wanted)
+    few = pose(engine25, loop25, EQUATIONS, resources=Resources(max_memory=kept - 1))
+    every, some = (solve(p, "cascade").alternatives() for p in (whole, few))
+    assert 0 < len(some) < len(every)
+    both = some.merge(every, on=["step", "node", "second_node"], how="left", indicator=True)
+    assert (both["_merge"] == "both").all()
+    for name in ("T_max", "M_sup"):
+        assert both[f"{name}_x"].to_numpy() == pytest.approx(both[f"{name}_y"], nan_ok=True)
+
+
+def test_a_response_that_nobody_asks_for_is_neither_computed_nor_kept(loop25):
+    wants = set()
+
+    class Asked(Dependent):
+        def solve(self, bricks, grips, want):
+            wants.add(want)
+            return self.engine.solve(bricks, grips, want)
+
+    engine = Asked(loop25.scene)
+    forces = Evaluation(engine, loop25, lambda _: {"F_move"})
+    assert {name for step in forces.steps for name in step.responses} == {"F_move"}
+    assert wants == {Want.SCREEN}  # grip forces always come: no field beside them was evaluated

@@ -1,0 +1,202 @@
+"""Built-in scenes: what they promise, and the vault of Bruun et al. as it is reconstructed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import seqopt
+from seqopt.contact.faces import bare_assembly
+from seqopt.contact.joint_space import face_distance
+from seqopt.engines.interface import Want, grip_columns
+from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.engines.rigid.dense import solve_dense
+from seqopt.errors import SceneError
+from seqopt.network.build import build_network
+from seqopt.scene.boxes import boxes, separations
+from seqopt.scene.doubts import doubts
+from seqopt.scene.scene_file import about, builtin_scenes, dump_scene, load_scene, parse_scene
+from seqopt.sequence.support import islands
+from tests.builders import first, largest_difference
+
+PRINTED = (2.670, 4.350)  # m; sides of the plan, section 3.1 of Bruun et al.
+NARROWEST, WIDEST = 0.0015, 0.0265  # m; between the faces of bricks that touch
+
+
+@pytest.fixture(scope="module")
+def vault():
+    return load_scene("vault338")
+
+
+@pytest.fixture(scope="module")
+def network(vault):
+    return build_network(vault)
+
+
+def own_pairs(scene, bricks):
+    """Pairs of which one at least is not of the arch, and how far they are apart."""
+    pairs, distance = separations(bricks)
+    kept = pairs.max(axis=1) >= 25
+    names = np.array([brick.name for brick in bricks])
+    return {frozenset(pair) for pair in names[pairs[kept]].tolist()}, distance[kept], pairs[kept]
+
+
+@pytest.mark.parametrize("name", builtin_scenes())
+def test_every_built_in_scene_is_named_drawn_from_text_and_not_odd(name):
+    scene = load_scene(name)
+    assert scene.name == name
+    assert scene.provenance
+    assert doubts(scene) == ()
+    assert about(name)
+    assert "\n" not in about(name)
+    assert parse_scene(dump_scene(scene)) == scene
+    assert load_scene(name) == scene
+
+
+@pytest.mark.parametrize("name", builtin_scenes())
+def test_bricks_of_built_in_scenes_touch_and_do_not_interpenetrate(name):
+    scene = load_scene(name)
+    _, distance = separations(scene.bricks)
+    assert distance.min() > 0
+    assembly = bare_assembly(build_network(scene), len(scene.bricks))
+    assert (assembly.area > 0).all()
+
+
+def test_the_vault_has_the_printed_count_and_plan(vault):
+    assert len(vault.bricks) == 338
+    corners = boxes(vault.bricks).corners().reshape(-1, 3)
+    assert np.ptp(corners, axis=0)[:2] == pytest.approx(PRINTED, abs=0.001)
+
+
+def test_the_vault_starts_with_the_arch(vault, arch25):
+    assert vault.placed[:25] == arch25.placed
+    assert vault.joints[:24] == arch25.joints
+    assert vault.grounds[:2] == arch25.grounds
+    assert vault.build_order == tuple(range(1, 339))
+    later = vault.bricks[25:]
+    assert {(b.dimensions, b.density) for b in later} == {((0.246, 0.116, 0.053), 2420.0)}
+
+
+def test_bricks_of_the_vault_are_a_joint_apart_and_all_neighbors_are_joined(vault):
+    pairs, distance, _ = own_pairs(vault, vault.bricks)
+    assert distance.min() > NARROWEST
+    near = {p for p, d in zip_pairs(vault) if d < 2 * WIDEST}
+    assert near == {frozenset(joint.bricks) for joint in vault.joints}
+    assert near - pairs == {frozenset(joint.bricks) for joint in vault.joints[:24]}
+
+
+def zip_pairs(scene):
+    pairs, distance = separations(scene.bricks)
+    names = np.array([brick.name for brick in scene.bricks])
+    return [(frozenset(p), d) for p, d in zip(names[pairs].tolist(), distance, strict=True)]
+
+
+def test_joints_of_the_vault_are_between_their_faces_and_not_wide(vault):
+    bricks = {brick.name: brick for brick in vault.bricks}
+    widths = []
+    for joint in vault.joints:
+        along, at = np.array(joint.along), np.array(joint.position)
+        before = face_distance(bricks[joint.bricks[0]], -along, at)
+        after = face_distance(bricks[joint.bricks[1]], along, at)
+        assert before == pytest.approx(after, abs=1e-9) or joint in vault.joints[:24]
+        widths.append(before + after)
+    assert min(widths) > NARROWEST
+    assert max(widths) < WIDEST
+
+
+def test_stiffness_of_the_vault_is_that_of_the_arch_by_contact_area(vault, network, arch25):
+    assembly = bare_assembly(network, 338)
+    index = {brick.name: i for i, brick in enumerate(vault.placed)}
+    area = dict(zip(map(tuple, assembly.bodies.tolist()), assembly.area, strict=True))
+    given = arch25.joints[0]
+    for joint in vault.joints[24:]:
+        share = area[tuple(sorted(index[b] for b in joint.bricks))] / (0.116 * 0.053)
+        for name in ("translational_stiffness", "rotational_stiffness"):
+            wanted = share * np.array(getattr(given, name))
+            assert getattr(joint, name) == pytest.approx(wanted, rel=1e-9)
+
+
+def test_every_partial_vault_stands_on_the_ground(network):
+    assert all(islands(network, count) == () for count in range(1, 339))
+
+
+def test_layers_grow_to_either_side_in_turn(vault):
+    """How far out the newest brick lies never falls back by more than a layer."""
+    beside = np.array([b.position[1] for b in vault.placed[25:]])
+    reached = np.maximum.accumulate(np.abs(beside))
+    assert (np.abs(beside) > reached - 0.5).all()
+    sides = np.sign(beside[np.abs(beside) > 0.2])
+    turns = np.count_nonzero(np.diff(sides))
+    assert turns >= 15
+
+
+def pushed(brick, way):
+    place = np.array(brick.position) + 0.03 * np.array(way)
+    return replace(brick, position=tuple(place.tolist()))
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda b: pushed(b, b.length_axis),
+        lambda b: pushed(b, b.width_axis),
+        lambda b: replace(b, dimensions=(0.296, 0.166, 0.053)),
+    ],
+)
+@pytest.mark.parametrize("name", [60, 200, 300])
+def test_a_moved_or_swollen_brick_is_found(vault, change, name):
+    """Negative control of the check that nothing interpenetrates."""
+    moved = [change(b) if b.name == name else b for b in vault.bricks]
+    _, distance, _ = own_pairs(vault, moved)
+    assert distance.min() < 0
+
+
+def test_a_brick_that_is_pulled_out_is_found(vault):
+    """Negative control of the check that joints lie between faces."""
+    out = replace(vault.bricks[199], position=(*vault.bricks[199].position[:2], 5.0))
+    bricks = [out if b.name == 200 else b for b in vault.bricks]
+    with pytest.raises(SceneError, match="200"):
+        bare_assembly(build_network(replace(vault, bricks=tuple(bricks))), 338)
+
+
+@pytest.mark.parametrize(
+    ("method", "steps"),
+    [
+        (seqopt.sequential, 675),
+        (seqopt.cantilever, 675),
+        (lambda network: seqopt.three_robot_loop(network).steps, 1342),
+        (lambda network: seqopt.modified_sequential(network).steps, 1347),
+    ],
+)
+def test_methods_build_the_vault(network, method, steps):
+    assert len(method(network)) == steps
+
+
+def test_the_vault_answers_as_independent_solvers_do(vault):
+    network = build_network(first(vault, 60))
+    engine = ComplianceEngine(network)
+    for bricks in (26, 41, 60):
+        node = network.scene.placed[bricks - 1].placing_node
+        grips = np.array([[node, 2 * bricks - 6]])
+        fields = engine.solve(bricks, grips, Want.ALL)
+        wanted = solve_dense(network, bricks, grip_columns(network, bricks, grips))
+        assert largest_difference(fields, wanted, network) < 1e-9
+
+
+def test_the_first_bricks_of_the_vault_are_analyzed(vault):
+    table = seqopt.analyze(ComplianceEngine(first(vault, 45)), seqopt.sequential(first(vault, 45)))
+    assert len(table) == 89
+    numbers = table[["F_max_N", "M_sup_Nm", "D_max_1e-3mm"]].to_numpy()
+    assert np.isfinite(numbers).all()
+    twisting = table["bricks"] < 25
+    closed = table.loc[~twisting, "D_max_1e-3mm"].max()
+    assert closed < table.loc[twisting, "D_max_1e-3mm"].max()  # the closed arch carries the layers
+
+
+def test_the_dome_is_round_and_of_the_size_of_benchmarks():
+    scene = load_scene("dome163")
+    assert len(scene.bricks) == 163
+    lowest = boxes(scene.bricks[:22]).place
+    assert np.ptp(np.linalg.norm(lowest[:, :2], axis=1)) < 1e-12

@@ -1,0 +1,234 @@
+"""Laws of generated scenes: nothing interpenetrates, all touch, and engines agree on them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from seqopt.contact.faces import bare_assembly
+from seqopt.engines.frame import FrameEngine
+from seqopt.engines.interface import Want, grip_columns
+from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.engines.rigid.dense import solve_dense
+from seqopt.errors import SceneError
+from seqopt.network.build import build_network
+from seqopt.scene.arch import ArchShape, arch_scene
+from seqopt.scene.boxes import separations
+from seqopt.scene.doubts import doubts
+from seqopt.scene.library import (
+    DomeShape,
+    JointLaw,
+    VaultShape,
+    WallShape,
+    chain,
+    dome,
+    herringbone_vault,
+    wall,
+)
+from seqopt.scene.library.joints import joints_between
+from seqopt.scene.scene_file import load_scene
+from seqopt.sequence.support import islands
+from seqopt.sequence.three_robots import three_robot_loop
+from seqopt.sequence.two_robots import cantilever, sequential
+from tests.builders import largest_difference, small_arch
+
+
+def even_arch(count):
+    """A closed arch in the pattern VLR that ends with a brick along it."""
+    return arch_scene(ArchShape(pitch=np.linspace(1.3, -1.3, count).tolist()))
+
+
+@st.composite
+def small_walls(draw):
+    return wall(
+        WallShape(
+            columns=draw(st.integers(1, 5)),
+            courses=draw(st.integers(1, 5)),
+            dimensions=draw(st.tuples(*[st.floats(0.05, 0.4)] * 3)),
+            gap=draw(st.sampled_from([0.0, 0.002, 0.01])),
+        )
+    )
+
+
+@st.composite
+def small_domes(draw):
+    shape = DomeShape(
+        courses=draw(st.integers(1, 5)),
+        around=draw(st.sampled_from([12, 14, 16, 20])),
+        bond=draw(st.sampled_from(["running", "herringbone"])),
+        span=1.4,
+        rise=draw(st.floats(0.3, 0.7)),
+        opening=draw(st.floats(0.5, 0.9)),
+        thickness=draw(st.floats(0.03, 0.06)),
+        gap=draw(st.floats(0.0, 0.01)),
+    )
+    return dome(shape)
+
+
+@st.composite
+def small_vaults(draw):
+    arch = even_arch(draw(st.sampled_from([10, 13, 16])))
+    shape = VaultShape(
+        bricks=draw(st.integers(len(arch.bricks), 70)),
+        spacing=draw(st.floats(0.131, 0.14)),
+        plan_angle=draw(st.floats(-0.03, 0.03)),
+        skew=draw(st.floats(-0.5, 0.5)),
+        widening=draw(st.floats(0.0, 0.03)),
+    )
+    return herringbone_vault(arch, shape)
+
+
+chains = st.builds(chain, st.integers(7, 40), pattern=st.sampled_from(["VLR", "V", "LR", "VL"]))
+GENERATED = st.one_of(chains, small_walls(), small_domes(), small_vaults())
+
+
+@given(scene=GENERATED)
+def test_no_two_bricks_are_in_one_place(scene):
+    assume(len(scene.bricks) > 1)
+    pairs, distance = separations(scene.bricks)
+    thin = min(min(brick.dimensions) for brick in scene.bricks)
+    assert distance.min(initial=0.0) >= -1e-6 * thin
+    assert doubts(scene) == ()
+    joined = {frozenset(joint.bricks) for joint in scene.joints}
+    assert len(joined) == len(scene.joints)
+    names = [brick.name for brick in scene.bricks]
+    near = {frozenset((names[i], names[j])) for i, j in pairs.tolist()}
+    assert joined <= near
+
+
+@settings(max_examples=20)
+@given(scene=GENERATED)
+def test_every_joint_lies_between_the_faces_of_its_bricks(scene):
+    """The contact checks say so: gap, overlap, position. Areas are those that contact finds."""
+    network = build_network(scene)
+    count = len(scene.bricks)
+    assembly = bare_assembly(network, count)
+    assert (assembly.area > 0).all()
+    if scene.name.startswith(("wall", "dome")):  # in a chain joints have one stiffness
+        stiffness = network.springs.translational_stiffness[network.springs.acting(count), 0]
+        assert stiffness == pytest.approx(1.5e9 * assembly.area, rel=1e-9)
+
+
+@settings(max_examples=20)
+@given(scene=GENERATED)
+def test_every_partial_structure_stands_on_the_ground(scene):
+    network = build_network(scene)
+    for count in range(1, len(scene.bricks) + 1):
+        assert islands(network, count) == ()
+
+
+@settings(max_examples=10)
+@given(scene=GENERATED)
+def test_methods_take_it(scene):
+    network = build_network(scene)
+    assert sequential(network)[-1].bricks == len(scene.bricks)
+    assert cantilever(network)[-1].bricks == len(scene.bricks)
+    if len(scene.bricks) > 3:
+        assert len(three_robot_loop(network).moves) == len(scene.bricks) - 3
+
+
+@settings(max_examples=10)
+@given(scene=GENERATED, share=st.floats(0, 1))
+def test_compliance_agrees_with_independent_routes(scene, share):
+    """A dense system of all bricks, from the springs alone; and a frame of stiff bars."""
+    assume(len(scene.bricks) <= 30)
+    network = build_network(scene)
+    bricks = 1 + int(share * (len(scene.bricks) - 1))
+    last = scene.placed[bricks - 1]
+    grips = np.array([[last.placing_node]])
+    fields = ComplianceEngine(network).solve(bricks, grips, Want.ALL)
+    direct = solve_dense(network, bricks, grip_columns(network, bricks, grips))
+    assert largest_difference(fields, direct, network) < 1e-9
+    other = FrameEngine(network).solve(bricks, grips, Want.ALL)
+    size = np.abs(fields.edge_force).max()
+    assert np.abs(other.edge_force - fields.edge_force).max() <= 1e-4 * size
+
+
+@pytest.mark.parametrize(
+    ("make", "named"),
+    [
+        (lambda: chain(1), "chain: bricks is 1; give a whole number from 2"),
+        (lambda: chain(2.5), "chain: bricks is 2.5; give a whole number"),
+        (
+            lambda: chain(3),
+            "chain of 3: bricks 2 and 3 interpenetrate by 17.6 mm; give more bricks",
+        ),
+        (lambda: chain(9, lean=2.0), "chain: lean is 2 rad; give at most a right angle"),
+        (lambda: WallShape(columns=0, courses=1), "wall: columns is 0; give a whole number from 1"),
+        (lambda: WallShape(columns=True, courses=1), "wall: columns is True; give a whole number"),
+        (lambda: WallShape(columns=1, courses=1, gap=-1.0), "wall: gap is -1.0; give a positive"),
+        (lambda: WallShape(columns=1, courses=1, gap=0.1), "wall: gap is 0.1 m, half a brick"),
+        (
+            lambda: WallShape(columns=1, courses=1, dimensions=(1.0, 0.0, 1.0)),
+            "wall: dimensions is 0.0; give a positive number of m",
+        ),
+        (lambda: DomeShape(courses=1, around=2), "dome: around is 2; give a whole number from 3"),
+        (lambda: DomeShape(courses=1, around=12, bond="x"), "dome: bond is 'x'; give one of run"),
+        (
+            lambda: DomeShape(courses=1, around=13, bond="herringbone"),
+            "dome: around is 13; give an even number",
+        ),
+        (lambda: DomeShape(courses=1, around=12, rise=1.1), "dome: rise is 1.1 m; give at most"),
+        (lambda: DomeShape(courses=1, around=12, opening=2.0), "dome: opening is 2 m; give less"),
+        (lambda: DomeShape(courses=1, around=12, span=-1.0), "dome: span is -1.0; give a positive"),
+        (
+            lambda: dome(DomeShape(courses=40, around=24, opening=0.1)),
+            "dome: a brick in course 34 would be .* mm long and .* mm high; give fewer around",
+        ),
+        (lambda: VaultShape(bricks=0), "vault: bricks is 0; give a whole number from 1"),
+        (lambda: VaultShape(bricks=30, skew=math.inf), "vault: skew is inf; give a finite number"),
+        (lambda: VaultShape(bricks=30, plan_angle=5.1), "vault: plan_angle is 5.1 rad; give at"),
+        (lambda: VaultShape(bricks=30, spacing=0.0), "vault: spacing is 0.0; give a positive"),
+        (
+            lambda: herringbone_vault(even_arch(13), VaultShape(bricks=12)),
+            "vault: bricks is 12, and its arch has 13; give at least as many",
+        ),
+        (
+            lambda: herringbone_vault(even_arch(13), VaultShape(bricks=40, spacing=0.11)),
+            "vault: bricks .* interpenetrate by .* mm; give a wider spacing",
+        ),
+        (
+            lambda: herringbone_vault(small_arch(12), VaultShape(bricks=40)),
+            "vault: scene arch is no arch to start from; give a closed chain of equal bricks",
+        ),
+        (
+            lambda: herringbone_vault(wall(WallShape(columns=7, courses=1)), VaultShape(bricks=40)),
+            "vault: scene wall 7 x 1 is no arch to start from",
+        ),
+        (
+            lambda: herringbone_vault(chain(13, pattern="V"), VaultShape(bricks=40)),
+            "vault: brick 2 of chain 13 does not lie as L in the pattern VLR",
+        ),
+        (lambda: herringbone_vault("arch25", VaultShape(bricks=40)), "vault: a str is no arch"),
+        (
+            lambda: JointLaw(translational=(1.0, -1.0, 1.0)),
+            "joint law: translational is .*at least",
+        ),
+    ],
+)
+def test_one_line_says_what_is_wrong(make, named):
+    with pytest.raises(SceneError, match=named) as caught:
+        make()
+    assert "\n" not in str(caught.value)
+
+
+def test_bricks_that_are_apart_have_no_joint(arch25):
+    law = JointLaw(translational=(1.0, 1.0, 1.0))
+    with pytest.raises(
+        SceneError, match=r"joint \(1, 13\): the faces of its bricks do not overlap"
+    ):
+        joints_between(arch25.bricks, [(0, 12)], law)
+
+
+def test_a_vault_is_as_large_as_asked_and_a_skew_of_either_sign_builds_from_its_foot():
+    arch = load_scene("arch25")
+    for skew in (-1.0, 0.0, 1.0):
+        scene = herringbone_vault(arch, VaultShape(bricks=150, skew=skew))
+        assert len(scene.bricks) == 150
+        left = [brick for brick in scene.bricks[25:] if brick.position[1] > 0.1]
+        foot = left[0].position[0] < 1.0
+        assert foot == (skew < 0)

@@ -1,0 +1,206 @@
+"""Work that splits: as a loop, whoever works; workers that die lose nothing and leave nothing."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import subprocess
+import sys
+import time
+from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
+from functools import partial
+
+import pytest
+
+from seqopt.errors import SolverError, WorkerError
+from seqopt.work import Progress, hire, map_ordered
+from tests.builders import ROOT
+
+
+def square(number):
+    time.sleep(0.01 * (number % 3))  # later ones may be ready first
+    return number * number
+
+
+def square_or_fail(number):
+    if number in (3, 5):
+        time.sleep(0.1 * (number == 3))  # the later error comes first
+        raise SolverError(f"no square of {number}")
+    return number * number
+
+
+def die_once(folder, number):
+    """End the process as the system does where memory is short, the first time."""
+    mark = folder / f"died at {number}"
+    if number in (2, 7) and not mark.exists():
+        mark.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return number * number
+
+
+def die(number):
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def own_error(number):
+    class OddError(Exception):
+        """One that cannot be sent."""
+
+    raise OddError(number)
+
+
+WANTED = [number * number for number in range(12)]
+
+
+def test_results_come_in_order_whoever_works():
+    assert list(map_ordered(square, range(12))) == WANTED
+    with hire(workers=2) as crew:
+        assert list(map_ordered(square, range(12), crew)) == WANTED
+        assert list(map_ordered(square, range(12), crew)) == WANTED  # again, on the same processes
+    assert multiprocessing.active_children() == []
+    for kind in (ThreadPoolExecutor, ProcessPoolExecutor):
+        with kind(2) as executor, hire(executor) as crew:
+            assert list(map_ordered(square, range(12), crew)) == WANTED
+
+
+def test_tasks_are_taken_as_they_are_needed():
+    taken = []
+
+    def tasks():
+        for number in range(1000):
+            taken.append(number)
+            yield number
+
+    with ThreadPoolExecutor(2) as executor, hire(executor) as crew:
+        results = map_ordered(square, tasks(), crew)
+        assert next(results) == 0
+        assert len(taken) <= 8
+        results.close()
+
+
+def test_what_is_known_is_not_worked_on():
+    done = []
+    known = {4: 0, 5: 0}.get
+    with ThreadPoolExecutor(2) as executor:
+        for mine in (None, executor):
+            with hire(mine) as crew:
+                found = map_ordered(square, range(8), crew, known, lambda *pair: done.append(pair))
+                assert list(found) == [0, 1, 4, 9, 0, 0, 36, 49]
+    assert sorted(done) == sorted([(n, n * n) for n in (0, 1, 2, 3, 6, 7)] * 2)
+
+
+def test_the_first_error_is_raised_whoever_works():
+    for workers in (1, 2):
+        found = []
+        with pytest.raises(SolverError, match="no square of 3"), hire(workers=workers) as crew:
+            found.extend(map_ordered(square_or_fail, range(9), crew))
+    assert multiprocessing.active_children() == []
+
+
+def test_a_worker_that_dies_is_replaced_and_nothing_is_lost(tmp_path):
+    with hire(workers=2) as crew:
+        assert list(map_ordered(partial(die_once, tmp_path), range(12), crew)) == WANTED
+    assert len(list(tmp_path.iterdir())) == 2  # they did die
+
+
+def test_workers_that_always_die_end_in_a_line():
+    wanted = pytest.raises(WorkerError, match=r"workers ended 4 times .*BrokenProcessPool")
+    with wanted as caught, hire(workers=2) as crew:
+        list(map_ordered(die, range(3), crew))
+    assert "\n" not in str(caught.value)
+    assert multiprocessing.active_children() == []
+
+
+def test_an_executor_of_others_that_breaks_is_named(tmp_path):
+    wanted = pytest.raises(WorkerError, match=r"without an answer .*BrokenProcessPool")
+    with ProcessPoolExecutor(2) as executor, wanted, hire(executor) as crew:
+        list(map_ordered(partial(die_once, tmp_path), range(12), crew))
+
+
+class Forgetful(Executor):
+    """Loses every third task, as a cluster does whose machines come and go."""
+
+    def __init__(self):
+        self.calls = 0
+
+    def submit(self, function, /, *arguments, **named):
+        self.calls += 1
+        future = Future()
+        if self.calls % 3:
+            future.set_result(function(*arguments, **named))
+        else:
+            future.set_exception(OSError("connection lost"))
+        return future
+
+
+def test_what_an_executor_of_others_loses_is_given_out_again():
+    with hire(Forgetful(), workers=2) as crew:
+        assert list(map_ordered(square, range(12), crew)) == WANTED
+
+
+def test_an_error_that_cannot_be_sent_is_an_error_in_a_line():
+    with pytest.raises(WorkerError), hire(workers=2) as crew:
+        list(map_ordered(own_error, range(3), crew))
+
+
+ENDLESS = """
+import sys, time
+from seqopt.work import hire, map_ordered
+if __name__ == "__main__":
+    with hire(workers=2) as crew:
+        for _ in map_ordered(time.sleep, [0.1, 600, 600], crew):
+            print("under way", flush=True)
+"""
+
+
+def alive(group):
+    """Return the processes of a group that run."""
+    shown = subprocess.run(
+        ["ps", "-eo", "pgid,pid,stat"], capture_output=True, text=True, check=True
+    )
+    rows = [line.split() for line in shown.stdout.splitlines()[1:]]
+    return [row[1] for row in rows if row[0] == str(group) and not row[2].startswith("Z")]
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+@pytest.mark.parametrize("how", ["SIGINT", "SIGKILL"])
+def test_no_worker_outlives_its_master(tmp_path, how):
+    script = tmp_path / "endless.py"
+    script.write_text(ENDLESS, encoding="utf-8")
+    run = subprocess.Popen(
+        [sys.executable, str(script)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+    )
+    assert run.stdout.readline() == "under way\n"
+    assert len(alive(run.pid)) >= 3
+    signal_ = getattr(signal, how)
+    if how == "SIGINT":
+        os.killpg(run.pid, signal_)  # as ctrl-C does: to all of them
+    else:
+        run.send_signal(signal_)
+    run.stdout.close()
+    said = run.stderr.read()
+    run.wait(timeout=20)
+    run.stderr.close()
+    until = time.monotonic() + 20
+    while alive(run.pid) and time.monotonic() < until:
+        time.sleep(0.05)
+    assert alive(run.pid) == []
+    assert said.count("KeyboardInterrupt") == (how == "SIGINT")  # of the master alone
+
+
+def test_progress_is_told_after_a_while_only(monkeypatch):
+    said, now = [], [0.0]
+    monkeypatch.setattr(time, "perf_counter", lambda: now[0])
+    progress = Progress("responses", 10.0, said.append)
+    for _ in range(10):
+        now[0] += 0.4
+        progress.add(1.0)
+    assert said[0] == "responses: 30 %, 3 s left"
+    assert said[-1] == "responses: 100 %, 0 s left"
+    assert len(said) == 8
