@@ -21,7 +21,14 @@ from seqopt.engines.rigid.operator import OperatorBuilder, load_matrix
 from seqopt.engines.rigid.spanning_tree import grow_tree
 from seqopt.network.build import build_network
 from seqopt.scene.arch import ArchShape, arch_scene
-from tests.builders import branch, from_both_sides, hinged, six_bricks, small_arch
+from tests.builders import (
+    branch,
+    from_both_sides,
+    hinged,
+    six_bricks,
+    small_arch,
+    torsion_free,
+)
 
 SCENES = {
     "arch": small_arch(5),
@@ -139,6 +146,7 @@ def test_which_loads_act_at_a_grip():
     columns = np.array([[0, 4], [9, 2]])
     index = [[0, 1, 2, 12, 13, 14], [27, 28, 29, 6, 7, 8]]
     assert operator.load_index(columns).tolist() == index
+    assert (operator.loose, operator.softness) == (0, 0.0)  # nothing is
     held = replace(operator, loose=2, flexibility=np.zeros((32, 32)))
     assert held.directions == 3
     assert held.load_index(columns).tolist() == [[*row, 30, 31] for row in index]
@@ -179,21 +187,22 @@ def eliminated(matrix):
 
 
 @pytest.mark.parametrize("grips", [(6, 9), (9, 7), (2, 7, 9), (3, 8, 6), (8, 9, 1), (6, 8, 9)])
-def test_loose_motions_are_unknowns_of_the_grips(grips):
+@pytest.mark.parametrize(("loosen", "loose"), [(hinged, 3), (torsion_free, 1)])
+def test_loose_motions_are_unknowns_of_the_grips(loosen, loose, grips):
     """They move until nothing pulls at them; pivots are measured by what they stand on."""
-    net = build_network(hinged(six_bricks(), 2))
+    net = build_network(loosen(six_bricks(), 2))
     operator = held_operator(hold_loose(ungripped_system(net, 5)))
-    assert operator.loose == 3
+    assert operator.loose == loose
     columns = np.array([grips])
     index = operator.load_index(columns)
     force, pivot = grip_forces(operator, columns, index)
     part = operator.flexibility[np.ix_(index[0], index[0])]
     moved = part @ force[0] + operator.dead_displacement[index[0]]
-    assert np.abs(moved[:-3]).max() <= 1e-9 * np.abs(operator.dead_displacement[:30]).max()
-    assert np.abs(moved[-3:]).max() <= 1e-9 * np.abs(net.inner_weight).max()
+    assert np.abs(moved[:-loose]).max() <= 1e-9 * np.abs(operator.dead_displacement[:30]).max()
+    assert np.abs(moved[-loose:]).max() <= 1e-9 * np.abs(net.inner_weight).max()
     bricks = columns[0] // 2
     if len(set(bricks)) == len(grips):
-        scale = np.append(np.diag(part)[:-3], [-1 / operator.softness] * 3)
+        scale = np.append(np.diag(part)[:-loose], [-1 / operator.softness] * loose)
         assert pivot == pytest.approx([min(1.0, (eliminated(part) / scale).min())], rel=1e-6)
     else:
         weighed = load_matrix(index, force, len(operator.flexibility)) @ operator.edge_force

@@ -49,14 +49,15 @@ UNUSED = "without any no constraint has this variable, and faces have three corn
 LENGTHS = "both have a length: costs that have not are refused when they are made"
 EQUIVALENT = (
     *(
-        Equivalent(module, line, "strict=True", "strict=False", LENGTHS)
-        for module, line in (
-            ("formulations.*", "zip("),
-            ("seqopt.engines.*", "zip("),
-            ("seqopt.placement.flow", "zip("),
-            (CERTIFICATE, "zip("),
-            (COSTS, "enumerate(zip("),
-            (COSTS, "zip(self.single[-2::-1]"),
+        Equivalent(module, line, "strict=True", "strict=False", why)
+        for module, line, why in (
+            ("formulations.*", "zip(", LENGTHS),
+            ("seqopt.placement.flow", "zip(", LENGTHS),
+            (COSTS, "enumerate(zip(", LENGTHS),
+            (COSTS, "zip(self.single[-2::-1]", LENGTHS),
+            (CERTIFICATE, "shared in zip(", LENGTHS),
+            (CERTIFICATE, "zip(choice, sizes", "lengths were compared before"),
+            ("seqopt.engines.rigid.operator", "zip(", "both are by ground end of one network"),
         )
     ),
     *(
@@ -115,8 +116,12 @@ EQUIVALENT = (
         GRIPS, "softness", "else 1.0", "else 2.0", "without loose motions nothing is scaled"
     ),
     Equivalent(GRIPS, "bricks[couples", "pair, 0", "pair, 1", "both grips hold this brick"),
-    Equivalent(GRIPS, "reshape(len(edge)", "-1", "-2", "any negative length is what is left"),
-    Equivalent(GRIPS, "reshape(len(force)", "-1", "-2", "any negative length is what is left"),
+    Equivalent(
+        "seqopt.engines.rigid.*", "reshape(", "-1", "-2", "a negative length is what is left"
+    ),
+    Equivalent(
+        CERTIFICATE, "@dataclass", "repr=False", "repr=True", "without arrays both look alike"
+    ),
     Equivalent(COMPLIANCE, "pivot >= TRUSTED", ">=", ">", "no pivot is 1e-5 to the last bit"),
     *(
         Equivalent(COMPLIANCE, "force[~trusted]", "0.0", size, "these sets are answered anew")
