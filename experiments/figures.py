@@ -2,7 +2,8 @@
 
 Method: draw `arch25` with its network; the twisting step 35 of the sequential method beside the
 cantilever method at the same step; responses along all methods; printed against computed ones;
-`vault338` while it grows and from above; a scene of each generator of the library.
+`vault338` while it grows and from above; a scene of each generator of the library; the Pareto sets
+of the free schedule and of the loop.
 Every picture is held against the stored one before it takes its place: gray means over squares of
 16 pixels, so that fonts do not count, may differ by a fifth of what tells the stored picture from a
 blank one.
@@ -29,17 +30,26 @@ from seqopt.arrays import Floats
 from seqopt.engines.interface import Engine, Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network
+from seqopt.placement.free_front import FreeFront
+from seqopt.placement.free_problem import pose_free
+from seqopt.placement.front import find_front
+from seqopt.placement.loop_front import LoopFront
 from seqopt.report.comparison import method_tables
 from seqopt.report.draw import View, draw_bricks, draw_grips, draw_network, draw_responses
+from seqopt.report.fronts import front_figure
 from seqopt.scene.boxes import boxes
 from seqopt.scene.library import DomeShape, WallShape, chain, dome, wall
 from seqopt.scene.scene_file import load_scene
+from seqopt.sequence.free_rules import FreeRules
+from seqopt.sequence.three_robots import three_robot_loop
+from seqopt.study.presets import WORST_RATIO
 from seqopt.study.published import as_printed
 from seqopt.study.tables import printed_steps
 
 VIEW = View(azimuth=35, elevation=22)
 MAGNIFY = 2000.0
 SQUARE, ALIKE = 16, 0.2  # pixels; share of what the stored picture shows
+ROUNDED = {"F_largest": 5.0, "M_sup": 0.5, "T_max": 5.0, "D_max": 5e-7}
 COLUMNS = {
     "F_rob1_N": "F_rob1 [N]",
     "M_sup_Nm": "M_sup [N m]",
@@ -170,6 +180,21 @@ def library(_: Engine) -> Figure:
     return figure
 
 
+def free_front(engine: Engine) -> Figure:
+    """Draw the Pareto sets of the free schedule and of the loop, and the methods of the paper."""
+    names = [*ROUNDED]
+    free = pose_free(engine, FreeRules(), WORST_RATIO, ",".join(names))
+    fronts = [
+        find_front(problem)
+        for problem in (
+            FreeFront(free, ROUNDED),
+            LoopFront(engine, three_robot_loop(engine.network), names, rounding=ROUNDED),
+        )
+    ]
+    methods = method_tables(engine)[0]
+    return front_figure(fronts[0], methods, {"three-robot loop": fronts[1].table})
+
+
 PICTURES: dict[str, Callable[[Engine], Figure]] = {
     "twisting_step.png": twisting_step,
     "network.png": network_picture,
@@ -178,6 +203,7 @@ PICTURES: dict[str, Callable[[Engine], Figure]] = {
     "agreement.png": printed_against_computed,
     "vault338.png": vault,
     "library.png": library,
+    "free_front.png": free_front,
 }
 
 

@@ -18,17 +18,21 @@ from __future__ import annotations
 import numpy as np
 
 from seqopt.errors import ProblemError
-from seqopt.placement.formulation import Formulation, FormulationKind, Selection
+from seqopt.placement.first_choice import stopped
+from seqopt.placement.formulation import End, Formulation, FormulationKind, Selection
 from seqopt.placement.interface import Aim, PlacementProblem
+from seqopt.placement.watch import Watch
 
 
-def solve(problem: PlacementProblem, *, width: int = 5) -> Selection:
+def solve(problem: PlacementProblem, *, watch: Watch | None = None, width: int = 5) -> Selection:
     """Return the best choice found with a beam.
 
     Parameters
     ----------
     problem : PlacementProblem
         Its sums are used.
+    watch : Watch, optional
+        Says when to stop, and is told what is found.
     width : int
         How many partial choices are kept, from 1.
 
@@ -47,17 +51,28 @@ def solve(problem: PlacementProblem, *, width: int = 5) -> Selection:
     if width < 1:
         raise ProblemError(f"beam: width is {width}; give a whole number from 1")
     costs = problem.sums
-    found = [_beam(problem, width), _greedy(problem)]
-    choice = min(found, key=costs.cost)
-    return Selection(choice, costs.cost(choice))
+    watch = watch or Watch()
+    found = [_greedy(problem, watch), _beam(problem, width, watch)]
+    met = [choice for choice in found if choice is not None]
+    if not met:
+        return stopped(problem)
+    choice = min(reversed(met), key=costs.cost)
+    end = End.DONE if len(met) == len(found) else End.STOPPED
+    return Selection(choice, costs.cost(choice), end=end)
 
 
-def _beam(problem: PlacementProblem, width: int) -> tuple[int, ...]:
+def _beam(problem: PlacementProblem, width: int, watch: Watch) -> tuple[int, ...] | None:
+    """Return the best choice of the beam; the greedy one if no kept one leads on.
+
+    None if time is over.
+    """
     costs = problem.sums
     good = costs.continuable()
     paths: list[tuple[int, ...]] = [()]
     spent = np.zeros(1)
     for k, (single, shared) in enumerate(zip(costs.single, costs.shared, strict=True)):
+        if watch.over:
+            return None
         ends = [path[-1] if path else 0 for path in paths]
         through = spent[:, None] + shared[ends]
         best = through.argmin(axis=0)
@@ -65,18 +80,23 @@ def _beam(problem: PlacementProblem, width: int) -> tuple[int, ...]:
         order = np.argsort(total, kind="stable")
         kept = order[np.isfinite(total[order])][:width]
         if not len(kept):  # no kept choice can be continued
-            return _greedy(problem)
+            return _greedy(problem, Watch())
         paths = [(*paths[best[j]], int(j)) for j in kept]
         spent = total[kept]
     return paths[0]
 
 
-def _greedy(problem: PlacementProblem) -> tuple[int, ...]:
-    """Return the choice that takes, move by move, the candidate that is cheapest now."""
+def _greedy(problem: PlacementProblem, watch: Watch) -> tuple[int, ...] | None:
+    """Return the choice that takes, move by move, the candidate that is cheapest now.
+
+    None if time is over.
+    """
     costs = problem.sums
     good = costs.continuable()
     choice: list[int] = []
     for k, single in enumerate(costs.single):
+        if watch.over:
+            return None
         row = problem.conditional(k, choice[-1]) if choice else costs.shared[0][0]
         possible = good[k] & np.isfinite(costs.shared[k][choice[-1] if choice else 0])
         choice.append(int(np.argmin(np.where(possible, single + row, np.inf))))

@@ -26,19 +26,25 @@ import numpy as np
 
 from seqopt.arrays import Floats
 from seqopt.errors import ProblemError
+from seqopt.placement.first_choice import stopped
 from seqopt.placement.formulation import Formulation, FormulationKind, Reads, Selection
 from seqopt.placement.interface import Aim, PlacementProblem
+from seqopt.placement.watch import Watch
 
 CHARGES = ("later", "earlier")
 
 
-def solve(problem: PlacementProblem, *, charge: str = "later") -> Selection:
+def solve(
+    problem: PlacementProblem, *, watch: Watch | None = None, charge: str = "later"
+) -> Selection:
     """Return the choices of the cascade.
 
     Parameters
     ----------
     problem : PlacementProblem
         Its sums are used.
+    watch : Watch, optional
+        Says when to stop, and is told what is found.
     charge : str
         Which of two moves answers for the step that they share: ``later`` or ``earlier``.
 
@@ -56,10 +62,13 @@ def solve(problem: PlacementProblem, *, charge: str = "later") -> Selection:
     """
     if charge not in CHARGES:
         raise ProblemError(f"cascade: charge is {charge!r}; give one of {', '.join(CHARGES)}")
+    watch = watch or Watch()
     layered = problem.sums
     good = layered.continuable()
     choice: list[int] = []
     for k, single in enumerate(layered.single):
+        if watch.over:
+            return stopped(problem)
         possible = good[k] & np.isfinite(layered.shared[k][choice[-1] if choice else 0])
         costs = single + _charged(problem, k, choice, charge)
         choice.append(int(np.argmin(np.where(possible, costs, np.inf))))

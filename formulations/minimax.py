@@ -16,17 +16,21 @@ from __future__ import annotations
 import numpy as np
 
 from seqopt.placement.costs import LayeredCosts
+from seqopt.placement.first_choice import stopped
 from seqopt.placement.formulation import Formulation, FormulationKind, Selection
 from seqopt.placement.interface import Aim, PlacementProblem
+from seqopt.placement.watch import Watch
 
 
-def solve(problem: PlacementProblem) -> Selection:
+def solve(problem: PlacementProblem, *, watch: Watch | None = None) -> Selection:
     """Return a choice whose worst cost is least.
 
     Parameters
     ----------
     problem : PlacementProblem
         Its peaks are used.
+    watch : Watch, optional
+        Says when to stop, and is told what is found.
 
     Returns
     -------
@@ -40,6 +44,8 @@ def solve(problem: PlacementProblem) -> Selection:
     """
     costs = problem.peaks
     costs.continuable()
+    if (watch or Watch()).over:
+        return stopped(problem, Aim.PEAK)
     peak = _least_peak(costs)
     allowed = LayeredCosts(
         tuple(np.where(single <= peak, single, np.inf) for single in costs.single),

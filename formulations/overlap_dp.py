@@ -18,17 +18,21 @@ from __future__ import annotations
 
 import numpy as np
 
+from seqopt.placement.first_choice import stopped
 from seqopt.placement.formulation import Formulation, FormulationKind, Selection
 from seqopt.placement.interface import Aim, PlacementProblem
+from seqopt.placement.watch import Watch
 
 
-def solve(problem: PlacementProblem) -> Selection:
+def solve(problem: PlacementProblem, *, watch: Watch | None = None) -> Selection:
     """Return the exact optimum of the sum over the build.
 
     Parameters
     ----------
     problem : PlacementProblem
         Its sums are used.
+    watch : Watch, optional
+        Says when to stop, and is told what is found.
 
     Returns
     -------
@@ -40,10 +44,13 @@ def solve(problem: PlacementProblem) -> Selection:
     InfeasibleError
         If no choice is allowed.
     """
+    watch = watch or Watch()
     costs = problem.sums
     costs.continuable()
     to_go = [costs.single[-1]]
     for single, shared in zip(costs.single[-2::-1], costs.shared[:0:-1], strict=True):
+        if watch.over:
+            return stopped(problem)
         to_go.insert(0, single + (shared + to_go[0]).min(axis=1))
     choice: list[int] = []
     for shared, rest in zip(costs.shared, to_go, strict=True):

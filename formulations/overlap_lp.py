@@ -19,18 +19,22 @@ import cvxpy as cp
 import numpy as np
 
 from formulations.solvers import minimize
+from seqopt.placement.first_choice import stopped
 from seqopt.placement.flow import layered_flow
 from seqopt.placement.formulation import Formulation, FormulationKind, Selection
 from seqopt.placement.interface import Aim, PlacementProblem
+from seqopt.placement.watch import Watch
 
 
-def solve(problem: PlacementProblem) -> Selection:
+def solve(problem: PlacementProblem, *, watch: Watch | None = None) -> Selection:
     """Return the choice that the largest flow follows.
 
     Parameters
     ----------
     problem : PlacementProblem
         Its sums and budgets are used.
+    watch : Watch, optional
+        Says when to stop, and is told what is found.
 
     Returns
     -------
@@ -42,8 +46,9 @@ def solve(problem: PlacementProblem) -> Selection:
     InfeasibleError
         If no choice is allowed, or no flow is within all budgets.
     SolverError
-        If the solver ends without an optimum.
+        If the solver ends without an optimum, or stops and no choice is at hand.
     """
+    watch = watch or Watch()
     flow = layered_flow(problem)
     arcs = cp.Variable(len(flow.cost), nonneg=True)
     conserve = cp.Zero(flow.balance @ arcs - flow.source)
@@ -51,7 +56,9 @@ def solve(problem: PlacementProblem) -> Selection:
         cp.NonNeg(cap - amount @ arcs) for cap, amount in zip(flow.caps, flow.amounts, strict=True)
     ]
     program = cp.Problem(cp.Minimize(flow.cost @ arcs), [conserve, *caps])
-    optimum = minimize(program, cp.CLARABEL, feasible=flow.feasible)
+    optimum = minimize(program, feasible=flow.feasible, time_limit=watch.left)
+    if optimum.stopped:
+        return stopped(problem)
     choice = flow.choice(np.asarray(arcs.value))
     prices = flow.prices([float(cap.dual_value) for cap in caps])
     objective = problem.sums.cost(choice)

@@ -13,22 +13,87 @@ programming gives the same answer hundreds of times faster.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import cvxpy as cp
 import numpy as np
 
-from formulations.solvers import minimize
-from seqopt.placement.flow import layered_flow
-from seqopt.placement.formulation import Formulation, FormulationKind, Selection
+from formulations.solvers import minimize_whole
+from seqopt.placement.first_choice import stopped
+from seqopt.placement.flow import LayeredFlow, layered_flow
+from seqopt.placement.formulation import End, Formulation, FormulationKind, Selection
 from seqopt.placement.interface import Aim, PlacementProblem
+from seqopt.placement.watch import Watch
 
 
-def solve(problem: PlacementProblem) -> Selection:
+@dataclass(frozen=True, eq=False)
+class Written:
+    """The program, written down.
+
+    Attributes
+    ----------
+    program : cvxpy.Problem
+        Costs are scaled.
+    arcs : cvxpy.Variable
+        Of every allowed pair.
+    flow : LayeredFlow
+        The arcs and their scale.
+    """
+
+    program: cp.Problem
+    arcs: cp.Variable
+    flow: LayeredFlow
+
+    def bound(self, value: float) -> float:
+        """Return a lower bound in the unit of the costs, lower by what the solver may be off.
+
+        Parameters
+        ----------
+        value : float
+            Of the scaled program.
+
+        Returns
+        -------
+        float
+        """
+        return self.flow.bound(value)
+
+
+def write(problem: PlacementProblem) -> Written:
+    """Return the program of a problem.
+
+    Parameters
+    ----------
+    problem : PlacementProblem
+        Its sums and budgets are used.
+
+    Returns
+    -------
+    Written
+
+    Raises
+    ------
+    InfeasibleError
+        If no choice is allowed, or none is within one of the budgets.
+    """
+    flow = layered_flow(problem)
+    arcs = cp.Variable(len(flow.cost), boolean=True)
+    conserve = cp.Zero(flow.balance @ arcs - flow.source)
+    caps = [
+        cp.NonNeg(cap - amount @ arcs) for cap, amount in zip(flow.caps, flow.amounts, strict=True)
+    ]
+    return Written(cp.Problem(cp.Minimize(flow.cost @ arcs), [conserve, *caps]), arcs, flow)
+
+
+def solve(problem: PlacementProblem, *, watch: Watch | None = None) -> Selection:
     """Return the exact optimum within the budgets.
 
     Parameters
     ----------
     problem : PlacementProblem
         Its sums and budgets are used.
+    watch : Watch, optional
+        Says when to stop, and is told what is found.
 
     Returns
     -------
@@ -40,20 +105,20 @@ def solve(problem: PlacementProblem) -> Selection:
     InfeasibleError
         If no choice is allowed, or none is within all budgets.
     SolverError
-        If the solver ends without an optimum.
+        If the solver ends without an optimum, or stops and no choice is at hand.
     """
-    flow = layered_flow(problem)
-    arcs = cp.Variable(len(flow.cost), boolean=True)
-    conserve = cp.Zero(flow.balance @ arcs - flow.source)
-    caps = [
-        cp.NonNeg(cap - amount @ arcs) for cap, amount in zip(flow.caps, flow.amounts, strict=True)
-    ]
-    program = cp.Problem(cp.Minimize(flow.cost @ arcs), [conserve, *caps])
-    optimum = minimize(program, cp.HIGHS, feasible=flow.feasible)
-    choice = flow.choice(np.asarray(arcs.value))
-    objective = problem.sums.cost(choice)
-    bound = flow.bound(optimum.value)
-    return Selection(choice, objective, bound, compile_seconds=optimum.compile_seconds)
+    watch = watch or Watch()
+    written = write(problem)
+    flow = written.flow
+    optimum = minimize_whole(
+        written.program, feasible=flow.feasible, watch=watch, told=written.bound
+    )
+    if not np.isfinite(optimum.value):
+        return stopped(problem, bound=written.bound(optimum.bound))
+    choice = flow.choice(np.asarray(written.arcs.value))
+    bound = written.bound(optimum.bound if optimum.stopped else optimum.value)
+    end = End.STOPPED if optimum.stopped else End.DONE
+    return Selection(choice, problem.sums.cost(choice), bound, {}, optimum.compile_seconds, end)
 
 
 FORMULATION = Formulation(

@@ -10,9 +10,10 @@ next :math:`h` moves,
 
 and commits :math:`o_k`. The step shared with the committed choice is ranked among the candidates
 of move :math:`k` alone. With ``horizon=1`` this is the search of a single move of Bruun et al.
-(equation 1): every candidate analyzed in every step of its window, ranked per criterion, least sum
-wins. With the whole build as horizon it is brute force and exact; tests hold the other formulations
-against it on small builds. The work grows with the product of the candidates' numbers.
+(equation 1), every candidate analyzed in every step of its window, ranked per criterion, least sum
+wins, and chooses as ``cascade`` does; without proof it is that. With the whole build as horizon it
+is brute force and exact; tests hold the other formulations against it on small builds. The work
+grows with the product of the candidates' numbers.
 """
 
 from __future__ import annotations
@@ -24,19 +25,23 @@ import numpy as np
 from seqopt.arrays import Floats
 from seqopt.errors import ProblemError
 from seqopt.placement.costs import LayeredCosts
-from seqopt.placement.formulation import Formulation, FormulationKind, Reads, Selection
+from seqopt.placement.first_choice import stopped
+from seqopt.placement.formulation import Formulation, FormulationKind, Selection
 from seqopt.placement.interface import Aim, PlacementProblem
+from seqopt.placement.watch import Watch
 
 MOST = 20_000_000  # combinations in one enumeration: 160 MB
 
 
-def solve(problem: PlacementProblem, *, horizon: int = 1) -> Selection:
+def solve(problem: PlacementProblem, *, watch: Watch | None = None, horizon: int = 2) -> Selection:
     """Return the committed choices.
 
     Parameters
     ----------
     problem : PlacementProblem
         Its sums are used.
+    watch : Watch, optional
+        Says when to stop, and is told what is found.
     horizon : int
         How many moves are enumerated at once, from 1.
 
@@ -52,6 +57,7 @@ def solve(problem: PlacementProblem, *, horizon: int = 1) -> Selection:
     ProblemError
         If the horizon is below 1, or there are more combinations than `MOST`.
     """
+    watch = watch or Watch()
     costs = problem.sums
     sizes = costs.sizes
     if horizon < 1:
@@ -59,11 +65,13 @@ def solve(problem: PlacementProblem, *, horizon: int = 1) -> Selection:
     good = costs.continuable()
     choice: list[int] = []
     while len(choice) < len(sizes):
+        if watch.over:
+            return stopped(problem)
         k = len(choice)
         count = math.prod(sizes[k : k + horizon])
         if count > MOST:
             raise ProblemError(
-                f"rank_search: {count:.2g} combinations of {min(horizon, len(sizes) - k)} moves; "
+                f"rank_search: {count:.2g} combinations of {min(horizon, len(sizes))} moves; "
                 f"lower the horizon (at most {MOST:.0e} are enumerated)"
             )
         row = problem.conditional(k, choice[-1]) if choice else costs.shared[0][0]
@@ -92,5 +100,5 @@ FORMULATION = Formulation(
     FormulationKind.HEURISTIC,
     Aim.SUM,
     solve,
-    Reads.WINDOW,
+    windowed=(("horizon", 1),),
 )

@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+import math
+import time
 import warnings
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import cvxpy as cp
+import highspy
+import numpy as np
 
 from seqopt.errors import InfeasibleError, SolverError
+from seqopt.placement.watch import Watch
 from seqopt.stability.limit_analysis import Claim
 
-OPTIONS = {cp.CLARABEL: {}, cp.HIGHS: {"mip_rel_gap": 1e-9, "mip_abs_gap": 1e-9}}
+GAPS = {"mip_rel_gap": 1e-9, "mip_abs_gap": 1e-9}  # of integer programs
+HIGHS_ENDS = {"kOptimal": cp.OPTIMAL, "kInfeasible": cp.INFEASIBLE}
 CONE_OPTIONS: tuple[dict[str, object], ...] = (
     {"equilibrate_enable": False, "static_regularization_constant": 1e-7},
     {"warm_start": False},  # a solver that is kept keeps its options
@@ -31,26 +39,50 @@ class Optimum:
     Attributes
     ----------
     value : float
-        Of the objective.
+        Of the objective; infinite where it was stopped before it had any solution.
     compile_seconds : float
         What cvxpy took to write the program down for the solver, s.
+    bound : float
+        On the objective, as the solver says.
+    nodes : int
+        Of its search tree.
+    stopped : bool
+        Whether its time was over.
     """
 
     value: float
     compile_seconds: float
+    bound: float = -math.inf
+    nodes: int = 0
+    stopped: bool = False
 
 
-def minimize(program: cp.Problem, solver: str, *, feasible: bool) -> Optimum:
-    """Solve a linear or integer program.
+@dataclass(frozen=True)
+class Size:
+    """How large a program is, as it is handed to a solver.
+
+    Attributes
+    ----------
+    rows, columns, nonzeros, binaries : int
+    """
+
+    rows: int
+    columns: int
+    nonzeros: int
+    binaries: int
+
+
+def minimize(program: cp.Problem, *, feasible: bool, time_limit: float = math.inf) -> Optimum:
+    """Solve a linear program by Clarabel.
 
     Parameters
     ----------
     program : cvxpy.Problem
         Its variables take the values of the optimum.
-    solver : str
-        ``cvxpy.CLARABEL`` or ``cvxpy.HIGHS``.
     feasible : bool
         Whether the program is known to have a solution.
+    time_limit : float, optional
+        After which it stops with nothing, s.
 
     Returns
     -------
@@ -61,21 +93,161 @@ def minimize(program: cp.Problem, solver: str, *, feasible: bool) -> Optimum:
     InfeasibleError
         If the solver proves that nothing is within all budgets.
     SolverError
-        If it ends in any other way than with an optimum, or calls a program infeasible that is not.
+        If it ends in any other way than with an optimum or at its limit, or calls a program
+        infeasible that is not.
     """
+    limit = {"time_limit": time_limit} if math.isfinite(time_limit) else {}
     try:
         with warnings.catch_warnings():  # an inaccurate end is refused below
             warnings.filterwarnings("ignore", "Solution may be inaccurate", UserWarning)
-            program.solve(solver=solver, **OPTIONS[solver])
+            program.solve(solver=cp.CLARABEL, **limit)
     except cp.SolverError as error:
-        raise SolverError(f"{solver} failed: {error}; rescale the costs") from error
-    if program.status == cp.INFEASIBLE and feasible:
+        raise SolverError(f"{cp.CLARABEL} failed: {error}; rescale the costs") from error
+    seconds = float(program.compilation_time or 0.0)
+    if program.status == cp.USER_LIMIT and limit:
+        return Optimum(math.inf, seconds, stopped=True)
+    _require_optimum(program.status, cp.CLARABEL, feasible=feasible)
+    value = float(program.value)
+    return Optimum(value, seconds, value)
+
+
+def minimize_whole(
+    program: cp.Problem,
+    *,
+    feasible: bool,
+    watch: Watch | None = None,
+    told: Callable[[float], float] = float,
+) -> Optimum:
+    """Solve an integer program by HiGHS.
+
+    Parameters
+    ----------
+    program : cvxpy.Problem
+        Its variables take the values of the best solution, if there is one.
+    feasible : bool
+        Whether the program is known to have a solution.
+    watch : Watch, optional
+        Says when to stop, and is told values and bounds as they are found.
+    told : callable, optional
+        Turns a value of the program into the unit that the watch is told.
+
+    Returns
+    -------
+    Optimum
+
+    Raises
+    ------
+    InfeasibleError, SolverError
+        As `minimize`.
+    """
+    watch = watch or Watch()
+    start = time.perf_counter()
+    try:
+        data, chain, inverse = program.get_problem_data(cp.HIGHS)
+        solver = _loaded(data, whole=True)
+        seconds = time.perf_counter() - start
+        offset = float(inverse[-1].get("offset", 0.0))
+        _listen(solver, watch, lambda value: told(value + offset))
+        status = _end(solver, watch.left)
+    except cp.SolverError as error:
+        raise SolverError(f"{cp.HIGHS} failed: {error}; rescale the costs") from error
+    info = solver.getInfo()
+    stopped = status == "kTimeLimit"
+    bound = float(info.mip_dual_bound) + offset
+    if stopped and not math.isfinite(info.objective_function_value):
+        return Optimum(math.inf, seconds, bound, int(info.mip_node_count), stopped=True)
+    if not stopped:
+        _require_optimum(HIGHS_ENDS.get(status, status), cp.HIGHS, feasible=feasible)
+    results = {"solution": solver.getSolution(), "info": info, "model_status": "kOptimal"}
+    program.unpack_results(results | {"run_time": solver.getRunTime()}, chain, inverse)
+    return Optimum(float(program.value), seconds, bound, int(info.mip_node_count), stopped)
+
+
+def anatomy(program: cp.Problem) -> tuple[Size, float]:
+    """Return how large an integer program is, and the bound of its linear relaxation.
+
+    Parameters
+    ----------
+    program : cvxpy.Problem
+
+    Returns
+    -------
+    size : Size
+    bound : float
+
+    Raises
+    ------
+    SolverError
+        If the relaxation is not solved.
+    """
+    data, _, inverse = program.get_problem_data(cp.HIGHS)
+    solver = _loaded(data, whole=False)
+    _require_optimum(HIGHS_ENDS.get(_end(solver, math.inf), ""), cp.HIGHS, feasible=True)
+    matrix = data["A"].tocsc()
+    rows, columns = matrix.shape
+    size = Size(rows, columns, int(matrix.nnz), len(data["bool_vars_idx"]))
+    value = float(solver.getInfo().objective_function_value)
+    return size, value + float(inverse[-1].get("offset", 0.0))
+
+
+def _require_optimum(status: str, solver: str, *, feasible: bool) -> None:
+    """Raise an error unless a solver ended with an optimum."""
+    if status == cp.INFEASIBLE and feasible:
         raise SolverError(f"{solver} calls a problem infeasible that is not; rescale the costs")
-    if program.status == cp.INFEASIBLE:
+    if status == cp.INFEASIBLE:
         raise InfeasibleError("no choice is within all budgets; raise a bound")
-    if program.status != cp.OPTIMAL:
-        raise SolverError(f"{solver} ended with status {program.status!r}; rescale the costs")
-    return Optimum(float(program.value), float(program.compilation_time or 0.0))
+    if status != cp.OPTIMAL:
+        raise SolverError(f"{solver} ended with status {status!r}; rescale the costs")
+
+
+def _loaded(data: dict[str, Any], *, whole: bool) -> highspy.Highs:
+    """Return HiGHS with a program: equations first, then inequalities, as cvxpy writes them."""
+    model = highspy.HighsModel()
+    lp, matrix, right = model.lp_, data["A"].tocsc(), data["b"]
+    lp.num_row_, lp.num_col_ = matrix.shape
+    lp.col_cost_, lp.row_upper_ = data["c"], right
+    lp.row_lower_ = np.where(np.arange(len(right)) < data["dims"].zero, right, -highspy.kHighsInf)
+    lp.a_matrix_.format_ = highspy.MatrixFormat.kColwise
+    lp.a_matrix_.start_, lp.a_matrix_.index_ = matrix.indptr, matrix.indices
+    lp.a_matrix_.value_ = matrix.data
+    binary = np.zeros(lp.num_col_, dtype=bool)
+    binary[list(data["bool_vars_idx"])] = True
+    low, high = data.get("lower_bounds"), data.get("upper_bounds")
+    low = np.full(len(binary), -highspy.kHighsInf) if low is None else low
+    high = np.full(len(binary), highspy.kHighsInf) if high is None else high
+    lp.col_lower_ = np.where(binary, np.maximum(low, 0.0), low)
+    lp.col_upper_ = np.where(binary, np.minimum(high, 1.0), high)
+    kinds = (highspy.HighsVarType.kContinuous, highspy.HighsVarType.kInteger)
+    if whole:
+        lp.integrality_ = [kinds[int(is_binary)] for is_binary in binary]
+    solver = highspy.Highs()
+    for name, value in {"log_to_console": False, **GAPS}.items():
+        solver.setOptionValue(name, value)
+    solver.passModel(model)
+    return solver
+
+
+def _listen(solver: highspy.Highs, watch: Watch, told: Callable[[float], float]) -> None:
+    """Let HiGHS tell a watch every better solution, and its bounds between them."""
+
+    def hear(event: Any) -> None:
+        data = event.data_out
+        watch.tell(_finite(told(data.mip_primal_bound), math.inf), told(data.mip_dual_bound))
+
+    solver.cbMipImprovingSolution += hear
+    solver.cbMipInterrupt += hear
+
+
+def _finite(value: float, otherwise: float) -> float:
+    return value if abs(value) < highspy.kHighsInf else otherwise
+
+
+def _end(solver: highspy.Highs, seconds: float) -> str:
+    """Run HiGHS and return how that ended, in its words."""
+    if math.isfinite(seconds):
+        solver.setOptionValue("time_limit", seconds)
+    solver.run()
+    return str(solver.getModelStatus().name)
 
 
 def end_of(program: cp.Problem, attempt: int) -> Claim:

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from seqopt.network.network import Network
     from seqopt.placement.certificate import Certificate
     from seqopt.placement.formulation import Formulation, formulations
+    from seqopt.placement.free_problem import pose_free
     from seqopt.placement.plan import Plan
     from seqopt.placement.problem import pose
     from seqopt.placement.requirements import Limit
@@ -41,6 +42,7 @@ if TYPE_CHECKING:
     from seqopt.scene.arch import ArchShape, arch_scene
     from seqopt.scene.scene import Scene
     from seqopt.scene.scene_file import load_scene, save_scene
+    from seqopt.sequence.free_rules import FreeRules
     from seqopt.sequence.plan_file import read_plan
     from seqopt.sequence.schedule import Schedule
     from seqopt.sequence.schedule_file import read_schedule
@@ -61,6 +63,7 @@ _HOMES = {
     "network.network": ("Network",),
     "placement.certificate": ("Certificate",),
     "placement.formulation": ("Formulation", "formulations"),
+    "placement.free_problem": ("pose_free",),
     "placement.plan": ("Plan",),
     "placement.problem": ("pose",),
     "placement.requirements": ("Limit",),
@@ -69,6 +72,7 @@ _HOMES = {
     "scene.arch": ("ArchShape", "arch_scene"),
     "scene.scene": ("Scene",),
     "scene.scene_file": ("load_scene", "save_scene"),
+    "sequence.free_rules": ("FreeRules",),
     "sequence.plan_file": ("read_plan",),
     "sequence.schedule": ("Schedule",),
     "sequence.schedule_file": ("read_schedule",),
@@ -106,6 +110,8 @@ __all__ = [  # noqa: RUF022  # in the order in which they are met
     "pose",
     "Formulation",
     "formulations",
+    "FreeRules",
+    "pose_free",
     "solve",
     "optimize",
     "Plan",

@@ -70,11 +70,9 @@ def optimize(
     1.185
     """
     start = time.perf_counter()
-    resources = _resources(options)
-    solver, opened = _assemble(scene, schedule, engine)
+    parts = *_assemble(scene, schedule, engine), find_criterion(criterion), limits, ()
     assemble = time.perf_counter() - start
-    problem = pose(solver, opened, find_criterion(criterion), limits, (), resources)
-    plan = solve(problem, formulation, **options)
+    plan = solve(pose(*parts, _resources(options)), formulation, **options)
     return replace(plan, seconds={"assemble": assemble, **plan.seconds})
 
 

@@ -8,11 +8,12 @@ import numpy as np
 from hypothesis import strategies as st
 
 from experiments.harness.walls import running_bond
-from seqopt.placement.costs import LayeredCosts
+from seqopt.placement.costs import Budget, LayeredCosts
 from seqopt.placement.interface import CostProblem
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.parts import Robot
 from seqopt.scene.reach import Anywhere, Side, Sphere
+from seqopt.sequence.free_rules import FreeRules
 from seqopt.study.presets import ROBOTS
 from tests.builders import about_vertical, from_both_sides, moved
 
@@ -149,7 +150,7 @@ def flat_arches(draw):
 def problems(draw, most_moves=5, most_candidates=4):
     """Costs with many ties and some choices not allowed."""
     sizes = draw(st.lists(st.integers(1, most_candidates), min_size=1, max_size=most_moves))
-    cost = st.one_of(st.integers(0, 3).map(float), st.just(np.inf))
+    cost = st.sampled_from([0.0, 1.0, 2.0, 3.0] * 3 + [np.inf])  # with more, hardly any is solvable
 
     def array(*shape):
         count = int(np.prod(shape))
@@ -158,3 +159,46 @@ def problems(draw, most_moves=5, most_candidates=4):
     single = tuple(array(size) for size in sizes)
     shared = tuple(array(a, b) for a, b in zip([1, *sizes[:-1]], sizes, strict=True))
     return CostProblem(LayeredCosts(single, shared))
+
+
+@st.composite
+def budgeted(draw, most_budgets=3):
+    """A problem with budgets on whole amounts, some negative, of choices and of pairs."""
+    problem = draw(problems())
+
+    def arrays(parts):
+        sizes = [part.size for part in parts]
+        flat = draw(st.lists(st.integers(-1, 3), min_size=sum(sizes), max_size=sum(sizes)))
+        cuts = np.split(np.array(flat, float), np.cumsum(sizes)[:-1])
+        return tuple(cut.reshape(part.shape) for cut, part in zip(cuts, parts, strict=True))
+
+    budgets = tuple(
+        Budget(
+            f"use {i}",
+            arrays(problem.sums.single),
+            arrays(problem.sums.shared),
+            float(draw(st.integers(-2, 10))),
+        )
+        for i in range(draw(st.integers(1, most_budgets)))
+    )
+    return replace(problem, budgets=budgets)
+
+
+@st.composite
+def free_builds(draw, most_bricks=5, most_robots=4):
+    """A small arch or wall with a few robots, and rules of the free schedule."""
+    scene = draw(st.one_of(arches(max_bricks=most_bricks, min_bricks=2), both_sided()))
+    if len(scene.bricks) > most_bricks:
+        scene = draw(arches(max_bricks=most_bricks, min_bricks=2))
+    scene = draw(teams(scene))
+    scene = replace(scene, robots=scene.robots[:most_robots])
+    names = [robot.name for robot in scene.robots]
+    rules = FreeRules(
+        least_grips=draw(st.integers(0, 2)),
+        newest=draw(st.sampled_from(["either", "placing", "free"])),
+        regrips=draw(st.sampled_from([None, 0, 1])),
+        ending=draw(st.sampled_from(["held", "released", "one-by-one"])),
+        placers=tuple(names[: draw(st.sampled_from([0, len(names) - 1]))]),
+        payload=draw(st.sampled_from(["kept", "ignored"])),
+    )
+    return scene, rules

@@ -34,6 +34,8 @@ from seqopt.network.statics import build_statics
 from seqopt.scene.boxes import boxes
 from seqopt.scene.library.meeting import meeting
 from seqopt.stability.assessment import assess, bonded
+from seqopt.stability.directions import first_directions
+from seqopt.stability.known import HoldingForces, Known
 from seqopt.stability.prover import Prover
 
 COMPRESSED = (sparse.csr_array, sparse.csc_array)
@@ -64,6 +66,8 @@ def values(arch25):
         *(Solution(np.zeros(6), np.zeros((1, 6)), np.zeros((0, 3))), system, system.points, held),
         *(settle(held), ComplianceEngine(network).solve(2, [[2]], Want.ALL)),
         *(diagnose(network, 2, [2]), proven, proven.answer, assess(assembly, EPOXY)),
+        *Known(assembly, bonded(assembly, EPOXY)).motions_of(np.ones((2, 6))),
+        *(HoldingForces(0.0, np.zeros(1)), first_directions(4, 1)),
     )
     return {type(value).__name__: value for value in every}
 

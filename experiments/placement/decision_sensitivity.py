@@ -110,7 +110,7 @@ def measure(scene: Scene, wanted: Iterator[tuple[str, float, int]]) -> pd.DataFr
     nominal = {
         name: Decision(
             find_formulation("overlap_dp").solve(problem).choice,
-            find_formulation("rank_search").solve(problem).choice,
+            find_formulation("cascade").solve(problem).choice,
         )
         for name, problem in problems(scene, schedule).items()
     }

@@ -48,7 +48,7 @@ def plans(engine: ComplianceEngine) -> Plans:
     net = engine.network
     out = {name: method(net) for name, method in METHODS.items()}
     modified = pose(engine, modified_sequential(net), EQUATIONS)
-    out["modified sequential"] = solve(modified, "rank_search").steps
+    out["modified sequential"] = solve(modified, "cascade").steps
     out["three-robot, published"] = published_plan(net.scene)
     loop = pose(engine, three_robot_loop(net), EQUATIONS)
     out["three-robot, optimized"] = solve(loop, "overlap_dp").steps

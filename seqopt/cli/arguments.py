@@ -6,15 +6,25 @@ import argparse
 from pathlib import Path
 from typing import NoReturn, TypeAlias
 
+from seqopt.cli.common_arguments import (
+    caps_arguments,
+    criterion_arguments,
+    limit_argument,
+    resources_arguments,
+    robots_argument,
+    strict_argument,
+)
+from seqopt.cli.free import FREE
+from seqopt.cli.free_arguments import add_pareto, add_rules
 from seqopt.cli.status import Status
 from seqopt.cli.terminal import complain, show
 from seqopt.contact.mortar import MORTARS
 from seqopt.engines.registry import ENGINES
 from seqopt.placement.formulation import formulation_names
+from seqopt.responses.staged import Placing
 from seqopt.scene.scene_file import builtin_scenes
 from seqopt.sequence.three_robots import SCHEDULES
 from seqopt.sequence.two_robots import METHODS
-from seqopt.study.presets import CRITERIA, EQUATIONS
 from seqopt.study.published import PUBLISHED
 
 
@@ -50,6 +60,7 @@ def parser() -> argparse.ArgumentParser:
     _add_compare(commands, [scene, engine])
     _add_analyze(commands, [scene, engine])
     _add_optimize(commands, [scene, engine])
+    add_pareto(commands, [scene, engine], limit_argument)
     _add_assess(commands, [scene])
     _add_scene(commands, [scene])
     return whole
@@ -88,14 +99,6 @@ def _engine_arguments() -> _Parser:
     return engine
 
 
-def _strict_argument(command: argparse.ArgumentParser) -> None:
-    command.add_argument(
-        "--strict",
-        action="store_true",
-        help="end with status 1 if a robot would exceed its payload in a step",
-    )
-
-
 def _add_compare(commands: Commands, parents: list[_Parser]) -> None:
     command = commands.add_parser(
         "compare",
@@ -104,10 +107,10 @@ def _add_compare(commands: Commands, parents: list[_Parser]) -> None:
         description="Analyze every method on a scene; show the largest responses side by side, for "
         "the reference arch beside the printed ones, and list the inconsistencies in print.",
     )
-    _robots_argument(command, "all methods, which take as many as they need: the")
-    _criterion_argument(command)
+    robots_argument(command, "all methods, which take as many as they need: the")
+    criterion_arguments(command)
     command.add_argument("--out", type=Path, metavar="DIR", help="write tables and figures there")
-    _strict_argument(command)
+    strict_argument(command)
 
 
 def _add_analyze(commands: Commands, parents: list[_Parser]) -> None:
@@ -129,7 +132,14 @@ def _add_analyze(commands: Commands, parents: list[_Parser]) -> None:
         metavar="FILE",
         help="NumPy archive (.npz) to write: every edge force, node displacement and reaction",
     )
-    _strict_argument(command)
+    command.add_argument(
+        "--staged",
+        choices=tuple(way.value for way in Placing),
+        help="staged construction analysis instead of every step from scratch: bricks come without "
+        "stress, set down fitted to the deformed structure or where they are planned, and grips "
+        "close where they find their nodes",
+    )
+    strict_argument(command)
 
 
 def _steps_arguments(command: argparse.ArgumentParser) -> None:
@@ -141,17 +151,7 @@ def _steps_arguments(command: argparse.ArgumentParser) -> None:
         help=f"how the build goes; {PUBLISHED} is the printed three-robot plan of arch25",
     )
     steps.add_argument("--plan", type=Path, metavar="FILE", help="CSV of the steps")
-    _robots_argument(command, "--method sequential or cantilever: the two")
-
-
-def _robots_argument(command: argparse.ArgumentParser, whose: str) -> None:
-    command.add_argument(
-        "--robots",
-        default="",
-        metavar="NAME,NAME[,NAME]",
-        help=f"with {whose} robots that take part, in the order of their roles (default: the first "
-        "of the scene whose reach allows the build)",
-    )
+    robots_argument(command, "--method sequential or cantilever: the two")
 
 
 def _add_assess(commands: Commands, parents: list[_Parser]) -> None:
@@ -183,22 +183,6 @@ def _add_assess(commands: Commands, parents: list[_Parser]) -> None:
     )
 
 
-def _criterion_argument(command: argparse.ArgumentParser) -> None:
-    command.add_argument(
-        "--crown",
-        metavar="BRICKS",
-        help="for criteria of ranks: bricks placed at the crown, or none; by default derived from "
-        "the scene",
-    )
-    command.add_argument(
-        "--criteria",
-        default=EQUATIONS.name,
-        metavar="NAME",
-        help=f"what a step costs: {', '.join(CRITERIA)}, or responses to rank with weights, as "
-        "T_max,M_sup=2,F_move; equations (2) and (3) of Bruun et al. by default",
-    )
-
-
 def _add_optimize(commands: Commands, parents: list[_Parser]) -> None:
     command = commands.add_parser(
         "optimize",
@@ -211,26 +195,28 @@ def _add_optimize(commands: Commands, parents: list[_Parser]) -> None:
     )
     command.add_argument(
         "--formulation",
-        required=True,
         metavar="NAME",
-        help=f"one of {', '.join(formulation_names())}",
+        help=f"one of {', '.join(formulation_names())}; the free schedule has its own",
     )
     command.add_argument(
         "--schedule",
         default=next(iter(SCHEDULES)),
         metavar="NAME|FILE",
         help=f"which build has the open grips: {', '.join(SCHEDULES)} (of all robots), or a CSV "
-        "file of steps in which open grips are marked ? (default: %(default)s)",
+        "file of steps in which open grips are marked ? (default: %(default)s); or "
+        f"{FREE}: any robot may release, hold or place next",
     )
-    _robots_argument(command, "a schedule by name: the")
-    _criterion_argument(command)
+    robots_argument(command, "a schedule by name: the")
+    criterion_arguments(command)
     command.add_argument(
-        "--limit",
-        action="append",
-        default=[],
-        metavar="LIMIT",
-        help="no open step may exceed it: payload, or as F_largest=300 (SI units); may be repeated",
+        "--aim",
+        metavar="NAME,NAME",
+        help="with --schedule free, what is to be least, the most important first: minmax (of the "
+        "criterion, worst-ratio by default), sum, steps, regrips, travel, a response or "
+        "sum(RESPONSE) (default: minmax)",
     )
+    add_rules(command)
+    caps_arguments(command)
     command.add_argument(
         "--option",
         action="append",
@@ -244,31 +230,9 @@ def _add_optimize(commands: Commands, parents: list[_Parser]) -> None:
         help="with cascade or rank_search: solve only the models that the search meets, a fifth "
         "or so; how far the choice is from the optimum stays unknown",
     )
-    _resources_arguments(command)
+    resources_arguments(command)
     command.add_argument("--out", type=Path, metavar="DIR", required=True, help="folder to write")
-    _strict_argument(command)
-
-
-def _resources_arguments(command: argparse.ArgumentParser) -> None:
-    """Add the arguments that say what a computation may use; results do not depend on them."""
-    command.add_argument(
-        "--workers",
-        default="1",
-        metavar="N",
-        help="processes to share the work among; pays from some ten seconds (default: %(default)s)",
-    )
-    command.add_argument(
-        "--cache",
-        type=Path,
-        metavar="DIR",
-        help="keep answers there and use what is there: a run that was ended goes on",
-    )
-    command.add_argument(
-        "--max-memory",
-        metavar="SIZE",
-        help="what responses and costs may take, as 500MB or 2GB (default: four fifths of what is "
-        "free)",
-    )
+    strict_argument(command)
 
 
 def _add_scene(commands: Commands, parents: list[_Parser]) -> None:

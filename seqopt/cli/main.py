@@ -1,18 +1,19 @@
-"""The command line: ``seqopt compare | optimize | analyze | assess | scene``."""
+"""The command line: ``seqopt compare | optimize | pareto | analyze | assess | scene``."""
 
 from __future__ import annotations
 
 import argparse
-import json
 import sys
-import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 
 import numpy as np
-import pandas as pd
 
 from seqopt.cli.arguments import parser
+from seqopt.cli.asked import asked_engine, payloads_hold, say_idle, say_levels, step_answers
+from seqopt.cli.criteria import asked_criterion
+from seqopt.cli.free import pareto
+from seqopt.cli.optimize import optimize
 from seqopt.cli.outputs import (
     comparison_files,
     keep_apart,
@@ -20,19 +21,18 @@ from seqopt.cli.outputs import (
     write_outputs,
 )
 from seqopt.cli.status import Status, status_of
-from seqopt.cli.terminal import complain, flush, progress, quiet_numbers, say, show, silence
+from seqopt.cli.terminal import (
+    flush,
+    progress,
+    quiet_numbers,
+    say,
+    show,
+    silence,
+)
 from seqopt.cli.values import (
-    parse_criterion,
-    parse_limits,
     parse_mortar,
-    parse_options,
-    parse_resources,
     parse_robots,
 )
-from seqopt.contact.mortar import MORTARS
-from seqopt.engines.auto import AutoEngine
-from seqopt.engines.interface import Engine
-from seqopt.engines.registry import make_engine
 from seqopt.errors import SceneError, SeqoptError, SolverError, StepError
 from seqopt.files import (
     csv_text,
@@ -42,25 +42,17 @@ from seqopt.files import (
     write_text,
 )
 from seqopt.network.build import build_network
-from seqopt.network.network import Network
-from seqopt.placement.formulation import find_formulation
-from seqopt.placement.plan import Plan
-from seqopt.placement.problem import pose
-from seqopt.placement.promises import overloads
-from seqopt.placement.solving import solve
 from seqopt.report.comparison import compare
 from seqopt.report.text import format_comparison
-from seqopt.responses.table import analyze, fields_archive
+from seqopt.responses.table import archive, response_table
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import about, builtin_scenes, dump_scene, load_scene
 from seqopt.sequence.plan_file import read_plan
-from seqopt.sequence.schedule import Schedule
-from seqopt.sequence.schedule_file import find_schedule
-from seqopt.sequence.steps import AnyStep, Step, idle_robots
+from seqopt.sequence.steps import Step
 from seqopt.sequence.two_robots import METHODS
 from seqopt.stability.assessment import Verdict
 from seqopt.stability.steps import assess_steps, format_verdicts, stability_table
-from seqopt.study.published import PUBLISHED, is_reference_arch, paper_models, published_plan
+from seqopt.study.published import PUBLISHED, is_reference_arch, published_plan
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -100,123 +92,36 @@ def _run(arguments: Sequence[str] | None) -> int:
 
 def _compare(options: argparse.Namespace) -> Status:
     scene = load_scene(options.scene)
-    engine = _engine(options, build_network(scene))
-    criterion = parse_criterion(options.criteria, options.crown)
+    engine = asked_engine(options, build_network(scene))
+    criterion = asked_criterion(options)
     if options.out is not None:
         require_matplotlib(options.out)
         require_folder(options.out)
     result = compare(engine, criterion, progress, parse_robots(options.robots))
-    _say_levels(engine)
+    say_levels(engine)
     show(format_comparison(result, scene, criterion) + "\n")
     if options.out is not None and result.loop is not None:
         write_outputs(options, comparison_files(result))
         say(f"tables and figures written to {options.out}")
-    return _payloads_hold(options, scene, *result.tables.values())
-
-
-def _engine(options: argparse.Namespace, network: Network) -> Engine:
-    mortar = None if options.mortar is None else MORTARS[options.mortar]
-    try:
-        return make_engine(options.engine, network, mortar)
-    except SceneError as error:
-        raise SceneError(f"--engine {options.engine}: {error}") from error
-
-
-def _say_levels(engine: Engine) -> None:
-    """Say which levels an engine that picks them took, and why."""
-    if not isinstance(engine, AutoEngine):
-        return
-    for choice, sets in engine.tally.items():
-        complain(f"engine: {choice.level.value} for {sets} grip sets: {choice.reason}")
-    if engine.unchecked:
-        complain(f"engine: {engine.unchecked}")
-
-
-def _paper_count(schedule: Schedule) -> dict[str, int] | None:
-    """Return how many models the paper counts for the loop of three robots; none for others."""
-    if schedule.method != "three-robot":
-        return None
-    return dict(zip(("cascading", "overlap"), paper_models(schedule), strict=True))
-
-
-def _say_idle(scene: Scene, steps: Sequence[AnyStep]) -> None:
-    """Name the robots that never grip."""
-    if idle := idle_robots(scene, steps):
-        complain(f"robots: {', '.join(idle)} never grip{'s' * (len(idle) == 1)}")
-
-
-def _optimize(options: argparse.Namespace) -> Status:
-    formulation = find_formulation(options.formulation)
-    chosen = parse_options(formulation, options.option)
-    criterion = parse_criterion(options.criteria, options.crown)
-    scene = load_scene(options.scene)
-    limits = parse_limits(options.limit, scene)
-    resources = parse_resources(options, progress)
-    require_folder(options.out)
-    start = time.perf_counter()
-    network = build_network(scene)
-    engine, schedule = (
-        _engine(options, network),
-        find_schedule(network, options.schedule, parse_robots(options.robots)),
-    )
-    assemble = time.perf_counter() - start
-    problem = pose(engine, schedule, criterion, limits, (), resources)
-    plan = solve(problem, formulation, proof=not options.no_proof, **chosen)
-    progress("")
-    _say_levels(engine)
-    report = plan.summary() | {
-        "models_paper_count": _paper_count(schedule),
-        "seconds": {"assemble": assemble, **plan.seconds},
-    }
-    table = plan.responses()
-    files = {
-        "plan.csv": csv_text(table),
-        "selection.csv": csv_text(plan.table()),
-        "responses.csv": csv_text(plan.alternatives()),
-        "summary.json": json.dumps(report, indent=2) + "\n",
-    }
-    write_outputs(options, files)
-    say(
-        f"{formulation.name} ({formulation.kind.value}): {_worth(plan)}, "
-        f"{plan.models} models; written to {options.out}"
-    )
-    for excess in plan.overloads:
-        say(f"payload exceeded: {excess}")
-    _say_idle(scene, plan.steps)
-    return _payloads_hold(options, scene, table)
-
-
-def _payloads_hold(options: argparse.Namespace, scene: Scene, *tables: pd.DataFrame) -> Status:
-    """Return the status that ``--strict`` asks for."""
-    over = [str(excess) for table in tables for excess in overloads(scene, table)]
-    if not options.strict or not over:
-        return Status.DONE
-    complain(f"seqopt: payload exceeded: {'; '.join(over)}")
-    return Status.DOES_NOT_HOLD
-
-
-def _worth(plan: Plan) -> str:
-    if plan.certificate is None:
-        return "not compared with the optimum"
-    return f"objective {plan.certificate.objective:.6g}, gap {100 * plan.certificate.gap:.3g} %"
+    return payloads_hold(options, scene, *result.tables.values())
 
 
 def _analyze(options: argparse.Namespace) -> Status:
     keep_apart(options, options.out, options.fields)
     scene = load_scene(options.scene)
-    engine = _engine(options, build_network(scene))
-    steps = _steps(scene, options)
-    table = analyze(engine, steps)
-    _say_levels(engine)
+    network = build_network(scene)
+    engine, steps = asked_engine(options, network), _steps(scene, options)
+    table = response_table(network, step_answers(options, engine, steps))
+    say_levels(engine)
     if options.fields is not None:
-        write_bytes(options.fields, fields_archive(engine, steps))
+        write_bytes(options.fields, archive(network, step_answers(options, engine, steps)))
     if options.out is None:
         show(csv_text(table))
     else:
         write_csv(options.out, table)
         say(f"{len(table)} steps written to {options.out}")
-    _say_idle(scene, steps)
-    return _payloads_hold(options, scene, table)
+    say_idle(scene, steps)
+    return payloads_hold(options, scene, table)
 
 
 def _assess(options: argparse.Namespace) -> Status:
@@ -296,7 +201,8 @@ def _line(text: str) -> None:
 COMMANDS: dict[str, Callable[[argparse.Namespace], int | None]] = {
     "compare": _compare,
     "analyze": _analyze,
-    "optimize": _optimize,
+    "optimize": optimize,
+    "pareto": pareto,
     "assess": _assess,
     "scene": _scene,
 }

@@ -4,12 +4,17 @@ from __future__ import annotations
 
 import argparse
 import io
+import json
 from collections.abc import Mapping
 from importlib.util import find_spec
 from pathlib import Path
 
+import pandas as pd
+
 from seqopt.errors import FileError
 from seqopt.files import csv_text, require_apart, write_folder
+from seqopt.placement.plan import Plan
+from seqopt.placement.watch import trace_rows
 from seqopt.report.comparison import Comparison
 from seqopt.scene.scene_file import builtin_scenes
 
@@ -55,6 +60,50 @@ def comparison_files(result: Comparison) -> dict[str, bytes | str]:
         figure.savefig(buffer, dpi=130)
         files[name] = buffer.getvalue()
     return files
+
+
+def plan_files(plan: Plan, report: Mapping[str, object]) -> dict[str, bytes | str]:
+    """Return the tables of a plan and its summary, by file name.
+
+    Parameters
+    ----------
+    plan : Plan
+    report : mapping of str to object
+        The summary, ready for JSON.
+
+    Returns
+    -------
+    dict of str to (bytes or str)
+        With what was found at which time, unless no proof was asked for.
+    """
+    files: dict[str, bytes | str] = {
+        "plan.csv": csv_text(plan.responses()),
+        "selection.csv": csv_text(plan.table()),
+        "responses.csv": csv_text(plan.alternatives()),
+        "summary.json": json.dumps(report, indent=2) + "\n",
+    }
+    if rows := trace_rows(plan.selection.trace):
+        files["trace.csv"] = csv_text(pd.DataFrame(rows))
+    return files
+
+
+def worth(plan: Plan) -> str:
+    """Return what a plan is worth, in words.
+
+    Parameters
+    ----------
+    plan : Plan
+
+    Returns
+    -------
+    str
+    """
+    among = plan.summary()["candidates"]
+    if plan.certificate is None:
+        return "not compared with the optimum"
+    if among != "all":
+        return f"objective {plan.certificate.objective:.6g}, {among}"
+    return f"objective {plan.certificate.objective:.6g}, gap {100 * plan.certificate.gap:.3g} %"
 
 
 def write_outputs(options: argparse.Namespace, files: Mapping[str, bytes | str]) -> None:

@@ -101,6 +101,16 @@ def progress(stage: str) -> None:
         print(f"\r\033[K{text}", end="\r", file=sys.stderr, flush=True)
 
 
+def tell(finding: object) -> None:
+    """Say what a formulation has found so far where a person watches.
+
+    Parameters
+    ----------
+    finding : seqopt.placement.watch.Finding
+    """
+    progress(str(finding))
+
+
 def flush() -> None:
     """Write what standard output still holds back.
 

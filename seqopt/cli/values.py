@@ -1,20 +1,19 @@
-"""What the words of the command line stand for: criteria, limits, options, mortars."""
+"""What the words of the command line stand for: robots, limits, numbers, options, mortars."""
 
 from __future__ import annotations
 
 import argparse
+import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 from seqopt.contact.mortar import MORTARS, Mortar
 from seqopt.errors import ProblemError
-from seqopt.placement.criteria import RankSum
 from seqopt.placement.formulation import Formulation, as_formulation
-from seqopt.placement.requirements import Criterion, Limit, payload_limits
-from seqopt.placement.scales import NEVER
+from seqopt.placement.requirements import Limit, payload_limits
 from seqopt.responses.choices import CHOICE_RESPONSES
-from seqopt.responses.resources import Resources
 from seqopt.scene.scene import Scene
 from seqopt.study.presets import CRITERIA
 
@@ -23,99 +22,6 @@ SIZE = re.compile(r"([0-9]*\.?[0-9]+(?:e[0-9]+)?) *((?:[kmgt]i?)?b?)", re.IGNORE
 MOST_WORKERS = 1024
 LARGEST = 1e100  # number: products of larger ones overflow
 RESPONSES = (*CHOICE_RESPONSES, "F_each")
-
-
-def parse_criterion(text: str, crown: str | None = None) -> Criterion:
-    """Return a criterion by name, or a rank sum of named responses with weights.
-
-    Parameters
-    ----------
-    text : str
-        A name of `seqopt.CRITERIA`, or responses as ``T_max,M_sup=2``; a weight is 1 by default.
-    crown : str, optional
-        Bricks placed at the crown, or ``none``.
-
-    Returns
-    -------
-    Criterion
-
-    Raises
-    ------
-    ProblemError
-        If there is no such criterion or response, a weight is not positive, or the criterion has
-        no crown.
-    """
-    if crown is not None:
-        named = CRITERIA.get(text)
-        if not isinstance(named, RankSum):
-            raise ProblemError(f"--crown {crown}: {text} has none; leave it out")
-        return replace(named, crown=NEVER if crown == "none" else _number(crown, "--crown"))
-    if text in CRITERIA:
-        return CRITERIA[text]
-    terms = []
-    for part in BETWEEN.split(text):
-        name, weight = _split(part)
-        terms.append((_response(name, "--criteria"), _number(weight or "1", f"--criteria {part}")))
-    return RankSum(text, tuple(terms), tuple(terms))
-
-
-def parse_resources(
-    options: argparse.Namespace, progress: Callable[[str], None] | None = None
-) -> Resources:
-    """Return what a computation may use.
-
-    Parameters
-    ----------
-    options : argparse.Namespace
-        With ``workers``, ``cache`` and ``max_memory``.
-    progress : callable, optional
-        Told how far it is.
-
-    Returns
-    -------
-    Resources
-
-    Raises
-    ------
-    ProblemError
-        If a number is none that can be meant.
-    """
-    if not options.workers.isdecimal() or not 1 <= int(options.workers) <= MOST_WORKERS:
-        raise ProblemError(
-            f"--workers {options.workers}: give a whole number from 1 to {MOST_WORKERS}"
-        )
-    most = None if options.max_memory is None else parse_size(options.max_memory)
-    return Resources(int(options.workers), None, options.cache, most, progress)
-
-
-def parse_size(text: str) -> float:
-    """Return a number of bytes.
-
-    Parameters
-    ----------
-    text : str
-        As ``2GB``, ``500 MB`` or ``1.5GiB``; bytes without a unit.
-
-    Returns
-    -------
-    float
-
-    Raises
-    ------
-    ProblemError
-        If it is none.
-
-    Examples
-    --------
-    >>> parse_size("1.5GB")
-    1500000000.0
-    """
-    found = SIZE.fullmatch(text.strip())
-    if found is None or not 0 < float(found[1]) < LARGEST:
-        raise ProblemError(f"--max-memory {text}: give a size, as 500MB or 2GB")
-    unit = found[2].upper()
-    power = "KMGT".find(unit[:1]) + 1 if unit[:1] in "KMGT" and unit[:1] else 0
-    return float(found[1]) * float(1024 if "I" in unit else 1000) ** power
 
 
 def parse_robots(text: str) -> tuple[str, ...]:
@@ -154,15 +60,67 @@ def parse_limits(texts: Sequence[str], scene: Scene) -> tuple[Limit, ...]:
     """
     out: list[Limit] = []
     for text in texts:
-        name, value = _split(text)
+        name, value = split_word(text)
         if text == "payload":
             out += payload_limits(scene)
         else:
-            out.append(Limit(_response(name, "--limit"), _number(value, f"--limit {text}")))
+            out.append(Limit(response_word(name, "--limit"), number_word(value, f"--limit {text}")))
     return tuple(out)
 
 
-def parse_options(formulation: Formulation | str, texts: Sequence[str]) -> dict[str, int | str]:
+def parse_time_limit(text: str | None) -> float:
+    """Return seconds from words.
+
+    Parameters
+    ----------
+    text : str, optional
+
+    Returns
+    -------
+    float
+        Infinite where none are given.
+
+    Raises
+    ------
+    ProblemError
+        If it is no number from 0.
+    """
+    return math.inf if text is None else number_word(text, "--time-limit", zero="allowed")
+
+
+def parse_numbers(
+    where: str, texts: Sequence[str], known: Mapping[str, object] | None = None
+) -> dict[str, float]:
+    """Return positive numbers by name from words.
+
+    Parameters
+    ----------
+    where : str
+        The argument, for messages.
+    texts : sequence of str
+        Each ``NAME=VALUE``.
+    known : mapping of str to object, optional
+        Names that there are; any by default.
+
+    Returns
+    -------
+    dict of str to float
+
+    Raises
+    ------
+    ProblemError
+        If there is no such name, or a value is not positive.
+    """
+    out: dict[str, float] = {}
+    for text in texts:
+        name, value = split_word(text)
+        if known is not None and name not in known:
+            raise ProblemError(f"{where} {text}: there is no such; give one of {', '.join(known)}")
+        out[name] = number_word(value, f"{where} {text}")
+    return out
+
+
+def parse_options(formulation: Formulation | str, texts: Sequence[str]) -> dict[str, Any]:
     """Return the options of a formulation from words.
 
     Parameters
@@ -183,7 +141,7 @@ def parse_options(formulation: Formulation | str, texts: Sequence[str]) -> dict[
     """
     formulation = as_formulation(formulation)
     known = formulation.options
-    out: dict[str, int | str] = {}
+    out: dict[str, Any] = {}
     for text in texts:
         name, _, value = text.partition("=")
         if name not in known:
@@ -220,21 +178,48 @@ def parse_mortar(options: argparse.Namespace) -> Mortar:
     """
     base = MORTARS[options.mortar]
     given = {
-        name: _number(text, f"--{name.replace('_', '-')}", zero="allowed")
+        name: number_word(text, f"--{name.replace('_', '-')}", zero="allowed")
         for name in ("friction", "tensile_strength", "cohesion")
         if (text := getattr(options, name)) is not None
     }
     return replace(base, **given)
 
 
-def _split(text: str) -> tuple[str, str]:
-    """Return a response, whose brackets may hold anything, and the number after it."""
+def split_word(text: str) -> tuple[str, str]:
+    """Return a response, whose brackets may hold anything, and the number after it.
+
+    Parameters
+    ----------
+    text : str
+        As ``NAME=VALUE``, or a name alone.
+
+    Returns
+    -------
+    (str, str)
+    """
     end = text.rfind("]") + 1
     name, _, number = text[end:].partition("=")
     return text[:end] + name, number
 
 
-def _response(name: str, where: str) -> str:
+def response_word(name: str, where: str) -> str:
+    """Return the name of a response if there is one of it.
+
+    Parameters
+    ----------
+    name : str
+    where : str
+        The argument, for messages.
+
+    Returns
+    -------
+    str
+
+    Raises
+    ------
+    ProblemError
+        If there is none.
+    """
     if name not in RESPONSES and not name.startswith("F_"):
         names = (*CRITERIA, *RESPONSES) if where == "--criteria" else ("payload", *CHOICE_RESPONSES)
         known = ", ".join((*names, "F_ROBOT"))
@@ -242,7 +227,25 @@ def _response(name: str, where: str) -> str:
     return name
 
 
-def _number(text: str, where: str, zero: str = "") -> float:
+def number_word(text: str, where: str, zero: str = "") -> float:
+    """Return a positive number from a word.
+
+    Parameters
+    ----------
+    text, where : str
+        The word; the argument, for messages.
+    zero : str, optional
+        Anything where zero is a number too.
+
+    Returns
+    -------
+    float
+
+    Raises
+    ------
+    ProblemError
+        If it is none.
+    """
     try:
         value = float(text)
     except ValueError:

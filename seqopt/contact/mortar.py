@@ -63,13 +63,39 @@ Examples
 MORTARS = {"epoxy": EPOXY, "dry": DRY}
 
 
+def bond_mortar(strength: float, friction: float = FRICTION) -> Mortar:
+    """Return the mortar of a bond that carries so much tension and, at once, so much shear.
+
+    Parameters
+    ----------
+    strength : float
+        Pa.
+    friction : float, optional
+
+    Returns
+    -------
+    Mortar
+
+    Raises
+    ------
+    SceneError
+        If a number is negative or not finite.
+
+    Examples
+    --------
+    >>> bond_mortar(3e3, friction=0.5)
+    Mortar(friction=0.5, tensile_strength=3000.0, cohesion=4500.0)
+    """
+    return Mortar(friction=friction, tensile_strength=strength, cohesion=strength * (1 + friction))
+
+
 def find_mortar(mortar: Mortar | str) -> Mortar:
     """Return a mortar, by name or itself.
 
     Parameters
     ----------
     mortar : Mortar or str
-        A mortar, or a name of `MORTARS`.
+        A mortar, a name of `MORTARS`, or ``bond=STRENGTH`` with a strength in Pa.
 
     Returns
     -------
@@ -82,6 +108,14 @@ def find_mortar(mortar: Mortar | str) -> Mortar:
     """
     if isinstance(mortar, Mortar):
         return mortar
-    if mortar not in MORTARS:
-        raise SceneError(f"mortar {mortar!r}: give a Mortar, or one of {', '.join(MORTARS)}")
-    return MORTARS[mortar]
+    if mortar in MORTARS:
+        return MORTARS[mortar]
+    known = ", ".join(MORTARS)
+    name, _, strength = mortar.partition("=")
+    try:
+        pascal = float(strength if name == "bond" else "")
+    except ValueError:
+        raise SceneError(
+            f"mortar {mortar!r}: give a Mortar, or one of {known}, or bond=STRENGTH (Pa)"
+        ) from None
+    return bond_mortar(pascal)

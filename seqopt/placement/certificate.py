@@ -9,8 +9,10 @@ import numpy as np
 
 from seqopt.arrays import FrozenValue
 from seqopt.errors import SolverError
+from seqopt.placement.budget_proof import least_within
 from seqopt.placement.costs import TINY, LayeredCosts
 from seqopt.placement.formulation import (
+    End,
     Formulation,
     FormulationKind,
     Selection,
@@ -30,14 +32,13 @@ class Certificate(FrozenValue):
     objective : float
         The value of the selection, recomputed; in the unit of the criterion.
     bound : float
-        The least value of any choice, found anew from the data; where budgets forbid choices, the
-        least without them.
+        The least value of any choice, found anew from the data; with budgets a bound on the value
+        of any choice within them, by prices and partial choices of the certificate's own.
     gap : float
         Objective less bound, over the size of the costs that the choice meets, signs aside: their
         sum, or the largest for a peak. It has no unit.
     claimed_gap : float
-        The same with the formulation's own bound where that is higher; it is not proven, but knows
-        the budgets.
+        The same with the formulation's own bound where that is higher; it is not proven.
     spent : mapping of str to float
         What the selection takes of each budget.
 
@@ -101,6 +102,8 @@ def certify(problem: PlacementProblem, selection: Selection, aim: Aim) -> Certif
     highest = value if problem.budgets else bound
     if not selection.bound <= highest + TOLERANCE * scale:  # NaN is no bound
         raise SolverError(f"the claimed bound {selection.bound:.9g} exceeds {highest:.9g}")
+    if problem.budgets and aim is Aim.SUM:
+        bound = max(bound, least_within(problem, value, selection.prices, scale))
     gap, claimed = (max(0.0, value - b) / scale for b in (bound, max(bound, selection.bound)))
     return Certificate(value, bound, gap, claimed, spent)
 
@@ -208,12 +211,13 @@ def judge(
     Raises
     ------
     SolverError
-        If the certificate fails, or without budgets a formulation that is no heuristic misses the
-        optimum.
+        If the certificate fails, or without budgets a formulation that is no heuristic and ran to
+        its end misses the optimum.
     """
     formulation = as_formulation(formulation)
     certificate = certify(problem, selection, formulation.aim)
-    exact = formulation.kind is not FormulationKind.HEURISTIC and not problem.budgets
+    promises = formulation.kind is not FormulationKind.HEURISTIC and selection.end is End.DONE
+    exact = promises and not problem.budgets
     if exact and certificate.gap > TOLERANCE:
         raise SolverError(
             f"{formulation.name} promises the optimum {certificate.bound:.9g}, "

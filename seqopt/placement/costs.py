@@ -234,8 +234,10 @@ class Budget(FrozenValue):
         float
             What is left over the larger of the bound and the amounts taken, all without sign, so
             that amounts that cancel count in full. Negative beyond the bound; zero if nothing is
-            left.
+            left, one if there is no cap.
         """
         taken = LayeredCosts(self.single, self.shared).parts(choice)
         left = self.bound - sum(taken)
-        return left / max(abs(self.bound), sum(map(abs, taken)), TINY) if left else 0.0
+        if left in (0, np.inf):
+            return min(left, 1.0)
+        return left / max(abs(self.bound), sum(map(abs, taken)))

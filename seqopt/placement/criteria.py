@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from seqopt.arrays import Floats
-from seqopt.placement.ranks import scaled_ranks
+from seqopt.placement.ranks import Among, Ranked, ranks_of
 from seqopt.placement.requirements import ChoiceResponses
 from seqopt.placement.scales import NEVER, ROUNDED, SceneFacts
 from seqopt.placement.terms import known, present, scale_of, spell_out
@@ -26,10 +26,8 @@ class RankSum:
     """The criteria of Bruun et al.: ranks of responses, averaged, least is best (a Borda count).
 
     Ranks start at 1; ties share the mean of their ranks. Responses are rounded to a resolution
-    before they are ranked, so that differences without meaning decide nothing. In a step with two
-    open moves the ranks run over all pairs and are scaled down to as many as the later move has
-    candidates, so that it weighs as much as any other step. A robot that does not grip ranks all
-    choices equal. Source: equations (1) to (3) of Bruun et al.
+    before they are ranked, so that differences without meaning decide nothing. A robot that does
+    not grip ranks all choices equal. Source: equations (1) to (3) of Bruun et al.
 
     Parameters
     ----------
@@ -45,6 +43,11 @@ class RankSum:
     resolution : tuple of (str, float), optional
         What a response is rounded to, by its first letter: N, N m, m. By default `ROUNDED` in the
         scene's own units, so that density, length, stiffness and units of force change no choice.
+    ranked : Ranked
+        In a step with two open moves ranks run over all pairs, scaled down to as many as the later
+        move has candidates, or over its candidates given the choice before.
+    among : Among
+        Whether a node that the choice before makes impossible is ranked in later steps.
     """
 
     name: str
@@ -53,12 +56,15 @@ class RankSum:
     crown: float | None = None
     delay: int = 0
     resolution: tuple[tuple[str, float], ...] | None = None
+    ranked: Ranked = Ranked.PAIRS
+    among: Among = Among.ALL
 
     @property
     def settings(self) -> Mapping[str, object]:
-        """Its crown, None where there is none, and what it rounds to."""
+        """Its crown, None where there is none, what it rounds to and what it ranks among."""
         crown = None if self.crown == NEVER else self.crown
-        return {"crown": crown, "resolution": dict(self.resolution or ())}
+        ranks = {"ranked": self.ranked.value, "among": self.among.value}
+        return {"crown": crown, "resolution": dict(self.resolution or ()), **ranks}
 
     def wanted(self, bricks: int) -> tuple[str, ...]:
         """Return the responses that it needs of a move.
@@ -125,7 +131,8 @@ class RankSum:
         total: Floats = np.zeros_like(responses[terms[0][0]])
         rounding = dict(known(self.resolution, self.name))
         for name, weight in terms:
-            total = total + weight * scaled_ranks(responses[name] / rounding[name[0]], choices)
+            units = responses[name] / rounding[name[0]]
+            total = total + weight * ranks_of(units, choices, self.ranked)
         return total / sum(weight for _, weight in terms)
 
     def _terms(self, bricks: int) -> tuple[tuple[str, float], ...]:

@@ -144,7 +144,7 @@ def layered_flow(problem: PlacementProblem) -> LayeredFlow:
     """
     costs = problem.sums
     costs.continuable()
-    feasible = _within_each(problem)
+    feasible = within_each(problem)
     arcs = [shared + single for shared, single in zip(costs.shared, costs.single, strict=True)]
     allowed = tuple(np.isfinite(arc) for arc in arcs)
     cost = np.concatenate([arc[mask] for arc, mask in zip(arcs, allowed, strict=True)])
@@ -166,8 +166,24 @@ def layered_flow(problem: PlacementProblem) -> LayeredFlow:
     )
 
 
-def _within_each(problem: PlacementProblem) -> bool:
-    """Return whether a choice is known to be within all budgets; each is tried on its own."""
+def within_each(problem: PlacementProblem) -> bool:
+    """Return whether a choice is known to be within all budgets; each is tried on its own.
+
+    Parameters
+    ----------
+    problem : PlacementProblem
+
+    Returns
+    -------
+    bool
+
+    Raises
+    ------
+    InfeasibleError
+        If no choice is within one of them.
+    ProblemError
+        If one is not for the moves and candidates of the problem.
+    """
     costs = problem.sums
     known = True
     for budget in problem.budgets:
@@ -182,7 +198,7 @@ def _within_each(problem: PlacementProblem) -> bool:
         )
         least = least_sum(LayeredCosts(single, shared))
         sizes = sum(float(np.abs(a).max()) for a in (*budget.single, *budget.shared))
-        if least > budget.bound + TOLERANCE * max(abs(budget.bound), sizes):
+        if least > budget.bound + TOLERANCE * sizes:
             raise InfeasibleError(
                 f"no choice is within all budgets: any takes at least {least:.6g} of "
                 f"{budget.name!r}, more than {budget.bound:.6g}; raise that bound"

@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 import inspect
-import operator
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from importlib.metadata import EntryPoint, entry_points
-from typing import Any
 
 import numpy as np
 
 from seqopt.arrays import FrozenValue
-from seqopt.errors import ProblemError, SeqoptError, SolverError
-from seqopt.placement.interface import Aim, PlacementProblem
+from seqopt.errors import ProblemError
+from seqopt.placement.interface import Aim
+from seqopt.placement.watch import Finding
 
 GROUP = "seqopt.formulations"
+EXHIBITS = "seqopt.exhibits"
+WATCH = "watch"  # the name by which a formulation takes a watch
 
 
 class FormulationKind(Enum):
@@ -32,6 +33,13 @@ class Reads(Enum):
 
     ALL = "all"  # every pair in every shared step
     WINDOW = "window"  # by default, shared steps only for choices already made
+
+
+class End(Enum):
+    """How a formulation ended."""
+
+    DONE = "done"
+    STOPPED = "stopped"  # before it could keep what it promises; its choice and bound stand
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -50,6 +58,10 @@ class Selection(FrozenValue):
         Dual value of each budget: the rate at which one more unit would lower the bound.
     compile_seconds : float
         Part of the time to solve that went into writing the program down for a solver, s.
+    end : End
+        Whether it ended early.
+    trace : tuple of Finding
+        What it knew at which time: choices and bounds.
     """
 
     choice: tuple[int, ...]
@@ -57,6 +69,8 @@ class Selection(FrozenValue):
     bound: float = -np.inf
     prices: Mapping[str, float] = field(default_factory=dict)
     compile_seconds: float = 0.0
+    end: End = End.DONE
+    trace: tuple[Finding, ...] = field(default=(), compare=False)
 
 
 @dataclass(frozen=True)
@@ -77,6 +91,8 @@ class Formulation:
         Which steps it looks at with its default options.
     takes_budgets : bool
         Whether it can keep totals over the build within budgets.
+    windowed : tuple of (str, int or str), optional
+        Options with which it looks at one window after the other, if it does so with some only.
 
     Examples
     --------
@@ -93,6 +109,14 @@ class Formulation:
     solve: Callable[..., Selection]
     reads: Reads = Reads.ALL
     takes_budgets: bool = False
+    windowed: tuple[tuple[str, int | str], ...] | None = None
+
+    @property
+    def window_options(self) -> dict[str, int | str] | None:
+        """Options with which it looks at one window after the other; None if it never does."""
+        if self.windowed is None:
+            return {} if self.reads is Reads.WINDOW else None
+        return dict(self.windowed)
 
     @property
     def options(self) -> dict[str, int | str]:
@@ -100,8 +124,13 @@ class Formulation:
         return {
             name: parameter.default
             for name, parameter in inspect.signature(self.solve).parameters.items()
-            if parameter.kind is inspect.Parameter.KEYWORD_ONLY
+            if parameter.kind is inspect.Parameter.KEYWORD_ONLY and name != WATCH
         }
+
+    @property
+    def watched(self) -> bool:
+        """Whether ``solve`` takes a `Watch`, and so a time limit."""
+        return WATCH in inspect.signature(self.solve).parameters
 
 
 def formulation_names() -> tuple[str, ...]:
@@ -127,9 +156,24 @@ def formulations() -> dict[str, Formulation]:
     --------
     >>> import seqopt
     >>> [name for name, f in seqopt.formulations().items() if f.takes_budgets]
-    ['overlap_lp', 'overlap_mip']
+    ['labels', 'lagrangian', 'overlap_lp', 'overlap_mip']
     """
     found = {entry.name: _load(entry) for entry in entry_points(group=GROUP)}
+    return dict(sorted(found.items()))
+
+
+def exhibits() -> dict[str, Formulation]:
+    """Return the exhibits: entry points of the group ``seqopt.exhibits``.
+
+    They solve what `formulations` solve, by programs that are there to be looked at. Comparisons
+    leave them out.
+
+    Returns
+    -------
+    dict of str to Formulation
+        By name, in alphabetical order.
+    """
+    found = {entry.name: _load(entry) for entry in entry_points(group=EXHIBITS)}
     return dict(sorted(found.items()))
 
 
@@ -138,7 +182,7 @@ def _load(entry: EntryPoint) -> Formulation:
         found = entry.load()
     except Exception as error:  # whatever a package of others may raise
         raise ProblemError(
-            f"formulation {entry.name!r}: {entry.value} cannot be loaded: {_said(error)}; "
+            f"formulation {entry.name!r}: {entry.value} cannot be loaded: {said(error)}; "
             "install it anew or remove it"
         ) from error
     if not isinstance(found, Formulation):
@@ -155,7 +199,7 @@ def find_formulation(name: str) -> Formulation:
     Parameters
     ----------
     name : str
-        One of `formulation_names`.
+        One of `formulation_names`, or of an exhibit.
 
     Returns
     -------
@@ -166,10 +210,11 @@ def find_formulation(name: str) -> Formulation:
     ProblemError
         If there is none of that name; the message lists those there are.
     """
-    if name not in formulation_names():
+    found = [e for group in (GROUP, EXHIBITS) for e in entry_points(group=group) if e.name == name]
+    if not found:
         known = ", ".join(formulation_names())
         raise ProblemError(f"formulation {name!r}: there is no such; give one of {known}")
-    return _load(next(entry for entry in entry_points(group=GROUP) if entry.name == name))
+    return _load(found[0])
 
 
 def as_formulation(given: Formulation | str) -> Formulation:
@@ -196,53 +241,15 @@ def as_formulation(given: Formulation | str) -> Formulation:
     raise ProblemError(f"a {type(given).__name__} is no formulation; give one of {known}")
 
 
-def select(formulation: Formulation, problem: PlacementProblem, **options: Any) -> Selection:
-    """Return the selection of a formulation, with numbers where numbers belong.
+def said(error: Exception) -> str:
+    """Return what an error of others says, in a line.
 
     Parameters
     ----------
-    formulation : Formulation
-    problem : PlacementProblem
-    **options
-        Of the formulation.
+    error : Exception
 
     Returns
     -------
-    Selection
-        Claimed, not proven.
-
-    Raises
-    ------
-    ProblemError, SolverError
-        As the formulation does; a `SolverError` also if it raises anything else, or returns
-        something that is no selection.
+    str
     """
-    try:
-        found: object = formulation.solve(problem, **options)
-    except (SeqoptError, MemoryError):
-        raise
-    except Exception as error:  # whatever a formulation of others may raise
-        raise SolverError(f"formulation {formulation.name} failed: {_said(error)}") from error
-    if not isinstance(found, Selection):
-        kind = type(found).__name__
-        raise SolverError(f"formulation {formulation.name} returned a {kind}, not a Selection")
-    try:
-        seconds = float(found.compile_seconds)
-        if not 0 <= seconds < np.inf:
-            raise ValueError(f"compile_seconds is {seconds}")
-        return Selection(
-            choice=tuple(operator.index(index) for index in found.choice),
-            objective=float(found.objective),
-            bound=float(found.bound),
-            prices={str(name): float(price) for name, price in found.prices.items()},
-            compile_seconds=seconds,
-        )
-    except (TypeError, ValueError, AttributeError, OverflowError) as error:
-        raise SolverError(
-            f"formulation {formulation.name} returned a Selection that is none: {_said(error)}"
-        ) from error
-
-
-def _said(error: Exception) -> str:
-    """Return what an error of others says, in a line."""
     return " ".join(f"{type(error).__name__}: {error}".split())

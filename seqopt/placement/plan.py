@@ -13,10 +13,12 @@ from seqopt.errors import ProblemError
 from seqopt.placement.certificate import TOLERANCE, Certificate
 from seqopt.placement.formulation import (
     Formulation,
+    FormulationKind,
     Reads,
     Selection,
 )
 from seqopt.placement.interface import PlacementProblem
+from seqopt.placement.objectives import split_gap, under_both
 from seqopt.placement.problem import Problem
 from seqopt.placement.promises import Excess, overloads
 from seqopt.placement.ranking import move_costs, rank_of
@@ -212,28 +214,70 @@ class Plan:
             for choices in self._posed.window_choices(k, before[k]):
                 yield self._posed, choices, self.nodes[k - 1] if len(choices.moves) == 2 else None
 
+    def _budgets(self) -> dict[str, dict[str, float | None]]:
+        """Return what there is of every budget, what is spent, and its price."""
+        prices = self.selection.prices
+        return {
+            budget.name: {
+                "bound": budget.bound if np.isfinite(budget.bound) else None,
+                "spent": budget.spent(self.selection.choice),
+                "price": prices.get(budget.name),
+            }
+            for budget in self.problem.budgets
+        }
+
+    def objectives(self) -> dict[str, dict[str, float | None] | None]:
+        """Return the sum of ranks under both objectives, and the two parts of a heuristic's gap.
+
+        Returns
+        -------
+        dict
+            ``objectives`` as of `under_both`; ``gap_parts`` with ``short_sight`` and ``objective``,
+            as of `split_gap`, for heuristics. None without proof or without ranks.
+        """
+        none: dict[str, dict[str, float | None] | None] = {"objectives": None, "gap_parts": None}
+        if self.certificate is None:
+            return none
+        values = under_both(self._posed, self.selection.choice)
+        if None in values.values():
+            return none
+        heuristic = self.formulation.kind is FormulationKind.HEURISTIC
+        parts = split_gap(self._posed, self.selection.choice) if heuristic else None
+        if parts is None:
+            return {"objectives": values, "gap_parts": None}
+        split: dict[str, float | None] = {"short_sight": parts.short_sight}
+        return {"objectives": values, "gap_parts": split | {"objective": parts.objective}}
+
     def summary(self) -> dict[str, object]:
         """Return what there is to say about the plan, ready for JSON.
 
         Returns
         -------
         dict
-            Names of scene, schedule, formulation and criterion; ``status`` (``optimal``,
-            ``claimed optimal`` where budgets leave the proof to the solver, ``feasible`` or
-            ``unproven``), ``objective``, ``bound``, ``gap``, ``claimed_gap``; the payloads that
-            are exceeded; ``idle_robots``, which never grip; ``models_evaluated`` and ``seconds``.
+            Names of scene, schedule, formulation and criterion; ``candidates``, all or a heuristic
+            choice of them; ``status`` (``optimal``, ``claimed optimal`` where the proof is left to
+            a solver, both ``among these`` where candidates were left out, ``feasible`` or
+            ``unproven``), ``objective``, ``bound``, ``gap``, ``claimed_gap``; of criteria of
+            ranks the sums under both ``objectives`` and of heuristics the two ``gap_parts`` (see
+            `seqopt.placement.objectives`), null without proof; of every one of the ``budgets`` what
+            is there, spent and what one more unit would save; whether it ``ended`` ``done`` or was
+            ``stopped``; the payloads that are exceeded; ``idle_robots``, which never grip;
+            ``models_evaluated`` and ``seconds``.
         """
         schedule, proof = self._posed.schedule, self.certificate
         status = "unproven"
         if proof is not None:
             proven, claimed = proof.gap <= TOLERANCE, proof.claimed_gap <= TOLERANCE
             status = "optimal" if proven else "claimed optimal" if claimed else "feasible"
+        among = f"heuristic: {schedule.left_out}" if schedule.left_out else "all"
+        status += " among these" if schedule.left_out and status.endswith("optimal") else ""
         return {
             "scene": schedule.scene.name,
             "schedule": schedule.method,
             "formulation": self.formulation.name,
             "kind": self.formulation.kind.value,
             "aim": self.formulation.aim.value,
+            "candidates": among,
             "criterion": self._posed.criterion.name,
             **self._posed.criterion.settings,
             "status": status,
@@ -241,6 +285,9 @@ class Plan:
             "bound": None if proof is None else proof.bound,
             "gap": None if proof is None else proof.gap,
             "claimed_gap": None if proof is None else proof.claimed_gap,
+            **self.objectives(),
+            "budgets": self._budgets(),
+            "ended": self.selection.end.value,
             "idle_robots": list(idle_robots(schedule.scene, self.steps)),
             "payload_exceeded": [str(excess) for excess in self.overloads],
             "models_evaluated": self.models,

@@ -17,9 +17,10 @@ from seqopt.placement.costs import Budget, LayeredCosts
 from seqopt.placement.interface import Aim
 from seqopt.placement.joining import Joined
 from seqopt.placement.kinds import robots_of
+from seqopt.placement.possible import compared, spread_over_pairs
 from seqopt.placement.requirements import Criterion, Limit, ResponsesAsked
 from seqopt.placement.scales import SceneFacts
-from seqopt.placement.windows import window_anew
+from seqopt.placement.windows import by_move, window_anew, window_kept
 from seqopt.responses.choices import CHOICE_RESPONSES, Evaluation, StepChoices
 from seqopt.responses.quantities import robot_response
 from seqopt.responses.resources import HERE, Resources
@@ -99,7 +100,8 @@ class Problem:
         for steps in self.evaluation.levels():
             start = time.perf_counter()
             for choices in steps:
-                joined.add(choices.moves, self.step_costs(choices))
+                faced = compared(choices, self.schedule, self.criterion)
+                joined.add(faced.moves, self.step_costs(faced))
             seconds += time.perf_counter() - start
         return joined, seconds
 
@@ -135,8 +137,9 @@ class Problem:
         """
         out = np.zeros(len(self.schedule.moves[move].candidates))
         for choices in self.window_choices(move, before):
-            if len(choices.moves) == 2:
-                out = out + self.step_costs(choices)
+            faced = compared(choices, self.schedule, self.criterion, before)
+            if len(faced.moves) == 2:
+                out = out + self.step_costs(faced)
         return out
 
     def window_choices(self, move: int, before: int) -> tuple[StepChoices, ...]:
@@ -155,20 +158,16 @@ class Problem:
         """
         if self.evaluation.streams:
             return window_anew(self.evaluation, move, before)
-        out = []
-        for choices in self._decided.get(move, ()):
-            row = before if len(choices.moves) == 2 else slice(None)
-            responses = {name: values[row] for name, values in choices.responses.items()}
-            out.append(StepChoices(choices.step, choices.moves, responses))
-        return tuple(out)
+        return window_kept(self._decided.get(move, ()), before)
 
     @cached_property
     def _decided(self) -> Mapping[int, Sequence[StepChoices]]:
-        """The steps that each move decides: those in which it is the last that is open."""
-        found: dict[int, list[StepChoices]] = {}
-        for choices in self.evaluation.steps:
-            found.setdefault(choices.moves[-1], []).append(choices)
-        return found
+        return by_move(self.evaluation.steps)
+
+    @cached_property
+    def others(self) -> dict[Criterion, Problem]:
+        """The same problem under other criteria that need the same responses, as they are met."""
+        return {}
 
     def step_costs(self, choices: StepChoices, rows: slice | int = slice(None)) -> Floats:
         """Return the costs of a step's choices, infinite where they are not allowed.
@@ -186,7 +185,8 @@ class Problem:
         """
         responses = {name: values[rows] for name, values in choices.responses.items()}
         move = self.schedule.moves[choices.moves[-1]]
-        costs = self.criterion.costs(responses, move.bricks, len(move.candidates))
+        criterion = spread_over_pairs(choices, self.criterion)
+        costs = criterion.costs(responses, move.bricks, len(move.candidates))
         costs = np.where(np.isfinite(costs), costs, np.inf)
         for limit in self.limits:
             costs[limit.exceeded(responses[limit.response])] = np.inf

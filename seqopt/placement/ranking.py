@@ -11,6 +11,7 @@ import pandas as pd
 from seqopt.arrays import Floats
 from seqopt.placement.costs import LayeredCosts
 from seqopt.placement.criteria import RankSum, WeightedSum, WorstRatio
+from seqopt.placement.possible import compared
 from seqopt.placement.problem import Problem
 from seqopt.placement.requirements import Criterion
 from seqopt.responses.choices import StepChoices
@@ -39,7 +40,8 @@ def move_costs(problem: Problem, move: int, before: int, without: int | None = N
     """
     total = np.zeros(len(problem.schedule.moves[move].candidates))
     for choices in problem.window_choices(move, before):
-        total += problem.step_costs(_without(choices, without))
+        faced = compared(choices, problem.schedule, problem.criterion, before)
+        total += problem.step_costs(_without(faced, without))
     if without is not None:
         total[without] = np.inf
     return total

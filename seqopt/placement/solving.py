@@ -2,79 +2,139 @@
 
 from __future__ import annotations
 
+import math
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from typing import Any
+from dataclasses import dataclass
+from numbers import Real
+from typing import Any, overload
 
 import numpy as np
 
-from seqopt.errors import ProblemError
-from seqopt.placement.certificate import judge
+from seqopt.errors import InfeasibleError, ProblemError
+from seqopt.placement.certificate import judge, least_sum
+from seqopt.placement.conflicts import refusal
 from seqopt.placement.formulation import (
     Formulation,
-    Reads,
     Selection,
     as_formulation,
     formulations,
-    select,
 )
+from seqopt.placement.free_plan import FreePlan, solve_free
+from seqopt.placement.free_problem import FreeProblem
 from seqopt.placement.interface import Handed, PlacementProblem
 from seqopt.placement.plan import Plan
 from seqopt.placement.problem import Problem
 from seqopt.placement.promises import require_possible
+from seqopt.placement.ranks import Among
+from seqopt.placement.schedule_formulation import ScheduleFormulation
+from seqopt.placement.selecting import select
+from seqopt.placement.watch import Finding, Watch
 from seqopt.placement.window_search import search_windows
+from seqopt.scene.checks import short
+
+
+@dataclass(frozen=True)
+class _Run:
+    """How long a formulation may take, and who is told what it finds."""
+
+    time_limit: float
+    progress: Callable[[Finding], object] | None
+
+
+@overload
+def solve(
+    problem: PlacementProblem,
+    formulation: Formulation | str,
+    *,
+    proof: bool = True,
+    time_limit: float = math.inf,
+    progress: Callable[[Finding], object] | None = None,
+    **options: Any,
+) -> Plan: ...
+
+
+@overload
+def solve(
+    problem: FreeProblem,
+    formulation: ScheduleFormulation | str,
+    *,
+    proof: bool = True,
+    time_limit: float = math.inf,
+    progress: Callable[[str], object] | None = None,
+    **options: Any,
+) -> FreePlan: ...
 
 
 def solve(
-    problem: PlacementProblem, formulation: Formulation | str, *, proof: bool = True, **options: Any
-) -> Plan:
+    problem: PlacementProblem | FreeProblem,
+    formulation: Formulation | ScheduleFormulation | str,
+    *,
+    proof: bool = True,
+    time_limit: float = math.inf,
+    progress: Callable[[Any], object] | None = None,
+    **options: Any,
+) -> Plan | FreePlan:
     """Solve a problem by a formulation and check the answer from the problem's own data.
 
     Parameters
     ----------
-    problem : PlacementProblem
-        From `seqopt.pose`, or a `seqopt.placement.CostProblem`.
-    formulation : Formulation or str
-        One of `seqopt.formulations`, or its name.
+    problem : PlacementProblem or FreeProblem
+        From `seqopt.pose`, a `seqopt.placement.CostProblem`, or of the free schedule, from
+        `seqopt.placement.free_problem.pose_free`.
+    formulation : Formulation, ScheduleFormulation or str
+        One of `seqopt.formulations`, or its name; ``schedule_search`` for the free schedule.
     proof : bool, optional
-        False lets a formulation that looks at one window after the other solve only the models that
-        it meets; how far its choice is from the optimum then stays unknown.
+        False lets ``cascade`` or ``rank_search`` solve only the models that they meet, one window
+        after the other; how far the choice is from the optimum then stays unknown.
+    time_limit : float, optional
+        After which it stops with the best choice so far and a bound, s; computing all costs before
+        and checking the answer are not counted.
+    progress : callable, optional
+        Told every better choice and bound as it is found.
     **options
         Of the formulation.
 
     Returns
     -------
-    Plan
+    Plan or FreePlan
 
     Raises
     ------
-    InfeasibleError
-        If no choice is allowed.
-    ProblemError
-        If the formulation is not for such a problem, or does not know an option.
-    SolverError
-        If a solver fails, or the answer is not what its formulation claims.
-
-    Examples
-    --------
-    >>> import seqopt
-    >>> network = seqopt.build_network(seqopt.load_scene("arch25"))
-    >>> engine = seqopt.make_engine("compliance", network)
-    >>> schedule = seqopt.three_robot_loop(network)
-    >>> problem = seqopt.pose(engine, schedule, seqopt.CRITERIA["equations-2-3"])
-    >>> seqopt.solve(problem, "cascade").certificate.gap > 0.009
-    True
+    InfeasibleError, ProblemError, SolverError
+        If no choice is allowed; if problem, formulation and options do not go together; if a solver
+        fails, or the answer is not what its formulation claims.
     """
-    formulation = as_formulation(formulation)
+    if isinstance(problem, FreeProblem):
+        told = {} if progress is None else {"progress": progress}
+        timed = {} if math.isinf(time_limit) else {"seconds": time_limit}
+        return solve_free(problem, formulation, proof=proof, **told, **timed, **options)
+    if isinstance(formulation, ScheduleFormulation):
+        raise ProblemError(f"{formulation.name} is for free schedules; pose one with pose_free")
+    found = _fitting(problem, formulation, time_limit, options)
+    if not proof:
+        return _solve_windows(problem, found, options)
+    return _solve_all(problem, found, _Run(time_limit, progress), options)
+
+
+def _fitting(
+    problem: PlacementProblem,
+    formulation: Formulation | str,
+    time_limit: float,
+    options: Mapping[str, object],
+) -> Formulation:
+    """Return the formulation if it, the problem and the options go together."""
+    found = as_formulation(formulation)
     if not isinstance(getattr(problem, "budgets", None), tuple):
         raise ProblemError(
             f"a {type(problem).__name__} is no problem; give one that seqopt.pose made"
         )
-    require_fit(problem, formulation, options)
+    require_fit(problem, found, options)
+    _require_time(found, time_limit)
     if isinstance(problem, Problem):
         require_possible(problem)
-    return (_solve_all if proof else _solve_windows)(problem, formulation, options)
+    return found
 
 
 def require_fit(
@@ -106,14 +166,26 @@ def require_fit(
             raise ProblemError(f"option {name}: {formulation.name} has {known}")
 
 
+def _require_time(formulation: Formulation, time_limit: float) -> None:
+    """Raise an error unless a time limit is one, and the formulation can keep it."""
+    if not isinstance(time_limit, Real) or not time_limit >= 0:
+        raise ProblemError(f"time_limit is {short(time_limit)}; give seconds from 0")
+    if np.isfinite(time_limit) and not formulation.watched:
+        raise ProblemError(f"{formulation.name} takes no time limit; leave it out")
+
+
 def _solve_all(
-    problem: PlacementProblem, formulation: Formulation, options: Mapping[str, Any]
+    problem: PlacementProblem,
+    formulation: Formulation,
+    run: _Run,
+    options: Mapping[str, Any],
 ) -> Plan:
     """Return the certified plan of a formulation that is given the costs of all choices."""
     seconds: dict[str, float] = {}
     stages = problem.seconds(formulation.aim)  # computes the costs: solving is timed alone
-    with _timed(seconds, "solve"):
-        selection = select(formulation, Handed(problem), **options)  # the judge has the originals
+    with _timed(seconds, "solve"), _conflicts_named(problem):
+        handed = Handed(problem)  # the judge has the originals
+        selection = select(formulation, handed, Watch(run.time_limit, run.progress), **options)
     seconds["compile"] = selection.compile_seconds
     seconds["solve"] -= selection.compile_seconds
     with _timed(seconds, "verify"):
@@ -127,8 +199,9 @@ def _solve_windows(
     problem: PlacementProblem, formulation: Formulation, options: Mapping[str, Any]
 ) -> Plan:
     """Return the plan of a search that solves only the models it meets."""
-    if formulation.reads is not Reads.WINDOW or options:
-        able = [name for name, other in formulations().items() if other.reads is Reads.WINDOW]
+    alone = formulation.window_options
+    if alone is None or options not in ({}, alone):
+        able = [n for n, other in formulations().items() if other.window_options is not None]
         asked = " ".join(
             [formulation.name, *(f"{name}={value}" for name, value in options.items())]
         )
@@ -138,6 +211,10 @@ def _solve_windows(
         )
     if not isinstance(problem, Problem):
         raise ProblemError("the costs of all choices are given; ask for the proof, it is free")
+    if getattr(problem.criterion, "among", Among.ALL) is not Among.ALL:
+        raise ProblemError(
+            "ranks among possible candidates need all models: rank among all, or ask for the proof"
+        )
     seconds: dict[str, float] = {}
     with _timed(seconds, "search"):
         found = search_windows(problem)
@@ -146,6 +223,17 @@ def _solve_windows(
         steps = problem.steps(found.choice)
     stages = {"respond": respond, "rank": seconds["search"] - respond, "verify": seconds["verify"]}
     return Plan(problem, formulation, Selection(found.choice, np.nan), None, steps, stages, found)
+
+
+@contextmanager
+def _conflicts_named(problem: PlacementProblem) -> Iterator[None]:
+    """Name the budgets that conflict where a formulation says that none can be kept together."""
+    try:
+        yield
+    except InfeasibleError:
+        if not problem.budgets or not np.isfinite(least_sum(problem.sums)):
+            raise
+        raise refusal(problem) from None
 
 
 @contextmanager

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
+from seqopt.placement.plan import Plan
 from seqopt.report.comparison import LARGEST, Comparison
 from seqopt.report.draw import draw_responses
 from seqopt.study.published import PUBLISHED
@@ -76,4 +79,46 @@ def _gaps(result: Comparison) -> Figure:
     left.set_ylabel(f"gap to the exact optimum (0 drawn at {FLOOR:g})")
     handles, labels = left.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside right center", frameon=False, fontsize=8)
+    return figure
+
+
+def trace_figure(plans: Sequence[Plan]) -> Figure:
+    """Return a figure of choices and bounds against time.
+
+    Parameters
+    ----------
+    plans : sequence of Plan
+        Of one problem, each by another formulation.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Values of choices drawn through, bounds dashed, as steps over the time since a formulation
+        began.
+    """
+    figure = Figure(figsize=(7, 4), layout="constrained")
+    axes = figure.subplots()
+    for number, plan in enumerate(plans):
+        trace = plan.selection.trace
+        seconds = np.array([found.seconds for found in trace])
+        for values, style in (
+            ([found.objective for found in trace], "-"),
+            ([found.bound for found in trace], "--"),
+        ):
+            known = np.isfinite(values)
+            label = plan.formulation.name if style == "-" else None
+            marker = MARKERS[number % len(MARKERS)]
+            axes.step(
+                seconds[known],
+                np.array(values)[known],
+                style + marker,
+                where="post",
+                color=f"C{number}",
+                ms=4,
+                mfc="none",
+                label=label,
+            )
+    axes.set(xscale="log", xlabel="time [s]", ylabel="objective; bound dashed")
+    axes.grid(visible=True, which="both", lw=0.2)
+    axes.legend(frameon=False, fontsize=8)
     return figure

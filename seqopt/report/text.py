@@ -35,6 +35,8 @@ def format_comparison(comparison: Comparison, scene: Scene, criterion: Criterion
         blocks.append(f"Loop of robots: not possible here; {comparison.refusal}")
     else:
         blocks.append(_formulations(comparison.table, loop, criterion))
+    if comparison.table["conditional"].notna().any():
+        blocks.append(_objectives(comparison.table))
     if loop is not None and loop.ranks is not None:
         blocks.append(_ranks(loop.ranks))
     return "\n\n".join(blocks)
@@ -114,6 +116,26 @@ def _line(name: str, row: pd.Series[float]) -> str:
     )
 
 
+def _objectives(table: pd.DataFrame) -> str:
+    """Return what every plan is worth under both objectives, and the parts of heuristics' gaps."""
+    lines = [
+        "Ranks over all pairs, and given the choice before; a heuristic's gap in two parts:",
+        "what it loses by not looking ahead, and what the change of objective costs",
+        f"{'':22}{'pairs':>11}{'given':>11}{'gap':>8}{'sight':>9}{'change':>9}",
+    ]
+    for problem, rows in table[table["conditional"].notna()].groupby("problem", sort=False):
+        lines.append(f"{problem}:")
+        for name, row in rows.iterrows():
+            line = f"{f'  {name}':22}{row['pairs']:11.2f}{row['conditional']:11.2f}"
+            if np.isfinite(row["short_sight"]):
+                line += f"{100 * row['gap']:7.2f}%"
+                line += "".join(
+                    f"{100 * row[part]:8.2f}%" for part in ("short_sight", "change_of_objective")
+                )
+            lines.append(line)
+    return "\n".join(lines)
+
+
 def _ranks(table: pd.DataFrame) -> str:
     """Return where the published plan's nodes rank, a line for each way to rank them."""
     return "\n".join(
@@ -123,7 +145,7 @@ def _ranks(table: pd.DataFrame) -> str:
 
 def _rank_lines(table: pd.DataFrame) -> Iterator[str]:
     for column, label in (
-        ("rank_in_window", "rank_search, cascade"),
+        ("rank_in_window", "cascade"),
         ("rank_overlap", "overlap"),
         ("rank_peak", "minimax"),
     ):

@@ -1,8 +1,8 @@
 """Responses: the few numbers that say how a partial structure bears its weight and its grips.
 
 An engine gives forces and displacements everywhere; a response is one number of these, such as the
-largest tension. Responses come as a table of given steps, or over all choices of steps with open
-grips.
+largest tension. Responses come as a table of given steps, each from scratch or with what the steps
+before it lock in (`analyze_staged`), or over all choices of steps with open grips.
 
 >>> from seqopt.engines.registry import make_engine
 >>> from seqopt.network.build import build_network
@@ -31,6 +31,7 @@ True
 from seqopt.responses.choices import Evaluation, StepChoices
 from seqopt.responses.quantities import RESPONSES, Response, responses_of
 from seqopt.responses.resources import Resources
+from seqopt.responses.staged import analyze_staged
 from seqopt.responses.table import analyze
 
 __all__ = [
@@ -40,5 +41,6 @@ __all__ = [
     "Response",
     "StepChoices",
     "analyze",
+    "analyze_staged",
     "responses_of",
 ]

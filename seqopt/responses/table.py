@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 import pandas as pd
@@ -63,7 +63,30 @@ def analyze(engine: Engine, steps: Sequence[Step]) -> pd.DataFrame:
     if not isinstance(getattr(engine, "network", None), Network):
         kind = type(engine).__name__
         raise SceneError(f"a {kind} is no engine; give make_engine('compliance', network)")
-    return pd.DataFrame([_row(engine, step) for step in require_steps(steps)])
+    return response_table(
+        engine.network, ((step, step_fields(engine, step)) for step in require_steps(steps))
+    )
+
+
+def response_table(network: Network, answers: Iterable[tuple[Step, Fields]]) -> pd.DataFrame:
+    """Return a row of responses for every step, as `analyze` does, from the fields of each.
+
+    Parameters
+    ----------
+    network : Network
+    answers : iterable of (Step, Fields)
+        Steps with every grip given, and the full fields of one grip set each.
+
+    Returns
+    -------
+    pandas.DataFrame
+
+    Raises
+    ------
+    SolverError
+        If a response is not finite.
+    """
+    return pd.DataFrame([_row(network, step, fields) for step, fields in answers])
 
 
 def force_column(robot: Robot) -> str:
@@ -156,7 +179,23 @@ def fields_archive(engine: Engine, steps: Sequence[Step]) -> bytes:
     MechanismError, SolverError
         As the engine does, the step named.
     """
-    network = engine.network
+    return archive(engine.network, [(step, step_fields(engine, step)) for step in steps])
+
+
+def archive(network: Network, answers: Iterable[tuple[Step, Fields]]) -> bytes:
+    """Return the full fields of steps as `fields_archive` does.
+
+    Parameters
+    ----------
+    network : Network
+    answers : iterable of (Step, Fields)
+        Steps and the full fields of one grip set each.
+
+    Returns
+    -------
+    bytes
+        The content of the archive; SI units.
+    """
     arrays: dict[str, np.ndarray] = {
         "edge_nodes": network.edge_nodes,
         "node_position": network.node_position,
@@ -164,8 +203,7 @@ def fields_archive(engine: Engine, steps: Sequence[Step]) -> bytes:
         "support_brick": np.array([ground.brick for ground in network.scene.grounds]),
         "support_point": network.springs.anchor[network.springs.support],
     }
-    for step in steps:
-        fields = step_fields(engine, step)
+    for step, fields in answers:
         for name in ("edge_force", "displacement", "grip_force", "support"):
             arrays[f"step{step.number}_{name}"] = getattr(fields, name)[0]
     buffer = io.BytesIO()
@@ -173,9 +211,8 @@ def fields_archive(engine: Engine, steps: Sequence[Step]) -> bytes:
     return buffer.getvalue()
 
 
-def _row(engine: Engine, step: Step) -> dict[str, object]:
-    network = engine.network
-    scene, fields = network.scene, step_fields(engine, step)
+def _row(network: Network, step: Step, fields: Fields) -> dict[str, object]:
+    scene = network.scene
     held = require_finite("grip force", grip_forces(network, fields), step.bricks)
     forces = iter(held[0])
     row: dict[str, object] = {"step": step.number, "type": step.kind.value, "bricks": step.bricks}

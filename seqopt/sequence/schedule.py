@@ -93,6 +93,8 @@ class Schedule:
         Numbered from 1.
     moves : tuple of Move
         In the order in which they are made.
+    left_out : str, optional
+        What was done to look at fewer candidates than there are; empty where all are open.
 
     Raises
     ------
@@ -114,6 +116,7 @@ class Schedule:
     scene: Scene
     steps: tuple[OpenStep, ...]
     moves: tuple[Move, ...]
+    left_out: str = ""
 
     def __post_init__(self) -> None:
         for step in self.steps:

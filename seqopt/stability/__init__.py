@@ -12,9 +12,12 @@ An assembly of blocks is assessed with the mortar in its joints; a solver's word
 ['does not stand', 'stands']
 
 `assess_steps` asks the same of every step of a build, and `stability_table` lays the answers out.
+`Screen` says which of many grip sets stand, and `Margins` by how much: most of them unsolved.
 """
 
 from seqopt.stability.assessment import Stability, Verdict, assess
+from seqopt.stability.margins import Margins
+from seqopt.stability.screens import Screen
 from seqopt.stability.steps import assess_steps, stability_table
 
-__all__ = ["Stability", "Verdict", "assess", "assess_steps", "stability_table"]
+__all__ = ["Margins", "Screen", "Stability", "Verdict", "assess", "assess_steps", "stability_table"]

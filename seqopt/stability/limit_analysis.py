@@ -120,7 +120,9 @@ def compile_equilibrium(assembly: Assembly) -> Program:
     return compiled(assembly)
 
 
-def limits(assembly: Assembly, case: Case, z: float) -> tuple[Floats, Floats, Floats]:
+def limits(
+    assembly: Assembly, case: Case, z: float, own: Floats | None = None
+) -> tuple[Floats, Floats, Floats]:
     """Return what corners and grips can bear at a z, over the force scale.
 
     Parameters
@@ -128,6 +130,8 @@ def limits(assembly: Assembly, case: Case, z: float) -> tuple[Floats, Floats, Fl
     assembly : Assembly
     case : Case
     z : float
+    own : (G,) float, optional
+        Payload of every grip, N; by default the assembly's.
 
     Returns
     -------
@@ -137,7 +141,8 @@ def limits(assembly: Assembly, case: Case, z: float) -> tuple[Floats, Floats, Fl
         Of the grips.
     """
     share = assembly.corner_area * assembly.stress_scale / assembly.scales[0]
-    payload = case.payload[0] * assembly.payload / assembly.scales[0] + z * case.payload[1]
+    own = assembly.payload if own is None else own
+    payload = case.payload[0] * own / assembly.scales[0] + z * case.payload[1]
     tension, cohesion = case.tension, case.cohesion
     return (
         share * (tension[0] + z * tension[1]),
@@ -146,7 +151,7 @@ def limits(assembly: Assembly, case: Case, z: float) -> tuple[Floats, Floats, Fl
     )
 
 
-def violation(assembly: Assembly, case: Case, answer: Answer) -> float:
+def violation(assembly: Assembly, case: Case, answer: Answer, own: Floats | None = None) -> float:
     """Return by how much the forces of an answer violate a case at most.
 
     Parameters
@@ -154,6 +159,8 @@ def violation(assembly: Assembly, case: Case, answer: Answer) -> float:
     assembly : Assembly
     case : Case
     answer : Answer
+    own : (G,) float, optional
+        Payload of every grip, N; by default the assembly's.
 
     Returns
     -------
@@ -163,7 +170,7 @@ def violation(assembly: Assembly, case: Case, answer: Answer) -> float:
     z, force, grip = answer.value, answer.contact_force, answer.grip_force
     residual = assembly.contact_map @ force.ravel() + assembly.grip_map @ grip.ravel()
     residual += assembly.load() + z * assembly.load(case.pull)
-    tension, cohesion, payload = limits(assembly, case, z)
+    tension, cohesion, payload = limits(assembly, case, z, own)
     excess = (
         np.abs(residual),
         -force[:, 0] - tension,

@@ -90,6 +90,25 @@ def test_analyze_writes_the_columns_of_table_a1(capsys, tmp_path, engine, engine
         assert (table[column] - values[column]).abs().max() <= close
 
 
+def test_a_staged_analysis_carries_what_is_locked_in(capsys, tmp_path, engine25):
+    tables = {}
+    for way in ("fitted", "planned"):
+        path, fields = tmp_path / f"{way}.csv", tmp_path / f"{way}.npz"
+        words = ("--staged", way, "--out", str(path), "--fields", str(fields))
+        assert run(capsys, "analyze", "--method", "cantilever", *words)[0] == 0
+        tables[way] = pd.read_csv(path)
+        last = np.load(fields)["step49_displacement"]
+        largest = 1e6 * np.linalg.norm(last, axis=1).max()
+        assert tables[way]["D_max_1e-3mm"].iloc[-1] == pytest.approx(largest, rel=1e-4)
+    once = analyze(engine25, cantilever(engine25.network))
+    fitted, planned = tables["fitted"], tables["planned"]
+    assert fitted["F_max_N"].max() == planned["F_max_N"].max() < 0.8 * once["F_max_N"].max()
+    assert fitted["D_max_1e-3mm"].max() > planned["D_max_1e-3mm"].max()
+    words = ("analyze", "--method", "cantilever", "--staged", "fitted", "--engine", "frame")
+    status, _, err = run(capsys, *words)
+    assert (status, "--engine compliance" in err) == (2, True)
+
+
 def test_analyze_prints_without_out(capsys):
     status, out, _ = run(capsys, "analyze", "--method", "published")
     assert status == 0
@@ -288,7 +307,7 @@ def test_optimize_with_words_of_ones_own(capsys, tmp_path):
 
 def test_optimize_without_proof(capsys, tmp_path):
     chosen = ("--formulation", "rank_search", "--engine", "auto")
-    for folder, words in (("with", ()), ("without", ("--no-proof",))):
+    for folder, words in (("with", ("--option", "horizon=1")), ("without", ("--no-proof",))):
         status, out, _ = run(capsys, "optimize", *chosen, *words, "--out", str(tmp_path / folder))
         assert (status, out.count("\n")) == (0, 1)
         assert ("not compared with the optimum" in out) == (folder == "without")
@@ -486,3 +505,69 @@ def test_the_command_line_says_why(capsys):
     assert "use the compliance engine" in capsys.readouterr().err
     assert main(["analyze", "--method", "sequential", "--mortar", "dry"]) == 2
     assert "engine compliance: its joints hold anything" in capsys.readouterr().err
+
+
+def test_ranks_are_taken_as_asked(tmp_path):
+    words = ("--formulation", "overlap_dp", "--ranked", "conditional")
+    assert main(["optimize", "arch25", *words, "--out", str(tmp_path / "a")]) == 0
+    found = json.loads((tmp_path / "a" / "summary.json").read_text(encoding="utf-8"))
+    assert (found["ranked"], found["among"]) == ("conditional", "all")
+    assert found["objective"] == found["objectives"]["conditional"] == pytest.approx(656.025)
+
+
+def test_ranks_are_not_asked_of_what_has_none(tmp_path, capsys):
+    words = ("--formulation", "overlap_dp", "--criteria", "weighted", "--among", "possible")
+    assert main(["optimize", "arch25", *words, "--out", str(tmp_path / "a")]) == 2
+    assert "--among possible: weighted has no ranks; leave it out" in capsys.readouterr().err
+
+
+def test_budgets_are_kept_as_asked(tmp_path):
+    words = ("--formulation", "labels", "--budget", "travel=0.8", "--budget")
+    words += ("steps_over:F_largest=300:3", "--out", str(tmp_path / "a"))
+    assert main(["optimize", "arch25", *words]) == 0
+    found = json.loads((tmp_path / "a" / "summary.json").read_text(encoding="utf-8"))
+    way, steps = found["budgets"].values()
+    assert way["bound"] == pytest.approx(0.8 * 24.006771, rel=1e-6)
+    assert way["spent"] <= way["bound"]
+    assert way["price"] > 0
+    assert steps["spent"] <= steps["bound"] == 3
+    assert found["status"] == "optimal"
+    assert found["ended"] == "done"
+
+
+@pytest.mark.parametrize(
+    ("budget", "status", "said"),
+    [
+        ("travel=2m", 3, "any takes at least 10.8316 of 'robot travel [m]', more than 2"),
+        ("travel=few", 2, "'few' is not a number from 0"),
+        ("travel=-1m", 2, "'-1' is not a number from 0"),
+        ("travel=250:3", 2, "there is no such; give travel=0.8"),
+        ("steps_over:T_max=3", 2, "there is no such; give travel=0.8"),
+        ("steps_over:T_max=80:3m", 2, "steps have no meters"),
+        ("robot_use:rob9=80:3", 2, "response F_rob9: there is no such"),
+    ],
+)
+def test_budgets_that_cannot_be_get_one_line(tmp_path, capsys, budget, status, said):
+    words = ("--formulation", "labels", "--budget", budget, "--out", str(tmp_path / "a"))
+    assert main(["optimize", "arch25", *words]) == status
+    assert said in capsys.readouterr().err
+    assert not (tmp_path / "a").exists()
+
+
+def test_a_budget_is_given_once(tmp_path, capsys):
+    words = ("--formulation", "labels", "--budget", "travel=2m", "--budget", "travel=0.5")
+    assert main(["optimize", "arch25", *words, "--out", str(tmp_path / "a")]) == 2
+    assert "--budget travel=0.5: it stands there twice" in capsys.readouterr().err
+
+
+def test_a_time_limit_ends_with_a_choice_and_a_trace(tmp_path, capsys):
+    words = ("--formulation", "overlap_dp", "--time-limit", "0", "--out", str(tmp_path / "a"))
+    assert main(["optimize", "arch25", *words]) == 0
+    found = json.loads((tmp_path / "a" / "summary.json").read_text(encoding="utf-8"))
+    assert (found["ended"], found["status"]) == ("stopped", "feasible")
+    trace = pd.read_csv(tmp_path / "a" / "trace.csv")
+    assert list(trace.columns) == ["seconds", "objective", "bound", "gap"]
+    assert trace["objective"].iloc[-1] == pytest.approx(found["objective"])
+    assert trace["bound"].iloc[-1] <= found["bound"]
+    assert main(["optimize", "arch25", *words[:2], "--time-limit", "soon", *words[4:]]) == 2
+    assert "--time-limit: 'soon' is not a positive number or zero" in capsys.readouterr().err

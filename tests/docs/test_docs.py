@@ -6,10 +6,11 @@ import re
 import subprocess
 import sys
 
+import pandas as pd
 import pytest
 
 from seqopt.cli.main import main
-from seqopt.placement.formulation import formulations
+from seqopt.placement.formulation import exhibits, formulations
 from tests.builders import ROOT
 
 
@@ -78,6 +79,21 @@ def examples():
 def test_examples_print_what_they_show(code, printed, capsys):
     exec(compile(code, "example", "exec"), {})
     assert capsys.readouterr().out.strip() == printed.strip()
+
+
+def test_exhibits_stand_on_the_page_that_compares_them():
+    page = (ROOT / "docs" / "formulations" / "why.md").read_text(encoding="utf-8")
+    stored = pd.read_csv(ROOT / "experiments" / "results" / "program_shapes.csv")
+    assert {*exhibits(), "overlap_mip"} == {*stored["formulation"]}
+    for row in stored.itertuples():
+        line = next(text for text in page.splitlines() if text.startswith(f"| `{row.formulation}`"))
+        cells = [cell.strip() for cell in line.strip("|").split("|")]
+        counts = (row.rows, row.columns, row.nonzeros, row.binaries)
+        assert cells[1:5] == [f"{count:,}" for count in counts]
+        assert float(cells[5]) == pytest.approx(row.relaxed, rel=1e-3, abs=1e-3)
+        assert float(cells[6]) == pytest.approx(row.optimum, rel=1e-3)
+        assert int(cells[7]) == row.nodes
+        assert float(cells[8].split()[0]) == pytest.approx(row.seconds, rel=0.1)
 
 
 def test_every_formulation_has_a_page_with_an_example():

@@ -20,6 +20,7 @@ from experiments.engines import (
     engine_speed,
     fidelity_ladder,
     frame_contrast,
+    parallel,
 )
 from experiments.harness.catalog import claims
 from experiments.harness.plotting import RESULTS
@@ -29,10 +30,12 @@ from experiments.placement import (
     degenerate_placement,
     formulation_cost,
     heuristic_gaps,
+    program_shapes,
     speed_accuracy,
+    staged_construction,
 )
-from experiments.robustness import fuzz
-from experiments.stability import failing_steps, witnesses
+from experiments.robustness import fuzz, mutation_testing
+from experiments.stability import dry_grips, failing_steps, witnesses
 from experiments.study import criteria_variants, paper_counterparts
 from experiments.study.parts.paper_items import ITEMS
 from seqopt.study.tables import printed
@@ -93,6 +96,7 @@ def checks() -> dict[str, tuple[Check, Tables, Callable[..., Iterator[tuple[Any,
             (rows("discrete_arches"),),
             spoil_discrete,
         ),
+        "dry_grips": (dry_grips.holds, (rows("dry_grips"), rows("dry_grips_build")), spoil_dry),
         "engine_growth": (engine_growth.holds, (rows("engine_growth_runs"),), spoil_growth),
         "engine_limits": (
             lambda table: all(engine_limits.judge(table).values()),
@@ -131,16 +135,31 @@ def checks() -> dict[str, tuple[Check, Tables, Callable[..., Iterator[tuple[Any,
             (rows("identify_arch25_refit"),),
             spoil_identified,
         ),
+        "mutation_testing": (
+            mutation_testing.holds,
+            (
+                rows("mutation_testing"),
+                pd.read_csv(RESULTS / "mutation_survivors.csv", keep_default_na=False),
+            ),
+            spoil_mutation,
+        ),
         "paper_counterparts": (
             lambda table: not paper_counterparts.faults(numbered, table),
             (rows("paper_counterparts"),),
             spoil_counterparts,
         ),
+        "parallel": (parallel.holds, (rows("parallel"),), spoil_parallel),
         "peers": (peers.judge, tuple(parts), spoil_peers),
+        "program_shapes": (program_shapes.holds, (rows("program_shapes"),), spoil_shapes),
         "speed_accuracy": (
             lambda table: all(speed_accuracy.holds(table).values()),
             (rows("runs"),),
             spoil_runs,
+        ),
+        "staged_construction": (
+            lambda *tables: all(staged_construction.holds(*tables).values()),
+            (rows("staged_construction"), rows("staged_choice")),
+            spoil_staged,
         ),
         "witnesses": (
             lambda table: not witnesses.faults(table, ["rbe", "lmgc90"], largest(table)),
@@ -181,6 +200,12 @@ def spoil_degenerate(table):
         yield (spoiled(table, "message", "", status=status),)
 
 
+def spoil_parallel(table):
+    yield (spoiled(table, "times_as_fast_by_cpu", 1.5, way="two processes"),)
+    yield (table.assign(same=table["way"] != "two processes"),)
+    yield (table[table["way"] != "two processes"],)
+
+
 def spoil_discrete(table):
     nearly = printed("de_validation").set_index("bricks")["error_percent"] + 9
     one = (table["pads"] == "stated") & (table["grip"] == "node") & (table["joint"] == "as printed")
@@ -189,10 +214,39 @@ def spoil_discrete(table):
     yield (spoiled(table, "shear_used", 1.2, bricks=17),)
 
 
+def spoil_dry(table, built):
+    yield spoiled(table, "open", 1, bricks=24, case="dry"), built
+    yield spoiled(table, "contradicted", 1, bricks=17, case="bond 3 kPa"), built
+    yield spoiled(table, "solved", 2000, bricks=25, case="dry"), built
+    yield table, spoiled(built, "placed", 25, robots=2)
+    yield table, spoiled(built, "placed", 24, robots=3)
+
+
+def spoil_staged(table, chosen):
+    published = {"method": staged_construction.PUBLISHED, "analysis": "fitted"}
+    yield spoiled(table, "F_largest_N", 270.0, **published), chosen
+    yield spoiled(table, "F_largest_N", 650.0, method="cantilever", analysis="fitted"), chosen
+    yield spoiled(table, "T_max_N", 120.0, method="sequential", analysis="fitted"), chosen
+    yield spoiled(table, "imbalance_N", 1e-3, step=40), chosen
+    yield table, chosen.assign(fitted=chosen["scratch"])
+    yield table, chosen.assign(scratch_worst_fitted=1.0)
+
+
 def spoil_fuzz(cases, kills):
     yield spoiled(cases, "faults", 1, kind="scene", command="analyze"), kills
     yield cases, spoiled(kills, "left", "a part", signal="SIGKILL")
     yield cases, spoiled(kills, "left", "whole, and a hidden folder", signal="SIGTERM")
+
+
+def spoil_mutation(table, survivors):
+    last = table["module"].iloc[-1]
+    named = survivors[survivors["reason"] != ""]
+    yield spoiled(table, "as_it_is", "killed", module=last), survivors
+    yield spoiled(table, "with_a_broken_line", "survived", module=last), survivors
+    yield spoiled(table, "equivalent_but_killed", 1, module=last), survivors
+    yield table, survivors.assign(reason="none could")
+    yield table, survivors.drop(index=named.index[0])
+    yield table.assign(survived=table["killed"] // 10), survivors
 
 
 def spoil_growth(table):
@@ -248,6 +302,16 @@ def spoil_contrast(table):
     ),)  # fmt: skip
     flat = table.assign(**dict.fromkeys(frame_contrast.FIELDS, 1e-07), refused=0)
     yield (flat,)  # no contrast is better than another
+
+
+def spoil_shapes(table):
+    yield (spoiled(table, "relaxed", 650.0, formulation="assignment_tight"),)
+    yield (spoiled(table, "relaxed", 640.0, formulation="assignment_loose"),)
+    yield (spoiled(table, "relaxed", 0.9, formulation="minimax_arc"),)
+    yield (spoiled(table, "relaxed", 0.2, formulation="minimax_big_m"),)
+    yield (spoiled(table, "nodes", 1000.0, formulation="overlap_mip"),)
+    yield (table.assign(proven=True),)
+    yield (spoiled(table, "value", 1.2, formulation="minimax_layer"),)
 
 
 def spoil_gaps(table):

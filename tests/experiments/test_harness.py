@@ -55,10 +55,10 @@ def test_everything_runs_and_is_a_row(smoke):
     errors = smoke.groupby("engine")["error"].max()
     assert errors["auto"] == 0 < errors["discrete"] < 1e-8
     assert errors["discrete"] < errors["frame 1e7"] < 1e-5 < errors["frame 1e3"]
-    windows = smoke[smoke["formulation"].isin(["rank_search", "cascade"])]
+    windows = smoke[smoke["formulation"] == "cascade"]
     assert windows["models"].max() < exact["models"].min()
     alone = smoke[smoke["formulation"] == NO_PROOF].reset_index(drop=True)
-    proven = smoke[smoke["formulation"] == "rank_search"].reset_index(drop=True)
+    proven = smoke[smoke["formulation"] == "cascade"].reset_index(drop=True)
     assert alone["objective"].equals(proven["objective"])
     compiled = smoke[smoke["formulation"].isin(["overlap_lp", "overlap_mip"])]
     assert (compiled["compile"] > 0).all()

@@ -13,7 +13,7 @@ from seqopt.engines.interface import Want
 from seqopt.errors import ProblemError, StepError
 from seqopt.placement.budgets import travel
 from seqopt.placement.costs import LayeredCosts
-from seqopt.placement.formulation import FormulationKind, Reads
+from seqopt.placement.formulation import FormulationKind
 from seqopt.placement.interface import CostProblem
 from seqopt.placement.problem import Problem
 from seqopt.workflow import find_criterion
@@ -124,7 +124,7 @@ def test_budgets_are_refused_by_those_that_do_not_take_them(engine25, name):
     if formulation.takes_budgets:
         assert seqopt.solve(problem, name).certificate.spent
         return
-    with pytest.raises(ProblemError, match="couples all moves; use overlap_lp or overlap_mip"):
+    with pytest.raises(ProblemError, match="couples all moves; use labels or lagrangian"):
         seqopt.solve(problem, name)
 
 
@@ -132,7 +132,7 @@ def test_budgets_are_refused_by_those_that_do_not_take_them(engine25, name):
 def test_without_proof_only_windows_are_searched(counted, name):
     engine, problem = counted
     formulation = seqopt.formulations()[name]
-    if formulation.reads is Reads.WINDOW:
+    if formulation.window_options is not None:
         assert formulation.kind is FormulationKind.HEURISTIC
         assert seqopt.solve(problem, formulation, proof=False).steps
         return

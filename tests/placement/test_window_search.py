@@ -56,6 +56,7 @@ def test_a_dead_end_is_named(engine25):
         ("overlap_dp", {}, "overlap_dp looks beyond"),
         ("beam", {}, "beam looks beyond"),
         ("cascade", {"charge": "earlier"}, "cascade charge=earlier looks beyond"),
+        ("rank_search", {"horizon": 2}, "rank_search horizon=2 looks beyond"),
     ],
 )
 def test_what_looks_further_is_refused(problem25, name, options, said):

@@ -10,8 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from seqopt.cli.criteria import parse_criterion
 from seqopt.cli.main import main
-from seqopt.cli.values import parse_criterion, parse_limits
+from seqopt.cli.values import parse_limits
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network
 from seqopt.placement.budgets import robot_use

@@ -12,8 +12,8 @@ def test_the_loop_with_the_published_nodes_is_the_published_plan(arch25, loop25,
 
 
 def test_the_window_rank_is_the_studys_search(problem25):
-    """The choice of rank_search is first in its own window, move by move."""
-    choice = formulations()["rank_search"].solve(problem25).choice
+    """The choice of the cascade is first in its own window, move by move."""
+    choice = formulations()["cascade"].solve(problem25).choice
     assert (rank_choice(problem25, choice)["rank_in_window"] == 1).all()
     exact = formulations()["overlap_dp"].solve(problem25).choice
     assert (rank_choice(problem25, exact)["rank_overlap"] == 1).all()

@@ -60,11 +60,39 @@ def solve_mixed(network: Network, bricks: int, columns: Ints) -> Fields:
 
 def _solve_one(parts: Ungripped, grips: Ints) -> Fields:
     """Return the fields of one grip set."""
+    network = parts.network
+    solution = solve_load(parts, grips, parts.load)
+    return respond(network, parts.statics, parts.motion, grips[None], solution)
+
+
+def solve_load(parts: Ungripped, grips: Ints, pull: Floats) -> Solution:
+    """Return how a partial structure answers to a load while a grip set holds its nodes still.
+
+    Parameters
+    ----------
+    parts : Ungripped
+    grips : (r,) int
+        Indices into ``network.inner.ravel()``.
+    pull : (6b,) float
+        The load, scaled as ``parts.load``.
+
+    Returns
+    -------
+    Solution
+        Of one grip set.
+
+    Raises
+    ------
+    MechanismError
+        If a motion that the load excites meets no resistance.
+    SolverError
+        If the answer still changes by more than `LAST_CORRECTION`.
+    """
     network, bricks = parts.network, parts.bricks
     system = mixed_system(parts, grips)
     joints, moves = len(parts.wrench_unit), len(parts.twist_unit)
     load = np.zeros(system.matrix.shape[0])
-    load[joints : joints + moves] = parts.load
+    load[joints : joints + moves] = pull
     try:
         factors = factorize(system)
     except RuntimeError as error:
@@ -83,8 +111,7 @@ def _solve_one(parts: Ungripped, grips: Ints) -> Fields:
         )
     wrench, twist = unscaled(parts, result[None, : joints + moves])
     force = (system.force @ (result[joints + moves :] * parts.unit)).reshape(1, -1, 3)
-    solution = Solution(twist, wrench, force)
-    return respond(network, parts.statics, parts.motion, grips[None], solution)
+    return Solution(twist, wrench, force)
 
 
 def unchanged(parts: Ungripped, states: Floats, corrections: Floats) -> Bools:

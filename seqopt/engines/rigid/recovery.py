@@ -59,13 +59,10 @@ def respond(
     """
     twist, wrench, force = solution.twist, solution.wrench, solution.force.copy()
     sets, bricks = len(twist), twist.shape[1] // 6
-    edges = network.count_edges(bricks)
     load = np.tile(network.inner_weight[: 2 * bricks], (sets, 1, 1))
     load[np.arange(sets)[:, None], columns] += force
-    through = wrench[:, :, :3].reshape(sets, 3 * wrench.shape[1])
-    carried = (statics.edge_of_spring[:edges] @ through.T).T
-    carried += (statics.edge_of_load[:edges, : 6 * bricks] @ load.reshape(sets, 6 * bricks).T).T
-    _split_pairs(network, columns, force, carried)
+    carried = edge_forces(network, statics, wrench, load)
+    split_pairs(network, columns, force, carried)
     return Fields(
         edge_force=carried,
         displacement=(motion @ twist.T).T.reshape(sets, motion.shape[0] // 3, 3),
@@ -74,6 +71,32 @@ def respond(
         joint_wrench=wrench,
         brick_twist=twist.reshape(sets, bricks, 6),
     )
+
+
+def edge_forces(network: Network, statics: Statics, wrench: Floats, load: Floats) -> Floats:
+    """Return what the edges carry.
+
+    Parameters
+    ----------
+    network : Network
+    statics : Statics
+        Of the network.
+    wrench : (S, J, 6) float
+        Of every spring of the network on its second body, N and N m.
+    load : (S, 2b, 3) float
+        Forces at the inner nodes, those of grips among them, N.
+
+    Returns
+    -------
+    (S, E) float
+        Tension positive, N.
+    """
+    sets, bricks = len(load), load.shape[1] // 2
+    edges = network.count_edges(bricks)
+    through = wrench[:, :, :3].reshape(sets, 3 * wrench.shape[1])
+    carried = (statics.edge_of_spring[:edges] @ through.T).T
+    carried += (statics.edge_of_load[:edges, : 6 * bricks] @ load.reshape(sets, 6 * bricks).T).T
+    return np.asarray(carried)
 
 
 def reactions(network: Network, statics: Statics, wrench: Floats) -> Floats:
@@ -96,8 +119,19 @@ def reactions(network: Network, statics: Statics, wrench: Floats) -> Floats:
     return np.asarray(np.einsum("gij,sgj->sgi", statics.support_of_spring, at_spring))
 
 
-def _split_pairs(network: Network, columns: Ints, force: Floats, carried: Floats) -> None:
-    """Let each of two grips on one brick take what reaches its own node."""
+def split_pairs(network: Network, columns: Ints, force: Floats, carried: Floats) -> None:
+    """Let each of two grips on one brick take what reaches its own node, in place.
+
+    Parameters
+    ----------
+    network : Network
+    columns : (S, r) int
+        Grips as indices into ``network.inner.ravel()``.
+    force : (S, r, 3) float
+        Of the grips, N.
+    carried : (S, E) float
+        By the edges, N.
+    """
     inner = np.flatnonzero(network.edge_spring < 0)
     edge_of = np.empty(len(network.inner), dtype=np.int64)
     edge_of[network.edge_brick[inner]] = inner

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 from seqopt.scene.library.dome import dome
 from seqopt.scene.library.dome_shape import DomeShape
@@ -46,7 +47,7 @@ def vault338(arch: Scene) -> Scene:
         skew=1.74,
         widening=0.0234,
     )
-    return herringbone_vault(arch, shape, "vault338", provenance=VAULT)
+    return replace(herringbone_vault(arch, shape, "vault338"), provenance=VAULT)
 
 
 def dome163() -> Scene:

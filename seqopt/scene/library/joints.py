@@ -8,9 +8,9 @@ import numpy as np
 
 from seqopt.arrays import Floats, Vector
 from seqopt.errors import SceneError
-from seqopt.scene.boxes import boxes
+from seqopt.scene.boxes import Boxes, boxes
 from seqopt.scene.library.law import JointLaw
-from seqopt.scene.library.meeting import Pairs, meeting, widths
+from seqopt.scene.library.meeting import Meeting, Pairs, meeting, widths
 from seqopt.scene.parts import THICKEST, Brick, Ground, Joint
 
 STUB = 0.05  # m; of a ground end that does not say
@@ -48,20 +48,8 @@ def joints_between(
         return ()
     shapes = boxes(bricks)
     found = meeting(shapes, pairs, normals)
-    apart = np.flatnonzero(found.shared.area == 0)
-    if len(apart):
-        i, j = pairs[apart[0]]
-        raise SceneError(
-            f"joint ({bricks[i].name}, {bricks[j].name}): the faces of its bricks do not overlap; "
-            "move the bricks to each other"
-        )
-    start, end, taper = widths(shapes, found)
-    middle = (found.shared.centroid[:, None, :] @ found.sides)[:, 0]
-    place = middle + 0.5 * (start + end)[:, None] * found.along
-    a, b = np.array(pairs).T
-    thin = 2 * np.minimum(shapes.half[a].min(axis=1), shapes.half[b].min(axis=1))
-    widest = end - start + taper
-    thick = np.where(widest > THICKEST * thin, widest, 0.0).tolist()
+    _require_overlap(bricks, pairs, found)
+    place, thick = _between(shapes, pairs, found)
     faces = zip(found.shared.area.tolist(), found.shared.moments.tolist(), strict=True)
     stiff = [law.stiffness(area, (about, across)) for area, (about, across) in faces]
     rows = zip(pairs, place, found.along, found.sides[:, 0], stiff, thick, strict=True)
@@ -128,3 +116,25 @@ def as_vector(values: Floats) -> Vector:
     """
     x, y, z = values.tolist()
     return x, y, z
+
+
+def _require_overlap(bricks: Sequence[Brick], pairs: Pairs, found: Meeting) -> None:
+    """Raise an error that names the first two bricks whose faces share nothing."""
+    apart = np.flatnonzero(found.shared.area == 0)
+    if len(apart):
+        i, j = pairs[apart[0]]
+        raise SceneError(
+            f"joint ({bricks[i].name}, {bricks[j].name}): the faces of its bricks do not overlap; "
+            "move the bricks to each other"
+        )
+
+
+def _between(shapes: Boxes, pairs: Pairs, found: Meeting) -> tuple[Floats, list[float]]:
+    """Return the points (P, 3) halfway between faces, and the widths of joints that are thick."""
+    start, end, taper = widths(shapes, found)
+    middle = (found.shared.centroid[:, None, :] @ found.sides)[:, 0]
+    place = middle + 0.5 * (start + end)[:, None] * found.along
+    thin = 2 * shapes.half[np.array(pairs)].min(axis=(1, 2))
+    widest = end - start + taper
+    thick: list[float] = np.where(widest > THICKEST * thin, widest, 0.0).tolist()
+    return place, thick

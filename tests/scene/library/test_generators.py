@@ -185,7 +185,7 @@ def test_compliance_agrees_with_independent_routes(scene, share):
         (lambda: VaultShape(bricks=30, spacing=0.0), "vault: spacing is 0.0; give a positive"),
         (
             lambda: herringbone_vault(even_arch(13), VaultShape(bricks=12)),
-            "vault: 12 bricks, and its arch arch has 13; give at least as many",
+            "vault: bricks is 12, and its arch has 13; give at least as many",
         ),
         (
             lambda: herringbone_vault(even_arch(13), VaultShape(bricks=40, spacing=0.11)),

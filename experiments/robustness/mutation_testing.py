@@ -1,0 +1,238 @@
+"""Claim: tests notice at least 95 % of the changes made to what computes, costs and certifies.
+
+Method: Cosmic Ray changes one operator, number, loop or decorator of a module at a time
+(`experiments.robustness.parts.mutants`), and the tests that are for the module run against it. A
+mutant that fails one is killed; one that loops is ended after ten times what the tests take, and
+counts as killed. Where a module has more mutants than ``--most``, as many are drawn, by a fixed
+seed. A mutant that no test could kill, since nothing that is promised changes, is named in
+`experiments.robustness.parts.equivalents` with the reason; no other is taken off, and one that is
+named there and killed makes the claim fail. Controls, for every module: its own text survives, and
+a text with a line that raises is killed.
+
+Of the tools that were alive in 2026 Cosmic Ray (8.7, MIT) was taken, since it also changes what
+mutmut (3.8, BSD) leaves alone: constants of a module, properties and decorated functions, which
+here are tolerances and the engine's ``solve``; mutatest and mutpy have had no release since 2022.
+Its own runner starts a Python per mutant, four seconds of imports each; ours forks one that has
+them, and writes no file (`experiments.robustness.parts.mutant_trials`).
+
+Inputs: the modules below. Command:
+``python -m experiments.robustness.mutation_testing [--quick] [--again] [--only TEXT] [--most N]``;
+``--again`` tries what survived the last run, after tests were added. Writes
+``experiments/results/mutation_testing.csv`` and ``mutation_survivors.csv``.
+"""
+
+from __future__ import annotations
+
+import zlib
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+from scipy.stats import binomtest
+
+from experiments.harness.claim import Claim, ClaimError, Extra, Finding, Option, Options
+from experiments.harness.plotting import RESULTS
+
+if TYPE_CHECKING:
+    from experiments.robustness.parts.mutants import Mutant
+
+RIGID = (
+    "engines/test_operator",
+    "engines/test_rigid_bricks",
+    "validation/test_closed_forms",
+    "engines/test_conformance",
+    "engines/test_planar",
+)
+CHOSEN = ("formulations/test_programs", "formulations/test_degenerate")
+STANDING = ("formulations/test_equilibrium", "validation/test_limit_analysis")
+MODULES = {
+    "seqopt.engines.rigid.compliance": (
+        *("engines/test_compliance", "engines/test_operator", "engines/test_rigid_bricks"),
+        *("engines/test_planar", "responses/test_finite"),
+    ),
+    "seqopt.engines.rigid.operator": RIGID,
+    "seqopt.engines.rigid.grip_equations": RIGID,
+    "seqopt.placement.costs": ("placement/test_costs", "placement/test_values"),
+    "seqopt.placement.certificate": ("placement/test_certificate", "placement/test_values"),
+    "seqopt.placement.criteria": ("placement/test_criteria", "placement/test_problem"),
+    "seqopt.placement.ranks": ("placement/test_criteria", "placement/test_problem"),
+    "seqopt.placement.terms": ("placement/test_criteria", "placement/test_scales"),
+    "seqopt.placement.flow": ("placement/test_flow", "placement/test_values", *CHOSEN),
+    "formulations.beam": CHOSEN,
+    "formulations.cascade": CHOSEN,
+    "formulations.limit_analysis": STANDING,
+    "formulations.minimax": CHOSEN,
+    "formulations.overlap_dp": CHOSEN,
+    "formulations.overlap_lp": CHOSEN,
+    "formulations.overlap_mip": CHOSEN,
+    "formulations.rank_search": CHOSEN,
+    "formulations.solvers": ("formulations/test_equilibrium", *CHOSEN),
+}
+LEAST = 0.95  # of the mutants that are not equivalent
+MOST, QUICK_MOST, QUICK = 60, 8, "seqopt.placement.ranks"
+BROKEN = "\nraise RuntimeError\n"
+CONTROLS = {"as_it_is": "survived", "with_a_broken_line": "killed"}
+STORE, SURVIVORS = RESULTS / "mutation_testing.csv", RESULTS / "mutation_survivors.csv"
+KEY = ["module", "operator", "before", "after"]
+
+
+def files(module: str) -> list[str]:
+    """Return the test files that are run against a module, the quickest first."""
+    return [f"tests/{name}.py" for name in MODULES[module]]
+
+
+def drawn(module: str, most: int) -> tuple[list[Mutant], int]:
+    """Return the mutants of a module to be tried, and how many there are."""
+    from experiments.robustness.parts.mutants import mutants  # noqa: PLC0415  # an extra
+
+    every = list(mutants(module))
+    if len(every) <= most:
+        return every, len(every)
+    chosen = np.random.default_rng(zlib.crc32(module.encode())).choice(
+        len(every), most, replace=False
+    )
+    return [every[i] for i in sorted(chosen)], len(every)
+
+
+def tried(module: str, chosen: list[Mutant]) -> tuple[pd.DataFrame, dict[str, str]]:
+    """Return what became of mutants, a row each, and of the controls."""
+    from experiments.robustness.parts.equivalents import reason  # noqa: PLC0415
+    from experiments.robustness.parts.mutant_trials import limit, trial  # noqa: PLC0415
+    from experiments.robustness.parts.mutants import path_of  # noqa: PLC0415
+
+    source, tests = path_of(module).read_text(encoding="utf-8"), files(module)
+    seconds = limit(module, source, tests)
+    texts = dict(zip(CONTROLS, (source, source + BROKEN), strict=True))
+    controls = {name: trial(module, text, tests, seconds) for name, text in texts.items()}
+    rows = []
+    for mutant in chosen:
+        about = {name: getattr(mutant, name) for name in ("line", *KEY)}
+        outcome = trial(module, mutant.source, tests, seconds)
+        rows.append(about | {"outcome": outcome, "reason": reason(mutant)})
+    return pd.DataFrame(rows, columns=["line", *KEY, "outcome", "reason"]), controls
+
+
+def counted(rows: pd.DataFrame, mutants: int) -> dict[str, int]:
+    """Return how many mutants of a module ended in which way."""
+    survived, named = rows["outcome"] == "survived", rows["reason"] != ""
+    return {
+        "mutants": mutants,
+        "tried": len(rows),
+        "killed": int((~survived).sum()),
+        "of_these_timed_out": int((rows["outcome"] == "timed out").sum()),
+        "equivalent": int((survived & named).sum()),
+        "survived": int((survived & ~named).sum()),
+        "equivalent_but_killed": int((~survived & named).sum()),
+    }
+
+
+def measured(module: str, most: int) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """Return the row of a module, and what survived."""
+    chosen, count = drawn(module, most)
+    rows, controls = tried(module, chosen)
+    row = {"module": module} | counted(rows, count) | controls
+    return pd.DataFrame([row | {"tests": " ".join(MODULES[module])}]), left(rows)
+
+
+def left(rows: pd.DataFrame) -> pd.DataFrame:
+    """Return what survived."""
+    return rows[rows["outcome"] == "survived"].drop(columns="outcome")
+
+
+def stored() -> tuple[pd.DataFrame, pd.DataFrame]:
+    """Return what is stored of modules and survivors."""
+    if not STORE.exists():
+        return pd.DataFrame(columns=["module"]), pd.DataFrame(columns=["line", *KEY, "reason"])
+    return pd.read_csv(STORE), pd.read_csv(SURVIVORS, keep_default_na=False)
+
+
+def store(row: pd.DataFrame, survivors: pd.DataFrame) -> None:
+    """Put a module's row and survivors in the place of those that are stored."""
+    (module,) = row["module"]
+    for path, table, new in zip((STORE, SURVIVORS), stored(), (row, survivors), strict=True):
+        whole = pd.concat([t for t in (table[table["module"] != module], new) if len(t)])
+        order = whole["module"].map([*MODULES].index)
+        whole.assign(order=order).sort_values("order", kind="stable").drop(columns="order").to_csv(
+            path, index=False
+        )
+
+
+def measured_again(module: str) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """Return a module's stored row and survivors, the survivors being tried anew."""
+    from experiments.robustness.parts.equivalents import reason  # noqa: PLC0415
+
+    table, before = stored()
+    row = table[table["module"] == module].reset_index(drop=True)
+    keys = {*before.loc[before["module"] == module, KEY].itertuples(index=False, name=None)}
+    parts: dict[bool, list[Mutant]] = {True: [], False: []}
+    for mutant in drawn(module, int(row.loc[0, "tried"]))[0]:
+        parts[tuple(getattr(mutant, name) for name in KEY) in keys].append(mutant)
+    if len(parts[True]) != (before["module"] == module).sum():
+        raise ClaimError(f"{module} is not what it was; run it without --again")
+    rows, controls = tried(module, parts[True])
+    fresh = counted(rows, 0)
+    surviving = {name: fresh[name] for name in ("equivalent", "survived")}
+    killed = int(row.loc[0, "tried"]) - sum(surviving.values())
+    wrong = fresh["equivalent_but_killed"] + sum(reason(mutant) != "" for mutant in parts[False])
+    again = row.assign(**surviving, killed=killed, equivalent_but_killed=wrong, **controls)
+    return again, left(rows)
+
+
+def share(table: pd.DataFrame) -> tuple[float, float]:
+    """Return which share of the mutants that are not equivalent is killed, and at least is.
+
+    The second, of all mutants with 95 % confidence, is the first where all of them were tried.
+    """
+    killed = int(table["killed"].sum())
+    of = killed + int(table["survived"].sum())
+    if (table["tried"] == table["mutants"]).all():
+        return killed / of, killed / of
+    return killed / of, float(binomtest(killed, of).proportion_ci(0.95, "wilson").low)
+
+
+def holds(table: pd.DataFrame, survivors: pd.DataFrame) -> bool:
+    """Return whether enough is killed, nothing is wrongly called equivalent, and controls agree."""
+    unnamed = int((survivors["reason"] == "").sum())
+    return (
+        share(table)[0] >= LEAST
+        and not table["equivalent_but_killed"].any()
+        and unnamed == table["survived"].sum()
+        and len(survivors) - unnamed == table["equivalent"].sum()
+        and all((table[name] == outcome).all() for name, outcome in CONTROLS.items())
+    )
+
+
+def experiment(options: Options) -> Finding:
+    from experiments.robustness.parts.mutant_trials import preload  # noqa: PLC0415  # an extra
+
+    preload()
+    most = QUICK_MOST if options.quick else int(options.most)
+    found = []
+    for module in [QUICK] if options.quick else [m for m in MODULES if options.only in m]:
+        found.append(measured_again(module) if options.again else measured(module, most))
+        print(found[-1][0].drop(columns="tests").to_string(index=False), flush=True)
+        if not options.quick:
+            store(*found[-1])
+    table, survivors = map(pd.concat, zip(*found, strict=True))
+    for row in survivors[survivors["reason"] == ""].itertuples():
+        print(f"survives: {row.module}:{row.line}: {row.before}  ->  {row.after}")
+    share_found, least = share(table)
+    note = f": {share_found:.1%} of {table['tried'].sum()} mutants killed, equivalent ones aside"
+    if (table["tried"] < table["mutants"]).any():
+        note += f"; of all {table['mutants'].sum()} with 95 % confidence {least:.1%} or more"
+    return Finding(holds(table, survivors), note)
+
+
+CLAIM = Claim(
+    experiment,
+    quick=f"{QUICK_MOST} mutants of one module, nothing written",
+    options=(
+        Option("--again", "try what survived the last run"),
+        Option("--only", "modules with this in their names; rows of others stay", ""),
+        Option("--most", "how many mutants of a module are tried", str(MOST)),
+    ),
+    needs=(Extra("cosmic_ray", 'pip install "seqopt[mutation]"'),),
+)
+
+if __name__ == "__main__":
+    CLAIM.main()

@@ -1,0 +1,130 @@
+"""Mutants that no test can kill, since nothing changes that is promised, each with its reason."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fnmatch import fnmatch
+
+from experiments.robustness.parts.mutants import Mutant
+
+
+@dataclass(frozen=True)
+class Equivalent:
+    """A change that changes nothing.
+
+    Attributes
+    ----------
+    module : str
+        Dotted; may have a ``*``.
+    line : str
+        What the line holds, beside what is changed.
+    old, new : str
+        What becomes what.
+    reason : str
+        Why nothing changes.
+    """
+
+    module: str
+    line: str
+    old: str
+    new: str
+    reason: str
+
+    def covers(self, mutant: Mutant) -> bool:
+        """Return whether a mutant is this change at one place, whatever the spaces."""
+        if not (fnmatch(mutant.module, self.module) and self.line in mutant.before):
+            return False
+        before, after, old, new = (
+            text.replace(" ", "") for text in (mutant.before, mutant.after, self.old, self.new)
+        )
+        places = (i for i in range(len(before)) if before.startswith(old, i))
+        return any(before[:i] + new + before[i + len(old) :] == after for i in places)
+
+
+COMPLIANCE = "seqopt.engines.rigid.compliance"
+GRIPS = "seqopt.engines.rigid.grip_equations"
+COSTS, CERTIFICATE = "seqopt.placement.costs", "seqopt.placement.certificate"
+CRITERIA, RANKS = "seqopt.placement.criteria", "seqopt.placement.ranks"
+UNUSED = "without any no constraint has this variable, and faces have three corners or more"
+LENGTHS = "both have a length: costs that have not are refused when they are made"
+EQUIVALENT = (
+    *(
+        Equivalent(module, line, "strict=True", "strict=False", LENGTHS)
+        for module, line in (
+            ("formulations.*", "zip("),
+            ("seqopt.engines.*", "zip("),
+            ("seqopt.placement.flow", "zip("),
+            (CERTIFICATE, "zip("),
+            (COSTS, "enumerate(zip("),
+            (COSTS, "zip(self.single[-2::-1]"),
+        )
+    ),
+    *(
+        Equivalent(module, "", "np.zeros(1)", "np.zeros(2)", "two equal ways are one")
+        for module in (CERTIFICATE, "formulations.*")
+    ),
+    Equivalent("formulations.*", "if ", "else 0", "else -1", "of one row the first is the last"),
+    Equivalent(
+        "formulations.*", "if ", "shared[0][0]", "shared[0][-1]", "of one row the first is the last"
+    ),
+    Equivalent(
+        "formulations.rank_search", "while len(", "<", "!=", "no choice is longer than all moves"
+    ),
+    *(
+        Equivalent(
+            "formulations.rank_search", "MOST", "20_000_000", size, "a bound on memory alone"
+        )
+        for size in ("20000001", "19999999")
+    ),
+    Equivalent("formulations.cascade", "charge", "==", ">=", "it is later or earlier"),
+    Equivalent("formulations.cascade", "len(shared)", "<", "!=", "no move is beyond the last"),
+    Equivalent("formulations.minimax", "np.full(", "1", "2", "two equal ways are one"),
+    Equivalent(COSTS, "== np.inf", "==", ">=", "nothing is larger than infinity"),
+    Equivalent(COSTS, "== -np.inf", "==", "<=", "nothing is smaller than minus infinity"),
+    Equivalent(COSTS, "out, before", "0", "-1", "of one row the first is the last"),
+    *(
+        Equivalent(COSTS, "initial", "0.0", size, "whether sums overflow is not a matter of 1")
+        for size in ("1.0", "-1.0")
+    ),
+    *(
+        Equivalent(COMPLIANCE, "CHUNK", "2048", size, "the size of a pass changes no answer")
+        for size in ("2047", "2049")
+    ),
+    *(
+        Equivalent(COMPLIANCE, "CANCEL", "10.0", size, "where one way of two that agree ends")
+        for size in ("9.0", "11.0")
+    ),
+    Equivalent(CRITERIA, "zeros_like", "[0][0]", "[-1][0]", "responses of a step have one shape"),
+    Equivalent(RANKS, "ndim", "==", "<=", "a step has one open move or two: one axis or two"),
+    Equivalent(
+        CERTIFICATE, "low, high", "- 1", "* 1", "the largest of all costs is never looked at"
+    ),
+    Equivalent("seqopt.placement.flow", "known and", "== 1", "<= 1", "there is this one at least"),
+    *(
+        Equivalent("formulations.limit_analysis", "cp.Variable", f"{old}1", f"{old}{size}", UNUSED)
+        for old, size in (("corners,", 0), ("corners,", 2), ("grips,", 0))
+    ),
+    *(
+        Equivalent("formulations.solvers", "SECONDS", "300.0", size, "when a solver has stalled")
+        for size in ("299.0", "301.0")
+    ),
+    Equivalent(
+        GRIPS, "softness", "else 1.0", "else 0.0", "without loose motions nothing is scaled"
+    ),
+    Equivalent(
+        GRIPS, "softness", "else 1.0", "else 2.0", "without loose motions nothing is scaled"
+    ),
+    Equivalent(GRIPS, "bricks[couples", "pair, 0", "pair, 1", "both grips hold this brick"),
+    Equivalent(GRIPS, "reshape(len(edge)", "-1", "-2", "any negative length is what is left"),
+    Equivalent(GRIPS, "reshape(len(force)", "-1", "-2", "any negative length is what is left"),
+    Equivalent(COMPLIANCE, "pivot >= TRUSTED", ">=", ">", "no pivot is 1e-5 to the last bit"),
+    *(
+        Equivalent(COMPLIANCE, "force[~trusted]", "0.0", size, "these sets are answered anew")
+        for size in ("1.0", "-1.0")
+    ),
+)
+
+
+def reason(mutant: Mutant) -> str:
+    """Return why a mutant is equivalent, empty where it is not said to be."""
+    return next((known.reason for known in EQUIVALENT if known.covers(mutant)), "")

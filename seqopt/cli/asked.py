@@ -1,0 +1,129 @@
+"""What several commands are asked for, and what they say of it."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator, Sequence
+
+import pandas as pd
+
+from seqopt.cli.status import Status
+from seqopt.cli.terminal import (
+    complain,
+)
+from seqopt.contact.mortar import MORTARS
+from seqopt.engines.auto import AutoEngine
+from seqopt.engines.interface import Engine, Fields
+from seqopt.engines.registry import make_engine
+from seqopt.errors import SceneError
+from seqopt.network.network import Network
+from seqopt.placement.promises import overloads
+from seqopt.responses.staged import staged_fields
+from seqopt.responses.table import step_fields
+from seqopt.scene.scene import Scene
+from seqopt.sequence.steps import AnyStep, Step, idle_robots
+
+
+def asked_engine(options: argparse.Namespace, network: Network) -> Engine:
+    """Return the engine that a command is asked for.
+
+    Parameters
+    ----------
+    options : argparse.Namespace
+        With ``engine`` and ``mortar``.
+    network : Network
+
+    Returns
+    -------
+    Engine
+
+    Raises
+    ------
+    SceneError
+        If the scene is not for it.
+    """
+    mortar = None if options.mortar is None else MORTARS[options.mortar]
+    try:
+        return make_engine(options.engine, network, mortar)
+    except SceneError as error:
+        raise SceneError(f"--engine {options.engine}: {error}") from error
+
+
+def say_levels(engine: Engine) -> None:
+    """Say which levels an engine that picks them took, and why.
+
+    Parameters
+    ----------
+    engine : Engine
+    """
+    if not isinstance(engine, AutoEngine):
+        return
+    for choice, sets in engine.tally.items():
+        complain(f"engine: {choice.level.value} for {sets} grip sets: {choice.reason}")
+    if engine.unchecked:
+        complain(f"engine: {engine.unchecked}")
+
+
+def say_idle(scene: Scene, steps: Sequence[AnyStep]) -> None:
+    """Name the robots that never grip.
+
+    Parameters
+    ----------
+    scene : Scene
+    steps : sequence of Step or OpenStep
+    """
+    if idle := idle_robots(scene, steps):
+        complain(f"robots: {', '.join(idle)} never grip{'s' * (len(idle) == 1)}")
+
+
+def payloads_hold(options: argparse.Namespace, scene: Scene, *tables: pd.DataFrame) -> Status:
+    """Return the status that ``--strict`` asks for.
+
+    Parameters
+    ----------
+    options : argparse.Namespace
+        With ``strict``.
+    scene : Scene
+    *tables : pandas.DataFrame
+        Responses of steps.
+
+    Returns
+    -------
+    Status
+    """
+    over = [str(excess) for table in tables for excess in overloads(scene, table)]
+    if not options.strict or not over:
+        return Status.DONE
+    complain(f"seqopt: payload exceeded: {'; '.join(over)}")
+    return Status.DOES_NOT_HOLD
+
+
+def step_answers(
+    options: argparse.Namespace, engine: Engine, steps: Sequence[Step]
+) -> Iterator[tuple[Step, Fields]]:
+    """Return steps with their fields, each from scratch or with what earlier ones lock in.
+
+    Parameters
+    ----------
+    options : argparse.Namespace
+        With ``staged``, where bricks are set down or None, and ``engine``.
+    engine : Engine
+    steps : sequence of Step
+
+    Returns
+    -------
+    iterator of (Step, Fields)
+
+    Raises
+    ------
+    SceneError
+        If a staged analysis is asked of another engine than the one of rigid bricks.
+    """
+    if options.staged is None:
+        return ((step, step_fields(engine, step)) for step in steps)
+    if options.engine != "compliance":
+        raise SceneError(
+            f"--engine {options.engine}: --staged goes with exactly rigid bricks alone; "
+            "give --engine compliance"
+        )
+    return zip(steps, staged_fields(engine.network, steps, options.staged), strict=True)

@@ -1,0 +1,138 @@
+"""Budgets on the command line: what their words stand for."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from seqopt.errors import ProblemError
+from seqopt.placement.budgets import steps_over, travel
+from seqopt.placement.costs import Budget
+from seqopt.placement.problem import Problem
+from seqopt.placement.solving import solve
+from seqopt.responses.quantities import robot_response
+
+FREE = "overlap_dp"  # finds the optimum without budgets, of which a share may be asked
+SHAPE = re.compile(
+    r"(?P<kind>travel|steps_over:(?P<response>.+)|robot_use:(?P<robot>.+))"
+    r"=((?P<level>[^:=]+):)?(?P<bound>[^:=]+?)(?P<unit>m|x|)"
+)
+FORMS = "travel=0.8, travel=3.5m, steps_over:F_largest=250:10 or robot_use:rob1=100:5"
+
+
+@dataclass(frozen=True)
+class AskedBudget:
+    """A budget as it is asked for.
+
+    Attributes
+    ----------
+    words : str
+        Of the command line.
+    response : str
+        Whose steps over a level are counted; empty for the way that robots go.
+    level : float
+        SI units.
+    bound : float
+        How much there is, or a share of what the optimum without budgets takes.
+    share : bool
+        Whether it is one.
+    """
+
+    words: str
+    response: str
+    level: float
+    bound: float
+    share: bool
+
+    def of(self, problem: Problem, bound: float) -> Budget:
+        """Return the budget for a problem.
+
+        Parameters
+        ----------
+        problem : Problem
+        bound : float
+            How much there is, in its unit.
+
+        Returns
+        -------
+        Budget
+        """
+        if not self.response:
+            return travel(problem, bound)
+        return steps_over(problem, self.response, self.level, bound)
+
+
+def parse_budgets(texts: Sequence[str]) -> tuple[AskedBudget, ...]:
+    """Return budgets from words.
+
+    Parameters
+    ----------
+    texts : sequence of str
+        Each ``travel=BOUND``, ``steps_over:RESPONSE=LEVEL:BOUND`` or
+        ``robot_use:ROBOT=LEVEL:BOUND``, SI units. A bound of travel is a share of what the optimum
+        without budgets travels, or in meters, as ``3.5m``; other bounds are numbers of steps, or
+        shares, as ``0.8x``.
+
+    Returns
+    -------
+    tuple of AskedBudget
+
+    Raises
+    ------
+    ProblemError
+        If one has another form, or stands there twice.
+    """
+    found = tuple(_parse(text) for text in texts)
+    for i, budget in enumerate(found):
+        if any((b.response, b.level) == (budget.response, budget.level) for b in found[:i]):
+            raise ProblemError(f"--budget {budget.words}: it stands there twice; give one bound")
+    return found
+
+
+def _parse(text: str) -> AskedBudget:
+    found = SHAPE.fullmatch(text)
+    if found is None or (found["level"] is None) != (found["kind"] == "travel"):
+        raise ProblemError(f"--budget {text}: there is no such; give {FORMS}")
+    is_travel = found["kind"] == "travel"
+    if found["unit"] == "m" and not is_travel:
+        raise ProblemError(f"--budget {text}: steps have no meters; give a number of them")
+    response = found["response"] or (robot_response(found["robot"]) if found["robot"] else "")
+    level = 0.0 if is_travel else _positive(found["level"], text)
+    share = found["unit"] == "x" or (is_travel and not found["unit"])
+    return AskedBudget(text, response, level, _positive(found["bound"], text), share)
+
+
+def _positive(text: str, words: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = -1.0
+    if not (np.isfinite(value) and value >= 0):
+        raise ProblemError(f"--budget {words}: {text!r} is not a number from 0; give {FORMS}")
+    return value
+
+
+def with_budgets(problem: Problem, asked: Sequence[AskedBudget]) -> Problem:
+    """Return a problem with budgets; shares are those of its optimum without any.
+
+    Parameters
+    ----------
+    problem : Problem
+        Posed with the responses that the budgets name.
+    asked : sequence of AskedBudget
+
+    Returns
+    -------
+    Problem
+    """
+    budgets: list[Budget] = []
+    for each in asked:
+        bound = each.bound
+        if each.share:
+            free = solve(problem, FREE).selection.choice
+            bound *= each.of(problem, np.inf).spent(free)
+        budgets.append(each.of(problem, bound))
+    return replace(problem, budgets=tuple(budgets))

@@ -1,0 +1,266 @@
+"""Commands of the free schedule and of Pareto sets."""
+
+from __future__ import annotations
+
+import argparse
+import io
+import json
+from collections.abc import Mapping, Sequence
+
+import pandas as pd
+
+from seqopt.cli.asked import asked_engine
+from seqopt.cli.criteria import parse_criterion
+from seqopt.cli.outputs import require_matplotlib, write_outputs
+from seqopt.cli.status import Status
+from seqopt.cli.terminal import complain, progress, say
+from seqopt.cli.values import parse_limits, parse_numbers, parse_robots, parse_time_limit
+from seqopt.engines.interface import Engine
+from seqopt.errors import ProblemError, StepError
+from seqopt.files import csv_text, require_folder
+from seqopt.network.build import build_network
+from seqopt.placement.criteria import WORST_OVER_METHODS
+from seqopt.placement.formulation import formulation_names
+from seqopt.placement.free_front import FreeFront
+from seqopt.placement.free_problem import FreeProblem, pose_free
+from seqopt.placement.front import Front, FrontProblem, find_front, pick
+from seqopt.placement.loop_front import LoopFront
+from seqopt.placement.promises import overloads
+from seqopt.placement.requirements import Criterion
+from seqopt.placement.schedule_formulation import find_schedule_formulation
+from seqopt.placement.solving import solve
+from seqopt.report.fronts import worst_of
+from seqopt.report.methods import method_tables
+from seqopt.responses.table import analyze
+from seqopt.scene.scene import Scene
+from seqopt.scene.scene_file import dump_scene, load_scene
+from seqopt.sequence.free_rules import FreeRules, with_robots
+from seqopt.sequence.schedule_file import find_schedule
+from seqopt.sequence.steps import Step, idle_robots
+
+FREE = "free"  # the schedule that is no list of steps
+
+
+def optimize_free(options: argparse.Namespace) -> Status:
+    """Choose every step of a free schedule, and write the plan.
+
+    Parameters
+    ----------
+    options : argparse.Namespace
+        Of the command ``optimize``.
+
+    Returns
+    -------
+    Status
+    """
+    _require_free(options)
+    formulation = find_schedule_formulation(options.formulation or "schedule_search")
+    numbers = parse_numbers("--option", options.option, formulation.options)
+    scene, problem = _posed(options, options.aim or "minmax")
+    require_folder(options.out)
+    whole = {name: type(formulation.options[name])(value) for name, value in numbers.items()}
+    limit = parse_time_limit(options.time_limit)
+    proof = not options.no_proof
+    plan = solve(problem, formulation, proof=proof, time_limit=limit, progress=progress, **whole)
+    table = plan.responses()
+    files = {
+        "plan.csv": csv_text(table),
+        "summary.json": json.dumps(plan.summary(), indent=2) + "\n",
+    }
+    write_outputs(options, files | _scene_file(options, scene))
+    pairs = zip(problem.goals, plan.selection.objective, strict=True)
+    values = ", ".join(f"{goal} {value:.6g}" for goal, value in pairs)
+    say(
+        f"{formulation.name} ({formulation.kind.value}): {values}, {plan.status}; "
+        f"{len(plan.steps)} steps, {plan.regrips} regrips, {problem.sets.solved} models; "
+        f"written to {options.out}"
+    )
+    if idle := idle_robots(scene, plan.steps):
+        complain(f"robots: {', '.join(idle)} never grip{'s' * (len(idle) == 1)}")
+    if plan.selection.stopped == "interrupt":
+        return Status.INTERRUPTED
+    over = [str(excess) for excess in overloads(scene, table)]
+    for excess in over:
+        say(f"payload exceeded: {excess}")
+    return Status.DOES_NOT_HOLD if options.strict and over else Status.DONE
+
+
+def pareto(options: argparse.Namespace) -> Status:
+    """Find all plans that no other beats in every response, and write them.
+
+    Parameters
+    ----------
+    options : argparse.Namespace
+        Of the command ``pareto``.
+
+    Returns
+    -------
+    Status
+    """
+    require_matplotlib(options.out)
+    require_folder(options.out)
+    scene, free = _posed(options, options.aim)
+    rounding = parse_numbers("--round", options.round, dict.fromkeys(map(str, free.goals)))
+    problem: FrontProblem = FreeFront(free, rounding)
+    if options.schedule != FREE:
+        problem = _loop(options, free, rounding)
+    front = find_front(problem, seconds=float(options.seconds), progress=progress)
+    methods = _methods(free.engine)
+    files = _front_files(front, free.engine, methods)
+    said = f"{len(front.steps)} points, {'complete' if front.complete else 'not complete'}"
+    if options.pick:
+        chosen = pick(front.table, options.pick, _under(options.under, methods))
+        files["pick.csv"] = csv_text(analyze(free.engine, front.steps[chosen]))
+        values = front.table.iloc[chosen]
+        row = ", ".join(f"{name} {value:.6g}" for name, value in values.items())
+        said += f"; picked row {chosen + 1}: {row}"
+    write_outputs(options, files | _scene_file(options, scene))
+    say(f"{said}; written to {options.out}")
+    return Status.DONE
+
+
+def require_loop(options: argparse.Namespace) -> None:
+    """Raise an error if options that only the free schedule has are given without it.
+
+    Parameters
+    ----------
+    options : argparse.Namespace
+        Of the command ``optimize``.
+
+    Raises
+    ------
+    ProblemError
+        Naming the option, or the formulation that is missing.
+    """
+    for name, given in (("--aim", options.aim), ("--rule", options.rule)):
+        if given:
+            raise ProblemError(f"{name}: only the free schedule has it; give --schedule {FREE}")
+    if options.formulation is None:
+        known = ", ".join(formulation_names())
+        raise ProblemError(f"--formulation: it is missing; give one of {known}")
+
+
+def _require_free(options: argparse.Namespace) -> None:
+    """Raise an error if options that the free schedule does not have are given with it."""
+    unknown = ("budget", "candidates", "cache", "max_memory", "ranked", "among")
+    given = [name for name in unknown if getattr(options, name)]
+    given += ["workers"] if options.workers != "1" else []
+    if given:
+        raise ProblemError(
+            f"--{given[0].replace('_', '-')}: the free schedule has no such; leave it out"
+        )
+
+
+def _posed(options: argparse.Namespace, aim: str) -> tuple[Scene, FreeProblem]:
+    """Return the scene with its robots, and the problem of its free schedule."""
+    scene = load_scene(options.scene)
+    names = parse_robots(options.robots)
+    if options.robots.isdecimal():
+        scene, names = with_robots(scene, int(options.robots)), ()
+    if options.schedule != FREE and (options.rule or options.robots.isdecimal()):
+        raise StepError(f"--schedule {options.schedule}: rules and a count of robots go with free")
+    rules = parse_rules(options.rule, names if options.schedule == FREE else ())
+    criterion: Criterion = WORST_OVER_METHODS
+    if options.criteria is not None:
+        criterion = parse_criterion(options.criteria, options.crown)
+    engine = asked_engine(options, build_network(scene))
+    return scene, pose_free(engine, rules, criterion, aim, parse_limits(options.limit, scene))
+
+
+def parse_rules(texts: Sequence[str], robots: tuple[str, ...]) -> FreeRules:
+    """Return rules from words.
+
+    Parameters
+    ----------
+    texts : sequence of str
+        Each ``NAME=VALUE``.
+    robots : tuple of str
+        Those that take part; none for all.
+
+    Returns
+    -------
+    FreeRules
+
+    Raises
+    ------
+    StepError
+        If there is no such rule, or its value is none.
+    """
+    given: dict[str, object] = {"robots": robots}
+    counts = ("least_grips", "regrips")
+    known = ("newest", "payload", "ending", "placers", *counts)
+    for text in texts:
+        name, _, value = text.partition("=")
+        if name not in known:
+            raise StepError(f"--rule {text}: there is no such; give one of {', '.join(known)}")
+        if name in counts:
+            given[name] = int(value) if value.isdecimal() else value
+            if name == "regrips" and value == "any":
+                given[name] = None
+        elif name == "placers":
+            given[name] = () if value == "any" else parse_robots(value)
+        else:
+            given[name] = value
+    return FreeRules(**given)  # type: ignore[arg-type]
+
+
+def _loop(
+    options: argparse.Namespace, free: FreeProblem, rounding: Mapping[str, float]
+) -> FrontProblem:
+    names = [goal.response for goal in free.goals]
+    if not all(names):
+        raise ProblemError(f"--aim {options.aim}: a schedule of given steps has responses only")
+    robots = parse_robots(options.robots)
+    schedule = find_schedule(free.network, options.schedule, robots)
+    return LoopFront(free.engine, schedule, names, free.limits, rounding)
+
+
+def _methods(engine: Engine) -> dict[str, pd.DataFrame]:
+    try:
+        return method_tables(engine)[0]
+    except StepError:
+        return {}
+
+
+def _front_files(
+    front: Front, engine: Engine, methods: Mapping[str, pd.DataFrame]
+) -> dict[str, bytes | str]:
+    """Return table, plans, chart and summary of a Pareto set by file name."""
+    from seqopt.report.fronts import front_figure  # noqa: PLC0415  # matplotlib is an extra
+
+    known: dict[tuple[Step, ...], pd.DataFrame] = {}
+    plans = []
+    for number, steps in enumerate(front.steps, start=1):
+        table = known.setdefault(steps, analyze(engine, steps))
+        plans.append(table.assign(point=number))
+    buffer = io.BytesIO()
+    front_figure(front, methods).savefig(buffer, dpi=130)
+    summary = {
+        "points": len(front.steps),
+        "complete": front.complete,
+        "seconds": dict(front.seconds),
+    }
+    numbered = front.table.copy()
+    numbered.insert(0, "point", range(1, len(numbered) + 1))
+    return {
+        "pareto.csv": csv_text(numbered),
+        "plans.csv": csv_text(pd.concat(plans, ignore_index=True)),
+        "pareto.png": buffer.getvalue(),
+        "summary.json": json.dumps(summary, indent=2) + "\n",
+    }
+
+
+def _under(texts: Sequence[str], methods: Mapping[str, pd.DataFrame]) -> dict[str, float]:
+    """Return bounds from words: RESPONSE=VALUE, or the name of a method to beat."""
+    out: dict[str, float] = {}
+    for text in texts:
+        bounds = worst_of(methods[text]) if text in methods else parse_numbers("--under", [text])
+        for name, value in bounds.items():
+            out[name] = min(value, out.get(name, value))
+    return out
+
+
+def _scene_file(options: argparse.Namespace, scene: Scene) -> dict[str, bytes | str]:
+    """Return the scene where its robots are others than those of the scene that was named."""
+    same = len(load_scene(options.scene).robots) == len(scene.robots)
+    return {} if same else {"scene.json": dump_scene(scene)}

@@ -1,0 +1,105 @@
+"""The command ``optimize``: choose every open grip of a build."""
+
+from __future__ import annotations
+
+import argparse
+import time
+
+from seqopt.cli.asked import asked_engine, payloads_hold, say_idle, say_levels
+from seqopt.cli.budgets import parse_budgets, with_budgets
+from seqopt.cli.criteria import asked_criterion
+from seqopt.cli.free import FREE, optimize_free, require_loop
+from seqopt.cli.means import parse_resources
+from seqopt.cli.outputs import (
+    plan_files,
+    worth,
+    write_outputs,
+)
+from seqopt.cli.status import Status
+from seqopt.cli.terminal import (
+    progress,
+    say,
+    tell,
+)
+from seqopt.cli.values import (
+    parse_limits,
+    parse_options,
+    parse_robots,
+    parse_time_limit,
+)
+from seqopt.files import (
+    require_folder,
+)
+from seqopt.network.build import build_network
+from seqopt.placement.formulation import find_formulation
+from seqopt.placement.problem import Problem, pose
+from seqopt.placement.solving import solve
+from seqopt.scene.scene_file import load_scene
+from seqopt.sequence.schedule import Schedule
+from seqopt.sequence.schedule_file import find_schedule
+from seqopt.sequence.thinning import thin
+from seqopt.study.published import paper_models
+
+
+def optimize(options: argparse.Namespace) -> Status:
+    """Choose every open grip of a build, and write the plan.
+
+    Parameters
+    ----------
+    options : argparse.Namespace
+        Of the command ``optimize``.
+
+    Returns
+    -------
+    Status
+    """
+    if options.schedule == FREE:
+        return optimize_free(options)
+    require_loop(options)
+    formulation = find_formulation(options.formulation)
+    chosen = parse_options(formulation, options.option)
+    limit, proof = parse_time_limit(options.time_limit), not options.no_proof
+    start = time.perf_counter()
+    problem = _posed(options)
+    assemble = time.perf_counter() - start
+    plan = solve(problem, formulation, proof=proof, time_limit=limit, progress=tell, **chosen)
+    progress("")
+    say_levels(problem.engine)
+    report = plan.summary() | {
+        "models_paper_count": _paper_count(problem.schedule),
+        "seconds": {"assemble": assemble, **plan.seconds},
+    }
+    table = plan.responses()
+    write_outputs(options, plan_files(plan, report))
+    say(
+        f"{formulation.name} ({formulation.kind.value}): {worth(plan)}, "
+        f"{plan.models} models; written to {options.out}"
+    )
+    for excess in plan.overloads:
+        say(f"payload exceeded: {excess}")
+    say_idle(problem.schedule.scene, plan.steps)
+    return payloads_hold(options, problem.schedule.scene, table)
+
+
+def _posed(options: argparse.Namespace) -> Problem:
+    """Return the problem that is asked for."""
+    criterion = asked_criterion(options)
+    scene = load_scene(options.scene)
+    limits = parse_limits(options.limit, scene)
+    resources = parse_resources(options, progress)
+    budgets = parse_budgets(options.budget)
+    require_folder(options.out)
+    network = build_network(scene)
+    engine = asked_engine(options, network)
+    schedule = find_schedule(network, options.schedule, parse_robots(options.robots))
+    if options.candidates is not None:
+        schedule = thin(schedule, options.candidates)
+    counted = [budget.response for budget in budgets if budget.response]
+    return with_budgets(pose(engine, schedule, criterion, limits, counted, resources), budgets)
+
+
+def _paper_count(schedule: Schedule) -> dict[str, int] | None:
+    """Return how many models the paper counts for the loop of three robots; none for others."""
+    if schedule.method != "three-robot":
+        return None
+    return dict(zip(("cascading", "overlap"), paper_models(schedule), strict=True))

@@ -1,0 +1,220 @@
+"""The Pareto set of a free schedule: its states below bounds, and whether they connect."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.csgraph import breadth_first_order, shortest_path
+
+from seqopt.arrays import Bools, Floats, Ints
+from seqopt.errors import InfeasibleError, ProblemError
+from seqopt.placement.free_goals import Measure
+from seqopt.placement.free_graph import StateGraph, explore
+from seqopt.placement.free_infeasible import why_impossible
+from seqopt.placement.free_judge import plan_values
+from seqopt.placement.free_paths import below, keep_best, reaches_end, shortest
+from seqopt.placement.free_problem import FreeProblem
+from seqopt.placement.free_steps import steps_of
+from seqopt.sequence.steps import Step
+
+DIGITS = 9  # after the first
+EDGE = 1e-9  # of a rounding step: how far above a multiple a value still counts as it
+
+
+class FreeFront:
+    """The free schedule of a problem whose goals are all to be small at once.
+
+    Parameters
+    ----------
+    problem : FreeProblem
+        Its goals are responses, and at most one of steps and regrips.
+    rounding : mapping of str to float, optional
+        What numbers are rounded up to multiples of, by name, SI units; none by default.
+
+    Raises
+    ------
+    ProblemError
+        If the goals are others, or a rounding is no positive number.
+    """
+
+    def __init__(self, problem: FreeProblem, rounding: Mapping[str, float] | None = None) -> None:
+        self._problem = problem
+        counted = [m for m in (g.measure for g in problem.goals) if m is not Measure.PEAK]
+        if len(counted) > 1 or {*counted} - {Measure.STEPS, Measure.REGRIPS}:
+            raise ProblemError(
+                "pareto: give responses, and at most one of steps and regrips; of these one "
+                "follows from the other and the grips held at the end"
+            )
+        self._round = rounding_steps(self.names, rounding)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The goals."""
+        return tuple(map(str, self._problem.goals))
+
+    @cached_property
+    def _graph(self) -> StateGraph:
+        graph = explore(self._problem)
+        if not graph.whole:
+            raise InfeasibleError(why_impossible(self._problem))
+        for level in graph.levels:
+            level.values = rounded_up(level.values, self._round)
+        return graph
+
+    @cached_property
+    def _counted(self) -> int | None:
+        """Which goal counts moves."""
+        measures = [goal.measure for goal in self._problem.goals]
+        return next((k for k, m in enumerate(measures) if m is not Measure.PEAK), None)
+
+    def best_below(self, bounds: Floats) -> tuple[Floats, object] | None:
+        """Return a plan that none beats among those below bounds.
+
+        Parameters
+        ----------
+        bounds : (k,) float
+
+        Returns
+        -------
+        point : (k,) float
+        plan : object
+            None for both where there is no plan.
+        """
+        graph = below(self._graph, self._peaks(bounds))
+        if graph is None or not reaches_end(graph):
+            return None
+        point = np.zeros(len(bounds))
+        order = [*range(len(bounds))]
+        if self._counted is not None:  # a count is bounded along a path, not state by state
+            order = sorted(order, key=lambda k: k != self._counted)
+        for k in order:
+            graph, point[k] = keep_best(graph, k)
+            if not point[k] < bounds[k]:
+                return None
+        path = shortest(graph)
+        return point, tuple((b, *graph.levels[b].states[row].tolist()) for b, row in path)
+
+    def _peaks(self, bounds: Floats) -> Floats:
+        out = bounds.copy()
+        if self._counted is not None:
+            out[self._counted] = np.inf
+        return out
+
+    def is_empty_below(self, bounds: Floats) -> bool:
+        """Return whether there is no plan below bounds, by a search through one flat graph.
+
+        Parameters
+        ----------
+        bounds : (k,) float
+
+        Returns
+        -------
+        bool
+        """
+        source, target, regrip, values, ends = self._flat
+        ok = np.asarray((values < self._peaks(bounds)).all(axis=1))
+        ok[0] = True
+        kept = ok[source] & ok[target]
+        if self._counted is None:
+            graph = sparse.csr_array(
+                (np.ones(kept.sum(), dtype=np.int8), (source[kept], target[kept])), (len(ok),) * 2
+            )
+            reached = breadth_first_order(graph, 0, return_predecessors=False)
+            return not ends[reached].any()
+        steps = self._problem.goals[self._counted].measure is Measure.STEPS
+        cost = np.ones(kept.sum()) if steps else 1.0 + len(ok) * regrip[kept]
+        graph = sparse.csr_array((cost, (source[kept], target[kept])), (len(ok),) * 2)
+        least = shortest_path(graph, indices=0)[ends].min(initial=np.inf)
+        least = least if steps or np.isinf(least) else least // len(ok)
+        return not least < bounds[self._counted]
+
+    @cached_property
+    def _flat(self) -> tuple[Ints, Ints, Bools, Floats, Bools]:
+        """All moves of the graph between states numbered through, their values, and the ends."""
+        levels = self._graph.levels
+        first = np.cumsum([0, *(len(level.states) for level in levels)])
+        parts = []
+        for b, level in enumerate(levels):
+            for to, arcs in ((b, level.inner), (b + 1, level.onward)):
+                parts.append((arcs.source + first[b], arcs.target + first[to], arcs.regrip))
+        source, target, regrip = (np.concatenate(part) for part in zip(*parts, strict=True))
+        ends = np.zeros(first[-1], dtype=bool)
+        ends[first[-2] :] = self._graph.ends()
+        values = np.concatenate([level.values for level in levels])
+        return source, target, regrip, values, ends
+
+    def steps(self, plan: object) -> tuple[Step, ...]:
+        """Return the checked steps of a plan.
+
+        Parameters
+        ----------
+        plan : tuple of tuple of int
+            Its states.
+
+        Returns
+        -------
+        tuple of Step
+        """
+        return steps_of(self._problem.space, plan)  # type: ignore[arg-type]
+
+    def values(self, steps: Sequence[Step]) -> Floats:
+        """Return the goals' values of a sequence, from the responses of its steps.
+
+        Parameters
+        ----------
+        steps : sequence of Step
+
+        Returns
+        -------
+        (k,) float
+        """
+        return rounded_up(np.array(plan_values(self._problem, steps)), self._round)
+
+
+def rounding_steps(names: Sequence[str], rounding: Mapping[str, float] | None) -> Floats:
+    """Return what every number is rounded up to multiples of; zero where it is not.
+
+    Parameters
+    ----------
+    names : sequence of str
+    rounding : mapping of str to float or None
+
+    Returns
+    -------
+    (k,) float
+
+    Raises
+    ------
+    ProblemError
+        If a name is none of these, or a step is no positive number.
+    """
+    for name, step in (rounding or {}).items():
+        if name not in names or not 0 < step < np.inf:
+            known = ", ".join(names)
+            raise ProblemError(f"round {name}={step:g}: give a positive step for one of {known}")
+    return np.array([(rounding or {}).get(name, 0.0) for name in names])
+
+
+def rounded_up(values: Floats, steps: Floats) -> Floats:
+    """Return values rounded up to multiples of steps, others rounded to ten digits.
+
+    What differs by less than ten digits is the same: no plan is better by an error of rounding.
+
+    Parameters
+    ----------
+    values : (..., k) float
+    steps : (k,) float
+        Zero where no step is given.
+
+    Returns
+    -------
+    (..., k) float
+    """
+    safe = np.where(steps > 0, steps, 1.0)
+    size = np.abs(np.where((values != 0) & np.isfinite(values), values, 1.0))
+    digit = 10.0 ** (np.floor(np.log10(size)) - DIGITS)
+    plain = np.where(np.isfinite(values), np.round(values / digit) * digit, values)
+    return np.where(steps > 0, np.ceil(values / safe - EDGE) * safe, plain)

@@ -1,0 +1,85 @@
+"""Goals of a free schedule: what is to be least over a build, and their names."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+from seqopt.errors import ProblemError
+from seqopt.scene.checks import short
+
+LARGEST = "F_largest"
+STATE_RESPONSES = ("T_max", "M_sup", "D_max", "C_max", LARGEST)
+"""Responses of a state, whoever moved last: those that goals, criteria and limits may name."""
+
+
+class Measure(Enum):
+    """How a goal adds up over the steps of a build."""
+
+    PEAK = "peak"  # the largest of any step
+    SUM = "sum"  # the sum over all steps
+    STEPS = "steps"  # how many steps there are
+    REGRIPS = "regrips"  # how many grips are taken beside those that place a brick
+    TRAVEL = "travel"  # how far robots go from one grip to the next, m
+
+
+@dataclass(frozen=True)
+class Goal:
+    """What a free schedule makes least.
+
+    Parameters
+    ----------
+    measure : Measure
+    response : str, optional
+        Whose peak or sum it is; that of the criterion if none is named.
+    """
+
+    measure: Measure
+    response: str = ""
+
+    def __str__(self) -> str:
+        names = {Measure.PEAK: "minmax", Measure.SUM: "sum"}
+        if not self.response:
+            return names.get(self.measure, self.measure.value)
+        return f"sum({self.response})" if self.measure is Measure.SUM else self.response
+
+    @property
+    def of_states(self) -> bool:
+        """Whether it is about responses, and not about moves alone."""
+        return self.measure in (Measure.PEAK, Measure.SUM)
+
+
+def parse_goals(text: str) -> tuple[Goal, ...]:
+    """Return goals from words, the most important first.
+
+    Parameters
+    ----------
+    text : str
+        ``minmax`` (the worst of the criterion), ``sum`` (over all steps), ``steps``, ``regrips``,
+        ``travel``, a response (its worst) or ``sum(RESPONSE)``, with commas between them.
+
+    Returns
+    -------
+    tuple of Goal
+
+    Raises
+    ------
+    ProblemError
+        If there is no such goal, or one stands there twice.
+
+    Examples
+    --------
+    >>> [str(goal) for goal in parse_goals("minmax,steps,sum(T_max)")]
+    ['minmax', 'steps', 'sum(T_max)']
+    """
+    known = {"minmax": Goal(Measure.PEAK), "sum": Goal(Measure.SUM)}
+    known |= {m.value: Goal(m) for m in (Measure.STEPS, Measure.REGRIPS, Measure.TRAVEL)}
+    known |= {name: Goal(Measure.PEAK, name) for name in STATE_RESPONSES}
+    known |= {f"sum({name})": Goal(Measure.SUM, name) for name in STATE_RESPONSES}
+    words = [word.strip() for word in text.split(",")] if isinstance(text, str) else [text]
+    for word in words:
+        if word not in known:
+            raise ProblemError(f"aim {short(word)}: there is no such; give {', '.join(known)}")
+        if words.count(word) > 1:
+            raise ProblemError(f"aim {word}: it stands there twice; name it once")
+    return tuple(known[word] for word in words)

@@ -1,0 +1,99 @@
+"""Why a free schedule is impossible: the brick at which it stops, and what would open a way."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from seqopt.placement.free_goals import STATE_RESPONSES, Goal, Measure
+from seqopt.placement.free_graph import explore
+from seqopt.placement.free_paths import least_to_end
+from seqopt.placement.free_problem import FreeProblem
+
+STEPS = (Goal(Measure.STEPS),)
+
+
+def why_impossible(problem: FreeProblem) -> str:
+    """Return why no plan is allowed, in a line.
+
+    Parameters
+    ----------
+    problem : FreeProblem
+        Which has no plan.
+
+    Returns
+    -------
+    str
+        Naming the brick at which it stops and what opens a way: a rule to loosen, or how far a
+        limit has to be raised.
+    """
+    graph = explore(replace(problem, goals=STEPS))
+    placed = problem.network.scene.placed
+    stops = len(graph.levels) - 1
+    where = f"after brick {placed[-1].name} the build cannot end"
+    if stops < len(placed):
+        where = f"brick {placed[stops].name} ({stops + 1} of {len(placed)}) is never placed"
+    ways = list(_opening(problem))
+    if not ways:
+        ways = [both] if (both := _pair(problem)) else []
+    if not ways:
+        return (
+            f"free schedule: {where}, whatever two rules or limits are loosened; extend a reach or "
+            "add a robot"
+        )
+    ways = [_enough(problem, way) for way in ways]
+    return f"free schedule: {where}; a way opens with {' or '.join(ways)}"
+
+
+def _opening(problem: FreeProblem) -> Iterator[str]:
+    """Yield rules, each loosened as little as is enough alone, and limits that alone are enough."""
+    problem = replace(problem, goals=STEPS)
+    done: set[str] = set()
+    for text, rules in problem.rules.loosened():
+        rule = text.partition("=")[0]
+        if rule not in done and explore(replace(problem, rules=rules)).whole:
+            done.add(rule)
+            yield text
+    for limit in problem.limits:
+        rest = tuple(other for other in problem.limits if other is not limit)
+        if explore(replace(problem, limits=rest)).whole:
+            yield limit.response
+
+
+def _pair(problem: FreeProblem) -> str:
+    """Return the first two that open a way together: rules, or a rule and a limit; or nothing."""
+    for text, rules in problem.rules.loosened():
+        other = next(_opening(replace(problem, rules=rules)), "")
+        if other:
+            return f"{text} together with {other}"
+    return ""
+
+
+def _enough(problem: FreeProblem, way: str) -> str:
+    """Return how far a limit has to be raised, where it is a limit that is loosened."""
+    found = [limit for limit in problem.limits if limit.response == way]
+    if not found or way not in STATE_RESPONSES:
+        return f"no limit on {way}" if found else way
+    rest = tuple(limit for limit in problem.limits if limit.response != way)
+    least = worst_least(replace(problem, limits=rest), way)
+    return f"{way}={least:.6g} in the place of {found[0].bound:g}"
+
+
+def worst_least(problem: FreeProblem, response: str) -> float:
+    """Return the least worst value of a response that a plan within the other limits reaches.
+
+    Parameters
+    ----------
+    problem : FreeProblem
+    response : str
+        One of `seqopt.placement.free_goals.STATE_RESPONSES`.
+
+    Returns
+    -------
+    float
+        SI units; infinite if there is no plan.
+    """
+    graph = explore(replace(problem, goals=(Goal(Measure.PEAK, response),)))
+    return float(least_to_end(graph, 0)[0].min()) if graph.whole else np.inf

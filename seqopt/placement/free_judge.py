@@ -1,0 +1,188 @@
+"""Certificates of free schedules: a plan recomputed, and a proof that none is better.
+
+The plan's own values come from the responses of its steps, one after the other. For every goal all
+plans are then sought that keep the goals before it at their values and take less of this one: state
+by state, by the rules in plain words, with responses asked of the engine anew. None must reach an
+end. This shares nothing with the search that is judged.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import pandas as pd
+
+from seqopt.arrays import FrozenValue
+from seqopt.errors import SolverError
+from seqopt.placement.free_goals import LARGEST, Goal, Measure
+from seqopt.placement.free_problem import FreeProblem, ScheduleSelection
+from seqopt.placement.free_proof import Proof
+from seqopt.responses.quantities import CHOSEN_BY
+from seqopt.responses.table import analyze, force_column
+from seqopt.sequence.free_check import check_free
+from seqopt.sequence.steps import Step, StepKind
+
+TOLERANCE = 1e-6  # over the size of a value: how far a claim may be from what the engine says
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ScheduleCertificate(FrozenValue):
+    """What a free schedule is worth, checked from the problem's data alone.
+
+    Attributes
+    ----------
+    objective : tuple of float
+        The value of every goal, recomputed.
+    bound : tuple of float
+        What no plan stays below, goals before it being at their values; minus infinity where
+        nothing is proven.
+    gap : float
+        The largest of the differences of both, over the size of the values; infinite where nothing
+        is proven.
+    states : int
+        How many states the proof looked at.
+    """
+
+    objective: tuple[float, ...]
+    bound: tuple[float, ...]
+    gap: float
+    states: int
+
+
+def judge_schedule(
+    problem: FreeProblem, selection: ScheduleSelection, steps: Sequence[Step]
+) -> ScheduleCertificate:
+    """Check a free schedule from the problem's own data, without the search.
+
+    Parameters
+    ----------
+    problem : FreeProblem
+    selection : ScheduleSelection
+        What a formulation claims.
+    steps : sequence of Step
+        Of the selection, checked in the scene.
+
+    Returns
+    -------
+    ScheduleCertificate
+
+    Raises
+    ------
+    SolverError
+        If a value is not what was claimed, a limit is exceeded, or a better plan exists.
+    StepError
+        If a step breaks a rule.
+    """
+    check_free(problem.network, problem.rules, steps)
+    values = plan_values(problem, steps)
+    for goal, value, claimed in zip(problem.goals, values, selection.objective, strict=True):
+        if not abs(value - claimed) <= TOLERANCE * max(abs(value), abs(claimed)):
+            raise SolverError(f"{goal} is {value:.9g}, not {claimed:.9g} as claimed")
+    if selection.stopped:
+        return _stopped(values)
+    proof = Proof(problem)
+    for k, goal in enumerate(problem.goals):
+        if proof.finds_better(values, k):
+            raise SolverError(f"{goal}: {values[k]:.9g} is promised as the least; a plan has less")
+    return ScheduleCertificate(values, values, 0.0, proof.states)
+
+
+def _stopped(values: tuple[float, ...]) -> ScheduleCertificate:
+    """Return the certificate of a search that ended early: its bounds are claimed, not proven."""
+    none = (-np.inf,) * len(values)
+    return ScheduleCertificate(values, none, np.inf, 0)
+
+
+def plan_values(problem: FreeProblem, steps: Sequence[Step]) -> tuple[float, ...]:
+    """Return what goals take of a sequence, from the responses of its steps.
+
+    Parameters
+    ----------
+    problem : FreeProblem
+    steps : sequence of Step
+
+    Returns
+    -------
+    tuple of float
+        SI units.
+
+    Raises
+    ------
+    SolverError
+        If a step exceeds a limit.
+    """
+    table = analyze(problem.engine, steps)
+    columns = state_columns(problem, table)
+    for limit in problem.limits:
+        if limit.response in columns and limit.exceeded(columns[limit.response]).any():
+            at = int(np.argmax(columns[limit.response])) + 1
+            raise SolverError(f"step {at} exceeds the limit on {limit.response}")
+    out = []
+    for goal in problem.goals:
+        if goal.measure is Measure.STEPS:
+            out.append(float(len(steps)))
+        elif goal.measure is Measure.REGRIPS:
+            out.append(float(sum(step.kind is StepKind.REPOSITION for step in steps)))
+        elif goal.measure is Measure.TRAVEL:
+            out.append(travel_of(problem, steps))
+        else:
+            costs = _costs(problem, goal, columns, len(steps))
+            out.append(float(costs.max() if goal.measure is Measure.PEAK else costs.sum()))
+    return tuple(out)
+
+
+def state_columns(problem: FreeProblem, table: pd.DataFrame) -> Mapping[str, np.ndarray]:
+    """Return the named responses of a table of steps, SI units.
+
+    Parameters
+    ----------
+    problem : FreeProblem
+    table : pandas.DataFrame
+        From `seqopt.analyze`.
+
+    Returns
+    -------
+    dict of str to (n,) float
+    """
+    forces = table[[force_column(robot) for robot in problem.network.scene.robots]].abs()
+    out = {LARGEST: forces.max(axis=1).fillna(0.0).to_numpy(float)}
+    for name in problem.named:
+        if name == "C_max":
+            out[name] = np.maximum(0.0, -table["F_min_N"].to_numpy(float))
+        elif name != LARGEST:
+            out[name] = table[CHOSEN_BY[name].column].to_numpy(float) / CHOSEN_BY[name].scale
+    return out
+
+
+def travel_of(problem: FreeProblem, steps: Sequence[Step]) -> float:
+    """Return how far robots go from one grip to the next.
+
+    Parameters
+    ----------
+    problem : FreeProblem
+    steps : sequence of Step
+
+    Returns
+    -------
+    float
+        m; straight lines.
+    """
+    scene, total = problem.network.scene, 0.0
+    for robot in range(len(scene.robots)):
+        nodes = [step.grips[robot] for step in steps]
+        held = [node for node in nodes if node is not None]
+        for first, second in pairwise(held):
+            ends = [scene.node_position(node) for node in (first, second)]
+            total += float(np.linalg.norm(np.array(ends[0]) - np.array(ends[1])))
+    return total
+
+
+def _costs(
+    problem: FreeProblem, goal: Goal, columns: Mapping[str, np.ndarray], count: int
+) -> np.ndarray:
+    if goal.response:
+        return columns[goal.response]
+    return np.asarray(problem.criterion.costs(columns, 1, count))

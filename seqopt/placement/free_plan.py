@@ -1,0 +1,190 @@
+"""The plan of a free schedule: solved, judged, and what there is to say about it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import pandas as pd
+
+from seqopt.errors import InfeasibleError, ProblemError
+from seqopt.placement.formulation import Formulation
+from seqopt.placement.free_infeasible import why_impossible
+from seqopt.placement.free_judge import TOLERANCE, ScheduleCertificate, judge_schedule
+from seqopt.placement.free_problem import FreeProblem, ScheduleSelection
+from seqopt.placement.free_steps import steps_of
+from seqopt.placement.promises import Excess, overloads
+from seqopt.placement.schedule_formulation import ScheduleFormulation, find_schedule_formulation
+from seqopt.responses.table import analyze
+from seqopt.sequence.free_rules import Ending
+from seqopt.sequence.steps import Step, StepKind, idle_robots
+
+
+@dataclass(frozen=True, repr=False)
+class FreePlan:
+    """A free schedule: every step of the build, and what the whole is worth.
+
+    Attributes
+    ----------
+    problem : FreeProblem
+        What was solved.
+    formulation : ScheduleFormulation
+        What solved it.
+    selection : ScheduleSelection
+        The states, and what the formulation claims of them.
+    certificate : ScheduleCertificate or None
+        What they are worth, checked; None where no proof was asked for.
+    steps : tuple of Step
+        Checked.
+    seconds : mapping of str to float
+        By stage, s: solve (responses among it), verify.
+    """
+
+    problem: FreeProblem
+    formulation: ScheduleFormulation
+    selection: ScheduleSelection
+    certificate: ScheduleCertificate | None
+    steps: tuple[Step, ...]
+    seconds: Mapping[str, float] = field(compare=False, hash=False)
+
+    def __repr__(self) -> str:
+        pairs = zip(self.problem.goals, self.selection.objective, strict=True)
+        values = ", ".join(f"{goal} {value:.6g}" for goal, value in pairs)
+        name = self.problem.network.scene.name
+        return f"FreePlan({name!r}, {len(self.steps)} steps, {values}, {self.status})"
+
+    @property
+    def status(self) -> str:
+        """``optimal``, ``feasible`` where the search ended early, or ``unproven``."""
+        if self.selection.stopped:
+            return "feasible"
+        proven = self.certificate is not None and self.certificate.gap <= TOLERANCE
+        return "optimal" if proven else "unproven"
+
+    @property
+    def regrips(self) -> int:
+        """How many grips are taken beside those that place a brick."""
+        return sum(step.kind is StepKind.REPOSITION for step in self.steps)
+
+    @cached_property
+    def overloads(self) -> tuple[Excess, ...]:
+        """The payloads that steps exceed, where rules ignore them."""
+        return overloads(self.problem.network.scene, self._responses)
+
+    def responses(self) -> pd.DataFrame:
+        """Return the responses of every step.
+
+        Returns
+        -------
+        pandas.DataFrame
+            As of `seqopt.analyze`.
+        """
+        return self._responses.copy()
+
+    @cached_property
+    def _responses(self) -> pd.DataFrame:
+        return analyze(self.problem.engine, self.steps)
+
+    def summary(self) -> dict[str, object]:
+        """Return what there is to say about the plan, ready for JSON.
+
+        Returns
+        -------
+        dict
+            ``aims`` with ``objective`` and ``bound`` by name; the rules; how many ``steps`` there
+            are, ``steps_before_release`` without those that let all go at the end, ``regrips``;
+            ``models_evaluated`` (grip sets solved), ``seconds`` and more.
+        """
+        problem, chosen = self.problem, self.selection
+        goals = [str(goal) for goal in problem.goals]
+        bound = chosen.bound if self.certificate is None else self.certificate.bound
+        if chosen.stopped:
+            bound = chosen.bound
+        finite = (None if abs(value) == float("inf") else value for value in bound)
+        return {
+            "scene": problem.network.scene.name,
+            "schedule": "free",
+            "formulation": self.formulation.name,
+            "kind": self.formulation.kind.value,
+            "aims": goals,
+            "criterion": problem.criterion.name,
+            **problem.criterion.settings,
+            "limits": {limit.response: limit.bound for limit in problem.limits},
+            "rules": problem.rules.described(problem.network.scene),
+            "status": self.status,
+            "stopped": chosen.stopped,
+            "objective": dict(zip(goals, chosen.objective, strict=True)),
+            "bound": dict(zip(goals, finite, strict=True)),
+            "steps": len(self.steps),
+            "steps_before_release": len(self.steps) - self._letting_go,
+            "regrips": self.regrips,
+            "idle_robots": list(idle_robots(problem.network.scene, self.steps)),
+            "payload_exceeded": [str(excess) for excess in self.overloads],
+            "models_evaluated": problem.sets.solved,
+            "states_in_proof": 0 if self.certificate is None else self.certificate.states,
+            "seconds": dict(self.seconds),
+        }
+
+    @property
+    def _letting_go(self) -> int:
+        """How many steps at the end only let go."""
+        if self.problem.rules.ending is Ending.HELD:
+            return 0
+        kinds = [step.kind is StepKind.RELEASE for step in reversed(self.steps)]
+        least = self.problem.rules.least_grips
+        count = 0
+        while kinds[count] and len(self.steps[-1 - count].held) < least:
+            count += 1
+        return count
+
+
+def solve_free(
+    problem: FreeProblem,
+    formulation: ScheduleFormulation | Formulation | str = "schedule_search",
+    *,
+    proof: bool = True,
+    **options: Any,
+) -> FreePlan:
+    """Solve the problem of a free schedule, and judge the answer.
+
+    Parameters
+    ----------
+    problem : FreeProblem
+    formulation : ScheduleFormulation or str
+        One of another kind is refused.
+    proof : bool, optional
+        False leaves out the proof that no plan is better; the plan's own values are not checked.
+    **options
+        Of the formulation; ``progress`` is told in a few words how far it is.
+
+    Returns
+    -------
+    FreePlan
+
+    Raises
+    ------
+    InfeasibleError
+        Naming the brick at which it stops, and the rule or limit whose loosening opens a way.
+    ProblemError
+        If there is no such formulation or option.
+    SolverError
+        If the answer is not what its formulation claims.
+    """
+    formulation = find_schedule_formulation(formulation)
+    for name in options:
+        if name not in (*formulation.options, "progress"):
+            known = ", ".join(formulation.options) or "no options"
+            raise ProblemError(f"option {name}: {formulation.name} has {known}")
+    start = time.perf_counter()
+    try:
+        selection = formulation.solve(problem, **options)
+    except InfeasibleError:
+        raise InfeasibleError(why_impossible(problem)) from None
+    solved = time.perf_counter()
+    steps = steps_of(problem.space, selection.states)
+    certificate = judge_schedule(problem, selection, steps) if proof else None
+    seconds = {"solve": solved - start, "verify": time.perf_counter() - solved}
+    return FreePlan(problem, formulation, selection, certificate, steps, seconds)

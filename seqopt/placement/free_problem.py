@@ -1,0 +1,247 @@
+"""The problem of the free schedule: who does what next, and where, over a whole build."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from seqopt.arrays import Bools, Floats, FrozenValue, Ints
+from seqopt.engines.interface import Engine
+from seqopt.errors import ProblemError
+from seqopt.network.network import Network
+from seqopt.placement.criteria import RankSum
+from seqopt.placement.free_goals import LARGEST, STATE_RESPONSES, Goal, Measure, parse_goals
+from seqopt.placement.requirements import LIMIT_TOLERANCE, Criterion, Limit
+from seqopt.placement.scales import SceneFacts
+from seqopt.responses.grip_sets import GripSets
+from seqopt.responses.quantities import robot_response
+from seqopt.scene.checks import short
+from seqopt.sequence.free_rules import FreeRules
+from seqopt.sequence.free_space import FreeSpace
+from seqopt.sequence.free_start import free_space
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ScheduleSelection(FrozenValue):
+    """A free schedule, and what its formulation claims of it.
+
+    Attributes
+    ----------
+    states : tuple of tuple of int
+        After every step: how many bricks stand, then the node that each robot holds, as a place in
+        build order from 1; robots of one kind stand together, 0 for one that is free.
+    objective : tuple of float
+        Claimed value of every goal.
+    bound : tuple of float
+        Claimed lower bound of every goal, those before it being at their values.
+    stopped : str
+        Why the search ended before all was proven: ``time`` or ``interrupt``; empty if it did not.
+    """
+
+    states: tuple[tuple[int, ...], ...]
+    objective: tuple[float, ...]
+    bound: tuple[float, ...]
+    stopped: str = ""
+
+
+@dataclass(frozen=True, repr=False)
+class FreeProblem:
+    """The free schedule of a scene: nothing is computed before it is asked for.
+
+    Attributes
+    ----------
+    engine : Engine
+        What computes responses.
+    rules : FreeRules
+        Which moves are possible.
+    criterion : Criterion
+        What a step costs, for the goals that name no response.
+    goals : tuple of Goal
+        What is to be least, the most important first.
+    limits : tuple of Limit
+        What no step may exceed.
+    """
+
+    engine: Engine
+    rules: FreeRules
+    criterion: Criterion
+    goals: tuple[Goal, ...]
+    limits: tuple[Limit, ...] = ()
+
+    def __repr__(self) -> str:
+        goals = ", ".join(map(str, self.goals))
+        return f"FreeProblem({self.network.scene.name!r}, {goals}, {len(self.limits)} limits)"
+
+    @property
+    def network(self) -> Network:
+        """Of the scene that is built."""
+        return self.engine.network
+
+    @cached_property
+    def space(self) -> FreeSpace:
+        """Its states and moves."""
+        parks = any(goal.measure is Measure.TRAVEL for goal in self.goals)
+        return free_space(self.network, self.rules, self.caps, parks=parks)
+
+    @cached_property
+    def caps(self) -> Mapping[str, float]:
+        """Limits on single robots, by name, N."""
+        own = {robot_response(robot.name): robot.name for robot in self.network.scene.robots}
+        out: dict[str, float] = {}
+        for limit in self.limits:
+            if limit.response in own:
+                name = own[limit.response]
+                out[name] = min(limit.bound, out.get(name, np.inf))
+        return out
+
+    @cached_property
+    def named(self) -> tuple[str, ...]:
+        """The responses that goals, criterion and limits name."""
+        names = [goal.response for goal in self.goals if goal.response]
+        if any(goal.of_states and not goal.response for goal in self.goals):
+            names += self.criterion.wanted(1)
+        names += [limit.response for limit in self.limits]
+        return tuple(name for name in STATE_RESPONSES if name in names)
+
+    @property
+    def leading(self) -> int:
+        """The first goal that is about responses, or the first of all."""
+        return next((k for k, goal in enumerate(self.goals) if goal.of_states), 0)
+
+    @cached_property
+    def sets(self) -> GripSets:
+        """Responses of grip sets, those of the engine that are named; the forces come with them."""
+        return GripSets(self.engine, [name for name in self.named if name != LARGEST])
+
+    def responses(self, bricks: int, states: Ints) -> tuple[Mapping[str, Floats], Bools]:
+        """Return the named responses of states, and which states are within all limits.
+
+        Parameters
+        ----------
+        bricks : int
+        states : (n, c) int
+            As in `seqopt.sequence.free_space`.
+
+        Returns
+        -------
+        responses : dict of str to (n,) float
+            SI units.
+        within : (n,) bool
+        """
+        held = self.space.held(states)
+        answers, forces = self.sets.answers(bricks, held)
+        names = [name for name in self.named if name != LARGEST]
+        found = dict(zip(names, answers.T, strict=True))
+        found[LARGEST] = forces.max(axis=1, initial=0.0)
+        within = np.isfinite(answers).all(axis=1) & np.isfinite(forces).all(axis=1)
+        for limit in self.limits:
+            if limit.response in found:
+                within &= ~limit.exceeded(found[limit.response])
+        return found, within & self._carried(states, forces)
+
+    def worth(self, bricks: int, states: Ints) -> tuple[Floats, Bools]:
+        """Return what goals that are about responses take of states.
+
+        Parameters
+        ----------
+        bricks : int
+        states : (n, c) int
+
+        Returns
+        -------
+        values : (n, g) float
+            A column for every goal; zero for one that is about moves alone.
+        within : (n,) bool
+            Which states are within all limits.
+        """
+        found, within = self.responses(bricks, states)
+        out = np.zeros((len(states), len(self.goals)))
+        for column, goal in enumerate(self.goals):
+            if goal.response:
+                out[:, column] = found[goal.response]
+            elif goal.of_states:
+                out[:, column] = self.criterion.costs(found, bricks, len(states))
+        out[~within] = np.inf
+        return out, within & np.isfinite(out).all(axis=1)
+
+    def _carried(self, states: Ints, forces: Floats) -> Bools:
+        """Return in which states no grip exceeds what its robot may carry."""
+        kinds = self.space.kinds
+        caps = np.concatenate([np.full(len(kind.robots), kind.cap) for kind in kinds])
+        most = caps + LIMIT_TOLERANCE * np.where(np.isfinite(caps), caps, 0.0)
+        if (most == most[0]).all():
+            return np.asarray((forces <= most[0]).all(axis=1))
+        order = np.argsort(states[:, : len(caps)].clip(min=0), axis=1, kind="stable")
+        return np.asarray((forces <= most[order]).all(axis=1))
+
+
+def pose_free(
+    engine: Engine,
+    rules: FreeRules,
+    criterion: Criterion,
+    goals: Sequence[Goal] | str = "minmax",
+    limits: Sequence[Limit] = (),
+) -> FreeProblem:
+    """Return the problem of the free schedule of an engine's scene.
+
+    Parameters
+    ----------
+    engine : Engine
+        What computes responses.
+    rules : FreeRules
+        Which moves are possible.
+    criterion : Criterion
+        What a step costs; ranks among choices do not go here.
+    goals : sequence of Goal or str
+        What is to be least; see `parse_goals`.
+    limits : sequence of Limit
+        What no step may exceed.
+
+    Returns
+    -------
+    FreeProblem
+        Nothing is computed yet, but for the scales of a criterion that takes them from the scene.
+
+    Raises
+    ------
+    ProblemError
+        If goals, criterion or limits name what a state does not have.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> engine = seqopt.make_engine("compliance", seqopt.load_scene("arch25"))
+    >>> pose_free(engine, FreeRules(), seqopt.CRITERIA["worst-ratio"], "minmax,steps")
+    FreeProblem('arch25', minmax, steps, 0 limits)
+    """
+    goals = parse_goals(goals) if isinstance(goals, str) else tuple(goals)
+    if not goals or not all(isinstance(goal, Goal) for goal in goals):
+        raise ProblemError(f"aims {short(goals)}: give goals, or their names, as 'minmax,steps'")
+    limits = (limits,) if isinstance(limits, Limit) else tuple(limits)
+    robots = {robot_response(robot.name) for robot in engine.network.scene.robots}
+    for limit in limits:
+        _require(limit.response, {*STATE_RESPONSES, *robots}, "limit")
+    if any(goal.of_states and not goal.response for goal in goals):
+        criterion = _of_states(engine, criterion)
+    return FreeProblem(engine, rules, criterion, goals, limits)
+
+
+def _of_states(engine: Engine, criterion: Criterion) -> Criterion:
+    """Return a criterion posed for a scene, if it is about states alone."""
+    if isinstance(criterion, RankSum):
+        raise ProblemError(
+            f"criterion {criterion.name}: it ranks the choices of a move, and a free schedule "
+            "has none; take worst-ratio, weighted or another one of responses"
+        )
+    for name in criterion.wanted(1):
+        _require(name, {*STATE_RESPONSES}, f"criterion {criterion.name}")
+    return criterion.for_scene(SceneFacts(engine))
+
+
+def _require(name: str, known: set[str], where: str) -> None:
+    if name not in known:
+        listed = ", ".join(sorted(known))
+        raise ProblemError(f"{where}: a state of a free schedule has no {name}; give {listed}")

@@ -1,0 +1,273 @@
+"""Pareto sets: all plans that no other beats in everything, how to pick one, and their proof."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import pandas as pd
+
+from seqopt.arrays import Floats, FrozenValue
+from seqopt.errors import InfeasibleError, ProblemError, SolverError
+from seqopt.placement.schedule_formulation import ScheduleFormulation, find_schedule_formulation
+from seqopt.sequence.steps import Step, StepKind
+
+TOLERANCE = 1e-6  # of a value: how far a point may be from what the engine says of its plan
+
+
+class FrontProblem(Protocol):
+    """What a formulation of Pareto sets is given."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The numbers that are to be small."""
+
+    def best_below(self, bounds: Floats) -> tuple[Floats, object] | None:
+        """Return a plan that none beats among those below bounds.
+
+        Parameters
+        ----------
+        bounds : (k,) float
+            Every number must be less.
+
+        Returns
+        -------
+        point : (k,) float
+            Its numbers, SI units.
+        plan : object
+            What `steps` takes.
+        """
+
+    def is_empty_below(self, bounds: Floats) -> bool:
+        """Return whether there is no plan below bounds, found by another route.
+
+        Parameters
+        ----------
+        bounds : (k,) float
+
+        Returns
+        -------
+        bool
+        """
+
+    def steps(self, plan: object) -> tuple[Step, ...]:
+        """Return the checked steps of a plan.
+
+        Parameters
+        ----------
+        plan : object
+            From `best_below`.
+
+        Returns
+        -------
+        tuple of Step
+        """
+
+    def values(self, steps: Sequence[Step]) -> Floats:
+        """Return the numbers of a sequence, from the responses of its steps.
+
+        Parameters
+        ----------
+        steps : sequence of Step
+
+        Returns
+        -------
+        (k,) float
+            SI units, rounded as the problem's are.
+        """
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class FrontSelection(FrozenValue):
+    """The points of a Pareto set, and what its formulation claims of them.
+
+    Attributes
+    ----------
+    points : (n, k) float
+        SI units.
+    plans : tuple of object
+        One for every point.
+    stopped : str
+        Why the search ended before the set was complete; empty if it did not.
+    """
+
+    points: Floats
+    plans: tuple[object, ...]
+    stopped: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Front:
+    """A Pareto set whose points are checked.
+
+    Attributes
+    ----------
+    table : pandas.DataFrame
+        A row per point, by the first number: the numbers that are to be small, SI units, then
+        ``steps`` and ``regrips`` of its plan where they are none of these.
+    steps : tuple of tuple of Step
+        The plan of every row.
+    complete : bool
+        Whether it was proven that no further point exists.
+    seconds : mapping of str to float
+        By stage, s: solve, verify.
+    """
+
+    table: pd.DataFrame
+    steps: tuple[tuple[Step, ...], ...]
+    complete: bool
+    seconds: Mapping[str, float]
+
+
+def find_front(
+    problem: FrontProblem,
+    formulation: ScheduleFormulation | str = "pareto_zones",
+    *,
+    seconds: float = np.inf,
+    progress: Callable[[str], None] = lambda _: None,
+) -> Front:
+    """Return the Pareto set of a problem, its points recomputed and its completeness judged.
+
+    Parameters
+    ----------
+    problem : FrontProblem
+    formulation : ScheduleFormulation or str
+    seconds : float, optional
+        After which the points found are returned.
+    progress : callable, optional
+        Told in a few words how far it is.
+
+    Returns
+    -------
+    Front
+
+    Raises
+    ------
+    InfeasibleError
+        If no plan is allowed.
+    SolverError
+        If a plan is not worth what is claimed, or the set lacks a point.
+    """
+    start = time.perf_counter()
+    formulation = find_schedule_formulation(formulation)
+    found: FrontSelection = formulation.solve(problem, seconds=seconds, progress=progress)
+    if not len(found.points) and not found.stopped:
+        raise InfeasibleError("pareto: no plan is within the limits; relax one")
+    solved = time.perf_counter()
+    order = np.lexsort(found.points.T[::-1])
+    points = found.points[order]
+    plans = tuple(problem.steps(found.plans[i]) for i in order)
+    for point, steps in zip(points, plans, strict=True):
+        values = problem.values(steps)
+        if not (np.abs(values - point) <= TOLERANCE * np.abs(point)).all():
+            raise SolverError(f"a plan is worth {values.tolist()}, not {point.tolist()} as claimed")
+    _require_apart(points)
+    if not found.stopped:
+        _require_complete(problem, points, progress)
+    spent = {"solve": solved - start, "verify": time.perf_counter() - solved}
+    return Front(_table(problem, points, plans), plans, not found.stopped, spent)
+
+
+def _require_apart(points: Floats) -> None:
+    for i, point in enumerate(points):
+        others = np.delete(points, i, axis=0)
+        if (others <= point).all(axis=1).any():
+            raise SolverError(f"the point {point.tolist()} is dominated by another one")
+
+
+def _require_complete(
+    problem: FrontProblem, points: Floats, progress: Callable[[str], None]
+) -> None:
+    """Raise an error if a plan exists that no point dominates: bounds found anew, one by one."""
+    bounds = upper_bounds(points)
+    for i, bound in enumerate(bounds):
+        progress(f"proof: {i} of {len(bounds)} zones")
+        if not problem.is_empty_below(bound):
+            raise SolverError(f"the set lacks a point below {bound.tolist()}")
+
+
+def upper_bounds(points: Floats) -> Floats:
+    """Return the corners below which lies all that no point dominates.
+
+    Points are taken by their last number, ascending; up to the next one only those before it
+    count, so that the corners are those of sets with one number less.
+
+    Parameters
+    ----------
+    points : (n, k) float
+
+    Returns
+    -------
+    (m, k) float
+    """
+    if points.shape[1] == 1:
+        return np.array([[points.min(initial=np.inf)]])
+    levels = np.unique(points[:, -1])
+    out = []
+    for low, high in zip([-np.inf, *levels], [*levels, np.inf], strict=True):
+        before = points[points[:, -1] <= low, :-1]
+        if not len(before):
+            corners = np.full((1, points.shape[1] - 1), np.inf)
+        else:
+            corners = upper_bounds(before)
+        out.append(np.column_stack([corners, np.full(len(corners), high)]))
+    found = np.unique(np.concatenate(out), axis=0)
+    kept: list[Floats] = []
+    for corner in found[::-1]:
+        if not kept or not (np.array(kept) >= corner).all(axis=1).any():
+            kept.append(corner)
+    return np.array(kept)
+
+
+def _table(problem: FrontProblem, points: Floats, plans: Sequence[Sequence[Step]]) -> pd.DataFrame:
+    table = pd.DataFrame(points, columns=[*problem.names])
+    counts = {
+        "steps": [len(steps) for steps in plans],
+        "regrips": [sum(s.kind is StepKind.REPOSITION for s in steps) for steps in plans],
+    }
+    for name, column in counts.items():
+        if name not in table:
+            table[name] = column
+    return table
+
+
+def pick(table: pd.DataFrame, least: str, under: Mapping[str, float] | None = None) -> int:
+    """Return the row of a Pareto set with the least of one number among those below bounds.
+
+    Parameters
+    ----------
+    table : pandas.DataFrame
+        Of a `Front`.
+    least : str
+        A column.
+    under : mapping of str to float, optional
+        What columns must stay below, SI units.
+
+    Returns
+    -------
+    int
+        Its place, from 0; of several the first.
+
+    Raises
+    ------
+    ProblemError
+        If there is no such column, or no row is below all bounds.
+    """
+    under = dict(under or {})
+    for name in (least, *under):
+        if name not in table:
+            known = ", ".join(map(str, table.columns))
+            raise ProblemError(f"pick {name}: the set has no such column; give one of {known}")
+    rows = np.ones(len(table), dtype=bool)
+    for name, bound in under.items():
+        rows &= table[name].to_numpy(float) < bound
+    if not rows.any():
+        closest = ", ".join(f"{name} from {table[name].min():.6g}" for name in under)
+        raise ProblemError(
+            f"pick {least}: no plan of the set is below all bounds; it has {closest}"
+        )
+    values = np.where(rows, table[least].to_numpy(float), np.inf)
+    return int(values.argmin())

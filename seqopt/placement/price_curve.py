@@ -1,0 +1,80 @@
+"""What a budget costs: the objective against how much there is of it, with its price as slope."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from seqopt.errors import InfeasibleError
+from seqopt.placement.costs import Budget
+from seqopt.placement.formulation import Formulation
+from seqopt.placement.interface import PlacementProblem
+from seqopt.placement.solving import solve
+
+
+def price_curve(
+    problem: PlacementProblem,
+    budget: Budget,
+    bounds: Sequence[float],
+    formulation: Formulation | str = "labels",
+    **options: Any,
+) -> pd.DataFrame:
+    """Solve a problem for several bounds of a budget.
+
+    Parameters
+    ----------
+    problem : PlacementProblem
+        Its own budgets stay.
+    budget : Budget
+        Whatever its bound is.
+    bounds : sequence of float
+        How much there is of it, in its unit.
+    formulation : Formulation or str
+        One that takes budgets.
+    **options
+        Of `seqopt.solve` and of the formulation.
+
+    Returns
+    -------
+    pandas.DataFrame
+        A row per bound. Columns: ``bound``, ``objective``, ``proven`` (the certificate's lower
+        bound), ``gap``, ``spent`` and ``price``, the cost that one more unit would save (the slope
+        of the relaxation, downward); NaN where no choice is within the budgets.
+    """
+    rows = [_row(problem, replace(budget, bound=bound), formulation, options) for bound in bounds]
+    columns = ["bound", "objective", "proven", "gap", "spent", "price"]
+    return pd.DataFrame(rows, columns=columns)
+
+
+def _row(
+    problem: PlacementProblem,
+    budget: Budget,
+    formulation: Formulation | str,
+    options: dict[str, Any],
+) -> dict[str, float]:
+    capped = _with(problem, budget)
+    try:
+        plan = solve(capped, formulation, **options)
+    except InfeasibleError:
+        return {"bound": budget.bound}
+    proof = plan.certificate
+    if proof is None:
+        return {"bound": budget.bound}
+    return {
+        "bound": budget.bound,
+        "objective": proof.objective,
+        "proven": proof.bound,
+        "gap": proof.gap,
+        "spent": proof.spent[budget.name],
+        "price": plan.selection.prices.get(budget.name, np.nan),
+    }
+
+
+def _with(problem: PlacementProblem, budget: Budget) -> PlacementProblem:
+    """Return a problem with one more budget."""
+    changed: PlacementProblem = replace(problem, budgets=(*problem.budgets, budget))  # type: ignore[type-var]
+    return changed

@@ -1,0 +1,87 @@
+"""Formulations of the free schedule: what solves it, and how they are found."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib.metadata import entry_points
+from typing import Any
+
+from seqopt.errors import ProblemError
+from seqopt.placement.formulation import Formulation, FormulationKind
+
+GROUP = "seqopt.schedule_formulations"
+
+
+@dataclass(frozen=True)
+class ScheduleFormulation:
+    """A way to solve the free schedule.
+
+    Attributes
+    ----------
+    name, summary : str
+        What it is called, and what it does in a few words.
+    kind : FormulationKind
+        What it promises.
+    solve : callable
+        Takes the problem and named options, returns a `ScheduleSelection`, or of a Pareto set a
+        `seqopt.placement.front.FrontSelection`.
+    """
+
+    name: str
+    summary: str
+    kind: FormulationKind
+    solve: Callable[..., Any]
+
+    @property
+    def options(self) -> dict[str, int | float]:
+        """The options of ``solve`` that are numbers, by name, and their defaults."""
+        return {
+            name: parameter.default
+            for name, parameter in inspect.signature(self.solve).parameters.items()
+            if isinstance(parameter.default, int | float)
+        }
+
+
+def find_schedule_formulation(
+    given: ScheduleFormulation | Formulation | str,
+) -> ScheduleFormulation:
+    """Return a formulation of the free schedule, by name or itself.
+
+    Parameters
+    ----------
+    given : ScheduleFormulation or str
+        A formulation of another kind is refused.
+
+    Returns
+    -------
+    ScheduleFormulation
+
+    Raises
+    ------
+    ProblemError
+        If there is none of that name, or it is something else.
+
+    Examples
+    --------
+    >>> find_schedule_formulation("schedule_search").kind.value
+    'exact'
+    """
+    if isinstance(given, ScheduleFormulation):
+        return given
+    if isinstance(given, Formulation):
+        raise ProblemError(
+            f"{given.name}: a free schedule has no moves to choose; use schedule_search"
+        )
+    entries = {entry.name: entry for entry in entry_points(group=GROUP)}
+    if not isinstance(given, str) or given not in entries:
+        known = ", ".join(sorted(entries))
+        raise ProblemError(f"{given!r} is no formulation of the free schedule; give {known}")
+    found: object = entries[given].load()
+    if not isinstance(found, ScheduleFormulation):
+        raise ProblemError(
+            f"formulation {given!r}: {entries[given].value} is a {type(found).__name__}; let the "
+            "entry point name a ScheduleFormulation"
+        )
+    return found

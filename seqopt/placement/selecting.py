@@ -1,0 +1,79 @@
+"""How a formulation is called: what it returns is read as a selection, or it has failed."""
+
+from __future__ import annotations
+
+import operator
+from typing import Any
+
+import numpy as np
+
+from seqopt.errors import SeqoptError, SolverError
+from seqopt.placement.formulation import WATCH, End, Formulation, Selection, said
+from seqopt.placement.interface import PlacementProblem
+from seqopt.placement.watch import Finding, Watch
+
+
+def select(
+    formulation: Formulation, problem: PlacementProblem, watch: Watch | None = None, **options: Any
+) -> Selection:
+    """Return the selection of a formulation, with numbers where numbers belong.
+
+    Parameters
+    ----------
+    formulation : Formulation
+    problem : PlacementProblem
+    watch : Watch, optional
+        Handed to the formulation if it takes one; the trace is read from it.
+    **options
+        Of the formulation.
+
+    Returns
+    -------
+    Selection
+        Claimed, not proven.
+
+    Raises
+    ------
+    ProblemError, SolverError
+        As the formulation does; a `SolverError` also if it raises anything else, or returns
+        something that is no selection.
+    """
+    watch = watch or Watch()
+    told = {WATCH: watch} if formulation.watched else {}
+    try:
+        found: object = formulation.solve(problem, **told, **options)
+    except (SeqoptError, MemoryError):
+        raise
+    except Exception as error:  # whatever a formulation of others may raise
+        raise SolverError(f"formulation {formulation.name} failed: {said(error)}") from error
+    if not isinstance(found, Selection):
+        kind = type(found).__name__
+        raise SolverError(f"formulation {formulation.name} returned a {kind}, not a Selection")
+    return _with_numbers(formulation, found, watch)
+
+
+def _with_numbers(formulation: Formulation, found: Selection, watch: Watch) -> Selection:
+    """Return a selection with numbers where numbers belong, or raise a `SolverError`."""
+    try:
+        seconds = float(found.compile_seconds)
+        if not 0 <= seconds < np.inf:
+            raise ValueError(f"compile_seconds is {seconds}")
+        return Selection(
+            choice=tuple(operator.index(index) for index in found.choice),
+            objective=float(found.objective),
+            bound=float(found.bound),
+            prices={str(name): float(price) for name, price in found.prices.items()},
+            compile_seconds=seconds,
+            end=End(found.end),
+            trace=_traced(watch, float(found.objective), float(found.bound)),
+        )
+    except (TypeError, ValueError, AttributeError, OverflowError) as error:
+        raise SolverError(
+            f"formulation {formulation.name} returned a Selection that is none: {said(error)}"
+        ) from error
+
+
+def _traced(watch: Watch, objective: float, bound: float) -> tuple[Finding, ...]:
+    """Return what was told, ending with what is claimed."""
+    watch.tell(objective, bound)
+    return watch.trace

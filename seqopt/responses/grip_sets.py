@@ -1,0 +1,134 @@
+"""Responses of grip sets, solved when they are first asked for, and kept.
+
+For whoever searches among more sets than need to be solved: all sets that are asked for at once are
+solved in batches, each of them once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import reduce
+from operator import or_
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from seqopt.arrays import Floats, Ints
+from seqopt.engines.interface import Engine, Want
+from seqopt.errors import MechanismError
+from seqopt.responses.alike import BLOCK
+from seqopt.responses.quantities import CHOSEN_BY, lengths, require_finite
+
+
+class GripSets:
+    """The responses of grip sets of one scene.
+
+    Parameters
+    ----------
+    engine : Engine
+        What solves them.
+    names : sequence of str
+        Responses of `seqopt.responses.quantities.CHOSEN_BY` that are wanted.
+
+    Attributes
+    ----------
+    solved : int
+        How many different grip sets were solved.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import seqopt
+    >>> network = seqopt.build_network(seqopt.load_scene("arch25"))
+    >>> sets = GripSets(seqopt.make_engine("compliance", network), ["T_max"])
+    >>> responses, forces = sets.answers(2, np.array([[0, 3], [2, 3]]))  # zero: no grip
+    >>> responses.shape, forces.shape, sets.solved
+    ((2, 1), (2, 2), 2)
+    """
+
+    def __init__(self, engine: Engine, names: Sequence[str]) -> None:
+        self._engine = engine
+        self._names = tuple(names)
+        self._want = reduce(or_, (CHOSEN_BY[name].needs for name in names), Want(0))
+        self._known: dict[tuple[int, int], tuple[Ints, Floats]] = {}
+        scene = engine.network.scene
+        self._number = np.array([0, *(node for brick in scene.placed for node in brick.nodes)])
+        self.solved = 0
+
+    def answers(self, bricks: int, held: Ints) -> tuple[Floats, Floats]:
+        """Return the responses of grip sets and the forces of their grips.
+
+        Parameters
+        ----------
+        bricks : int
+            How many bricks stand.
+        held : (S, r) int
+            Nodes held, ascending in every row, as places in build order counted from 1; zeros for
+            robots that hold none.
+
+        Returns
+        -------
+        responses : (S, R) float
+            In the order of the names, SI units; infinite where something would be loose.
+        forces : (S, r) float
+            N; zero for a robot that holds none.
+        """
+        held = np.asarray(held)
+        out = np.zeros((len(held), len(self._names) + held.shape[1]))
+        grips = (held > 0).sum(axis=1)
+        for count in np.unique(grips).tolist():
+            rows = np.flatnonzero(grips == count)
+            nodes = held[rows, held.shape[1] - count :]
+            found = self._found(bricks, count, nodes)
+            out[rows, : len(self._names)] = found[:, : len(self._names)]
+            out[rows, out.shape[1] - count :] = found[:, len(self._names) :]
+        return out[:, : len(self._names)], out[:, len(self._names) :]
+
+    def _found(self, bricks: int, count: int, nodes: Ints) -> Floats:
+        """Return responses and forces of sets (S, count), those that are new solved now."""
+        codes = self._codes(nodes)
+        empty = np.zeros(0, dtype=np.int64), np.zeros((0, len(self._names) + count))
+        known, values = self._known.get((bricks, count), empty)
+        distinct, first = np.unique(codes, return_index=True)
+        fresh = first[~np.isin(distinct, known, assume_unique=True)]
+        if len(fresh):
+            known = np.concatenate([known, codes[fresh]])
+            values = np.concatenate([values, self._solve(bricks, nodes[fresh])])
+            order = np.argsort(known, kind="stable")
+            known, values = known[order], values[order]
+            self._known[bricks, count] = known, values
+            self.solved += len(fresh)
+        return np.asarray(values[np.searchsorted(known, codes)])
+
+    def _codes(self, nodes: Ints) -> Ints:
+        """Return a number for every set (S, r) that no other one has."""
+        out = np.zeros(len(nodes), dtype=np.int64)
+        for column in nodes.T:
+            out = out * len(self._number) + column
+        return out
+
+    def _solve(self, bricks: int, nodes: Ints) -> Floats:
+        """Return responses and forces of sets, (S, R + r)."""
+        parts = [
+            self._block(bricks, self._number[nodes[start : start + BLOCK]])
+            for start in range(0, len(nodes), BLOCK)
+        ]
+        return np.concatenate(parts)
+
+    def _block(self, bricks: int, grips: ArrayLike) -> Floats:
+        """Return the same of a few sets of node numbers; those that leave something loose apart."""
+        grips = np.asarray(grips)
+        try:
+            fields = self._engine.solve(bricks, grips, self._want)
+        except MechanismError:
+            if len(grips) == 1:
+                return np.full((1, len(self._names) + grips.shape[1]), np.inf)
+            half = len(grips) // 2
+            halves = [self._block(bricks, part) for part in (grips[:half], grips[half:])]
+            return np.concatenate(halves)
+        columns = [CHOSEN_BY[name].of(self._engine.network, fields) for name in self._names]
+        forces = lengths(fields.grip_force)
+        for name, values in zip(self._names, columns, strict=True):
+            require_finite(name, values, bricks)
+        require_finite("grip force", forces, bricks)
+        return np.column_stack([*columns, forces])

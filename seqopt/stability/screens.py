@@ -1,0 +1,229 @@
+"""Which grip sets of a half-built structure stand: many at a time, most of them unsolved.
+
+A set stands if forces are found that hold it, and falls if a motion is found in which it falls:
+either is checked by the structure's own data (`seqopt.stability.known`), with the friction cone and
+the payloads as they are. What one set proves decides many others, so that a linear program, whose
+cones are inscribed polyhedra, is solved for few of them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from seqopt.arrays import Bools, Floats, Ints
+from seqopt.contact.assembly import Assembly
+from seqopt.contact.mortar import Mortar, find_mortar
+from seqopt.errors import GripError
+from seqopt.network.build import network_of
+from seqopt.network.network import Network
+from seqopt.scene.scene import Scene
+from seqopt.stability.assessment import bonded, sideways
+from seqopt.stability.held_program import CompileHeld, compile_held
+from seqopt.stability.held_states import HeldStates, node_assembly
+from seqopt.stability.limit_analysis import EXACT
+
+STANDS, FALLS, OPEN = 1, -1, 0
+
+
+class Screen:
+    """Says which grip sets of the partial structures of a scene stand.
+
+    Parameters
+    ----------
+    network : Network or Scene
+    mortar : Mortar or str
+        Of all joints; or its name.
+    tilt : float, optional
+        By which it must survive being tilted in eight directions, rad: the sideways acceleration
+        tan(tilt) g.
+    compiled : callable, optional
+        Makes the programs to solve; the registered one by default.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> screen = Screen(seqopt.load_scene("arch25"), seqopt.DRY)
+    >>> screen.stands(5, [[10, 7], [10, 0]])  # 10th and 7th node in build order; one robot free
+    array([ 1, -1], dtype=int8)
+    """
+
+    def __init__(
+        self,
+        network: Network | Scene,
+        mortar: Mortar | str,
+        tilt: float = 0.0,
+        compiled: CompileHeld = compile_held,
+    ) -> None:
+        self.network = network_of(network)
+        self.mortar = find_mortar(mortar)
+        self.tilt = tilt
+        self._compile = compiled
+        self._levels: dict[int, tuple[HeldStates, ...]] = {}
+
+    @property
+    def solved(self) -> int:
+        """How many linear programs were solved."""
+        return sum(states.solved for level in self._levels.values() for states in level)
+
+    def stands(
+        self, bricks: int, held: ArrayLike, payload: ArrayLike | None = None
+    ) -> NDArray[np.int8]:
+        """Return which grip sets stand.
+
+        Parameters
+        ----------
+        bricks : int
+            How many bricks stand, in build order.
+        held : (S, r) int
+            Nodes held, as places in build order counted from 1; zero for a robot that holds none.
+        payload : float or (r,) or (S, r) float, optional
+            Largest force of those that hold them, N; by default of the scene's robots, if all have
+            the same.
+
+        Returns
+        -------
+        (S,) int8
+            1 where it is proven that the structure stands, -1 where it is proven that it falls, and
+            0 where neither is.
+
+        Raises
+        ------
+        GripError
+            If there are no such nodes, or payloads are missing or not numbers.
+        """
+        places, loads = held_places(self.network, bricks, held, payload)
+        out = np.full(len(places), STANDS, dtype=np.int8)
+        for states in self._level(bricks):
+            rows = np.flatnonzero(out != FALLS)
+            bracket = states.bracket(places[rows], loads[rows], decided)
+            fall, stand = bracket[:, 0] > EXACT, bracket[:, 1] <= EXACT
+            out[rows[fall]] = FALLS
+            out[rows[~fall & ~stand]] = OPEN
+        return out
+
+    def _level(self, bricks: int) -> tuple[HeldStates, ...]:
+        if bricks not in self._levels:
+            upright = node_assembly(self.network, bricks)
+            self._levels[bricks] = tuple(
+                lacking(assembly, self.mortar, self._compile)
+                for assembly in tilted(upright, self.tilt, self.network.scene.up)
+            )
+        return self._levels[bricks]
+
+
+def lacking(assembly: Assembly, mortar: Mortar, compiled: CompileHeld) -> HeldStates:
+    """Return the question whether a structure stands: whether it lacks any bond.
+
+    Parameters
+    ----------
+    assembly : Assembly
+        Its grips are all that may ever be held.
+    mortar : Mortar
+    compiled : callable
+        Makes the program to solve.
+
+    Returns
+    -------
+    HeldStates
+    """
+    case = bonded(assembly, mortar)
+    fixed = replace(case, tension=(case.tension[0], 0.0), cohesion=(case.cohesion[0], 0.0))
+    return HeldStates(assembly, case, compiled, fixed)
+
+
+def decided(bracket: Floats) -> Bools:
+    """Return where it is proven that no bond is lacking, or that some is.
+
+    Parameters
+    ----------
+    bracket : (S, 2) float
+        Of the bond that is lacking.
+
+    Returns
+    -------
+    (S,) bool
+    """
+    return np.asarray((bracket[:, 1] <= EXACT) | (bracket[:, 0] > EXACT))
+
+
+def tilted(assembly: Assembly, tilt: float, up: tuple[float, float, float]) -> tuple[Assembly, ...]:
+    """Return the assemblies to which the sideways pulls of a tilt turn one.
+
+    Parameters
+    ----------
+    assembly : Assembly
+    tilt : float
+        rad; for none it is the assembly itself.
+    up : Vector
+        Unit vector against gravity.
+
+    Returns
+    -------
+    tuple of Assembly
+        One per direction.
+    """
+    if not tilt:
+        return (assembly,)
+    weight = np.linalg.norm(assembly.weight, axis=1, keepdims=True)
+    cases = sideways(bonded(assembly, Mortar(friction=0.0)), up)
+    pulls = [np.tan(tilt) * weight * np.array(case.pull) for case in cases]
+    return tuple(replace(assembly, weight=assembly.weight + pull) for pull in pulls)
+
+
+def held_places(
+    network: Network, bricks: int, held: ArrayLike, payload: ArrayLike | None
+) -> tuple[Ints, Floats]:
+    """Return grip sets as grips of `seqopt.stability.held_states.node_assembly`.
+
+    Parameters
+    ----------
+    network : Network
+    bricks : int
+        How many bricks stand.
+    held : (S, r) int
+        Nodes held, as places in build order counted from 1; zero for a robot that holds none.
+    payload : float or (r,) or (S, r) float, optional
+        N; by default of the scene's robots, if all have the same.
+
+    Returns
+    -------
+    places : (S, r) int
+        From 0; the number of nodes for none.
+    payload : (S, r) float
+        N; zero for none.
+
+    Raises
+    ------
+    GripError
+        If there are no such nodes, or payloads are missing or not numbers.
+    """
+    sets = np.asarray(held)
+    most = 2 * bricks
+    if sets.ndim != 2 or (sets.size and sets.dtype.kind not in "iu"):
+        raise GripError(f"held: an array of shape {sets.shape}; give a row of nodes per grip set")
+    if not 1 <= bricks <= len(network.inner):
+        raise GripError(f"{bricks} bricks: give from 1 to {len(network.inner)}")
+    if sets.size and not 0 <= sets.min() <= sets.max() <= most:
+        bad = sets.min() if sets.min() < 0 else sets.max()
+        raise GripError(
+            f"held: node {bad} of {bricks} bricks; give from 1 to {most}, or 0 for none"
+        )
+    loads = np.broadcast_to(_payload(network, payload), sets.shape)
+    if not (np.isfinite(loads).all() and (loads >= 0).all()):
+        raise GripError("payload: it is negative or no number; give N")
+    free = sets == 0
+    return np.where(free, most, sets - 1).astype(np.int64), np.where(free, 0.0, loads)
+
+
+def _payload(network: Network, payload: ArrayLike | None) -> Floats:
+    if payload is not None:
+        return np.asarray(payload, dtype=float)
+    own = {robot.payload for robot in network.scene.robots}
+    if len(own) != 1:
+        raise GripError(
+            f"scene {network.scene.name}: its robots have no payload in common; give one per grip"
+        )
+    return np.array(own.pop())

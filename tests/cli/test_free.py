@@ -1,0 +1,131 @@
+"""The free schedule and Pareto sets on the command line."""
+
+from __future__ import annotations
+
+import json
+
+import pandas as pd
+import pytest
+
+from seqopt.cli.main import main
+from seqopt.scene.scene_file import load_scene, save_scene
+from seqopt.sequence.plan_file import read_plan
+from tests.builders import small_arch
+
+
+@pytest.fixture
+def arch(tmp_path):
+    path = tmp_path / "arch.json"
+    save_scene(small_arch(5), path)
+    return str(path)
+
+
+def run(capsys, *arguments):
+    try:
+        status = main([*arguments])
+    except SystemExit as stop:
+        status = int(stop.code or 0)
+    out, err = capsys.readouterr()
+    return status, out, err
+
+
+def test_optimize_writes_a_plan_that_reads_back(capsys, tmp_path, arch):
+    out = tmp_path / "out"
+    status, said, _ = run(
+        capsys, "optimize", arch, "--schedule", "free", "--aim", "minmax,steps", "--out", str(out)
+    )
+    assert status == 0
+    assert "optimal" in said
+    summary = json.loads((out / "summary.json").read_text())
+    assert summary["status"] == "optimal"
+    assert summary["bound"] == pytest.approx(summary["objective"])
+    assert summary["scales"]["F_largest"] > 0  # from the scene's own methods
+    steps = read_plan(load_scene(arch), out / "plan.csv")
+    assert len(steps) == summary["steps"] == summary["objective"]["steps"]
+    assert not (out / "scene.json").exists()
+
+
+def test_more_robots_come_with_their_scene(capsys, tmp_path, arch):
+    out = tmp_path / "out"
+    words = ["--robots", "4", "--rule", "ending=one-by-one", "--rule", "regrips=1"]
+    status, *_ = run(capsys, "optimize", arch, "--schedule", "free", *words, "--out", str(out))
+    assert status == 0
+    scene = load_scene(out / "scene.json")
+    assert [robot.name for robot in scene.robots][3:] == ["rob4"]
+    steps = read_plan(scene, out / "plan.csv")
+    assert steps[-1].held == ()
+    assert len(steps[-2].held) == 1
+
+
+@pytest.mark.parametrize(
+    ("words", "status", "said"),
+    [
+        (["--rule", "newest=never"], 2, "rule newest: 'never'; give one of either"),
+        (["--rule", "speed=2"], 2, "--rule speed=2: there is no such; give one of newest"),
+        (["--rule", "regrips=few"], 2, "rule regrips: 'few'"),
+        (["--aim", "speed"], 2, "aim 'speed': there is no such"),
+        (["--robots", "7"], 2, "7 robots: the free schedule takes two to 5"),
+        (["--robots", "rob9,rob1"], 2, "robot 'rob9': there is no such"),
+        (["--option", "width=0"], 2, "--option width=0: '0' is not a positive number"),
+        (["--option", "speed=1"], 2, "--option speed=1: there is no such; give one of width"),
+        (["--formulation", "minimax"], 2, "no formulation of the free schedule"),
+        (["--criteria", "equations-2-3"], 2, "it ranks the choices of a move"),
+        (["--limit", "F_largest=1"], 3, "a way opens with F_largest="),
+    ],
+)
+def test_what_is_wrong_gets_one_line(capsys, tmp_path, arch, words, status, said):
+    arguments = ["optimize", arch, "--schedule", "free", *words, "--out", str(tmp_path / "out")]
+    found, _, error = run(capsys, *arguments)
+    assert found == status
+    assert said in error
+    assert error.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_what_only_the_free_schedule_has(capsys, tmp_path, arch):
+    out = ["--out", str(tmp_path / "out")]
+    for words in (["--aim", "steps"], ["--rule", "regrips=0"]):
+        status, _, error = run(capsys, "optimize", arch, *words, *out)
+        assert status == 2
+        assert "only the free schedule has it; give --schedule free" in error
+    status, _, error = run(capsys, "optimize", arch, *out)
+    assert status == 2
+    assert "--formulation: it is missing; give one of beam" in error
+
+
+def test_pareto_writes_table_plans_and_chart(capsys, tmp_path, arch):
+    out = tmp_path / "front"
+    words = ["--aim", "F_largest,M_sup", "--round", "M_sup=0.5", "--pick", "M_sup"]
+    status, said, _ = run(
+        capsys, "pareto", arch, *words, "--under", "F_largest=1000", "--out", str(out)
+    )
+    assert status == 0
+    table = pd.read_csv(out / "pareto.csv")
+    assert f"{len(table)} points, complete; picked row" in said
+    plans = pd.read_csv(out / "plans.csv")
+    assert {*plans["point"]} == {*table["point"]}
+    for point, rows in plans.groupby("point"):
+        largest = rows[[c for c in rows if c.startswith("F_rob")]].abs().max().max()
+        row = table[table["point"] == point].iloc[0]
+        assert largest == pytest.approx(row["F_largest"], rel=1e-5)
+        assert rows["M_sup_Nm"].max() <= row["M_sup"] * (1 + 1e-5)
+    assert (out / "pareto.png").read_bytes()[:4] == b"\x89PNG"
+    picked = read_plan(load_scene(arch), out / "pick.csv")
+    assert len(picked) == table["steps"][table["M_sup"].argmin()]
+
+
+def test_pareto_of_a_loop_and_methods_to_beat(capsys, tmp_path, arch):
+    out = ["--out", str(tmp_path / "front")]
+    loop = ["--schedule", "three-robot", "--aim", "F_largest,T_max"]
+    status, said, _ = run(capsys, "pareto", arch, *loop, *out)
+    assert status == 0
+    assert "complete" in said
+    words = ["--aim", "F_largest,M_sup,T_max,D_max", "--pick", "steps", "--under", "cantilever"]
+    status, said, error = run(capsys, "pareto", arch, *words, *out)
+    assert "picked row" in said or "no plan of the set is below all bounds" in error
+    status, _, error = run(capsys, "pareto", arch, "--pick", "steps", "--under", "magic", *out)
+    assert status == 2
+    assert "--under magic" in error
+    status, _, error = run(capsys, "pareto", arch, *loop, "--rule", "regrips=0", *out)
+    assert status == 2
+    assert "go with free" in error

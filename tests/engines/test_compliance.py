@@ -1,0 +1,156 @@
+"""When the fast engine's own answers stand, and when they are corrected."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from experiments.engines.parts.limit_scenes import LOOSE_AT, chain, loosened
+from experiments.engines.parts.reference_chain import solve_exactly
+from seqopt.engines.interface import NAMES, Want, grip_columns
+from seqopt.engines.planar import PlanarEngine
+from seqopt.engines.rigid import compliance
+from seqopt.engines.rigid.compliance import CANCEL, EVEN, ComplianceEngine, cancels, solve_batch
+from seqopt.engines.rigid.operator import ComplianceOperator, OperatorBuilder
+from seqopt.engines.rigid.spanning_tree import grow_tree
+from seqopt.network.build import build_network
+from tests.builders import from_both_sides, six_bricks, small_arch
+
+KINDS = ("translational_stiffness", "rotational_stiffness")
+BOTH_SIDES = [(6, 15, 25), (9, 14, 26)]  # of the loose joint
+
+
+def apart(fields, others):
+    """The largest difference of any field, relative to its largest entry."""
+    pairs = [(getattr(fields, name), getattr(others, name)) for name in NAMES]
+    return max(np.abs(a - b).max() / np.abs(b).max() for a, b in pairs)
+
+
+def test_nothing_is_corrected_where_joints_are_even(monkeypatch):
+    monkeypatch.setattr(compliance, "Refinement", None)
+    for scene in (six_bricks(), from_both_sides(5), chain(9)):
+        engine, count = ComplianceEngine(build_network(scene)), len(scene.bricks)
+        for bricks in (1, 2, count - 1, count, 1):
+            node = scene.placed[bricks - 1].placing_node
+            assert np.isfinite(engine.solve(bricks, [[node]]).grip_force).all()
+
+
+def test_grips_on_both_sides_of_a_joint_that_hardly_turns(monkeypatch):
+    """Pivots find nothing wrong there, and digits are lost: the control."""
+    net = build_network(loosened(chain(16), 1e-7, only_turning=True))
+    columns = grip_columns(net, 16, BOTH_SIDES)
+    operator = OperatorBuilder(net, grow_tree(net)).operator(16)
+    plain, trusted = solve_batch(operator, columns, Want.ALL)
+    assert trusted.all()
+    better, worse = ComplianceEngine(net).solve(16, BOTH_SIDES, Want.ALL), 0.0
+    for row, grips in enumerate(columns):
+        exact = solve_exactly(net, 16, grips)
+        size = np.abs(exact.displacement).max()
+        nodes = net.inner.ravel()
+        assert np.abs(better.displacement[row, nodes] - exact.displacement).max() <= 1e-9 * size
+        gap = np.abs(plain.displacement[row, nodes] - exact.displacement).max()
+        worse = max(worse, gap / size)
+    assert worse > 5e-9
+    assert not solve_batch(operator, columns, even=False)[1].all()
+
+
+def evenly(scene, joint, kind, share):
+    """The scene with equal joints, one of which is softer in one direction."""
+    stiff = {"translational_stiffness": (1e8,) * 3, "rotational_stiffness": (1e6,) * 3}
+    grounds = tuple(replace(g, **stiff) for g in scene.grounds)
+    joints = [replace(j, **stiff) for j in scene.joints]
+    size = stiff[kind][0]
+    joints[joint] = replace(joints[joint], **{kind: (size, share * size, size)})
+    return replace(scene, grounds=grounds, joints=tuple(joints))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(
+    ("share", "uneven"), [(1.0, False), (EVEN, False), (0.99 * EVEN, True), (1.01 / EVEN, True)]
+)
+@pytest.mark.parametrize("scene", [chain(6), small_arch(5), from_both_sides(7)])
+def test_who_looks_for_what_cancels(monkeypatch, scene, kind, share, uneven):
+    """Only what has a joint that is far softer or stiffer than others, from where it acts on."""
+    looked = []
+    monkeypatch.setattr(
+        compliance, "cancels", lambda *seen: looked.append(seen[0].bricks) or cancels(*seen)
+    )
+    joint = scene.joints[2]
+    engine = ComplianceEngine(build_network(evenly(scene, 2, kind, share)))
+    for bricks in range(1, len(scene.bricks) + 1):
+        engine.solve(bricks, [[scene.placed[bricks - 1].placing_node]])
+    acts = 1 + max(scene.build_order.index(brick) for brick in joint.bricks)
+    assert looked == ([*range(acts, len(scene.bricks) + 1)] if uneven else [])
+
+
+@pytest.mark.parametrize(("share", "seen"), [(1 - 1e-9, False), (1 + 1e-9, True)])
+@pytest.mark.parametrize("chunk", [2, 2048])
+def test_motions_cancel_where_their_parts_are_ten_times_what_is_left(
+    monkeypatch, share, seen, chunk
+):
+    """At any node that a grip loads, what forces and weight move, signs aside, over the rest."""
+    monkeypatch.setattr(compliance, "CHUNK", chunk)
+    rng, nothing = np.random.default_rng(0), np.zeros((7, 1))
+    flexibility, dead, motion = rng.normal(size=(6, 6)), rng.normal(size=6), np.eye(7, 9)
+    index = np.array([[0, 1, 2], [3, 4, 5], [0, 4, 2], [5, 1, 3], [2, 0, 4]])
+    force = rng.normal(size=index.shape)
+    for row in range(5):
+        loaded = np.append(np.zeros(6), 1.0)
+        loaded[index[row]] = force[row]
+        parts = max(
+            sum(abs(flexibility[i, j] * f) for j, f in zip(index[row], force[row], strict=True))
+            + abs(dead[i])
+            for i in index[row]
+        )
+        left = np.abs(loaded @ motion).max()
+        size = share * CANCEL * left / parts
+        own = ComplianceOperator(
+            *(1, size * flexibility, size * dead, nothing, motion),
+            *(nothing, nothing, nothing, np.eye(2, 3), np.zeros(2, int)),
+        )
+        assert cancels(own, index, force)[row] == seen
+    assert cancels(own, np.zeros((3, 0), int), np.zeros((3, 0))).tolist() == [False] * 3
+
+
+def test_what_was_corrected_before_for_other_bricks_is_no_help():
+    """More bricks, fewer, the same again: each as an engine of its own would say."""
+    net = build_network(loosened(chain(16), 1e-9, only_turning=True))
+    engine, joined = ComplianceEngine(net), LOOSE_AT + 2
+    for bricks in (joined + 1, joined + 3, joined, joined + 2, joined + 2):
+        grips = [[2 * bricks - 1, 2 * bricks - 3, 4]]
+        own = ComplianceEngine(net).solve(bricks, grips, Want.ALL)
+        assert engine.solve(bricks, grips, Want.ALL) == own
+
+
+def test_a_correction_is_kept_for_the_same_bricks(monkeypatch):
+    made = []
+    real = compliance.Refinement
+    monkeypatch.setattr(compliance, "Refinement", lambda *o: made.append(o[1]) or real(*o))
+    engine = ComplianceEngine(build_network(loosened(chain(16), 1e-9, only_turning=True)))
+    for bricks in (16, 16, 14, 14, 16):
+        engine.solve(bricks, [[2 * bricks - 1, 2 * bricks - 3, 4]])
+    assert made == [16, 14, 16]
+
+
+def test_bricks_in_a_plane_are_corrected_too():
+    net = build_network(loosened(chain(16, pattern="V"), 1e-9, only_turning=True))
+    sets = [(26, 29, 31), (27, 31, 30), (4, 14, 30)]
+    plane, space = (e(net).solve(16, sets, Want.ALL) for e in (PlanarEngine, ComplianceEngine))
+    for name in ("displacement", "grip_force", "support"):
+        size = np.abs(getattr(space, name)).max()
+        assert np.abs(getattr(plane, name) - getattr(space, name)).max() <= 1e-9 * size
+
+
+def test_sets_keep_their_places_where_some_are_corrected():
+    net = build_network(loosened(chain(16), 1e-9, only_turning=True))
+    sets = [(1, 2, 3), (26, 29, 31), (3, 8, 10), (27, 31, 30), (5, 9, 11)]
+    engine = ComplianceEngine(net)
+    whole = engine.solve(16, sets, Want.ALL)
+    for row, grips in enumerate(sets):
+        own = engine.solve(16, [grips], Want.ALL)
+        assert all(
+            np.allclose(getattr(whole, n)[row], getattr(own, n)[0], rtol=1e-9, atol=1e-12)
+            for n in NAMES
+        )

@@ -1,0 +1,201 @@
+"""The compliance operator and its grips' equations against solving each structure directly."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from experiments.harness.walls import running_bond
+from seqopt.engines.basis import SPACE
+from seqopt.engines.interface import NAMES, Want, grip_columns
+from seqopt.engines.planar import PlanarEngine
+from seqopt.engines.rigid.compliance import ComplianceEngine, solve_batch
+from seqopt.engines.rigid.dense import solve_dense
+from seqopt.engines.rigid.grip_equations import grip_forces, still_forces
+from seqopt.engines.rigid.held_operator import held_operator
+from seqopt.engines.rigid.loose import hold_loose
+from seqopt.engines.rigid.mixed_system import ungripped_system
+from seqopt.engines.rigid.operator import OperatorBuilder, load_matrix
+from seqopt.engines.rigid.spanning_tree import grow_tree
+from seqopt.network.build import build_network
+from seqopt.scene.arch import ArchShape, arch_scene
+from tests.builders import branch, from_both_sides, hinged, six_bricks, small_arch
+
+SCENES = {
+    "arch": small_arch(5),
+    "wall": running_bond(3, 3),
+    "both sides": from_both_sides(6, "VLR"),
+    "branch": branch(),
+}
+
+
+def unequal(scene):
+    """The scene with joints of which no two are alike, in no two directions."""
+    joints = [
+        replace(
+            joint,
+            translational_stiffness=(1e8 + 1e6 * i, 2e8 + 3e6 * i, 5e8),
+            rotational_stiffness=(1e6 + 1e4 * i, 3e6, 4e6 + 2e4 * i),
+        )
+        for i, joint in enumerate(scene.joints)
+    ]
+    return replace(scene, joints=tuple(joints))
+
+
+def free_nodes(scene, bricks):
+    nodes = [node for brick in scene.placed[:bricks] for node in brick.nodes]
+    return [node for node in nodes if node not in scene.blocked_nodes]
+
+
+def sets_of(scene, bricks, grips, count=4):
+    """Sets of free nodes, among them those of the last bricks, where two share a brick."""
+    free = free_nodes(scene, bricks)
+    rng = np.random.default_rng(10 * bricks + grips)
+    drawn = [rng.choice(free, grips, replace=False) for _ in range(count)]
+    return np.array([*drawn, free[:grips], free[-grips:]]) if grips else np.zeros((1, 0), int)
+
+
+@pytest.mark.parametrize("grips", [0, 1, 2, 3, 4])
+@pytest.mark.parametrize("name", SCENES)
+def test_every_field_is_that_of_a_direct_solve(name, grips):
+    """At every brick count: what closes loops is there or not, ends carry or do not yet."""
+    scene = unequal(SCENES[name])
+    net = build_network(scene)
+    builder = OperatorBuilder(net, grow_tree(net))
+    for bricks in range(1, len(scene.bricks) + 1):
+        if len(free_nodes(scene, bricks)) < grips:
+            continue
+        columns = grip_columns(net, bricks, sets_of(scene, bricks, grips))
+        fields, trusted = solve_batch(builder.operator(bricks), columns, Want.ALL)
+        direct = solve_dense(net, bricks, columns)
+        assert trusted.all()
+        for field in NAMES:
+            own, other = getattr(fields, field), getattr(direct, field)
+            unit = 1e-8 if field in ("displacement", "brick_twist") else 1.0  # what 1 N moves
+            gap = np.abs(own - other).max(initial=0)
+            assert gap <= 1e-9 * np.abs(other).max(initial=unit), (bricks, field)
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_flexibility_is_symmetric_and_costs_work(name):
+    """Maxwell's law; forces on nodes do work that is not negative, none without motion."""
+    net = build_network(unequal(SCENES[name]))
+    operator = OperatorBuilder(net, grow_tree(net)).operator(len(net.inner))
+    flexibility = operator.flexibility
+    assert np.abs(flexibility - flexibility.T).max() <= 1e-12 * flexibility.max()
+    values = np.linalg.eigvalsh(flexibility)
+    assert values[0] >= -1e-12 * values[-1]
+    assert operator.directions == 3
+    weight = net.inner_weight.ravel()
+    assert operator.dead_displacement == pytest.approx(flexibility @ weight, rel=1e-12)
+
+
+@pytest.mark.parametrize("grips", [1, 2, 3])
+def test_in_a_plane_the_same_with_fewer_directions(grips):
+    shape = ArchShape(pitch=np.linspace(1.3, -1.3, 6).tolist(), pattern="V")
+    net = build_network(unequal(arch_scene(shape)))
+    plane, space = PlanarEngine(net), ComplianceEngine(net)
+    for bricks in (2, 5, 6):
+        sets = sets_of(net.scene, bricks, grips)
+        a, b = (engine.solve(bricks, sets, Want.ALL) for engine in (plane, space))
+        for field in NAMES:
+            size = np.abs(getattr(b, field)).max()
+            assert np.abs(getattr(a, field) - getattr(b, field)).max() <= 1e-8 * size, field
+
+
+def test_only_what_is_wanted_is_computed():
+    net = build_network(small_arch(5))
+    engine = ComplianceEngine(net)
+    whole = engine.solve(5, [[3, 7]], Want.ALL)
+    fields = {
+        Want.EDGES: "edge_force",
+        Want.DISPLACEMENTS: "displacement",
+        Want.SUPPORT: "support",
+        Want.JOINTS: "joint_wrench",
+        Want.BRICKS: "brick_twist",
+    }
+    for want in fields:
+        part = engine.solve(5, [[3, 7]], want)
+        assert (part.grip_force == whole.grip_force).all()
+        for other, name in fields.items():
+            own = getattr(part, name)
+            assert own.shape[1] == 0 if other is not want else (own == getattr(whole, name)).all()
+
+
+def test_loads_as_a_matrix():
+    index, force = np.array([[2, 0], [1, 3]]), np.array([[5.0, 7.0], [9.0, 11.0]])
+    dense = [[7.0, 0, 5, 0, 1], [0, 9, 0, 11, 1]]
+    assert load_matrix(index, force, 4).toarray().tolist() == dense
+    half = load_matrix(index, force, 4, weight=0.5).toarray()
+    assert half[:, -1].tolist() == [0.5, 0.5]
+    assert load_matrix(index[:, :0], force[:, :0], 4).toarray().tolist() == [[0, 0, 0, 0, 1]] * 2
+
+
+def test_which_loads_act_at_a_grip():
+    net = build_network(small_arch(5))
+    operator = OperatorBuilder(net, grow_tree(net), SPACE).operator(5)
+    columns = np.array([[0, 4], [9, 2]])
+    index = [[0, 1, 2, 12, 13, 14], [27, 28, 29, 6, 7, 8]]
+    assert operator.load_index(columns).tolist() == index
+    held = replace(operator, loose=2, flexibility=np.zeros((32, 32)))
+    assert held.directions == 3
+    assert held.load_index(columns).tolist() == [[*row, 30, 31] for row in index]
+
+
+@pytest.mark.parametrize("sets", [[(0, 3)], [(2, 3)], [(4, 9, 8)], [(8, 5, 9)], [(2, 6, 3, 7)]])
+def test_forces_undo_what_they_are_asked_to(sets):
+    """Between grips on one brick, in whichever places, the inner edge carries nothing."""
+    net = build_network(unequal(small_arch(5)))
+    operator = OperatorBuilder(net, grow_tree(net)).operator(5)
+    columns = np.array(sets)
+    index = operator.load_index(columns)
+    force, _ = grip_forces(operator, columns, index)
+    flexibility, dead = operator.flexibility, operator.dead_displacement[index[0]]
+    moved = flexibility[np.ix_(index[0], index[0])] @ force[0] + dead
+    assert np.abs(moved).max() <= 1e-9 * np.abs(dead).max()
+    again = still_forces(operator, columns, index, dead[None])
+    moved = flexibility[np.ix_(index[0], index[0])] @ again[0] + dead
+    assert np.abs(moved).max() <= 1e-9 * np.abs(dead).max()
+    carried = load_matrix(index, force, len(flexibility)) @ operator.edge_force
+    bricks = columns[0] // 2
+    for brick in {b for b in bricks if (bricks == b).sum() == 2}:
+        edge = operator.inner_edge[brick]
+        assert abs(carried[0, edge]) <= 1e-9 * np.abs(carried).max()
+        first, second = np.flatnonzero(bricks == brick)
+        axis = operator.axis[brick]
+        pulls = [again[0].reshape(-1, 3)[place] @ axis for place in (first, second)]
+        assert abs(pulls[0] - pulls[1]) <= 1e-6 * np.abs(again).max()  # no force between them
+
+
+def eliminated(matrix):
+    """The pivots of a matrix, from the first unknown to the last."""
+    left, pivots = matrix.copy(), []
+    while len(left):
+        pivots.append(left[0, 0])
+        left = left[1:, 1:] - np.outer(left[1:, 0], left[0, 1:]) / left[0, 0]
+    return np.array(pivots)
+
+
+@pytest.mark.parametrize("grips", [(6, 9), (9, 7), (2, 7, 9), (3, 8, 6), (8, 9, 1), (6, 8, 9)])
+def test_loose_motions_are_unknowns_of_the_grips(grips):
+    """They move until nothing pulls at them; pivots are measured by what they stand on."""
+    net = build_network(hinged(six_bricks(), 2))
+    operator = held_operator(hold_loose(ungripped_system(net, 5)))
+    assert operator.loose == 3
+    columns = np.array([grips])
+    index = operator.load_index(columns)
+    force, pivot = grip_forces(operator, columns, index)
+    part = operator.flexibility[np.ix_(index[0], index[0])]
+    moved = part @ force[0] + operator.dead_displacement[index[0]]
+    assert np.abs(moved[:-3]).max() <= 1e-9 * np.abs(operator.dead_displacement[:30]).max()
+    assert np.abs(moved[-3:]).max() <= 1e-9 * np.abs(net.inner_weight).max()
+    bricks = columns[0] // 2
+    if len(set(bricks)) == len(grips):
+        scale = np.append(np.diag(part)[:-3], [-1 / operator.softness] * 3)
+        assert pivot == pytest.approx([min(1.0, (eliminated(part) / scale).min())], rel=1e-6)
+    else:
+        weighed = load_matrix(index, force, len(operator.flexibility)) @ operator.edge_force
+        (brick,) = {b for b in bricks if (bricks == b).sum() == 2}
+        assert abs(weighed[0, operator.inner_edge[brick]]) <= 1e-9 * np.abs(weighed).max()

@@ -1,0 +1,220 @@
+"""Formulations against the programs that their own texts display, written out by enumeration."""
+
+from __future__ import annotations
+
+from itertools import pairwise, product
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import formulations.rank_search
+from seqopt.errors import InfeasibleError, ProblemError
+from seqopt.placement.costs import LayeredCosts
+from seqopt.placement.formulation import FormulationKind, Reads
+from seqopt.placement.formulation import formulations as registered
+from seqopt.placement.interface import Aim, CostProblem
+from tests.strategies import problems
+
+ALL = registered()
+INF = np.inf
+
+
+class Ranked(CostProblem):
+    """A problem whose shared steps look otherwise once the choice before is made, as ranks do."""
+
+    def conditional(self, move, before):
+        row = np.nan_to_num(super().conditional(move, before), posinf=1.0)
+        return (7 * row + 3 * move) % 5
+
+
+def ranked(problem):
+    """The problem as one of ranks, or None if no choice is allowed."""
+    own = Ranked(problem.sums)
+    try:
+        own.sums.continuable()
+    except InfeasibleError:
+        return None
+    return own
+
+
+def later(costs, k, i):
+    """Whether a candidate is allowed and leads on to the last move."""
+    if not np.isfinite(costs.single[k][i]):
+        return False
+    if k + 1 == len(costs.single):
+        return True
+    ahead = range(costs.sizes[k + 1])
+    return any(np.isfinite(costs.shared[k + 1][i, j]) and later(costs, k + 1, j) for j in ahead)
+
+
+def charged(problem, k, before, i):
+    """What move k answers for in the step that it shares with the one before; None if blocked."""
+    shared = problem.sums.shared[k][before[-1] if before else 0, i]
+    if not (np.isfinite(shared) and later(problem.sums, k, i)):
+        return None
+    return problem.conditional(k, before[-1])[i] if before else shared
+
+
+def first_of_least(worth):
+    """The first of those candidates that are worth least, None being worth nothing."""
+    return min((value, i) for i, value in enumerate(worth) if value is not None)[1]
+
+
+def cascaded(problem, charge):
+    costs, choice = problem.sums, []
+    for k, size in enumerate(costs.sizes):
+        worth = [charged(problem, k, choice, i) for i in range(size)]
+        for i in range(size):
+            if worth[i] is not None and charge == "earlier":
+                last = k + 1 == len(costs.sizes)
+                worth[i] = 0.0 if last else min(costs.shared[k + 1][i])
+            if worth[i] is not None:
+                worth[i] += costs.single[k][i]
+        choice.append(first_of_least(worth))
+    return tuple(choice)
+
+
+def searched(problem, horizon):
+    costs, choice = problem.sums, []
+    while len(choice) < len(costs.sizes):
+        k, worth = len(choice), {}
+        for ahead in product(*(range(size) for size in costs.sizes[k : k + horizon])):
+            total = charged(problem, k, choice, ahead[0])
+            if total is None or not all(later(costs, k + n, i) for n, i in enumerate(ahead)):
+                continue
+            total += sum(costs.single[k + n][i] for n, i in enumerate(ahead))
+            total += sum(costs.shared[k + n + 1][p] for n, p in enumerate(pairwise(ahead)))
+            if np.isfinite(total):
+                worth[ahead] = total
+        best = min(worth, key=lambda ahead: (worth[ahead], ahead))
+        choice += best if k + horizon >= len(costs.sizes) else best[:1]
+    return tuple(choice)
+
+
+def beamed(problem, width):
+    costs, kept = problem.sums, [(0.0, ())]
+    for k, size in enumerate(costs.sizes):
+        found = []
+        for i in range(size):
+            before = [
+                (c + costs.shared[k][p[-1] if p else 0, i], n) for n, (c, p) in enumerate(kept)
+            ]
+            total, n = min(before)
+            if later(costs, k, i) and np.isfinite(total):
+                found.append((total + costs.single[k][i], (*kept[n][1], i)))
+        kept = sorted(found, key=lambda pair: pair[0])[:width]
+        if not kept:
+            return cascaded(problem, "later")
+    return min(kept[0][1], cascaded(problem, "later"), key=costs.cost)
+
+
+@given(problem=problems(), data=st.data())
+@settings(max_examples=150)
+def test_heuristics_do_what_they_display(problem, data):
+    """Also where the shared step, once the choice before is made, is ranked otherwise."""
+    own = ranked(problem)
+    if own is None:
+        return
+    charge = data.draw(st.sampled_from(["later", "earlier"]))
+    number = data.draw(st.integers(1, 4))
+    for name, options, choice in (
+        ("cascade", {"charge": charge}, cascaded(own, charge)),
+        ("beam", {"width": number}, beamed(own, number)),
+        ("rank_search", {"horizon": number}, searched(own, number)),
+    ):
+        found = ALL[name].solve(own, **options)
+        assert (name, found.choice) == (name, choice)
+        assert (found.objective, found.bound) == (own.sums.cost(choice), -INF)
+
+
+@pytest.mark.parametrize(("name", "option"), [("beam", "width"), ("rank_search", "horizon")])
+def test_numbers_start_at_one(name, option):
+    problem = CostProblem(LayeredCosts((np.zeros(2),), (np.zeros((1, 2)),)))
+    assert ALL[name].solve(problem, **{option: 1}).choice == (0,)
+    for number in (0, -1):
+        with pytest.raises(ProblemError, match=f"{name}: {option} is {number}; give a whole"):
+            ALL[name].solve(problem, **{option: number})
+
+
+def test_what_each_promises():
+    exact, bound, heuristic = (
+        FormulationKind.EXACT,
+        FormulationKind.BOUND,
+        FormulationKind.HEURISTIC,
+    )
+    promised = {
+        name: (own.kind, own.aim, own.reads, own.takes_budgets) for name, own in ALL.items()
+    }
+    assert promised == {
+        "beam": (heuristic, Aim.SUM, Reads.ALL, False),
+        "cascade": (heuristic, Aim.SUM, Reads.WINDOW, False),
+        "minimax": (exact, Aim.PEAK, Reads.ALL, False),
+        "overlap_dp": (exact, Aim.SUM, Reads.ALL, False),
+        "overlap_lp": (bound, Aim.SUM, Reads.ALL, True),
+        "overlap_mip": (exact, Aim.SUM, Reads.ALL, True),
+        "rank_search": (heuristic, Aim.SUM, Reads.WINDOW, False),
+    }
+
+
+@given(problem=problems())
+def test_defaults_are_those_of_the_texts(problem):
+    own = ranked(problem)
+    if own is not None:
+        for name, options in (
+            ("cascade", {"charge": "later"}),
+            ("beam", {"width": 5}),
+            ("rank_search", {"horizon": 1}),
+        ):
+            assert ALL[name].solve(own).choice == ALL[name].solve(own, **options).choice
+            assert ALL[name].options == options
+
+
+@given(problem=problems())
+def test_exact_ones_take_the_best_and_of_equal_ones_the_first(problem):
+    costs = problem.sums
+    choices = [*product(*(range(size) for size in costs.sizes))]
+    if not np.isfinite([costs.cost(c) for c in choices]).any():
+        for name in ("overlap_dp", "minimax"):
+            with pytest.raises(InfeasibleError):
+                ALL[name].solve(problem)
+        return
+    best = min(choices, key=lambda c: (costs.cost(c), c))
+    found = ALL["overlap_dp"].solve(problem)
+    assert (found.choice, found.objective, found.bound) == (best, *[costs.cost(best)] * 2)
+    flat = min(choices, key=lambda c: (costs.worst(c), costs.cost(c)))
+    found = ALL["minimax"].solve(problem)
+    assert costs.cost(found.choice) == costs.cost(flat)
+    assert found.objective == found.bound == costs.worst(found.choice) == costs.worst(flat)
+
+
+@pytest.mark.parametrize("seed", range(15))
+def test_exact_ones_on_costs_of_any_sign(seed):
+    rng = np.random.default_rng(seed)
+    sizes = rng.integers(2, 5, size=4)
+    single = tuple(rng.integers(-9, 9, size=size).astype(float) for size in sizes)
+    pairs = zip((1, *sizes[:-1]), sizes, strict=True)
+    costs = LayeredCosts(single, tuple(rng.integers(-9, 9, size=p).astype(float) for p in pairs))
+    choices = [*product(*(range(size) for size in costs.sizes))]
+    problem = CostProblem(costs)
+    total, worst = min(map(costs.cost, choices)), min(map(costs.worst, choices))
+    assert ALL["overlap_dp"].solve(problem).objective == total
+    assert ALL["minimax"].solve(problem).objective == worst
+    for name in ("overlap_lp", "overlap_mip"):
+        found = ALL[name].solve(problem)
+        assert found.objective == total
+        assert total - 1e-4 <= found.bound <= total
+        assert found.prices == {}
+        assert found.compile_seconds > 0
+
+
+def test_how_much_is_enumerated_at_once(monkeypatch):
+    free = tuple(np.zeros(2) for _ in range(3))
+    problem = CostProblem(LayeredCosts(free, (np.zeros((1, 2)), np.eye(2), np.eye(2))))
+    monkeypatch.setattr(formulations.rank_search, "MOST", 8)
+    assert ALL["rank_search"].solve(problem, horizon=9).choice == (0, 1, 0)
+    monkeypatch.setattr(formulations.rank_search, "MOST", 7)
+    assert ALL["rank_search"].solve(problem, horizon=2).choice == (0, 1, 0)
+    with pytest.raises(ProblemError, match=r"8 combinations of 3 moves; .*\(at most 7e\+00 are"):
+        ALL["rank_search"].solve(problem, horizon=9)

@@ -1,0 +1,328 @@
+"""The free schedule and its Pareto sets against brute force on small builds, and on the arch."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise, product
+
+import networkx as nx
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+import seqopt
+from seqopt.engines.interface import Want
+from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.errors import InfeasibleError, MechanismError, ProblemError
+from seqopt.network.build import build_network
+from seqopt.placement.criteria import WorstRatio
+from seqopt.placement.free_front import FreeFront
+from seqopt.placement.free_problem import pose_free
+from seqopt.placement.front import find_front, pick, upper_bounds
+from seqopt.placement.loop_front import LoopFront
+from seqopt.placement.requirements import LIMIT_TOLERANCE, Limit
+from seqopt.placement.schedule_formulation import find_schedule_formulation
+from seqopt.responses.quantities import CHOSEN_BY, lengths
+from seqopt.sequence.free_check import RuleBook
+from seqopt.sequence.free_rules import FreeRules, Payload, with_robots
+from seqopt.sequence.steps import StepKind
+from seqopt.sequence.three_robots import three_robot_loop
+from tests.builders import small_arch
+from tests.strategies import free_builds
+
+FOUR = ("F_largest", "M_sup", "T_max", "D_max")
+ONES = WorstRatio("ones", (("F_largest", 100.0), ("M_sup", 10.0), ("T_max", 30.0), ("D_max", 1e-5)))
+
+
+def responses(engine, bricks, grips):
+    """The four worst responses of a state, solved alone; None where something is loose."""
+    held = [node for node in grips if node is not None]
+    try:
+        fields = engine.solve(bricks, np.array([held], dtype=int).reshape(1, -1), Want.ALL)
+    except MechanismError:
+        return None
+    forces = lengths(fields.grip_force)[0]
+    worst = [CHOSEN_BY[name].of(engine.network, fields)[0] for name in FOUR[1:]]
+    return np.array([max(forces, default=0.0), *worst]), dict(zip(held, forces, strict=True))
+
+
+def allowed(engine, rules, bricks, grips):
+    """The four worst responses of a state; None where it is loose or a payload is exceeded."""
+    found = responses(engine, bricks, grips)
+    if found is None:
+        return None
+    worst, forces = found
+    for robot, node in zip(engine.network.scene.robots, grips, strict=True):
+        kept = rules.payload is Payload.KEPT and node is not None
+        if kept and forces[node] > robot.payload * (1 + LIMIT_TOLERANCE):
+            return None
+    return worst
+
+
+def whole_graph(engine, rules):
+    """Every labeled state with its four responses, the steps between them, start and ends."""
+    book = RuleBook(engine.network, rules)
+    start = (0, (None,) * len(engine.network.scene.robots), 0)
+    graph = nx.DiGraph([("ends", "end")], regrip=0.0)
+    graph.add_node(start, worst=np.zeros(4))
+    work = [start]
+    while work:
+        state = work.pop()
+        for kind, bricks, grips, regrips in book.follow(*state):
+            after = (bricks, grips, regrips if rules.regrips is not None else 0)
+            if after not in graph:
+                worst = allowed(engine, rules, bricks, grips)
+                if worst is None:
+                    continue
+                graph.add_node(after, worst=worst)
+                work.append(after)
+                if book.ends(bricks, grips):
+                    graph.add_edge(after, "end", regrip=0.0)
+            graph.add_edge(state, after, regrip=float(kind is StepKind.REPOSITION))
+    graph.remove_node("ends")
+    return graph, start
+
+
+def least_peak(graph, start, costs):
+    """The least worst cost of any path, by trying every value that occurs."""
+    for value in sorted({*costs.values()}):
+        kept = [n for n in graph if n == "end" or costs[n] <= value]
+        if start in kept and nx.has_path(graph.subgraph(kept), start, "end"):
+            return value, graph.subgraph(kept)
+    return None
+
+
+def peaks(graph):
+    scales = np.array([scale for _, scale in ONES.limits])
+    return {n: float((d["worst"] / scales).max()) for n, d in graph.nodes(data=True) if n != "end"}
+
+
+def brute_force(engine, rules):
+    """The least peak, the fewest steps at it, then the fewest steps of all, the peak at them."""
+    graph, start = whole_graph(engine, rules)
+    costs = peaks(graph)
+    found = least_peak(graph, start, costs)
+    if found is None:
+        return None
+    value, below = found
+    steps = nx.shortest_path_length(below, start, "end") - 1
+    regrips = nx.shortest_path_length(below, start, "end", weight="regrip")
+    fewest = nx.shortest_path_length(graph, start, "end")
+    to, back = (
+        nx.single_source_shortest_path_length(graph, start),
+        nx.single_source_shortest_path_length(graph.reverse(), "end"),
+    )
+    tight = nx.DiGraph(
+        (a, b) for a, b in graph.edges if to.get(a, 99) + 1 + back.get(b, 99) == fewest
+    )
+    return value, steps, regrips, fewest - 1, least_peak(tight, start, costs)[0]
+
+
+def check_against_brute_force(scene, rules):
+    engine = ComplianceEngine(build_network(scene))
+    best = brute_force(engine, rules)
+    first, second, third = (
+        pose_free(engine, rules, ONES, aim)
+        for aim in ("minmax,steps", "steps,minmax", "minmax,regrips")
+    )
+    if best is None:
+        with pytest.raises(InfeasibleError, match="free schedule: "):
+            seqopt.solve(first, "schedule_search")
+        return
+    value, steps, regrips, fewest, peak = best
+    plan = seqopt.solve(first, "schedule_search")
+    assert plan.certificate.objective == pytest.approx((value, steps))
+    assert plan.certificate.gap == 0
+    other = seqopt.solve(second, "schedule_search")
+    assert other.certificate.objective == pytest.approx((fewest, peak))
+    last = seqopt.solve(third, "schedule_search")
+    assert last.certificate.objective == pytest.approx((value, regrips))
+
+
+@given(build=free_builds(most_bricks=4, most_robots=3))
+@settings(max_examples=10, deadline=None)
+def test_it_equals_brute_force(build):
+    check_against_brute_force(*build)
+
+
+@pytest.mark.slow
+@given(build=free_builds(most_bricks=6, most_robots=4))
+@settings(max_examples=15, deadline=None)
+def test_it_equals_brute_force_on_more_bricks_and_robots(build):
+    assume(len(build[0].bricks) >= 4)
+    check_against_brute_force(*build)
+
+
+def dominated(point, points):
+    return any((p <= point).all() and (p < point).any() for p in points)
+
+
+def brute_front(engine, rules, step):
+    """All vectors that no plan dominates, by trying every combination of values that occur."""
+    graph, start = whole_graph(engine, rules)
+    worst = {
+        n: np.ceil(d["worst"][[0, 1]] / step - 1e-9) * step
+        for n, d in graph.nodes(data=True)
+        if n != "end"
+    }
+    values = [sorted({w[k] for w in worst.values()}) for k in range(2)]
+    found = []
+    for point in map(np.array, product(*values)):
+        if not dominated(point, found) and not any((p == point).all() for p in found):
+            kept = [n for n in graph if n == "end" or (worst[n] <= point).all()]
+            if start in kept and nx.has_path(graph.subgraph(kept), start, "end"):
+                found.append(point)
+    return sorted(tuple(p) for p in found if not dominated(p, found))
+
+
+@given(build=free_builds(most_bricks=4, most_robots=3))
+@settings(max_examples=6, deadline=None)
+def test_pareto_sets_equal_brute_force(build):
+    scene, rules = build
+    engine = ComplianceEngine(build_network(scene))
+    step = np.array([5.0, 2.0])
+    problem = pose_free(engine, rules, ONES, "F_largest,M_sup")
+    expected = brute_front(engine, rules, step)
+    front = FreeFront(problem, {"F_largest": 5.0, "M_sup": 2.0})
+    if not expected:
+        with pytest.raises(InfeasibleError):
+            find_front(front)
+        return
+    found = find_front(front)
+    assert found.complete
+    assert found.table[["F_largest", "M_sup"]].to_numpy() == pytest.approx(np.array(expected))
+
+
+@given(
+    points=st.lists(st.tuples(*[st.integers(0, 4)] * 3), min_size=1, max_size=6),
+    z=st.tuples(*[st.integers(0, 5)] * 3),
+)
+def test_corners_hold_what_no_point_dominates(points, z):
+    points, z = np.array(points, float), np.array(z, float)
+    free = not (points <= z).all(axis=1).any()
+    assert free == (z < upper_bounds(points)).all(axis=1).any()
+
+
+@pytest.fixture(scope="module")
+def arch(engine25):
+    return pose_free(engine25, FreeRules(), seqopt.CRITERIA["worst-ratio-published"], "minmax")
+
+
+def test_the_arch_of_the_paper(arch):
+    """0.8401 against 1.185 of the loop; 50 steps with the one in which all let go."""
+    plan = seqopt.solve(replace(arch, goals=pose_goals("minmax,steps,regrips")), "schedule_search")
+    assert plan.certificate.objective == pytest.approx((0.84009, 50, 1), abs=1e-5)
+    assert plan.summary()["steps_before_release"] == 49
+    assert plan.problem.sets.solved < 8000  # of 19,490 that robots can hold
+    assert not plan.overloads
+
+
+def test_fewest_steps_that_beat_every_published_maximum(arch, engine25):
+    limits = [Limit(name, bound) for name, bound in arch.criterion.limits]
+    problem = pose_free(engine25, FreeRules(), arch.criterion, "steps,regrips,minmax", limits)
+    plan = seqopt.solve(problem, "schedule_search")
+    assert plan.certificate.objective == pytest.approx((48, 0, 0.88289), abs=1e-5)
+    assert plan.summary()["steps_before_release"] == 47
+
+
+def pose_goals(text):
+    engine = ComplianceEngine(build_network(small_arch(4)))
+    return pose_free(engine, FreeRules(), ONES, text).goals
+
+
+def test_all_states_of_the_arch_are_counted(arch):
+    from seqopt.placement.free_graph import explore  # noqa: PLC0415
+
+    graph = explore(arch)
+    assert sum(len(level.states) for level in graph.levels) == 71035  # start and end among them
+
+
+def test_time_and_interrupts_leave_a_plan_and_a_bound(arch, monkeypatch):
+    calls = []
+
+    def interrupt(stage):
+        calls.append(stage)
+        if len(calls) == 40:  # in the second search
+            raise KeyboardInterrupt
+
+    plan = seqopt.solve(arch, "schedule_search", progress=interrupt)
+    assert plan.status == "feasible"
+    assert plan.selection.stopped == "interrupt"
+    assert 0 < plan.selection.bound[0] <= 0.8401 <= plan.selection.objective[0] + 1e-4
+    assert plan.certificate.gap == np.inf
+    with pytest.raises(ProblemError, match="too few to find a plan"):
+        seqopt.solve(arch, "schedule_search", seconds=0.0)
+    with pytest.raises(ProblemError, match="option speed: schedule_search has width"):
+        seqopt.solve(arch, "schedule_search", speed=2)
+
+
+def test_travel_is_that_of_the_steps():
+    network = build_network(with_robots(small_arch(5), 4))
+    problem = pose_free(ComplianceEngine(network), FreeRules(), ONES, "minmax,travel")
+    plan = seqopt.solve(problem, "schedule_search")  # its certificate recomputes both
+    scene = network.scene
+    ways = 0.0
+    for robot in range(4):
+        held = [s.grips[robot] for s in plan.steps if s.grips[robot] is not None]
+        ways += sum(
+            np.linalg.norm(np.subtract(scene.node_position(a), scene.node_position(b)))
+            for a, b in pairwise(held)
+        )
+    assert plan.certificate.objective[1] == pytest.approx(ways)
+
+
+def test_refusals_name_the_brick_and_what_opens_a_way(arch, engine25):
+    two = FreeRules(robots=("rob1", "rob2"))
+    said = r"brick 3 \(3 of 25\) is never placed; a way opens with least_grips=1 together with"
+    with pytest.raises(InfeasibleError, match=said):
+        seqopt.solve(replace(arch, rules=two), "schedule_search")
+    tight = pose_free(engine25, FreeRules(), ONES, "steps", [Limit("F_largest", 200.0)])
+    with pytest.raises(InfeasibleError, match=r"F_largest=216\.005 in the place of 200"):
+        seqopt.solve(tight, "schedule_search")
+    enough = [Limit("F_largest", 216.006)]
+    assert seqopt.solve(replace(tight, limits=tuple(enough)), "schedule_search").steps
+
+
+def test_the_front_of_the_arch_rounded(arch):
+    problem = replace(arch, goals=pose_goals("F_largest,M_sup,T_max,D_max"))
+    rounding = {"F_largest": 5.0, "M_sup": 1.0, "T_max": 5.0, "D_max": 1e-6}
+    front = find_front(FreeFront(problem, rounding))
+    assert front.complete
+    assert len(front.table) == 34
+    best = pick(front.table, "D_max", {"F_largest": 250.0})
+    assert front.table.iloc[best][[*FOUR]].tolist() == pytest.approx([245, 17, 70, 1.2e-5])
+    with pytest.raises(ProblemError, match="no plan of the set is below all bounds"):
+        pick(front.table, "steps", {"F_largest": 100.0})
+    with pytest.raises(ProblemError, match="no such column"):
+        pick(front.table, "speed")
+
+
+def test_steps_can_be_among_what_is_to_be_small(arch, engine25):
+    problem = pose_free(engine25, FreeRules(), arch.criterion, "F_largest,M_sup,steps")
+    front = find_front(FreeFront(problem, {"F_largest": 10.0, "M_sup": 2.0}))
+    steps = front.table["steps"].to_numpy()
+    assert steps.min() == 48
+    assert len({*steps}) > 1
+    with pytest.raises(ProblemError, match="at most one of steps and regrips"):
+        FreeFront(pose_free(engine25, FreeRules(), arch.criterion, "steps,regrips"))
+
+
+def test_the_front_of_the_loop_holds_its_best_peak(engine25):
+    loop = three_robot_loop(engine25.network)
+    names = [name for name, _ in seqopt.CRITERIA["worst-ratio-published"].limits]
+    front = find_front(LoopFront(engine25, loop, names[:2], rounding={"F_largest": 5.0}))
+    assert front.complete
+    alone = seqopt.solve(
+        seqopt.pose(engine25, loop, WorstRatio("F", (("F_largest", 1.0),))), "minimax"
+    )
+    least = np.ceil(alone.certificate.objective / 5) * 5
+    assert front.table["F_largest"].min() == pytest.approx(least)
+
+
+def test_formulations_are_found_by_name():
+    assert find_schedule_formulation("pareto_zones").kind.value == "exact"
+    with pytest.raises(
+        ProblemError, match="no formulation of the free schedule; give pareto_zones"
+    ):
+        find_schedule_formulation("overlap_dp")

@@ -1,0 +1,108 @@
+"""Laws of the free schedule: what never makes it worse, and what changes nothing."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.errors import InfeasibleError
+from seqopt.network.build import build_network
+from seqopt.placement.criteria import WorstRatio
+from seqopt.placement.free_problem import pose_free
+from seqopt.placement.solving import solve
+from seqopt.scene.parts import Robot
+from seqopt.scene.reach import Anywhere, Sphere
+from seqopt.sequence.free_rules import FreeRules
+from tests.builders import rescaled
+from tests.strategies import free_builds
+
+SCALES = (("F_largest", 100.0), ("M_sup", 10.0), ("T_max", 30.0), ("D_max", 1e-5))
+
+
+def best(scene, rules, aim="minmax", scales=SCALES):
+    """The optimum, infinite where there is none."""
+    engine = ComplianceEngine(build_network(scene))
+    problem = pose_free(engine, rules, WorstRatio("ones", scales), aim)
+    try:
+        return np.array(solve(problem, "schedule_search").certificate.objective)
+    except InfeasibleError:
+        return np.full(aim.count(",") + 1, np.inf)
+
+
+few = settings(max_examples=6, deadline=None)
+builds = free_builds(most_bricks=4, most_robots=3)
+
+
+def not_worse(new, old):
+    return bool((new <= old * (1 + 1e-9)).all())
+
+
+@given(build=builds)
+@few
+def test_one_more_robot_never_worsens_the_optimum(build):
+    scene, rules = build
+    more = (*scene.robots, Robot(name="extra", payload=500.0, reach=Anywhere()))
+    assert not_worse(best(replace(scene, robots=more), rules), best(scene, rules))
+
+
+@given(build=builds, data=st.data())
+@few
+def test_more_reach_never_worsens_the_optimum(build, data):
+    scene, rules = build
+    which = data.draw(st.integers(0, len(scene.robots) - 1))
+    rules = replace(rules, newest="either")  # where a robot places depends on its reach otherwise
+    robots = [replace(r, reach=Anywhere()) if i == which else r for i, r in enumerate(scene.robots)]
+    assert not_worse(best(replace(scene, robots=tuple(robots)), rules), best(scene, rules))
+
+
+@pytest.mark.slow
+@given(build=builds)
+@few
+def test_a_looser_rule_never_worsens_the_optimum(build):
+    scene, rules = build
+    value = best(scene, rules)
+    for _, loose in rules.loosened():
+        assert not_worse(best(scene, loose), value)
+
+
+@given(build=builds, data=st.data())
+@few
+def test_the_order_of_robots_changes_nothing(build, data):
+    scene, rules = build
+    order = data.draw(st.permutations(scene.robots))
+    other = replace(scene, robots=tuple(order))
+    a, b = best(scene, rules, "minmax,steps"), best(other, rules, "minmax,steps")
+    assert a == pytest.approx(b, rel=1e-9)
+
+
+@given(
+    build=builds,
+    length=st.floats(0.2, 5.0),
+    force=st.floats(0.1, 10.0),
+    softness=st.floats(0.1, 10.0),
+)
+@few
+def test_scaling_changes_nothing(build, length, force, softness):
+    scene, rules = build
+    robots = (
+        replace(r, reach=Anywhere()) if isinstance(r.reach, Sphere) else r for r in scene.robots
+    )
+    scene = replace(scene, robots=tuple(robots))  # spheres are not scaled with the scene
+    factor = {"F": force, "M": force * length, "T": force, "D": force * softness}
+    scales = tuple((name, scale * factor[name[0]]) for name, scale in SCALES)
+    a = best(scene, rules, "minmax")
+    b = best(rescaled(scene, length, force, softness), rules, "minmax", scales)
+    assert a == pytest.approx(b, rel=1e-5)
+
+
+def test_a_worse_optimum_is_seen():
+    """The negative control of all laws above."""
+    assert not not_worse(np.array([1.1]), np.array([1.0]))
+    assert not_worse(np.array([1.0]), np.array([np.inf]))
+    with pytest.raises(TypeError):
+        FreeRules(2)

@@ -1,0 +1,189 @@
+"""Rules of the free schedule: what is accepted, and what is said of what is not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from seqopt.errors import StepError
+from seqopt.network.build import build_network
+from seqopt.sequence.free_check import RuleBook, check_free
+from seqopt.sequence.free_rules import FreeRules, with_robots
+from seqopt.sequence.free_start import free_space
+from seqopt.sequence.free_team import node_numbers, sort_robots
+from seqopt.sequence.steps import Step, StepKind
+from tests.builders import small_arch
+from tests.strategies import free_builds
+
+
+@pytest.mark.parametrize(
+    ("rules", "said"),
+    [
+        ({"newest": "never"}, "rule newest: 'never'; give one of either, placing, free"),
+        ({"least_grips": -1}, "rule least_grips: -1; give a whole number from 0 on"),
+        ({"least_grips": 2.5}, "rule least_grips: 2.5"),
+        ({"regrips": "few"}, "rule regrips: 'few'; give a whole number"),
+        ({"ending": "soon"}, "rule ending: 'soon'; give one of held, released, one-by-one"),
+        ({"robots": ("rob1", "rob1")}, "rule robots: rob1 occurs twice"),
+        ({"placers": 3}, "rule placers: 3; give names of robots"),
+    ],
+)
+def test_wrong_rules_get_one_line(rules, said):
+    with pytest.raises(StepError, match=said) as caught:
+        FreeRules(**rules)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("rules", "said"),
+    [
+        ({"robots": ("rob9", "rob1")}, "robot 'rob9': there is no such"),
+        ({"robots": ("rob1",)}, "1 robots take part; name two to 5"),
+        ({"least_grips": 4}, "rule least_grips: 4 grips of 3 robots; give at most 3"),
+        ({"robots": ("rob1", "rob2"), "placers": ("rob3",)}, "rule placers: rob3 takes no part"),
+    ],
+)
+def test_rules_that_do_not_fit_a_scene(rules, said):
+    with pytest.raises(StepError, match=said):
+        FreeRules(**rules).team(small_arch(4))
+
+
+def test_further_robots_are_mobile():
+    scene = small_arch(4)
+    assert [robot.name for robot in with_robots(scene, 5).robots][3:] == ["rob4", "rob5"]
+    assert len(with_robots(scene, 2).robots) == 2
+    for count in (1, 6, 2.5):
+        with pytest.raises(StepError, match="two to 5"):
+            with_robots(scene, count)
+
+
+def test_robots_of_one_kind_are_found():
+    network = build_network(with_robots(small_arch(5), 5))
+    kinds = sort_robots(network, FreeRules())
+    assert max(len(kind.robots) for kind in kinds) >= 3
+    apart = sort_robots(network, FreeRules(placers=("rob3",)))
+    assert len(apart) == len(kinds) + 1
+    capped = sort_robots(network, FreeRules(), {"rob4": 100.0})
+    assert len(capped) == len(kinds) + 1
+
+
+def named(space, bricks, states):
+    """States as a plain value: by kind the set of nodes held, and the regrips."""
+    numbers = np.array([0, *node_numbers(space.network)])
+    for row in states.tolist():
+        held = tuple(frozenset(int(numbers[n]) for n in row[a:b] if n > 0) for a, b in space.slots)
+        yield bricks, held, row[-1] if space.rules.regrips is not None else 0
+
+
+def all_of_space(space):
+    """Every state that many-at-a-time moves reach, and the pairs of states they join."""
+    states, joined = set(), set()
+    level = space.start()
+    for bricks in range(space.bricks + 1):
+        entry = level
+        while len(entry):
+            fresh = set(named(space, bricks, entry)) - states
+            states |= fresh
+            keep = [i for i, name in enumerate(named(space, bricks, entry)) if name in fresh]
+            entry = entry[keep]
+            level = np.concatenate([level, entry])
+            parts = [space.releases(bricks, entry), space.holds(bricks, entry)] if bricks else []
+            for moves in parts:
+                ends = zip(
+                    named(space, bricks, entry[moves.source]),
+                    named(space, bricks, moves.states),
+                    strict=True,
+                )
+                joined |= set(ends)
+            entry = np.concatenate([entry[:0], *(moves.states for moves in parts)])
+        if bricks < space.bricks:
+            moves = space.places(bricks, level)
+            ends = zip(
+                named(space, bricks, level[moves.source]),
+                named(space, bricks + 1, moves.states),
+                strict=True,
+            )
+            joined |= set(ends)
+            level = moves.states
+    return states, joined
+
+
+def all_of_book(network, rules):
+    """The same by plain rules, one state after the other, robots of one kind as a set."""
+    book, kinds = RuleBook(network, rules), sort_robots(network, rules)
+
+    def name(bricks, grips, regrips):
+        held = tuple(frozenset(grips[r] for r in k.robots if grips[r] is not None) for k in kinds)
+        return bricks, held, regrips if rules.regrips is not None else 0
+
+    start = (0, (None,) * len(network.scene.robots), 0)
+    seen, work, joined = {start}, [start], set()
+    while work:
+        state = work.pop()
+        for _, *after in book.follow(*state):
+            joined.add((name(*state), name(*after)))
+            counted = (*after[:2], after[2] if rules.regrips is not None else 0)
+            if counted not in seen:
+                seen.add(counted)
+                work.append(counted)
+    return {name(*state) for state in seen}, joined
+
+
+@given(build=free_builds(most_bricks=4, most_robots=3))
+@settings(max_examples=25)
+def test_many_at_a_time_and_one_after_the_other_agree(build):
+    scene, rules = build
+    network = build_network(scene)
+    states, joined = all_of_space(free_space(network, rules))
+    expected_states, expected_joined = all_of_book(network, rules)
+    assert states == expected_states
+    assert joined == expected_joined
+
+
+def test_a_rule_less_is_seen():
+    """The negative control of the test above."""
+    network = build_network(small_arch(4))
+    strict = all_of_space(free_space(network, FreeRules()))
+    loose = all_of_book(network, FreeRules(least_grips=1))
+    assert strict[0] < loose[0]
+    assert strict[1] < loose[1]
+
+
+def steps_of(*states):
+    return [Step(i, kind, b, grips) for i, (kind, b, grips) in enumerate(states, start=1)]
+
+
+def test_a_sequence_that_breaks_a_rule_is_seen():
+    place, release = StepKind.PLACE, StepKind.RELEASE
+    network = build_network(small_arch(4))
+    first, second = (brick.nodes for brick in network.scene.placed[:2])
+    begun = [(place, 1, (first[1], None, None)), (place, 2, (first[1], second[0], None))]
+    with pytest.raises(StepError, match="1 grips, fewer than least_grips=2"):
+        check_free(network, FreeRules(), steps_of(*begun, (release, 2, (None, second[0], None))))
+    with pytest.raises(StepError, match="nobody holds the newest brick"):
+        check_free(
+            network,
+            FreeRules(least_grips=1),
+            steps_of(*begun, (release, 2, (first[1], None, None))),
+        )
+    with pytest.raises(StepError, match="the build does not end there"):
+        check_free(network, FreeRules(), steps_of(*begun))
+    with pytest.raises(StepError, match="no rule allows it"):
+        check_free(network, FreeRules(placers=("rob2", "rob3")), steps_of(*begun))
+
+
+def test_too_many_states_to_number_are_refused():
+    network = build_network(small_arch(4))
+    with pytest.raises(StepError, match="more states than can be numbered"):
+        free_space(network, FreeRules(regrips=10**17))
+
+
+@given(st.integers(0, 3))
+def test_loosened_rules_allow_more(least):
+    rules = FreeRules(least_grips=least, newest="placing", regrips=1, placers=("rob1", "rob2"))
+    texts = [text for text, _ in rules.loosened()]
+    assert texts[:least] == [f"least_grips={n}" for n in range(least - 1, -1, -1)]
+    assert {"newest=either", "newest=free", "regrips=2", "regrips=any"} <= {*texts}
+    assert {"placers=any", "payload=ignored", "ending=held"} <= {*texts}
