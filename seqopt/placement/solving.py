@@ -89,8 +89,7 @@ def solve(
         False lets ``cascade`` or ``rank_search`` solve only the models that they meet, one window
         after the other; how far the choice is from the optimum then stays unknown.
     time_limit : float, optional
-        After which it stops with the best choice so far and a bound, s; computing all costs before
-        and checking the answer are not counted.
+        After which it stops choosing, with the best choice so far and a bound, s.
     progress : callable, optional
         Told every better choice and bound as it is found.
     **options
