@@ -52,6 +52,7 @@ MODULES = {
     ),
     "seqopt.engines.rigid.operator": RIGID,
     "seqopt.engines.rigid.grip_equations": RIGID,
+    "seqopt.engines.rigid.growth": ("engines/test_operator", "engines/test_growth"),
     "seqopt.placement.costs": ("placement/test_costs", "placement/test_values"),
     "seqopt.placement.certificate": ("placement/test_certificate", "placement/test_values"),
     "seqopt.placement.criteria": ("placement/test_criteria", "placement/test_problem"),

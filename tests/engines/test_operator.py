@@ -13,11 +13,12 @@ from seqopt.engines.interface import NAMES, Want, grip_columns
 from seqopt.engines.planar import PlanarEngine
 from seqopt.engines.rigid.compliance import ComplianceEngine, solve_batch
 from seqopt.engines.rigid.dense import solve_dense
-from seqopt.engines.rigid.grip_equations import grip_forces, still_forces
+from seqopt.engines.rigid.grip_equations import grip_forces, share_pairs, still_forces
 from seqopt.engines.rigid.held_operator import held_operator
+from seqopt.engines.rigid.loads import load_matrix
 from seqopt.engines.rigid.loose import hold_loose
 from seqopt.engines.rigid.mixed_system import ungripped_system
-from seqopt.engines.rigid.operator import OperatorBuilder, load_matrix
+from seqopt.engines.rigid.operator import OperatorBuilder
 from seqopt.engines.rigid.spanning_tree import grow_tree
 from seqopt.network.build import build_network
 from seqopt.scene.arch import ArchShape, arch_scene
@@ -159,14 +160,15 @@ def test_forces_undo_what_they_are_asked_to(sets):
     operator = OperatorBuilder(net, grow_tree(net)).operator(5)
     columns = np.array(sets)
     index = operator.load_index(columns)
-    force, _ = grip_forces(operator, columns, index)
+    force = grip_forces(operator, columns, index).force
+    share_pairs(operator, columns, index, force)
     flexibility, dead = operator.flexibility, operator.dead_displacement[index[0]]
     moved = flexibility[np.ix_(index[0], index[0])] @ force[0] + dead
     assert np.abs(moved).max() <= 1e-9 * np.abs(dead).max()
     again = still_forces(operator, columns, index, dead[None])
     moved = flexibility[np.ix_(index[0], index[0])] @ again[0] + dead
     assert np.abs(moved).max() <= 1e-9 * np.abs(dead).max()
-    carried = load_matrix(index, force, len(flexibility)) @ operator.edge_force
+    carried = operator.answer("edge_force", index, force)
     bricks = columns[0] // 2
     for brick in {b for b in bricks if (bricks == b).sum() == 2}:
         edge = operator.inner_edge[brick]
@@ -195,7 +197,8 @@ def test_loose_motions_are_unknowns_of_the_grips(loosen, loose, grips):
     assert operator.loose == loose
     columns = np.array([grips])
     index = operator.load_index(columns)
-    force, pivot = grip_forces(operator, columns, index)
+    force, pivot, _ = grip_forces(operator, columns, index)
+    share_pairs(operator, columns, index, force)
     part = operator.flexibility[np.ix_(index[0], index[0])]
     moved = part @ force[0] + operator.dead_displacement[index[0]]
     assert np.abs(moved[:-loose]).max() <= 1e-9 * np.abs(operator.dead_displacement[:30]).max()
@@ -205,6 +208,6 @@ def test_loose_motions_are_unknowns_of_the_grips(loosen, loose, grips):
         scale = np.append(np.diag(part)[:-loose], [-1 / operator.softness] * loose)
         assert pivot == pytest.approx([min(1.0, (eliminated(part) / scale).min())], rel=1e-6)
     else:
-        weighed = load_matrix(index, force, len(operator.flexibility)) @ operator.edge_force
+        weighed = operator.answer("edge_force", index, force)
         (brick,) = {b for b in bricks if (bricks == b).sum() == 2}
         assert abs(weighed[0, operator.inner_edge[brick]]) <= 1e-9 * np.abs(weighed).max()

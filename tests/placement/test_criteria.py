@@ -85,14 +85,16 @@ def test_what_ranks_take_from_a_scene():
     assert dict(posed.resolution) == {
         name: share * Facts().units.of(name) for name, share in ROUNDED
     }
-    assert posed.settings == {"crown": 7, "resolution": dict(posed.resolution)}
+    assert posed.settings["crown"] == 7
+    assert posed.settings["resolution"] == dict(posed.resolution)
     assert posed.for_scene(Facts(crown=99)) == posed
     given = replace(open_one, crown=3, resolution=EXACT).for_scene(Facts())
     assert (given.crown, given.resolution) == (3, EXACT)
     same = replace(open_one, after=open_one.before, crown=3).for_scene(Facts())
     assert same.crown == NEVER
     assert same.settings["crown"] is None
-    assert open_one.settings == {"crown": None, "resolution": {}}
+    assert open_one.settings["crown"] is None
+    assert open_one.settings["resolution"] == {}
     prompt = RankSum("own", equal("T_max"), equal("M_sup")).for_scene(Facts())
     assert prompt.crown == 5
 

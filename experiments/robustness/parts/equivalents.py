@@ -57,7 +57,6 @@ EQUIVALENT = (
             (COSTS, "zip(self.single[-2::-1]", LENGTHS),
             (CERTIFICATE, "shared in zip(", LENGTHS),
             (CERTIFICATE, "zip(choice, sizes", "lengths were compared before"),
-            ("seqopt.engines.rigid.operator", "zip(", "both are by ground end of one network"),
         )
     ),
     *(
@@ -122,7 +121,7 @@ EQUIVALENT = (
     Equivalent(
         CERTIFICATE, "@dataclass", "repr=False", "repr=True", "without arrays both look alike"
     ),
-    Equivalent(COMPLIANCE, "pivot >= TRUSTED", ">=", ">", "no pivot is 1e-5 to the last bit"),
+    Equivalent(COMPLIANCE, "doubt <= accuracy", "<=", "<", "no doubt is it to the last bit"),
     *(
         Equivalent(COMPLIANCE, "force[~trusted]", "0.0", size, "these sets are answered anew")
         for size in ("1.0", "-1.0")
