@@ -134,14 +134,38 @@ def test_what_was_corrected_before_for_other_bricks_is_no_help():
         assert engine.solve(bricks, grips, Want.ALL) == own
 
 
-def test_a_correction_is_kept_for_the_same_bricks(monkeypatch):
-    made = []
-    real = compliance.Refinement
-    monkeypatch.setattr(compliance, "Refinement", lambda *o: made.append(o[1]) or real(*o))
+def test_a_correction_is_kept_for_the_same_bricks_and_gets_their_operator(monkeypatch):
+    made, helped = [], []
+
+    class Watched(compliance.Refinement):
+        def __init__(self, network, bricks, *more):
+            made.append(bricks)
+            super().__init__(network, bricks, *more)
+
+        def solve(self, columns, operator):
+            helped.append(operator is not None)
+            return super().solve(columns, operator)
+
+    monkeypatch.setattr(compliance, "Refinement", Watched)
     engine = ComplianceEngine(build_network(loosened(chain(16), 1e-9, only_turning=True)))
     for bricks in (16, 16, 14, 14, 16):
         engine.solve(bricks, [[2 * bricks - 1, 2 * bricks - 3, 4]])
     assert made == [16, 14, 16]
+    assert helped == [True] * 5
+
+
+def test_what_is_only_to_be_compared_is_corrected_less(monkeypatch):
+    """Between the accuracies of both; the control asks for more."""
+    net = build_network(chain(100))
+    sets, engine = [[199, 198, 197]], ComplianceEngine(net)
+    operator = OperatorBuilder(net, grow_tree(net)).operator(100)
+    columns = grip_columns(net, 100, sets)
+    assert not solve_batch(operator, columns)[1].any()
+    assert solve_batch(operator, columns, accuracy=compliance.SCREEN)[1].all()
+    monkeypatch.setattr(compliance, "Refinement", None)
+    engine.solve(100, sets, Want.RESPONSES | Want.SCREEN)
+    with pytest.raises(TypeError):
+        engine.solve(100, sets)
 
 
 @pytest.mark.parametrize("factor", [1e-4, 1e-5, 1e-6, 1e-9])

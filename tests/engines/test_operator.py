@@ -211,3 +211,25 @@ def test_loose_motions_are_unknowns_of_the_grips(loosen, loose, grips):
         weighed = operator.answer("edge_force", index, force)
         (brick,) = {b for b in bricks if (bricks == b).sum() == 2}
         assert abs(weighed[0, operator.inner_edge[brick]]) <= 1e-9 * np.abs(weighed).max()
+
+
+@pytest.mark.parametrize("grips", [(3,), (6, 9), (2, 7, 9)])
+def test_what_rounding_may_change_grips_forces_by(grips):
+    """Of each displacement the digits that are lost, over what is left to tell the force by."""
+    net = build_network(unequal(small_arch(5)))
+    operator = OperatorBuilder(net, grow_tree(net)).operator(5)
+    rng = np.random.default_rng(0)
+    operator = replace(operator, loss=rng.uniform(1.0, 9.0, len(operator.loss)))
+    columns = np.array([grips])
+    index = operator.load_index(columns)
+    force, pivot, doubt = grip_forces(operator, columns, index)
+    part, loss = operator.flexibility[np.ix_(index[0], index[0])], operator.loss[index[0]]
+    own, size, dead = np.diag(part), np.abs(force[0]), np.abs(operator.dead_displacement[index[0]])
+    left = eliminated(part)
+    sums = [
+        sum(np.sqrt(own[i] * loss[i] * own[j] * loss[j]) * size[j] for j in range(len(own)))
+        + dead[i] * loss[i]
+        for i in range(len(own))
+    ]
+    assert doubt == pytest.approx([(sums / left).max() / size.max()], rel=1e-9)
+    assert pivot == pytest.approx([(left / own).min()], rel=1e-9)

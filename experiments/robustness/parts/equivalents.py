@@ -121,6 +121,18 @@ EQUIVALENT = (
     Equivalent(
         CERTIFICATE, "@dataclass", "repr=False", "repr=True", "without arrays both look alike"
     ),
+    Equivalent(GRIPS, "pivot > 0", ">", ">=", "what is over a pivot of zero is infinite"),
+    Equivalent(GRIPS, "TINY", "0.0", "-1.0", "without forces it is TINY either way"),
+    *(
+        Equivalent(COMPLIANCE, "UNSEEN", "100", size, "a margin that was met, to two digits")
+        for size in ("99", "101")
+    ),
+    *(
+        Equivalent(
+            COMPLIANCE, "len(held) >= bricks", old, new, "loads beyond those asked for are spare"
+        )
+        for old, new in (("2 *", "2 +"), (">=", "!="))
+    ),
     Equivalent(COMPLIANCE, "doubt <= accuracy", "<=", "<", "no doubt is it to the last bit"),
     *(
         Equivalent(COMPLIANCE, "force[~trusted]", "0.0", size, "these sets are answered anew")
