@@ -17,7 +17,8 @@ and writes no file (`experiments.robustness.parts.mutant_trials`).
 
 Inputs: the modules below. Command:
 ``python -m experiments.robustness.mutation_testing [--quick] [--again] [--only TEXT] [--most N]``;
-``--again`` tries what survived the last run, after tests were added, and what was not drawn. Writes
+``--again`` tries what survived the last run, after tests were added, and with a larger ``--most``
+what was not tried; of what was drawn the share is then no estimate of the rest any more. Writes
 ``experiments/results/mutation_testing.csv`` and ``mutation_survivors.csv``.
 """
 
@@ -70,8 +71,7 @@ MODULES = {
     "formulations.solvers": ("formulations/test_equilibrium", *CHOSEN),
 }
 LEAST = 0.95  # of the mutants that are not equivalent
-MOST, EVERY = 60, 10**9
-QUICK_MOST, QUICK = 8, "seqopt.placement.ranks"
+MOST, QUICK_MOST, QUICK = 60, 8, "seqopt.placement.ranks"
 BROKEN = "\nraise RuntimeError\n"
 CONTROLS = {"as_it_is": "survived", "with_a_broken_line": "killed"}
 STORE, SURVIVORS = RESULTS / "mutation_testing.csv", RESULTS / "mutation_survivors.csv"
@@ -159,8 +159,8 @@ def store(row: pd.DataFrame, survivors: pd.DataFrame) -> None:
         )
 
 
-def measured_again(module: str) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """Return a module's row and survivors, what survived and what was not drawn being tried."""
+def measured_again(module: str, most: int) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """Return a module's row and survivors, what survived and what was not tried being tried."""
     from experiments.robustness.parts.equivalents import reason  # noqa: PLC0415
 
     table, before = stored()
@@ -170,9 +170,11 @@ def measured_again(module: str) -> tuple[pd.DataFrame, pd.DataFrame]:
     killed = [m for m in drawn_before if tuple(getattr(m, name) for name in KEY) not in survived]
     if len(drawn_before) - len(killed) != (before["module"] == module).sum():
         raise ClaimError(f"{module} is not what it was; run it without --again")
-    left_to_try = [mutant for mutant in drawn(module, EVERY)[0] if mutant not in killed]
-    rows, controls = tried(module, left_to_try)
-    counts = counted(rows, len(killed) + len(rows)) | {"tried": len(killed) + len(rows)}
+    more, mutants = drawn(module, most)
+    again = [mutant for mutant in drawn_before if mutant not in killed]
+    fresh = [mutant for mutant in more if mutant not in drawn_before] if most > MOST else []
+    rows, controls = tried(module, again + fresh)
+    counts = counted(rows, mutants) | {"tried": len(killed) + len(rows)}
     counts["killed"] += len(killed)
     counts["of_these_timed_out"] += int(row.loc[0, "of_these_timed_out"])
     counts["equivalent_but_killed"] += sum(reason(mutant) != "" for mutant in killed)
@@ -210,7 +212,7 @@ def experiment(options: Options) -> Finding:
     most = QUICK_MOST if options.quick else int(options.most)
     found = []
     for module in [QUICK] if options.quick else [m for m in MODULES if options.only in m]:
-        found.append(measured_again(module) if options.again else measured(module, most))
+        found.append(measured_again(module, most) if options.again else measured(module, most))
         print(found[-1][0].drop(columns="tests").to_string(index=False), flush=True)
         if not options.quick:
             store(*found[-1])
@@ -228,7 +230,7 @@ CLAIM = Claim(
     experiment,
     quick=f"{QUICK_MOST} mutants of one module, nothing written",
     options=(
-        Option("--again", "try what survived the last run, and what it did not draw"),
+        Option("--again", "try what survived the last run, and what --most has beyond it"),
         Option("--only", "modules with this in their names; rows of others stay", ""),
         Option("--most", "how many mutants of a module are tried", str(MOST)),
     ),

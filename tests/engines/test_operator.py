@@ -9,7 +9,7 @@ import pytest
 
 from experiments.harness.walls import running_bond
 from seqopt.engines.basis import SPACE
-from seqopt.engines.interface import NAMES, Want, grip_columns
+from seqopt.engines.interface import FLAGS, NAMES, Want, grip_columns
 from seqopt.engines.planar import PlanarEngine
 from seqopt.engines.rigid.compliance import ComplianceEngine, solve_batch
 from seqopt.engines.rigid.dense import solve_dense
@@ -233,3 +233,56 @@ def test_what_rounding_may_change_grips_forces_by(grips):
     ]
     assert doubt == pytest.approx([(sums / left).max() / size.max()], rel=1e-9)
     assert pivot == pytest.approx([(left / own).min()], rel=1e-9)
+
+
+@pytest.mark.parametrize("grips", [1, 2, 3])
+@pytest.mark.parametrize("name", SCENES)
+def test_answers_do_not_depend_on_how_they_are_summed(monkeypatch, name, grips):
+    """Loads' responses mapped once and summed, or sums mapped; all bricks loaded, or those held."""
+    scene = unequal(SCENES[name])
+    net = build_network(scene)
+    bricks = len(scene.bricks)
+    columns = grip_columns(net, bricks, sets_of(scene, bricks, grips))
+    builder = OperatorBuilder(net, grow_tree(net))
+    found = []
+    for few, held in ((10**9, None), (0, None), (0, np.unique(columns // 2))):
+        monkeypatch.setattr("seqopt.engines.rigid.operator.FEW", few)
+        found.append(solve_batch(builder.operator(bricks, held), columns, Want.ALL)[0])
+    for field in NAMES:
+        once, *others = (getattr(fields, field) for fields in found)
+        for other in others:
+            assert np.abs(other - once).max() <= 1e-9 * np.abs(once).max(), field
+
+
+def test_answers_beside_loose_motions_do_not_depend_on_it_either(monkeypatch):
+    net = build_network(torsion_free(six_bricks(), 2))
+    operator = held_operator(hold_loose(ungripped_system(net, 5)))
+    columns = np.array([(2, 7, 9), (3, 8, 6)])
+    index = operator.load_index(columns)
+    force = np.random.default_rng(0).normal(size=index.shape)
+    answers = {}
+    for few in (10**9, 0):
+        monkeypatch.setattr("seqopt.engines.rigid.operator.FEW", few)
+        answers[few] = {name: operator.answer(name, index, force) for name in FLAGS}
+    for name, once in answers[10**9].items():
+        assert np.abs(answers[0][name] - once).max() <= 1e-9 * np.abs(once).max(), name
+
+
+def test_which_bricks_are_loaded():
+    net = build_network(small_arch(5))
+    operator = OperatorBuilder(net, grow_tree(net)).operator(5, np.array([1, 3]))
+    assert operator.place.tolist() == [-1, 0, -1, 1, -1]
+    for held, covered in (([1], True), ([3, 1], True), ([0], False), ([1, 0], False), ([], True)):
+        assert operator.covers(np.array(held, dtype=int)) is covered
+    size = operator.nbytes
+    assert size >= operator.flexibility.nbytes + operator.twist.nbytes + operator.wrench.nbytes
+    more = operator.displacement.nbytes  # made when it is asked for
+    assert operator.nbytes == size + more + (operator.maps.nbytes - operator_maps(net))
+
+
+def operator_maps(net):
+    """What maps take before a field is asked for."""
+    fresh = OperatorBuilder(net, grow_tree(net)).operator(5, np.array([1, 3]))
+    own = fresh.flexibility.nbytes + fresh.twist.nbytes + fresh.wrench.nbytes
+    assert fresh.nbytes == own + fresh.maps.nbytes
+    return fresh.maps.nbytes

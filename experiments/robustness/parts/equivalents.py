@@ -42,6 +42,7 @@ class Equivalent:
 
 
 COMPLIANCE = "seqopt.engines.rigid.compliance"
+OPERATOR = "seqopt.engines.rigid.operator"
 GRIPS = "seqopt.engines.rigid.grip_equations"
 COSTS, CERTIFICATE = "seqopt.placement.costs", "seqopt.placement.certificate"
 CRITERIA, RANKS = "seqopt.placement.criteria", "seqopt.placement.ranks"
@@ -95,7 +96,8 @@ EQUIVALENT = (
         for size in ("9.0", "11.0")
     ),
     Equivalent(CRITERIA, "zeros_like", "[0][0]", "[-1][0]", "responses of a step have one shape"),
-    Equivalent(RANKS, "ndim", "==", "<=", "a step has one open move or two: one axis or two"),
+    Equivalent(RANKS, "ranks if values.ndim", "==", "<=", "a step has one open move or two"),
+    Equivalent(RANKS, "ordered", "!=", ">", "in order, what is another is larger"),
     Equivalent(
         CERTIFICATE, "low, high", "- 1", "* 1", "the largest of all costs is never looked at"
     ),
@@ -133,6 +135,15 @@ EQUIVALENT = (
         )
         for old, new in (("2 *", "2 +"), (">=", "!="))
     ),
+    *(
+        Equivalent(OPERATOR, "loads, every", "2 *", new, "which way of two that agree is taken")
+        for new in ("1 *", "3 *", "2 +", "2 -", "2 /")
+    ),
+    *(
+        Equivalent(OPERATOR, "every <= max", "<=", new, "which way of two that agree is taken")
+        for new in ("<", "!=", ">", ">=", "==")
+    ),
+    Equivalent(OPERATOR, "swapaxes", "-2", "2", "of four axes these are one"),
     Equivalent(COMPLIANCE, "doubt <= accuracy", "<=", "<", "no doubt is it to the last bit"),
     *(
         Equivalent(COMPLIANCE, "force[~trusted]", "0.0", size, "these sets are answered anew")
