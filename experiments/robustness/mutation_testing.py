@@ -115,6 +115,13 @@ def tried(module: str, chosen: list[Mutant]) -> tuple[pd.DataFrame, dict[str, st
     return pd.DataFrame(rows, columns=["line", *KEY, "outcome", "reason"]), controls
 
 
+def text_of(module: str) -> str:
+    """Return a number for the text of a module: rows of another text are of what it once was."""
+    from experiments.robustness.parts.mutants import path_of  # noqa: PLC0415
+
+    return f"crc32 {zlib.crc32(path_of(module).read_bytes()):08x}"
+
+
 def counted(rows: pd.DataFrame, mutants: int) -> dict[str, int]:
     """Return how many mutants of a module ended in which way."""
     survived, named = rows["outcome"] == "survived", rows["reason"] != ""
@@ -134,7 +141,7 @@ def measured(module: str, most: int) -> tuple[pd.DataFrame, pd.DataFrame]:
     chosen, count = drawn(module, most)
     rows, controls = tried(module, chosen)
     row = {"module": module} | counted(rows, count) | controls
-    row["survived_at_first"] = row["survived"]
+    row |= {"survived_at_first": row["survived"], "text": text_of(module)}
     return pd.DataFrame([row | {"tests": " ".join(MODULES[module])}]), left(rows)
 
 
@@ -183,7 +190,8 @@ def measured_again(module: str, most: int) -> tuple[pd.DataFrame, pd.DataFrame]:
     first = int(row.loc[0, "survived_at_first"]) - max(alike, 0)
     counts["survived_at_first"] = first + counted(rows[len(again) :], 0)["survived"]
     counts["equivalent_but_killed"] += sum(reason(mutant) != "" for mutant in killed)
-    return row.assign(**counts, **controls, tests=" ".join(MODULES[module])), left(rows)
+    about = {"text": text_of(module), "tests": " ".join(MODULES[module])}
+    return row.assign(**counts, **controls, **about), left(rows)
 
 
 def share(table: pd.DataFrame) -> float:
@@ -206,7 +214,7 @@ def first_look(table: pd.DataFrame) -> tuple[float, float]:
 def holds(table: pd.DataFrame, survivors: pd.DataFrame) -> bool:
     """Return whether enough is killed, nothing is wrongly called equivalent, and controls agree."""
     unnamed = int((survivors["reason"] == "").sum())
-    return (
+    return bool(
         share(table) >= LEAST
         and not table["equivalent_but_killed"].any()
         and unnamed == table["survived"].sum()
@@ -227,6 +235,9 @@ def experiment(options: Options) -> Finding:
         if not options.quick:
             store(*found[-1])
     table, survivors = map(pd.concat, zip(*found, strict=True))
+    for row in stored()[0].itertuples():
+        if not options.quick and row.text != text_of(row.module):
+            print(f"{row.module} has changed since it was measured")
     for row in survivors[survivors["reason"] == ""].itertuples():
         print(f"survives: {row.module}:{row.line}: {row.before}  ->  {row.after}")
     note = f": {share(table):.1%} of {table['tried'].sum()} mutants killed, equivalent ones aside"
