@@ -9,15 +9,16 @@ import pytest
 
 from experiments.harness.walls import running_bond
 from seqopt.engines.basis import SPACE
-from seqopt.engines.interface import NAMES, Want, grip_columns
+from seqopt.engines.interface import FLAGS, NAMES, Want, grip_columns
 from seqopt.engines.planar import PlanarEngine
 from seqopt.engines.rigid.compliance import ComplianceEngine, solve_batch
 from seqopt.engines.rigid.dense import solve_dense
-from seqopt.engines.rigid.grip_equations import grip_forces, still_forces
+from seqopt.engines.rigid.grip_equations import grip_forces, share_pairs, still_forces
 from seqopt.engines.rigid.held_operator import held_operator
+from seqopt.engines.rigid.loads import load_matrix
 from seqopt.engines.rigid.loose import hold_loose
 from seqopt.engines.rigid.mixed_system import ungripped_system
-from seqopt.engines.rigid.operator import OperatorBuilder, load_matrix
+from seqopt.engines.rigid.operator import OperatorBuilder
 from seqopt.engines.rigid.spanning_tree import grow_tree
 from seqopt.network.build import build_network
 from seqopt.scene.arch import ArchShape, arch_scene
@@ -159,14 +160,15 @@ def test_forces_undo_what_they_are_asked_to(sets):
     operator = OperatorBuilder(net, grow_tree(net)).operator(5)
     columns = np.array(sets)
     index = operator.load_index(columns)
-    force, _ = grip_forces(operator, columns, index)
+    force = grip_forces(operator, columns, index).force
+    share_pairs(operator, columns, index, force)
     flexibility, dead = operator.flexibility, operator.dead_displacement[index[0]]
     moved = flexibility[np.ix_(index[0], index[0])] @ force[0] + dead
     assert np.abs(moved).max() <= 1e-9 * np.abs(dead).max()
     again = still_forces(operator, columns, index, dead[None])
     moved = flexibility[np.ix_(index[0], index[0])] @ again[0] + dead
     assert np.abs(moved).max() <= 1e-9 * np.abs(dead).max()
-    carried = load_matrix(index, force, len(flexibility)) @ operator.edge_force
+    carried = operator.answer("edge_force", index, force)
     bricks = columns[0] // 2
     for brick in {b for b in bricks if (bricks == b).sum() == 2}:
         edge = operator.inner_edge[brick]
@@ -195,7 +197,8 @@ def test_loose_motions_are_unknowns_of_the_grips(loosen, loose, grips):
     assert operator.loose == loose
     columns = np.array([grips])
     index = operator.load_index(columns)
-    force, pivot = grip_forces(operator, columns, index)
+    force, pivot, _ = grip_forces(operator, columns, index)
+    share_pairs(operator, columns, index, force)
     part = operator.flexibility[np.ix_(index[0], index[0])]
     moved = part @ force[0] + operator.dead_displacement[index[0]]
     assert np.abs(moved[:-loose]).max() <= 1e-9 * np.abs(operator.dead_displacement[:30]).max()
@@ -205,6 +208,81 @@ def test_loose_motions_are_unknowns_of_the_grips(loosen, loose, grips):
         scale = np.append(np.diag(part)[:-loose], [-1 / operator.softness] * loose)
         assert pivot == pytest.approx([min(1.0, (eliminated(part) / scale).min())], rel=1e-6)
     else:
-        weighed = load_matrix(index, force, len(operator.flexibility)) @ operator.edge_force
+        weighed = operator.answer("edge_force", index, force)
         (brick,) = {b for b in bricks if (bricks == b).sum() == 2}
         assert abs(weighed[0, operator.inner_edge[brick]]) <= 1e-9 * np.abs(weighed).max()
+
+
+@pytest.mark.parametrize("grips", [(3,), (6, 9), (2, 7, 9)])
+def test_what_rounding_may_change_grips_forces_by(grips):
+    """Of each displacement the digits that are lost, over what is left to tell the force by."""
+    net = build_network(unequal(small_arch(5)))
+    operator = OperatorBuilder(net, grow_tree(net)).operator(5)
+    rng = np.random.default_rng(0)
+    operator = replace(operator, loss=rng.uniform(1.0, 9.0, len(operator.loss)))
+    columns = np.array([grips])
+    index = operator.load_index(columns)
+    force, pivot, doubt = grip_forces(operator, columns, index)
+    part, loss = operator.flexibility[np.ix_(index[0], index[0])], operator.loss[index[0]]
+    own, size, dead = np.diag(part), np.abs(force[0]), np.abs(operator.dead_displacement[index[0]])
+    left = eliminated(part)
+    sums = [
+        sum(np.sqrt(own[i] * loss[i] * own[j] * loss[j]) * size[j] for j in range(len(own)))
+        + dead[i] * loss[i]
+        for i in range(len(own))
+    ]
+    assert doubt == pytest.approx([(sums / left).max() / size.max()], rel=1e-9)
+    assert pivot == pytest.approx([(left / own).min()], rel=1e-9)
+
+
+@pytest.mark.parametrize("grips", [1, 2, 3])
+@pytest.mark.parametrize("name", SCENES)
+def test_answers_do_not_depend_on_how_they_are_summed(monkeypatch, name, grips):
+    """Loads' responses mapped once and summed, or sums mapped; all bricks loaded, or those held."""
+    scene = unequal(SCENES[name])
+    net = build_network(scene)
+    bricks = len(scene.bricks)
+    columns = grip_columns(net, bricks, sets_of(scene, bricks, grips))
+    builder = OperatorBuilder(net, grow_tree(net))
+    found = []
+    for few, held in ((10**9, None), (0, None), (0, np.unique(columns // 2))):
+        monkeypatch.setattr("seqopt.engines.rigid.operator.FEW", few)
+        found.append(solve_batch(builder.operator(bricks, held), columns, Want.ALL)[0])
+    for field in NAMES:
+        once, *others = (getattr(fields, field) for fields in found)
+        for other in others:
+            assert np.abs(other - once).max() <= 1e-9 * np.abs(once).max(), field
+
+
+def test_answers_beside_loose_motions_do_not_depend_on_it_either(monkeypatch):
+    net = build_network(torsion_free(six_bricks(), 2))
+    operator = held_operator(hold_loose(ungripped_system(net, 5)))
+    columns = np.array([(2, 7, 9), (3, 8, 6)])
+    index = operator.load_index(columns)
+    force = np.random.default_rng(0).normal(size=index.shape)
+    answers = {}
+    for few in (10**9, 0):
+        monkeypatch.setattr("seqopt.engines.rigid.operator.FEW", few)
+        answers[few] = {name: operator.answer(name, index, force) for name in FLAGS}
+    for name, once in answers[10**9].items():
+        assert np.abs(answers[0][name] - once).max() <= 1e-9 * np.abs(once).max(), name
+
+
+def test_which_bricks_are_loaded():
+    net = build_network(small_arch(5))
+    operator = OperatorBuilder(net, grow_tree(net)).operator(5, np.array([1, 3]))
+    assert operator.place.tolist() == [-1, 0, -1, 1, -1]
+    for held, covered in (([1], True), ([3, 1], True), ([0], False), ([1, 0], False), ([], True)):
+        assert operator.covers(np.array(held, dtype=int)) is covered
+    size = operator.nbytes
+    assert size >= operator.flexibility.nbytes + operator.twist.nbytes + operator.wrench.nbytes
+    more = operator.displacement.nbytes  # made when it is asked for
+    assert operator.nbytes == size + more + (operator.maps.nbytes - operator_maps(net))
+
+
+def operator_maps(net):
+    """What maps take before a field is asked for."""
+    fresh = OperatorBuilder(net, grow_tree(net)).operator(5, np.array([1, 3]))
+    own = fresh.flexibility.nbytes + fresh.twist.nbytes + fresh.wrench.nbytes
+    assert fresh.nbytes == own + fresh.maps.nbytes
+    return fresh.maps.nbytes

@@ -10,7 +10,7 @@ import pytest
 from seqopt.errors import ProblemError
 from seqopt.placement.criteria import OVER_METHODS, WORST_OVER_METHODS, RankSum, WeightedSum
 from seqopt.placement.criteria import WorstRatio as Worst
-from seqopt.placement.ranks import mean_ranks, scaled_ranks
+from seqopt.placement.ranks import Ranked, mean_ranks, ranks_of, scaled_ranks
 from seqopt.placement.scales import NEVER, ROUNDED, Units
 from seqopt.placement.terms import equal, present
 
@@ -77,6 +77,32 @@ def test_ranks_of_pairs_run_as_far_as_those_of_candidates():
     assert mean_ranks(np.array([7.0, 1.0, 7.0, 7.0, 3.0])).tolist() == [4, 1, 4, 4, 2]
 
 
+@pytest.mark.parametrize("seed", range(12))
+def test_given_the_choice_before_every_row_is_ranked_for_itself(seed):
+    rng = np.random.default_rng(seed)
+    values = rng.integers(-4, 5, size=rng.integers(1, 7, size=2)) + rng.uniform(-0.4, 0.4)
+    values[rng.random(values.shape) < 0.2] = NAN
+    if np.isnan(values).all():
+        values[0, 0] = 1.0
+    rows = ranks_of(values, 9, Ranked.CONDITIONAL)
+    for row, own in zip(rows, values, strict=True):
+        one = np.full(own.shape, NAN) if np.isnan(own).all() else scaled_ranks(own, len(own))
+        assert row == pytest.approx(one, nan_ok=True)
+    assert ranks_of(np.full((2, 3), NAN), 4, Ranked.CONDITIONAL).tolist() == [[2.5] * 3] * 2
+
+
+@pytest.mark.parametrize("ranked_among", Ranked)
+def test_what_one_move_decides_is_ranked_in_either_way(ranked_among):
+    single, pairs = np.array([3.0, 1.0, 2.0]), np.array([[4.0, 1.0], [2.0, 3.0]])
+    assert ranks_of(single, 3, ranked_among).tolist() == [3, 1, 2]
+    by_row = [[2.0, 1.0], [1.0, 2.0]]
+    by_pair = [[2.25, 0.75], [1.25, 1.75]]
+    expected = by_pair if ranked_among is Ranked.PAIRS else by_row
+    assert ranks_of(pairs, 2, ranked_among).tolist() == expected
+    own = replace(ranked((("T_max", 1.0),)), ranked=ranked_among)
+    assert own.costs({"T_max": 10 * pairs}, 3, 2).tolist() == expected
+
+
 def test_what_ranks_take_from_a_scene():
     open_one = RankSum("own", (("F_each", 2.0), ("T_max", 1.0)), equal("M_sup"), delay=2)
     posed = open_one.for_scene(Facts())
@@ -85,14 +111,16 @@ def test_what_ranks_take_from_a_scene():
     assert dict(posed.resolution) == {
         name: share * Facts().units.of(name) for name, share in ROUNDED
     }
-    assert posed.settings == {"crown": 7, "resolution": dict(posed.resolution)}
+    assert posed.settings["crown"] == 7
+    assert posed.settings["resolution"] == dict(posed.resolution)
     assert posed.for_scene(Facts(crown=99)) == posed
     given = replace(open_one, crown=3, resolution=EXACT).for_scene(Facts())
     assert (given.crown, given.resolution) == (3, EXACT)
     same = replace(open_one, after=open_one.before, crown=3).for_scene(Facts())
     assert same.crown == NEVER
     assert same.settings["crown"] is None
-    assert open_one.settings == {"crown": None, "resolution": {}}
+    assert open_one.settings["crown"] is None
+    assert open_one.settings["resolution"] == {}
     prompt = RankSum("own", equal("T_max"), equal("M_sup")).for_scene(Facts())
     assert prompt.crown == 5
 

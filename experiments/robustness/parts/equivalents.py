@@ -42,6 +42,7 @@ class Equivalent:
 
 
 COMPLIANCE = "seqopt.engines.rigid.compliance"
+OPERATOR = "seqopt.engines.rigid.operator"
 GRIPS = "seqopt.engines.rigid.grip_equations"
 COSTS, CERTIFICATE = "seqopt.placement.costs", "seqopt.placement.certificate"
 CRITERIA, RANKS = "seqopt.placement.criteria", "seqopt.placement.ranks"
@@ -57,7 +58,6 @@ EQUIVALENT = (
             (COSTS, "zip(self.single[-2::-1]", LENGTHS),
             (CERTIFICATE, "shared in zip(", LENGTHS),
             (CERTIFICATE, "zip(choice, sizes", "lengths were compared before"),
-            ("seqopt.engines.rigid.operator", "zip(", "both are by ground end of one network"),
         )
     ),
     *(
@@ -96,7 +96,8 @@ EQUIVALENT = (
         for size in ("9.0", "11.0")
     ),
     Equivalent(CRITERIA, "zeros_like", "[0][0]", "[-1][0]", "responses of a step have one shape"),
-    Equivalent(RANKS, "ndim", "==", "<=", "a step has one open move or two: one axis or two"),
+    Equivalent(RANKS, "ranks if values.ndim", "==", "<=", "a step has one open move or two"),
+    Equivalent(RANKS, "ordered", "!=", ">", "in order, what is another is larger"),
     Equivalent(
         CERTIFICATE, "low, high", "- 1", "* 1", "the largest of all costs is never looked at"
     ),
@@ -122,7 +123,28 @@ EQUIVALENT = (
     Equivalent(
         CERTIFICATE, "@dataclass", "repr=False", "repr=True", "without arrays both look alike"
     ),
-    Equivalent(COMPLIANCE, "pivot >= TRUSTED", ">=", ">", "no pivot is 1e-5 to the last bit"),
+    Equivalent(GRIPS, "pivot > 0", ">", ">=", "what is over a pivot of zero is infinite"),
+    Equivalent(GRIPS, "TINY", "0.0", "-1.0", "without forces it is TINY either way"),
+    *(
+        Equivalent(COMPLIANCE, "UNSEEN", "100", size, "a margin that was met, to two digits")
+        for size in ("99", "101")
+    ),
+    *(
+        Equivalent(
+            COMPLIANCE, "len(held) >= bricks", old, new, "loads beyond those asked for are spare"
+        )
+        for old, new in (("2 *", "2 +"), (">=", "!="))
+    ),
+    *(
+        Equivalent(OPERATOR, "loads, every", "2 *", new, "which way of two that agree is taken")
+        for new in ("1 *", "3 *", "2 +", "2 -", "2 /")
+    ),
+    *(
+        Equivalent(OPERATOR, "every <= max", "<=", new, "which way of two that agree is taken")
+        for new in ("<", "!=", ">", ">=", "==")
+    ),
+    Equivalent(OPERATOR, "swapaxes", "-2", "2", "of four axes these are one"),
+    Equivalent(COMPLIANCE, "doubt <= accuracy", "<=", "<", "no doubt is it to the last bit"),
     *(
         Equivalent(COMPLIANCE, "force[~trusted]", "0.0", size, "these sets are answered anew")
         for size in ("1.0", "-1.0")
