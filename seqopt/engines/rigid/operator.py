@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy import sparse
 
 from seqopt.arrays import Floats, FrozenValue, Ints, frozen
 from seqopt.engines.basis import SPACE, Basis
@@ -89,6 +90,14 @@ class ComplianceOperator(FrozenValue):
         out[self.held] = np.arange(len(self.held))
         return frozen(out)
 
+    @cached_property
+    def shares(self) -> Floats:
+        """Roots of flexibilities, what weight adds to their sum, what makes it forces; (3, l)."""
+        own = np.maximum(np.abs(self.flexibility.diagonal()), np.finfo(float).tiny)
+        root = np.sqrt(own * self.loss)
+        weight = np.abs(self.dead_displacement) * self.loss / root
+        return frozen(np.stack([root, weight, root / own]))
+
     def covers(self, held: Ints) -> bool:
         """Return whether loads act at the nodes of bricks.
 
@@ -123,7 +132,9 @@ class ComplianceOperator(FrozenValue):
             rows = np.hstack([rows, np.tile(after, (len(rows), 1))])
         return np.asarray(rows)
 
-    def answer(self, name: str, index: Ints, force: Floats) -> Floats:
+    def answer(
+        self, name: str, index: Ints, force: Floats, load: sparse.csr_array | None = None
+    ) -> Floats:
         """Return a field of sets of forces beside the weight.
 
         Where there are fewer sets than loads of all bricks, their twists and wrenches are summed
@@ -137,6 +148,8 @@ class ComplianceOperator(FrozenValue):
             Loads that act.
         force : (S, k) float
             By how much, N.
+        load : (S, l + 1) sparse, optional
+            The same as a matrix, `seqopt.engines.rigid.loads.load_matrix`, if it is known.
 
         Returns
         -------
@@ -144,7 +157,8 @@ class ComplianceOperator(FrozenValue):
         """
         loads, every = len(self.twist) - 1, 2 * self.axis.size
         if every <= max(FEW, len(index)):  # whatever was asked before: answers do not depend on it
-            return np.asarray(load_matrix(index, force, loads) @ getattr(self, name))
+            load = load_matrix(index, force, loads) if load is None else load
+            return np.asarray(load @ getattr(self, name))
         states = self.twist if name in OF_TWISTS else self.wrench
         out = np.empty((len(index), self.maps.count(name)))
         step = max(16, AT_ONCE // states.shape[1])
