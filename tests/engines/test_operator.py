@@ -13,11 +13,12 @@ from seqopt.engines.interface import NAMES, Want, grip_columns
 from seqopt.engines.planar import PlanarEngine
 from seqopt.engines.rigid.compliance import ComplianceEngine, solve_batch
 from seqopt.engines.rigid.dense import solve_dense
-from seqopt.engines.rigid.grip_equations import grip_forces, still_forces
+from seqopt.engines.rigid.grip_equations import grip_forces, share_pairs, still_forces
 from seqopt.engines.rigid.held_operator import held_operator
+from seqopt.engines.rigid.loads import load_matrix
 from seqopt.engines.rigid.loose import hold_loose
 from seqopt.engines.rigid.mixed_system import ungripped_system
-from seqopt.engines.rigid.operator import OperatorBuilder, load_matrix
+from seqopt.engines.rigid.operator import OperatorBuilder
 from seqopt.engines.rigid.spanning_tree import grow_tree
 from seqopt.network.build import build_network
 from seqopt.scene.arch import ArchShape, arch_scene
@@ -159,7 +160,8 @@ def test_forces_undo_what_they_are_asked_to(sets):
     operator = OperatorBuilder(net, grow_tree(net)).operator(5)
     columns = np.array(sets)
     index = operator.load_index(columns)
-    force, _ = grip_forces(operator, columns, index)
+    force = grip_forces(operator, columns, index).force
+    share_pairs(operator, columns, index, force, np.empty((1, 0)))
     flexibility, dead = operator.flexibility, operator.dead_displacement[index[0]]
     moved = flexibility[np.ix_(index[0], index[0])] @ force[0] + dead
     assert np.abs(moved).max() <= 1e-9 * np.abs(dead).max()
@@ -195,7 +197,8 @@ def test_loose_motions_are_unknowns_of_the_grips(loosen, loose, grips):
     assert operator.loose == loose
     columns = np.array([grips])
     index = operator.load_index(columns)
-    force, pivot = grip_forces(operator, columns, index)
+    force, pivot, _ = grip_forces(operator, columns, index)
+    share_pairs(operator, columns, index, force, np.empty((1, 0)))
     part = operator.flexibility[np.ix_(index[0], index[0])]
     moved = part @ force[0] + operator.dead_displacement[index[0]]
     assert np.abs(moved[:-loose]).max() <= 1e-9 * np.abs(operator.dead_displacement[:30]).max()

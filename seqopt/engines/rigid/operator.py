@@ -72,6 +72,11 @@ class ComplianceOperator(FrozenValue):
     softness: float = 0.0
 
     @property
+    def bricks(self) -> int:
+        """How many stand, b."""
+        return len(self.axis)
+
+    @property
     def directions(self) -> int:
         """In how many directions a node is loaded and held, d."""
         return int(self.axis.shape[1])
