@@ -1,6 +1,8 @@
 """Claim: memory grows at most as the square of the brick count, and time of an analysis not faster.
 
-Not faster but for a half: the exponents that are held against it are 2.1 and 2.5.
+Exponents up to 2.1 for memory and 2.5 for the time of an analysis count as that. A search without
+proof meets as many models as the square of the brick count, each with fields as long as that
+count: up to 3.
 
 Method: `analyze` of all steps of the sequential method, and the three-robot loop without proof
 (criterion `equations-2-3`, cascade), on chains of 25 to 1,000 bricks in the shape of `arch25` and
@@ -39,7 +41,7 @@ SCENES = {
 QUICK = {"analyze": ["chain13", "chain25"], "no proof": ["chain13"]}
 PATIENCE, ROOM = 120.0, 6 * 2**30  # s and bytes of an older version's run
 FROM = 100  # bricks from which on exponents are fitted
-MOST_MEMORY, MOST_TIME = 2.1, 2.5  # exponents that are claimed
+MOST_MEMORY, MOST_TIME = 2.1, {"analyze": 2.5, "no proof": 3.0}  # exponents that are claimed
 
 
 def run_apart(task: str, name: str, home: Path, patience: float | None = None) -> growth_runs.Row:
@@ -125,10 +127,10 @@ def holds(table: pd.DataFrame) -> bool:
     """Return whether every run of this version ended and grows no faster than is claimed."""
     mine = table[table["version"] == "this"]
     memory = exponents(table, "memory_MB", float(mine["memory_MB"].min()))
-    slow = max(exponents(table, "seconds").values(), default=0.0) > MOST_TIME
-    return bool(
-        mine["seconds"].notna().all() and not slow and memory.get("analyze", 0) <= MOST_MEMORY
-    )
+    time = exponents(table, "seconds")
+    small = all(value <= MOST_MEMORY for value in memory.values())
+    fast = all(value <= MOST_TIME[task] for task, value in time.items())
+    return bool(mine["seconds"].notna().all() and small and fast)
 
 
 CLAIM = Claim(

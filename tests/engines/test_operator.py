@@ -161,7 +161,7 @@ def test_forces_undo_what_they_are_asked_to(sets):
     columns = np.array(sets)
     index = operator.load_index(columns)
     force = grip_forces(operator, columns, index).force
-    share_pairs(operator, columns, index, force)
+    share_pairs(operator, columns, index, force, np.empty((1, 0)))
     flexibility, dead = operator.flexibility, operator.dead_displacement[index[0]]
     moved = flexibility[np.ix_(index[0], index[0])] @ force[0] + dead
     assert np.abs(moved).max() <= 1e-9 * np.abs(dead).max()
@@ -198,7 +198,7 @@ def test_loose_motions_are_unknowns_of_the_grips(loosen, loose, grips):
     columns = np.array([grips])
     index = operator.load_index(columns)
     force, pivot, _ = grip_forces(operator, columns, index)
-    share_pairs(operator, columns, index, force)
+    share_pairs(operator, columns, index, force, np.empty((1, 0)))
     part = operator.flexibility[np.ix_(index[0], index[0])]
     moved = part @ force[0] + operator.dead_displacement[index[0]]
     assert np.abs(moved[:-loose]).max() <= 1e-9 * np.abs(operator.dead_displacement[:30]).max()

@@ -13,7 +13,6 @@ Brick counts are best asked in ascending order: what all of them share grows in 
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -24,7 +23,6 @@ from seqopt.engines.basis import SPACE, Basis
 from seqopt.engines.failures import failing_in_a_line
 from seqopt.engines.interface import (
     FLAGS,
-    NAMES,
     Fields,
     Want,
     grip_columns,
@@ -33,6 +31,7 @@ from seqopt.engines.interface import (
 )
 from seqopt.engines.rigid.grip_equations import grip_forces, share_pairs
 from seqopt.engines.rigid.kept import Kept
+from seqopt.engines.rigid.loads import load_matrix
 from seqopt.engines.rigid.operator import ComplianceOperator, OperatorBuilder
 from seqopt.engines.rigid.refinement import Refinement
 from seqopt.engines.rigid.spanning_tree import grow_tree
@@ -108,13 +107,14 @@ class ComplianceEngine:
         operator = self._operator(bricks, columns)
         accuracy = max(SCREEN, self._accuracy) if want & Want.SCREEN else self._accuracy
         even = bricks <= self._even
-        fields, trusted = solve_batch(operator, columns, want, even=even, accuracy=accuracy)
+        found, trusted = _answers(operator, columns, want, even=even, accuracy=accuracy)
         if self._basis is not SPACE:
-            fields = replace(fields, grip_force=fields.grip_force @ self._basis.force)
+            found["grip_force"] = found["grip_force"] @ self._basis.force
         if not trusted.all():
             better = keep_wanted(self._refined(bricks, columns[~trusted]), want)
-            fields = _replaced(fields, ~trusted, better)
-        return require_finite(fields, bricks, grips)
+            for name, values in found.items():
+                values[~trusted] = getattr(better, name)
+        return require_finite(Fields(**found), bricks, grips)
 
     def _operator(self, bricks: int, columns: Ints) -> ComplianceOperator:
         """Return an operator that answers grip sets: one that is kept, or else a new one."""
@@ -179,6 +179,14 @@ def solve_batch(
         Grip forces in the directions of the operator.
     trusted : (S,) bool
     """
+    found, trusted = _answers(operator, columns, want, even=even, accuracy=accuracy)
+    return Fields(**found), trusted
+
+
+def _answers(
+    operator: ComplianceOperator, columns: Ints, want: Want, *, even: bool, accuracy: float
+) -> tuple[dict[str, Floats], Bools]:
+    """Return the fields of grip sets by name, not frozen yet, and which of them are accurate."""
     sets = len(columns)
     index = operator.load_index(columns)
     force = np.empty(index.shape)
@@ -195,36 +203,27 @@ def solve_batch(
 
 def _fields(
     operator: ComplianceOperator, columns: Ints, index: Ints, force: Floats, want: Want
-) -> Fields:
-    """Return the fields of grip sets whose grips exert forces (S, k)."""
-    empty = share_pairs(operator, columns, index, force)
+) -> dict[str, Floats]:
+    """Return the fields of grip sets whose grips exert forces (S, k), by name."""
     sets, held = columns.shape
+    load = load_matrix(index, force, len(operator.flexibility))
 
     def answer(name: str, *shape: int) -> Floats:
         if not want & FLAGS[name]:
             return np.empty((sets, 0, *shape))
-        wanted = operator.answer(name, index, force)
+        wanted = operator.answer(name, index, force, load)
         return wanted.reshape(sets, wanted.shape[1] // math.prod(shape), *shape)
 
-    carried = answer("edge_force")
-    if want & Want.EDGES:
-        carried[empty] = 0.0
-    return Fields(
-        edge_force=carried,
-        displacement=answer("displacement", 3),
-        grip_force=force[:, : held * operator.directions].reshape(sets, held, operator.directions),
-        support=answer("support", 6),
-        joint_wrench=answer("joint_wrench", 6),
-        brick_twist=answer("brick_twist", 6),
-    )
-
-
-def _replaced(answer: Fields, which: Bools, better: Fields) -> Fields:
-    """Return fields in which those of the sets ``which`` are others; the rest is copied once."""
-    whole = {name: getattr(answer, name).copy() for name in NAMES}
-    for name in NAMES:
-        whole[name][which] = getattr(better, name)
-    return Fields(**whole)
+    found = {
+        "edge_force": answer("edge_force"),
+        "displacement": answer("displacement", 3),
+        "support": answer("support", 6),
+        "joint_wrench": answer("joint_wrench", 6),
+        "brick_twist": answer("brick_twist", 6),
+    }
+    share_pairs(operator, columns, index, force, found["edge_force"])
+    width = operator.directions
+    return {**found, "grip_force": force[:, : held * width].reshape(sets, held, width)}
 
 
 def _count_even(network: Network) -> int:

@@ -54,27 +54,24 @@ def grip_forces(operator: ComplianceOperator, columns: Ints, index: Ints) -> Gri
     dead = operator.dead_displacement.take(np.ascontiguousarray(index.T))
     force, pivots = _solved(operator, columns, index, dead)
     pivot = pivots.min(axis=0, initial=1.0)
-    doubt = _doubt(operator, index, force, dead, pivots)
+    doubt = _doubt(operator, index, force, pivots)
     return GripForces(force, pivot, np.where(pivot > 0, doubt, np.inf))
 
 
-def _doubt(
-    operator: ComplianceOperator, index: Ints, force: Floats, dead: Floats, pivots: Floats
-) -> Floats:
+def _doubt(operator: ComplianceOperator, index: Ints, force: Floats, pivots: Floats) -> Floats:
     """Return the error of forces (S, k) for rounding of one part in one, over the largest.
 
     A displacement is known to a share of all that adds up in it; with ``|G_ij| ≤ √(G_ii G_jj)``
     that is read off the diagonal. Over its pivot it is the force that it leaves undetermined.
     """
-    rows = np.ascontiguousarray(index.T)
-    loss = operator.loss.take(rows)
-    own = operator.flexibility.diagonal().take(rows)
     size = np.abs(force.T)
-    root = np.sqrt(np.abs(own) * loss)
-    parts = root * np.einsum("ks,ks->s", root, size) + np.abs(dead) * loss
+    root, own, scale = operator.shares.take(np.ascontiguousarray(index.T), axis=1)
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-        left = np.max(parts / (own * pivots), axis=0, initial=0.0)
-        return np.asarray(left / np.maximum(size.max(axis=0, initial=0.0), TINY))
+        own += np.einsum("ks,ks->s", root, size)
+        own *= scale
+        own /= pivots
+        most = np.maximum(size.max(axis=0, initial=0.0), TINY)
+        return np.asarray(own.max(axis=0, initial=0.0) / most)
 
 
 def still_forces(operator: ComplianceOperator, columns: Ints, index: Ints, moved: Floats) -> Floats:
@@ -97,8 +94,8 @@ def still_forces(operator: ComplianceOperator, columns: Ints, index: Ints, moved
 
 
 def share_pairs(
-    operator: ComplianceOperator, columns: Ints, index: Ints, force: Floats
-) -> tuple[Ints, Ints]:
+    operator: ComplianceOperator, columns: Ints, index: Ints, force: Floats, carried: Floats
+) -> None:
     """Let each of two grips on one brick take what reaches its own node.
 
     Then the inner edge between them carries nothing: the limit of a stiff bar with both ends held.
@@ -111,24 +108,26 @@ def share_pairs(
         As of `grip_forces`.
     force : (S, k) float
         Changed in place, N.
-
-    Returns
-    -------
-    sets, edges : (p,) int
-        The inner edges that carry nothing.
+    carried : (S, E) or (S, 0) float
+        By the edges, N; changed in place. Computed where they are needed if there are none.
     """
     pairs = _pairs(operator, columns)
-    edges = operator.inner_edge[pairs.brick]
-    if not len(edges):
-        return pairs.sets, edges
-    carried = operator.answer("edge_force", index[pairs.sets], force[pairs.sets])
-    shift = carried[np.arange(len(edges)), edges][:, None] * pairs.axis
-    shift[columns[pairs.sets, pairs.first] % 2 == 1] *= -1.0  # the axis leads to the second node
+    if not len(pairs.sets):
+        return
+    sets, edges = pairs.sets, operator.inner_edge[pairs.brick]
+    if carried.shape[1]:
+        between = carried[sets, edges]
+        carried[sets, edges] = 0.0
+    else:
+        between = operator.answer("edge_force", index[sets], force[sets])[
+            np.arange(len(sets)), edges
+        ]
+    shift = between[:, None] * pairs.axis
+    shift[columns[sets, pairs.first] % 2 == 1] *= -1.0  # the axis leads to the second node
     width = pairs.axis.shape[1]
     nodes = force[:, : force.shape[1] - operator.loose].reshape(len(force), -1, width)
-    nodes[pairs.sets, pairs.first] += shift
-    nodes[pairs.sets, pairs.second] -= shift
-    return pairs.sets, edges
+    nodes[sets, pairs.first] += shift
+    nodes[sets, pairs.second] -= shift
 
 
 def _solved(

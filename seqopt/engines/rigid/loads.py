@@ -6,6 +6,7 @@ import numpy as np
 from scipy import sparse
 
 from seqopt.arrays import Floats, Ints
+from seqopt.engines.basis import Basis
 from seqopt.network.network import Network
 
 
@@ -58,3 +59,24 @@ def inner_edges(network: Network, bricks: int) -> tuple[Ints, Floats, Floats]:
     edge = np.flatnonzero(network.edge_spring[: network.count_edges(bricks)] < 0)
     axis = network.edge_axis[edge]
     return edge, axis, np.einsum("bi,bi->b", axis, network.inner_weight[1 : 2 * bricks : 2])
+
+
+def inner_motions(network: Network, basis: Basis) -> Floats:
+    """Return the displacements of the inner nodes of bricks for their unit twists.
+
+    Parameters
+    ----------
+    network : Network
+    basis : Basis
+        d directions of forces, k of twists.
+
+    Returns
+    -------
+    (n, 2d, k) float
+    """
+    count, forces = len(network.inner), len(basis.force)
+    arms = network.node_position[network.inner] - network.centroid[:count, None]
+    out = np.zeros((count, 2, forces, len(basis.wrench)))
+    out[..., :forces] = np.eye(forces)
+    out[..., forces:] = basis.levers(arms).swapaxes(-1, -2)
+    return out.reshape(count, 2 * forces, len(basis.wrench))

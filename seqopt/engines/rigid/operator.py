@@ -6,12 +6,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy import sparse
 
 from seqopt.arrays import Floats, FrozenValue, Ints, frozen
 from seqopt.engines.basis import SPACE, Basis
 from seqopt.engines.interface import FLAGS
 from seqopt.engines.rigid.growth import Growth
-from seqopt.engines.rigid.loads import inner_edges, load_matrix
+from seqopt.engines.rigid.loads import inner_edges, inner_motions, load_matrix
 from seqopt.engines.rigid.response_maps import AT_ONCE, ResponseMaps, scene_maps
 from seqopt.engines.rigid.spanning_tree import SpanningTree
 from seqopt.network.network import Network
@@ -71,6 +72,11 @@ class ComplianceOperator(FrozenValue):
     softness: float = 0.0
 
     @property
+    def bricks(self) -> int:
+        """How many stand, b."""
+        return len(self.axis)
+
+    @property
     def directions(self) -> int:
         """In how many directions a node is loaded and held, d."""
         return int(self.axis.shape[1])
@@ -78,16 +84,24 @@ class ComplianceOperator(FrozenValue):
     @property
     def nbytes(self) -> int:
         """Bytes of the arrays that there are by now."""
-        names = ("flexibility", "twist", "wrench", *FLAGS)
-        own = sum(int(vars(self)[name].nbytes) for name in names if name in vars(self))
-        return own + self.maps.nbytes
+        made = vars(self).keys() & {"flexibility", "twist", "wrench", *FLAGS}
+        return self.maps.nbytes + sum(int(vars(self)[name].nbytes) for name in made)
 
     @cached_property
     def place(self) -> Ints:
         """Which of the bricks that are loaded each is, (b,); -1 of one that is not."""
-        out = np.full(len(self.axis), -1)
+        out = np.full(self.bricks, -1)
         out[self.held] = np.arange(len(self.held))
         return frozen(out)
+
+    @cached_property
+    def shares(self) -> Floats:
+        """Roots of flexibilities, what weight adds to their sum, what makes it forces; (3, l)."""
+        own = np.maximum(np.abs(self.flexibility.diagonal()), np.finfo(float).tiny)
+        root = np.sqrt(own * self.loss)
+        return frozen(
+            np.stack([root, np.abs(self.dead_displacement) * self.loss / root, root / own])
+        )
 
     def covers(self, held: Ints) -> bool:
         """Return whether loads act at the nodes of bricks.
@@ -117,13 +131,15 @@ class ComplianceOperator(FrozenValue):
         """
         nodes = 2 * self.place[columns // 2] + columns % 2
         rows = self.directions * nodes[:, :, None] + np.arange(self.directions)
-        rows = rows.reshape(len(columns), self.directions * columns.shape[1])
+        rows = rows.reshape(len(columns), columns.shape[1] * self.directions)
         if self.loose:
             after = len(self.flexibility) - self.loose + np.arange(self.loose)
             rows = np.hstack([rows, np.tile(after, (len(rows), 1))])
         return np.asarray(rows)
 
-    def answer(self, name: str, index: Ints, force: Floats) -> Floats:
+    def answer(
+        self, name: str, index: Ints, force: Floats, load: sparse.csr_array | None = None
+    ) -> Floats:
         """Return a field of sets of forces beside the weight.
 
         Where there are fewer sets than loads of all bricks, their twists and wrenches are summed
@@ -137,6 +153,8 @@ class ComplianceOperator(FrozenValue):
             Loads that act.
         force : (S, k) float
             By how much, N.
+        load : (S, l + 1) sparse, optional
+            The same as a matrix, `seqopt.engines.rigid.loads.load_matrix`, if it is known.
 
         Returns
         -------
@@ -144,9 +162,9 @@ class ComplianceOperator(FrozenValue):
         """
         loads, every = len(self.twist) - 1, 2 * self.axis.size
         if every <= max(FEW, len(index)):  # whatever was asked before: answers do not depend on it
-            return np.asarray(load_matrix(index, force, loads) @ getattr(self, name))
-        states = self.twist if name in OF_TWISTS else self.wrench
-        out = np.empty((len(index), self.maps.count(name)))
+            load = load_matrix(index, force, loads) if load is None else load
+            return np.asarray(load @ getattr(self, name))
+        states, out = self._states(name), np.empty((len(index), self.maps.count(name)))
         step = max(16, AT_ONCE // states.shape[1])
         for start in range(0, len(index), step):
             part = slice(start, start + step)
@@ -164,12 +182,14 @@ class ComplianceOperator(FrozenValue):
         at = index[:, : nodes * width : width] // width
         brick, own = self.held[at // 2], force[:, : nodes * width].reshape(len(index), nodes, width)
         along = np.einsum("snd,snd->sn", own, self.axis[brick]) * (at % 2)
-        every = np.arange(len(index))
         for i in range(nodes):  # two may share an edge
-            out[every, self.inner_edge[brick[:, i]]] += along[:, i]
+            out[np.arange(len(index)), self.inner_edge[brick[:, i]]] += along[:, i]
+
+    def _states(self, name: str) -> Floats:
+        return self.twist if name in OF_TWISTS else self.wrench
 
     def _rows(self, name: str) -> Floats:
-        return self.maps.apply(name, self.twist if name in OF_TWISTS else self.wrench)
+        return self.maps.apply(name, self._states(name))
 
     @cached_property
     def edge_force(self) -> Floats:
@@ -217,7 +237,7 @@ class OperatorBuilder:
         self.network, self.basis = network, basis
         self.growth = Growth(network, tree, basis)
         self._maps = scene_maps(network, basis)
-        self._nodes = self._node_motion(np.arange(len(network.inner)))
+        self._nodes = inner_motions(network, basis)
 
     def operator(self, bricks: int, held: Ints | None = None) -> ComplianceOperator:
         """Return the operator of a partial structure.
@@ -252,16 +272,6 @@ class OperatorBuilder:
             inner_edge=inner_edge,
             loss=np.repeat(self.growth.loss[held], nodes.shape[1]),
         )
-
-    def _node_motion(self, held: Ints) -> Floats:
-        """Return the displacements (h, 2d, k) of the nodes of bricks for their unit twists."""
-        network, basis = self.network, self.basis
-        arms = network.node_position[network.inner[held]] - network.centroid[held][:, None]
-        forces = len(basis.force)
-        out = np.zeros((len(held), 2, forces, len(basis.wrench)))
-        out[..., :forces] = np.eye(forces)
-        out[..., forces:] = basis.levers(arms).swapaxes(-1, -2)
-        return out.reshape(len(held), 2 * forces, len(basis.wrench))
 
     def _rows(self, bricks: int, which: Ints | slice, nodes: Floats) -> tuple[Floats, Floats]:
         """Return the twists and wrenches under unit loads at nodes, and under the weight."""
