@@ -4,12 +4,12 @@ That is by the time that they compute, with a core each: on a shared machine the
 others. The answers are the same to the last bit, on Dask's local cluster too.
 
 Method: the states of the three-robot loop's steps with one open grip, those that a search without
-proof needs, of the vault of 338 bricks (``--scene`` takes another: ``chain338``, ``wall``, or a name
-of `seqopt.load_scene`; ``--pairs`` takes all steps). One process, two, and Dask's local cluster of
-two take turns in one run, each from a new engine; starting the processes counts, the cluster is
-started before. Per way the medians of: seconds by the clock, time that all processes computed
-(CPU), how many times as fast as one process that is by the clock, and by that time with a core
-each; and what sending a call that does nothing takes. Load is what waited for the cores of the
+proof needs, of the vault of 338 bricks (``--scene`` takes another: ``chain100``, ``wall``, or a
+name of `seqopt.load_scene`; ``--pairs`` takes all steps). One process, two, and Dask's local
+cluster of two take turns in one run, each from a new engine; starting the processes counts, the
+cluster is started before. Per way the medians of: seconds by the clock, time that all processes
+computed (CPU), how many times as fast as one process that is by the clock, and by that time with a
+core each; and what sending a call that does nothing takes. Load is what waited for the cores of the
 machine when the run began.
 
 Inputs: none. Command: ``python -m experiments.engines.parallel [--quick] [--scene NAME]
