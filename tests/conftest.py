@@ -1,10 +1,14 @@
 from __future__ import annotations
 
 import os
+import signal
 
 # several threads per process fight over the cores; set before numpy is imported, for subprocesses
 os.environ["OPENBLAS_NUM_THREADS"] = "1"
 os.environ["OMP_NUM_THREADS"] = "1"
+
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # in the background of a shell; programs that
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # tests start would not end by it
 
 import pytest
 from hypothesis import HealthCheck, settings

@@ -253,10 +253,14 @@ def test_an_experiment_that_reaches_across_is_seen(a, b):
 
 def test_claims_that_read_the_clock_declare_it():
     modules = graph("experiments")
-    clocks = {dotted(path) for path in sources("experiments") if "time" in imports(path)}
+    clocks = {
+        dotted(path)
+        for path in sources("experiments")
+        if "time" in imports(path) or ".seconds" in path.read_text(encoding="utf-8")
+    }
     for name, claim in claims().items():
         reads = clocks & {claim.module, *nx.descendants(modules, claim.module)}
-        assert bool(reads) == claim.takes_time, name
+        assert claim.takes_time or not reads, name
 
 
 def test_experiments_take_few_parameters():

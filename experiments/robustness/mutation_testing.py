@@ -12,12 +12,12 @@ a text with a line that raises is killed.
 Of the tools that were alive in 2026 Cosmic Ray (8.7, MIT) was taken, since it also changes what
 mutmut (3.8, BSD) leaves alone: constants of a module, properties and decorated functions, which
 here are tolerances and the engine's ``solve``; mutatest and mutpy have had no release since 2022.
-Its own runner starts a Python per mutant, four seconds of imports each; ours forks one that has
-them, and writes no file (`experiments.robustness.parts.mutant_trials`).
+Its own runner starts a Python per mutant, a second of imports each; ours forks one that has them,
+and writes no file (`experiments.robustness.parts.mutant_trials`).
 
 Inputs: the modules below. Command:
 ``python -m experiments.robustness.mutation_testing [--quick] [--again] [--only TEXT] [--most N]``;
-``--again`` tries what survived the last run, after tests were added. Writes
+``--again`` tries what survived the last run, after tests were added, and what was not drawn. Writes
 ``experiments/results/mutation_testing.csv`` and ``mutation_survivors.csv``.
 """
 
@@ -69,7 +69,8 @@ MODULES = {
     "formulations.solvers": ("formulations/test_equilibrium", *CHOSEN),
 }
 LEAST = 0.95  # of the mutants that are not equivalent
-MOST, QUICK_MOST, QUICK = 60, 8, "seqopt.placement.ranks"
+MOST, EVERY = 60, 10**9
+QUICK_MOST, QUICK = 8, "seqopt.placement.ranks"
 BROKEN = "\nraise RuntimeError\n"
 CONTROLS = {"as_it_is": "survived", "with_a_broken_line": "killed"}
 STORE, SURVIVORS = RESULTS / "mutation_testing.csv", RESULTS / "mutation_survivors.csv"
@@ -158,24 +159,23 @@ def store(row: pd.DataFrame, survivors: pd.DataFrame) -> None:
 
 
 def measured_again(module: str) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """Return a module's stored row and survivors, the survivors being tried anew."""
+    """Return a module's row and survivors, what survived and what was not drawn being tried."""
     from experiments.robustness.parts.equivalents import reason  # noqa: PLC0415
 
     table, before = stored()
     row = table[table["module"] == module].reset_index(drop=True)
-    keys = {*before.loc[before["module"] == module, KEY].itertuples(index=False, name=None)}
-    parts: dict[bool, list[Mutant]] = {True: [], False: []}
-    for mutant in drawn(module, int(row.loc[0, "tried"]))[0]:
-        parts[tuple(getattr(mutant, name) for name in KEY) in keys].append(mutant)
-    if len(parts[True]) != (before["module"] == module).sum():
+    survived = {*before.loc[before["module"] == module, KEY].itertuples(index=False, name=None)}
+    drawn_before = drawn(module, int(row.loc[0, "tried"]))[0]
+    killed = [m for m in drawn_before if tuple(getattr(m, name) for name in KEY) not in survived]
+    if len(drawn_before) - len(killed) != (before["module"] == module).sum():
         raise ClaimError(f"{module} is not what it was; run it without --again")
-    rows, controls = tried(module, parts[True])
-    fresh = counted(rows, 0)
-    surviving = {name: fresh[name] for name in ("equivalent", "survived")}
-    killed = int(row.loc[0, "tried"]) - sum(surviving.values())
-    wrong = fresh["equivalent_but_killed"] + sum(reason(mutant) != "" for mutant in parts[False])
-    again = row.assign(**surviving, killed=killed, equivalent_but_killed=wrong, **controls)
-    return again, left(rows)
+    left_to_try = [mutant for mutant in drawn(module, EVERY)[0] if mutant not in killed]
+    rows, controls = tried(module, left_to_try)
+    counts = counted(rows, len(killed) + len(rows)) | {"tried": len(killed) + len(rows)}
+    counts["killed"] += len(killed)
+    counts["of_these_timed_out"] += int(row.loc[0, "of_these_timed_out"])
+    counts["equivalent_but_killed"] += sum(reason(mutant) != "" for mutant in killed)
+    return row.assign(**counts, **controls, tests=" ".join(MODULES[module])), left(rows)
 
 
 def share(table: pd.DataFrame) -> tuple[float, float]:
@@ -227,7 +227,7 @@ CLAIM = Claim(
     experiment,
     quick=f"{QUICK_MOST} mutants of one module, nothing written",
     options=(
-        Option("--again", "try what survived the last run"),
+        Option("--again", "try what survived the last run, and what it did not draw"),
         Option("--only", "modules with this in their names; rows of others stay", ""),
         Option("--most", "how many mutants of a module are tried", str(MOST)),
     ),

@@ -231,11 +231,6 @@ def _add_optimize(commands: Commands, parents: list[_Parser]) -> None:
         "or so; how far the choice is from the optimum stays unknown",
     )
     resources_arguments(command)
-    command.add_argument(
-        "--time-limit",
-        metavar="SECONDS",
-        help="stop choosing after it, with the best choice so far and a bound",
-    )
     command.add_argument("--out", type=Path, metavar="DIR", required=True, help="folder to write")
     strict_argument(command)
 

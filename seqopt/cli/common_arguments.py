@@ -105,6 +105,11 @@ def resources_arguments(command: argparse.ArgumentParser) -> None:
         "within:1.5 for nodes at most 1.5 m from them; a heuristic",
     )
     command.add_argument(
+        "--time-limit",
+        metavar="SECONDS",
+        help="stop choosing after it, with the best choice so far and a bound",
+    )
+    command.add_argument(
         "--workers",
         default="1",
         metavar="N",

@@ -32,7 +32,7 @@ from seqopt.files import (
 )
 from seqopt.network.build import build_network
 from seqopt.placement.formulation import find_formulation
-from seqopt.placement.problem import pose
+from seqopt.placement.problem import Problem, pose
 from seqopt.placement.solving import solve
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.schedule import Schedule
@@ -58,37 +58,15 @@ def optimize(options: argparse.Namespace) -> Status:
     require_loop(options)
     formulation = find_formulation(options.formulation)
     chosen = parse_options(formulation, options.option)
-    criterion = asked_criterion(options)
-    scene = load_scene(options.scene)
-    limits = parse_limits(options.limit, scene)
-    resources = parse_resources(options, progress)
-    budgets = parse_budgets(options.budget)
-    require_folder(options.out)
+    limit, proof = parse_time_limit(options.time_limit), not options.no_proof
     start = time.perf_counter()
-    network = build_network(scene)
-    engine, schedule = (
-        asked_engine(options, network),
-        find_schedule(network, options.schedule, parse_robots(options.robots)),
-    )
-    if options.candidates is not None:
-        schedule = thin(schedule, options.candidates)
+    problem = _posed(options)
     assemble = time.perf_counter() - start
-    counted = [budget.response for budget in budgets if budget.response]
-    posed = pose(engine, schedule, criterion, limits, counted, resources)
-    limit = parse_time_limit(options.time_limit)
-    proof = not options.no_proof
-    plan = solve(
-        with_budgets(posed, budgets),
-        formulation,
-        proof=proof,
-        time_limit=limit,
-        progress=tell,
-        **chosen,
-    )
+    plan = solve(problem, formulation, proof=proof, time_limit=limit, progress=tell, **chosen)
     progress("")
-    say_levels(engine)
+    say_levels(problem.engine)
     report = plan.summary() | {
-        "models_paper_count": _paper_count(schedule),
+        "models_paper_count": _paper_count(problem.schedule),
         "seconds": {"assemble": assemble, **plan.seconds},
     }
     table = plan.responses()
@@ -99,8 +77,25 @@ def optimize(options: argparse.Namespace) -> Status:
     )
     for excess in plan.overloads:
         say(f"payload exceeded: {excess}")
-    say_idle(scene, plan.steps)
-    return payloads_hold(options, scene, table)
+    say_idle(problem.schedule.scene, plan.steps)
+    return payloads_hold(options, problem.schedule.scene, table)
+
+
+def _posed(options: argparse.Namespace) -> Problem:
+    """Return the problem that is asked for."""
+    criterion = asked_criterion(options)
+    scene = load_scene(options.scene)
+    limits = parse_limits(options.limit, scene)
+    resources = parse_resources(options, progress)
+    budgets = parse_budgets(options.budget)
+    require_folder(options.out)
+    network = build_network(scene)
+    engine = asked_engine(options, network)
+    schedule = find_schedule(network, options.schedule, parse_robots(options.robots))
+    if options.candidates is not None:
+        schedule = thin(schedule, options.candidates)
+    counted = [budget.response for budget in budgets if budget.response]
+    return with_budgets(pose(engine, schedule, criterion, limits, counted, resources), budgets)
 
 
 def _paper_count(schedule: Schedule) -> dict[str, int] | None:

@@ -100,8 +100,21 @@ def _highest(paths: Sequence[Path], reach: float) -> tuple[Floats, float]:
     planes = np.array([[1.0, *-path.over] for path in paths])
     heights = np.array([path.cost for path in paths])
     count = planes.shape[1] - 1
+    if count == 1:
+        return _highest_of_lines(heights, -planes[:, 1], reach)
     bounds = [(None, None), *([(0.0, reach)] * count)]
     found = linprog([-1.0, *[0.0] * count], planes, heights, bounds=bounds)
     if found.x is None or found.fun is None or not found.success:
         raise SolverError(f"prices of budgets: {found.message}; rescale the costs")
     return np.asarray(found.x[1:]), float(-found.fun)
+
+
+def _highest_of_lines(heights: Floats, slopes: Floats, reach: float) -> tuple[Floats, float]:
+    """Return where the lowest of few lines is highest: at an end, or where two of them meet."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        meet = (heights[:, None] - heights) / (slopes - slopes[:, None])
+    inside = np.isfinite(meet) & (meet > 0) & (meet < reach)
+    at = np.concatenate([[0.0, reach], np.unique(meet[inside])])
+    lowest = (heights[:, None] + slopes[:, None] * at).min(axis=0)
+    best = int(np.argmax(lowest))
+    return at[best : best + 1], float(lowest[best])

@@ -20,7 +20,7 @@ from seqopt.placement.kinds import robots_of
 from seqopt.placement.possible import compared, spread_over_pairs
 from seqopt.placement.requirements import Criterion, Limit, ResponsesAsked
 from seqopt.placement.scales import SceneFacts
-from seqopt.placement.windows import window_anew
+from seqopt.placement.windows import by_move, window_anew, window_kept
 from seqopt.responses.choices import CHOICE_RESPONSES, Evaluation, StepChoices
 from seqopt.responses.quantities import robot_response
 from seqopt.responses.resources import HERE, Resources
@@ -158,20 +158,11 @@ class Problem:
         """
         if self.evaluation.streams:
             return window_anew(self.evaluation, move, before)
-        out = []
-        for choices in self._decided.get(move, ()):
-            row = before if len(choices.moves) == 2 else slice(None)
-            responses = {name: values[row] for name, values in choices.responses.items()}
-            out.append(StepChoices(choices.step, choices.moves, responses))
-        return tuple(out)
+        return window_kept(self._decided.get(move, ()), before)
 
     @cached_property
     def _decided(self) -> Mapping[int, Sequence[StepChoices]]:
-        """The steps that each move decides: those in which it is the last that is open."""
-        found: dict[int, list[StepChoices]] = {}
-        for choices in self.evaluation.steps:
-            found.setdefault(choices.moves[-1], []).append(choices)
-        return found
+        return by_move(self.evaluation.steps)
 
     @cached_property
     def others(self) -> dict[Criterion, Problem]:

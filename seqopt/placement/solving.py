@@ -89,8 +89,7 @@ def solve(
         False lets ``cascade`` or ``rank_search`` solve only the models that they meet, one window
         after the other; how far the choice is from the optimum then stays unknown.
     time_limit : float, optional
-        After which it stops with the best choice so far and a bound, s; computing all costs before
-        and checking the answer are not counted.
+        After which it stops choosing, with the best choice so far and a bound, s.
     progress : callable, optional
         Told every better choice and bound as it is found.
     **options
@@ -105,15 +104,6 @@ def solve(
     InfeasibleError, ProblemError, SolverError
         If no choice is allowed; if problem, formulation and options do not go together; if a solver
         fails, or the answer is not what its formulation claims.
-
-    Examples
-    --------
-    >>> import seqopt
-    >>> network = seqopt.build_network(seqopt.load_scene("arch25"))
-    >>> engine, schedule = seqopt.make_engine("auto", network), seqopt.three_robot_loop(network)
-    >>> problem = seqopt.pose(engine, schedule, seqopt.CRITERIA["equations-2-3"])
-    >>> seqopt.solve(problem, "cascade").certificate.gap > 0.009
-    True
     """
     if isinstance(problem, FreeProblem):
         told = {} if progress is None else {"progress": progress}

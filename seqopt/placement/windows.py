@@ -70,3 +70,42 @@ def window_anew(evaluation: Evaluation, move: int, before: int) -> tuple[StepCho
     )
     moves = {step.number: step.moves for step in schedule.steps}
     return tuple(replace(each, moves=moves[each.step.number]) for each in found.steps)
+
+
+def by_move(steps: Sequence[StepChoices]) -> Mapping[int, Sequence[StepChoices]]:
+    """Return the steps that each move decides: those in which it is the last that is open.
+
+    Parameters
+    ----------
+    steps : sequence of StepChoices
+
+    Returns
+    -------
+    mapping of int to sequence of StepChoices
+    """
+    found: dict[int, list[StepChoices]] = {}
+    for choices in steps:
+        found.setdefault(choices.moves[-1], []).append(choices)
+    return found
+
+
+def window_kept(decided: Sequence[StepChoices], before: int) -> tuple[StepChoices, ...]:
+    """Return the steps that a move decides, for its candidates alone, from those of all choices.
+
+    Parameters
+    ----------
+    decided : sequence of StepChoices
+    before : int
+        The candidate chosen for the move before it.
+
+    Returns
+    -------
+    tuple of StepChoices
+        In order.
+    """
+    out = []
+    for choices in decided:
+        row = before if len(choices.moves) == 2 else slice(None)
+        responses = {name: values[row] for name, values in choices.responses.items()}
+        out.append(StepChoices(choices.step, choices.moves, responses))
+    return tuple(out)

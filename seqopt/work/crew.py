@@ -34,6 +34,9 @@ class Crew(Protocol):
         concurrent.futures.Future
         """
 
+    def look_after(self) -> None:
+        """See to it that a worker that has died does not keep the others waiting."""
+
     def replace(self, error: BaseException) -> bool:
         """Take new workers for those that died.
 
@@ -76,6 +79,9 @@ class Given:
         concurrent.futures.Future
         """
         return self.executor.submit(function, *arguments)
+
+    def look_after(self) -> None:
+        """Leave the workers to the executor; see `Crew`."""
 
     def replace(self, error: BaseException) -> bool:
         """Say whether the executor still takes work; its workers are its own matter.

@@ -18,6 +18,7 @@ from seqopt.work.crew import Crew
 Task = TypeVar("Task")
 Result = TypeVar("Result")
 UNDER_WAY = 4  # tasks given out or waiting to be taken, for every worker
+PATIENCE = 1.0  # s without an answer, after which workers are looked after
 FAILURES = 3  # times in a row that workers may end without any answer
 GUARD = 'if __name__ == "__main__":'
 
@@ -134,7 +135,7 @@ class _Course(Generic[Task, Result]):
     def _collect(self) -> None:
         """Wait for an answer at least; what came without one is to be given out again."""
         failure: BaseException | None = None
-        for future in wait(self.running, return_when=FIRST_COMPLETED).done:
+        for future in self._ended():
             number, task = self.running.pop(future)
             try:
                 fine, result = future.result()
@@ -148,6 +149,14 @@ class _Course(Generic[Task, Result]):
                 self.done(task, result)
         if failure is not None:
             self._failed(failure)
+
+    def _ended(self) -> set[Future[Any]]:
+        """Wait until a call at least has ended."""
+        while True:
+            ended = wait(self.running, PATIENCE, FIRST_COMPLETED).done
+            if ended:
+                return ended
+            self.crew.look_after()
 
     def _failed(self, error: BaseException) -> None:
         """Replace workers that died, unless there are none any more."""

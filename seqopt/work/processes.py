@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ProcessPoolExecutor
 from contextlib import contextmanager, suppress
 from multiprocessing.connection import Connection
+from multiprocessing.process import BaseProcess
 from typing import Any
 
 import numpy as np
@@ -31,6 +32,7 @@ class Processes:
         self.workers = workers
         self._pool: ProcessPoolExecutor | None = None
         self._leash: Connection | None = None
+        self._started: list[BaseProcess] = []
 
     def submit(self, function: Callable[..., Any], *arguments: object) -> Future[Any]:
         """Give a call out; see `Crew`.
@@ -48,8 +50,26 @@ class Processes:
             context = multiprocessing.get_context("spawn")  # threads and fork do not go together
             end, self._leash = context.Pipe(duplex=False)
             self._pool = ProcessPoolExecutor(self.workers, context, _follow, (end,))
+        before = [] if self._started else multiprocessing.active_children()
         with _deaf():
-            return self._pool.submit(function, *arguments)
+            future = self._pool.submit(function, *arguments)
+        if not self._started:
+            self._started = [p for p in multiprocessing.active_children() if p not in before]
+        return future
+
+    def look_after(self) -> None:
+        """End all processes if one has died while it sent an answer; see `Crew`.
+
+        The rest of that answer would be waited for without end: others, and this process itself,
+        keep open what it was sent through. Once they let go, the pool knows that it is broken.
+        """
+        if self._leash is None or all(process.is_alive() for process in self._started):
+            return
+        self._leash.close()
+        results = getattr(self._pool, "_result_queue", None)  # there is no public way to it
+        writer = getattr(results, "_writer", None)
+        if writer is not None:
+            writer.close()
 
     def replace(self, error: BaseException) -> bool:
         """Take new processes for those that died; see `Crew`.
@@ -81,6 +101,7 @@ class Processes:
         if self._leash is not None and not now:
             self._leash.close()
         self._pool = self._leash = None
+        self._started = []
 
 
 @contextmanager

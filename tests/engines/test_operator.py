@@ -14,11 +14,21 @@ from seqopt.engines.planar import PlanarEngine
 from seqopt.engines.rigid.compliance import ComplianceEngine, solve_batch
 from seqopt.engines.rigid.dense import solve_dense
 from seqopt.engines.rigid.grip_equations import grip_forces, still_forces
+from seqopt.engines.rigid.held_operator import held_operator
+from seqopt.engines.rigid.loose import hold_loose
+from seqopt.engines.rigid.mixed_system import ungripped_system
 from seqopt.engines.rigid.operator import OperatorBuilder, load_matrix
 from seqopt.engines.rigid.spanning_tree import grow_tree
 from seqopt.network.build import build_network
 from seqopt.scene.arch import ArchShape, arch_scene
-from tests.builders import branch, from_both_sides, small_arch
+from tests.builders import (
+    branch,
+    from_both_sides,
+    hinged,
+    six_bricks,
+    small_arch,
+    torsion_free,
+)
 
 SCENES = {
     "arch": small_arch(5),
@@ -136,6 +146,7 @@ def test_which_loads_act_at_a_grip():
     columns = np.array([[0, 4], [9, 2]])
     index = [[0, 1, 2, 12, 13, 14], [27, 28, 29, 6, 7, 8]]
     assert operator.load_index(columns).tolist() == index
+    assert (operator.loose, operator.softness) == (0, 0.0)  # nothing is
     held = replace(operator, loose=2, flexibility=np.zeros((32, 32)))
     assert held.directions == 3
     assert held.load_index(columns).tolist() == [[*row, 30, 31] for row in index]
@@ -164,3 +175,36 @@ def test_forces_undo_what_they_are_asked_to(sets):
         axis = operator.axis[brick]
         pulls = [again[0].reshape(-1, 3)[place] @ axis for place in (first, second)]
         assert abs(pulls[0] - pulls[1]) <= 1e-6 * np.abs(again).max()  # no force between them
+
+
+def eliminated(matrix):
+    """The pivots of a matrix, from the first unknown to the last."""
+    left, pivots = matrix.copy(), []
+    while len(left):
+        pivots.append(left[0, 0])
+        left = left[1:, 1:] - np.outer(left[1:, 0], left[0, 1:]) / left[0, 0]
+    return np.array(pivots)
+
+
+@pytest.mark.parametrize("grips", [(6, 9), (9, 7), (2, 7, 9), (3, 8, 6), (8, 9, 1), (6, 8, 9)])
+@pytest.mark.parametrize(("loosen", "loose"), [(hinged, 3), (torsion_free, 1)])
+def test_loose_motions_are_unknowns_of_the_grips(loosen, loose, grips):
+    """They move until nothing pulls at them; pivots are measured by what they stand on."""
+    net = build_network(loosen(six_bricks(), 2))
+    operator = held_operator(hold_loose(ungripped_system(net, 5)))
+    assert operator.loose == loose
+    columns = np.array([grips])
+    index = operator.load_index(columns)
+    force, pivot = grip_forces(operator, columns, index)
+    part = operator.flexibility[np.ix_(index[0], index[0])]
+    moved = part @ force[0] + operator.dead_displacement[index[0]]
+    assert np.abs(moved[:-loose]).max() <= 1e-9 * np.abs(operator.dead_displacement[:30]).max()
+    assert np.abs(moved[-loose:]).max() <= 1e-9 * np.abs(net.inner_weight).max()
+    bricks = columns[0] // 2
+    if len(set(bricks)) == len(grips):
+        scale = np.append(np.diag(part)[:-loose], [-1 / operator.softness] * loose)
+        assert pivot == pytest.approx([min(1.0, (eliminated(part) / scale).min())], rel=1e-6)
+    else:
+        weighed = load_matrix(index, force, len(operator.flexibility)) @ operator.edge_force
+        (brick,) = {b for b in bricks if (bricks == b).sum() == 2}
+        assert abs(weighed[0, operator.inner_edge[brick]]) <= 1e-9 * np.abs(weighed).max()

@@ -15,6 +15,7 @@ from experiments.calibration import calibration
 from experiments.calibration.parts import arch_scores, calibration_spread
 from experiments.discrete import contact_steps, discrete_arches
 from experiments.engines import (
+    engine_growth,
     engine_limits,
     engine_speed,
     fidelity_ladder,
@@ -96,6 +97,7 @@ def checks() -> dict[str, tuple[Check, Tables, Callable[..., Iterator[tuple[Any,
             spoil_discrete,
         ),
         "dry_grips": (dry_grips.holds, (rows("dry_grips"), rows("dry_grips_build")), spoil_dry),
+        "engine_growth": (engine_growth.holds, (rows("engine_growth_runs"),), spoil_growth),
         "engine_limits": (
             lambda table: all(engine_limits.judge(table).values()),
             (rows("engine_limits"),),
@@ -245,6 +247,13 @@ def spoil_mutation(table, survivors):
     yield table, survivors.assign(reason="none could")
     yield table, survivors.drop(index=named.index[0])
     yield table.assign(survived=table["killed"] // 10), survivors
+
+
+def spoil_growth(table):
+    for column in ("seconds", "memory_MB"):  # as the cube, and a run without an end
+        cube = 1e-4 * table["bricks"] ** 3 + table["memory_MB"].min()
+        yield (table.assign(**{column: table[column].where(table["version"] != "this", cube)}),)
+    yield (spoiled(table, "seconds", np.nan, version="this", scene="vault338"),)
 
 
 def spoil_limits(table):

@@ -5,7 +5,7 @@ Forces count in the cube's weight, strengths in that weight over its face, so th
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import FrozenInstanceError, replace
 
 import cvxpy as cp
 import numpy as np
@@ -13,7 +13,7 @@ import pytest
 
 from experiments.stability.parts.blocks import stack
 from formulations.limit_analysis import compile_equilibrium
-from formulations.solvers import CONE_OPTIONS, ENDS, SECONDS, end_of
+from formulations.solvers import CONE_OPTIONS, ENDS, SECONDS, Optimum, end_of, minimize
 from seqopt.stability.limit_analysis import CAP, Case, Claim, Sense, limits
 from tests.builders import held
 
@@ -177,6 +177,28 @@ def test_the_first_attempt_is_the_first(monkeypatch):
     for attempts in ((), (0,), (1,)):
         program(case(Sense.LARGEST), *attempts)
     assert given == [0, 0, 1]
+
+
+def test_the_first_attempt_has_its_authors_scaling_the_next_starts_afresh_with_the_solvers():
+    first, second = CONE_OPTIONS
+    assert first["equilibrate_enable"] is False
+    assert "equilibrate_enable" not in second  # the solver's own
+    assert second["warm_start"] is False  # which would keep the first one's
+
+
+@pytest.mark.parametrize("seconds", [None, 0.25])
+def test_an_optimum_is_a_value_and_the_time_to_write_it_down(monkeypatch, seconds):
+    """An integer one is sought to nine digits."""
+    x = cp.Variable(boolean=True)
+    given, solve = [], cp.Problem.solve
+    monkeypatch.setattr(*(cp.Problem, "solve"), lambda own, **o: given.append(o) or solve(own, **o))
+    monkeypatch.setattr(cp.Problem, "compilation_time", seconds, raising=False)
+    found = minimize(cp.Problem(cp.Minimize(3 - 2 * x)), cp.HIGHS, feasible=True)
+    assert found == Optimum(1.0, seconds or 0.0)
+    assert 0 < given[0]["mip_rel_gap"] <= 1e-9
+    assert 0 < given[0]["mip_abs_gap"] <= 1e-9
+    with pytest.raises(FrozenInstanceError):
+        found.value = 2.0
 
 
 def test_a_solver_that_fails_has_stalled(monkeypatch):

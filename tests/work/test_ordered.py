@@ -7,10 +7,12 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from functools import partial
 
+import numpy as np
 import pytest
 
 from seqopt.errors import SolverError, WorkerError
@@ -37,6 +39,15 @@ def die_once(folder, number):
         mark.touch()
         os.kill(os.getpid(), signal.SIGKILL)
     return number * number
+
+
+def die_while_sending(folder, number):
+    """End the process the first time, most likely amid an answer of 200 MB."""
+    mark = folder / f"died at {number}"
+    if number == 1 and not mark.exists():
+        mark.touch()
+        threading.Timer(0.1, os.kill, (os.getpid(), signal.SIGKILL)).start()
+    return np.full(25_000_000, float(number))
 
 
 def die(number):
@@ -102,6 +113,14 @@ def test_a_worker_that_dies_is_replaced_and_nothing_is_lost(tmp_path):
     with hire(workers=2) as crew:
         assert list(map_ordered(partial(die_once, tmp_path), range(12), crew)) == WANTED
     assert len(list(tmp_path.iterdir())) == 2  # they did die
+
+
+def test_a_worker_that_dies_while_it_sends_keeps_nobody_waiting(tmp_path):
+    """The rest of its answer was waited for without end."""
+    with hire(workers=2) as crew:
+        answers = map_ordered(partial(die_while_sending, tmp_path), range(3), crew)
+        assert [float(answer.max()) for answer in answers] == [0.0, 1.0, 2.0]
+    assert len(list(tmp_path.iterdir())) == 1
 
 
 def test_workers_that_always_die_end_in_a_line():

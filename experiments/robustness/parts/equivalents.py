@@ -42,20 +42,22 @@ class Equivalent:
 
 
 COMPLIANCE = "seqopt.engines.rigid.compliance"
+GRIPS = "seqopt.engines.rigid.grip_equations"
 COSTS, CERTIFICATE = "seqopt.placement.costs", "seqopt.placement.certificate"
 CRITERIA, RANKS = "seqopt.placement.criteria", "seqopt.placement.ranks"
 UNUSED = "without any no constraint has this variable, and faces have three corners or more"
 LENGTHS = "both have a length: costs that have not are refused when they are made"
 EQUIVALENT = (
     *(
-        Equivalent(module, line, "strict=True", "strict=False", LENGTHS)
-        for module, line in (
-            ("formulations.*", "zip("),
-            ("seqopt.engines.*", "zip("),
-            ("seqopt.placement.flow", "zip("),
-            (CERTIFICATE, "zip("),
-            (COSTS, "enumerate(zip("),
-            (COSTS, "zip(self.single[-2::-1]"),
+        Equivalent(module, line, "strict=True", "strict=False", why)
+        for module, line, why in (
+            ("formulations.*", "zip(", LENGTHS),
+            ("seqopt.placement.flow", "zip(", LENGTHS),
+            (COSTS, "enumerate(zip(", LENGTHS),
+            (COSTS, "zip(self.single[-2::-1]", LENGTHS),
+            (CERTIFICATE, "shared in zip(", LENGTHS),
+            (CERTIFICATE, "zip(choice, sizes", "lengths were compared before"),
+            ("seqopt.engines.rigid.operator", "zip(", "both are by ground end of one network"),
         )
     ),
     *(
@@ -102,6 +104,23 @@ EQUIVALENT = (
     *(
         Equivalent("formulations.limit_analysis", "cp.Variable", f"{old}1", f"{old}{size}", UNUSED)
         for old, size in (("corners,", 0), ("corners,", 2), ("grips,", 0))
+    ),
+    *(
+        Equivalent("formulations.solvers", "SECONDS", "300.0", size, "when a solver has stalled")
+        for size in ("299.0", "301.0")
+    ),
+    Equivalent(
+        GRIPS, "softness", "else 1.0", "else 0.0", "without loose motions nothing is scaled"
+    ),
+    Equivalent(
+        GRIPS, "softness", "else 1.0", "else 2.0", "without loose motions nothing is scaled"
+    ),
+    Equivalent(GRIPS, "bricks[couples", "pair, 0", "pair, 1", "both grips hold this brick"),
+    Equivalent(
+        "seqopt.engines.rigid.*", "reshape(", "-1", "-2", "a negative length is what is left"
+    ),
+    Equivalent(
+        CERTIFICATE, "@dataclass", "repr=False", "repr=True", "without arrays both look alike"
     ),
     Equivalent(COMPLIANCE, "pivot >= TRUSTED", ">=", ">", "no pivot is 1e-5 to the last bit"),
     *(

@@ -1,8 +1,9 @@
-"""Exactly rigid bricks: one compliance operator per brick count answers every grip set.
+"""Exactly rigid bricks: one flexibility that grows with the build answers every grip set.
 
-`ComplianceEngine` grows a spanning tree of springs, makes the operator of a brick count from it,
-solves the grips' equations in batches and hands the few sets that would lose digits to
-`solve_mixed`; `solve_dense` is a third route, for tests and for mechanisms.
+`ComplianceEngine` grows it on a spanning tree of springs, makes the operator of the gripped bricks
+from it, solves the grips' equations in batches, and has the few sets that may err more than is
+accepted corrected (`seqopt.engines.rigid.refinement`). `solve_mixed` and `solve_dense` are other
+routes, for last resorts, tests and mechanisms.
 """
 
 from seqopt.engines.rigid.compliance import ComplianceEngine

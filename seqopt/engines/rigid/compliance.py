@@ -1,11 +1,13 @@
-"""The fast engine: exactly rigid bricks, one compliance operator per brick count.
+"""The fast engine: exactly rigid bricks, one flexibility that grows with the build.
 
 With the flexibility ``G`` of the inner nodes and their displacements ``d`` under the weight, grips
 at the nodes ``S`` exert the forces ``λ`` that hold them still, ``G[S, S] λ = -d[S]``; every
 response is then the sum of the responses to the weight and to ``λ``. Where these nearly cancel
-(grips far out on a long chain and close together, or beyond a joint that is nearly loose), and
-where something is loose, grip sets are corrected by the residuals of wrenches and motions side by
-side (`seqopt.engines.rigid.refinement`).
+(grips far out on a long chain and close together, or beyond a joint that is nearly loose), so that
+more than the accepted error may be left, and where something is loose, grip sets are corrected by
+the residuals of wrenches and motions side by side (`seqopt.engines.rigid.refinement`).
+
+Brick counts are best asked in ascending order: what all of them share grows in place.
 """
 
 from __future__ import annotations

@@ -93,7 +93,8 @@ def hold_loose(parts: Ungripped) -> HeldSystem:
         )
         matrix = sparse.block_array([[matrix, -wide.T], [wide, None]], format="csr")
     try:
-        factors = splu(sparse.csc_array(matrix), diag_pivot_thresh=NEAR)
+        # springs first, then bricks as they are built: neighbors stand near each other
+        factors = splu(sparse.csc_array(matrix), permc_spec="NATURAL", diag_pivot_thresh=NEAR)
     except RuntimeError as error:  # SuperLU met an exactly zero pivot
         raise SolverError(
             f"{parts.bricks} bricks: exactly singular in double precision; stiffen what is soft"
