@@ -4,13 +4,13 @@ That is by the time that they compute, with a core each: on a shared machine the
 others. The answers are the same to the last bit, on Dask's local cluster too.
 
 Method: the states of the three-robot loop's steps with one open grip, those that a search without
-proof needs, of the vault of 338 bricks (``--scene`` takes another: ``chain338``, ``wall``, or a
-name of `seqopt.load_scene`; ``--pairs`` takes all steps). One process, two, and Dask's local
-cluster of two take turns in one run, each from a new engine; starting the processes counts, the
-cluster is started before. Per way the medians of: seconds by the clock, time that all processes
-computed (CPU), how many times as fast as one process that is by the clock, and by that time with a
-core each; and what sending a call that does nothing takes. Load is what waited for the cores of the
-machine when the run began.
+proof needs, of the vault of 338 bricks (``--scene`` takes another: ``chain100``, ``wall``, or a
+name of `seqopt.load_scene`; ``--pairs`` takes all steps). One process and two take turns, then
+comes Dask's local cluster of two, in one run and each from a new engine; starting the processes
+counts, the cluster is started before. Per way the medians of: seconds by the clock, time that all
+processes computed (CPU), how many times as fast as one process that is by the clock, and by that
+time with a core each; and what sending a call that does nothing takes. Load is what waited for the
+cores of the machine when the run began.
 
 Inputs: none. Command: ``python -m experiments.engines.parallel [--quick] [--scene NAME]
 [--pairs]``. Writes ``experiments/results/parallel.csv``; rows of other scenes stay.
@@ -21,8 +21,8 @@ from __future__ import annotations
 import os
 import resource
 import time
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from importlib.util import find_spec
 
@@ -89,19 +89,28 @@ def run(network: Network, schedule: Schedule, resources: Resources) -> Run:
     return Run(found.steps, found.models, time.perf_counter() - start, cpu() - before)
 
 
-@contextmanager
-def ways() -> Iterator[dict[str, Resources]]:
-    """Have the ways to share the work: one process, two, and Dask's where it is installed."""
-    with ExitStack() as stack:
-        out = {"one process": Resources(), "two processes": Resources(workers=2)}
-        if find_spec("distributed") is not None:
-            from distributed import Client, LocalCluster  # noqa: PLC0415  # an extra
+HERE = {"one process": Resources(), "two processes": Resources(workers=2)}
 
-            options = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": None}
-            cluster = stack.enter_context(LocalCluster(processes=True, **options))
-            client = stack.enter_context(Client(cluster))
-            out["dask, two processes"] = Resources(2, client.get_executor())
-        yield out
+
+@contextmanager
+def cluster() -> Iterator[dict[str, Resources]]:
+    """Have Dask's local cluster where it is installed, which keeps its memory as processes do.
+
+    By default it gives memory back all the time, and so do all processes that are started after.
+    """
+    if find_spec("distributed") is None:
+        yield {}
+        return
+    import dask  # noqa: PLC0415  # an extra
+    from distributed import Client, LocalCluster  # noqa: PLC0415
+
+    options = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": None}
+    with (
+        dask.config.set({"distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": 2**27}),
+        LocalCluster(processes=True, **options) as local,
+        Client(local) as client,
+    ):
+        yield {"dask, two processes": Resources(2, client.get_executor())}
 
 
 def overhead(resources: Resources, calls: int = 64) -> float:
@@ -117,12 +126,18 @@ def measured(name: str, rounds: int, *, single: bool) -> pd.DataFrame:
     """Return a row per way, the ways having taken turns."""
     network, load = network_of(name), os.getloadavg()[0]
     schedule = schedule_of(network, single=single)
-    with ways() as found:
-        runs = {way: [] for way in found}
+    runs: dict[str, list[Run]] = {}
+    sent: dict[str, float] = {}
+
+    def take_turns(ways: Mapping[str, Resources]) -> None:
         for _ in range(rounds):
-            for way, resources in found.items():
-                runs[way].append(run(network, schedule, resources))
-        sent = {way: overhead(resources) for way, resources in found.items()}
+            for way, resources in ways.items():
+                runs.setdefault(way, []).append(run(network, schedule, resources))
+        sent.update({way: overhead(resources) for way, resources in ways.items()})
+
+    take_turns(HERE)
+    with cluster() as ways:
+        take_turns(ways)
     alone = runs["one process"]
     rows = []
     for way, mine in runs.items():

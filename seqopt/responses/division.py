@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
@@ -16,6 +16,7 @@ from seqopt.work.crew import Crew, hire
 from seqopt.work.ordered import map_ordered
 from seqopt.work.progress import Progress
 
+SEVERAL = 4  # portions' work that states of one brick count may be before they are parted
 PORTIONS = 32  # tasks for every worker: one that is slow, or dies, leaves little to the others
 
 
@@ -83,8 +84,9 @@ def share_out(
 ) -> Iterator[Portion]:
     """Return portions of about equal work, each of neighboring blocks; stored ones apart.
 
-    Engines that grow with the structure serve ascending brick counts best, so that portions keep
-    the order of the blocks.
+    Engines that grow with the structure serve ascending brick counts best, and what all states of
+    one share they prepare once: portions keep the order of the blocks, and end between brick counts
+    unless one has several portions' work.
 
     Parameters
     ----------
@@ -102,16 +104,26 @@ def share_out(
     enough = 0.0 if crew is None else total / (PORTIONS * crew.workers)
     mine: list[Block] = []
     for block in blocks:
+        if _complete(mine, block, enough):
+            yield Portion(tuple(mine))
+            mine = []
         found = None if store is None else store.find(block)
         if found is None:
             mine.append(block)
-        if mine and (found is not None or sum(each.work for each in mine) >= enough):
+        if mine and (found is not None or crew is None):
             yield Portion(tuple(mine))
             mine = []
         if found is not None:
             yield Portion((block,), [found])
     if mine:
         yield Portion(tuple(mine))
+
+
+def _complete(mine: Sequence[Block], coming: Block, enough: float) -> bool:
+    """Return whether blocks are a portion before another one comes."""
+    work = sum(block.work for block in mine)
+    between = bool(mine) and coming.bricks != mine[-1].bricks
+    return work >= (enough if between else SEVERAL * enough) and bool(mine)
 
 
 @dataclass(frozen=True)

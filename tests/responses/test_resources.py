@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import pickle
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -26,6 +27,7 @@ from seqopt.responses.states import Block, answer
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.study.presets import CRITERIA, EQUATIONS
+from seqopt.work.processes import Processes
 
 
 def everything(_):
@@ -63,6 +65,28 @@ def test_results_are_the_same_however_work_is_shared(small_blocks, loop25, porti
             engine = make_engine("auto", loop25.scene)
             found = evaluation(engine, loop25, executor=executor, workers=workers)
             assert found.steps == expected
+
+
+@pytest.mark.parametrize("portions", [3, 32])
+def test_what_states_of_a_brick_count_share_is_prepared_once(loop25, portions, monkeypatch):
+    """Blocks of one brick count go to one worker unless they are several portions' work."""
+    monkeypatch.setattr(alike, "BLOCK", 5)
+    monkeypatch.setattr(division, "PORTIONS", portions)
+    single = replace(loop25, steps=tuple(s for s in loop25.steps if len(s.moves) == 1))
+    levels = alike.steps_alike(single)
+    groups = [alike.alike(single, steps, everything) for level in levels for steps in level]
+    every = [block for group in groups for block in group.blocks()]
+    total = sum(block.work for block in every)
+    shared = [*division.share_out(every, None, total, Processes(2))]
+    assert [block for portion in shared for block in portion.blocks] == every
+    assert portions / 2 < len(shared) <= 2 * portions
+    if portions == 3:
+        counts = [{block.bricks for block in portion.blocks} for portion in shared]
+        assert all(a.isdisjoint(b) for a, b in itertools.pairwise(counts))
+    most = division.SEVERAL * total / (2 * portions) + max(block.work for block in every)
+    assert all(portion.work <= most for portion in shared)
+    alone = [*division.share_out(every, None, total, None)]
+    assert [len(portion.blocks) for portion in alone] == [1] * len(every)
 
 
 BUILT = arch_scene(ArchShape(pitch=np.linspace(1.3, -1.3, 7).tolist(), pattern="V"))  # in a plane
