@@ -33,7 +33,7 @@ from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.placement.formulation import FormulationKind
 from seqopt.placement.free_goals import Measure
 from seqopt.placement.free_graph import StateGraph, explore
-from seqopt.placement.free_paths import keep_best, least_from_start, shortest
+from seqopt.placement.free_paths import TIED, keep_best, least_from_start, shortest
 from seqopt.placement.free_problem import FreeProblem, ScheduleSelection
 from seqopt.placement.schedule_formulation import ScheduleFormulation
 
@@ -127,7 +127,8 @@ def _below(problem: FreeProblem, ceiling: float, growth: float, tell: Tell) -> S
     if np.isfinite(ceiling) or problem.goals[0].measure is not Measure.PEAK:
         threshold = ceiling / FAR_BELOW
     while True:
-        graph = explore(problem, threshold, tell=tell)
+        tied = threshold + TIED * abs(threshold) if np.isfinite(threshold) else threshold
+        graph = explore(problem, tied, tell=tell)
         if graph.whole or threshold >= ceiling or graph.excluded == np.inf:
             return graph
         threshold = min(ceiling, max(graph.excluded, threshold * growth))

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import _thread
 import contextlib
 import io
 import os
 import signal
 import sys
+import threading
+from collections.abc import Callable
+from types import FrameType
 
 INTERRUPTED, FAILED = 130, 4  # as seqopt.cli.status has it, which may not be there yet
 LEAST = 340e6  # bytes of addresses with which a program starts
+AGAIN = 0.05  # s after which an interrupt that was lost is raised again
 
 
 def run() -> int:
@@ -21,11 +26,13 @@ def run() -> int:
         The exit status.
     """
     try:
-        _take_signals()
         _open_streams()
+        _answer_signals(_leave)  # libraries that are being loaded may lose what is raised in them
         _require_room()
         from seqopt.cli.main import main  # noqa: PLC0415  # what an interrupt may meet
 
+        sys.unraisablehook = _raise_again
+        _answer_signals(signal.default_int_handler)
         status = main()
     except KeyboardInterrupt:
         with contextlib.suppress(OSError, AttributeError):
@@ -46,11 +53,27 @@ def run() -> int:
     return status
 
 
-def _take_signals() -> None:
+def _answer_signals(answer: Callable[[int, FrameType | None], object]) -> None:
     """Let all signals that ask for an end ask as ctrl-C does, so that files are cleaned up."""
-    for name in ("SIGTERM", "SIGHUP"):
-        if hasattr(signal, name) and signal.getsignal(getattr(signal, name)) is signal.SIG_DFL:
-            signal.signal(getattr(signal, name), signal.default_int_handler)
+    for name in ("SIGINT", "SIGTERM", "SIGHUP"):
+        number = getattr(signal, name, None)
+        if number is not None and signal.getsignal(number) not in (signal.SIG_IGN, None):
+            signal.signal(number, answer)
+
+
+def _leave(*_: object) -> None:
+    """End the program at once: nothing is written before it has started."""
+    with contextlib.suppress(OSError):
+        os.write(2, b"seqopt: interrupted\n")
+    os._exit(INTERRUPTED)
+
+
+def _raise_again(lost: sys.UnraisableHookArgs) -> None:
+    """Ask once more where an interrupt met what cannot raise, as the end of an object."""
+    if issubclass(lost.exc_type, KeyboardInterrupt):
+        threading.Timer(AGAIN, _thread.interrupt_main).start()  # at once it would meet this hook
+    else:
+        sys.__unraisablehook__(lost)
 
 
 def _require_room() -> None:

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import os
-import signal
 import stat
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import pandas as pd
 
 from seqopt.errors import FileError
+from seqopt.interrupts import undisturbed
 
 LARGEST_INPUT = 64_000_000  # bytes; a scene of 100,000 bricks has 40 million
 HIDDEN = ".seqopt-"  # start of the names of what is not complete yet
@@ -139,12 +138,14 @@ def write_folder(folder: Path, files: Mapping[str, bytes | str]) -> None:
             _put_all([(target / name, content) for name, content in files.items()])
             return
         make_folder(target.parent)
-        with tempfile.TemporaryDirectory(dir=target.parent, prefix=HIDDEN) as hidden:
+        with (
+            undisturbed(),
+            tempfile.TemporaryDirectory(dir=target.parent, prefix=HIDDEN) as hidden,
+        ):
             whole = Path(hidden) / "whole"
             whole.mkdir()  # as open as any new folder; the one around it is private
             _put_all([(whole / name, content) for name, content in files.items()])
-            with _undisturbed():
-                whole.rename(target)
+            whole.rename(target)
     except (OSError, ValueError) as error:
         raise _unwritable(folder, error) from error
 
@@ -241,29 +242,15 @@ def _stage(path: Path, content: bytes | str) -> tuple[Path, Path]:
 def _put_all(files: Sequence[tuple[Path, bytes | str]]) -> None:
     """Write files; then put them in their places, one right after the other."""
     staged: list[tuple[Path, Path]] = []
-    try:
-        for path, content in files:
-            staged.append(_stage(path, content))
-        with _undisturbed():
+    with undisturbed():
+        try:
+            for path, content in files:
+                staged.append(_stage(path, content))
             for hidden, target in staged:
                 hidden.replace(target)
-    finally:
-        for hidden, _ in staged:
-            hidden.unlink(missing_ok=True)
-
-
-@contextmanager
-def _undisturbed() -> Iterator[None]:
-    """Hold back the signals that end a program, where the system can."""
-    if os.name != "posix":
-        yield
-        return
-    ends = {signal.SIGINT, signal.SIGTERM, signal.SIGHUP}
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, ends)
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        finally:
+            for hidden, _ in staged:
+                hidden.unlink(missing_ok=True)
 
 
 def _is_same(path: Path, other: Path) -> bool:

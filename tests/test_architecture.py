@@ -13,7 +13,7 @@ from experiments.harness.catalog import claims
 ROOT = Path(__file__).resolve().parent.parent
 
 ROOMS = (
-    {"arrays", "errors"},
+    {"arrays", "errors", "interrupts"},
     {"files", "work"},
     {"scene"},
     {"network"},

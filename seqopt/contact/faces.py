@@ -93,7 +93,7 @@ def _contact(network: Network, spring: int) -> tuple[str, Floats, Floats]:
     point = springs.position[spring]
     axes = _oriented(springs.axes[spring], point, between)
     common = _overlap(axes, point, between, name)
-    middle = point + common.mean(axis=0) @ axes[1:]
+    middle = point + _centroid(common) @ axes[1:]
     before = -face_distance(between[0], -axes[0], middle) if len(between) > 1 else 0.0
     JointSpace(
         name=name,
@@ -159,6 +159,13 @@ def _clip(polygon: Floats, other: Floats) -> Floats:
                 kept.append(polygon[i])
         polygon = np.array(kept).reshape(-1, 2)
     return polygon
+
+
+def _centroid(polygon: Floats) -> Floats:
+    """Return the centroid (2,) of a polygon; a corner that occurs twice does not count twice."""
+    (x, y), (u, v) = polygon.T, np.roll(polygon, -1, axis=0).T
+    turn = x * v - u * y
+    return np.asarray([(x + u) @ turn, (y + v) @ turn] / (3.0 * turn.sum()))
 
 
 def _polygon_area(polygon: Floats) -> float:

@@ -113,7 +113,7 @@ def _solve_one(network: Network, bricks: int, columns: Ints, contrast: float) ->
     load = np.zeros((frame.nodes, 6))
     load[network.inner[:bricks].ravel(), :3] = network.inner_weight[: 2 * bricks]
     held = network.inner.ravel()[columns]
-    base = np.flatnonzero(network.node_kind[:nodes] == PartKind.BASE)
+    base = np.flatnonzero(network.node_kind[:nodes] == PartKind.BASE.value)
     free = np.ones((frame.nodes, 6), dtype=bool)
     free[base] = False
     free[held, :3] = False
@@ -143,11 +143,11 @@ def _frame(network: Network, bricks: int, contrast: float) -> _Frame:
     """
     edges, nodes = network.count_edges(bricks), network.count_nodes(bricks)
     springs, kind = network.springs, network.edge_kind[:edges]
-    split = np.flatnonzero(kind != PartKind.INNER)
+    split = np.flatnonzero(kind != PartKind.INNER.value)
     which = network.edge_spring[split]
     total = nodes + len(split)
     ends = network.edge_nodes[:edges].copy()
-    ends[split, np.where(kind[split] == PartKind.BASE, 0, 1)] = nodes + np.arange(len(split))
+    ends[split, np.where(kind[split] == PartKind.BASE.value, 0, 1)] = nodes + np.arange(len(split))
     pairs = np.stack([springs.node[which], nodes + np.arange(len(split))], axis=1)
     stretch = contrast * springs.translational_stiffness.max()  # EA / L
     bend = contrast * springs.rotational_stiffness.max()  # EI / L = GJ / L
@@ -194,7 +194,7 @@ def _beams(
 def _joint_wrenches(network: Network, bricks: int, stress: Floats) -> Floats:
     """Return the wrench (S, 6) of every spring on its second body from half-joint stresses."""
     springs, edges = network.springs, network.count_edges(bricks)
-    split = np.flatnonzero(network.edge_kind[:edges] != PartKind.INNER)
+    split = np.flatnonzero(network.edge_kind[:edges] != PartKind.INNER.value)
     which = network.edge_spring[split]
     mine = (network.edge_brick[split] == springs.bodies[which, 1]) & (
         springs.since[which] <= bricks

@@ -58,7 +58,10 @@ def _followers(network: Network, bricks: int) -> tuple[Ints, Ints, Floats]:
     """Return which node follows which brick by which share."""
     springs = network.springs
     kind = network.node_kind[: network.count_nodes(bricks)]
-    inner, joint = np.flatnonzero(kind == PartKind.INNER), np.flatnonzero(kind == PartKind.JOINT)
+    inner, joint = (
+        np.flatnonzero(kind == PartKind.INNER.value),
+        np.flatnonzero(kind == PartKind.JOINT.value),
+    )
     spring = network.node_spring[joint]
     bodies = springs.bodies[spring]
     acts = springs.since[spring] <= bricks

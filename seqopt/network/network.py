@@ -28,7 +28,11 @@ GROUND = -1  # stands for the ground where a brick's index in build order is exp
 
 
 class PartKind(IntEnum):
-    """What a node or an edge of the network is."""
+    """What a node or an edge of the network is.
+
+    Arrays are compared with its values: of a member NumPy asks the class for more, and an interrupt
+    that comes just then is lost.
+    """
 
     INNER = 0  # inner node; edge between the inner nodes of a brick
     JOINT = 1  # joint node; half-edge between an inner node and a joint node
@@ -176,7 +180,7 @@ class Network(FrozenValue):
         return {
             int(name): i  # type: ignore[call-overload]
             for i, name in enumerate(self.node_name)
-            if self.node_kind[i] == PartKind.INNER
+            if self.node_kind[i] == PartKind.INNER.value
         }
 
     @cached_property

@@ -47,15 +47,15 @@ def build_statics(network: Network) -> Statics:
     """
     axis, kind, spring = network.edge_axis, network.edge_kind, network.edge_spring
     springs = network.springs
-    outer = np.flatnonzero(kind != PartKind.INNER)
+    outer = np.flatnonzero(kind != PartKind.INNER.value)
     on_first = (springs.bodies[spring[outer], 0] == network.edge_brick[outer]) & (
-        kind[outer] == PartKind.JOINT
+        kind[outer] == PartKind.JOINT.value
     )
     sign = np.where(on_first, -1.0, 1.0)[:, None]
-    inner = np.flatnonzero(kind == PartKind.INNER)
+    inner = np.flatnonzero(kind == PartKind.INNER.value)
     inner_edge = np.empty(len(network.inner), dtype=np.int64)
     inner_edge[network.edge_brick[inner]] = inner
-    half = kind[outer] == PartKind.JOINT
+    half = kind[outer] == PartKind.JOINT.value
     brick = network.edge_brick[outer]
     arrives = half & (network.edge_nodes[outer, 0] == network.inner[brick, 1])
     through = inner_edge[brick[arrives]]

@@ -10,7 +10,7 @@ from seqopt.arrays import Bools, Floats
 from seqopt.placement.free_goals import Measure
 from seqopt.placement.free_graph import Arcs, Level, StateGraph
 
-TIGHT = 1e-12  # of the least sum: by how much a path may exceed it and still be one of the best
+TIED = 1e-9  # of the least: by how much a path may exceed it and still be one of the best
 Join = Callable[[Floats, Floats], Floats]
 
 
@@ -89,7 +89,7 @@ def keep_best(graph: StateGraph, goal: int) -> tuple[StateGraph, float]:
     join = _join(graph, goal)
     before, after = least_from_start(graph, goal), least_to_end(graph, goal)
     least = float(after[0].min())
-    most = least if join is np.maximum else least + TIGHT * abs(least)
+    most = least + TIED * abs(least)
 
     def tight(b: int, to: int, arcs: Arcs) -> Bools:
         costs = graph.costs(goal, to, arcs)

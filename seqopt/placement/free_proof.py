@@ -19,6 +19,7 @@ from seqopt.sequence.free_rules import Ending, Payload
 from seqopt.sequence.steps import Grips, StepKind
 
 BELOW = 1e-9  # by how much a plan must be better, over the size of the value
+ROUNDING = 1e-12  # by how much it may be worse in a goal before, likewise
 REMEMBERED = 50_000  # states of which what follows is kept
 BATCH = 2048  # grip sets whose fields are held at once
 State = tuple[int, Grips, int, Grips]  # bricks, grips, regrips since the last, where robots were
@@ -64,7 +65,7 @@ class Proof:
         -------
         bool
         """
-        most = [value + BELOW * abs(value) for value in values[:k]]
+        most = [value + ROUNDING * abs(value) for value in values[:k]]
         less = float(np.nextafter(values[k], -np.inf))  # of none there is no share
         most.append(min(less, values[k] - BELOW * abs(values[k])))
         none: Grips = (None,) * len(self._problem.network.scene.robots)

@@ -81,13 +81,12 @@ def solve(
     Parameters
     ----------
     problem : PlacementProblem or FreeProblem
-        From `seqopt.pose`, a `seqopt.placement.CostProblem`, or of the free schedule, from
+        A `seqopt.placement.CostProblem`, or one of `seqopt.pose` or of
         `seqopt.placement.free_problem.pose_free`.
     formulation : Formulation, ScheduleFormulation or str
-        One of `seqopt.formulations`, or its name; ``schedule_search`` for the free schedule.
+        Or its name, of `seqopt.formulations`; ``schedule_search`` for the free schedule.
     proof : bool, optional
-        False lets ``cascade`` or ``rank_search`` solve only the models that they meet, one window
-        after the other; how far the choice is from the optimum then stays unknown.
+        False: ``cascade`` or ``rank_search`` solve only what they meet, and no gap is known.
     time_limit : float, optional
         After which it stops choosing, with the best choice so far and a bound, s.
     progress : callable, optional
@@ -102,28 +101,33 @@ def solve(
     Raises
     ------
     InfeasibleError, ProblemError, SolverError
-        If no choice is allowed; if problem, formulation and options do not go together; if a solver
-        fails, or the answer is not what its formulation claims.
+        If no choice is allowed; what is given does not go together; a solver or claim fails.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> seqopt.solve(seqopt.optimize("arch25").problem, "overlap_dp").certificate.gap
+    0.0
     """
     if isinstance(problem, FreeProblem):
-        told = {} if progress is None else {"progress": progress}
-        timed = {} if math.isinf(time_limit) else {"seconds": time_limit}
-        return solve_free(problem, formulation, proof=proof, **told, **timed, **options)
-    if isinstance(formulation, ScheduleFormulation):
-        raise ProblemError(f"{formulation.name} is for free schedules; pose one with pose_free")
+        options |= {} if progress is None else {"progress": progress}
+        options |= {} if math.isinf(time_limit) else {"seconds": time_limit}
+        return solve_free(problem, formulation, proof=proof, **options)
     found = _fitting(problem, formulation, time_limit, options)
-    if not proof:
-        return _solve_windows(problem, found, options)
-    return _solve_all(problem, found, _Run(time_limit, progress), options)
+    if proof:
+        return _solve_all(problem, found, _Run(time_limit, progress), options)
+    return _solve_windows(problem, found, options)
 
 
 def _fitting(
     problem: PlacementProblem,
-    formulation: Formulation | str,
+    formulation: Formulation | ScheduleFormulation | str,
     time_limit: float,
     options: Mapping[str, object],
 ) -> Formulation:
     """Return the formulation if it, the problem and the options go together."""
+    if isinstance(formulation, ScheduleFormulation):
+        raise ProblemError(f"{formulation.name} is for free schedules; pose one with pose_free")
     found = as_formulation(formulation)
     if not isinstance(getattr(problem, "budgets", None), tuple):
         raise ProblemError(

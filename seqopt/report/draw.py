@@ -143,7 +143,7 @@ def draw_network(  # noqa: PLR0913  # what is drawn, and how, each by its name
     axes.add_collection(_lines(list(seen[network.edge_nodes[:edges]]), edge_force))
     _draw_nodes(axes, network.node_kind[:nodes], seen)
     if numbers:
-        for i in np.flatnonzero(network.node_kind[:nodes] == PartKind.INNER):
+        for i in np.flatnonzero(network.node_kind[:nodes] == PartKind.INNER.value):
             axes.annotate(
                 str(network.node_name[i]), seen[i], (3, 2), textcoords="offset points", fontsize=6
             )

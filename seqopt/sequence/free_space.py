@@ -236,11 +236,12 @@ class FreeSpace:
         """Return the moves and those in which all let go; who lets go forgets where it was."""
         if self.rules.ending is Ending.RELEASED:
             rows = np.flatnonzero((states[:, : self.robots] > 0).any(axis=1))
-            none = np.zeros((len(rows), states.shape[1]), dtype=np.int64)
+            none = states[rows]
+            none[:, : self.robots] = 0
             parts = [moves, Moves(rows, none, np.zeros(len(rows)))]
             moves = join_moves(parts, self.robots + self._counts)
         bare = (moves.states[:, : self.robots] <= 0).all(axis=1)
-        moves.states[bare] = 0
+        moves.states[bare, : self.robots] = 0
         return moves
 
     @property

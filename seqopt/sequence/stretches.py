@@ -18,7 +18,7 @@ def lies_along(network: Network) -> frozenset[int]:
     frozenset of int
         Names of the bricks.
     """
-    half = network.edge_kind == PartKind.JOINT
+    half = network.edge_kind == PartKind.JOINT.value
     touched = set(network.edge_nodes[half, 0].tolist())
     return frozenset(
         brick.name

@@ -1,0 +1,41 @@
+"""Interrupts that wait until what must not be left half done is done."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+
+ENDS = tuple(
+    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
+)
+
+
+@contextmanager
+def undisturbed() -> Iterator[None]:
+    """Hold back the signals that end a program; one that came meanwhile is answered after."""
+    if threading.current_thread() is not threading.main_thread():  # signals are not answered here
+        yield
+        return
+    came: list[int] = []
+
+    def note(number: int, _: FrameType | None) -> None:
+        came.append(number)
+
+    masks = hasattr(signal, "pthread_sigmask")  # other threads may still take them: see note
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, ENDS) if masks else set()
+    answered = [(number, signal.getsignal(number)) for number in ENDS]
+    answers = [(number, answer) for number, answer in answered if callable(answer)]
+    try:
+        for number, _ in answers:
+            signal.signal(number, note)
+        yield
+    finally:
+        for number, answer in answers:
+            signal.signal(number, answer)
+        if masks:
+            signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+        for number in came[:1]:
+            signal.raise_signal(number)
