@@ -25,7 +25,6 @@ from experiments.placement import (
     heuristic_gaps,
     speed_accuracy,
 )
-from experiments.robustness import fuzz
 from experiments.stability import failing_steps, witnesses
 from experiments.study import criteria_variants, paper_counterparts
 from experiments.study.parts.paper_items import ITEMS
@@ -117,7 +116,6 @@ def checks() -> dict[str, tuple[Check, Tables, Callable[..., Iterator[tuple[Any,
             (rows("frame_contrast"),),
             spoil_contrast,
         ),
-        "fuzz": (fuzz.holds, (rows("fuzz"), rows("fuzz_kills")), spoil_fuzz),
         "heuristic_gaps": (heuristic_gaps.holds, (rows("heuristic_gaps"),), spoil_gaps),
         "identify_arch25": (
             lambda table: arch_scores.holds(table, quick=False),
@@ -180,12 +178,6 @@ def spoil_discrete(table):
     yield (table.assign(error_pct=table["error_pct"].where(~one, table["bricks"].map(nearly))),)
     yield (spoiled(table, "tension_MPa", 3.5, bricks=24),)
     yield (spoiled(table, "shear_used", 1.2, bricks=17),)
-
-
-def spoil_fuzz(cases, kills):
-    yield spoiled(cases, "faults", 1, kind="scene", command="analyze"), kills
-    yield cases, spoiled(kills, "left", "a part", signal="SIGKILL")
-    yield cases, spoiled(kills, "left", "whole, and a hidden folder", signal="SIGTERM")
 
 
 def spoil_limits(table):
