@@ -2,9 +2,10 @@
 
 Command: ``python -m experiments`` lists; ``python -m experiments all [--quick]`` runs each one in
 a process of its own and, unless quick, stores verdicts and seconds in
-``experiments/results/verdicts.csv``. Experiments whose times are a result run alone, the others two
-at a time, those first that took longest the last time. An experiment that an extra is missing for
-is named and left out. The exit status is 1 if a claim does not hold, or if none is found.
+``experiments/results/verdicts.csv``; names in the place of ``all`` run these alone. Experiments
+whose times are a result run alone, the others two at a time, those first that took longest the last
+time. An experiment that an extra is missing for is named and left out. The exit status is 1 if a
+claim does not hold, or if none is found.
 """
 
 from __future__ import annotations
@@ -62,10 +63,10 @@ def ended(
             yield jobs[job], job.result()
 
 
-def run_all(*arguments: str) -> pd.DataFrame:
-    """Run every experiment; return a row each."""
+def run_all(*arguments: str, only: Sequence[str] = ()) -> pd.DataFrame:
+    """Run experiments, every one by default; return a row each."""
     every, last, rows = claims(), stored("seconds"), []
-    names = sorted(every, key=lambda name: -float(str(last.get(name, "inf"))))
+    names = sorted(only or every, key=lambda name: -float(str(last.get(name, "inf"))))
     alone = [name for name in names if every[name].takes_time]
     others = [name for name in names if name not in alone]
     for group, together in ((others, TOGETHER), (alone, 1)):
@@ -74,6 +75,15 @@ def run_all(*arguments: str) -> pd.DataFrame:
             rows.append({"experiment": name, "verdict": verdict, "seconds": seconds})
     table = pd.DataFrame(rows).sort_values("experiment", ignore_index=True)
     return table.assign(claim=[every[name].text for name in table["experiment"]])
+
+
+def store(table: pd.DataFrame) -> None:
+    """Store the rows of experiments that ran beside those of the others."""
+    if STORE.exists():
+        before = pd.read_csv(STORE)
+        kept = before["experiment"].isin(set(claims()) - set(table["experiment"]))
+        table = pd.concat([before[kept], table]).sort_values("experiment")
+    table.to_csv(STORE, index=False, float_format="%.1f", lineterminator="\n")
 
 
 def listed() -> Iterator[str]:
@@ -87,19 +97,24 @@ def main() -> int:
     parser = argparse.ArgumentParser(
         prog="python -m experiments", description=__doc__.splitlines()[0]
     )
-    parser.add_argument("what", nargs="?", choices=("list", "all"), default="list")
+    parser.add_argument("what", nargs="*", metavar="NAME", help="experiments, or list or all")
     parser.add_argument("--quick", action="store_true", help="reduced size, nothing stored")
     options = parser.parse_args()
     try:
-        if options.what == "list":
+        if options.what in ([], ["list"]):
             print(*listed(), sep="\n")
             return 0
-        table = run_all(*(["--quick"] if options.quick else []))
+        only = [] if options.what == ["all"] else options.what
+        if unknown := [name for name in only if name not in claims()]:
+            raise ClaimError(
+                f"{unknown[0]}: there is no such experiment; give some of {', '.join(claims())}"
+            )
+        table = run_all(*(["--quick"] if options.quick else []), only=only)
     except ClaimError as error:
         print(error, file=sys.stderr)
         return 1
     if not options.quick:
-        table.to_csv(STORE, index=False, float_format="%.1f", lineterminator="\n")
+        store(table)
     return int(not table["verdict"].str.startswith(("holds", "left out")).all())
 
 

@@ -322,3 +322,25 @@ def test_the_exit_status_says_whether_all_claims_hold(monkeypatch, verdict, stat
     monkeypatch.setattr("experiments.__main__.run", lambda *_: (verdict, 1.0))
     monkeypatch.setattr("sys.argv", ["experiments", "all", "--quick"])
     assert main() == status
+
+
+def test_named_experiments_renew_their_own_verdicts(monkeypatch, tmp_path, capsys):
+    before = pd.DataFrame(
+        {
+            "experiment": ["figures", "peers"],
+            "verdict": "holds",
+            "seconds": 2.0,
+            "claim": "an old one",
+        }
+    )
+    before.to_csv(tmp_path / "verdicts.csv", index=False)
+    monkeypatch.setattr("experiments.__main__.STORE", tmp_path / "verdicts.csv")
+    monkeypatch.setattr("experiments.__main__.run", lambda *_: ("does not hold", 1.0))
+    monkeypatch.setattr("sys.argv", ["experiments", "peers", "calibration"])
+    assert main() == 1
+    after = pd.read_csv(tmp_path / "verdicts.csv")
+    assert after["experiment"].tolist() == ["calibration", "figures", "peers"]
+    assert after["verdict"].tolist() == ["does not hold", "holds", "does not hold"]
+    monkeypatch.setattr("sys.argv", ["experiments", "perrs"])
+    assert main() == 1
+    assert "perrs: there is no such experiment" in capsys.readouterr().err
