@@ -71,9 +71,16 @@ def _leave(*_: object) -> None:
 def _raise_again(lost: sys.UnraisableHookArgs) -> None:
     """Ask once more where an interrupt met what cannot raise, as the end of an object."""
     if issubclass(lost.exc_type, KeyboardInterrupt):
-        threading.Timer(AGAIN, _thread.interrupt_main).start()  # at once it would meet this hook
+        threading.Timer(AGAIN, _interrupt).start()  # at once it would meet this hook
     else:
         sys.__unraisablehook__(lost)
+
+
+def _interrupt() -> None:
+    if hasattr(signal, "pthread_kill") and (main := threading.main_thread().ident):
+        signal.pthread_kill(main, signal.SIGINT)  # ends a wait too
+    else:
+        _thread.interrupt_main()
 
 
 def _require_room() -> None:

@@ -189,7 +189,7 @@ def test_an_answer_stopped_early_is_allowed_and_its_bound_holds(name, problem, l
     assert plan.selection.bound <= best + 1e-6 <= worth + 2e-6
     trace = plan.selection.trace
     assert tuple(told) == trace
-    assert trace[-1].objective == pytest.approx(worth, abs=1e-6)
+    assert trace[-1].objective == pytest.approx(worth, rel=1e-6, abs=1e-6)
     for before, after in pairwise(trace):
         assert before.seconds <= after.seconds
         assert before.objective >= after.objective
