@@ -109,8 +109,8 @@ def _line(name: str, row: pd.Series[float]) -> str:
         f"{name:22}"
         + cell(row["objective"], 11, f"{row['objective']:.2f}")
         + cell(row["gap"], 8, f"{100 * row['gap']:.2f}%")
-        + f"{row['F_rob']:7.1f}{'!' if row['overloaded'] else ' '}"
-        + "".join(f"{row[column]:8.1f}" for column in LARGEST if column != "F_rob")
+        + f"{_number(row['F_rob']):>7}{'!' if row['overloaded'] else ' '}"
+        + "".join(f"{_number(row[column]):>8}" for column in LARGEST if column != "F_rob")
         + cell(row["models"], 8, f"{row['models']:.0f}")
         + cell(row["seconds"], 9, f"{row['seconds']:.4f}")
     )
@@ -158,4 +158,4 @@ def _rank_lines(table: pd.DataFrame) -> Iterator[str]:
 
 def _number(value: object) -> str:
     number = float(str(value))
-    return "-" if np.isnan(number) else f"{number:.1f}"
+    return "-" if np.isnan(number) else f"{number:.1f}" if abs(number) < 1e6 else f"{number:.0e}"

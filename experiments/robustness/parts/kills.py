@@ -16,7 +16,7 @@ import numpy as np
 from experiments.harness.plotting import HOME
 
 SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
-OPTIMIZE = ("plan.csv", "selection.csv", "responses.csv", "summary.json")
+OPTIMIZE = ("plan.csv", "selection.csv", "responses.csv", "trace.csv", "summary.json")
 BLOCKS = tuple(f"block{i}" for i in range(24))
 WRITER = """
 import signal

@@ -139,14 +139,14 @@ class Corrector:
         done = np.zeros(len(columns), dtype=bool)
         left = np.flatnonzero(np.isfinite(answers.states).all(axis=1))
         for _ in range(STEPS):
+            if not len(left):
+                break
             state, force = answers.states[left], answers.force[left]
             change, more = self._correction(columns[left], index[left], state, force)
             answers.states[left] = state + change
             answers.force[left] = force + more
             done[left] = unchanged(self.parts, state, change)
             left = left[~done[left] & np.isfinite(change).all(axis=1)]
-            if not len(left):
-                break
         return done
 
     def _correction(
