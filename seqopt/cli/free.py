@@ -12,6 +12,7 @@ import pandas as pd
 from seqopt.cli.asked import asked_engine
 from seqopt.cli.criteria import parse_criterion
 from seqopt.cli.outputs import require_matplotlib, write_outputs
+from seqopt.cli.rules import parse_rules, parse_standing
 from seqopt.cli.status import Status
 from seqopt.cli.terminal import complain, progress, say
 from seqopt.cli.values import parse_limits, parse_numbers, parse_robots, parse_time_limit
@@ -29,12 +30,12 @@ from seqopt.placement.promises import overloads
 from seqopt.placement.requirements import Criterion
 from seqopt.placement.schedule_formulation import find_schedule_formulation
 from seqopt.placement.solving import solve
-from seqopt.report.fronts import worst_of
+from seqopt.report.fronts import shown_table, worst_of
 from seqopt.report.methods import method_tables
 from seqopt.responses.table import analyze
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import dump_scene, load_scene
-from seqopt.sequence.free_rules import FreeRules, with_robots
+from seqopt.sequence.free_rules import with_robots
 from seqopt.sequence.schedule_file import find_schedule
 from seqopt.sequence.steps import Step, idle_robots
 
@@ -67,9 +68,10 @@ def optimize_free(options: argparse.Namespace) -> Status:
         "plan.csv": csv_text(table),
         "summary.json": json.dumps(plan.summary(), indent=2) + "\n",
     }
+    if problem.standing is not None:
+        files["stability.csv"] = csv_text(plan.stability())
     write_outputs(options, files | _scene_file(options, scene))
-    pairs = zip(problem.goals, plan.selection.objective, strict=True)
-    values = ", ".join(f"{goal} {value:.6g}" for goal, value in pairs)
+    values = ", ".join(f"{name} {value:.6g}" for name, value in plan.objective.items())
     say(
         f"{formulation.name} ({formulation.kind.value}): {values}, {plan.status}; "
         f"{len(plan.steps)} steps, {plan.regrips} regrips, {problem.sets.solved} models; "
@@ -111,7 +113,7 @@ def pareto(options: argparse.Namespace) -> Status:
     if options.pick:
         chosen = pick(front.table, options.pick, _under(options.under, methods))
         files["pick.csv"] = csv_text(analyze(free.engine, front.steps[chosen]))
-        values = front.table.iloc[chosen]
+        values = shown_table(front.table).iloc[chosen]
         row = ", ".join(f"{name} {value:.6g}" for name, value in values.items())
         said += f"; picked row {chosen + 1}: {row}"
     write_outputs(options, files | _scene_file(options, scene))
@@ -132,7 +134,8 @@ def require_loop(options: argparse.Namespace) -> None:
     ProblemError
         Naming the option, or the formulation that is missing.
     """
-    for name, given in (("--aim", options.aim), ("--rule", options.rule)):
+    free = ("aim", "rule", "stands", "tilt", "friction")
+    for name, given in ((f"--{word}", getattr(options, word)) for word in free):
         if given:
             raise ProblemError(f"{name}: only the free schedule has it; give --schedule {FREE}")
     if options.formulation is None:
@@ -164,44 +167,8 @@ def _posed(options: argparse.Namespace, aim: str) -> tuple[Scene, FreeProblem]:
     if options.criteria is not None:
         criterion = parse_criterion(options.criteria, options.crown)
     engine = asked_engine(options, build_network(scene))
-    return scene, pose_free(engine, rules, criterion, aim, parse_limits(options.limit, scene))
-
-
-def parse_rules(texts: Sequence[str], robots: tuple[str, ...]) -> FreeRules:
-    """Return rules from words.
-
-    Parameters
-    ----------
-    texts : sequence of str
-        Each ``NAME=VALUE``.
-    robots : tuple of str
-        Those that take part; none for all.
-
-    Returns
-    -------
-    FreeRules
-
-    Raises
-    ------
-    StepError
-        If there is no such rule, or its value is none.
-    """
-    given: dict[str, object] = {"robots": robots}
-    counts = ("least_grips", "regrips")
-    known = ("newest", "payload", "ending", "placers", *counts)
-    for text in texts:
-        name, _, value = text.partition("=")
-        if name not in known:
-            raise StepError(f"--rule {text}: there is no such; give one of {', '.join(known)}")
-        if name in counts:
-            given[name] = int(value) if value.isdecimal() else value
-            if name == "regrips" and value == "any":
-                given[name] = None
-        elif name == "placers":
-            given[name] = () if value == "any" else parse_robots(value)
-        else:
-            given[name] = value
-    return FreeRules(**given)  # type: ignore[arg-type]
+    limits = parse_limits(options.limit, scene)
+    return scene, pose_free(engine, rules, criterion, aim, limits, parse_standing(options))
 
 
 def _loop(
@@ -240,7 +207,7 @@ def _front_files(
         "complete": front.complete,
         "seconds": dict(front.seconds),
     }
-    numbered = front.table.copy()
+    numbered = shown_table(front.table)
     numbered.insert(0, "point", range(1, len(numbered) + 1))
     return {
         "pareto.csv": csv_text(numbered),

@@ -34,6 +34,25 @@ def add_rules(command: argparse.ArgumentParser) -> None:
     )
 
 
+def add_standing(command: argparse.ArgumentParser) -> None:
+    """Add what demands that every state of a free schedule stands.
+
+    Parameters
+    ----------
+    command : argparse.ArgumentParser
+    """
+    command.add_argument(
+        "--stands",
+        metavar="MORTAR",
+        help="with --schedule free: every state must be proven to stand, robots within payload: "
+        "dry, epoxy or bond=STRENGTH (Pa)",
+    )
+    command.add_argument("--friction", metavar="F", help="with --stands: coefficient of friction")
+    command.add_argument(
+        "--tilt", metavar="DEG", help="with --stands: tilt that every state must survive"
+    )
+
+
 def add_pareto(
     commands: argparse._SubParsersAction[Any],
     parents: Sequence[argparse.ArgumentParser],
@@ -77,6 +96,7 @@ def add_pareto(
         help="how many robots (further ones are mobile), or which take part",
     )
     add_rules(command)
+    add_standing(command)
     limit(command)
     _add_choice(command)
     command.add_argument("--out", type=Path, metavar="DIR", required=True, help="folder to write")

@@ -160,18 +160,22 @@ class FreeFront:
         """
         return steps_of(self._problem.space, plan)  # type: ignore[arg-type]
 
-    def values(self, steps: Sequence[Step]) -> Floats:
+    def values(self, steps: Sequence[Step], claimed: Floats) -> Floats:
         """Return the goals' values of a sequence, from the responses of its steps.
 
         Parameters
         ----------
         steps : sequence of Step
+        claimed : (k,) float
+            What margins of stability are held against.
 
         Returns
         -------
         (k,) float
         """
-        return rounded_up(np.array(plan_values(self._problem, steps)), self._round)
+        return rounded_up(
+            np.array(plan_values(self._problem, steps, claimed.tolist())), self._round
+        )
 
 
 def rounding_steps(names: Sequence[str], rounding: Mapping[str, float] | None) -> Floats:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
+from math import degrees, pi
 
 from seqopt.errors import ProblemError
+from seqopt.placement.standing import MARGINS
 from seqopt.scene.checks import short
 
 LARGEST = "F_largest"
@@ -31,7 +33,7 @@ class Goal:
     ----------
     measure : Measure
     response : str, optional
-        Whose peak or sum it is; that of the criterion if none is named.
+        Whose peak or sum it is, or a margin of stability; that of the criterion if none is named.
     """
 
     measure: Measure
@@ -45,8 +47,27 @@ class Goal:
 
     @property
     def of_states(self) -> bool:
-        """Whether it is about responses, and not about moves alone."""
+        """Whether it is about states, and not about moves alone."""
         return self.measure in (Measure.PEAK, Measure.SUM)
+
+    @property
+    def of_margins(self) -> bool:
+        """Whether it is about how surely states stand, and not about responses."""
+        return self.response in MARGINS
+
+    def shown(self, value: float) -> float:
+        """Return a value as people read it: of a tilt, how much is survived, in degrees.
+
+        Parameters
+        ----------
+        value : float
+            SI units; of a tilt, how far it is from a right angle.
+
+        Returns
+        -------
+        float
+        """
+        return degrees(pi / 2 - value) if self.response == "tilt" else value
 
 
 def parse_goals(text: str) -> tuple[Goal, ...]:
@@ -56,7 +77,9 @@ def parse_goals(text: str) -> tuple[Goal, ...]:
     ----------
     text : str
         ``minmax`` (the worst of the criterion), ``sum`` (over all steps), ``steps``, ``regrips``,
-        ``travel``, a response (its worst) or ``sum(RESPONSE)``, with commas between them.
+        ``travel``, a response (its worst) or ``sum(RESPONSE)``, with commas between them; also
+        ``bond`` and ``friction`` (the least with which every state stands) and ``tilt`` (the
+        largest that every state survives).
 
     Returns
     -------
@@ -75,6 +98,7 @@ def parse_goals(text: str) -> tuple[Goal, ...]:
     known = {"minmax": Goal(Measure.PEAK), "sum": Goal(Measure.SUM)}
     known |= {m.value: Goal(m) for m in (Measure.STEPS, Measure.REGRIPS, Measure.TRAVEL)}
     known |= {name: Goal(Measure.PEAK, name) for name in STATE_RESPONSES}
+    known |= {name: Goal(Measure.PEAK, name) for name in MARGINS}
     known |= {f"sum({name})": Goal(Measure.SUM, name) for name in STATE_RESPONSES}
     words = [word.strip() for word in text.split(",")] if isinstance(text, str) else [text]
     for word in words:

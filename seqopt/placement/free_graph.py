@@ -212,12 +212,7 @@ def _chosen(
 ) -> tuple[Ints, Floats, float]:
     """Return the new states with which the search goes on, their values, and what is left out."""
     ceiling, width = most
-    values, within = problem.worth(bricks, states)
-    excluded = np.inf
-    if problem.goals[0].measure is Measure.PEAK:
-        above = within & (values[:, 0] > ceiling)
-        excluded = float(values[above, 0].min(initial=np.inf))
-        within &= ~above
+    values, within, excluded = problem.worth(bricks, states, ceiling)
     states, values = states[within], values[within]
     if width is not None and len(states) > width:
         best = np.argsort(values[:, problem.leading], kind="stable")[:width]

@@ -13,6 +13,7 @@ from seqopt.placement.free_paths import least_to_end
 from seqopt.placement.free_problem import FreeProblem
 
 STEPS = (Goal(Measure.STEPS),)
+STANDING = "no demand to stand"
 
 
 def why_impossible(problem: FreeProblem) -> str:
@@ -56,6 +57,8 @@ def _opening(problem: FreeProblem) -> Iterator[str]:
         if rule not in done and explore(replace(problem, rules=rules)).whole:
             done.add(rule)
             yield text
+    if problem.standing is not None and explore(replace(problem, standing=None)).whole:
+        yield STANDING
     for limit in problem.limits:
         rest = tuple(other for other in problem.limits if other is not limit)
         if explore(replace(problem, limits=rest)).whole:
@@ -73,6 +76,9 @@ def _pair(problem: FreeProblem) -> str:
 
 def _enough(problem: FreeProblem, way: str) -> str:
     """Return how far a limit has to be raised, where it is a limit that is loosened."""
+    if way == STANDING and problem.standing is not None and not problem.standing.tilt:
+        least = worst_least(replace(problem, standing=None), "bond")
+        return f"a bond of {least:.4g} Pa" if np.isfinite(least) else way
     found = [limit for limit in problem.limits if limit.response == way]
     if not found or way not in STATE_RESPONSES:
         return f"no limit on {way}" if found else way
@@ -88,7 +94,7 @@ def worst_least(problem: FreeProblem, response: str) -> float:
     ----------
     problem : FreeProblem
     response : str
-        One of `seqopt.placement.free_goals.STATE_RESPONSES`.
+        One of `seqopt.placement.free_goals.STATE_RESPONSES`, or ``bond``.
 
     Returns
     -------

@@ -20,6 +20,7 @@ from seqopt.errors import SolverError
 from seqopt.placement.free_goals import LARGEST, Goal, Measure
 from seqopt.placement.free_problem import FreeProblem, ScheduleSelection
 from seqopt.placement.free_proof import Proof
+from seqopt.placement.standing_proof import proven_margins, require_margin
 from seqopt.responses.quantities import CHOSEN_BY
 from seqopt.responses.table import analyze, force_column
 from seqopt.sequence.free_check import check_free
@@ -77,7 +78,7 @@ def judge_schedule(
         If a step breaks a rule.
     """
     check_free(problem.network, problem.rules, steps)
-    values = plan_values(problem, steps)
+    values = plan_values(problem, steps, selection.objective)
     for goal, value, claimed in zip(problem.goals, values, selection.objective, strict=True):
         if not abs(value - claimed) <= TOLERANCE * max(abs(value), abs(claimed)):
             raise SolverError(f"{goal} is {value:.9g}, not {claimed:.9g} as claimed")
@@ -87,7 +88,12 @@ def judge_schedule(
     for k, goal in enumerate(problem.goals):
         if proof.finds_better(values, k):
             raise SolverError(f"{goal}: {values[k]:.9g} is promised as the least; a plan has less")
-    return ScheduleCertificate(values, values, 0.0, proof.states)
+    bounds = [
+        proof.bound(values, k) if goal.of_margins else values[k]
+        for k, goal in enumerate(problem.goals)
+    ]
+    gaps = [(v - b) / abs(v) for v, b in zip(values, bounds, strict=True) if v != b]
+    return ScheduleCertificate(values, tuple(bounds), max(gaps, default=0.0), proof.states)
 
 
 def _stopped(values: tuple[float, ...]) -> ScheduleCertificate:
@@ -96,13 +102,17 @@ def _stopped(values: tuple[float, ...]) -> ScheduleCertificate:
     return ScheduleCertificate(values, none, np.inf, 0)
 
 
-def plan_values(problem: FreeProblem, steps: Sequence[Step]) -> tuple[float, ...]:
+def plan_values(
+    problem: FreeProblem, steps: Sequence[Step], claimed: Sequence[float] = ()
+) -> tuple[float, ...]:
     """Return what goals take of a sequence, from the responses of its steps.
 
     Parameters
     ----------
     problem : FreeProblem
     steps : sequence of Step
+    claimed : sequence of float, optional
+        Of every goal: margins of stability are held against these, and taken from them.
 
     Returns
     -------
@@ -112,7 +122,7 @@ def plan_values(problem: FreeProblem, steps: Sequence[Step]) -> tuple[float, ...
     Raises
     ------
     SolverError
-        If a step exceeds a limit.
+        If a step exceeds a limit, does not stand as is demanded, or has less of a margin.
     """
     table = analyze(problem.engine, steps)
     columns = state_columns(problem, table)
@@ -120,9 +130,13 @@ def plan_values(problem: FreeProblem, steps: Sequence[Step]) -> tuple[float, ...
         if limit.response in columns and limit.exceeded(columns[limit.response]).any():
             at = int(np.argmax(columns[limit.response])) + 1
             raise SolverError(f"step {at} exceeds the limit on {limit.response}")
+    margins = _margins(problem, steps)
     out = []
-    for goal in problem.goals:
-        if goal.measure is Measure.STEPS:
+    for k, goal in enumerate(problem.goals):
+        if goal.of_margins:
+            require_margin(goal.response, claimed[k], margins[goal.response])
+            out.append(claimed[k])
+        elif goal.measure is Measure.STEPS:
             out.append(float(len(steps)))
         elif goal.measure is Measure.REGRIPS:
             out.append(float(sum(step.kind is StepKind.REPOSITION for step in steps)))
@@ -132,6 +146,13 @@ def plan_values(problem: FreeProblem, steps: Sequence[Step]) -> tuple[float, ...
             costs = _costs(problem, goal, columns, len(steps))
             out.append(float(costs.max() if goal.measure is Measure.PEAK else costs.sum()))
     return tuple(out)
+
+
+def _margins(problem: FreeProblem, steps: Sequence[Step]) -> Mapping[str, float]:
+    """Return the margins of a plan where they count, and require that it stands where it must."""
+    if problem.standing is None and not any(goal.of_margins for goal in problem.goals):
+        return {}
+    return proven_margins(problem, steps)
 
 
 def state_columns(problem: FreeProblem, table: pd.DataFrame) -> Mapping[str, np.ndarray]:

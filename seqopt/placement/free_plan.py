@@ -18,9 +18,11 @@ from seqopt.placement.free_problem import FreeProblem, ScheduleSelection
 from seqopt.placement.free_steps import steps_of
 from seqopt.placement.promises import Excess, overloads
 from seqopt.placement.schedule_formulation import ScheduleFormulation, find_schedule_formulation
+from seqopt.placement.standing_proof import certified
 from seqopt.responses.table import analyze
 from seqopt.sequence.free_rules import Ending
 from seqopt.sequence.steps import Step, StepKind, idle_robots
+from seqopt.stability.steps import stability_table
 
 
 @dataclass(frozen=True, repr=False)
@@ -51,8 +53,7 @@ class FreePlan:
     seconds: Mapping[str, float] = field(compare=False, hash=False)
 
     def __repr__(self) -> str:
-        pairs = zip(self.problem.goals, self.selection.objective, strict=True)
-        values = ", ".join(f"{goal} {value:.6g}" for goal, value in pairs)
+        values = ", ".join(f"{name} {value:.6g}" for name, value in self.objective.items())
         name = self.problem.network.scene.name
         return f"FreePlan({name!r}, {len(self.steps)} steps, {values}, {self.status})"
 
@@ -63,6 +64,12 @@ class FreePlan:
             return "feasible"
         proven = self.certificate is not None and self.certificate.gap <= TOLERANCE
         return "optimal" if proven else "unproven"
+
+    @property
+    def objective(self) -> dict[str, float]:
+        """The value of every goal by its name; of a tilt, what is survived, in degrees."""
+        pairs = zip(self.problem.goals, self.selection.objective, strict=True)
+        return {str(goal): goal.shown(value) for goal, value in pairs}
 
     @property
     def regrips(self) -> int:
@@ -88,6 +95,17 @@ class FreePlan:
     def _responses(self) -> pd.DataFrame:
         return analyze(self.problem.engine, self.steps)
 
+    def stability(self) -> pd.DataFrame:
+        """Return whether every step stands and by which margins, by the cone program.
+
+        Returns
+        -------
+        pandas.DataFrame
+            As of `seqopt.stability.steps.stability_table`, with the mortar that was demanded, or
+            dry.
+        """
+        return stability_table(self.steps, certified(self.problem, self.steps))
+
     def summary(self) -> dict[str, object]:
         """Return what there is to say about the plan, ready for JSON.
 
@@ -103,7 +121,10 @@ class FreePlan:
         bound = chosen.bound if self.certificate is None else self.certificate.bound
         if chosen.stopped:
             bound = chosen.bound
-        finite = (None if abs(value) == float("inf") else value for value in bound)
+        finite = (
+            None if abs(value) == float("inf") else goal.shown(value)
+            for goal, value in zip(problem.goals, bound, strict=True)
+        )
         return {
             "scene": problem.network.scene.name,
             "schedule": "free",
@@ -116,8 +137,9 @@ class FreePlan:
             "rules": problem.rules.described(problem.network.scene),
             "status": self.status,
             "stopped": chosen.stopped,
-            "objective": dict(zip(goals, chosen.objective, strict=True)),
+            "objective": self.objective,
             "bound": dict(zip(goals, finite, strict=True)),
+            "stands": self._standing,
             "steps": len(self.steps),
             "steps_before_release": len(self.steps) - self._letting_go,
             "regrips": self.regrips,
@@ -127,6 +149,15 @@ class FreePlan:
             "states_in_proof": 0 if self.certificate is None else self.certificate.states,
             "seconds": dict(self.seconds),
         }
+
+    @property
+    def _standing(self) -> dict[str, object] | None:
+        """What was demanded of the stability of states, and what it took to know."""
+        if self.problem.standing is None:
+            return None
+        sets = self.problem.stability
+        counts = {"looked_at": sets.looked_at, "programs": sets.programs}
+        return {**self.problem.standing.described(), **counts, "undecided": sets.undecided}
 
     @property
     def _letting_go(self) -> int:

@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints
+from seqopt.contact.mortar import Mortar, find_mortar
 from seqopt.engines.interface import Engine
 from seqopt.errors import ProblemError
 from seqopt.network.network import Network
@@ -16,12 +17,15 @@ from seqopt.placement.criteria import RankSum
 from seqopt.placement.free_goals import LARGEST, STATE_RESPONSES, Goal, Measure, parse_goals
 from seqopt.placement.requirements import LIMIT_TOLERANCE, Criterion, Limit
 from seqopt.placement.scales import SceneFacts
+from seqopt.placement.standing import Standing, StandingSets
 from seqopt.responses.grip_sets import GripSets
 from seqopt.responses.quantities import robot_response
 from seqopt.scene.checks import short
 from seqopt.sequence.free_rules import FreeRules
 from seqopt.sequence.free_space import FreeSpace
 from seqopt.sequence.free_start import free_space
+from seqopt.sequence.steps import Grips
+from seqopt.stability.assessment import Stability
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -63,6 +67,8 @@ class FreeProblem:
         What is to be least, the most important first.
     limits : tuple of Limit
         What no step may exceed.
+    standing : Standing or None
+        That every state must stand, if it is demanded.
     """
 
     engine: Engine
@@ -70,6 +76,7 @@ class FreeProblem:
     criterion: Criterion
     goals: tuple[Goal, ...]
     limits: tuple[Limit, ...] = ()
+    standing: Standing | None = None
 
     def __repr__(self) -> str:
         goals = ", ".join(map(str, self.goals))
@@ -142,40 +149,84 @@ class FreeProblem:
                 within &= ~limit.exceeded(found[limit.response])
         return found, within & self._carried(states, forces)
 
-    def worth(self, bricks: int, states: Ints) -> tuple[Floats, Bools]:
-        """Return what goals that are about responses take of states.
+    def worth(
+        self, bricks: int, states: Ints, ceiling: float = np.inf
+    ) -> tuple[Floats, Bools, float]:
+        """Return what goals that are about states take of them.
+
+        What stands, and by what margin, is asked only of states that nothing else rules out.
 
         Parameters
         ----------
         bricks : int
         states : (n, c) int
+        ceiling : float, optional
+            The first goal must not take more, where it is about a peak.
 
         Returns
         -------
         values : (n, g) float
             A column for every goal; zero for one that is about moves alone.
         within : (n,) bool
-            Which states are within all limits.
+            Which states are within all limits and below the ceiling, and stand if they must.
+        excluded : float
+            The least that the first goal takes of a state that is left out for the ceiling.
         """
         found, within = self.responses(bricks, states)
         out = np.zeros((len(states), len(self.goals)))
         for column, goal in enumerate(self.goals):
-            if goal.response:
-                out[:, column] = found[goal.response]
-            elif goal.of_states:
-                out[:, column] = self.criterion.costs(found, bricks, len(states))
+            if goal.of_states and not goal.of_margins:
+                named = found[goal.response] if goal.response else None
+                costs = self.criterion.costs(found, bricks, len(states)) if named is None else named
+                out[:, column] = costs
         out[~within] = np.inf
-        return out, within & np.isfinite(out).all(axis=1)
+        within &= np.isfinite(out).all(axis=1)
+        within, excluded = self._below(out, within, ceiling)
+        if self.standing is not None:
+            rows = np.flatnonzero(within)
+            within[rows] = self.stability.stand(bricks, *self._grips(states[rows]))
+        for column, goal in enumerate(self.goals):
+            if goal.of_margins:
+                rows = np.flatnonzero(within)
+                ends = self.stability.margins(goal.response, bricks, *self._grips(states[rows]))
+                out[rows, column] = ends[:, 1]
+        within, more = self._below(out, within & np.isfinite(out).all(axis=1), ceiling)
+        return out, within, min(excluded, more)
+
+    def _below(self, values: Floats, within: Bools, ceiling: float) -> tuple[Bools, float]:
+        """Return which states the first goal leaves, and the least value that is left out."""
+        if self.goals[0].measure is not Measure.PEAK:
+            return within, np.inf
+        above = within & (values[:, 0] > ceiling)
+        return within & ~above, float(values[above, 0].min(initial=np.inf))
+
+    @cached_property
+    def stability(self) -> StandingSets:
+        """What is known of how grip sets stand."""
+        return StandingSets(self.network, self.standing or Standing(), self._caps)
+
+    @cached_property
+    def certified(self) -> dict[tuple[int, Grips], Stability]:
+        """What the cone program says of states, as far as it was asked."""
+        return {}
+
+    @cached_property
+    def _caps(self) -> Floats:
+        """The largest force of the robot of every column of a state, N."""
+        kinds = self.space.kinds
+        return np.concatenate([np.full(len(kind.robots), kind.cap) for kind in kinds])
+
+    def _grips(self, states: Ints) -> tuple[Ints, Floats]:
+        """Return the nodes held, ascending, and the largest force at each, (n, r)."""
+        held = states[:, : len(self._caps)].clip(min=0)
+        order = np.argsort(held, axis=1, kind="stable")
+        return np.take_along_axis(held, order, axis=1), self._caps[order]
 
     def _carried(self, states: Ints, forces: Floats) -> Bools:
         """Return in which states no grip exceeds what its robot may carry."""
-        kinds = self.space.kinds
-        caps = np.concatenate([np.full(len(kind.robots), kind.cap) for kind in kinds])
-        most = caps + LIMIT_TOLERANCE * np.where(np.isfinite(caps), caps, 0.0)
-        if (most == most[0]).all():
-            return np.asarray((forces <= most[0]).all(axis=1))
-        order = np.argsort(states[:, : len(caps)].clip(min=0), axis=1, kind="stable")
-        return np.asarray((forces <= most[order]).all(axis=1))
+        most = self._grips(states)[1]
+        slack = LIMIT_TOLERANCE * np.where(np.isfinite(most), most, 0.0)
+        return np.asarray((forces <= most + slack).all(axis=1))
 
 
 def pose_free(
@@ -184,6 +235,7 @@ def pose_free(
     criterion: Criterion,
     goals: Sequence[Goal] | str = "minmax",
     limits: Sequence[Limit] = (),
+    stands: Standing | Mortar | str | None = None,
 ) -> FreeProblem:
     """Return the problem of the free schedule of an engine's scene.
 
@@ -199,6 +251,8 @@ def pose_free(
         What is to be least; see `parse_goals`.
     limits : sequence of Limit
         What no step may exceed.
+    stands : Standing, Mortar or str, optional
+        That every state must stand, with which mortar: ``"dry"``, ``"bond=3e3"`` (Pa).
 
     Returns
     -------
@@ -226,7 +280,11 @@ def pose_free(
         _require(limit.response, {*STATE_RESPONSES, *robots}, "limit")
     if any(goal.of_states and not goal.response for goal in goals):
         criterion = _of_states(engine, criterion)
-    return FreeProblem(engine, rules, criterion, goals, limits)
+    standing = stands if isinstance(stands, Standing | None) else Standing(find_mortar(stands))
+    problem = FreeProblem(engine, rules, criterion, goals, limits, standing)
+    if standing is not None or any(goal.of_margins for goal in goals):
+        _ = problem.stability  # what cannot be asked is refused now
+    return problem
 
 
 def _of_states(engine: Engine, criterion: Criterion) -> Criterion:

@@ -13,6 +13,8 @@ from seqopt.errors import MechanismError
 from seqopt.placement.free_goals import LARGEST, Goal, Measure
 from seqopt.placement.free_problem import FreeProblem
 from seqopt.placement.requirements import LIMIT_TOLERANCE
+from seqopt.placement.standing import slack
+from seqopt.placement.standing_proof import StandingProof
 from seqopt.responses.quantities import CHOSEN_BY, lengths
 from seqopt.sequence.free_check import RuleBook
 from seqopt.sequence.free_rules import Ending, Payload
@@ -26,6 +28,7 @@ State = tuple[int, Grips, int, Grips]  # bricks, grips, regrips since the last, 
 Label = tuple[float, ...]  # what the goals that add up took so far
 Known = dict[State, list[Label]]
 GripSet = tuple[int, ...]
+Move = tuple[State, Label, StepKind, State]
 
 
 class Proof:
@@ -48,6 +51,7 @@ class Proof:
         self._groups = self._alike()
         self._most = self._loads()
         self._worth: dict[tuple[int, GripSet], tuple[Label, dict[int, float]] | None] = {}
+        self._stands = StandingProof(problem, self._most)
         self._follows: dict[State, list[tuple[StepKind, State]]] = {}
         self.states = 0
 
@@ -66,8 +70,7 @@ class Proof:
         bool
         """
         most = [value + ROUNDING * abs(value) for value in values[:k]]
-        less = float(np.nextafter(values[k], -np.inf))  # of none there is no share
-        most.append(min(less, values[k] - BELOW * abs(values[k])))
+        most.append(self.bound(values, k))
         none: Grips = (None,) * len(self._problem.network.scene.robots)
         known: Known = {(0, none, 0, none): [(0.0,) * (k + 1)]}
         for bricks in range(len(self._problem.network.inner) + 1):
@@ -76,12 +79,10 @@ class Proof:
             while work:
                 moves = [(s, label, *move) for s, label in work for move in self._after(s)]
                 self._solve({(s[0], _held(s)) for *_, s in moves})
+                labels = [self._add(label, s, kind, after, most) for s, label, kind, after in moves]
                 work = []
-                for state, label, kind, after in moves:
-                    new = self._add(label, state, kind, after, most)
-                    if new is None or not _keep(
-                        following if after[0] > bricks else known, after, new
-                    ):
+                for after, new in self._standing(moves, labels, most):
+                    if not _keep(following if after[0] > bricks else known, after, new):
                         continue
                     if self._book.ends(after[0], after[1]):
                         return True
@@ -90,6 +91,32 @@ class Proof:
             self.states += len(known) if not k else 0
             known = following
         return False
+
+    def bound(self, values: Label, k: int) -> float:
+        """Return what a plan must stay below to be better in a goal.
+
+        Parameters
+        ----------
+        values : tuple of float
+        k : int
+
+        Returns
+        -------
+        float
+        """
+        value, goal = values[k], self._problem.goals[k]
+        if goal.of_margins:
+            return value - slack(goal.response, value)
+        less = float(np.nextafter(value, -np.inf))  # of none there is no share
+        return min(less, value - BELOW * abs(value))
+
+    def _standing(
+        self, moves: list[Move], labels: list[Label | None], most: list[float]
+    ) -> Iterator[tuple[State, Label]]:
+        """Yield the states that may be passed, and what goals took on the way to them."""
+        found = [(move[3], new) for move, new in zip(moves, labels, strict=True) if new is not None]
+        stand = self._stands.allows([(after[0], after[1]) for after, _ in found], most)
+        yield from (pair for pair, ok in zip(found, stand, strict=True) if ok)
 
     def _add(
         self, label: Label, before: State, kind: StepKind, after: State, most: list[float]
@@ -231,9 +258,9 @@ class Proof:
         self, goal: Goal, found: dict[str, np.ndarray], bricks: int, fields: Fields
     ) -> np.ndarray:
         count = len(fields.grip_force)
-        if goal.response:
+        if goal.response and not goal.of_margins:
             return found[goal.response]
-        if goal.of_states:
+        if goal.of_states and not goal.of_margins:
             return np.asarray(self._problem.criterion.costs(found, bricks, count))
         return np.zeros(count)
 

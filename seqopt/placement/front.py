@@ -66,12 +66,14 @@ class FrontProblem(Protocol):
         tuple of Step
         """
 
-    def values(self, steps: Sequence[Step]) -> Floats:
+    def values(self, steps: Sequence[Step], claimed: Floats) -> Floats:
         """Return the numbers of a sequence, from the responses of its steps.
 
         Parameters
         ----------
         steps : sequence of Step
+        claimed : (k,) float
+            What margins of stability are held against.
 
         Returns
         -------
@@ -161,7 +163,7 @@ def find_front(
     points = found.points[order]
     plans = tuple(problem.steps(found.plans[i]) for i in order)
     for point, steps in zip(points, plans, strict=True):
-        values = problem.values(steps)
+        values = problem.values(steps, point)
         if not (np.abs(values - point) <= TOLERANCE * np.abs(point)).all():
             raise SolverError(f"a plan is worth {values.tolist()}, not {point.tolist()} as claimed")
     _require_apart(points)

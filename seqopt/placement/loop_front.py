@@ -156,12 +156,14 @@ class LoopFront:
         """
         return self._problem.steps(plan)  # type: ignore[arg-type]
 
-    def values(self, steps: Sequence[Step]) -> Floats:
+    def values(self, steps: Sequence[Step], claimed: Floats) -> Floats:
         """Return the worst responses of a sequence, from those of its steps.
 
         Parameters
         ----------
         steps : sequence of Step
+        claimed : (k,) float
+            Not needed for responses.
 
         Returns
         -------

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
+import numpy as np
 import pandas as pd
 
 from seqopt.responses.quantities import CHOSEN_BY
@@ -22,6 +23,9 @@ LABELS = {
     "D_max": "D_max [1e-3 mm]",
     "steps": "steps",
     "regrips": "regrips",
+    "bond": "bond needed [kPa]",
+    "friction": "friction needed",
+    "tilt": "tilt survived [deg]",
 }
 MARKERS = "sD^vP*"
 FAR = 2.5  # a method so much worse than the set makes an axis logarithmic
@@ -100,4 +104,27 @@ def front_figure(
 
 
 def _shown(value: pd.Series[float] | float, name: str) -> pd.Series[float] | float:
+    if name == "tilt":
+        return value * (-180.0 / np.pi) + 90.0
+    if name == "bond":
+        return value / 1e3
     return value * CHOSEN_BY[name].scale if name in CHOSEN_BY else value
+
+
+def shown_table(table: pd.DataFrame) -> pd.DataFrame:
+    """Return the table of a Pareto set with the tilt that is survived, in degrees.
+
+    Parameters
+    ----------
+    table : pandas.DataFrame
+        Of `seqopt.placement.front.Front`, where a tilt is how far it is from a right angle, rad.
+
+    Returns
+    -------
+    pandas.DataFrame
+        ``tilt_survived_deg`` in the place of ``tilt``.
+    """
+    if "tilt" not in table:
+        return table.copy()
+    out = table.assign(tilt=_shown(table["tilt"], "tilt"))
+    return out.rename(columns={"tilt": "tilt_survived_deg"})

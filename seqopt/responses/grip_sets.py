@@ -17,6 +17,7 @@ from seqopt.arrays import Floats, Ints
 from seqopt.engines.interface import Engine, Want
 from seqopt.errors import MechanismError
 from seqopt.responses.alike import BLOCK
+from seqopt.responses.known_rows import KnownRows
 from seqopt.responses.quantities import CHOSEN_BY, lengths, require_finite
 
 
@@ -29,11 +30,6 @@ class GripSets:
         What solves them.
     names : sequence of str
         Responses of `seqopt.responses.quantities.CHOSEN_BY` that are wanted.
-
-    Attributes
-    ----------
-    solved : int
-        How many different grip sets were solved.
 
     Examples
     --------
@@ -50,10 +46,14 @@ class GripSets:
         self._engine = engine
         self._names = tuple(names)
         self._want = reduce(or_, (CHOSEN_BY[name].needs for name in names), Want(0))
-        self._known: dict[tuple[int, int], tuple[Ints, Floats]] = {}
+        self._known = KnownRows()
         scene = engine.network.scene
         self._number = np.array([0, *(node for brick in scene.placed for node in brick.nodes)])
-        self.solved = 0
+
+    @property
+    def solved(self) -> int:
+        """How many different grip sets were solved."""
+        return self._known.count
 
     def answers(self, bricks: int, held: Ints) -> tuple[Floats, Floats]:
         """Return the responses of grip sets and the forces of their grips.
@@ -86,19 +86,9 @@ class GripSets:
 
     def _found(self, bricks: int, count: int, nodes: Ints) -> Floats:
         """Return responses and forces of sets (S, count), those that are new solved now."""
-        codes = self._codes(nodes)
-        empty = np.zeros(0, dtype=np.int64), np.zeros((0, len(self._names) + count))
-        known, values = self._known.get((bricks, count), empty)
-        distinct, first = np.unique(codes, return_index=True)
-        fresh = first[~np.isin(distinct, known, assume_unique=True)]
-        if len(fresh):
-            known = np.concatenate([known, codes[fresh]])
-            values = np.concatenate([values, self._solve(bricks, nodes[fresh])])
-            order = np.argsort(known, kind="stable")
-            known, values = known[order], values[order]
-            self._known[bricks, count] = known, values
-            self.solved += len(fresh)
-        return np.asarray(values[np.searchsorted(known, codes)])
+        return self._known.of(
+            (bricks, count), self._codes(nodes), lambda new: self._solve(bricks, nodes[new])
+        )
 
     def _codes(self, nodes: Ints) -> Ints:
         """Return a number for every set (S, r) that no other one has."""
@@ -113,7 +103,8 @@ class GripSets:
             self._block(bricks, self._number[nodes[start : start + BLOCK]])
             for start in range(0, len(nodes), BLOCK)
         ]
-        return np.concatenate(parts)
+        width = len(self._names) + nodes.shape[1]
+        return np.concatenate([np.zeros((0, width)), *parts])
 
     def _block(self, bricks: int, grips: ArrayLike) -> Floats:
         """Return the same of a few sets of node numbers; those that leave something loose apart."""

@@ -1,0 +1,195 @@
+"""That the states of a free schedule stand: the demand, and what is known of grip sets."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from math import degrees, isfinite, pi
+
+import numpy as np
+
+from seqopt.arrays import Bools, Floats, Ints
+from seqopt.contact.mortar import DRY, Mortar, find_mortar
+from seqopt.errors import ProblemError
+from seqopt.network.network import Network
+from seqopt.responses.known_rows import KnownRows
+from seqopt.scene.checks import short
+from seqopt.stability.margins import Margins
+from seqopt.stability.screens import FALLS, STANDS, Screen
+
+MARGINS = ("bond", "friction", "tilt")
+"""What goals may ask of the stability of states, each of them to be small: the least bond (Pa), the
+least coefficient of friction, and how far the tilt that is survived is from a right angle (rad)."""
+NARROW = {"bond": (0.02, 50.0), "friction": (0.0, 2.0**-6), "tilt": (0.0, 2e-3)}
+"""By margin, within which share of itself and within what a value is proven: brackets' widths."""
+
+
+@dataclass(frozen=True)
+class Standing:
+    """The demand that every state of a schedule is proven to stand, robots within payload.
+
+    Parameters
+    ----------
+    mortar : Mortar or str
+        Of all joints; or its name.
+    tilt : float, optional
+        That every state must survive in whichever of eight directions is worst, rad.
+
+    Raises
+    ------
+    ProblemError
+        If the tilt is none that anything survives.
+
+    Examples
+    --------
+    >>> Standing("dry").described()["tilt_deg"]
+    0.0
+    """
+
+    mortar: Mortar = field(default=DRY)
+    tilt: float = 0.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "mortar", find_mortar(self.mortar))
+        if not (isinstance(self.tilt, int | float) and 0 <= self.tilt < pi / 2):
+            raise ProblemError(f"tilt {short(self.tilt)}: give an angle from 0 to below pi/2, rad")
+
+    def described(self) -> dict[str, float]:
+        """Return the demand, ready for JSON.
+
+        Returns
+        -------
+        dict
+            Friction, strengths (Pa) and tilt (degrees).
+        """
+        return {
+            "friction": self.mortar.friction,
+            "tensile_strength_Pa": self.mortar.tensile_strength,
+            "cohesion_Pa": self.mortar.cohesion,
+            "tilt_deg": degrees(self.tilt),
+        }
+
+
+class StandingSets:
+    """Which grip sets of a scene stand, and by what margins; each is looked at once.
+
+    Parameters
+    ----------
+    network : Network
+    standing : Standing
+        Margins are those of its mortar.
+    payloads : (k,) float
+        All that robots may have, N.
+
+    Attributes
+    ----------
+    undecided : int
+        How many grip sets were neither proven to stand nor to fall.
+
+    Raises
+    ------
+    ProblemError
+        If a robot could hold anything.
+    """
+
+    def __init__(self, network: Network, standing: Standing, payloads: Floats) -> None:
+        self._payloads = np.unique(payloads)
+        if not all(isfinite(load) for load in self._payloads):
+            raise ProblemError(
+                "a robot without a largest force holds up anything, and says nothing of what "
+                "stands; give it a payload, or a limit on its force, and keep payloads"
+            )
+        self._screen = Screen(network, standing.mortar, standing.tilt)
+        self._margins = Margins(network, standing.mortar)
+        self._known: Mapping[str, KnownRows] = {name: KnownRows() for name in ("", *MARGINS)}
+        self._most = 1 + 2 * len(network.inner)
+        self.undecided = 0
+
+    @property
+    def looked_at(self) -> int:
+        """Of how many grip sets it was asked whether they stand."""
+        return self._known[""].count
+
+    @property
+    def programs(self) -> int:
+        """How many linear programs were solved."""
+        return self._screen.solved + self._margins.solved
+
+    def stand(self, bricks: int, held: Ints, payload: Floats) -> Bools:
+        """Return which grip sets are proven to stand.
+
+        Parameters
+        ----------
+        bricks : int
+        held : (S, r) int
+            Nodes held, ascending, as places in build order counted from 1; zeros for none.
+        payload : (S, r) float
+            Largest force of each, N.
+
+        Returns
+        -------
+        (S,) bool
+        """
+
+        def verdicts(rows: Ints) -> Floats:
+            found = self._screen.stands(bricks, held[rows], payload[rows])
+            self.undecided += int(((found != STANDS) & (found != FALLS)).sum())
+            return found[:, None].astype(float)
+
+        return np.asarray(self._ask("", bricks, (held, payload), verdicts)[:, 0] == STANDS)
+
+    def margins(self, name: str, bricks: int, held: Ints, payload: Floats) -> Floats:
+        """Return between which values a margin of grip sets lies, as goals count it.
+
+        Parameters
+        ----------
+        name : str
+            One of `MARGINS`.
+        bricks : int
+        held : (S, r) int
+        payload : (S, r) float
+
+        Returns
+        -------
+        (S, 2) float
+            What is proven not to be enough, and what is proven to be.
+        """
+
+        def brackets(rows: Ints) -> Floats:
+            found = getattr(self._margins, name)(bricks, held[rows], payload[rows])
+            if name != "tilt":
+                return np.asarray(found)
+            return np.where(np.isnan(found), np.inf, pi / 2 - found[:, ::-1])
+
+        return self._ask(name, bricks, (held, payload), brackets)
+
+    def _ask(
+        self,
+        name: str,
+        bricks: int,
+        grips: tuple[Ints, Floats],
+        compute: Callable[[Ints], Floats],
+    ) -> Floats:
+        held, payload = grips
+        kinds = np.where(held > 0, np.searchsorted(self._payloads, payload), 0)
+        codes = np.zeros(len(held), dtype=np.int64)
+        for nodes, kind in zip(held.T, kinds.T, strict=True):
+            codes = (codes * self._most + nodes) * len(self._payloads) + kind
+        return self._known[name].of(bricks, codes, compute)
+
+
+def slack(name: str, value: float) -> float:
+    """Return within what a margin is proven.
+
+    Parameters
+    ----------
+    name : str
+        One of `MARGINS`.
+    value : float
+
+    Returns
+    -------
+    float
+    """
+    share, least = NARROW[name]
+    return max(share * abs(value), least)

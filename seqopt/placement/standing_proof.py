@@ -1,0 +1,166 @@
+"""That states stand, found anew for whoever judges a free schedule."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import pi
+
+import numpy as np
+
+from seqopt.arrays import Floats, Ints
+from seqopt.errors import SolverError
+from seqopt.placement.free_problem import FreeProblem
+from seqopt.placement.standing import Standing, StandingSets, slack
+from seqopt.sequence.steps import Grips, Step
+from seqopt.stability.assessment import Stability, Verdict
+from seqopt.stability.steps import assess_steps
+
+SURE = 1e-3  # rad, or as a share: how far the cone program may be from what forces prove
+
+
+class StandingProof:
+    """Says which states a better plan could pass: what stands, and by which margin at best.
+
+    Parameters
+    ----------
+    problem : FreeProblem
+    payload : mapping of int to float
+        The most that every robot may carry, N.
+    """
+
+    def __init__(self, problem: FreeProblem, payload: dict[int, float]) -> None:
+        goals = enumerate(problem.goals)
+        self._margins = [(k, goal.response) for k, goal in goals if goal.of_margins]
+        self._asked = bool(problem.standing or self._margins)
+        self._demanded, self._payload = problem.standing is not None, payload
+        scene = problem.network.scene
+        nodes = (None, *(node for brick in scene.placed for node in brick.nodes))
+        self._place = {node: place for place, node in enumerate(nodes)}
+        if self._asked:
+            loads = np.array(list(payload.values()))
+            self._sets = StandingSets(problem.network, problem.standing or Standing(), loads)
+
+    def allows(self, states: Sequence[tuple[int, Grips]], most: Sequence[float]) -> list[bool]:
+        """Return which states stand, if they must, with margins that may be as small as asked.
+
+        Parameters
+        ----------
+        states : sequence of (int, tuple of (int or None))
+            How many bricks stand, and which node each of the scene's robots holds.
+        most : sequence of float
+            What the first goals may take.
+
+        Returns
+        -------
+        list of bool
+        """
+        if not self._asked:
+            return [True] * len(states)
+        out = np.ones(len(states), dtype=bool)
+        for bricks in {bricks for bricks, _ in states}:
+            rows = np.array([i for i, (count, _) in enumerate(states) if count == bricks])
+            held, payload = self._rows([states[i][1] for i in rows])
+            if self._demanded:
+                out[rows] = self._sets.stand(bricks, held, payload)
+            for k, name in self._margins:
+                left = np.flatnonzero(out[rows])
+                if k < len(most) and len(left):
+                    ends = self._sets.margins(name, bricks, held[left], payload[left])
+                    out[rows[left]] = ends[:, 0] <= most[k]
+        return out.tolist()
+
+    def _rows(self, grips: Sequence[Grips]) -> tuple[Ints, Floats]:
+        """Return nodes held and the payloads of those who hold them, ascending by node."""
+        held = np.array([[self._place[node] for node in row] for row in grips])
+        payload = np.array([self._payload[r] for r in range(held.shape[1])])
+        order = np.argsort(held, axis=1, kind="stable")
+        return np.take_along_axis(held, order, axis=1), payload[order]
+
+
+def proven_margins(problem: FreeProblem, steps: Sequence[Step]) -> dict[str, float]:
+    """Return the margins of a plan by the cone program, and require that every step stands.
+
+    Parameters
+    ----------
+    problem : FreeProblem
+    steps : sequence of Step
+
+    Returns
+    -------
+    dict of str to float
+        The worst ``bond``, ``friction`` and ``tilt`` of any step, as goals count them.
+
+    Raises
+    ------
+    SolverError
+        Naming the step that is not proven to stand as is demanded.
+    """
+    standing = problem.standing or Standing()
+    results = certified(problem, steps)
+    if problem.standing is not None:
+        for step, result in zip(steps, results, strict=True):
+            if result.verdict is not Verdict.STANDS or result.tilt < standing.tilt - SURE:
+                raise SolverError(
+                    f"step {step.number} is not proven to stand as demanded: "
+                    f"{result.verdict.value}, tilt survived {result.tilt:.4g} rad"
+                )
+    return worst_margins(results)
+
+
+def certified(problem: FreeProblem, steps: Sequence[Step]) -> tuple[Stability, ...]:
+    """Return verdict and margins of every step by the cone program; of equal ones once.
+
+    Parameters
+    ----------
+    problem : FreeProblem
+    steps : sequence of Step
+
+    Returns
+    -------
+    tuple of Stability
+    """
+    mortar = (problem.standing or Standing()).mortar
+    for step in steps:
+        if (step.bricks, step.grips) not in problem.certified:
+            (result,) = assess_steps(problem.network, [step], mortar)
+            problem.certified[step.bricks, step.grips] = result
+    return tuple(problem.certified[step.bricks, step.grips] for step in steps)
+
+
+def worst_margins(results: Sequence[Stability]) -> dict[str, float]:
+    """Return the worst margins of any step, as goals count them.
+
+    Parameters
+    ----------
+    results : sequence of Stability
+
+    Returns
+    -------
+    dict of str to float
+        ``bond`` (Pa), ``friction``, and how far ``tilt`` is from a right angle (rad); NaN where
+        nothing is proven of a step.
+    """
+    tilts = [result.tilt for result in results]
+    return {
+        "bond": float(np.max([result.bond for result in results])),
+        "friction": float(np.max([result.friction for result in results])),
+        "tilt": float(pi / 2 - np.min(tilts)),
+    }
+
+
+def require_margin(name: str, claimed: float, proven: float) -> None:
+    """Raise an error if a margin is worse than claimed by more than brackets are wide.
+
+    Parameters
+    ----------
+    name : str
+        One of `seqopt.placement.standing.MARGINS`.
+    claimed, proven : float
+
+    Raises
+    ------
+    SolverError
+        With both values.
+    """
+    if not proven <= claimed + slack(name, claimed):
+        raise SolverError(f"{name} is {proven:.6g}, not {claimed:.6g} as claimed")
