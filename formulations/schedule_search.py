@@ -18,14 +18,16 @@ regrips, which keeps the best states of every brick count, gives a first plan. T
 rises until states below it connect the empty site to an end; responses are computed only for states
 next to those that are reached below it. Among these every goal is a shortest path, with the maximum
 in the place of the sum for a peak; what is not on a best path of one goal is left out before the
-next. The certificate proves every value anew: below it no path connects the empty site to an
-end.
+next. A margin of stability comes first: the best one with which states still connect both ends is
+found by halving an interval, and all further states must have it. The certificate proves every
+value anew: below it no path connects the empty site to an end.
 """
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -36,6 +38,7 @@ from seqopt.placement.free_graph import StateGraph, explore
 from seqopt.placement.free_paths import TIED, keep_best, least_from_start, shortest
 from seqopt.placement.free_problem import FreeProblem, ScheduleSelection
 from seqopt.placement.schedule_formulation import ScheduleFormulation
+from seqopt.placement.sturdiest import best_margin
 
 FAR_BELOW = 4.0  # what the narrow search finds, over the first threshold
 
@@ -102,6 +105,12 @@ def _search(
     problem: FreeProblem, options: tuple[int, float], tell: Tell, reached: list[StateGraph]
 ) -> ScheduleSelection:
     """Return the best free schedule, or the first one found where the search is stopped."""
+    if problem.goals[0].of_margins:
+        value, bound, rest = best_margin(problem, tell)
+        after = _search(rest, options, tell, reached)
+        if len(problem.goals) == 1:  # what was chosen after it was nobody's wish
+            after = replace(after, objective=(), bound=())
+        return replace(after, objective=(value, *after.objective), bound=(bound, *after.bound))
     found = None
     try:
         narrow = explore(problem, width=options[0], tell=tell)

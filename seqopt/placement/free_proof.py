@@ -69,6 +69,8 @@ class Proof:
         -------
         bool
         """
+        if self._problem.goals[k].of_margins and values[k] == 0:
+            return False
         most = [value + ROUNDING * abs(value) for value in values[:k]]
         most.append(self.bound(values, k))
         none: Grips = (None,) * len(self._problem.network.scene.robots)
@@ -106,7 +108,7 @@ class Proof:
         """
         value, goal = values[k], self._problem.goals[k]
         if goal.of_margins:
-            return value - slack(goal.response, value)
+            return max(0.0, value - slack(goal.response, value))
         less = float(np.nextafter(value, -np.inf))  # of none there is no share
         return min(less, value - BELOW * abs(value))
 

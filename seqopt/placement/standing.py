@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import degrees, isfinite, pi
 
 import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
-from seqopt.contact.mortar import DRY, Mortar, find_mortar
+from seqopt.contact.mortar import DRY, Mortar, bond_mortar, find_mortar
 from seqopt.errors import ProblemError
 from seqopt.network.network import Network
 from seqopt.responses.known_rows import KnownRows
@@ -20,6 +20,7 @@ from seqopt.stability.screens import FALLS, STANDS, Screen
 MARGINS = ("bond", "friction", "tilt")
 """What goals may ask of the stability of states, each of them to be small: the least bond (Pa), the
 least coefficient of friction, and how far the tilt that is survived is from a right angle (rad)."""
+TILTS = 1024  # steps of a right angle, to which the tilt of a state is found
 NARROW = {"bond": (0.02, 50.0), "friction": (0.0, 2.0**-6), "tilt": (0.0, 2e-3)}
 """By margin, within which share of itself and within what a value is proven: brackets' widths."""
 
@@ -53,6 +54,26 @@ class Standing:
         object.__setattr__(self, "mortar", find_mortar(self.mortar))
         if not (isinstance(self.tilt, int | float) and 0 <= self.tilt < pi / 2):
             raise ProblemError(f"tilt {short(self.tilt)}: give an angle from 0 to below pi/2, rad")
+
+    def demanding(self, name: str, value: float) -> Standing:
+        """Return the demand with which a margin is no worse than a value.
+
+        Parameters
+        ----------
+        name : str
+            One of `MARGINS`.
+        value : float
+            As goals count it.
+
+        Returns
+        -------
+        Standing
+        """
+        if name == "tilt":
+            return replace(self, tilt=pi / 2 - value)
+        if name == "friction":
+            return replace(self, mortar=replace(self.mortar, friction=value))
+        return replace(self, mortar=bond_mortar(value, self.mortar.friction))
 
     def described(self) -> dict[str, float]:
         """Return the demand, ready for JSON.
@@ -101,6 +122,8 @@ class StandingSets:
             )
         self._screen = Screen(network, standing.mortar, standing.tilt)
         self._margins = Margins(network, standing.mortar)
+        self._network, self._mortar = network, standing.mortar
+        self._tilts_known: dict[int, Screen] = {}
         self._known: Mapping[str, KnownRows] = {name: KnownRows() for name in ("", *MARGINS)}
         self._most = 1 + 2 * len(network.inner)
         self.undecided = 0
@@ -113,7 +136,8 @@ class StandingSets:
     @property
     def programs(self) -> int:
         """How many linear programs were solved."""
-        return self._screen.solved + self._margins.solved
+        own = sum(screen.solved for screen in self._tilts_known.values())
+        return own + self._screen.solved + self._margins.solved
 
     def stand(self, bricks: int, held: Ints, payload: Floats) -> Bools:
         """Return which grip sets are proven to stand.
@@ -130,13 +154,30 @@ class StandingSets:
         -------
         (S,) bool
         """
+        return np.asarray(self._verdicts(bricks, held, payload) == STANDS)
 
+    def may_stand(self, bricks: int, held: Ints, payload: Floats) -> Bools:
+        """Return which grip sets are not proven to fall.
+
+        Parameters
+        ----------
+        bricks : int
+        held : (S, r) int
+        payload : (S, r) float
+
+        Returns
+        -------
+        (S,) bool
+        """
+        return np.asarray(self._verdicts(bricks, held, payload) != FALLS)
+
+    def _verdicts(self, bricks: int, held: Ints, payload: Floats) -> Floats:
         def verdicts(rows: Ints) -> Floats:
             found = self._screen.stands(bricks, held[rows], payload[rows])
             self.undecided += int(((found != STANDS) & (found != FALLS)).sum())
             return found[:, None].astype(float)
 
-        return np.asarray(self._ask("", bricks, (held, payload), verdicts)[:, 0] == STANDS)
+        return self._ask("", bricks, (held, payload), verdicts)[:, 0]
 
     def margins(self, name: str, bricks: int, held: Ints, payload: Floats) -> Floats:
         """Return between which values a margin of grip sets lies, as goals count it.
@@ -156,12 +197,32 @@ class StandingSets:
         """
 
         def brackets(rows: Ints) -> Floats:
-            found = getattr(self._margins, name)(bricks, held[rows], payload[rows])
-            if name != "tilt":
-                return np.asarray(found)
-            return np.where(np.isnan(found), np.inf, pi / 2 - found[:, ::-1])
+            if name == "tilt":
+                return self._tilts(bricks, held[rows], payload[rows])
+            return np.asarray(getattr(self._margins, name)(bricks, held[rows], payload[rows]))
 
         return self._ask(name, bricks, (held, payload), brackets)
+
+    def _tilts(self, bricks: int, held: Ints, payload: Floats) -> Floats:
+        """Return between which angles from a right one tilts lie, by halving intervals."""
+        low, high = np.full(len(held), -1), np.full(len(held), TILTS)
+        fallen = high.copy()
+        while (left := high - low > 1).any():
+            middle = np.where(low < 0, 0, (low + high) // 2)
+            for step in np.unique(middle[left]).tolist():
+                rows = np.flatnonzero(left & (middle == step))
+                found = self._tilted(step).stands(bricks, held[rows], payload[rows])
+                low[rows[found == STANDS]] = step
+                high[rows[found != STANDS]] = step
+                fallen[rows[found == FALLS]] = step
+        survived = np.where(low < 0, -np.inf, low * (pi / 2 / TILTS))
+        return np.stack([pi / 2 - fallen * (pi / 2 / TILTS), pi / 2 - survived], axis=1)
+
+    def _tilted(self, step: int) -> Screen:
+        if step not in self._tilts_known:
+            tilt = step * (pi / 2 / TILTS)
+            self._tilts_known[step] = Screen(self._network, self._mortar, tilt)
+        return self._tilts_known[step]
 
     def _ask(
         self,

@@ -29,19 +29,14 @@ class StandingProof:
     """
 
     def __init__(self, problem: FreeProblem, payload: dict[int, float]) -> None:
-        goals = enumerate(problem.goals)
-        self._margins = [(k, goal.response) for k, goal in goals if goal.of_margins]
-        self._asked = bool(problem.standing or self._margins)
-        self._demanded, self._payload = problem.standing is not None, payload
+        self._problem, self._payload = problem, payload
+        self._sets: dict[Standing, StandingSets] = {}
         scene = problem.network.scene
         nodes = (None, *(node for brick in scene.placed for node in brick.nodes))
         self._place = {node: place for place, node in enumerate(nodes)}
-        if self._asked:
-            loads = np.array(list(payload.values()))
-            self._sets = StandingSets(problem.network, problem.standing or Standing(), loads)
 
     def allows(self, states: Sequence[tuple[int, Grips]], most: Sequence[float]) -> list[bool]:
-        """Return which states stand, if they must, with margins that may be as small as asked.
+        """Return which states stand, if they must, and are not proven to lack a margin.
 
         Parameters
         ----------
@@ -54,20 +49,23 @@ class StandingProof:
         -------
         list of bool
         """
-        if not self._asked:
-            return [True] * len(states)
         out = np.ones(len(states), dtype=bool)
-        for bricks in {bricks for bricks, _ in states}:
+        base = self._problem.standing
+        asked = base or Standing()
+        for goal, value in zip(self._problem.goals, most, strict=False):
+            if goal.of_margins:
+                asked = asked.demanding(goal.response, max(value, 0.0))
+        for bricks in {bricks for bricks, _ in states} if base or asked != Standing() else ():
             rows = np.array([i for i, (count, _) in enumerate(states) if count == bricks])
             held, payload = self._rows([states[i][1] for i in rows])
-            if self._demanded:
-                out[rows] = self._sets.stand(bricks, held, payload)
-            for k, name in self._margins:
-                left = np.flatnonzero(out[rows])
-                if k < len(most) and len(left):
-                    ends = self._sets.margins(name, bricks, held[left], payload[left])
-                    out[rows[left]] = ends[:, 0] <= most[k]
+            out[rows] = self._known(asked).may_stand(bricks, held, payload)
         return out.tolist()
+
+    def _known(self, asked: Standing) -> StandingSets:
+        if asked not in self._sets:
+            loads = np.array(list(self._payload.values()))
+            self._sets[asked] = StandingSets(self._problem.network, asked, loads)
+        return self._sets[asked]
 
     def _rows(self, grips: Sequence[Grips]) -> tuple[Ints, Floats]:
         """Return nodes held and the payloads of those who hold them, ascending by node."""

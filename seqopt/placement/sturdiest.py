@@ -1,0 +1,74 @@
+"""The best margin of stability with which a free schedule exists, by halving intervals."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from math import pi
+
+from seqopt.errors import InfeasibleError
+from seqopt.placement.free_goals import Goal, Measure
+from seqopt.placement.free_graph import StateGraph, explore
+from seqopt.placement.free_problem import FreeProblem
+from seqopt.placement.standing import Standing, slack
+from seqopt.stability.assessment import ROUGHEST
+
+WORST = {"bond": 1e9, "friction": ROUGHEST, "tilt": pi / 2}  # as goals count them
+FIRST = {"bond": 1e3, "friction": 0.5, "tilt": pi / 2 - 0.05}  # where the search begins
+WIDTH = 50  # states of a brick count from which a quick look for a plan goes on
+
+
+def best_margin(
+    problem: FreeProblem, tell: Callable[[StateGraph], None] = lambda _: None
+) -> tuple[float, float, FreeProblem]:
+    """Return the best value of the first goal, a margin, and what is left to choose at it.
+
+    Parameters
+    ----------
+    problem : FreeProblem
+        Whose first goal is about a margin.
+    tell : callable, optional
+        Called with the states that are reached; may raise to end the search.
+
+    Returns
+    -------
+    value : float
+        With which plans exist in which every state is proven to stand.
+    bound : float
+        With which none does.
+    rest : FreeProblem
+        Of the goals after it, with the demand that all stand with that value.
+
+    Raises
+    ------
+    InfeasibleError
+        If there is no plan, whatever the margin.
+    """
+    name = problem.goals[0].response
+    base = problem.standing or Standing()
+
+    def demanding(value: float) -> FreeProblem:
+        goals = problem.goals[1:] or (Goal(Measure.STEPS),)
+        return replace(problem, goals=goals, standing=base.demanding(name, value))
+
+    def exists(value: float) -> bool:
+        reach = replace(demanding(value), goals=(Goal(Measure.STEPS),))
+        return explore(reach, width=WIDTH, tell=tell).whole or explore(reach, tell=tell).whole
+
+    if name != "tilt" and exists(0.0):
+        return 0.0, 0.0, demanding(0.0)
+    low, high = _around(exists, FIRST[name], WORST[name])
+    while high - low > 0.9 * slack(name, high):
+        middle = (low * high) ** 0.5 if low > 0 and name == "bond" else (low + high) / 2
+        low, high = (low, middle) if exists(middle) else (middle, high)
+    return high, low, demanding(high)
+
+
+def _around(exists: Callable[[float], bool], first: float, worst: float) -> tuple[float, float]:
+    """Return a value with which no plan exists, and a larger one with which some does."""
+    low, high = 0.0, first
+    while not exists(high):
+        if high >= worst:
+            raise InfeasibleError("no plan of the free schedule stands, whatever the margin")
+        low, high = high, min(worst, 4 * high)
+    return low, high
