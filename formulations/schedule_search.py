@@ -89,6 +89,10 @@ def solve(
             f"options width={width}, growth={growth:g}: give a whole number from 1 on, and a "
             "number above 1"
         )
+    margins = [goal.of_margins for goal in problem.goals]
+    if sorted(margins, reverse=True) != margins:
+        named = ", ".join(map(str, problem.goals))
+        raise ProblemError(f"aims {named}: name bond, friction and tilt before all others")
     end = time.perf_counter() + seconds
     reached: list[StateGraph] = []
 

@@ -11,6 +11,7 @@ from seqopt.placement.free_goals import STATE_RESPONSES, Goal, Measure
 from seqopt.placement.free_graph import explore
 from seqopt.placement.free_paths import least_to_end
 from seqopt.placement.free_problem import FreeProblem
+from seqopt.sequence.free_rules import FreeRules, Payload
 
 STEPS = (Goal(Measure.STEPS),)
 STANDING = "no demand to stand"
@@ -52,7 +53,7 @@ def _opening(problem: FreeProblem) -> Iterator[str]:
     """Yield rules, each loosened as little as is enough alone, and limits that alone are enough."""
     problem = replace(problem, goals=STEPS)
     done: set[str] = set()
-    for text, rules in problem.rules.loosened():
+    for text, rules in _loosened(problem):
         rule = text.partition("=")[0]
         if rule not in done and explore(replace(problem, rules=rules)).whole:
             done.add(rule)
@@ -65,9 +66,16 @@ def _opening(problem: FreeProblem) -> Iterator[str]:
             yield limit.response
 
 
+def _loosened(problem: FreeProblem) -> Iterator[tuple[str, FreeRules]]:
+    """Yield the rules that can be loosened: what stands is asked of robots with payloads."""
+    for text, rules in problem.rules.loosened():
+        if problem.standing is None or rules.payload is Payload.KEPT:
+            yield text, rules
+
+
 def _pair(problem: FreeProblem) -> str:
     """Return the first two that open a way together: rules, or a rule and a limit; or nothing."""
-    for text, rules in problem.rules.loosened():
+    for text, rules in _loosened(problem):
         other = next(_opening(replace(problem, rules=rules)), "")
         if other:
             return f"{text} together with {other}"

@@ -272,9 +272,6 @@ def pose_free(
     FreeProblem('arch25', minmax, steps, 0 limits)
     """
     goals = parse_goals(goals) if isinstance(goals, str) else tuple(goals)
-    margins = [goal.of_margins for goal in goals if isinstance(goal, Goal)]
-    if sorted(margins, reverse=True) != margins:
-        raise ProblemError(f"aims {', '.join(map(str, goals))}: name bond, friction and tilt first")
     if not goals or not all(isinstance(goal, Goal) for goal in goals):
         raise ProblemError(f"aims {short(goals)}: give goals, or their names, as 'minmax,steps'")
     limits = (limits,) if isinstance(limits, Limit) else tuple(limits)

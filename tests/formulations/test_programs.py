@@ -4,17 +4,21 @@ from __future__ import annotations
 
 from itertools import pairwise, product
 
+import cvxpy as cp
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import formulations.beam
 import formulations.rank_search
+from formulations.solvers import anatomy, minimize, minimize_whole
 from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.placement.costs import LayeredCosts
-from seqopt.placement.formulation import FormulationKind, Reads
+from seqopt.placement.formulation import End, FormulationKind, Reads
 from seqopt.placement.formulation import formulations as registered
 from seqopt.placement.interface import Aim, CostProblem
+from seqopt.placement.watch import Watch
 from tests.strategies import problems
 
 ALL = registered()
@@ -218,3 +222,67 @@ def test_how_much_is_enumerated_at_once(monkeypatch):
     assert ALL["rank_search"].solve(problem, horizon=2).choice == (0, 1, 0)
     with pytest.raises(ProblemError, match=r"8 combinations of 3 moves; .*\(at most 7e\+00 are"):
         ALL["rank_search"].solve(problem, horizon=9)
+
+
+class Counting(Watch):
+    """A watch whose time is over after so many looks."""
+
+    def __init__(self, looks):
+        super().__init__()
+        self.looks = looks
+
+    @property
+    def over(self):
+        self.looks -= 1
+        return self.looks < 0
+
+
+def test_a_beam_says_whether_it_came_to_its_end():
+    flat = [np.zeros((1, 2)), np.ones((2, 2)), np.ones((2, 2))]
+    problem = CostProblem(LayeredCosts(single=[np.array([0.0, 1.0])] * 3, shared=flat))
+    beam = formulations.beam.solve
+    assert beam(problem).end is End.DONE
+    assert beam(problem, watch=Counting(4)).end is End.STOPPED  # the greedy search alone is done
+    assert beam(problem, watch=Counting(1)).end is not End.DONE
+
+
+def test_rank_search_without_proof_looks_at_the_next_move_alone():
+    assert ALL["rank_search"].window_options == {"horizon": 1}
+
+
+def boxed_program():
+    """The least is 5 - 2 + 1 - 0.5: with the offset, a bound below and one below zero."""
+    x, y = cp.Variable(2, boolean=True), cp.Variable(bounds=[-0.5, 2.0])
+    z = cp.Variable()
+    rules = [x[0] + x[1] == 1, z >= 1.0, z <= 3.0]
+    return cp.Problem(cp.Minimize(5.0 - 2.0 * x[0] - x[1] + y + z), rules)
+
+
+def test_programs_keep_their_offset_bounds_and_equations(capfd):
+    found = minimize_whole(boxed_program(), feasible=True)
+    assert found.value == pytest.approx(3.5)
+    assert found.bound == pytest.approx(3.5)
+    assert not found.stopped
+    assert 0 <= found.compile_seconds < 600
+    size, relaxed = anatomy(boxed_program())
+    assert relaxed == pytest.approx(3.5)
+    assert (size.rows, size.columns, size.binaries) == (3, 4, 2)
+    assert capfd.readouterr().out == ""  # the solver keeps quiet
+
+
+def test_a_relaxation_is_below_the_program():
+    x = cp.Variable(2, boolean=True)
+    program = cp.Problem(cp.Minimize(-x[0] - x[1]), [2 * x[0] + 2 * x[1] <= 3])
+    assert anatomy(program)[1] == pytest.approx(-1.5)
+    assert minimize_whole(program, feasible=True).value == pytest.approx(-1.0)
+
+
+def test_a_program_without_time_is_stopped_and_claims_nothing():
+    x = cp.Variable(40)
+    program = cp.Problem(cp.Minimize(cp.sum_squares(x - 1)), [cp.sum(x) == 1, x >= 0])
+    assert minimize(program, feasible=True).value > 0
+    found = minimize(program, feasible=True, time_limit=1e-9)
+    assert found.stopped
+    assert np.isinf(found.value)
+    whole = minimize_whole(boxed_program(), feasible=True, watch=Watch(time_limit=0.0))
+    assert whole.stopped or whole.value == pytest.approx(3.5)  # presolve may be done at once

@@ -43,6 +43,7 @@ class Equivalent:
 
 COMPLIANCE = "seqopt.engines.rigid.compliance"
 OPERATOR = "seqopt.engines.rigid.operator"
+GROWTH = "seqopt.engines.rigid.growth"
 GRIPS = "seqopt.engines.rigid.grip_equations"
 COSTS, CERTIFICATE = "seqopt.placement.costs", "seqopt.placement.certificate"
 CRITERIA, RANKS = "seqopt.placement.criteria", "seqopt.placement.ranks"
@@ -149,6 +150,16 @@ EQUIVALENT = (
         Equivalent(COMPLIANCE, "force[~trusted]", "0.0", size, "these sets are answered anew")
         for size in ("1.0", "-1.0")
     ),
+    *(
+        Equivalent(
+            COMPLIANCE, "len(held) >= bricks", old, new, "which way of two that agree is taken"
+        )
+        for old, new in (("if 2", "if not 2"), (">=", ">"), (">=", "<="))
+    ),
+    Equivalent(OPERATOR, "AT_ONCE // states", "//", "%", "how many are answered at a time"),
+    Equivalent(GROWTH, "AT_ONCE = 2**17", "2", "1", "how many are changed at a time"),
+    Equivalent(COSTS, "given.flat[0]", "0", "-1", "all of these entries are one"),
+    Equivalent("formulations.beam", "len(met)", "==", ">=", "no more are met than were found"),
 )
 
 

@@ -1,0 +1,220 @@
+"""Free schedules whose every state must stand: against brute force, and what judges them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import pi, radians
+
+import networkx as nx
+import numpy as np
+import pytest
+from hypothesis import given, reject, settings
+
+import seqopt
+from formulations.limit_analysis import compile_equilibrium
+from seqopt.contact.faces import bare_assembly, step_assembly
+from seqopt.contact.mortar import DRY, find_mortar
+from seqopt.engines.interface import Want
+from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.errors import InfeasibleError, MechanismError, ProblemError, SceneError, SolverError
+from seqopt.network.build import build_network
+from seqopt.placement.criteria import WorstRatio
+from seqopt.placement.free_front import FreeFront
+from seqopt.placement.free_judge import judge_schedule
+from seqopt.placement.free_problem import pose_free
+from seqopt.placement.front import find_front
+from seqopt.placement.requirements import LIMIT_TOLERANCE
+from seqopt.placement.standing import Standing, StandingSets
+from seqopt.responses.quantities import CHOSEN_BY, lengths
+from seqopt.sequence.free_check import RuleBook
+from seqopt.sequence.free_rules import FreeRules
+from seqopt.stability.assessment import Verdict, bonded, verdict_of
+from seqopt.stability.margins import Margins
+from seqopt.stability.prover import Prover
+from tests.builders import small_arch
+from tests.strategies import free_builds
+
+ONES = WorstRatio("ones", (("F_largest", 100.0), ("M_sup", 10.0)))
+
+
+def worth(engine, bricks, grips):
+    """What a state is worth, solved alone; infinite if it is loose or a robot holds too much."""
+    held = [node for node in grips if node is not None]
+    try:
+        fields = engine.solve(bricks, np.array([held], dtype=int).reshape(1, -1), Want.ALL)
+    except MechanismError:
+        return np.inf
+    force = dict(zip(held, lengths(fields.grip_force)[0], strict=True))
+    for robot, node in zip(engine.network.scene.robots, grips, strict=True):
+        if node is not None and force[node] > robot.payload * (1 + LIMIT_TOLERANCE):
+            return np.inf
+    moment = CHOSEN_BY["M_sup"].of(engine.network, fields)[0]
+    return max(max(force.values(), default=0.0) / 100.0, moment / 10.0)
+
+
+def stands(network, bricks, grips, mortar):
+    """By the cone program."""
+    assembly = step_assembly(network, bricks, grips)
+    return verdict_of(Prover(assembly, compile_equilibrium)(bonded(assembly, mortar)))
+
+
+def brute_force(engine, rules, mortar):
+    """The least peak of all plans whose states stand, by every state that can be reached."""
+    book = RuleBook(engine.network, rules)
+    start = (0, (None,) * len(engine.network.scene.robots), 0)
+    graph, work = nx.DiGraph(), [start]
+    graph.add_node(start, worth=0.0)
+    while work:
+        state = work.pop()
+        for _, bricks, grips, regrips in book.follow(*state):
+            after = (bricks, grips, regrips if rules.regrips is not None else 0)
+            if after not in graph:
+                value = worth(engine, bricks, grips)
+                fine = stands(engine.network, bricks, grips, mortar) is Verdict.STANDS
+                graph.add_node(after, worth=value if fine else np.inf)
+                work += [after] if fine and np.isfinite(value) else []
+            graph.add_edge(state, after)
+    ends = [n for n in graph if n[0] and book.ends(*n[:2])]
+    for value in sorted({d for _, d in graph.nodes(data="worth") if np.isfinite(d)}):
+        kept = graph.subgraph([n for n, d in graph.nodes(data="worth") if d <= value])
+        reached = nx.descendants(kept, start)
+        if any(end in reached for end in ends):
+            return value
+    return None
+
+
+def check(scene, rules, mortar="dry"):
+    engine = ComplianceEngine(build_network(scene))
+    best = brute_force(engine, rules, find_mortar(mortar))
+    problem = pose_free(engine, rules, ONES, "minmax", stands=mortar)
+    if best is None:
+        with pytest.raises(InfeasibleError, match="free schedule: "):
+            seqopt.solve(problem, "schedule_search")
+        return
+    plan = seqopt.solve(problem, "schedule_search")
+    assert plan.certificate.objective == pytest.approx((best,))
+    assert set(plan.stability()["verdict"]) == {"stands"}
+    assert problem.stability.undecided == 0
+
+
+@pytest.mark.parametrize("least", [1, 2])
+def test_a_small_arch_equals_brute_force(least):
+    check(small_arch(4), FreeRules(least_grips=least))
+
+
+@pytest.mark.slow
+@given(build=free_builds(most_bricks=4, most_robots=3))
+@settings(max_examples=12, deadline=None)
+def test_it_equals_brute_force(build):
+    scene, rules = build
+    try:
+        bare_assembly(build_network(scene), len(scene.bricks))
+    except SceneError:  # faces do not meet in joints as they were drawn
+        reject()
+    check(scene, replace(rules, payload="kept"), "bond=500")
+
+
+@pytest.fixture(scope="module")
+def dry():
+    engine = ComplianceEngine(build_network(small_arch(5)))
+    return pose_free(engine, FreeRules(), ONES, "minmax", stands="dry")
+
+
+def test_a_plan_that_does_not_stand_is_seen(dry):
+    """The negative control: the best plan of all, whose second brick is let go too soon."""
+    free = replace(dry, standing=None)
+    plan = seqopt.solve(free, "schedule_search")
+    loose = find_mortar("dry")
+    verdicts = [stands(dry.network, s.bricks, s.grips, loose) for s in plan.steps]
+    assert Verdict.FALLS in verdicts
+    with pytest.raises(SolverError, match=r"step \d+ is not proven to stand as demanded"):
+        judge_schedule(dry, plan.selection, plan.steps)
+
+
+def test_a_better_plan_that_stands_is_seen(dry):
+    strict = replace(dry, standing=Standing(DRY, radians(5.0)))
+    plan = seqopt.solve(strict, "schedule_search")
+    assert plan.stability()["tilt_survived_deg"].min() >= 5.0
+    best = seqopt.solve(dry, "schedule_search")
+    assert best.selection.objective[0] <= plan.selection.objective[0]
+    worse = replace(plan.selection, objective=plan.selection.objective)
+    if best.selection.objective[0] < plan.selection.objective[0] * (1 - 1e-6):
+        with pytest.raises(SolverError, match="a plan has less"):
+            judge_schedule(dry, worse, plan.steps)
+
+
+@pytest.mark.parametrize("aim", ["bond", "friction", "tilt", "tilt,minmax", "bond,steps"])
+def test_a_margin_is_the_best_to_its_width(dry, aim):
+    """With the value that was found a plan exists; past the bound none does."""
+    problem = pose_free(dry.engine, dry.rules, ONES, aim)
+    plan = seqopt.solve(problem, "schedule_search")
+    name, (value, *_), (bound, *_) = (
+        aim.split(",")[0],
+        *((plan.certificate.objective, plan.certificate.bound)),
+    )
+    assert bound <= value
+    rest = pose_free(dry.engine, dry.rules, ONES, "steps")
+    asked = Standing().demanding(name, value)
+    assert seqopt.solve(replace(rest, standing=asked), "schedule_search").steps
+    if bound < value:
+        past = Standing().demanding(name, bound)
+        with pytest.raises(InfeasibleError):
+            seqopt.solve(replace(rest, standing=past), "schedule_search")
+
+
+def test_margins_come_before_other_aims(dry):
+    problem = pose_free(dry.engine, dry.rules, ONES, "minmax,tilt")
+    with pytest.raises(ProblemError, match="name bond, friction and tilt before all others"):
+        seqopt.solve(problem, "schedule_search")
+
+
+def test_a_robot_that_holds_anything_says_nothing_of_what_stands(dry):
+    with pytest.raises(ProblemError, match="without a largest force holds up anything"):
+        pose_free(dry.engine, FreeRules(payload="ignored"), ONES, "minmax", stands="dry")
+
+
+def test_a_bond_that_opens_a_way_is_named():
+    engine = ComplianceEngine(build_network(small_arch(6)))
+    rules = FreeRules(robots=("rob1", "rob2"), least_grips=0)
+    problem = pose_free(engine, rules, ONES, "minmax", stands=Standing("dry", 0.0))
+    problem = replace(problem, standing=Standing(replace(DRY, friction=0.05)))
+    with pytest.raises(InfeasibleError, match=r"a way opens with .*a bond of [\d.e+]+ Pa"):
+        seqopt.solve(problem, "schedule_search")
+
+
+def test_tilts_by_steps_are_those_of_the_program(dry):
+    network = dry.network
+    payload = np.array([robot.payload for robot in network.scene.robots])
+    sets = StandingSets(network, Standing("dry"), payload)
+    held = np.array([[0, 0, 8], [0, 6, 8], [2, 6, 8], [0, 2, 3]])
+    loads = np.full(held.shape, payload[0])
+    exact = Margins(network, "dry").tilt(4, held, loads)
+    low, high = (pi / 2 - sets.margins("tilt", 4, held, loads)).T
+    for (least, most), a, b in zip(exact, high, low, strict=True):
+        if np.isnan(least):
+            assert np.isinf(a)
+        else:
+            assert a <= most + 1e-6
+            assert b >= least - 1e-6
+            assert b - a <= 2e-3
+
+
+def test_pareto_sets_with_a_margin(dry):
+    problem = pose_free(dry.engine, dry.rules, ONES, "F_largest,bond")
+    front = find_front(FreeFront(problem, {"F_largest": 10.0, "bond": 500.0}))
+    assert front.complete
+    assert (front.table["bond"] % 500 == 0).all()
+    assert front.table["bond"].is_monotonic_decreasing
+
+
+@pytest.mark.slow
+def test_the_arch_is_built_dry(engine25):
+    criterion = seqopt.CRITERIA["worst-ratio-published"]
+    problem = pose_free(engine25, FreeRules(), criterion, "steps,minmax", stands="dry")
+    plan = seqopt.solve(problem, "schedule_search")
+    assert plan.certificate.objective == pytest.approx((48, 0.919157), abs=1e-5)
+    assert set(plan.stability()["verdict"]) == {"stands"}
+    assert plan.regrips == 0
+    two = replace(problem, rules=FreeRules(robots=("rob1", "rob2"), least_grips=0))
+    with pytest.raises(InfeasibleError, match="brick 25"):
+        seqopt.solve(two, "schedule_search")
