@@ -57,6 +57,29 @@ def test_more_robots_come_with_their_scene(capsys, tmp_path, arch):
     assert len(steps[-2].held) == 1
 
 
+def test_states_that_must_stand(capsys, tmp_path, arch):
+    out = tmp_path / "out"
+    words = ["--stands", "dry", "--tilt", "2", "--aim", "steps,minmax"]
+    status, *_ = run(capsys, "optimize", arch, "--schedule", "free", *words, "--out", str(out))
+    assert status == 0
+    rows = pd.read_csv(out / "stability.csv")
+    assert set(rows["verdict"]) == {"stands"}
+    assert rows["tilt_survived_deg"].min() >= 2
+    said = json.loads((out / "summary.json").read_text())["stands"]
+    assert said["tilt_deg"] == pytest.approx(2)
+    assert (said["cohesion_Pa"], said["undecided"]) == (0, 0)
+
+
+def test_the_sturdiest_plan_is_in_degrees(capsys, tmp_path, arch):
+    out = tmp_path / "out"
+    words = ["--stands", "dry", "--aim", "tilt"]
+    status, said, _ = run(capsys, "optimize", arch, "--schedule", "free", *words, "--out", str(out))
+    assert status == 0
+    tilt = json.loads((out / "summary.json").read_text())["objective"]["tilt"]
+    assert f"tilt {tilt:.6g}" in said
+    assert tilt <= pd.read_csv(out / "stability.csv")["tilt_survived_deg"].min() + 0.1
+
+
 @pytest.mark.parametrize(
     ("words", "status", "said"),
     [
@@ -70,6 +93,12 @@ def test_more_robots_come_with_their_scene(capsys, tmp_path, arch):
         (["--option", "speed=1"], 2, "--option speed=1: there is no such; give one of width"),
         (["--formulation", "minimax"], 2, "no formulation of the free schedule"),
         (["--criteria", "equations-2-3"], 2, "it ranks the choices of a move"),
+        (["--tilt", "3"], 2, "--tilt: it goes with --stands"),
+        (["--stands", "jelly"], 2, "mortar 'jelly': give a Mortar, or one of epoxy, dry"),
+        (["--stands", "dry", "--tilt", "90"], 2, "give an angle from 0 to below pi/2"),
+        (["--stands", "dry", "--rule", "payload=ignored"], 2, "holds up anything"),
+        (["--aim", "minmax,tilt"], 2, "name bond, friction and tilt before all others"),
+        (["--stands", "bond=1e-9", "--friction", "0.01"], 3, "a bond of "),
         (["--limit", "F_largest=1"], 3, "a way opens with F_largest="),
     ],
 )
