@@ -16,6 +16,7 @@ from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.placement.certificate import judge, least_sum
 from seqopt.placement.conflicts import refusal
 from seqopt.placement.formulation import (
+    End,
     Formulation,
     Selection,
     as_formulation,
@@ -102,6 +103,8 @@ def solve(
     ------
     InfeasibleError, ProblemError, SolverError
         If no choice is allowed; what is given does not go together; a solver or claim fails.
+    KeyboardInterrupt
+        A first one lets it stop choosing as a time limit does, if a choice is at hand.
 
     Examples
     --------
@@ -117,6 +120,27 @@ def solve(
     if proof:
         return _solve_all(problem, found, _Run(time_limit, progress), options)
     return _solve_windows(problem, found, options)
+
+
+def on_the_way(plan: Plan) -> Plan:
+    """Return a plan, for whoever has more to do than to solve; an interrupt ends that too.
+
+    Parameters
+    ----------
+    plan : Plan
+
+    Returns
+    -------
+    Plan
+
+    Raises
+    ------
+    KeyboardInterrupt
+        If its formulation was interrupted.
+    """
+    if plan.selection.end is End.INTERRUPTED:
+        raise KeyboardInterrupt
+    return plan
 
 
 def _fitting(
