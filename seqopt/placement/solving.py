@@ -89,7 +89,7 @@ def solve(
     proof : bool, optional
         False: ``cascade`` or ``rank_search`` solve only what they meet, and no gap is known.
     time_limit : float, optional
-        After which it stops choosing, with the best choice so far and a bound, s.
+        After which, or at an interrupt, it stops choosing, with its best choice and a bound, s.
     progress : callable, optional
         Told every better choice and bound as it is found.
     **options
@@ -103,8 +103,6 @@ def solve(
     ------
     InfeasibleError, ProblemError, SolverError
         If no choice is allowed; what is given does not go together; a solver or claim fails.
-    KeyboardInterrupt
-        A first one lets it stop choosing as a time limit does, if a choice is at hand.
 
     Examples
     --------
