@@ -44,7 +44,9 @@ def test_a_flaw_fails_the_build(tmp_path, flaw):
     (source / "conf.py").write_bytes((ROOT / "docs" / "conf.py").read_bytes())
     front = "---\nfile_format: mystnb\nkernelspec:\n  name: python3\n---\n"
     (source / "index.md").write_text(f"{front}# Page\n\n{flaw}\n", encoding="utf-8")
-    assert build(source, tmp_path / "html").returncode != 0
+    done = build(source, tmp_path / "html")
+    assert done.returncode != 0
+    assert "index.md" in done.stderr  # the page is at fault, not how it is built
 
 
 def test_readme_shows_two_commands_that_exist(capsys):
