@@ -1,6 +1,12 @@
 """Sphinx configuration: the site is built with warnings as errors (see CONTRIBUTING.md)."""
 
+import sys
 from importlib.metadata import version as installed_version
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+
+from experiments.harness.stated import stated
 
 project = "seqopt"
 author = "The seqopt developers"
@@ -16,7 +22,8 @@ extensions = [
 html_theme = "furo"
 html_title = "seqopt"
 exclude_patterns = ["_build", "jupyter_execute"]  # what a build leaves behind
-myst_enable_extensions = ["amsmath", "dollarmath", "deflist"]
+myst_enable_extensions = ["amsmath", "dollarmath", "deflist", "substitution"]
+myst_substitutions = stated()  # figures of the stored runs, by name: {{ name }} in a page
 myst_heading_anchors = 3
 
 nb_execution_mode = "force"

@@ -19,6 +19,7 @@ from seqopt.stability.limit_analysis import Claim
 
 GAPS = {"mip_rel_gap": 1e-9, "mip_abs_gap": 1e-9}  # of integer programs
 HIGHS_ENDS = {"kOptimal": cp.OPTIMAL, "kInfeasible": cp.INFEASIBLE}
+STOPS = ("kTimeLimit", "kInterrupt")
 CONE_OPTIONS: tuple[dict[str, object], ...] = (
     {"equilibrate_enable": False, "static_regularization_constant": 1e-7},
     {"warm_start": False},  # a solver that is kept keeps its options
@@ -47,7 +48,7 @@ class Optimum:
     nodes : int
         Of its search tree.
     stopped : bool
-        Whether its time was over.
+        Whether its time was over, or it was interrupted.
     """
 
     value: float
@@ -152,7 +153,7 @@ def minimize_whole(
     except cp.SolverError as error:
         raise SolverError(f"{cp.HIGHS} failed: {error}; rescale the costs") from error
     info = solver.getInfo()
-    stopped = status == "kTimeLimit"
+    stopped = status in STOPS
     bound = float(info.mip_dual_bound) + offset
     if stopped and not math.isfinite(info.objective_function_value):
         return Optimum(math.inf, seconds, bound, int(info.mip_node_count), stopped=True)
@@ -228,14 +229,24 @@ def _loaded(data: dict[str, Any], *, whole: bool) -> highspy.Highs:
 
 
 def _listen(solver: highspy.Highs, watch: Watch, told: Callable[[float], float]) -> None:
-    """Let HiGHS tell a watch every better solution, and its bounds between them."""
+    """Let HiGHS tell a watch every better solution, and its bounds between them.
+
+    It ends when the watch says so, also while it solves linear programs.
+    """
 
     def hear(event: Any) -> None:
         data = event.data_out
         watch.tell(_finite(told(data.mip_primal_bound), math.inf), told(data.mip_dual_bound))
+        end(event)
+
+    def end(event: Any) -> None:
+        if watch.over:
+            event.interrupt()
 
     solver.cbMipImprovingSolution += hear
     solver.cbMipInterrupt += hear
+    solver.cbSimplexInterrupt += end
+    solver.cbIpmInterrupt += end
 
 
 def _finite(value: float, otherwise: float) -> float:

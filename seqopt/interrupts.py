@@ -1,10 +1,10 @@
-"""Interrupts that wait until what must not be left half done is done."""
+"""Interrupts that wait until what must not be left half done is done, or are answered by a call."""
 
 from __future__ import annotations
 
 import signal
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 
@@ -39,3 +39,33 @@ def undisturbed() -> Iterator[None]:
             signal.pthread_sigmask(signal.SIG_SETMASK, mask)
         for number in came[:1]:
             signal.raise_signal(number)
+
+
+@contextmanager
+def answered(told: Callable[[], object]) -> Iterator[None]:
+    """Answer the first of the signals that end a program by a call; a second one ends as before.
+
+    Signals that somebody else answers in a way of his own are left to him.
+
+    Parameters
+    ----------
+    told : callable
+        Called between two instructions of the main thread: it only takes note.
+    """
+    mine = threading.current_thread() is threading.main_thread()
+    numbers = [n for n in ENDS if mine and signal.getsignal(n) is signal.default_int_handler]
+
+    def give_back() -> None:
+        for number in numbers:
+            signal.signal(number, signal.default_int_handler)
+
+    def note(_: int, __: FrameType | None) -> None:
+        give_back()
+        told()
+
+    try:
+        for number in numbers:
+            signal.signal(number, note)
+        yield
+    finally:
+        give_back()

@@ -1,8 +1,6 @@
 """Claim: where dynamic programming serves, a solver costs tens of times more, on `arch25` hundreds.
 
-The ratio grows with the brick count: over chains of 6 to 50 bricks the linear program was seen at
-64 to 1,300 times, the integer program at 99 to 1,900. On every size it has to be 20 at least, on
-`arch25` 100.
+The ratio grows with the brick count. On every size it has to be 20 at least, on `arch25` 100.
 
 Method: the three-robot loop on chains of growing length, criterion `weighted-published`; every
 formulation of the sum solves the same posed problem in one process on one core, the best of several

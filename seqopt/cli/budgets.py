@@ -12,7 +12,7 @@ from seqopt.errors import ProblemError
 from seqopt.placement.budgets import steps_over, travel
 from seqopt.placement.costs import Budget
 from seqopt.placement.problem import Problem
-from seqopt.placement.solving import solve
+from seqopt.placement.solving import on_the_way, solve
 from seqopt.responses.quantities import robot_response
 
 FREE = "overlap_dp"  # finds the optimum without budgets, of which a share may be asked
@@ -132,7 +132,7 @@ def with_budgets(problem: Problem, asked: Sequence[AskedBudget]) -> Problem:
     for each in asked:
         bound = each.bound
         if each.share:
-            free = solve(problem, FREE).selection.choice
+            free = on_the_way(solve(problem, FREE)).selection.choice
             bound *= each.of(problem, np.inf).spent(free)
         budgets.append(each.of(problem, bound))
     return replace(problem, budgets=tuple(budgets))

@@ -17,6 +17,7 @@ from seqopt.cli.outputs import (
 )
 from seqopt.cli.status import Status
 from seqopt.cli.terminal import (
+    complain,
     progress,
     say,
     tell,
@@ -31,7 +32,7 @@ from seqopt.files import (
     require_folder,
 )
 from seqopt.network.build import build_network
-from seqopt.placement.formulation import find_formulation
+from seqopt.placement.formulation import End, find_formulation
 from seqopt.placement.problem import Problem, pose
 from seqopt.placement.solving import solve
 from seqopt.scene.scene_file import load_scene
@@ -78,6 +79,9 @@ def optimize(options: argparse.Namespace) -> Status:
     for excess in plan.overloads:
         say(f"payload exceeded: {excess}")
     say_idle(problem.schedule.scene, plan.steps)
+    if plan.selection.end is End.INTERRUPTED:
+        complain("seqopt: interrupted; the plan is the best that was met")
+        return Status.INTERRUPTED
     return payloads_hold(options, problem.schedule.scene, table)
 
 

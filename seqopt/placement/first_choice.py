@@ -46,8 +46,10 @@ def stopped(
         if all(budget.slack(choice) >= 0 for budget in problem.budgets):
             value = aim.worth(costs, choice)
             return Selection(choice, value, max(bound, at_least(costs, aim)), end=End.STOPPED)
+    known = f" (no choice is below {bound:.6g})" if np.isfinite(bound) else ""
     raise SolverError(
-        f"{why or 'time was over'} before any choice within all budgets was met; give it more time"
+        f"{why or f'it ended{known}'} before any choice within all budgets was met; "
+        "give it more time"
     )
 
 

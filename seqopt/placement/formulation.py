@@ -40,6 +40,7 @@ class End(Enum):
 
     DONE = "done"
     STOPPED = "stopped"  # before it could keep what it promises; its choice and bound stand
+    INTERRUPTED = "interrupted"  # by whoever asked for an end; its choice and bound stand
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -260,9 +260,9 @@ class Plan:
             ``unproven``), ``objective``, ``bound``, ``gap``, ``claimed_gap``; of criteria of
             ranks the sums under both ``objectives`` and of heuristics the two ``gap_parts`` (see
             `seqopt.placement.objectives`), null without proof; of every one of the ``budgets`` what
-            is there, spent and what one more unit would save; whether it ``ended`` ``done`` or was
-            ``stopped``; the payloads that are exceeded; ``idle_robots``, which never grip;
-            ``models_evaluated`` and ``seconds``.
+            is there, spent and what one more unit would save; whether it ``ended`` ``done``, was
+            ``stopped`` before that or ``interrupted``; the payloads that are exceeded;
+            ``idle_robots``, which never grip; ``models_evaluated`` and ``seconds``.
         """
         schedule, proof = self._posed.schedule, self.certificate
         status = "unproven"

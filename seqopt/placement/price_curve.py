@@ -13,7 +13,7 @@ from seqopt.errors import InfeasibleError
 from seqopt.placement.costs import Budget
 from seqopt.placement.formulation import Formulation
 from seqopt.placement.interface import PlacementProblem
-from seqopt.placement.solving import solve
+from seqopt.placement.solving import on_the_way, solve
 
 
 def price_curve(
@@ -58,7 +58,7 @@ def _row(
 ) -> dict[str, float]:
     capped = _with(problem, budget)
     try:
-        plan = solve(capped, formulation, **options)
+        plan = on_the_way(solve(capped, formulation, **options))
     except InfeasibleError:
         return {"bound": budget.bound}
     proof = plan.certificate

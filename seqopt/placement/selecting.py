@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import operator
+from contextlib import nullcontext
 from typing import Any
 
 import numpy as np
 
 from seqopt.errors import SeqoptError, SolverError
+from seqopt.interrupts import answered
 from seqopt.placement.formulation import WATCH, End, Formulation, Selection, said
 from seqopt.placement.interface import PlacementProblem
 from seqopt.placement.watch import Finding, Watch
@@ -23,7 +25,8 @@ def select(
     formulation : Formulation
     problem : PlacementProblem
     watch : Watch, optional
-        Handed to the formulation if it takes one; the trace is read from it.
+        Handed to the formulation if it takes one; the trace is read from it. An interrupt is then
+        told to it, so that the formulation ends with the best choice so far.
     **options
         Of the formulation.
 
@@ -37,11 +40,26 @@ def select(
     ProblemError, SolverError
         As the formulation does; a `SolverError` also if it raises anything else, or returns
         something that is no selection.
+    KeyboardInterrupt
+        If it was interrupted and no choice was at hand.
     """
     watch = watch or Watch()
+    ends = answered(watch.interrupt) if formulation.watched else nullcontext()
+    with ends:
+        return _with_numbers(formulation, _called(formulation, problem, watch, options), watch)
+
+
+def _called(
+    formulation: Formulation, problem: PlacementProblem, watch: Watch, options: dict[str, Any]
+) -> Selection:
+    """Return what a formulation returns, if that is a selection."""
     told = {WATCH: watch} if formulation.watched else {}
     try:
         found: object = formulation.solve(problem, **told, **options)
+    except SolverError as error:
+        if watch.interrupted:
+            raise KeyboardInterrupt(str(error)) from error
+        raise
     except (SeqoptError, MemoryError):
         raise
     except Exception as error:  # whatever a formulation of others may raise
@@ -49,7 +67,7 @@ def select(
     if not isinstance(found, Selection):
         kind = type(found).__name__
         raise SolverError(f"formulation {formulation.name} returned a {kind}, not a Selection")
-    return _with_numbers(formulation, found, watch)
+    return found
 
 
 def _with_numbers(formulation: Formulation, found: Selection, watch: Watch) -> Selection:
@@ -58,14 +76,15 @@ def _with_numbers(formulation: Formulation, found: Selection, watch: Watch) -> S
         seconds = float(found.compile_seconds)
         if not 0 <= seconds < np.inf:
             raise ValueError(f"compile_seconds is {seconds}")
+        trace = _traced(watch, float(found.objective), float(found.bound))
         return Selection(
             choice=tuple(operator.index(index) for index in found.choice),
             objective=float(found.objective),
             bound=float(found.bound),
             prices={str(name): float(price) for name, price in found.prices.items()},
             compile_seconds=seconds,
-            end=End(found.end),
-            trace=_traced(watch, float(found.objective), float(found.bound)),
+            end=End.INTERRUPTED if watch.interrupted else End(found.end),
+            trace=trace,
         )
     except (TypeError, ValueError, AttributeError, OverflowError) as error:
         raise SolverError(

@@ -16,6 +16,7 @@ from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.placement.certificate import judge, least_sum
 from seqopt.placement.conflicts import refusal
 from seqopt.placement.formulation import (
+    End,
     Formulation,
     Selection,
     as_formulation,
@@ -88,7 +89,7 @@ def solve(
     proof : bool, optional
         False: ``cascade`` or ``rank_search`` solve only what they meet, and no gap is known.
     time_limit : float, optional
-        After which it stops choosing, with the best choice so far and a bound, s.
+        After which, or at an interrupt, it stops choosing, with its best choice and a bound, s.
     progress : callable, optional
         Told every better choice and bound as it is found.
     **options
@@ -117,6 +118,27 @@ def solve(
     if proof:
         return _solve_all(problem, found, _Run(time_limit, progress), options)
     return _solve_windows(problem, found, options)
+
+
+def on_the_way(plan: Plan) -> Plan:
+    """Return a plan, for whoever has more to do than to solve; an interrupt ends that too.
+
+    Parameters
+    ----------
+    plan : Plan
+
+    Returns
+    -------
+    Plan
+
+    Raises
+    ------
+    KeyboardInterrupt
+        If its formulation was interrupted.
+    """
+    if plan.selection.end is End.INTERRUPTED:
+        raise KeyboardInterrupt
+    return plan
 
 
 def _fitting(

@@ -67,6 +67,7 @@ class Watch:
         self._limit = time_limit
         self._progress = progress
         self._trace: list[Finding] = []
+        self._interrupted = False
 
     @property
     def seconds(self) -> float:
@@ -76,12 +77,21 @@ class Watch:
     @property
     def left(self) -> float:
         """How much time is left, s; zero where it is over."""
-        return max(0.0, self._limit - self.seconds)
+        return 0.0 if self._interrupted else max(0.0, self._limit - self.seconds)
 
     @property
     def over(self) -> bool:
-        """Whether the time limit is reached."""
-        return self.seconds >= self._limit
+        """Whether the time limit is reached, or somebody asked for an end."""
+        return self._interrupted or self.seconds >= self._limit
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether somebody asked for an end."""
+        return self._interrupted
+
+    def interrupt(self) -> None:
+        """Ask for an end: time is over from now on."""
+        self._interrupted = True
 
     @property
     def trace(self) -> tuple[Finding, ...]:

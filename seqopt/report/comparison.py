@@ -20,7 +20,7 @@ from seqopt.placement.problem import Problem, pose
 from seqopt.placement.promises import overloads
 from seqopt.placement.ranking import rank_choice
 from seqopt.placement.requirements import Criterion
-from seqopt.placement.solving import solve
+from seqopt.placement.solving import on_the_way, solve
 from seqopt.report.methods import idle_note, method_tables
 from seqopt.responses.quantities import RESPONSES, robot_response
 from seqopt.responses.table import force_column
@@ -191,11 +191,11 @@ def _plans(
         if count >= MOST:
             progress("modified sequential method")
             modified = pose(engine, modified_sequential(network, robots[:3]), criterion)
-            plans["modified-sequential"] = solve(modified, "cascade")
+            plans["modified-sequential"] = on_the_way(solve(modified, "cascade"))
         problem = pose(engine, loop, criterion)
         for name, formulation in formulations().items():
             progress(f"{loop.method} loop by {name}")
-            plans[name] = solve(problem, formulation)
+            plans[name] = on_the_way(solve(problem, formulation))
     except (StepError, ProblemError) as error:
         return {}, None, str(error)
     return plans, problem, ""

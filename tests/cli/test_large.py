@@ -16,6 +16,7 @@ import pytest
 from seqopt.cli.main import main
 from seqopt.cli.means import parse_size
 from seqopt.errors import ProblemError
+from seqopt.placement import solving
 from seqopt.scene.scene_file import save_scene
 from tests.builders import ROOT, small_arch
 
@@ -195,3 +196,40 @@ def test_fewer_candidates_are_a_heuristic_that_says_so(capsys, tmp_path):
     assert second["objective"] >= first["objective"]
     assert main([*words, "--out", str(near), "--candidates", "far:6"]) == 2
     assert "give near:JOINTS or within:METERS" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", ["labels", "lagrangian", "overlap_mip"])
+def test_an_interrupted_choice_is_written_with_its_bound(capsys, monkeypatch, tmp_path, name):
+    """As ctrl-C at the first finding; what is written is whole."""
+    came = []
+
+    def interrupt(_):
+        came.append(1)
+        if len(came) == 1:
+            signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr("seqopt.cli.optimize.tell", interrupt)
+    words = ["optimize", "--formulation", name, "--budget", "travel=0.8"]
+    assert main([*words, "--out", str(tmp_path / "out")]) == 130
+    out, err = capsys.readouterr()
+    assert err == "seqopt: interrupted; the plan is the best that was met\n"
+    assert "written to" in out
+    written = contents(tmp_path / "out")
+    assert set(written) >= {"plan.csv", "selection.csv"}
+    assert (tmp_path / "out" / "trace.csv").exists()
+    summary = written["summary.json"]
+    assert summary["ended"] == "interrupted"
+    assert summary["bound"] <= summary["objective"]
+
+
+def test_an_interrupt_ends_all_that_is_compared(capsys, monkeypatch):
+    """One plan that was interrupted does not let the next begin."""
+    select = solving.select
+
+    def interrupted(formulation, problem, watch, **options):
+        watch.interrupt()
+        return select(formulation, problem, watch, **options)
+
+    monkeypatch.setattr(solving, "select", interrupted)
+    assert main(["compare"]) == 130
+    assert capsys.readouterr().err == "seqopt: interrupted\n"

@@ -9,9 +9,14 @@ import sys
 import pandas as pd
 import pytest
 
+from experiments.harness.plotting import RESULTS
+from experiments.harness.stated import stated
+from experiments.harness.wording import markdown, two
 from seqopt.cli.main import main
 from seqopt.placement.formulation import exhibits, formulations
 from tests.builders import ROOT
+
+STATED = stated()
 
 
 def build(source, target):
@@ -26,6 +31,9 @@ def test_the_site_builds_strictly(tmp_path):
     assert done.returncode == 0, done.stderr
     page = (tmp_path / "html" / "tutorials" / "reference_arch.html").read_text(encoding="utf-8")
     assert "306.5" in page  # a number that only the executed tutorial prints
+    page = (tmp_path / "html" / "formulations" / "index.html").read_text(encoding="utf-8")
+    assert f"takes {STATED['lp_times_25']} times as long at 25 bricks" in " ".join(page.split())
+    assert page.count("<table") >= 4
 
 
 @pytest.mark.slow
@@ -36,7 +44,9 @@ def test_a_flaw_fails_the_build(tmp_path, flaw):
     (source / "conf.py").write_bytes((ROOT / "docs" / "conf.py").read_bytes())
     front = "---\nfile_format: mystnb\nkernelspec:\n  name: python3\n---\n"
     (source / "index.md").write_text(f"{front}# Page\n\n{flaw}\n", encoding="utf-8")
-    assert build(source, tmp_path / "html").returncode != 0
+    done = build(source, tmp_path / "html")
+    assert done.returncode != 0
+    assert "index.md" in done.stderr  # the page is at fault, not how it is built
 
 
 def test_readme_shows_two_commands_that_exist(capsys):
@@ -54,9 +64,68 @@ def test_pictures_exist_and_no_number_is_missing():
         if "_build" in page.parts:
             continue
         text = page.read_text(encoding="utf-8")
-        assert "{{" not in text, page
+        names = [] if page.name == "README.md" else [*STATED]
+        assert text.count("{{") == sum(text.count(f"{{{{ {name} }}}}") for name in names), page
         for target in re.findall(r"!\[[^\]]*\]\(([^)]+)\)", text):
             assert (page.parent / target).exists(), f"{page}: {target}"
+
+
+def test_every_stored_figure_is_stated_in_one_place_or_more():
+    pages = [page.read_text(encoding="utf-8") for page in (ROOT / "docs").rglob("*.md")]
+    for name in STATED:
+        assert any(f"{{{{ {name} }}}}" in page for page in pages), name
+    for name in STATED:  # ratios of two formulations stand on one page
+        if "_times_" in name and "frame" not in name:
+            assert sum(f"{{{{ {name} }}}}" in page for page in pages) == 1, name
+
+
+def readme_figures():
+    """What the README states of stored rows, and where a change of either would show."""
+    speed = pd.read_csv(RESULTS / "engine_speed.csv", index_col=0)["value"]
+    errors = pd.read_csv(RESULTS / "identify_arch25_refit.csv").set_index("what")["shipped"]
+    largest = pd.read_csv(RESULTS / "witnesses.csv").set_index("case").loc["armadillo_cra"]
+    own = [errors[f"{what}_pct"] for what in ("median", "p90", "p95")]
+    other = [errors[f"Table B.1, {what}_pct"] for what in ("median", "p90", "p95")]
+    return {
+        r"takes ([\d,]+) times as long for the same choice \(([\d,]+) times on an arch": [
+            STATED["frame_times"],
+            STATED["frame_times_least"],
+        ],
+        r"outruns ([\d,]+) times in the median of five rounds \(([\d,]+) in the lowest\)": [
+            two(speed["ratio_median"]),
+            two(speed["ratio_lowest"]),
+        ],
+        r"median ([\d.]+) %, 90th percentile ([\d.]+) %, 95th ([\d.]+) %": [
+            f"{value:.2f}" for value in own
+        ],
+        r"which took no part: ([\d.]+), ([\d.]+) and ([\d.]+) %": [
+            f"{value:.2f}" for value in other
+        ],
+        r"(\d+) blocks in ([\d.]+) s": [str(largest["blocks"]), f"{largest['seconds']:.1f}"],
+    }
+
+
+@pytest.mark.parametrize(("pattern", "figures"), readme_figures().items())
+def test_readme_states_what_is_stored(pattern, figures):
+    text = " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
+    found = re.search(pattern, text)
+    assert found, pattern
+    assert [*found.groups()] == figures
+
+
+def test_readme_in_words_what_is_stored():
+    text = " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
+    assert "saves a fifth of the time at 25 bricks" in text
+    assert 15 <= float(STATED["proof_share_25"]) < 25
+    assert "a million three-grip sets a second" in text
+    speed = pd.read_csv(RESULTS / "engine_speed.csv", index_col=0)["value"]
+    assert 0.95e6 <= 1 / speed["fast_s_per_set"] < 2e6
+
+
+def test_figures_and_tables_in_words():
+    shown = [two(value) for value in (0.00034, 0.0996, 1, 12.3, 99.7, 1299.0, 0.0, float("nan"))]
+    assert shown == ["0.00034", "0.100", "1.0", "12", "100", "1,300", "0", "–"]
+    assert markdown(["a", "b"], [["1", "2"]]) == "| a | b |\n| --- | --- |\n| 1 | 2 |"
 
 
 def test_readme_python_runs(capsys):
@@ -81,19 +150,28 @@ def test_examples_print_what_they_show(code, printed, capsys):
     assert capsys.readouterr().out.strip() == printed.strip()
 
 
-def test_exhibits_stand_on_the_page_that_compares_them():
-    page = (ROOT / "docs" / "formulations" / "why.md").read_text(encoding="utf-8")
-    stored = pd.read_csv(ROOT / "experiments" / "results" / "program_shapes.csv")
+def test_exhibits_stand_in_the_table_that_compares_them():
+    stored = pd.read_csv(RESULTS / "program_shapes.csv")
     assert {*exhibits(), "overlap_mip"} == {*stored["formulation"]}
-    for row in stored.itertuples():
-        line = next(text for text in page.splitlines() if text.startswith(f"| `{row.formulation}`"))
+    lines = STATED["shapes_table"].splitlines()
+    for row, line in zip(stored.itertuples(), lines[2:], strict=True):
         cells = [cell.strip() for cell in line.strip("|").split("|")]
-        counts = (row.rows, row.columns, row.nonzeros, row.binaries)
-        assert cells[1:5] == [f"{count:,}" for count in counts]
+        counts = (row.rows, row.columns, row.nonzeros, row.binaries, row.nodes)
+        assert [*cells[1:5], cells[7]] == [f"{count:,}" for count in counts]
         assert float(cells[5]) == pytest.approx(row.relaxed, rel=1e-3, abs=1e-3)
         assert float(cells[6]) == pytest.approx(row.optimum, rel=1e-3)
-        assert int(cells[7]) == row.nodes
-        assert float(cells[8].split()[0]) == pytest.approx(row.seconds, rel=0.1)
+        assert ("between" in cells[8]) != row.proven
+
+
+@pytest.mark.parametrize("table", ["free_table", "budget_table"])
+def test_every_formulation_is_in_the_contest(table):
+    rows = STATED[table].splitlines()[2:]
+    names = [re.match(r"\| \[`(\w+)`\]", row)[1] for row in rows]
+    takers = [n for n, f in formulations().items() if f.takes_budgets or table == "free_table"]
+    assert sorted(names) == takers
+    for name in ("labels", "overlap_mip"):  # measured at every brick count
+        (row,) = (text for text in rows if f"[`{name}`]" in text)
+        assert "–" not in row
 
 
 def test_every_formulation_has_a_page_with_an_example():

@@ -26,6 +26,7 @@ from experiments.harness.catalog import claims
 from experiments.harness.plotting import RESULTS
 from experiments.peers import peers
 from experiments.placement import (
+    budget_proofs,
     decision_sensitivity,
     degenerate_placement,
     formulation_cost,
@@ -70,6 +71,7 @@ def checks() -> dict[str, tuple[Check, Tables, Callable[..., Iterator[tuple[Any,
     costs, tools = rows("formulation_cost"), rows("peers")
     parts = [tools[tools["part"] == part] for part in ("models", "placement")]
     return {
+        "budget_proofs": (budget_proofs.holds, (rows("budget_proofs"),), spoil_proofs),
         "calibration": (
             calibration.holds,
             (rows("calibration_fits"), rows("calibration_comparison")),
@@ -167,6 +169,17 @@ def checks() -> dict[str, tuple[Check, Tables, Callable[..., Iterator[tuple[Any,
             spoil_witnesses,
         ),
     }
+
+
+def spoil_proofs(table):
+    own = {"formulation": "labels", "bricks": 49, "case": "all three"}
+    yield (spoiled(table, "proven_gap", 2e-3, **own),)
+    yield (spoiled(table, "verify", 3.0, **own),)
+    yield (spoiled(table, "memory_MB", 1100.0, **own),)
+    yield (spoiled(table, "solve", 1.0, formulation="labels", bricks=25, case="travel 0.8"),)
+    yield (spoiled(table, "end", "stopped", formulation="overlap_mip", bricks=49),)
+    yield (spoiled(table, "objective", 100.0, formulation="overlap_mip", bricks=25),)
+    yield (spoiled(table, "bound", 1e5, formulation="lagrangian", case="force 0.7"),)
 
 
 def spoil_calibration(fits, beside):

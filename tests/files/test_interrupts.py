@@ -10,7 +10,7 @@ import time
 import pytest
 
 from seqopt.files import write_folder
-from seqopt.interrupts import undisturbed
+from seqopt.interrupts import answered, undisturbed
 
 
 def meanwhile(number):
@@ -51,6 +51,34 @@ def test_an_error_inside_comes_out_and_signals_are_as_before():
     with pytest.raises(ValueError, match="own"), undisturbed():
         raise ValueError("its own")
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_a_first_interrupt_is_a_call_and_a_second_one_ends():
+    calls = []
+
+    def work():
+        with answered(lambda: calls.append(1)):
+            signal.raise_signal(signal.SIGINT)
+            calls.append(2)
+            signal.raise_signal(signal.SIGINT)
+
+    with pytest.raises(KeyboardInterrupt):
+        work()
+    assert calls == [1, 2]
+    with answered(lambda: calls.append(3)):
+        pass
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_signals_that_others_answer_are_left_to_them():
+    came = []
+    before = signal.signal(signal.SIGINT, lambda *_: came.append("theirs"))
+    try:
+        with answered(lambda: came.append("ours")):
+            signal.raise_signal(signal.SIGINT)
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert came == ["theirs"]
 
 
 def test_other_threads_write_without_signals(tmp_path):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 from dataclasses import replace
 from itertools import pairwise, product
 
@@ -204,6 +205,41 @@ def test_no_time_is_enough_for_an_allowed_choice(name, problem25):
     assert plan.selection.end is End.STOPPED
     assert plan.certificate.gap < 0.3
     assert plan.selection.bound <= plan.certificate.bound + 1e-6
+
+
+@every
+def test_an_interrupt_leaves_an_allowed_choice_and_a_bound_that_holds(name, problem25):
+    """It comes with the first finding; a second one would end the program."""
+    formulation, best, came = ALL[name], ALL["overlap_dp"].solve(problem25).objective, []
+    if formulation.takes_budgets:
+        problem25 = replace(problem25, budgets=(travel(problem25, 20.0),))
+
+    def interrupt(finding):
+        if not came:
+            signal.raise_signal(signal.SIGINT)
+        came.append(finding)
+
+    plan = solve(problem25, formulation, progress=interrupt)
+    assert plan.selection.end is End.INTERRUPTED
+    assert plan.selection.trace == tuple(came)
+    assert plan.selection.bound <= plan.certificate.objective + 1e-6
+    if formulation.aim is Aim.SUM:
+        assert plan.certificate.objective >= best - 1e-6
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_an_interrupt_before_any_choice_within_the_budgets_says_the_bound(problem25):
+    budgets = (travel(problem25, 13.0), steps_over(problem25, "F_largest", 300.0, 1.0))
+
+    came = []
+
+    def interrupt(finding):
+        if not came:
+            signal.raise_signal(signal.SIGINT)
+        came.append(finding)
+
+    with pytest.raises(KeyboardInterrupt, match=r"no choice is below [0-9.]+\) before any"):
+        solve(replace(problem25, budgets=budgets), "labels", progress=interrupt)
 
 
 @takers

@@ -1,0 +1,137 @@
+"""Figures that the documentation states, from the rows that experiments have stored.
+
+The site is built with them: ``{{ name }}`` in a page stands for the entry of that name. A test
+holds the README, which is read as it is, to the same rows.
+"""
+
+from __future__ import annotations
+
+import pandas as pd
+
+from experiments.harness.contest_tables import budget_table, free_table, shapes_table
+from experiments.harness.plotting import RESULTS
+from experiments.harness.wording import markdown, two
+
+KEY = ["bricks", "criterion", "case"]
+LARGE = 100  # bricks
+PROVEN, UNPROVEN = "overlap_dp", "rank_search, no proof"
+
+
+def stated() -> dict[str, str]:
+    """Return every figure and table by the name that stands for it."""
+    contest = pd.read_csv(RESULTS / "budget_proofs.csv")
+    runs = pd.read_csv(RESULTS / "runs.csv")
+    gaps = pd.read_csv(RESULTS / "heuristic_gaps.csv")
+    return (
+        {"free_table": free_table(contest), "budget_table": budget_table(contest)}
+        | _solvers(contest)
+        | _budgets(contest)
+        | _engines(runs)
+        | _heuristics(runs, gaps)
+        | _shapes(pd.read_csv(RESULTS / "program_shapes.csv"))
+    )
+
+
+def _shapes(table: pd.DataFrame) -> dict[str, str]:
+    """Return how integer programs of one problem differ, and how long the weak ones take."""
+    seconds = table.set_index("formulation")["seconds"]
+    return {
+        "shapes_table": shapes_table(table),
+        "arc_s": two(seconds["minimax_arc"]),
+        "big_m_s": two(seconds["minimax_big_m"]),
+    }
+
+
+def _solvers(contest: pd.DataFrame) -> dict[str, str]:
+    """Return how many times as long as dynamic programming the general programs take."""
+    free = contest[contest["budgets"] == 0].set_index(["formulation", *KEY])["solve"].sort_index()
+    out = {}
+    for name in ("lp", "mip"):
+        times = (free[f"overlap_{name}"] / free["overlap_dp"]).groupby(level="bricks")
+        out |= {
+            f"{name}_times_{bricks}": two(value)
+            for bricks, value in times.median().iloc[[0, -1]].items()
+        }
+    return out
+
+
+def _budgets(contest: pd.DataFrame) -> dict[str, str]:
+    """Return how labels do, and how long HiGHS takes where it finishes, over them."""
+    capped = contest[contest["budgets"] > 0]
+    own, other, priced = (
+        capped[capped["formulation"] == name].set_index(KEY)
+        for name in ("labels", "overlap_mip", "lagrangian")
+    )
+    every = (other["solve"] / own["solve"]).dropna()  # at least, where it was stopped
+    finished = other[other["end"] == "done"]
+    times, large = every[finished.index], every.xs(LARGE, level="bricks")
+    stopped = own[own["end"] == "stopped"]
+    left = 100 * own["proven_gap"].max()
+    bound = 100 * (1 - priced["bound"] / own["objective"])
+    return {
+        "capped_problems": str(len(own)),
+        "labels_stopped": str(len(stopped)) if len(stopped) else "none",
+        "labels_left": two(left),
+        "highs_problems": str(len(other)),
+        "highs_finished": str(len(finished)),
+        "highs_least": two(times.min()),
+        "highs_median": two(times.median()),
+        "highs_most": two(times.max()),
+        "highs_large": str(len(large)),
+        "highs_large_finished": str(int((other.loc[LARGE, "end"] == "done").sum()) or "none"),
+        "highs_large_least": two(large.min()),
+        "highs_memory": two(other["memory_MB"].max() / 1024),
+        "lagrangian_below": two(bound.max()),
+        "lagrangian_gap": two(100 * priced["proven_gap"].max()),
+    }
+
+
+def _engines(runs: pd.DataFrame) -> dict[str, str]:
+    """Return what the frame, `auto` and a proof cost, from the chart of speed and accuracy."""
+    chosen = runs[runs["criterion"] == "equations-2-3"]
+    total = chosen.set_index(["engine", "formulation", "scene"])["total"].sort_index()
+    rigid, frame, auto = (total[name] for name in ("rigid bricks", "frame 1e7", "auto"))
+    share = rigid[UNPROVEN] / rigid[PROVEN]
+    every = runs.set_index(["engine", "formulation", "scene", "criterion"])["total"].sort_index()
+    ratios = every["frame 1e7", PROVEN] / every["rigid bricks", PROVEN]
+    return {
+        "frame_times": two(frame[PROVEN, "arch25"] / rigid[PROVEN, "arch25"]),
+        "frame_times_least": two(ratios.min()),
+        "auto_more": two(100 * (auto[PROVEN, "arch25"] / rigid[PROVEN, "arch25"] - 1)),
+        "proof_share_25": two(100 * (1 - share["arch25"])),
+        "proof_share_49": two(100 * (1 - share["chain49"])),
+        "frame_proof_share": two(100 * (1 - frame[UNPROVEN, "arch25"] / frame[PROVEN, "arch25"])),
+        "frame_proof_s": two(frame[PROVEN, "arch25"]),
+        "frame_no_proof_s": two(frame[UNPROVEN, "arch25"]),
+        "rigid_proof_s": two(rigid[PROVEN, "arch25"]),
+        "rigid_no_proof_s": two(rigid[UNPROVEN, "arch25"]),
+        "rigid_proof_49_s": two(rigid[PROVEN, "chain49"]),
+        "rigid_no_proof_49_s": two(rigid[UNPROVEN, "chain49"]),
+    }
+
+
+def _heuristics(runs: pd.DataFrame, gaps: pd.DataFrame) -> dict[str, str]:
+    """Return what heuristics lose: on the scenes of the chart, and on random arches."""
+    own = runs[(runs["engine"] == "rigid bricks") & (runs["formulation"] == "cascade")]
+    by = (100 * gaps.set_index(["criterion", "formulation"])["gap"]).groupby(level=[0, 1])
+    median, high, most = by.median(), by.quantile(0.9), by.max()
+    rows = [
+        [
+            f"`{criterion}`",
+            *(f"{of[criterion, 'cascade']:.2f} %" for of in (median, high, most)),
+            *(f"{of[criterion, 'rank_search']:.2f} %" for of in (high, most)),
+            f"{most[criterion, 'beam']:.2f} %",
+        ]
+        for criterion in gaps["criterion"].unique()
+    ]
+    head = ["criterion", "cascade: median", "90th percentile", "largest"]
+    head += ["rank_search (two moves): 90th percentile", "largest", "beam of five: largest"]
+    return {
+        "chart_problems": str(len(own)),
+        "cascade_mean": two(100 * own["gap"].mean()),
+        "cascade_most": two(100 * own["gap"].max()),
+        "arches": str(gaps["draw"].nunique()),
+        "cascade_worst": f"{most.xs('cascade', level=1).max():.1f}",
+        "rank_search_worst": f"{most.xs('rank_search', level=1).max():.1f}",
+        "gaps_table": markdown(head, rows),
+    }
