@@ -89,10 +89,7 @@ def solve(
             f"options width={width}, growth={growth:g}: give a whole number from 1 on, and a "
             "number above 1"
         )
-    margins = [goal.of_margins for goal in problem.goals]
-    if sorted(margins, reverse=True) != margins:
-        named = ", ".join(map(str, problem.goals))
-        raise ProblemError(f"aims {named}: name bond, friction and tilt before all others")
+    _require_order(problem)
     end = time.perf_counter() + seconds
     reached: list[StateGraph] = []
 
@@ -103,6 +100,13 @@ def solve(
             raise _TimeUpError
 
     return _search(problem, (width, growth), tell, reached)
+
+
+def _require_order(problem: FreeProblem) -> None:
+    margins = [goal.of_margins for goal in problem.goals]
+    if sorted(margins, reverse=True) != margins:
+        named = ", ".join(map(str, problem.goals))
+        raise ProblemError(f"aims {named}: name bond, friction and tilt before all others")
 
 
 def _search(

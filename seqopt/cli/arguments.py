@@ -15,7 +15,7 @@ from seqopt.cli.common_arguments import (
     strict_argument,
 )
 from seqopt.cli.free import FREE
-from seqopt.cli.free_arguments import add_pareto, add_rules, add_standing
+from seqopt.cli.free_arguments import add_pareto, add_rules
 from seqopt.cli.status import Status
 from seqopt.cli.terminal import complain, show
 from seqopt.contact.mortar import MORTARS
@@ -216,7 +216,6 @@ def _add_optimize(commands: Commands, parents: list[_Parser]) -> None:
         "sum(RESPONSE) (default: minmax)",
     )
     add_rules(command)
-    add_standing(command)
     caps_arguments(command)
     command.add_argument(
         "--option",

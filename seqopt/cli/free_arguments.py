@@ -33,14 +33,11 @@ def add_rules(command: argparse.ArgumentParser) -> None:
         help=f"with --schedule free: {RULES}; may be repeated",
     )
 
+    _add_standing(command)
 
-def add_standing(command: argparse.ArgumentParser) -> None:
-    """Add what demands that every state of a free schedule stands.
 
-    Parameters
-    ----------
-    command : argparse.ArgumentParser
-    """
+def _add_standing(command: argparse.ArgumentParser) -> None:
+    """Add what demands that every state of a free schedule stands."""
     command.add_argument(
         "--stands",
         metavar="MORTAR",
@@ -96,7 +93,6 @@ def add_pareto(
         help="how many robots (further ones are mobile), or which take part",
     )
     add_rules(command)
-    add_standing(command)
     limit(command)
     _add_choice(command)
     command.add_argument("--out", type=Path, metavar="DIR", required=True, help="folder to write")
