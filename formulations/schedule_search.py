@@ -36,8 +36,9 @@ from seqopt.placement.formulation import FormulationKind
 from seqopt.placement.free_goals import Measure
 from seqopt.placement.free_graph import StateGraph, explore
 from seqopt.placement.free_paths import TIED, keep_best, least_from_start, shortest
-from seqopt.placement.free_problem import FreeProblem, ScheduleSelection
+from seqopt.placement.free_problem import FreeProblem
 from seqopt.placement.schedule_formulation import ScheduleFormulation
+from seqopt.placement.schedule_selection import ScheduleSelection
 from seqopt.placement.sturdiest import best_margin
 
 FAR_BELOW = 4.0  # what the narrow search finds, over the first threshold

@@ -18,8 +18,9 @@ import pandas as pd
 from seqopt.arrays import FrozenValue
 from seqopt.errors import SolverError
 from seqopt.placement.free_goals import LARGEST, Goal, Measure
-from seqopt.placement.free_problem import FreeProblem, ScheduleSelection
+from seqopt.placement.free_problem import FreeProblem
 from seqopt.placement.free_proof import Proof
+from seqopt.placement.schedule_selection import ScheduleSelection
 from seqopt.placement.standing_proof import proven_margins, require_margin
 from seqopt.responses.quantities import CHOSEN_BY
 from seqopt.responses.table import analyze, force_column

@@ -14,10 +14,11 @@ from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.placement.formulation import Formulation
 from seqopt.placement.free_infeasible import why_impossible
 from seqopt.placement.free_judge import TOLERANCE, ScheduleCertificate, judge_schedule
-from seqopt.placement.free_problem import FreeProblem, ScheduleSelection
+from seqopt.placement.free_problem import FreeProblem
 from seqopt.placement.free_steps import steps_of
 from seqopt.placement.promises import Excess, overloads
 from seqopt.placement.schedule_formulation import ScheduleFormulation, find_schedule_formulation
+from seqopt.placement.schedule_selection import ScheduleSelection
 from seqopt.placement.standing_proof import certified
 from seqopt.responses.table import analyze
 from seqopt.sequence.free_rules import Ending

@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from seqopt.arrays import Bools, Floats, FrozenValue, Ints
+from seqopt.arrays import Bools, Floats, Ints
 from seqopt.contact.mortar import Mortar, find_mortar
 from seqopt.engines.interface import Engine
 from seqopt.errors import ProblemError
@@ -26,29 +26,6 @@ from seqopt.sequence.free_space import FreeSpace
 from seqopt.sequence.free_start import free_space
 from seqopt.sequence.steps import Grips
 from seqopt.stability.assessment import Stability
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class ScheduleSelection(FrozenValue):
-    """A free schedule, and what its formulation claims of it.
-
-    Attributes
-    ----------
-    states : tuple of tuple of int
-        After every step: how many bricks stand, then the node that each robot holds, as a place in
-        build order from 1; robots of one kind stand together, 0 for one that is free.
-    objective : tuple of float
-        Claimed value of every goal.
-    bound : tuple of float
-        Claimed lower bound of every goal, those before it being at their values.
-    stopped : str
-        Why the search ended before all was proven: ``time`` or ``interrupt``; empty if it did not.
-    """
-
-    states: tuple[tuple[int, ...], ...]
-    objective: tuple[float, ...]
-    bound: tuple[float, ...]
-    stopped: str = ""
 
 
 @dataclass(frozen=True, repr=False)

@@ -17,7 +17,7 @@ def steps_of(space: FreeSpace, states: Sequence[Sequence[int]]) -> tuple[Step, .
     ----------
     space : FreeSpace
     states : sequence of sequence of int
-        As of a `seqopt.placement.free_problem.ScheduleSelection`.
+        As of a `seqopt.placement.schedule_selection.ScheduleSelection`.
 
     Returns
     -------
