@@ -21,6 +21,7 @@ from seqopt.placement.promises import overloads
 from seqopt.placement.ranking import rank_choice
 from seqopt.placement.requirements import Criterion
 from seqopt.placement.solving import on_the_way, solve
+from seqopt.report.free_row import FREE, free_plan, free_row
 from seqopt.report.methods import idle_note, method_tables
 from seqopt.responses.quantities import RESPONSES, robot_response
 from seqopt.responses.table import force_column
@@ -153,6 +154,11 @@ def compare(
     tables |= {name: plan.responses() for name, plan in plans.items()}
     rows |= {name: _row(plan) for name, plan in plans.items()}
     loop = None if problem is None else _facts(problem, rows, robots)
+    progress("free schedule")
+    free, why_not = free_plan(engine, robots)
+    if free is not None:
+        tables[FREE], rows[FREE] = free.responses(), free_row(free)
+    notes += [why_not] if why_not else []
     if problem is not None:
         notes += idle_note(scene, f"{problem.schedule.method} loop", problem.schedule.steps)
     notes += _add_largest(scene, rows, tables)

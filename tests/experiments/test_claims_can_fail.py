@@ -36,7 +36,7 @@ from experiments.placement import (
     staged_construction,
 )
 from experiments.robustness import fuzz, mutation_testing
-from experiments.stability import dry_grips, failing_steps, witnesses
+from experiments.stability import dry_grips, dry_map, failing_steps, witnesses
 from experiments.study import criteria_variants, paper_counterparts
 from experiments.study.parts.paper_items import ITEMS
 from seqopt.study.tables import printed
@@ -99,6 +99,7 @@ def checks() -> dict[str, tuple[Check, Tables, Callable[..., Iterator[tuple[Any,
             spoil_discrete,
         ),
         "dry_grips": (dry_grips.holds, (rows("dry_grips"), rows("dry_grips_build")), spoil_dry),
+        "dry_map": (dry_map.holds, (rows("dry_map"),), spoil_map),
         "engine_growth": (engine_growth.holds, (rows("engine_growth_runs"),), spoil_growth),
         "engine_limits": (
             lambda table: all(engine_limits.judge(table).values()),
@@ -233,6 +234,14 @@ def spoil_dry(table, built):
     yield spoiled(table, "solved", 2000, bricks=25, case="dry"), built
     yield table, spoiled(built, "placed", 25, robots=2)
     yield table, spoiled(built, "placed", 24, robots=3)
+
+
+def spoil_map(table):
+    cell = {"bricks": 13, "thickness_m": 0.053, "friction": 0.466}
+    yield spoiled(table, "least_payload", 2.0, **cell, robots=3)
+    yield spoiled(table, "least_payload", np.inf, **cell, robots=4)
+    yield spoiled(table, "least_payload", 0.1, **(cell | {"friction": 0.3}), robots=3)
+    yield table.assign(least_payload=0.5)
 
 
 def spoil_staged(table, chosen):
