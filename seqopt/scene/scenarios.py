@@ -130,7 +130,8 @@ def _sample(
 ) -> Scene:
     """Return one scenario; each kind of change has random numbers of its own."""
     stiff, heavy, moved = (np.random.default_rng([*stream, kind]) for kind in range(3))
-    logs = stiff.uniform(*np.log(factors), (2, len(scene.joints) + len(scene.grounds)))
+    low, high = map(math.log, factors)
+    logs = stiff.uniform(low, high, (2, len(scene.joints) + len(scene.grounds)))
     shares = heavy.uniform(-1.0, 1.0, len(scene.bricks))
     try:
         out = weighed(stiffened(scene, *np.exp(logs)), 1.0 + density * shares)
