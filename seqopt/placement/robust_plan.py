@@ -51,6 +51,19 @@ class RobustPlan:
         Of the scenarios, as they prove it; of peaks the scenario where the plan is worst.
     seconds : mapping of str to float
         By stage, s: respond, solve, verify.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> from seqopt.placement.robust_aim import WORST_PEAK
+    >>> from seqopt.placement.robust_problem import robust
+    >>> from seqopt.scene.scenarios import scenarios
+    >>> scene = seqopt.load_scene("arch25")
+    >>> network = seqopt.build_network(scene)
+    >>> engine, loop = seqopt.make_engine("auto", network), seqopt.three_robot_loop(network)
+    >>> nominal = seqopt.pose(engine, loop, seqopt.CRITERIA["worst-ratio-published"])
+    >>> solve_robust(robust(nominal, scenarios(scene, count=3, seed=1), WORST_PEAK)).gap
+    0.0
     """
 
     problem: RobustProblem
@@ -135,23 +148,8 @@ def solve_robust(
 
     Raises
     ------
-    InfeasibleError
-        If no choice is allowed in all scenarios.
-    SolverError
-        If an answer is not what it is claimed to be.
-
-    Examples
-    --------
-    >>> import seqopt
-    >>> from seqopt.placement.robust_aim import WORST_PEAK
-    >>> from seqopt.placement.robust_problem import robust
-    >>> from seqopt.scene.scenarios import scenarios
-    >>> scene = seqopt.load_scene("arch25")
-    >>> network = seqopt.build_network(scene)
-    >>> engine, loop = seqopt.make_engine("auto", network), seqopt.three_robot_loop(network)
-    >>> nominal = seqopt.pose(engine, loop, seqopt.CRITERIA["worst-ratio-published"])
-    >>> solve_robust(robust(nominal, scenarios(scene, count=3, seed=1), WORST_PEAK)).gap
-    0.0
+    InfeasibleError, SolverError
+        If no choice is allowed in all scenarios; an answer is not what it is claimed to be.
     """
     layers = problem.layered(problem.aim.aim)
     joined = largest_of(layers)  # says if no choice is allowed in all scenarios
@@ -160,17 +158,14 @@ def solve_robust(
     if problem.aim.aim is Aim.PEAK:
         found, weights = _least_peak(minimax, joined, layers)
     else:
-        arcs = scenario_arcs(layers, problem.aim)
-        weighed = best_weights(arcs, watch)
-        found, weights = close_gap(arcs, weighed, watch, width), weighed.weights
+        found, weights = _least_total(layers, problem.aim, watch, width)
     taken = watch.seconds
     start = time.perf_counter()
     proven = _proven(joined, layers, problem.aim, weights)
     objective = _checked(problem, layers, found, proven)
     bound = min(max(found.bound, proven), objective)
     steps = problem.steps(found.choice)
-    verify = time.perf_counter() - start
-    seconds = {**problem.seconds, "solve": taken, "verify": verify}
+    seconds = {**problem.seconds, "solve": taken, "verify": time.perf_counter() - start}
     return RobustPlan(
         problem, found.choice, steps, objective, bound, min(proven, bound), weights, seconds
     )
@@ -185,6 +180,15 @@ def _least_peak(
     weights = np.zeros(len(layers))
     weights[int(np.argmax(peaks))] = 1.0
     return Searched(chosen.choice, chosen.objective, chosen.bound), weights
+
+
+def _least_total(
+    layers: tuple[LayeredCosts, ...], aim: RobustAim, watch: Watch, width: int
+) -> tuple[Searched, Floats]:
+    """Return the choice whose totals are worth least, as far as it is found."""
+    arcs = scenario_arcs(layers, aim)
+    weighed = best_weights(arcs, watch)
+    return close_gap(arcs, weighed, watch, width), weighed.weights
 
 
 def best_choice(costs: LayeredCosts, aim: Aim) -> Selection:
