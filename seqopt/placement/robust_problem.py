@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
+from seqopt.arrays import Floats
 from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.placement.costs import LayeredCosts
 from seqopt.placement.interface import Aim
@@ -59,6 +60,56 @@ class RobustProblem:
     def seconds(self) -> Mapping[str, float]:
         """What the costs of all scenarios took: ``respond``, s."""
         return {"respond": self._found[1]}
+
+    def under(self, aim: RobustAim) -> RobustProblem:
+        """Return the same problem with another aim; costs that are known stay known.
+
+        Parameters
+        ----------
+        aim : RobustAim
+
+        Returns
+        -------
+        RobustProblem
+        """
+        return self._kept(replace(self, aim=aim))
+
+    def first(self, count: int) -> RobustProblem:
+        """Return the problem of the first scenarios alone; costs that are known stay known.
+
+        Parameters
+        ----------
+        count : int
+            How many, from 1.
+
+        Returns
+        -------
+        RobustProblem
+        """
+        return self._kept(replace(self, scenes=self.scenes[: max(count, 1)]))
+
+    def _kept(self, other: RobustProblem) -> RobustProblem:
+        known: tuple[tuple[ScenarioCosts, ...], float] | None = vars(self).get("_found")
+        if known is not None:
+            vars(other)["_found"] = known[0][: len(other.scenes)], known[1]
+        return other
+
+    def values(self, choice: Sequence[int], aim: Aim) -> Floats:
+        """Return what a choice is worth in every scenario.
+
+        Parameters
+        ----------
+        choice : sequence of int
+            A candidate for every move.
+        aim : Aim
+            Its total, or its largest cost.
+
+        Returns
+        -------
+        (S,) float
+            Infinite where it exceeds a limit.
+        """
+        return np.array([aim.worth(costs, choice) for costs in self.layered(aim)])
 
     def layered(self, aim: Aim) -> tuple[LayeredCosts, ...]:
         """Return the costs that an aim is about, scenario by scenario.

@@ -62,14 +62,15 @@ class Trial:
         }
 
 
-def judge_unseen(plan: RobustPlan, scenes: Scenarios | Sequence[Scene]) -> Trial:
+def judge_unseen(plan: RobustPlan, scenes: RobustProblem | Scenarios | Sequence[Scene]) -> Trial:
     """Return what a plan is worth in other scenarios, beside two that it is measured by.
 
     Parameters
     ----------
     plan : RobustPlan
     scenes : Scenarios or sequence of Scene
-        Not those it was made for: drawn with another seed.
+        Not those it was made for: drawn with another seed. Or the problem over them, whose costs
+        may be known.
 
     Returns
     -------
@@ -86,8 +87,10 @@ def judge_unseen(plan: RobustPlan, scenes: Scenarios | Sequence[Scene]) -> Trial
     known = ScenarioCosts(nominal.sums, nominal.peaks, 0, 0.0)
     aim = problem.aim.aim
     chosen = best_choice(aim.costs(nominal), aim).choice
-    other = robust(nominal, scenes, problem.aim)
-    sets = {"nominal": (known,), "optimized": problem.costs, "unseen": other.costs}
+    unseen = scenes
+    if not isinstance(unseen, RobustProblem):
+        unseen = robust(nominal, unseen, problem.aim)
+    sets = {"nominal": (known,), "optimized": problem.costs, "unseen": unseen.costs}
     rows: list[dict[str, object]] = [
         {"set": name, "scenario": i, **_row(costs, problem, (plan.choice, chosen))}
         for name, found in sets.items()
