@@ -49,8 +49,8 @@ class StepCost:
     ...     return (responses["F_largest"] / 270) ** 2 + (responses["T_max"] / 87.7) ** 2
     >>> own = StepCost("squares", ("F_largest", "T_max"), squares)
     >>> plan = seqopt.optimize("arch25", criterion=own)
-    >>> plan.certificate.gap
-    0.0
+    >>> plan.certificate.gap < 1e-12
+    True
     """
 
     name: str
