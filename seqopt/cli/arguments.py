@@ -10,8 +10,10 @@ from seqopt.cli.common_arguments import (
     caps_arguments,
     criterion_arguments,
     limit_argument,
+    proof_argument,
     resources_arguments,
     robots_argument,
+    robust_arguments,
     strict_argument,
 )
 from seqopt.cli.free import FREE
@@ -224,12 +226,8 @@ def _add_optimize(commands: Commands, parents: list[_Parser]) -> None:
         metavar="NAME=VALUE",
         help="option of the formulation, as horizon=2 or width=10; may be repeated",
     )
-    command.add_argument(
-        "--no-proof",
-        action="store_true",
-        help="with cascade or rank_search: solve only the models that the search meets, a fifth "
-        "or so; how far the choice is from the optimum stays unknown",
-    )
+    proof_argument(command)
+    robust_arguments(command)
     resources_arguments(command)
     command.add_argument("--out", type=Path, metavar="DIR", required=True, help="folder to write")
     strict_argument(command)

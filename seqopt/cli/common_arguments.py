@@ -129,6 +129,60 @@ def resources_arguments(command: argparse.ArgumentParser) -> None:
     )
 
 
+def proof_argument(command: argparse.ArgumentParser) -> None:
+    """Add the argument that does without a proof.
+
+    Parameters
+    ----------
+    command : argparse.ArgumentParser
+    """
+    command.add_argument(
+        "--no-proof",
+        action="store_true",
+        help="with cascade or rank_search: solve only the models that the search meets, a fifth "
+        "or so; how far the choice is from the optimum stays unknown",
+    )
+
+
+def robust_arguments(command: argparse.ArgumentParser) -> None:
+    """Add the arguments that ask for a plan that is good in many scenarios.
+
+    Parameters
+    ----------
+    command : argparse.ArgumentParser
+    """
+    command.add_argument(
+        "--robust",
+        metavar="AIM",
+        help="over scenarios, what is to be least: worst-peak (largest cost of any step), "
+        "worst-total (largest total), or cvar=0.9 (mean total of the worst tenth); in the place of "
+        "--formulation",
+    )
+    command.add_argument(
+        "--scenarios",
+        metavar="N",
+        help="with --robust: how many samples of the scene it is good in (default: 30)",
+    )
+    command.add_argument(
+        "--unseen",
+        metavar="N",
+        help="with --robust: how many others, of the next seed, it is judged on (default: as many)",
+    )
+    command.add_argument(
+        "--seed", metavar="N", help="with --robust: which samples are drawn (default: 0)"
+    )
+    command.add_argument(
+        "--vary",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        help="with --robust, how far samples are from the scene: stiffness=3 (of each joint, by a "
+        "factor up to it, up or down), density=0.1 (of each brick, up to this share), "
+        "position=0.002 (of each brick and joint, up to so many m); these are the defaults; may be "
+        "repeated",
+    )
+
+
 def caps_arguments(command: argparse.ArgumentParser) -> None:
     """Add the arguments that forbid choices.
 

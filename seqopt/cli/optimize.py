@@ -5,40 +5,17 @@ from __future__ import annotations
 import argparse
 import time
 
-from seqopt.cli.asked import asked_engine, payloads_hold, say_idle, say_levels
-from seqopt.cli.budgets import parse_budgets, with_budgets
-from seqopt.cli.criteria import asked_criterion
+from seqopt.cli.asked import payloads_hold, say_idle, say_levels
 from seqopt.cli.free import FREE, optimize_free, require_loop
-from seqopt.cli.means import parse_resources
-from seqopt.cli.outputs import (
-    plan_files,
-    worth,
-    write_outputs,
-)
+from seqopt.cli.outputs import plan_files, worth, write_outputs
+from seqopt.cli.posing import asked_problem
+from seqopt.cli.robust import optimize_robust, require_no_scenarios
 from seqopt.cli.status import Status
-from seqopt.cli.terminal import (
-    complain,
-    progress,
-    say,
-    tell,
-)
-from seqopt.cli.values import (
-    parse_limits,
-    parse_options,
-    parse_robots,
-    parse_time_limit,
-)
-from seqopt.files import (
-    require_folder,
-)
-from seqopt.network.build import build_network
+from seqopt.cli.terminal import complain, progress, say, tell
+from seqopt.cli.values import parse_options, parse_time_limit
 from seqopt.placement.formulation import End, find_formulation
-from seqopt.placement.problem import Problem, pose
 from seqopt.placement.solving import solve
-from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.schedule import Schedule
-from seqopt.sequence.schedule_file import find_schedule
-from seqopt.sequence.thinning import thin
 from seqopt.study.published import paper_models
 
 
@@ -54,6 +31,9 @@ def optimize(options: argparse.Namespace) -> Status:
     -------
     Status
     """
+    if options.robust is not None:
+        return optimize_robust(options)
+    require_no_scenarios(options)
     if options.schedule == FREE:
         return optimize_free(options)
     require_loop(options)
@@ -61,7 +41,7 @@ def optimize(options: argparse.Namespace) -> Status:
     chosen = parse_options(formulation, options.option)
     limit, proof = parse_time_limit(options.time_limit), not options.no_proof
     start = time.perf_counter()
-    problem = _posed(options)
+    problem = asked_problem(options)
     assemble = time.perf_counter() - start
     plan = solve(problem, formulation, proof=proof, time_limit=limit, progress=tell, **chosen)
     progress("")
@@ -83,23 +63,6 @@ def optimize(options: argparse.Namespace) -> Status:
         complain("seqopt: interrupted; the plan is the best that was met")
         return Status.INTERRUPTED
     return payloads_hold(options, problem.schedule.scene, table)
-
-
-def _posed(options: argparse.Namespace) -> Problem:
-    """Return the problem that is asked for."""
-    criterion = asked_criterion(options)
-    scene = load_scene(options.scene)
-    limits = parse_limits(options.limit, scene)
-    resources = parse_resources(options, progress)
-    budgets = parse_budgets(options.budget)
-    require_folder(options.out)
-    network = build_network(scene)
-    engine = asked_engine(options, network)
-    schedule = find_schedule(network, options.schedule, parse_robots(options.robots))
-    if options.candidates is not None:
-        schedule = thin(schedule, options.candidates)
-    counted = [budget.response for budget in budgets if budget.response]
-    return with_budgets(pose(engine, schedule, criterion, limits, counted, resources), budgets)
 
 
 def _paper_count(schedule: Schedule) -> dict[str, int] | None:

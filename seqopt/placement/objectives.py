@@ -133,15 +133,28 @@ def least_among_least(first: LayeredCosts, second: LayeredCosts) -> float:
         ways.append(reached)
         reached = (reached[:, None] + arc).min(axis=0)
     least = float(reached.min())
-    kept = _on_a_least_path(arcs, ways, least + TIED * max(abs(least), TINY))
+    kept = on_a_least_path(arcs, ways, least + TIED * max(abs(least), TINY))
     total = np.zeros(1)
     for single, shared, mask in zip(second.single, second.shared, kept, strict=True):
         total = np.where(mask, total[:, None] + shared + single, np.inf).min(axis=0)
     return float(total.min())
 
 
-def _on_a_least_path(arcs: Sequence[Floats], ways: Sequence[Floats], most: float) -> list[Bools]:
-    """Return which pairs lie on a path of at most a cost, move by move."""
+def on_a_least_path(arcs: Sequence[Floats], ways: Sequence[Floats], most: float) -> list[Bools]:
+    """Return which pairs lie on a path of at most a cost, move by move.
+
+    Parameters
+    ----------
+    arcs : sequence of (C_{k-1}, C_k) float
+        What a pair and its later choice cost together.
+    ways : sequence of (C_{k-1},) float
+        The least cost up to every candidate of the move before.
+    most : float
+
+    Returns
+    -------
+    list of (C_{k-1}, C_k) bool
+    """
     to_go = np.zeros(arcs[-1].shape[1])
     out = []
     for arc, way in zip(reversed(arcs), reversed(ways), strict=True):

@@ -32,6 +32,7 @@ from experiments.placement import (
     formulation_cost,
     heuristic_gaps,
     program_shapes,
+    robust_placement,
     speed_accuracy,
     staged_construction,
 )
@@ -154,6 +155,11 @@ def checks() -> dict[str, tuple[Check, Tables, Callable[..., Iterator[tuple[Any,
         "parallel": (parallel.holds, (rows("parallel"),), spoil_parallel),
         "peers": (peers.judge, tuple(parts), spoil_peers),
         "program_shapes": (program_shapes.holds, (rows("program_shapes"),), spoil_shapes),
+        "robust_placement": (
+            robust_placement.holds,
+            (rows("robust_placement"), rows("robust_programs")),
+            spoil_robust,
+        ),
         "speed_accuracy": (
             lambda table: all(speed_accuracy.holds(table).values()),
             (rows("runs"),),
@@ -334,6 +340,17 @@ def spoil_shapes(table):
     yield (spoiled(table, "nodes", 1000.0, formulation="overlap_mip"),)
     yield (table.assign(proven=True),)
     yield (spoiled(table, "value", 1.2, formulation="minimax_layer"),)
+
+
+def spoil_robust(table, programs):
+    yield spoiled(table, "gap", 1e-3, aim="cvar=0.9", scenarios=100), programs
+    yield spoiled(table, "unseen_robust", 2.0, aim="worst-peak", scenarios=30), programs
+    yield spoiled(table, "unseen_robust", 150.0, aim="worst-total", scenarios=100), programs
+    yield spoiled(table, "unseen_robust", 1.0, aim="worst-peak", scenarios=10), programs
+    yield spoiled(table, "nominal_robust", 1.6, aim="worst-peak", scenarios=100), programs
+    yield table[table["scenarios"] < 30], programs
+    yield table, spoiled(programs, "program", 180.0, aim="worst-total")
+    yield table, spoiled(programs, "solve_s", 5.0, aim="cvar=0.9")
 
 
 def spoil_gaps(table):

@@ -1,0 +1,172 @@
+"""The command ``optimize --robust``: choose grips that are good in many scenarios."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import time
+from collections.abc import Mapping
+
+from seqopt.cli.asked import payloads_hold, say_idle, say_levels
+from seqopt.cli.outputs import write_outputs
+from seqopt.cli.posing import asked_problem
+from seqopt.cli.status import Status
+from seqopt.cli.terminal import progress, say, tell
+from seqopt.cli.values import number_word, parse_time_limit, split_word
+from seqopt.errors import ProblemError
+from seqopt.files import csv_text
+from seqopt.placement.robust_aim import RobustAim, parse_robust
+from seqopt.placement.robust_plan import solve_robust
+from seqopt.placement.robust_problem import robust
+from seqopt.placement.unseen import Trial, judge_unseen
+from seqopt.responses.table import analyze
+from seqopt.scene.scenarios import MOST, Scenarios, scenarios
+from seqopt.scene.scene import Scene
+from seqopt.sequence.steps import idle_robots
+
+ALONE = ("scenarios", "unseen", "seed", "vary")  # options that mean something with --robust alone
+NOT_WITH = ("formulation", "option", "no_proof", "budget", "aim", "rule")
+COUNT = 30
+SPREADS = ("stiffness", "density", "position")
+
+
+def require_no_scenarios(options: argparse.Namespace) -> None:
+    """Raise an error if options of scenarios are given without an aim over them.
+
+    Parameters
+    ----------
+    options : argparse.Namespace
+        Of the command ``optimize``.
+
+    Raises
+    ------
+    ProblemError
+        Naming the option.
+    """
+    for name in ALONE:
+        if getattr(options, name):
+            raise ProblemError(
+                f"--{name}: plans over scenarios alone have it; give --robust worst-peak, "
+                "worst-total or as cvar=0.9"
+            )
+
+
+def optimize_robust(options: argparse.Namespace) -> Status:
+    """Choose every open grip of a build over scenarios, judge the plan on others, and write it.
+
+    Parameters
+    ----------
+    options : argparse.Namespace
+        Of the command ``optimize``.
+
+    Returns
+    -------
+    Status
+    """
+    aim = _asked_aim(options)
+    limit = parse_time_limit(options.time_limit)
+    count = _count("--scenarios", options.scenarios, COUNT)
+    other = _count("--unseen", options.unseen, count)
+    seed = _count("--seed", options.seed, 0, least=0)
+    start = time.perf_counter()
+    problem = asked_problem(options)
+    known, unseen = (
+        _drawn(problem.schedule.scene, options, n, s) for n, s in ((count, seed), (other, seed + 1))
+    )
+    assemble = time.perf_counter() - start
+    plan = solve_robust(robust(problem, known, aim), time_limit=limit, progress=tell)
+    trial = judge_unseen(plan, unseen)
+    progress("")
+    say_levels(problem.engine)
+    table = analyze(problem.engine, plan.steps)
+    report = _report(trial, known, unseen)
+    report["seconds"] = {"assemble": assemble, **plan.seconds}
+    files: dict[str, bytes | str] = {
+        "plan.csv": csv_text(table),
+        "selection.csv": csv_text(plan.table()),
+        "scenarios.csv": csv_text(trial.table),
+        "summary.json": json.dumps(_plain(report), indent=2) + "\n",
+    }
+    write_outputs(options, files)
+    worth = trial.summary()["unseen"]
+    say(
+        f"{aim}: {plan.objective:.6g} over {count} scenarios, gap {100 * plan.gap:.3g} %; over "
+        f"{other} unseen {worth['robust']:.6g}, the nominal plan {worth['nominal']:.6g}; "
+        f"written to {options.out}"
+    )
+    say_idle(problem.schedule.scene, plan.steps)
+    return payloads_hold(options, problem.schedule.scene, table)
+
+
+def _asked_aim(options: argparse.Namespace) -> RobustAim:
+    """Return the aim over scenarios if nothing is asked for that does not go with it."""
+    try:
+        aim = parse_robust(options.robust)
+    except ProblemError as error:
+        raise ProblemError(f"--robust: {error}") from error
+    given = [name for name in NOT_WITH if getattr(options, name)]
+    given += ["schedule free"] if options.schedule == "free" else []
+    if given:
+        name = given[0].replace("_", "-")
+        raise ProblemError(f"--{name}: it does not go with --robust {options.robust}; leave it out")
+    return aim
+
+
+def _count(name: str, text: str | None, otherwise: int, least: int = 1) -> int:
+    """Return a whole number from words."""
+    if text is None:
+        return otherwise
+    if not (text.isascii() and text.isdecimal()) or not least <= int(text[:12]) <= MOST:
+        raise ProblemError(f"{name} {text}: give a whole number from {least} to {MOST}")
+    return int(text)
+
+
+def _drawn(scene: Scene, options: argparse.Namespace, count: int, seed: int) -> Scenarios:
+    """Return the scenarios that are asked for."""
+    asked: dict[str, float] = {}
+    for text in options.vary:
+        name, value = split_word(text)
+        if name not in SPREADS:
+            raise ProblemError(
+                f"--vary {text}: there is no such; give one of {', '.join(SPREADS)}, as stiffness=3"
+            )
+        asked[name] = number_word(value, f"--vary {text}", zero="allowed")
+    factor = asked.pop("stiffness", 3.0)
+    if factor < 1:
+        raise ProblemError(f"--vary stiffness={factor:g}: give a factor from 1")
+    return scenarios(scene, stiffness=(1 / factor, factor), count=count, seed=seed, **asked)
+
+
+def _report(trial: Trial, known: Scenarios, unseen: Scenarios) -> dict[str, object]:
+    """Return what there is to say about a plan over scenarios."""
+    plan = trial.plan
+    problem = plan.problem.nominal
+    schedule = problem.schedule
+    return {
+        "scene": schedule.scene.name,
+        "schedule": schedule.method,
+        "aim": str(plan.problem.aim),
+        "candidates": f"heuristic: {schedule.left_out}" if schedule.left_out else "all",
+        "criterion": problem.criterion.name,
+        **problem.criterion.settings,
+        "scenarios": known.settings,
+        "unseen": unseen.settings,
+        "status": plan.status,
+        "objective": plan.objective,
+        "bound": plan.bound,
+        "proven_by_weights": plan.proven,
+        "gap": plan.gap,
+        "worth": trial.summary(),
+        "idle_robots": list(idle_robots(schedule.scene, plan.steps)),
+        "models_evaluated": sum(costs.models for costs in plan.problem.costs),
+    }
+
+
+def _plain(value: object) -> object:
+    """Return what JSON can hold: null in the place of numbers that are not finite."""
+    if isinstance(value, Mapping):
+        return {str(name): _plain(part) for name, part in value.items()}
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

@@ -1,0 +1,146 @@
+"""A criterion of one's own: any function of the responses as the cost of a step."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from seqopt.arrays import Floats
+from seqopt.errors import ProblemError
+from seqopt.placement.formulation import said
+from seqopt.placement.requirements import ChoiceResponses
+from seqopt.placement.scales import SceneFacts
+from seqopt.placement.terms import present, spell_out
+
+StepFunction = Callable[[Mapping[str, Floats], int], Floats]
+"""Takes responses by name, (C,) or (C, D) in SI units, and the brick count; returns their costs."""
+
+
+@dataclass(frozen=True)
+class StepCost:
+    """What a step costs is a function of its responses.
+
+    The function is called once for every open step, with the responses of all choices at once, so
+    it is written with NumPy. A robot that does not grip has force zero. What it returns for choices
+    that are impossible is passed over.
+
+    Parameters
+    ----------
+    name : str
+        What the criterion is called.
+    responses : tuple of str
+        Those that the function takes, as `seqopt.placement.criteria` names them; ``F_each`` stands
+        for the forces of all robots, one by one.
+    function : callable
+        Of responses by name, each (C,) or (C, D), N, N m or m, and of the bricks placed when the
+        move is made; returns costs of the same shape, finite or, for what is not allowed, infinite.
+
+    Raises
+    ------
+    ProblemError
+        If it names no responses, or the function is none.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> def squares(responses, bricks):
+    ...     return (responses["F_largest"] / 270) ** 2 + (responses["T_max"] / 87.7) ** 2
+    >>> own = StepCost("squares", ("F_largest", "T_max"), squares)
+    >>> plan = seqopt.optimize("arch25", criterion=own)
+    >>> plan.certificate.gap < 1e-12
+    True
+    """
+
+    name: str
+    responses: tuple[str, ...]
+    function: StepFunction
+
+    def __post_init__(self) -> None:
+        if isinstance(self.responses, str) or not self.responses or not callable(self.function):
+            raise ProblemError(
+                f"criterion {self.name}: give names of responses, as ('T_max', 'M_sup'), and a "
+                "function of them"
+            )
+        object.__setattr__(self, "responses", tuple(self.responses))
+
+    @property
+    def settings(self) -> Mapping[str, object]:
+        """The responses it takes, and what its function is called."""
+        called = getattr(self.function, "__qualname__", type(self.function).__name__)
+        return {"responses": list(self.responses), "function": called}
+
+    def wanted(self, bricks: int) -> tuple[str, ...]:
+        """Return the responses that it needs.
+
+        Parameters
+        ----------
+        bricks : int
+            Without effect: it needs the same for every move.
+
+        Returns
+        -------
+        tuple of str
+            Names of responses.
+        """
+        return self.responses
+
+    def for_scene(self, facts: SceneFacts) -> StepCost:
+        """Return the criterion with ``F_each`` spelled out for the scene's robots.
+
+        Parameters
+        ----------
+        facts : SceneFacts
+            Of the scene.
+
+        Returns
+        -------
+        StepCost
+        """
+        terms = spell_out(tuple((name,) for name in self.responses), facts.robots)
+        return replace(self, responses=tuple(name for (name,) in terms))
+
+    def costs(self, responses: ChoiceResponses, bricks: int, choices: int) -> Floats:
+        """Return what the function makes of the responses.
+
+        Parameters
+        ----------
+        responses : mapping of str to (C,) or (C, D) float
+            As in `Criterion.costs`.
+        bricks : int
+            Bricks placed at the move that decides the step.
+        choices : int
+            Without effect.
+
+        Returns
+        -------
+        (C,) or (C, D) float
+            NaN where a choice is impossible.
+
+        Raises
+        ------
+        ProblemError
+            If the function fails, or returns another shape or what is no number.
+        """
+        given = {name: present(responses[name]) for name in self.responses}
+        impossible = np.isnan(np.stack([*given.values()])).any(axis=0)
+        try:
+            with np.errstate(all="ignore"):
+                found = np.array(self.function(given, bricks), dtype=float)
+        except Exception as error:  # whatever a function of others may raise
+            raise ProblemError(f"criterion {self.name}: its function failed: {said(error)}") from (
+                error
+            )
+        if found.shape != impossible.shape:
+            raise ProblemError(
+                f"criterion {self.name}: its function returned shape {found.shape} for responses "
+                f"of {impossible.shape}; give a cost for every choice"
+            )
+        wrong = ~impossible & (np.isnan(found) | (found == -np.inf))
+        if wrong.any():
+            raise ProblemError(
+                f"criterion {self.name}: its function returned {found[wrong][0]} for a possible "
+                f"choice at {bricks} bricks; give a number, or inf for what is not allowed"
+            )
+        return np.where(impossible, np.nan, found)

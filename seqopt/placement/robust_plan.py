@@ -1,0 +1,243 @@
+"""Solve a problem over scenarios; the answer is checked and becomes a plan."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+import pandas as pd
+
+from seqopt.arrays import Floats
+from seqopt.errors import SolverError
+from seqopt.placement.certificate import TOLERANCE, least_peak, least_sum
+from seqopt.placement.costs import TINY, LayeredCosts
+from seqopt.placement.formulation import Formulation, Selection, find_formulation
+from seqopt.placement.interface import Aim, CostProblem
+from seqopt.placement.robust_aim import RobustAim
+from seqopt.placement.robust_problem import RobustProblem, largest_of
+from seqopt.placement.scenario_arcs import Choice, scenario_arcs
+from seqopt.placement.scenario_search import WIDTH, Searched, close_gap
+from seqopt.placement.scenario_weights import best_weights
+from seqopt.placement.selecting import select
+from seqopt.placement.watch import Finding, Watch
+from seqopt.sequence.steps import Step
+
+CHOOSES = {Aim.PEAK: "minimax", Aim.SUM: "overlap_dp"}  # of one scenario, and of worst peaks
+
+
+@dataclass(frozen=True, eq=False)
+class RobustPlan:
+    """A plan for many scenarios, and what it is worth over them.
+
+    Attributes
+    ----------
+    problem : RobustProblem
+        What was solved.
+    choice : tuple of int
+        A candidate for every move.
+    steps : tuple of Step
+        The schedule with every move at its chosen node, checked.
+    objective : float
+        What the aim makes of the scenarios, computed anew from their costs.
+    bound : float
+        On the objective of any choice.
+    proven : float
+        The part of the bound that weights of scenarios prove by one dynamic program, computed anew;
+        of peaks it is the whole bound. The rest was closed by search.
+    weights : (S,) float
+        Of the scenarios, as they prove it; of peaks the scenario where the plan is worst.
+    seconds : mapping of str to float
+        By stage, s: respond, solve, verify.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> from seqopt.placement.robust_aim import WORST_PEAK
+    >>> from seqopt.placement.robust_problem import robust
+    >>> from seqopt.scene.scenarios import scenarios
+    >>> scene = seqopt.load_scene("arch25")
+    >>> network = seqopt.build_network(scene)
+    >>> engine, loop = seqopt.make_engine("auto", network), seqopt.three_robot_loop(network)
+    >>> nominal = seqopt.pose(engine, loop, seqopt.CRITERIA["worst-ratio-published"])
+    >>> solve_robust(robust(nominal, scenarios(scene, count=3, seed=1), WORST_PEAK)).gap
+    0.0
+    """
+
+    problem: RobustProblem
+    choice: Choice
+    steps: tuple[Step, ...]
+    objective: float
+    bound: float
+    proven: float
+    weights: Floats
+    seconds: Mapping[str, float] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        worth = f"objective {self.objective:.6g}, gap {100 * self.gap:.3g} %"
+        return f"RobustPlan({self.problem.aim}, {len(self.weights)} scenarios: {worth})"
+
+    @property
+    def nodes(self) -> tuple[int, ...]:
+        """The node chosen for every move."""
+        return self.problem.nominal.nodes(self.choice)
+
+    @property
+    def gap(self) -> float:
+        """What the bound leaves open, over the size of the objective."""
+        left = max(self.objective - self.bound, 0.0)
+        return left / max(abs(self.objective), abs(self.bound), TINY)
+
+    @property
+    def status(self) -> str:
+        """Whether it is ``optimal`` over these scenarios, or ``feasible``."""
+        return "optimal" if self.gap <= TOLERANCE else "feasible"
+
+    def table(self) -> pd.DataFrame:
+        """Return what was chosen for every move.
+
+        Returns
+        -------
+        pandas.DataFrame
+            A row per move. Columns: ``move``, ``step``, ``bricks``, ``robot``, ``node``,
+            ``candidates`` (how many there were).
+        """
+        moves = self.problem.nominal.schedule.moves
+        rows = [
+            {
+                "move": k,
+                "step": move.step,
+                "bricks": move.bricks,
+                "robot": move.robot,
+                "node": move.candidates[now],
+                "candidates": len(move.candidates),
+            }
+            for k, (move, now) in enumerate(zip(moves, self.choice, strict=True), start=1)
+        ]
+        return pd.DataFrame(rows)
+
+
+def solve_robust(
+    problem: RobustProblem,
+    *,
+    time_limit: float = math.inf,
+    progress: Callable[[Finding], object] | None = None,
+    width: int = WIDTH,
+) -> RobustPlan:
+    """Return the plan that is best over all scenarios, checked from their costs.
+
+    Peaks are solved exactly by one dynamic program. Totals are bounded by weights of the scenarios,
+    found by cuts, and the gap that is left is closed by search as far as ``width`` allows.
+
+    Parameters
+    ----------
+    problem : RobustProblem
+        Of `seqopt.placement.robust_problem.robust`.
+    time_limit : float, optional
+        After which it stops choosing, with the best choice so far and a bound, s.
+    progress : callable, optional
+        Told every better choice and bound as it is found.
+    width : int, optional
+        How many beginnings of choices are kept after every move.
+
+    Returns
+    -------
+    RobustPlan
+
+    Raises
+    ------
+    InfeasibleError, SolverError
+        If no choice is allowed in all scenarios; an answer is not what it is claimed to be.
+    """
+    layers = problem.layered(problem.aim.aim)
+    joined = largest_of(layers)  # says if no choice is allowed in all scenarios
+    minimax = find_formulation(CHOOSES[Aim.PEAK])  # loaded before the time is taken
+    watch = Watch(time_limit, progress)
+    if problem.aim.aim is Aim.PEAK:
+        found, weights = _least_peak(minimax, joined, layers)
+    else:
+        found, weights = _least_total(layers, problem.aim, watch, width)
+    taken = watch.seconds
+    start = time.perf_counter()
+    proven = _proven(joined, layers, problem.aim, weights)
+    objective = _checked(problem, layers, found, proven)
+    bound = min(max(found.bound, proven), objective)
+    steps = problem.steps(found.choice)
+    seconds = {**problem.seconds, "solve": taken, "verify": time.perf_counter() - start}
+    return RobustPlan(
+        problem, found.choice, steps, objective, bound, min(proven, bound), weights, seconds
+    )
+
+
+def _least_peak(
+    minimax: Formulation, joined: LayeredCosts, layers: tuple[LayeredCosts, ...]
+) -> tuple[Searched, Floats]:
+    """Return the choice whose worst peak is least; both maxima are one."""
+    chosen = select(minimax, CostProblem(joined))
+    peaks = np.array([each.worst(chosen.choice) for each in layers])
+    weights = np.zeros(len(layers))
+    weights[int(np.argmax(peaks))] = 1.0
+    return Searched(chosen.choice, chosen.objective, chosen.bound), weights
+
+
+def _least_total(
+    layers: tuple[LayeredCosts, ...], aim: RobustAim, watch: Watch, width: int
+) -> tuple[Searched, Floats]:
+    """Return the choice whose totals are worth least, as far as it is found."""
+    arcs = scenario_arcs(layers, aim)
+    weighed = best_weights(arcs, watch)
+    return close_gap(arcs, weighed, watch, width), weighed.weights
+
+
+def best_choice(costs: LayeredCosts, aim: Aim) -> Selection:
+    """Return the best choice of one scenario, not checked.
+
+    Parameters
+    ----------
+    costs : LayeredCosts
+    aim : Aim
+
+    Returns
+    -------
+    Selection
+    """
+    return select(find_formulation(CHOOSES[aim]), CostProblem(costs))
+
+
+def _proven(
+    joined: LayeredCosts, layers: tuple[LayeredCosts, ...], aim: RobustAim, weights: Floats
+) -> float:
+    """Return the bound that weights prove, by a judge that shares nothing with the search."""
+    if aim.aim is Aim.PEAK:
+        return least_peak(joined)
+    used = [(w, each) for w, each in zip(weights, layers, strict=True) if w > 0]
+    apart = abs(sum(w for w, _ in used) - 1.0)
+    if apart > 1e-9 or max(w for w, _ in used) > aim.most(len(layers)) * (1 + 1e-9):
+        raise SolverError("the weights of scenarios do not fit the aim; the bound is none")
+    moves = range(len(joined.single))
+    shut = [(np.isinf(joined.single[k]), np.isinf(joined.shared[k])) for k in moves]
+    single, shared = [], []
+    for k in moves:
+        open_single = sum(w * np.where(shut[k][0], 0.0, each.single[k]) for w, each in used)
+        open_shared = sum(w * np.where(shut[k][1], 0.0, each.shared[k]) for w, each in used)
+        single.append(np.where(shut[k][0], np.inf, open_single))
+        shared.append(np.where(shut[k][1], np.inf, open_shared))
+    return least_sum(LayeredCosts(tuple(single), tuple(shared)))
+
+
+def _checked(
+    problem: RobustProblem, layers: tuple[LayeredCosts, ...], found: Searched, proven: float
+) -> float:
+    """Return what a choice is worth by the scenarios' costs, if that is what is claimed."""
+    worth = problem.aim.aim.worth
+    value = problem.aim.value(np.array([worth(each, found.choice) for each in layers]))
+    size = max(abs(value), abs(found.value), TINY)
+    if not abs(value - found.value) <= TOLERANCE * size:
+        raise SolverError(f"the objective is {value:.9g}, not {found.value:.9g} as claimed")
+    if max(proven, found.bound) > value + TOLERANCE * size:
+        raise SolverError(
+            f"the bound is {max(proven, found.bound):.9g}, above the objective {value:.9g}"
+        )
+    return value

@@ -1,0 +1,241 @@
+"""The problem of a plan that is to be good in many scenarios at once."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from seqopt.arrays import Floats
+from seqopt.errors import InfeasibleError, ProblemError
+from seqopt.placement.costs import LayeredCosts
+from seqopt.placement.interface import Aim
+from seqopt.placement.problem import Problem
+from seqopt.placement.robust_aim import RobustAim
+from seqopt.placement.scenario_costs import ScenarioCosts, scenario_costs, tasks_of
+from seqopt.scene.checks import short
+from seqopt.scene.scenarios import Scenarios
+from seqopt.scene.scene import Scene
+from seqopt.sequence.steps import Step
+
+
+@dataclass(frozen=True, repr=False)
+class RobustProblem:
+    """Support placement over a whole build, in many scenarios at once.
+
+    Nothing is computed before it is asked for. Limits hold in every scenario.
+
+    Attributes
+    ----------
+    nominal : Problem
+        Of the scene as it is drawn; its criterion, with its numbers, holds in every scenario.
+    scenes : tuple of Scene
+        The scenarios.
+    aim : RobustAim
+        What is to be least over them.
+    """
+
+    nominal: Problem
+    scenes: tuple[Scene, ...]
+    aim: RobustAim
+
+    def __repr__(self) -> str:
+        schedule = self.nominal.schedule
+        what = f"{schedule.scene.name!r}, {schedule.method!r}, {len(self.scenes)} scenarios"
+        return f"RobustProblem({what}, criterion {self.nominal.criterion.name!r}, {self.aim})"
+
+    @property
+    def costs(self) -> tuple[ScenarioCosts, ...]:
+        """What choices cost, scenario by scenario."""
+        return self._found[0]
+
+    @cached_property
+    def _found(self) -> tuple[tuple[ScenarioCosts, ...], float]:
+        resources = self.nominal.evaluation.resources
+        return scenario_costs(tasks_of(self.nominal, self.scenes), resources)
+
+    @property
+    def seconds(self) -> Mapping[str, float]:
+        """What the costs of all scenarios took: ``respond``, s."""
+        return {"respond": self._found[1]}
+
+    def under(self, aim: RobustAim) -> RobustProblem:
+        """Return the same problem with another aim; costs that are known stay known.
+
+        Parameters
+        ----------
+        aim : RobustAim
+
+        Returns
+        -------
+        RobustProblem
+        """
+        return self._kept(replace(self, aim=aim))
+
+    def first(self, count: int) -> RobustProblem:
+        """Return the problem of the first scenarios alone; costs that are known stay known.
+
+        Parameters
+        ----------
+        count : int
+            How many, from 1.
+
+        Returns
+        -------
+        RobustProblem
+        """
+        return self._kept(replace(self, scenes=self.scenes[: max(count, 1)]))
+
+    def _kept(self, other: RobustProblem) -> RobustProblem:
+        known: tuple[tuple[ScenarioCosts, ...], float] | None = vars(self).get("_found")
+        if known is not None:
+            vars(other)["_found"] = known[0][: len(other.scenes)], known[1]
+        return other
+
+    def values(self, choice: Sequence[int], aim: Aim) -> Floats:
+        """Return what a choice is worth in every scenario.
+
+        Parameters
+        ----------
+        choice : sequence of int
+            A candidate for every move.
+        aim : Aim
+            Its total, or its largest cost.
+
+        Returns
+        -------
+        (S,) float
+            Infinite where it exceeds a limit.
+        """
+        return np.array([aim.worth(costs, choice) for costs in self.layered(aim)])
+
+    def layered(self, aim: Aim) -> tuple[LayeredCosts, ...]:
+        """Return the costs that an aim is about, scenario by scenario.
+
+        Parameters
+        ----------
+        aim : Aim
+            Sums or peaks.
+
+        Returns
+        -------
+        tuple of LayeredCosts
+        """
+        return tuple(c.sums if aim is Aim.SUM else c.peaks for c in self.costs)
+
+    def steps(self, choice: Sequence[int]) -> tuple[Step, ...]:
+        """Return the checked steps of the build; see `Problem.steps`.
+
+        Parameters
+        ----------
+        choice : sequence of int
+            A candidate for every move.
+
+        Returns
+        -------
+        tuple of Step
+        """
+        return self.nominal.steps(choice)
+
+
+def robust(problem: Problem, scenes: Scenarios | Sequence[Scene], aim: RobustAim) -> RobustProblem:
+    """Return the problem of a plan that is good in many scenarios at once.
+
+    Parameters
+    ----------
+    problem : Problem
+        The nominal one, of `seqopt.pose`; with an engine of `seqopt.make_engine`.
+    scenes : Scenarios or sequence of Scene
+        Of `seqopt.scene.scenarios.scenarios`, or scenes of one's own with the same bricks and
+        nodes.
+    aim : RobustAim
+
+    Returns
+    -------
+    RobustProblem
+        Nothing is computed yet.
+
+    Raises
+    ------
+    ProblemError
+        If there is no scenario, one has other bricks or nodes, or the problem has budgets.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> from seqopt.placement.robust_aim import WORST_PEAK
+    >>> from seqopt.scene.scenarios import scenarios
+    >>> scene = seqopt.load_scene("arch25")
+    >>> network = seqopt.build_network(scene)
+    >>> engine, loop = seqopt.make_engine("auto", network), seqopt.three_robot_loop(network)
+    >>> problem = seqopt.pose(engine, loop, seqopt.CRITERIA["worst-ratio-published"])
+    >>> robust(problem, scenarios(scene, count=5), WORST_PEAK)  # doctest: +ELLIPSIS
+    RobustProblem('arch25', 'three-robot', 5 scenarios, ... worst-peak)
+    """
+    if not isinstance(problem, Problem) or not isinstance(aim, RobustAim):
+        raise ProblemError(
+            f"{short(aim if isinstance(problem, Problem) else problem)}: give a problem of "
+            "seqopt.pose, scenarios, and an aim as WORST_PEAK, WORST_TOTAL or cvar(0.9)"
+        )
+    found = scenes.scenes if isinstance(scenes, Scenarios) else tuple(scenes)
+    if not found:
+        raise ProblemError("there is no scenario; give at least one")
+    if problem.budgets:
+        raise ProblemError(
+            f"budget {problem.budgets[0].name!r}: aims over scenarios take no budgets; leave it out"
+        )
+    for i, scene in enumerate(found, start=1):
+        _require_alike(problem.schedule.scene, scene, i)
+    tasks_of(problem, found[:1])  # says if engines for other scenes cannot be made
+    return RobustProblem(problem, found, aim)
+
+
+def _require_alike(nominal: Scene, scene: Scene, number: int) -> None:
+    """Raise an error if the choices of a schedule do not mean the same in a scenario."""
+    if not isinstance(scene, Scene):
+        raise ProblemError(f"scenario {number}: {short(scene)} is no scene")
+
+    def meant(it: Scene) -> tuple[object, ...]:
+        joints = tuple(joint.bricks for joint in it.joints)
+        ends = tuple((ground.brick, ground.closes_with) for ground in it.grounds)
+        nodes = tuple((brick.name, brick.nodes) for brick in it.placed)
+        robots = tuple(robot.name for robot in it.robots)
+        return joints, ends, nodes, robots, it.blocked_nodes
+
+    if meant(nominal) != meant(scene):
+        raise ProblemError(
+            f"scenario {number}: it has other bricks, nodes, joints, robots or another build order "
+            f"than {nominal.name}; vary stiffnesses, densities and positions alone"
+        )
+
+
+def largest_of(layers: Sequence[LayeredCosts]) -> LayeredCosts:
+    """Return the largest of several costs, choice by choice and pair by pair.
+
+    The largest cost that a choice meets in any of them is the largest that it meets in this one.
+
+    Parameters
+    ----------
+    layers : sequence of LayeredCosts
+        Of the same moves.
+
+    Returns
+    -------
+    LayeredCosts
+
+    Raises
+    ------
+    InfeasibleError
+        If no choice is allowed in all of them.
+    """
+    moves = range(len(layers[0].single))
+    single = tuple(np.max([each.single[k] for each in layers], axis=0) for k in moves)
+    shared = tuple(np.max([each.shared[k] for each in layers], axis=0) for k in moves)
+    out = LayeredCosts(single, shared)
+    try:
+        out.continuable()
+    except InfeasibleError as error:
+        raise InfeasibleError(f"over all {len(layers)} scenarios, {error}") from error
+    return out

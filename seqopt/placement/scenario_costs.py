@@ -1,0 +1,187 @@
+"""The costs of all choices of a schedule in every scenario, scenarios shared among workers."""
+
+from __future__ import annotations
+
+import pickle
+import time
+from collections.abc import Sequence
+from contextlib import closing
+from dataclasses import dataclass
+
+from seqopt.arrays import FrozenValue
+from seqopt.engines.recipe import Recipe, recipe_of
+from seqopt.engines.registry import make_engine
+from seqopt.errors import MechanismError, ProblemError, SolverError
+from seqopt.placement.costs import LayeredCosts
+from seqopt.placement.problem import Problem
+from seqopt.placement.promises import require_possible
+from seqopt.placement.requirements import Criterion, Limit, ResponsesAsked
+from seqopt.responses.choices import Evaluation
+from seqopt.responses.resources import Resources
+from seqopt.scene.scene import Scene
+from seqopt.sequence.schedule import Schedule
+from seqopt.work.crew import Crew, hire
+from seqopt.work.ordered import map_ordered
+from seqopt.work.progress import Progress
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ScenarioCosts(FrozenValue):
+    """What the choices of a schedule cost in one scenario.
+
+    Attributes
+    ----------
+    sums, peaks : LayeredCosts
+        As of `seqopt.placement.problem.Problem`; infinite where a limit is exceeded.
+    models : int
+        How many different models were solved.
+    seconds : float
+        That solving them took, s.
+    """
+
+    sums: LayeredCosts
+    peaks: LayeredCosts
+    models: int
+    seconds: float
+
+
+@dataclass(frozen=True)
+class ScenarioTask:
+    """One scenario, as it is sent to a worker.
+
+    Attributes
+    ----------
+    name : str
+        For messages.
+    recipe : Recipe
+        Of its engine.
+    schedule : Schedule
+        The nominal one, whose steps and candidates hold in every scenario.
+    criterion : Criterion
+        With the numbers of the nominal scene.
+    limits : tuple of Limit
+    also : tuple of str
+        Responses that are evaluated beside those that these name.
+    resources : Resources
+    """
+
+    name: str
+    recipe: Recipe
+    schedule: Schedule
+    criterion: Criterion
+    limits: tuple[Limit, ...]
+    also: tuple[str, ...]
+    resources: Resources
+
+    def problem(self) -> Problem:
+        """Return the placement problem of this scenario.
+
+        Returns
+        -------
+        Problem
+        """
+        recipe = self.recipe
+        engine = make_engine(recipe.engine, recipe.scene, **recipe.options)  # type: ignore[arg-type]
+        asked = ResponsesAsked(self.criterion, self.limits, self.also)
+        evaluation = Evaluation(engine, self.schedule, asked, self.resources)
+        return Problem(self.criterion, self.limits, evaluation)
+
+
+def tasks_of(problem: Problem, scenes: Sequence[Scene]) -> tuple[ScenarioTask, ...]:
+    """Return the tasks of scenarios.
+
+    Parameters
+    ----------
+    problem : Problem
+        The nominal one.
+    scenes : sequence of Scene
+
+    Returns
+    -------
+    tuple of ScenarioTask
+
+    Raises
+    ------
+    ProblemError
+        If the engine was not made by name, so that nobody knows how to make it for another scene.
+    """
+    recipe = recipe_of(problem.engine)
+    if recipe is None:
+        raise ProblemError(
+            f"engine {type(problem.engine).__name__}: scenarios need engines of their own; take "
+            "one of seqopt.make_engine"
+        )
+    asked = problem.evaluation.wanted
+    also = asked.also if isinstance(asked, ResponsesAsked) else ()
+    alone = problem.evaluation.resources.alone()
+    return tuple(
+        ScenarioTask(
+            f"scenario {i}",
+            Recipe(recipe.engine, scene, recipe.options),
+            problem.schedule,
+            problem.criterion,
+            problem.limits,
+            also,
+            alone,
+        )
+        for i, scene in enumerate(scenes, start=1)
+    )
+
+
+def scenario_costs(
+    tasks: Sequence[ScenarioTask], resources: Resources
+) -> tuple[tuple[ScenarioCosts, ...], float]:
+    """Return the costs in every scenario, and what they took.
+
+    Parameters
+    ----------
+    tasks : sequence of ScenarioTask
+    resources : Resources
+        A worker takes one scenario after the other.
+
+    Returns
+    -------
+    costs : tuple of ScenarioCosts
+    seconds : float
+        From the first to the last, s.
+
+    Raises
+    ------
+    InfeasibleError
+        If a step without an open grip exceeds a limit in a scenario.
+    MechanismError, SolverError, WorkerError
+        As engines and workers do, the scenario named.
+    """
+    start = time.perf_counter()
+    progress = Progress("scenarios", len(tasks), resources.progress)
+    with hire(resources.executor, resources.workers) as crew:
+        _require_sendable(tasks, crew)
+        with closing(map_ordered(_costs, tasks, crew, done=lambda *_: progress.add(1))) as found:
+            costs = tuple(found)
+    return costs, time.perf_counter() - start
+
+
+def _costs(task: ScenarioTask) -> ScenarioCosts:
+    problem = task.problem()
+    try:
+        require_possible(problem)
+        sums, peaks = problem.sums, problem.peaks
+    except MechanismError as error:
+        raise MechanismError(f"{task.name}: {error}", error.mode) from error
+    except SolverError as error:
+        raise SolverError(f"{task.name}: {error}") from error
+    evaluation = problem.evaluation
+    return ScenarioCosts(sums, peaks, evaluation.models, evaluation.seconds)
+
+
+def _require_sendable(tasks: Sequence[ScenarioTask], crew: Crew | None) -> None:
+    """Raise an error if tasks are to go to other processes and cannot be sent."""
+    if crew is None:
+        return
+    try:
+        pickle.dumps(tasks[:1])
+    except Exception as error:  # whatever objects of others may raise
+        raise ProblemError(
+            f"criterion {tasks[0].criterion.name}: it cannot be sent to other processes ({error}); "
+            "define it in a module, or let this process work alone"
+        ) from error

@@ -1,0 +1,100 @@
+"""Plans over scenarios on the command line."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import pandas as pd
+import pytest
+
+from seqopt.cli.main import main
+from seqopt.cli.robust import _plain
+from seqopt.scene.scene_file import save_scene
+from tests.builders import six_bricks
+
+
+@pytest.fixture
+def scene(tmp_path):
+    path = tmp_path / "six.json"
+    save_scene(six_bricks(), path)
+    return path
+
+
+def optimize(capsys, tmp_path, scene, *words):
+    """Exit status, standard output and standard error of one command."""
+    try:
+        status = main(["optimize", str(scene), *words, "--out", str(tmp_path / "out")])
+    except SystemExit as stop:
+        status = int(stop.code or 0)
+    out, err = capsys.readouterr()
+    return status, out, err
+
+
+@pytest.mark.parametrize("aim", ["worst-peak", "worst-total", "cvar=0.5"])
+def test_a_plan_over_scenarios_is_written(capsys, tmp_path, scene, aim):
+    words = ("--robust", aim, "--scenarios", "4", "--unseen", "3", "--seed", "5")
+    more = ("--criteria", "weighted-published", "--vary", "stiffness=2", "--vary", "position=0")
+    status, out, err = optimize(capsys, tmp_path, scene, *words, *more)
+    assert (status, err) == (0, "")
+    assert f"{aim}: " in out
+    assert "gap " in out
+    folder = tmp_path / "out"
+    summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    table = pd.read_csv(folder / "scenarios.csv")
+    assert table["set"].tolist() == ["nominal", *["optimized"] * 4, *["unseen"] * 3]
+    assert summary["scenarios"] == {
+        "count": 4,
+        "stiffness": [0.5, 2.0],
+        "density": 0.1,
+        "position_m": 0.0,
+        "seed": 5,
+    }
+    assert summary["unseen"]["seed"] == 6
+    assert (summary["aim"], summary["status"]) == (aim, "optimal")
+    assert summary["worth"]["optimized"]["robust"] == pytest.approx(summary["objective"])
+    assert summary["bound"] <= summary["objective"]
+    if aim != "cvar=0.5":
+        column = "robust_peak" if aim == "worst-peak" else "robust_total"
+        rows = table[table["set"] == "optimized"]
+        assert rows[column].max() == pytest.approx(summary["objective"], rel=1e-5)
+    steps = ("analyze", str(scene), "--plan", str(folder / "plan.csv"))
+    assert main(list(steps)) == 0  # it can be read as a plan
+    assert len(pd.read_csv(folder / "selection.csv")) > 0
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--robust", "cvar=2"], "--robust: cvar=2.0: give a level"),
+        (["--robust", "best"], "--robust: robust aim best: there is no such"),
+        (["--robust", "worst-peak", "--formulation", "minimax"], "--formulation: it does not go"),
+        (["--robust", "worst-peak", "--budget", "travel=0.8"], "--budget: it does not go with"),
+        (["--robust", "worst-peak", "--no-proof"], "--no-proof: it does not go with"),
+        (["--robust", "worst-total", "--schedule", "free"], "--schedule free: it does not go"),
+        (["--scenarios", "3", "--formulation", "minimax"], "--scenarios: plans over scenarios"),
+        (["--seed", "3", "--schedule", "free"], "--seed: plans over scenarios alone"),
+        (["--robust", "worst-peak", "--scenarios", "x"], "--scenarios x: give a whole number"),
+        (["--robust", "worst-peak", "--unseen", "0"], "--unseen 0: give a whole number from 1"),
+        (["--robust", "worst-peak", "--vary", "foo=1"], "--vary foo=1: there is no such"),
+        (["--robust", "worst-peak", "--vary", "density=-1"], "not a positive number"),
+        (["--robust", "worst-peak", "--vary", "stiffness=0.5"], "give a factor from 1"),
+        (["--robust", "worst-peak", "--vary", "density=1"], "density is 1.0"),
+    ],
+)
+def test_bad_input_gets_one_line(capsys, tmp_path, scene, words, said):
+    status, out, err = optimize(capsys, tmp_path, scene, *words)
+    assert (status, out, err.count("\n")) == (2, "", 1)
+    assert said in err
+    assert not (tmp_path / "out").exists()
+
+
+def test_what_no_choice_keeps_in_all_scenarios_has_no_answer(capsys, tmp_path, scene):
+    words = ("--robust", "worst-total", "--scenarios", "2", "--limit", "F_largest=1")
+    status, _, err = optimize(capsys, tmp_path, scene, *words)
+    assert (status, err.count("\n")) == (3, 1)
+
+
+def test_numbers_that_are_not_finite_are_null():
+    report = {"a": {"b": math.inf, "c": 1.5}, "d": [1], "e": math.nan}
+    assert _plain(report) == {"a": {"b": None, "c": 1.5}, "d": [1], "e": None}

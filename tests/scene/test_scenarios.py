@@ -1,0 +1,146 @@
+"""Scenarios: what varies, by how much, and what stays."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import FrozenInstanceError
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from seqopt.errors import SceneError
+from seqopt.scene.scenarios import scenarios
+from tests.builders import six_bricks
+from tests.strategies import arches
+
+
+def springs(scene):
+    return (*scene.joints, *scene.grounds)
+
+
+def factors(nominal, scene, name):
+    """The factors of a stiffness, (springs, 3)."""
+    pairs = zip(springs(scene), springs(nominal), strict=True)
+    return np.array([np.divide(getattr(a, name), getattr(b, name)) for a, b in pairs])
+
+
+def shifts(nominal, scene):
+    """How far bricks, joints and ground ends moved along every axis, m."""
+    return np.array(
+        [
+            np.subtract(a.position, b.position)
+            for part in ("bricks", "joints", "grounds")
+            for a, b in zip(getattr(scene, part), getattr(nominal, part), strict=True)
+        ]
+    )
+
+
+@given(
+    scene=arches(),
+    factor=st.floats(1.0, 5.0),
+    density=st.floats(0.0, 0.5),
+    position=st.floats(0.0, 0.002),
+    seed=st.integers(0, 2**40),
+)
+@settings(max_examples=25)
+def test_what_varies_stays_in_its_bounds_and_all_else_as_it_is(
+    scene, factor, density, position, seed
+):
+    drawn = scenarios(
+        scene,
+        stiffness=(1 / factor, factor),
+        density=density,
+        position=position,
+        count=3,
+        seed=seed,
+    )
+    for each in drawn.scenes:
+        for name in ("translational_stiffness", "rotational_stiffness"):
+            found = factors(scene, each, name)
+            assert np.ptp(found, axis=1) == pytest.approx(0, abs=1e-9)  # one for all three axes
+            assert (np.abs(np.log(found)) <= math.log(factor) + 1e-9).all()
+        pairs = zip(each.bricks, scene.bricks, strict=True)
+        assert all(abs(a.density / b.density - 1) <= density + 1e-9 for a, b in pairs)
+        assert np.abs(shifts(scene, each)).max() <= position * (1 + 1e-9) + 1e-12
+        assert [b.nodes for b in each.placed] == [b.nodes for b in scene.placed]
+        assert [j.bricks for j in each.joints] == [j.bricks for j in scene.joints]
+        assert (each.robots, each.blocked_nodes) == (scene.robots, scene.blocked_nodes)
+        for ours, theirs in zip(each.grounds, scene.grounds, strict=True):  # stubs keep their shape
+            stub = np.subtract(ours.anchor, ours.position)
+            assert stub == pytest.approx(np.subtract(theirs.anchor, theirs.position), abs=1e-12)
+
+
+def test_a_seed_is_a_sample_and_another_one_another():
+    scene = six_bricks()
+    few, more = (scenarios(scene, count=n, seed=7) for n in (2, 5))
+    assert more.scenes[:2] == few.scenes  # more scenarios leave the first as they are
+    assert scenarios(scene, count=2, seed=8).scenes != few.scenes
+    assert few.scenes[0] != few.scenes[1]
+
+
+def test_a_spread_that_is_set_to_nothing_leaves_the_others():
+    scene = six_bricks()
+    whole = scenarios(scene, count=1).scenes[0]
+    fixed = scenarios(scene, count=1, position=0.0).scenes[0]
+    stiff = scenarios(scene, count=1, position=0.0, density=0.0).scenes[0]
+    assert not shifts(scene, fixed).any()
+    assert [j.rotational_stiffness for j in fixed.joints] == [
+        j.rotational_stiffness for j in whole.joints
+    ]
+    assert [b.density for b in fixed.bricks] == [b.density for b in whole.bricks]
+    assert [b.density for b in stiff.bricks] == [b.density for b in scene.bricks]
+    alone = scenarios(scene, count=1, stiffness=(1, 1), density=0, position=0).scenes[0]
+    assert alone == scene
+
+
+def test_draws_spread_as_they_are_said_to():
+    """Log-uniform factors and uniform shares: means and spreads of many draws."""
+    scene = six_bricks()
+    drawn = scenarios(scene, count=300, seed=3)
+    stiff = np.array([factors(scene, s, "rotational_stiffness")[:, 0] for s in drawn.scenes])
+    logs = np.log(stiff) / math.log(3)
+    dense = np.array([[b.density for b in s.bricks] for s in drawn.scenes])
+    shares = (dense / [b.density for b in scene.bricks] - 1) / 0.1
+    moved = np.array([shifts(scene, s) for s in drawn.scenes]) / 0.002
+    for draws in (logs, shares, moved):
+        assert abs(draws.mean()) < 0.05
+        assert draws.std() == pytest.approx(1 / math.sqrt(3), rel=0.05)
+
+
+def test_scenarios_are_frozen_and_say_how_they_were_drawn():
+    drawn = scenarios(six_bricks(), count=2, seed=5)
+    with pytest.raises(FrozenInstanceError):
+        drawn.seed = 6
+    assert drawn.settings == {
+        "count": 2,
+        "stiffness": [1 / 3, 3.0],
+        "density": 0.1,
+        "position_m": 0.002,
+        "seed": 5,
+    }
+    assert "2 scenarios of" in repr(drawn)
+
+
+@pytest.mark.parametrize(
+    ("given", "match"),
+    [
+        ({"stiffness": (3, 1)}, "stiffness is"),
+        ({"stiffness": 3.0}, "stiffness is 3.0; give the least and the largest factor"),
+        ({"stiffness": (0.0, 1.0)}, "stiffness is"),
+        ({"stiffness": (math.nan, 1.0)}, "stiffness is"),
+        ({"density": 1.0}, "density is 1.0; give a number from 0 to below 1"),
+        ({"density": -0.1}, "density is"),
+        ({"position": math.nan}, "position is nan; give a number from 0"),
+        ({"position": "2 mm"}, "position is"),
+        ({"position": 1e20}, "scenario 1 of .* is no valid scene"),
+        ({"count": 0}, "count is 0; give a whole number from 1"),
+        ({"count": 2.5}, "count is"),
+        ({"seed": -1}, "seed is"),
+        ({"seed": True}, "seed is"),
+    ],
+)
+def test_numbers_that_cannot_be_meant(given, match):
+    with pytest.raises(SceneError, match=match):
+        scenarios(six_bricks(), **given)
