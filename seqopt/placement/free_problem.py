@@ -251,17 +251,27 @@ def pose_free(
     goals = parse_goals(goals) if isinstance(goals, str) else tuple(goals)
     if not goals or not all(isinstance(goal, Goal) for goal in goals):
         raise ProblemError(f"aims {short(goals)}: give goals, or their names, as 'minmax,steps'")
-    limits = (limits,) if isinstance(limits, Limit) else tuple(limits)
-    robots = {robot_response(robot.name) for robot in engine.network.scene.robots}
-    for limit in limits:
-        _require(limit.response, {*STATE_RESPONSES, *robots}, "limit")
+    limits = _checked(limits, engine.network)
     if any(goal.of_states and not goal.response for goal in goals):
         criterion = _of_states(engine, criterion)
     standing = stands if isinstance(stands, Standing | None) else Standing(find_mortar(stands))
-    problem = FreeProblem(engine, rules, criterion, goals, limits, standing)
-    if standing is not None or any(goal.of_margins for goal in goals):
+    return _asked(FreeProblem(engine, rules, criterion, goals, limits, standing))
+
+
+def _asked(problem: FreeProblem) -> FreeProblem:
+    """Return a problem whose stability can be asked, where it will be."""
+    if problem.standing is not None or any(goal.of_margins for goal in problem.goals):
         _ = problem.stability  # what cannot be asked is refused now
     return problem
+
+
+def _checked(limits: Sequence[Limit], network: Network) -> tuple[Limit, ...]:
+    """Return limits that are all on what a state has."""
+    limits = (limits,) if isinstance(limits, Limit) else tuple(limits)
+    robots = {robot_response(robot.name) for robot in network.scene.robots}
+    for limit in limits:
+        _require(limit.response, {*STATE_RESPONSES, *robots}, "limit")
+    return limits
 
 
 def _of_states(engine: Engine, criterion: Criterion) -> Criterion:
