@@ -155,10 +155,7 @@ def compare(
     rows |= {name: _row(plan) for name, plan in plans.items()}
     loop = None if problem is None else _facts(problem, rows, robots)
     progress("free schedule")
-    free, why_not = free_plan(engine, robots)
-    if free is not None:
-        tables[FREE], rows[FREE] = free.responses(), free_row(free)
-    notes += [why_not] if why_not else []
+    notes += _add_free(engine, robots, rows, tables)
     if problem is not None:
         notes += idle_note(scene, f"{problem.schedule.method} loop", problem.schedule.steps)
     notes += _add_largest(scene, rows, tables)
@@ -178,6 +175,20 @@ def _add_largest(
         rows[name].update(largest(scene, steps), overloaded=bool(over))
         notes += [f"{name}: {excess}" for excess in over]
     return notes
+
+
+def _add_free(
+    engine: Engine,
+    robots: Sequence[str],
+    rows: dict[str, dict[str, object]],
+    tables: dict[str, pd.DataFrame],
+) -> list[str]:
+    """Add the free schedule to rows and tables, or say why there is none."""
+    free, why_not = free_plan(engine, robots)
+    if free is None:
+        return [why_not]
+    tables[FREE], rows[FREE] = free.responses(), free_row(free)
+    return []
 
 
 def _plans(
