@@ -34,7 +34,10 @@ class Counting:
         return self.engine.solve(bricks, grips, want)
 
 
-@pytest.mark.parametrize("criterion", CRITERIA)
+@pytest.mark.parametrize(
+    "criterion",
+    [pytest.param(name, marks=pytest.mark.slow if i else ()) for i, name in enumerate(CRITERIA)],
+)
 @pytest.mark.parametrize("method", SCHEDULES)
 def test_it_chooses_as_the_cascade_does(engine25, method, criterion):
     schedule = SCHEDULES[method](engine25.network)

@@ -210,6 +210,7 @@ def test_robots_by_name_and_those_that_never_grip(capsys, tmp_path):
     assert run(capsys, "analyze", "--method", "published")[2] == ""
 
 
+@pytest.mark.slow
 def test_compare_names_idle_robots_and_degenerate_methods(capsys, tmp_path):
     status, out, _ = run(capsys, "compare")
     assert status == 0
@@ -224,6 +225,7 @@ def test_compare_names_idle_robots_and_degenerate_methods(capsys, tmp_path):
     assert "- cantilever: no brick extends one that is held" in out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("robots", "says"),
     [

@@ -244,10 +244,10 @@ def spoil_dry(table, built):
 
 def spoil_map(table):
     cell = {"bricks": 13, "thickness_m": 0.053, "friction": 0.466}
-    yield spoiled(table, "least_payload", 2.0, **cell, robots=3)
-    yield spoiled(table, "least_payload", np.inf, **cell, robots=4)
-    yield spoiled(table, "least_payload", 0.1, **(cell | {"friction": 0.3}), robots=3)
-    yield table.assign(least_payload=0.5)
+    yield (spoiled(table, "least_payload", 2.0, **cell, robots=3),)
+    yield (spoiled(table, "least_payload", np.inf, **cell, robots=4),)
+    yield (spoiled(table, "least_payload", 0.1, **(cell | {"friction": 0.3}), robots=3),)
+    yield (table.assign(least_payload=0.5),)
 
 
 def spoil_staged(table, chosen):

@@ -284,6 +284,7 @@ def test_refusals_name_the_brick_and_what_opens_a_way(arch, engine25):
     assert seqopt.solve(replace(tight, limits=tuple(enough)), "schedule_search").steps
 
 
+@pytest.mark.slow
 def test_the_front_of_the_arch_rounded(arch):
     problem = replace(arch, goals=pose_goals("F_largest,M_sup,T_max,D_max"))
     rounding = {"F_largest": 5.0, "M_sup": 1.0, "T_max": 5.0, "D_max": 1e-6}

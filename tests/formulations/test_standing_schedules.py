@@ -34,6 +34,7 @@ from seqopt.stability.prover import Prover
 from tests.builders import small_arch
 from tests.strategies import free_builds
 
+slow = pytest.mark.slow
 ONES = WorstRatio("ones", (("F_largest", 100.0), ("M_sup", 10.0)))
 
 
@@ -97,7 +98,7 @@ def check(scene, rules, mortar="dry"):
     assert problem.stability.undecided == 0
 
 
-@pytest.mark.parametrize("least", [1, 2])
+@pytest.mark.parametrize("least", [1, pytest.param(2, marks=slow)])
 def test_a_small_arch_equals_brute_force(least):
     check(small_arch(4), FreeRules(least_grips=least))
 
@@ -131,6 +132,7 @@ def test_a_plan_that_does_not_stand_is_seen(dry):
         judge_schedule(dry, plan.selection, plan.steps)
 
 
+@pytest.mark.slow
 def test_a_better_plan_that_stands_is_seen(dry):
     strict = replace(dry, standing=Standing(DRY, radians(5.0)))
     plan = seqopt.solve(strict, "schedule_search")
@@ -143,7 +145,10 @@ def test_a_better_plan_that_stands_is_seen(dry):
             judge_schedule(dry, worse, plan.steps)
 
 
-@pytest.mark.parametrize("aim", ["bond", "friction", "tilt", "tilt,minmax", "bond,steps"])
+@pytest.mark.parametrize(
+    "aim",
+    ["bond", "bond,steps", *(pytest.param(a, marks=slow) for a in ("friction", "tilt,minmax"))],
+)
 def test_a_margin_is_the_best_to_its_width(dry, aim):
     """With the value that was found a plan exists; past the bound none does."""
     problem = pose_free(dry.engine, dry.rules, ONES, aim)

@@ -144,7 +144,6 @@ EQUIVALENT = (
         Equivalent(OPERATOR, "every <= max", "<=", new, "which way of two that agree is taken")
         for new in ("<", "!=", ">", ">=", "==")
     ),
-    Equivalent(OPERATOR, "swapaxes", "-2", "2", "of four axes these are one"),
     Equivalent(COMPLIANCE, "doubt <= accuracy", "<=", "<", "no doubt is it to the last bit"),
     *(
         Equivalent(COMPLIANCE, "force[~trusted]", "0.0", size, "these sets are answered anew")

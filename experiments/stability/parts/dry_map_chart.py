@@ -7,6 +7,7 @@ import pandas as pd
 
 from experiments.harness.plotting import new_figure, save_figure
 
+DARK = 0.52  # from where figures are white
 LARGEST = 0.7  # payload over the arch's weight at the end of the scale
 
 
@@ -31,7 +32,8 @@ def chart(table: pd.DataFrame) -> None:
             for i, j in np.ndindex(*cells.shape):
                 value = cells.iloc[i, j]
                 text = f"{value:.2f}" if np.isfinite(value) else "–"
-                axis.text(j, i, text, ha="center", va="center", fontsize=8)
+                ink = "white" if value > DARK else "black"
+                axis.text(j, i, text, ha="center", va="center", fontsize=8, color=ink)
             axis.set_xticks(range(cells.shape[1]), [str(n) for n in cells.columns])
             axis.set_yticks(range(cells.shape[0]), [f"{f:g}" for f in cells.index])
             if axis in axes[0]:
