@@ -18,6 +18,9 @@ from seqopt.sequence.schedule import OpenStep
 from seqopt.sequence.steps import Step
 
 
+LISTED = 12  # steps that are named one by one
+
+
 @dataclass(frozen=True)
 class Excess:
     """A limit that some steps of a build exceed.
@@ -39,7 +42,9 @@ class Excess:
     robot: str = ""
 
     def __str__(self) -> str:
-        listed = ", ".join(map(str, self.steps))
+        listed = ", ".join(map(str, self.steps[:LISTED]))
+        if len(self.steps) > LISTED:
+            listed += f" and {len(self.steps) - LISTED} more"
         where = f"step{'s' * (len(self.steps) > 1)} {listed}"
         if self.robot:
             return (
