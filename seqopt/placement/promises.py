@@ -17,7 +17,6 @@ from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import OpenStep
 from seqopt.sequence.steps import Step
 
-
 LISTED = 12  # steps that are named one by one
 
 
