@@ -6,14 +6,14 @@ from contextlib import AbstractContextManager
 from functools import cache
 
 import numpy as np
-from scipy.linalg import blas
+from scipy.linalg import blas, lapack
 from threadpoolctl import ThreadpoolController
 
 from seqopt.errors import MemoryShortError
 from seqopt.work.memory import free_memory
 
 BUFFERS = 100e6  # bytes; taken at once: OpenBLAS waits without end for buffers it does not get
-SOME = 100  # rows of a matrix whose product needs them
+SOME = 200  # rows of a matrix whose product and factors need them
 
 
 def one_thread() -> AbstractContextManager[object]:
@@ -42,7 +42,7 @@ def _libraries() -> ThreadpoolController:
         )
     found = ThreadpoolController()
     with found.limit(limits=1, user_api="blas"):
-        some = np.ones((SOME, SOME))
-        _ = some @ some  # of NumPy's library, and
-        blas.dgemm(1.0, some, some)  # of SciPy's
+        some = np.eye(SOME)
+        _ = some @ some, np.linalg.inv(some)  # of NumPy's library, and
+        _ = blas.dgemm(1.0, some, some), lapack.dgetrf(some)  # of SciPy's
     return found

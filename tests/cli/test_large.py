@@ -139,6 +139,7 @@ def test_a_run_under_a_memory_limit_ends_in_a_line(tmp_path, workers):
     assert statuses == {0, 4}
 
 
+@pytest.mark.slow
 @posix
 @pytest.mark.parametrize("workers", ["1", "2"])
 def test_an_interrupt_names_what_was_chosen(tmp_path, workers):
@@ -163,6 +164,7 @@ def test_an_interrupt_names_what_was_chosen(tmp_path, workers):
     assert not left(run.pid)
 
 
+@pytest.mark.slow
 @posix
 def test_a_killed_worker_is_replaced(tmp_path):
     words = [*WORDS, "overlap_dp", "--out", tmp_path / "out", "--workers", "2"]

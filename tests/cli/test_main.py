@@ -42,6 +42,7 @@ def test_compare(capsys):
     assert "22" in out
 
 
+@pytest.mark.slow
 def test_compare_of_another_scene_shows_no_study(capsys, tmp_path):
     path = scene_file(capsys, tmp_path, lambda d: d.update(name="mine"))
     status, out, _ = run(capsys, "compare", str(path))

@@ -148,6 +148,7 @@ def test_statuses():
     assert [row for row in rows if row.isdigit()] == [str(status.value) for status in Status]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "status"),
     [

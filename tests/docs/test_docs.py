@@ -49,6 +49,7 @@ def test_a_flaw_fails_the_build(tmp_path, flaw):
     assert "index.md" in done.stderr  # the page is at fault, not how it is built
 
 
+@pytest.mark.slow
 def test_readme_shows_two_commands_that_exist(capsys):
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     commands = re.findall(r"```sh\n(.*?)\n```", text, flags=re.DOTALL)

@@ -105,7 +105,7 @@ for new in ("raise RuntimeError", "values = -values; flat = values.ravel()",
     print(trial(module, text.replace(line, f"    {new}\\n"), tests, 5))
 print(trial(module, text + "\\nraise RuntimeError\\n", tests, 60))
 try:
-    trial("seqopt.stability.prover", "raise RuntimeError", tests, 60)
+    trial("seqopt.report.draw", "raise RuntimeError", tests, 60)
 except RuntimeError as error:
     print(error)
 """
@@ -120,6 +120,6 @@ def test_what_becomes_of_a_module_that_is_changed():
     assert done.returncode == 0, done.stderr
     assert done.stdout.split("\n") == [
         *("survived", "killed", "killed", "timed out", "ended", "killed"),
-        *("no test imports seqopt.stability.prover", ""),
+        *("no test imports seqopt.report.draw", ""),
     ]
     assert (ROOT / "seqopt" / "placement" / "ranks.py").read_text(encoding="utf-8") == before

@@ -91,6 +91,7 @@ def test_blocks_keep_volume_and_centroid_as_solids():
     assert all(solid.convex for solid in scene.solids)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["bridge", "curve-3-blocks"])
 def test_what_stands_and_what_does_not_is_seen_by_both(name):
     """As published; without friction; and, for the bridge, with a support set free."""

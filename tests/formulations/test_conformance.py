@@ -242,6 +242,7 @@ def test_an_interrupt_before_any_choice_within_the_budgets_says_the_bound(proble
         solve(replace(problem25, budgets=budgets), "labels", progress=interrupt)
 
 
+@pytest.mark.slow
 @takers
 @given(problem=budgeted())
 @settings(max_examples=40)

@@ -98,6 +98,7 @@ def check(scene, rules, mortar="dry"):
     assert problem.stability.undecided == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("least", [1, pytest.param(2, marks=slow)])
 def test_a_small_arch_equals_brute_force(least):
     check(small_arch(4), FreeRules(least_grips=least))

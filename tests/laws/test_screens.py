@@ -42,6 +42,7 @@ def never_hurts(before, after):
     assert not ((before == STANDS) & (after == FALLS)).any()
 
 
+@pytest.mark.slow
 @settings(max_examples=15)
 @given(questions(), st.integers(1, 10), st.floats(0.1, 1.0), st.floats(10.0, 200.0))
 def test_more_never_hurts(question, extra, friction, payload):

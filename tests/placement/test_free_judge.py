@@ -148,6 +148,7 @@ def front_of(engine25):
     return judged
 
 
+@pytest.mark.slow
 def test_a_set_that_lacks_a_point_is_seen(front_of):
     whole = front_of(lambda found: found)
     assert whole.complete

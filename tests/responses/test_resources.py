@@ -44,6 +44,7 @@ def small_blocks(monkeypatch):
     monkeypatch.setattr(alike, "BLOCK", 50)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["compliance", "auto"])
 @pytest.mark.parametrize("workers", [2, 3])
 def test_results_are_the_same_whatever_the_workers(small_blocks, loop25, name, workers):
@@ -56,6 +57,7 @@ def test_results_are_the_same_whatever_the_workers(small_blocks, loop25, name, w
     assert getattr(shared, "tally", None) == getattr(alone, "tally", None)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("portions", [1, 7, 1000])
 def test_results_are_the_same_however_work_is_shared(small_blocks, loop25, portions, monkeypatch):
     monkeypatch.setattr(division, "PORTIONS", portions)
@@ -100,6 +102,7 @@ def blocks():
     return [block for group in groups for block in group.blocks()]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(ENGINES))
 @settings(max_examples=5)
 @given(order=st.permutations(range(len(blocks()))))

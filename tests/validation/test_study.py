@@ -106,6 +106,7 @@ def test_twisting_steps(tables, quantity):
     assert (np.abs(ours - study) <= 0.05 + 0.02 * study).all()
 
 
+@pytest.mark.slow
 def test_improvement_table(engine25):
     """Maxima of the two-robot methods within 3 %, of the plan, which no fit has seen, within 2 %.
 

@@ -115,6 +115,7 @@ def test_a_worker_that_dies_is_replaced_and_nothing_is_lost(tmp_path):
     assert len(list(tmp_path.iterdir())) == 2  # they did die
 
 
+@pytest.mark.slow
 def test_a_worker_that_dies_while_it_sends_keeps_nobody_waiting(tmp_path):
     """The rest of its answer was waited for without end."""
     with hire(workers=2) as crew:
@@ -123,6 +124,7 @@ def test_a_worker_that_dies_while_it_sends_keeps_nobody_waiting(tmp_path):
     assert len(list(tmp_path.iterdir())) == 1
 
 
+@pytest.mark.slow
 def test_workers_that_always_die_end_in_a_line():
     wanted = pytest.raises(WorkerError, match=r"workers ended 4 times .*BrokenProcessPool")
     with wanted as caught, hire(workers=2) as crew:
