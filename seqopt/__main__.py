@@ -13,7 +13,7 @@ from collections.abc import Callable
 from types import FrameType
 
 INTERRUPTED, FAILED = 130, 4  # as seqopt.cli.status has it, which may not be there yet
-LEAST = 340e6  # bytes of addresses with which a program starts
+LEAST = 400e6  # bytes of addresses with which a program starts
 AGAIN = 0.05  # s after which an interrupt that was lost is raised again
 
 
