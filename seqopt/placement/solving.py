@@ -13,7 +13,7 @@ from typing import Any, overload
 import numpy as np
 
 from seqopt.errors import InfeasibleError, ProblemError
-from seqopt.placement.certificate import judge, least_sum
+from seqopt.placement.certificate import certify_partial, judge, least_sum
 from seqopt.placement.conflicts import refusal
 from seqopt.placement.formulation import (
     End,
@@ -25,6 +25,7 @@ from seqopt.placement.formulation import (
 from seqopt.placement.free_plan import FreePlan, solve_free
 from seqopt.placement.free_problem import FreeProblem
 from seqopt.placement.interface import Handed, PlacementProblem
+from seqopt.placement.pair_search import search_pairs
 from seqopt.placement.plan import Plan
 from seqopt.placement.problem import Problem
 from seqopt.placement.promises import require_possible
@@ -50,6 +51,7 @@ def solve(
     formulation: Formulation | str,
     *,
     proof: bool = True,
+    lazy: bool = False,
     time_limit: float = math.inf,
     progress: Callable[[Finding], object] | None = None,
     **options: Any,
@@ -73,6 +75,7 @@ def solve(
     formulation: Formulation | ScheduleFormulation | str,
     *,
     proof: bool = True,
+    lazy: bool = False,
     time_limit: float = math.inf,
     progress: Callable[[Any], object] | None = None,
     **options: Any,
@@ -88,6 +91,8 @@ def solve(
         Or its name, of `seqopt.formulations`; ``schedule_search`` for the free schedule.
     proof : bool, optional
         False: ``cascade`` or ``rank_search`` solve only what they meet, and no gap is known.
+    lazy : bool, optional
+        Solve only the models that the proof needs; for exact formulations without budgets.
     time_limit : float, optional
         After which, or at an interrupt, it stops choosing, with its best choice and a bound, s.
     progress : callable, optional
@@ -111,10 +116,16 @@ def solve(
     0.0
     """
     if isinstance(problem, FreeProblem):
+        if lazy:
+            raise ProblemError("the free schedule is searched lazily as it is; leave lazy out")
         options |= {} if progress is None else {"progress": progress}
         options |= {} if math.isinf(time_limit) else {"seconds": time_limit}
         return solve_free(problem, formulation, proof=proof, **options)
     found = _fitting(problem, formulation, time_limit, options)
+    if lazy and not proof:
+        raise ProblemError("a lazy search proves what it finds; leave out lazy, or ask for a proof")
+    if lazy:
+        return _solve_lazily(problem, found, Watch(time_limit, progress), options)
     if proof:
         return _solve_all(problem, found, _Run(time_limit, progress), options)
     return _solve_windows(problem, found, options)
@@ -248,6 +259,32 @@ def _solve_windows(
         steps = problem.steps(found.choice)
     stages = {"respond": respond, "rank": seconds["search"] - respond, "verify": seconds["verify"]}
     return Plan(problem, formulation, Selection(found.choice, np.nan), None, steps, stages, found)
+
+
+def _solve_lazily(
+    problem: PlacementProblem, formulation: Formulation, watch: Watch, options: Mapping[str, Any]
+) -> Plan:
+    """Return the certified plan of a search that solves only the models that the proof needs."""
+    if not isinstance(problem, Problem):
+        raise ProblemError("the costs of all choices are given; nothing is saved by a lazy search")
+    if options:
+        raise ProblemError(f"option {min(options)}: a lazy search has no options; leave it out")
+    seconds: dict[str, float] = {}
+    with _timed(seconds, "search"):
+        found = search_pairs(problem, formulation, watch)
+    with _timed(seconds, "verify"):
+        certificate = certify_partial(found.costs, found.selection, found.objective)
+        steps = problem.steps(found.selection.choice)
+    return Plan(
+        problem,
+        formulation,
+        found.selection,
+        certificate,
+        steps,
+        seconds,
+        found.along,
+        found.models,
+    )
 
 
 @contextmanager
