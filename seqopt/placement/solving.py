@@ -7,7 +7,6 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
-from numbers import Real
 from typing import Any, overload
 
 import numpy as np
@@ -15,6 +14,7 @@ import numpy as np
 from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.placement.certificate import certify_partial, judge, least_sum
 from seqopt.placement.conflicts import refusal
+from seqopt.placement.fitting import require_fit, require_time
 from seqopt.placement.formulation import (
     End,
     Formulation,
@@ -34,7 +34,6 @@ from seqopt.placement.schedule_formulation import ScheduleFormulation
 from seqopt.placement.selecting import select
 from seqopt.placement.watch import Finding, Watch
 from seqopt.placement.window_search import search_windows
-from seqopt.scene.checks import short
 
 
 @dataclass(frozen=True)
@@ -167,47 +166,10 @@ def _fitting(
             f"a {type(problem).__name__} is no problem; give one that seqopt.pose made"
         )
     require_fit(problem, found, options)
-    _require_time(found, time_limit)
+    require_time(found, time_limit)
     if isinstance(problem, Problem):
         require_possible(problem)
     return found
-
-
-def require_fit(
-    problem: PlacementProblem, formulation: Formulation | str, options: Mapping[str, object]
-) -> None:
-    """Raise an error unless a formulation is for such a problem and has such options.
-
-    Parameters
-    ----------
-    problem : PlacementProblem
-    formulation : Formulation
-    options : mapping of str to object
-
-    Raises
-    ------
-    ProblemError
-        If the problem has budgets that the formulation does not take, or an option is not its own.
-    """
-    formulation = as_formulation(formulation)
-    if problem.budgets and not formulation.takes_budgets:
-        able = [name for name, other in formulations().items() if other.takes_budgets]
-        raise ProblemError(
-            f"{formulation.name}: the budget {problem.budgets[0].name!r} couples all moves; "
-            f"use {' or '.join(able)}"
-        )
-    for name in options:
-        if name not in formulation.options:
-            known = ", ".join(formulation.options) or "no options"
-            raise ProblemError(f"option {name}: {formulation.name} has {known}")
-
-
-def _require_time(formulation: Formulation, time_limit: float) -> None:
-    """Raise an error unless a time limit is one, and the formulation can keep it."""
-    if not isinstance(time_limit, Real) or not time_limit >= 0:
-        raise ProblemError(f"time_limit is {short(time_limit)}; give seconds from 0")
-    if np.isfinite(time_limit) and not formulation.watched:
-        raise ProblemError(f"{formulation.name} takes no time limit; leave it out")
 
 
 def _solve_all(
