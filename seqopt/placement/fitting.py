@@ -60,3 +60,18 @@ def require_time(formulation: Formulation, time_limit: float) -> None:
         raise ProblemError(f"time_limit is {short(time_limit)}; give seconds from 0")
     if np.isfinite(time_limit) and not formulation.watched:
         raise ProblemError(f"{formulation.name} takes no time limit; leave it out")
+
+
+def require_proof(proof: object) -> None:
+    """Raise an error where a lazy search is to leave out the proof, which is all it is for.
+
+    Parameters
+    ----------
+    proof : bool
+
+    Raises
+    ------
+    ProblemError
+    """
+    if not proof:
+        raise ProblemError("a lazy search proves what it finds; leave out lazy, or ask for a proof")

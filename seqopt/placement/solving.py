@@ -14,7 +14,7 @@ import numpy as np
 from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.placement.certificate import certify_partial, judge, least_sum
 from seqopt.placement.conflicts import refusal
-from seqopt.placement.fitting import require_fit, require_time
+from seqopt.placement.fitting import require_fit, require_proof, require_time
 from seqopt.placement.formulation import (
     End,
     Formulation,
@@ -38,10 +38,12 @@ from seqopt.placement.window_search import search_windows
 
 @dataclass(frozen=True)
 class _Run:
-    """How long a formulation may take, and who is told what it finds."""
+    """How long a formulation may take, who is told what it finds, and which models it is given."""
 
     time_limit: float
-    progress: Callable[[Finding], object] | None
+    progress: Callable[[Any], object] | None
+    proof: bool
+    lazy: bool
 
 
 @overload
@@ -114,20 +116,36 @@ def solve(
     >>> seqopt.solve(seqopt.optimize("arch25").problem, "overlap_dp").certificate.gap
     0.0
     """
+    run = _Run(time_limit, progress, proof, lazy)
     if isinstance(problem, FreeProblem):
-        if lazy:
-            raise ProblemError("the free schedule is searched lazily as it is; leave lazy out")
-        options |= {} if progress is None else {"progress": progress}
-        options |= {} if math.isinf(time_limit) else {"seconds": time_limit}
-        return solve_free(problem, formulation, proof=proof, **options)
+        return _solve_free(problem, formulation, run, options)
     found = _fitting(problem, formulation, time_limit, options)
-    if lazy and not proof:
-        raise ProblemError("a lazy search proves what it finds; leave out lazy, or ask for a proof")
-    if lazy:
-        return _solve_lazily(problem, found, Watch(time_limit, progress), options)
-    if proof:
-        return _solve_all(problem, found, _Run(time_limit, progress), options)
-    return _solve_windows(problem, found, options)
+    return _solve_loop(problem, found, run, options)
+
+
+def _solve_loop(
+    problem: PlacementProblem, formulation: Formulation, run: _Run, options: Mapping[str, Any]
+) -> Plan:
+    """Return the plan of a schedule with open grips."""
+    if run.lazy:
+        require_proof(run.proof)
+        return _solve_lazily(problem, formulation, run, options)
+    if run.proof:
+        return _solve_all(problem, formulation, run, options)
+    return _solve_windows(problem, formulation, options)
+
+
+def _solve_free(
+    problem: FreeProblem,
+    formulation: Formulation | ScheduleFormulation | str,
+    run: _Run,
+    options: dict[str, Any],
+) -> FreePlan:
+    """Return the plan of a free schedule."""
+    options |= {} if run.progress is None else {"progress": run.progress}
+    options |= {} if math.isinf(run.time_limit) else {"seconds": run.time_limit}
+    options |= {"lazy": True} if run.lazy else {}
+    return solve_free(problem, formulation, proof=run.proof, **options)
 
 
 def on_the_way(plan: Plan) -> Plan:
@@ -224,7 +242,7 @@ def _solve_windows(
 
 
 def _solve_lazily(
-    problem: PlacementProblem, formulation: Formulation, watch: Watch, options: Mapping[str, Any]
+    problem: PlacementProblem, formulation: Formulation, run: _Run, options: Mapping[str, Any]
 ) -> Plan:
     """Return the certified plan of a search that solves only the models that the proof needs."""
     if not isinstance(problem, Problem):
@@ -233,7 +251,7 @@ def _solve_lazily(
         raise ProblemError(f"option {min(options)}: a lazy search has no options; leave it out")
     seconds: dict[str, float] = {}
     with _timed(seconds, "search"):
-        found = search_pairs(problem, formulation, watch)
+        found = search_pairs(problem, formulation, Watch(run.time_limit, run.progress))
     with _timed(seconds, "verify"):
         certificate = certify_partial(found.costs, found.selection, found.objective)
         steps = problem.steps(found.selection.choice)
