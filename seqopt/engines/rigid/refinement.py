@@ -17,7 +17,7 @@ from scipy import sparse
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.engines.interface import Fields, join_sets, merge_sets, no_sets
 from seqopt.engines.rigid.grip_equations import grip_forces, still_forces
-from seqopt.engines.rigid.held_operator import held_operator, inner_motion
+from seqopt.engines.rigid.held_operator import held_operator
 from seqopt.engines.rigid.loads import load_matrix
 from seqopt.engines.rigid.loose import HeldSystem, hold_loose
 from seqopt.engines.rigid.mechanism import require_resistance
@@ -49,7 +49,7 @@ class Refinement:
         self.network, self.bricks = network, bricks
         self.parts = ungripped_system(network, bricks, statics)
         self.held: HeldSystem = hold_loose(self.parts)
-        self.inner = inner_motion(self.parts)
+        self.inner = self.parts.inner
         weighed = sparse.csr_array(self.parts.load[None])
         self.pulls = sparse.vstack([self.inner / self.parts.unit, weighed], format="csr")
 
