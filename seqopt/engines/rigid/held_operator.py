@@ -10,7 +10,6 @@ resist them, mostly not at all.
 from __future__ import annotations
 
 import numpy as np
-from scipy import sparse
 
 from seqopt.arrays import Floats
 from seqopt.engines.rigid.loads import inner_edges
