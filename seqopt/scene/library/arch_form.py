@@ -19,8 +19,8 @@ from seqopt.scene.library.laying import joint_width, whole_number
 from seqopt.scene.parts import THICKEST, Robot
 from seqopt.scene.scene import Scene
 
-REMEDY = "give another number of bricks, thinner ones or wider joints"
-TRIED = 6  # numbers of bricks, where none is given
+REMEDY = "give another number of bricks, or shorter or thinner ones"
+TRIED = 8  # numbers of bricks, where none is given
 
 
 @dataclass(frozen=True, kw_only=True)
