@@ -65,9 +65,27 @@ def report_page(
     """
     if not builds:
         raise ProblemError("a report of nothing; give at least one build")
+    data = json.dumps(_data(engine, builds), separators=(",", ":"))
+    parts = {
+        "title": f"{escape(engine.network.scene.name)}, step by step",
+        "sentence": escape(sentence),
+        "tables": "".join(_table(caption, table) for caption, table in tables),
+        "style": _asset("viewer.css"),
+        "data": data.replace("<", "\\u003c"),
+        "three": _asset("three.js"),
+        "viewer": _asset("viewer.js"),
+    }
+    page = _asset("page.html")
+    for name, content in parts.items():
+        page = page.replace(f"<!-- {name} -->", content, 1)
+    return page
+
+
+def _data(engine: Engine, builds: Sequence[Build]) -> dict[str, object]:
+    """Return what the viewer reads, fields for as many builds as there is room for."""
     network = engine.network
     ends = np.cumsum([size_of(network, build) for build in builds])
-    data = {
+    return {
         "structure": structure_data(network),
         "builds": [
             build_data(engine, build, fields=bool(end <= MOST))
@@ -76,19 +94,6 @@ def report_page(
         "responses": RESPONSES,
         "note": LEFT_OUT if ends[-1] > MOST else "",
     }
-    parts = {
-        "title": f"{escape(network.scene.name)}, step by step",
-        "sentence": escape(sentence),
-        "tables": "".join(_table(caption, table) for caption, table in tables),
-        "style": _asset("viewer.css"),
-        "data": json.dumps(data, separators=(",", ":")).replace("<", "\\u003c"),
-        "three": _asset("three.js"),
-        "viewer": _asset("viewer.js"),
-    }
-    page = _asset("page.html")
-    for name, content in parts.items():
-        page = page.replace(f"<!-- {name} -->", content, 1)
-    return page
 
 
 def _asset(name: str) -> str:
