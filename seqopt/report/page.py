@@ -66,15 +66,19 @@ def report_page(
     if not builds:
         raise ProblemError("a report of nothing; give at least one build")
     data = json.dumps(_data(engine, builds), separators=(",", ":"))
-    parts = {
-        "title": f"{escape(engine.network.scene.name)}, step by step",
-        "sentence": escape(sentence),
-        "tables": "".join(_table(caption, table) for caption, table in tables),
-        "style": _asset("viewer.css"),
-        "data": data.replace("<", "\\u003c"),
-        "three": _asset("three.js"),
-        "viewer": _asset("viewer.js"),
-    }
+    return _filled(
+        title=f"{escape(engine.network.scene.name)}, step by step",
+        sentence=escape(sentence),
+        tables="".join(_table(caption, table) for caption, table in tables),
+        style=_asset("viewer.css"),
+        data=data.replace("<", "\\u003c"),
+        three=_asset("three.js"),
+        viewer=_asset("viewer.js"),
+    )
+
+
+def _filled(**parts: str) -> str:
+    """Return the page with its parts in their places."""
     page = _asset("page.html")
     for name, content in parts.items():
         page = page.replace(f"<!-- {name} -->", content, 1)
