@@ -41,12 +41,12 @@ def report_page(
     sentence : str
         What there is to see, in a sentence.
     tables : sequence of (str, pandas.DataFrame), optional
-        Captions and tables above the viewer; a row whose first cell names a build shows it.
+        Captions and tables; a row whose first cell names a build shows it.
 
     Returns
     -------
     str
-        Fields are left out where a page would have more than `MOST` numbers; it says so.
+        Without some fields where there are more than `MOST` numbers; it says so.
 
     Raises
     ------
@@ -65,16 +65,20 @@ def report_page(
     """
     if not builds:
         raise ProblemError("a report of nothing; give at least one build")
-    data = json.dumps(_data(engine, builds), separators=(",", ":"))
     return _filled(
         title=f"{escape(engine.network.scene.name)}, step by step",
         sentence=escape(sentence),
         tables="".join(_table(caption, table) for caption, table in tables),
         style=_asset("viewer.css"),
-        data=data.replace("<", "\\u003c"),
+        data=_json(_data(engine, builds)),
         three=_asset("three.js"),
         viewer=_asset("viewer.js"),
     )
+
+
+def _json(data: object) -> str:
+    """Return JSON that cannot end the script that it stands in."""
+    return json.dumps(data, separators=(",", ":")).replace("<", "\\u003c")
 
 
 def _filled(**parts: str) -> str:
