@@ -6,56 +6,96 @@ import time
 from collections.abc import Sequence
 from dataclasses import fields, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, overload
 
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import make_engine
 from seqopt.errors import ProblemError
 from seqopt.network.build import build_network
+from seqopt.placement.criteria import WORST_OVER_METHODS
+from seqopt.placement.free_plan import FreePlan
+from seqopt.placement.free_problem import FreeProblem, pose_free
 from seqopt.placement.plan import Plan
 from seqopt.placement.problem import pose
 from seqopt.placement.requirements import Criterion, Limit
 from seqopt.placement.solving import solve
 from seqopt.responses.resources import Resources
+from seqopt.scene.checks import short
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import load_scene
+from seqopt.sequence.free_rules import FREE, FreeRules, with_robots
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.schedule_file import find_schedule
 from seqopt.study.presets import CRITERIA, EQUATIONS
+
+FREE_WORDS = ("aim", "rules", "robots", "stands")
+"""Options that the free schedule alone has."""
+
+
+@overload
+def optimize(
+    scene: Scene | str | Path,
+    schedule: Literal["free"],
+    criterion: Criterion | str | None = None,
+    formulation: str | None = None,
+    engine: str = "auto",
+    *,
+    limits: Sequence[Limit] = (),
+    **options: Any,
+) -> FreePlan: ...
+
+
+@overload
+def optimize(
+    scene: Scene | str | Path,
+    schedule: Schedule | Path | str = "three-robot",
+    criterion: Criterion | str | None = None,
+    formulation: str | None = None,
+    engine: str = "auto",
+    *,
+    limits: Sequence[Limit] = (),
+    **options: Any,
+) -> Plan: ...
 
 
 def optimize(
     scene: Scene | str | Path,
     schedule: Schedule | Path | str = "three-robot",
-    criterion: Criterion | str = EQUATIONS,
-    formulation: str = "overlap_dp",
+    criterion: Criterion | str | None = None,
+    formulation: str | None = None,
     engine: str = "auto",
     *,
     limits: Sequence[Limit] = (),
     **options: Any,
-) -> Plan:
-    """Choose where robots hold over a whole build.
+) -> Plan | FreePlan:
+    """Choose where robots hold over a whole build, or with a free schedule every step of it.
 
     Parameters
     ----------
     scene : Scene, str or pathlib.Path
         Or the name of a built-in scene, or a scene file.
     schedule : Schedule, pathlib.Path or str
-        A key of `seqopt.sequence.three_robots.SCHEDULES`, a schedule file, or a schedule.
-    criterion : Criterion or str
-        What a step costs; or a name of `seqopt.CRITERIA`.
-    formulation : str
-        One of `seqopt.formulations`.
+        A key of `seqopt.sequence.three_robots.SCHEDULES`, a schedule file, or a schedule;
+        ``"free"`` where any robot may release, hold or place next.
+    criterion : Criterion or str, optional
+        What a step costs; or a name of `seqopt.CRITERIA`. By default ``"equations-2-3"``, of the
+        free schedule ``"worst-ratio"``.
+    formulation : str, optional
+        One of `seqopt.formulations`, by default ``"overlap_dp"``; the free schedule has its own,
+        ``"schedule_search"``.
     engine : str
         A key of `seqopt.engines.registry.ENGINES`; ``"auto"`` models no more than is needed.
     limits : sequence of Limit
-        What no open step may exceed.
+        What no open step may exceed; of the free schedule no step.
     **options
-        Of `seqopt.responses.Resources` (as ``workers=2``), `seqopt.solve` and the formulation.
+        Of `seqopt.solve` and the formulation; and of `seqopt.responses.Resources` (as
+        ``workers=2``) or, with the free schedule, ``aim`` and ``stands`` as
+        `seqopt.pose_free` takes them, ``rules`` (a `seqopt.FreeRules`), ``robots`` (names of those
+        that take part, or how many; further ones than the scene's are mobile).
 
     Returns
     -------
-    Plan
+    Plan or FreePlan
 
     Raises
     ------
@@ -68,12 +108,51 @@ def optimize(
     >>> plan = seqopt.optimize("arch25", criterion="worst-ratio-published", formulation="minimax")
     >>> round(plan.certificate.objective, 3)
     1.185
+    >>> free = seqopt.optimize("arch25", "free", "worst-ratio-published", aim="minmax,steps")
+    >>> free
+    FreePlan('arch25', 50 steps, minmax 0.840088, steps 50, optimal)
     """
     start = time.perf_counter()
-    parts = *_assemble(scene, schedule, engine), find_criterion(criterion), limits, ()
+    made = load_scene(scene) if isinstance(scene, str | Path) else scene
+    if isinstance(schedule, str) and schedule == FREE:
+        problem = _pose_free(made, criterion or WORST_OVER_METHODS, engine, limits, options)
+        assemble = time.perf_counter() - start
+        free = solve(problem, formulation or "schedule_search", **options)
+        return replace(free, seconds={"assemble": assemble, **free.seconds})
+    _refuse(options, FREE_WORDS, f"only the free schedule has it; give schedule={FREE!r}")
+    parts = *_assemble(made, schedule, engine), find_criterion(criterion or EQUATIONS), limits, ()
     assemble = time.perf_counter() - start
-    plan = solve(pose(*parts, _resources(options)), formulation, **options)
+    plan = solve(pose(*parts, _resources(options)), formulation or "overlap_dp", **options)
     return replace(plan, seconds={"assemble": assemble, **plan.seconds})
+
+
+def _pose_free(
+    scene: Scene,
+    criterion: Criterion | str,
+    engine: str,
+    limits: Sequence[Limit],
+    options: dict[str, Any],
+) -> FreeProblem:
+    """Return the problem of a free schedule; what options say of it is taken out of them."""
+    own = [field.name for field in fields(Resources)]
+    _refuse(options, own, "the free schedule has no such; leave it out")
+    aim, stands = options.pop("aim", "minmax"), options.pop("stands", None)
+    rules, robots = options.pop("rules", FreeRules()), options.pop("robots", ())
+    if not isinstance(rules, FreeRules):
+        raise ProblemError(f"rules {short(rules)}: give a seqopt.FreeRules")
+    if isinstance(robots, int):
+        scene = with_robots(scene, robots)
+    elif robots:
+        rules = replace(rules, robots=robots)
+    made = make_engine(engine, build_network(scene))
+    return pose_free(made, rules, find_criterion(criterion), aim, limits, stands)
+
+
+def _refuse(options: dict[str, Any], names: Sequence[str], why: str) -> None:
+    """Raise an error if an option is given that does not go with the schedule."""
+    for name in names:
+        if name in options:
+            raise ProblemError(f"option {name}: {why}")
 
 
 def _resources(options: dict[str, Any]) -> Resources:
@@ -83,10 +162,10 @@ def _resources(options: dict[str, Any]) -> Resources:
 
 
 def _assemble(
-    scene: Scene | str | Path, schedule: Schedule | Path | str, engine: str
+    scene: Scene, schedule: Schedule | Path | str, engine: str
 ) -> tuple[Engine, Schedule]:
     """Return the engine and the schedule of a scene."""
-    network = build_network(load_scene(scene) if isinstance(scene, str | Path) else scene)
+    network = build_network(scene)
     return make_engine(engine, network), find_schedule(network, schedule)
 
 

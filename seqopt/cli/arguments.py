@@ -16,7 +16,6 @@ from seqopt.cli.common_arguments import (
     robust_arguments,
     strict_argument,
 )
-from seqopt.cli.free import FREE
 from seqopt.cli.free_arguments import add_pareto, add_rules
 from seqopt.cli.status import Status
 from seqopt.cli.terminal import complain, show
@@ -25,6 +24,7 @@ from seqopt.engines.registry import ENGINES
 from seqopt.placement.formulation import formulation_names
 from seqopt.responses.staged import Placing
 from seqopt.scene.scene_file import builtin_scenes
+from seqopt.sequence.free_rules import FREE
 from seqopt.sequence.three_robots import SCHEDULES
 from seqopt.sequence.two_robots import METHODS
 from seqopt.study.published import PUBLISHED

@@ -35,11 +35,9 @@ from seqopt.report.methods import method_tables
 from seqopt.responses.table import analyze
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import dump_scene, load_scene
-from seqopt.sequence.free_rules import with_robots
+from seqopt.sequence.free_rules import FREE, with_robots
 from seqopt.sequence.schedule_file import find_schedule
 from seqopt.sequence.steps import Step, idle_robots
-
-FREE = "free"  # the schedule that is no list of steps
 
 
 def optimize_free(options: argparse.Namespace) -> Status:

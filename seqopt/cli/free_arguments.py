@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from seqopt.cli.free import FREE
+from seqopt.sequence.free_rules import FREE
 from seqopt.sequence.three_robots import SCHEDULES
 
 RULES = (

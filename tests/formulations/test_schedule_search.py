@@ -22,7 +22,7 @@ from seqopt.placement.free_problem import pose_free
 from seqopt.placement.front import find_front, pick, upper_bounds
 from seqopt.placement.loop_front import LoopFront
 from seqopt.placement.requirements import LIMIT_TOLERANCE, Limit
-from seqopt.placement.schedule_formulation import find_schedule_formulation
+from seqopt.placement.schedule_formulation import Finds, find_schedule_formulation
 from seqopt.responses.quantities import CHOSEN_BY, lengths
 from seqopt.sequence.free_check import RuleBook
 from seqopt.sequence.free_rules import FreeRules, Payload, with_robots
@@ -321,8 +321,43 @@ def test_the_front_of_the_loop_holds_its_best_peak(engine25):
     assert front.table["F_largest"].min() == pytest.approx(least)
 
 
+def test_the_short_cut_does_what_the_long_way_does():
+    scene, limits = small_arch(5), [Limit("F_largest", 250.0)]
+    rules = FreeRules(ending="held")
+    engine = ComplianceEngine(build_network(with_robots(scene, 4)))
+    problem = pose_free(engine, rules, ONES, "minmax,steps", limits, "bond=1e5")
+    plan = seqopt.solve(problem, "schedule_search")
+    words = {"aim": "minmax,steps", "rules": rules, "robots": 4, "stands": "bond=1e5"}
+    short = seqopt.optimize(scene, "free", ONES, engine="compliance", limits=limits, **words)
+    assert (short.steps, short.objective) == (plan.steps, plan.objective)
+    assert [*short.seconds] == ["assemble", "solve", "verify"]
+    alone = seqopt.optimize(scene, "free", robots=["rob1", "rob3"], rules=FreeRules(least_grips=1))
+    assert alone.problem.criterion.name == "worst-ratio"
+    assert alone.summary()["rules"]["robots"] == ["rob1", "rob3"]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ({"criterion": "equations-2-3"}, "equations-2-3: it ranks the choices of a move"),
+        ({"formulation": "overlap_dp"}, "'overlap_dp' is no formulation of the free schedule"),
+        ({"formulation": "pareto_zones"}, "one plan is asked for; use schedule_search"),
+        ({"workers": 2}, "option workers: the free schedule has no such"),
+        ({"rules": {"regrips": 0}}, "rules {'regrips': 0}: give a seqopt.FreeRules"),
+        ({"robots": 9}, "9 robots: the free schedule takes two to 5"),
+        ({"robots": "rob9"}, "robot 'rob9': there is no such; give some of rob1"),
+        ({"width": 3, "depth": 1}, "option depth: schedule_search has width"),
+        ({"schedule": "loop", "aim": "steps"}, "option aim: only the free schedule has it"),
+    ],
+)
+def test_the_short_cut_says_in_a_line_what_does_not_fit(words, said):
+    with pytest.raises(seqopt.SeqoptError, match=said) as caught:
+        seqopt.optimize(**{"scene": small_arch(4), "schedule": "free"} | words)
+    assert "\n" not in str(caught.value)
+
+
 def test_formulations_are_found_by_name():
-    assert find_schedule_formulation("pareto_zones").kind.value == "exact"
+    assert find_schedule_formulation("pareto_zones", Finds.FRONT).kind.value == "exact"
     with pytest.raises(
         ProblemError, match="no formulation of the free schedule; give pareto_zones"
     ):
