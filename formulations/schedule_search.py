@@ -150,6 +150,7 @@ def _below(problem: FreeProblem, ceiling: float, growth: float, tell: Tell) -> S
         if graph.whole or threshold >= ceiling or graph.excluded == np.inf:
             return graph
         threshold = min(ceiling, max(graph.excluded, threshold * growth))
+        del graph  # or two of them would need memory at once
 
 
 def _selection(graph: StateGraph) -> ScheduleSelection:

@@ -8,7 +8,6 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any, Literal, overload
 
-from seqopt.engines.interface import Engine
 from seqopt.engines.registry import make_engine
 from seqopt.errors import ProblemError
 from seqopt.network.build import build_network
@@ -29,7 +28,16 @@ from seqopt.sequence.schedule_file import find_schedule
 from seqopt.study.presets import CRITERIA, EQUATIONS
 
 FREE_WORDS = ("aim", "rules", "robots", "stands")
-"""Options that the free schedule alone has."""
+"""Options that the free schedule alone has.
+
+``robots`` are names, or how many take part: further ones than the scene's are mobile.
+"""
+DEFAULTS: dict[str, tuple[Criterion, str]] = {
+    FREE: (WORST_OVER_METHODS, "schedule_search"),
+    "any other": (EQUATIONS, "overlap_dp"),
+}
+"""Criterion and formulation by schedule, where none is given."""
+Asked = tuple[Criterion | str | None, str | None, str]  # criterion, formulation, engine
 
 
 @overload
@@ -75,23 +83,18 @@ def optimize(
     scene : Scene, str or pathlib.Path
         Or the name of a built-in scene, or a scene file.
     schedule : Schedule, pathlib.Path or str
-        A key of `seqopt.sequence.three_robots.SCHEDULES`, a schedule file, or a schedule;
-        ``"free"`` where any robot may release, hold or place next.
+        One, its file, or a key of `seqopt.sequence.three_robots.SCHEDULES`; ``"free"``.
     criterion : Criterion or str, optional
-        What a step costs; or a name of `seqopt.CRITERIA`. By default ``"equations-2-3"``, of the
-        free schedule ``"worst-ratio"``.
+        What a step costs; or a name of `seqopt.CRITERIA`, by default that of `DEFAULTS`.
     formulation : str, optional
-        One of `seqopt.formulations`, by default ``"overlap_dp"``; the free schedule has its own,
-        ``"schedule_search"``.
+        One of `seqopt.formulations`; the free schedule has its own; by default of `DEFAULTS`.
     engine : str
         A key of `seqopt.engines.registry.ENGINES`; ``"auto"`` models no more than is needed.
     limits : sequence of Limit
         What no open step may exceed; of the free schedule no step.
     **options
-        Of `seqopt.solve` and the formulation; and of `seqopt.responses.Resources` (as
-        ``workers=2``) or, with the free schedule, ``aim`` and ``stands`` as
-        `seqopt.pose_free` takes them, ``rules`` (a `seqopt.FreeRules`), ``robots`` (names of those
-        that take part, or how many; further ones than the scene's are mobile).
+        Of `seqopt.solve`, the formulation, `seqopt.responses.Resources` (as ``workers=2``); of the
+        free schedule ``aim``, ``rules`` and ``stands`` of `seqopt.pose_free`, and ``robots``.
 
     Returns
     -------
@@ -105,31 +108,48 @@ def optimize(
     Examples
     --------
     >>> import seqopt
-    >>> plan = seqopt.optimize("arch25", criterion="worst-ratio-published", formulation="minimax")
-    >>> round(plan.certificate.objective, 3)
-    1.185
-    >>> free = seqopt.optimize("arch25", "free", "worst-ratio-published", aim="minmax,steps")
-    >>> free
+    >>> seqopt.optimize("arch25", "free", "worst-ratio-published", aim="minmax,steps")
     FreePlan('arch25', 50 steps, minmax 0.840088, steps 50, optimal)
     """
-    start = time.perf_counter()
     made = load_scene(scene) if isinstance(scene, str | Path) else scene
     if isinstance(schedule, str) and schedule == FREE:
-        problem = _pose_free(made, criterion or WORST_OVER_METHODS, engine, limits, options)
-        assemble = time.perf_counter() - start
-        free = solve(problem, formulation or "schedule_search", **options)
-        return replace(free, seconds={"assemble": assemble, **free.seconds})
+        return _optimize_free(made, (criterion, formulation, engine), limits, options)
+    return _optimize(made, schedule, (criterion, formulation, engine), limits, options)
+
+
+def _optimize(
+    scene: Scene,
+    schedule: Schedule | Path | str,
+    asked: Asked,
+    limits: Sequence[Limit],
+    options: dict[str, Any],
+) -> Plan:
+    """Return the plan of a schedule with open grips."""
+    start, (criterion, formulation) = time.perf_counter(), DEFAULTS["any other"]
     _refuse(options, FREE_WORDS, f"only the free schedule has it; give schedule={FREE!r}")
-    parts = *_assemble(made, schedule, engine), find_criterion(criterion or EQUATIONS), limits, ()
+    network = build_network(scene)
+    engine, found = make_engine(asked[2], network), find_schedule(network, schedule)
+    chosen, resources = find_criterion(asked[0] or criterion), _resources(options)
+    problem = pose(engine, found, chosen, limits, (), resources)
     assemble = time.perf_counter() - start
-    plan = solve(pose(*parts, _resources(options)), formulation or "overlap_dp", **options)
+    plan = solve(problem, asked[1] or formulation, **options)
+    return replace(plan, seconds={"assemble": assemble, **plan.seconds})
+
+
+def _optimize_free(
+    scene: Scene, asked: Asked, limits: Sequence[Limit], options: dict[str, Any]
+) -> FreePlan:
+    """Return the plan of the free schedule."""
+    start, (criterion, formulation) = time.perf_counter(), DEFAULTS[FREE]
+    problem = _pose_free(scene, (asked[0] or criterion, asked[2]), limits, options)
+    assemble = time.perf_counter() - start
+    plan = solve(problem, asked[1] or formulation, **options)
     return replace(plan, seconds={"assemble": assemble, **plan.seconds})
 
 
 def _pose_free(
     scene: Scene,
-    criterion: Criterion | str,
-    engine: str,
+    asked: tuple[Criterion | str, str],
     limits: Sequence[Limit],
     options: dict[str, Any],
 ) -> FreeProblem:
@@ -144,8 +164,8 @@ def _pose_free(
         scene = with_robots(scene, robots)
     elif robots:
         rules = replace(rules, robots=robots)
-    made = make_engine(engine, build_network(scene))
-    return pose_free(made, rules, find_criterion(criterion), aim, limits, stands)
+    engine = make_engine(asked[1], build_network(scene))
+    return pose_free(engine, rules, find_criterion(asked[0]), aim, limits, stands)
 
 
 def _refuse(options: dict[str, Any], names: Sequence[str], why: str) -> None:
@@ -159,14 +179,6 @@ def _resources(options: dict[str, Any]) -> Resources:
     """Take out of options what they say of resources."""
     given = {field.name for field in fields(Resources)} & options.keys()
     return Resources(**{name: options.pop(name) for name in given})
-
-
-def _assemble(
-    scene: Scene, schedule: Schedule | Path | str, engine: str
-) -> tuple[Engine, Schedule]:
-    """Return the engine and the schedule of a scene."""
-    network = build_network(scene)
-    return make_engine(engine, network), find_schedule(network, schedule)
 
 
 def find_criterion(criterion: Criterion | str) -> Criterion:

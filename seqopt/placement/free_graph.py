@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from seqopt.arrays import Bools, Floats, Ints
+from seqopt.arrays import Bools, Floats, Ints, frozen
 from seqopt.placement.free_goals import Measure
 from seqopt.placement.free_problem import FreeProblem
 from seqopt.sequence.free_moves import Moves
@@ -75,6 +75,11 @@ class Level:
     values: Floats
     inner: Arcs
     onward: Arcs
+
+
+_NONE: Rows = frozen(np.zeros(0, dtype=np.int32))
+NO_ARCS = Arcs(_NONE, _NONE, frozen(np.zeros(0, dtype=bool)), frozen(np.zeros(0)))
+NOTHING = Level(frozen(np.zeros((0, 0), dtype=int)), frozen(np.zeros((0, 0))), NO_ARCS, NO_ARCS)
 
 
 @dataclass(eq=False)
@@ -157,8 +162,7 @@ def explore(
         With fewer levels where no state of the next one is reached.
     """
     graph, space = StateGraph(problem), problem.space
-    none = _no_arcs()
-    level = Level(space.start(), np.zeros((1, len(problem.goals))), none, none)
+    level = Level(space.start(), np.zeros((1, len(problem.goals))), NO_ARCS, NO_ARCS)
     for bricks in range(1, space.bricks + 1):
         graph.levels.append(level)
         tell(graph)
@@ -204,7 +208,7 @@ def _close(
     rank[order] = np.arange(len(order))
     states, values = states[order], values[order]
     arcs = [_arcs(problem, Moves(rank[m.source], *m[1:]), states, regrip=hold) for m, hold in parts]
-    return Level(states, values, _joined(arcs), _no_arcs()), excluded
+    return Level(states, values, _joined(arcs), NO_ARCS), excluded
 
 
 def _chosen(
@@ -234,11 +238,6 @@ def _arcs(problem: FreeProblem, moves: Moves, states: Ints, *, regrip: bool) -> 
 
 def _joined(parts: list[Arcs]) -> Arcs:
     if not parts:
-        return _no_arcs()
+        return NO_ARCS
     names = ("source", "target", "regrip", "way")
     return Arcs(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
-
-
-def _no_arcs() -> Arcs:
-    none = np.zeros(0, dtype=np.int32)
-    return Arcs(none, none, np.zeros(0, dtype=bool), np.zeros(0))
