@@ -83,7 +83,7 @@ def add_pareto(
         "--aim",
         default=FOUR,
         metavar="NAME,NAME",
-        help="what is to be small: responses and, of the free schedule, steps or regrips "
+        help="what is to be small: responses and, of the free schedule, steps and regrips "
         "(default: %(default)s)",
     )
     command.add_argument(

@@ -93,11 +93,14 @@ class StateGraph:
         By brick count; as many as were reached.
     excluded : float
         The least that the first goal takes of a state that was left out for it.
+    held : int or None
+        How many grips are held where the build ends; any number by default.
     """
 
     problem: FreeProblem
     levels: list[Level] = field(default_factory=list)
     excluded: float = np.inf
+    held: int | None = None
 
     @property
     def whole(self) -> bool:
@@ -111,7 +114,9 @@ class StateGraph:
         -------
         (n,) bool
         """
-        return self.problem.space.ended(self.levels[-1].states)
+        states = self.levels[-1].states
+        ends = self.problem.space.ended(states)
+        return ends if self.held is None else ends & (self.problem.space.grips(states) == self.held)
 
     def costs(self, goal: int, level: int, arcs: Arcs) -> Floats:
         """Return what a goal takes of moves to a level.

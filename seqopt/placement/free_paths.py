@@ -105,7 +105,7 @@ def keep_best(graph: StateGraph, goal: int) -> tuple[StateGraph, float]:
             onward = onward.only(tight(b, b + 1, onward))
         levels.append(_part(level, nodes[b], (inner, onward), rank[b : b + 2]))
         graph.levels[b] = NOTHING  # or both graphs would need memory at once
-    return StateGraph(graph.problem, levels), least
+    return StateGraph(graph.problem, levels, held=graph.held), least
 
 
 def shortest(graph: StateGraph) -> list[tuple[int, int]]:
@@ -205,7 +205,7 @@ def below(graph: StateGraph, bounds: Floats) -> StateGraph | None:
         if b + 1 < len(graph.levels):
             onward = onward.only(nodes[b][onward.source] & nodes[b + 1][onward.target])
         levels.append(_part(level, nodes[b], (inner, onward), rank[b : b + 2]))
-    return StateGraph(graph.problem, levels)
+    return StateGraph(graph.problem, levels, held=graph.held)
 
 
 def reaches_end(graph: StateGraph) -> bool:

@@ -116,6 +116,19 @@ class FreeSpace:
         """
         return np.sort(states[:, : self.robots].clip(min=0), axis=1)
 
+    def grips(self, states: Ints) -> Ints:
+        """Return how many grips are held.
+
+        Parameters
+        ----------
+        states : (n, c) int
+
+        Returns
+        -------
+        (n,) int
+        """
+        return np.asarray((states[:, : self.robots] > 0).sum(axis=1))
+
     def places(self, bricks: int, states: Ints) -> Moves:
         """Return the moves that place the next brick; a free robot then holds it.
 
@@ -206,8 +219,7 @@ class FreeSpace:
         (n,) bool
         """
         held = states[:, : self.robots]
-        grips = (held > 0).sum(axis=1)
-        ok = np.asarray(grips >= (self.rules.least_grips if bricks > 1 else 0))
+        ok = np.asarray(self.grips(states) >= (self.rules.least_grips if bricks > 1 else 0))
         if self.rules.newest is not Newest.FREE:
             nodes = 2 * bricks + np.array([-1, 0])
             newest = np.zeros(len(states), dtype=bool)
