@@ -154,7 +154,7 @@ def _pose_free(
     options: dict[str, Any],
 ) -> FreeProblem:
     """Return the problem of a free schedule; what options say of it is taken out of them."""
-    own = [field.name for field in fields(Resources)]
+    own = [field.name for field in fields(Resources) if field.name != "max_memory"]
     _refuse(options, own, "the free schedule has no such; leave it out")
     aim, stands = options.pop("aim", "minmax"), options.pop("stands", None)
     rules, robots = options.pop("rules", FreeRules()), options.pop("robots", ())

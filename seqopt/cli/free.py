@@ -11,6 +11,7 @@ import pandas as pd
 
 from seqopt.cli.asked import asked_engine
 from seqopt.cli.criteria import parse_criterion
+from seqopt.cli.means import parse_size
 from seqopt.cli.outputs import require_matplotlib, write_outputs
 from seqopt.cli.rules import parse_rules, parse_standing
 from seqopt.cli.status import Status
@@ -59,6 +60,8 @@ def optimize_free(options: argparse.Namespace) -> Status:
     require_folder(options.out)
     whole = {name: type(formulation.options[name])(value) for name, value in numbers.items()}
     limit = parse_time_limit(options.time_limit)
+    if options.max_memory is not None:
+        whole["max_memory"] = parse_size(options.max_memory)
     proof = not options.no_proof
     plan = solve(problem, formulation, proof=proof, time_limit=limit, progress=progress, **whole)
     table = plan.responses()
@@ -143,7 +146,7 @@ def require_loop(options: argparse.Namespace) -> None:
 
 def _require_free(options: argparse.Namespace) -> None:
     """Raise an error if options that the free schedule does not have are given with it."""
-    unknown = ("budget", "candidates", "cache", "max_memory", "ranked", "among")
+    unknown = ("budget", "candidates", "cache", "ranked", "among")
     given = [name for name in unknown if getattr(options, name)]
     given += ["workers"] if options.workers != "1" else []
     if given:

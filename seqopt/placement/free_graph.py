@@ -8,7 +8,7 @@ through it.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -117,6 +117,16 @@ class StateGraph:
         states = self.levels[-1].states
         ends = self.problem.space.ended(states)
         return ends if self.held is None else ends & (self.problem.space.grips(states) == self.held)
+
+    @property
+    def nbytes(self) -> int:
+        """How much memory states and moves take."""
+        total = 0
+        for level in self.levels:
+            total += level.states.nbytes + level.values.nbytes
+            for arcs in (level.inner, level.onward):
+                total += sum(getattr(arcs, each.name).nbytes for each in fields(arcs))
+        return total
 
     def costs(self, goal: int, level: int, arcs: Arcs) -> Floats:
         """Return what a goal takes of moves to a level.

@@ -313,10 +313,25 @@ def test_time_and_interrupts_leave_a_plan_and_a_bound(arch, monkeypatch):
     assert plan.selection.stopped == "interrupt"
     assert 0 < plan.selection.bound[0] <= 0.8401 <= plan.selection.objective[0] + 1e-4
     assert plan.certificate.gap == np.inf
-    with pytest.raises(ProblemError, match="too few to find a plan"):
+    with pytest.raises(ProblemError, match="too little to find a plan"):
         seqopt.solve(arch, "schedule_search", seconds=0.0)
     with pytest.raises(ProblemError, match="option speed: schedule_search has width"):
         seqopt.solve(arch, "schedule_search", speed=2)
+
+
+def test_where_memory_ends_there_is_a_bound(arch):
+    best = seqopt.solve(arch, "schedule_search").selection.objective[0]
+    short = seqopt.solve(replace(arch), "schedule_search", max_memory=1e6)
+    assert (short.status, short.selection.stopped) == ("feasible", "memory")
+    assert best / 2 < short.selection.bound[0] <= best <= short.selection.objective[0]
+    for words, said in (
+        ({"max_memory": 1e3}, "max_memory: it is too"),
+        ({"seconds": 0}, "seconds"),
+    ):
+        for aim in ("minmax", "tilt,minmax"):
+            problem = replace(arch, goals=pose_goals(aim))
+            with pytest.raises(ProblemError, match=said):
+                seqopt.solve(problem, "schedule_search", **words)
 
 
 def test_travel_is_that_of_the_steps():
