@@ -20,6 +20,7 @@ from seqopt.placement.requirements import Criterion, Limit
 from seqopt.placement.solving import solve
 from seqopt.responses.resources import Resources
 from seqopt.scene.checks import short
+from seqopt.scene.orders import in_order
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.free_rules import FREE, FreeRules, with_robots
@@ -94,7 +95,8 @@ def optimize(
         What no open step may exceed; of the free schedule no step.
     **options
         Of `seqopt.solve`, the formulation, `seqopt.responses.Resources` (as ``workers=2``); of the
-        free schedule ``aim``, ``rules`` and ``stands`` of `seqopt.pose_free`, and ``robots``.
+        free schedule ``aim``, ``rules`` and ``stands`` of `seqopt.pose_free`, and ``robots``; and
+        ``order``, of `seqopt.build_network`.
 
     Returns
     -------
@@ -112,6 +114,7 @@ def optimize(
     FreePlan('arch25', 50 steps, minmax 0.840088, steps 50, optimal)
     """
     made = load_scene(scene) if isinstance(scene, str | Path) else scene
+    made = in_order(made, options.pop("order", None))
     if isinstance(schedule, str) and schedule == FREE:
         return _optimize_free(made, (criterion, formulation, engine), limits, options)
     return _optimize(made, schedule, (criterion, formulation, engine), limits, options)

@@ -23,6 +23,7 @@ from seqopt.contact.mortar import MORTARS
 from seqopt.engines.registry import ENGINES
 from seqopt.placement.formulation import formulation_names
 from seqopt.responses.staged import Placing
+from seqopt.scene.orders import ORDERS
 from seqopt.scene.scene_file import builtin_scenes
 from seqopt.sequence.free_rules import FREE
 from seqopt.sequence.three_robots import SCHEDULES
@@ -77,6 +78,12 @@ def _scene_argument() -> _Parser:
         default="arch25",
         metavar="SCENE",
         help=f"a built-in scene ({', '.join(builtin_scenes())}) or a JSON file; arch25 by default",
+    )
+    scene.add_argument(
+        "--order",
+        metavar="ORDER",
+        help=f"in which bricks are placed, in the place of the scene's own: {', '.join(ORDERS)} "
+        "(all ground ends at once), or their names, as 1..12,25..13",
     )
     return scene
 

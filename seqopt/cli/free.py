@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 
 import pandas as pd
 
-from seqopt.cli.asked import asked_engine
+from seqopt.cli.asked import asked_engine, asked_scene, scene_file
 from seqopt.cli.criteria import parse_criterion
 from seqopt.cli.means import parse_size
 from seqopt.cli.outputs import require_matplotlib, write_outputs
@@ -35,7 +35,6 @@ from seqopt.report.fronts import shown_table, worst_of
 from seqopt.report.methods import method_tables
 from seqopt.responses.table import analyze
 from seqopt.scene.scene import Scene
-from seqopt.scene.scene_file import dump_scene, load_scene
 from seqopt.sequence.free_rules import FREE, with_robots
 from seqopt.sequence.schedule_file import find_schedule
 from seqopt.sequence.steps import Step, idle_robots
@@ -71,7 +70,7 @@ def optimize_free(options: argparse.Namespace) -> Status:
     }
     if problem.standing is not None:
         files["stability.csv"] = csv_text(plan.stability())
-    write_outputs(options, files | _scene_file(options, scene))
+    write_outputs(options, files | scene_file(options, scene))
     values = ", ".join(f"{name} {value:.6g}" for name, value in plan.objective.items())
     say(
         f"{formulation.name} ({formulation.kind.value}): {values}, {plan.status}; "
@@ -117,7 +116,7 @@ def pareto(options: argparse.Namespace) -> Status:
         values = shown_table(front.table).iloc[chosen]
         row = ", ".join(f"{name} {value:.6g}" for name, value in values.items())
         said += f"; picked row {chosen + 1}: {row}"
-    write_outputs(options, files | _scene_file(options, scene))
+    write_outputs(options, files | scene_file(options, scene))
     say(f"{said}; written to {options.out}")
     return Status.DONE
 
@@ -157,7 +156,7 @@ def _require_free(options: argparse.Namespace) -> None:
 
 def _posed(options: argparse.Namespace, aim: str) -> tuple[Scene, FreeProblem]:
     """Return the scene with its robots, and the problem of its free schedule."""
-    scene = load_scene(options.scene)
+    scene = asked_scene(options)
     names = parse_robots(options.robots)
     if options.robots.isdecimal():
         scene, names = with_robots(scene, int(options.robots)), ()
@@ -226,9 +225,3 @@ def _under(texts: Sequence[str], methods: Mapping[str, pd.DataFrame]) -> dict[st
         for name, value in bounds.items():
             out[name] = min(value, out.get(name, value))
     return out
-
-
-def _scene_file(options: argparse.Namespace, scene: Scene) -> dict[str, bytes | str]:
-    """Return the scene where its robots are others than those of the scene that was named."""
-    same = len(load_scene(options.scene).robots) == len(scene.robots)
-    return {} if same else {"scene.json": dump_scene(scene)}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import time
 
-from seqopt.cli.asked import payloads_hold, say_idle, say_levels
+from seqopt.cli.asked import payloads_hold, say_idle, say_levels, scene_file
 from seqopt.cli.free import optimize_free, require_loop
 from seqopt.cli.outputs import plan_files, worth, write_outputs
 from seqopt.cli.posing import asked_problem
@@ -52,18 +52,19 @@ def optimize(options: argparse.Namespace) -> Status:
         "seconds": {"assemble": assemble, **plan.seconds},
     }
     table = plan.responses()
-    write_outputs(options, plan_files(plan, report))
+    scene = problem.schedule.scene
+    write_outputs(options, plan_files(plan, report) | scene_file(options, scene))
     say(
         f"{formulation.name} ({formulation.kind.value}): {worth(plan)}, "
         f"{plan.models} models; written to {options.out}"
     )
     for excess in plan.overloads:
         say(f"payload exceeded: {excess}")
-    say_idle(problem.schedule.scene, plan.steps)
+    say_idle(scene, plan.steps)
     if plan.selection.end is End.INTERRUPTED:
         complain("seqopt: interrupted; the plan is the best that was met")
         return Status.INTERRUPTED
-    return payloads_hold(options, problem.schedule.scene, table)
+    return payloads_hold(options, scene, table)
 
 
 def _paper_count(schedule: Schedule) -> dict[str, int] | None:
