@@ -68,17 +68,12 @@ def build_network(scene: Scene, order: Sequence[int] | str | None = None) -> Net
     nodes, edges = _of_bricks(scene)
     for s, (spring, since) in enumerate(springs):
         ends = spring.bricks if isinstance(spring, Joint) else (spring.brick,)
-        name = names[s]
-        nodes.append(
-            _Node(name, PartKind.JOINT, min(index_of[b] for b in ends) + 1, spring.position, s)
-        )
+        name, first = names[s], min(index_of[b] for b in ends) + 1
+        nodes.append(_Node(name, PartKind.JOINT, first, spring.position, s))
         for b in ends:
             brick = scene.placed[index_of[b]]
-            edges.append(
-                _Edge(
-                    (_nearest(brick, spring), name), PartKind.JOINT, index_of[b] + 1, index_of[b], s
-                )
-            )
+            met = (_nearest(brick, spring), name)
+            edges.append(_Edge(met, PartKind.JOINT, index_of[b] + 1, index_of[b], s))
         if isinstance(spring, Ground):
             base = ("base", *name[1:])
             nodes.append(_Node(base, PartKind.BASE, since, spring.anchor, s))
