@@ -84,7 +84,7 @@ def optimize(
     scene : Scene, str or pathlib.Path
         Or the name of a built-in scene, or a scene file.
     schedule : Schedule, pathlib.Path or str
-        One, its file, or a key of `seqopt.sequence.three_robots.SCHEDULES`; ``"free"``.
+        Or its file, or a key of `seqopt.sequence.three_robots.SCHEDULES`; ``"free"``.
     criterion : Criterion or str, optional
         What a step costs; or a name of `seqopt.CRITERIA`, by default that of `DEFAULTS`.
     formulation : str, optional
@@ -94,9 +94,8 @@ def optimize(
     limits : sequence of Limit
         What no open step may exceed; of the free schedule no step.
     **options
-        Of `seqopt.solve`, the formulation, `seqopt.responses.Resources` (as ``workers=2``); of the
-        free schedule ``aim``, ``rules`` and ``stands`` of `seqopt.pose_free`, and ``robots``; and
-        ``order``, of `seqopt.build_network`.
+        Of `seqopt.solve`, the formulation, `seqopt.responses.Resources` (as ``workers=2``); an
+        ``order``; of the free schedule ``robots``, and what `seqopt.pose_free` takes.
 
     Returns
     -------
@@ -113,8 +112,8 @@ def optimize(
     >>> seqopt.optimize("arch25", "free", "worst-ratio-published", aim="minmax,steps")
     FreePlan('arch25', 50 steps, minmax 0.840088, steps 50, optimal)
     """
-    made = load_scene(scene) if isinstance(scene, str | Path) else scene
-    made = in_order(made, options.pop("order", None))
+    found = load_scene(scene) if isinstance(scene, str | Path) else scene
+    made = in_order(found, options.pop("order", None))
     if isinstance(schedule, str) and schedule == FREE:
         return _optimize_free(made, (criterion, formulation, engine), limits, options)
     return _optimize(made, schedule, (criterion, formulation, engine), limits, options)

@@ -83,7 +83,8 @@ def _scene_argument() -> _Parser:
         "--order",
         metavar="ORDER",
         help=f"in which bricks are placed, in the place of the scene's own: {', '.join(ORDERS)} "
-        "(all ground ends at once), or their names, as 1..12,25..13",
+        "(all ground ends at once), or their names, as 1..12,25..13; "
+        "with a free schedule: search, for the best",
     )
     return scene
 

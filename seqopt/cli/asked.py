@@ -15,7 +15,7 @@ from seqopt.contact.mortar import MORTARS
 from seqopt.engines.auto import AutoEngine
 from seqopt.engines.interface import Engine, Fields
 from seqopt.engines.registry import make_engine
-from seqopt.errors import SceneError
+from seqopt.errors import ProblemError, SceneError
 from seqopt.network.network import Network
 from seqopt.placement.promises import overloads
 from seqopt.responses.staged import staged_fields
@@ -38,6 +38,8 @@ def asked_scene(options: argparse.Namespace) -> Scene:
     -------
     Scene
     """
+    if options.order == "search":
+        raise ProblemError("--order search: the free schedule of optimize has it alone")
     return in_order(load_scene(options.scene), options.order)
 
 

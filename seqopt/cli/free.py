@@ -12,6 +12,7 @@ import pandas as pd
 from seqopt.cli.asked import asked_engine, asked_scene, scene_file
 from seqopt.cli.criteria import parse_criterion
 from seqopt.cli.means import parse_size
+from seqopt.cli.order import SEARCH, optimize_order
 from seqopt.cli.outputs import require_matplotlib, write_outputs
 from seqopt.cli.rules import parse_rules, parse_standing
 from seqopt.cli.status import Status
@@ -53,6 +54,9 @@ def optimize_free(options: argparse.Namespace) -> Status:
     Status
     """
     _require_free(options)
+    if options.order == SEARCH:
+        options.order = None
+        return optimize_order(options, _posed(options, options.aim or "minmax")[1])
     formulation = find_schedule_formulation(options.formulation or "schedule_search")
     numbers = parse_numbers("--option", options.option, formulation.options)
     scene, problem = _posed(options, options.aim or "minmax")

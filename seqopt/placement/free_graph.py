@@ -182,9 +182,9 @@ def explore(
         graph.levels.append(level)
         tell(graph)
         moves = space.places(bricks - 1, level.states)
-        following, excluded = _close(problem, bricks, moves.states, (ceiling, width))
+        following, excluded = close_level(problem, bricks, moves.states, (ceiling, width))
         graph.excluded = min(graph.excluded, excluded)
-        level.onward = _arcs(problem, moves, following.states, regrip=False)
+        level.onward = arcs_to(problem, moves, following.states, regrip=False)
         level = following
         if not len(level.states):
             return graph
@@ -193,12 +193,26 @@ def explore(
     return graph
 
 
-def _close(
+def close_level(
     problem: FreeProblem, bricks: int, entry: Ints, most: tuple[float, int | None]
 ) -> tuple[Level, float]:
     """Return the level of all states that can be reached from some without placing a brick.
 
-    Also the least that the first goal takes of a state that was left out.
+    Parameters
+    ----------
+    problem : FreeProblem
+    bricks : int
+    entry : (n, c) int
+        Where the level is entered, some states perhaps more than once.
+    most : tuple of (float, int or None)
+        Ceiling and width of `explore`.
+
+    Returns
+    -------
+    level : Level
+        Without moves onward.
+    excluded : float
+        The least that the first goal takes of a state that was left out.
     """
     space = problem.space
     seen, excluded = np.zeros(0, dtype=np.int64), np.inf
@@ -222,7 +236,9 @@ def _close(
     rank = np.empty_like(order)
     rank[order] = np.arange(len(order))
     states, values = states[order], values[order]
-    arcs = [_arcs(problem, Moves(rank[m.source], *m[1:]), states, regrip=hold) for m, hold in parts]
+    arcs = [
+        arcs_to(problem, Moves(rank[m.source], *m[1:]), states, regrip=hold) for m, hold in parts
+    ]
     return Level(states, values, _joined(arcs), NO_ARCS), excluded
 
 
@@ -239,8 +255,22 @@ def _chosen(
     return states, values, excluded
 
 
-def _arcs(problem: FreeProblem, moves: Moves, states: Ints, *, regrip: bool) -> Arcs:
-    """Return the moves that lead to kept states, which are in the order of their codes."""
+def arcs_to(problem: FreeProblem, moves: Moves, states: Ints, *, regrip: bool) -> Arcs:
+    """Return the moves that lead to kept states.
+
+    Parameters
+    ----------
+    problem : FreeProblem
+    moves : Moves
+    states : (n, c) int
+        Kept ones, in the order of their codes.
+    regrip : bool
+        Whether the moves are regrips.
+
+    Returns
+    -------
+    Arcs
+    """
     known, codes = problem.space.codes(states), problem.space.codes(moves.states)
     at = np.searchsorted(known, codes)
     kept = np.zeros(len(codes), dtype=bool)

@@ -35,7 +35,7 @@ def least_from_start(graph: StateGraph, goal: int) -> list[Floats]:
         reached = np.full(len(level.states), np.inf)
         through = join(out[-1][entry.source], graph.costs(goal, b, entry))
         np.minimum.at(reached, entry.target, through)
-        out.append(_settle(reached, level.inner, graph.costs(goal, b, level.inner), join))
+        out.append(settle(reached, level.inner, graph.costs(goal, b, level.inner), join))
     return out
 
 
@@ -67,7 +67,7 @@ def least_to_end(graph: StateGraph, goal: int) -> list[Floats]:
             np.minimum.at(left, onward.source, through)
         inner = level.inner
         back = Arcs(inner.target, inner.source, inner.regrip, inner.way)
-        out.append(_settle(left, back, graph.costs(goal, b, inner), join))
+        out.append(settle(left, back, graph.costs(goal, b, inner), join))
     return out[::-1]
 
 
@@ -145,7 +145,7 @@ def _steps_to_end(graph: StateGraph) -> list[Floats]:
             np.minimum.at(left, level.onward.source, out[-1][level.onward.target] + 1)
         inner = level.inner
         back = Arcs(inner.target, inner.source, inner.regrip, inner.way)
-        out.append(_settle(left, back, np.ones(len(inner.source)), np.add))
+        out.append(settle(left, back, np.ones(len(inner.source)), np.add))
     return out[::-1]
 
 
@@ -153,8 +153,24 @@ def _join(graph: StateGraph, goal: int) -> Join:
     return np.maximum if graph.problem.goals[goal].measure is Measure.PEAK else np.add
 
 
-def _settle(least: Floats, arcs: Arcs, costs: Floats, join: Join) -> Floats:
-    """Return the least at every state of a level, moves among them counted."""
+def settle(least: Floats, arcs: Arcs, costs: Floats, join: Join) -> Floats:
+    """Return the least at every state of a level, moves among them counted.
+
+    Parameters
+    ----------
+    least : (n,) float
+        Where the level is entered.
+    arcs : Arcs
+        Among its states.
+    costs : (m,) float
+        Of the moves.
+    join : callable
+        How costs add up along a way.
+
+    Returns
+    -------
+    (n,) float
+    """
     while len(costs):
         better = least.copy()
         np.minimum.at(better, arcs.target, join(least[arcs.source], costs))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from enum import Enum
 from importlib.metadata import EntryPoint, entry_points
@@ -20,6 +20,7 @@ class Finds(Enum):
 
     PLAN = "one plan"
     FRONT = "a Pareto set"
+    ORDER = "an order"
 
 
 @dataclass(frozen=True)
@@ -53,6 +54,24 @@ class ScheduleFormulation:
             for name, parameter in inspect.signature(self.solve).parameters.items()
             if isinstance(parameter.default, int | float)
         }
+
+    def require_options(self, given: Iterable[str]) -> None:
+        """Raise an error unless options are of this formulation.
+
+        Parameters
+        ----------
+        given : iterable of str
+            Their names; ``progress`` goes without saying.
+
+        Raises
+        ------
+        ProblemError
+            Naming the one that is not.
+        """
+        for name in given:
+            if name not in (*self.options, "progress"):
+                known = ", ".join(self.options) or "no options"
+                raise ProblemError(f"option {name}: {self.name} has {known}")
 
 
 def find_schedule_formulation(

@@ -30,6 +30,7 @@ from experiments.placement import (
     decision_sensitivity,
     degenerate_placement,
     formulation_cost,
+    free_growth,
     heuristic_gaps,
     program_shapes,
     robust_placement,
@@ -133,6 +134,7 @@ def checks() -> dict[str, tuple[Check, Tables, Callable[..., Iterator[tuple[Any,
             spoil_contrast,
         ),
         "fuzz": (fuzz.holds, (rows("fuzz"), rows("fuzz_kills")), spoil_fuzz),
+        "free_growth": (free_growth.holds, (rows("free_growth"),), spoil_free_growth),
         "heuristic_gaps": (heuristic_gaps.holds, (rows("heuristic_gaps"),), spoil_gaps),
         "identify_arch25": (
             lambda table: arch_scores.holds(table, quick=False),
@@ -378,6 +380,13 @@ def spoil_peers(models, ways):
     yield spoiled(models, "ratio", 0.2, tool="dense products", setting="criterion"), ways
     yield spoiled(models, "difference", 1e-3, tool="PyNite"), ways
     yield models, spoiled(ways, "gap", 1e-3, tool="networkx, Dijkstra")
+
+
+def spoil_free_growth(table):
+    yield (spoiled(table, "status", "feasible", bricks=49, robots=4),)
+    yield (spoiled(table, "seconds", 5000.0, bricks=145),)
+    yield (spoiled(table, "memory_MB", 2100.0, bricks=19),)
+    yield (spoiled(table, "bound", 0.1, status="feasible"),)
 
 
 def spoil_runs(table, ratios):
