@@ -119,10 +119,8 @@ def solve(
 
     Raises
     ------
-    InfeasibleError
-        If no order has a plan.
-    ProblemError
-        If a number is none, or nothing was found when time was up or all orders were tried.
+    InfeasibleError, ProblemError
+        If no order has a plan; a number is none, or no plan was found by the end of the search.
     """
     if most < 0 or tries < 0:
         raise ProblemError(f"options most={most}, tries={tries}: give whole numbers from 0 on")

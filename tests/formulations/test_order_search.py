@@ -8,7 +8,6 @@ from itertools import permutations
 import numpy as np
 import pytest
 from hypothesis import given, settings
-from hypothesis import strategies as st
 
 import seqopt
 from formulations.order_search import FORMULATION
@@ -60,7 +59,7 @@ def check_against_brute_force(scene, rules, aim="minmax"):
 
 
 @given(build=free_builds(most_bricks=3, most_robots=3))
-@settings(max_examples=5, deadline=None)
+@settings(max_examples=4, deadline=None)
 def test_it_equals_brute_force(build):
     check_against_brute_force(*build)
 
@@ -85,10 +84,9 @@ def test_it_equals_brute_force_on_arches(count):
     check_against_brute_force(small_arch(count), FreeRules())
 
 
-@given(scene=st.integers(5, 6).map(small_arch), seed=st.integers(0, 9))
-@settings(max_examples=2, deadline=None)
-def test_a_heuristic_order_is_on_the_right_side(scene, seed):
-    problem = posed(scene)
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_heuristic_order_is_on_the_right_side(seed):
+    problem = posed(small_arch(5), aim="F_largest")
     best = solve_order(problem, FORMULATION).selection.objective
     tried = solve_order(problem, FORMULATION, most=6, tries=20, seed=seed)
     assert tried.selection.stopped == "size"
