@@ -6,14 +6,17 @@ import argparse
 import io
 import json
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import pandas as pd
 
 from seqopt.cli.asked import asked_engine, asked_scene, scene_file
 from seqopt.cli.criteria import parse_criterion
+from seqopt.cli.free_files import free_files
 from seqopt.cli.means import parse_size
 from seqopt.cli.order import SEARCH, optimize_order
 from seqopt.cli.outputs import require_matplotlib, write_outputs
+from seqopt.cli.pages import PAGE, front_page
 from seqopt.cli.rules import parse_rules, parse_standing
 from seqopt.cli.status import Status
 from seqopt.cli.terminal import complain, progress, say
@@ -65,15 +68,11 @@ def optimize_free(options: argparse.Namespace) -> Status:
     limit = parse_time_limit(options.time_limit)
     if options.max_memory is not None:
         whole["max_memory"] = parse_size(options.max_memory)
-    proof = not options.no_proof
-    plan = solve(problem, formulation, proof=proof, time_limit=limit, progress=progress, **whole)
+    how: dict[str, Any] = {"proof": not options.no_proof, "lazy": options.lazy, **whole}
+    plan = solve(problem, formulation, time_limit=limit, progress=progress, **how)
     table = plan.responses()
-    files = {
-        "plan.csv": csv_text(table),
-        "summary.json": json.dumps(plan.summary(), indent=2) + "\n",
-    }
-    if problem.standing is not None:
-        files["stability.csv"] = csv_text(plan.stability())
+    said = f"{', '.join(map(str, problem.goals))}; {plan.status}"
+    files = free_files(plan, plan.summary(), "free schedule", said)
     write_outputs(options, files | scene_file(options, scene))
     values = ", ".join(f"{name} {value:.6g}" for name, value in plan.objective.items())
     say(
@@ -214,6 +213,7 @@ def _front_files(
     numbered = shown_table(front.table)
     numbered.insert(0, "point", range(1, len(numbered) + 1))
     return {
+        PAGE: front_page(engine, shown_table(front.table), [known[steps] for steps in front.steps]),
         "pareto.csv": csv_text(numbered),
         "plans.csv": csv_text(pd.concat(plans, ignore_index=True)),
         "pareto.png": buffer.getvalue(),

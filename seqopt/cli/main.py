@@ -1,4 +1,4 @@
-"""The command line: ``seqopt compare | optimize | pareto | analyze | assess | scene``."""
+"""The command line: ``seqopt compare | optimize | pareto | analyze | assess | report | scene``."""
 
 from __future__ import annotations
 
@@ -27,6 +27,7 @@ from seqopt.cli.outputs import (
     require_matplotlib,
     write_outputs,
 )
+from seqopt.cli.pages import PAGE, comparison_page, folder_page
 from seqopt.cli.status import Status, status_of
 from seqopt.cli.terminal import (
     flush,
@@ -52,6 +53,7 @@ from seqopt.network.build import build_network
 from seqopt.report.comparison import compare
 from seqopt.report.text import format_comparison
 from seqopt.responses.table import archive, response_table
+from seqopt.scene.library.by_words import KINDS
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import about, builtin_scenes, dump_scene, load_scene
 from seqopt.sequence.plan_file import read_plan
@@ -108,7 +110,8 @@ def _compare(options: argparse.Namespace) -> Status:
     say_levels(engine)
     show(format_comparison(result, scene, criterion) + "\n")
     if options.out is not None and result.loop is not None:
-        write_outputs(options, comparison_files(result))
+        files = comparison_files(result) | {PAGE: comparison_page(engine, result)}
+        write_outputs(options, files)
         say(f"tables and figures written to {options.out}")
     return payloads_hold(options, scene, *result.tables.values())
 
@@ -175,11 +178,21 @@ def _steps(scene: Scene, options: argparse.Namespace) -> tuple[Step, ...]:
     return published_plan(scene)
 
 
+def _report(options: argparse.Namespace) -> None:
+    engine = asked_engine(options, build_network(asked_scene(options)))
+    path = options.folder / PAGE if options.out is None else options.out
+    keep_apart(options, path)
+    write_text(path, folder_page(engine, options.folder))
+    say(f"written to {path}")
+
+
 def _scene(options: argparse.Namespace) -> None:
     if options.list:
         for name in builtin_scenes():
             scene = load_scene(name)
             _line(f"{name}: {len(scene.bricks)} bricks, {len(scene.joints)} joints; {about(name)}")
+        for kind in KINDS.values():
+            _line(kind.about)
         return
     keep_apart(options, options.export)
     scene = asked_scene(options)
@@ -211,5 +224,6 @@ COMMANDS: dict[str, Callable[[argparse.Namespace], int | None]] = {
     "optimize": optimize,
     "pareto": pareto,
     "assess": _assess,
+    "report": _report,
     "scene": _scene,
 }

@@ -8,6 +8,7 @@ import time
 from seqopt.cli.asked import payloads_hold, say_idle, say_levels, scene_file
 from seqopt.cli.free import optimize_free, require_loop
 from seqopt.cli.outputs import plan_files, worth, write_outputs
+from seqopt.cli.pages import PAGE, plan_page
 from seqopt.cli.posing import asked_problem
 from seqopt.cli.robust import optimize_robust, require_no_scenarios
 from seqopt.cli.status import Status
@@ -40,11 +41,12 @@ def optimize(options: argparse.Namespace) -> Status:
     require_loop(options)
     formulation = find_formulation(options.formulation)
     chosen = parse_options(formulation, options.option)
-    limit, proof = parse_time_limit(options.time_limit), not options.no_proof
+    limit = parse_time_limit(options.time_limit)
+    how = {"proof": not options.no_proof, "lazy": options.lazy}
     start = time.perf_counter()
     problem = asked_problem(options)
     assemble = time.perf_counter() - start
-    plan = solve(problem, formulation, proof=proof, time_limit=limit, progress=tell, **chosen)
+    plan = solve(problem, formulation, **how, time_limit=limit, progress=tell, **chosen)
     progress("")
     say_levels(problem.engine)
     report = plan.summary() | {
@@ -53,7 +55,9 @@ def optimize(options: argparse.Namespace) -> Status:
     }
     table = plan.responses()
     scene = problem.schedule.scene
-    write_outputs(options, plan_files(plan, report) | scene_file(options, scene))
+    page = plan_page(problem.engine, formulation.name, table, worth(plan))
+    files = plan_files(plan, report) | {PAGE: page} | scene_file(options, scene)
+    write_outputs(options, files)
     say(
         f"{formulation.name} ({formulation.kind.value}): {worth(plan)}, "
         f"{plan.models} models; written to {options.out}"

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import argparse
-import json
 from math import isfinite
 
 from seqopt.cli.asked import scene_file
+from seqopt.cli.free_files import free_files
 from seqopt.cli.outputs import write_outputs
 from seqopt.cli.status import Status
 from seqopt.cli.terminal import progress, say
 from seqopt.cli.values import parse_numbers, parse_time_limit
 from seqopt.errors import ProblemError
-from seqopt.files import csv_text, require_folder
+from seqopt.files import require_folder
 from seqopt.placement.free_problem import FreeProblem
 from seqopt.placement.order_plan import OrderPlan, solve_order
 from seqopt.placement.order_problem import OrderProblem
@@ -58,12 +58,7 @@ def optimize_order(options: argparse.Namespace, free: FreeProblem) -> Status:
         **{"seconds": limit, **whole},
     )
     plan = found.plan
-    files: dict[str, bytes | str] = {
-        "plan.csv": csv_text(plan.responses()),
-        "summary.json": json.dumps(found.summary(), indent=2) + "\n",
-    }
-    if free.standing is not None:
-        files["stability.csv"] = csv_text(plan.stability())
+    files = free_files(plan, found.summary(), "best order", _said(found))
     write_outputs(options, files | scene_file(options, plan.problem.network.scene))
     say(f"{formulation.name} {_said(found)}; written to {options.out}")
     say(f"order: {', '.join(map(str, found.order))}")
