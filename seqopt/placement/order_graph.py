@@ -14,7 +14,7 @@ import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.placement.free_graph import Arcs, Level, arcs_to, close_level
-from seqopt.placement.free_paths import settle
+from seqopt.placement.free_paths import TIED, settle
 from seqopt.placement.free_problem import FreeProblem
 from seqopt.placement.order_problem import OrderProblem
 from seqopt.scene.orders import Order
@@ -96,12 +96,16 @@ class OrderGraph:
         """
         if len(self.parts) < len(self.problem.scene.bricks):
             return None
-        found = []
-        for key, part in self.parts[-1].items():
-            worth = np.where(self.ends(key), part.least, np.inf)
-            found.append((float(worth.min()), key, int(worth.argmin())))
-        best = min(found, key=lambda each: (each[0], each[1][1]))
-        return best if np.isfinite(best[0]) else None
+        worths = {
+            key: np.where(self.ends(key), part.least, np.inf)
+            for key, part in self.parts[-1].items()
+        }
+        value = min(float(worth.min()) for worth in worths.values())
+        if not np.isfinite(value):
+            return None
+        tied = {key: worth <= _tied(value) for key, worth in worths.items()}
+        key = min((key for key, rows in tied.items() if rows.any()), key=lambda key: key[1])
+        return value, key, int(tied[key].argmax())
 
     def order(self, value: float, key: Key, row: int) -> Order:
         """Return the order of a way that stays within a value.
@@ -118,7 +122,7 @@ class OrderGraph:
         -------
         tuple of int
         """
-        order = [key[1]]
+        order, value = [key[1]], _tied(value)
         for parts in reversed(self.parts):
             part = parts[key]
             leading = _leading(part, row, value)
@@ -133,6 +137,11 @@ class OrderGraph:
 
     def _least(self, key: Key) -> Floats:
         return self.parts[len(key[0]) - 1][key].least
+
+
+def _tied(value: float) -> float:
+    """Return up to what values count as one: none is better by an error of rounding."""
+    return value + TIED * abs(value)
 
 
 def _leading(part: Part, row: int, value: float) -> Bools:

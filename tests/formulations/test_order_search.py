@@ -179,10 +179,10 @@ def test_limits_hold_in_the_best_order():
 
 @pytest.mark.slow
 def test_the_arch_of_the_paper_in_its_best_order(arch25):
-    """Four bricks from one end, the rest from the other: 0.7693 instead of 0.8401."""
+    """Two bricks from one end, the rest from the other: 0.7693 instead of 0.8401."""
     criterion = seqopt.CRITERIA["worst-ratio-published"]
     engine = seqopt.make_engine("compliance", arch25)
     found = solve_order(OrderProblem(pose_free(engine, FreeRules(), criterion)), FORMULATION)
     assert found.status == "optimal"
     assert found.selection.objective == pytest.approx(0.76929, abs=1e-5)
-    assert found.order == (1, 2, 3, 4, *range(25, 4, -1))
+    assert found.order == (1, 2, *range(25, 2, -1))
