@@ -188,7 +188,9 @@ def _ended(graph: OrderGraph, search: _Search) -> bool | None:
     if graph.cut:
         return False
     if np.isinf(graph.excluded):
-        raise InfeasibleError("no order of the bricks has a plan; extend a reach or loosen a rule")
+        raise InfeasibleError(
+            "no order of the bricks has a plan; extend a reach, loosen a rule or raise a limit"
+        )
     return None
 
 
