@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, Literal, overload
 
 from seqopt.engines.registry import make_engine
-from seqopt.errors import ProblemError
+from seqopt.errors import ProblemError, did_you_mean
 from seqopt.network.build import build_network
 from seqopt.placement.criteria import WORST_OVER_METHODS
 from seqopt.placement.free_plan import FreePlan
@@ -204,6 +204,7 @@ def find_criterion(criterion: Criterion | str) -> Criterion:
         return criterion
     if criterion not in CRITERIA:
         raise ProblemError(
-            f"criterion {criterion!r}: there is no such; give one of {', '.join(CRITERIA)}"
+            f"criterion {criterion!r}: there is no such{did_you_mean(criterion, CRITERIA)}; give "
+            f"one of {', '.join(CRITERIA)}"
         )
     return CRITERIA[criterion]

@@ -17,7 +17,7 @@ import pandas as pd
 from seqopt.arrays import Floats
 from seqopt.engines.interface import Engine, Want
 from seqopt.files import csv_text
-from seqopt.network.network import GROUND, Network
+from seqopt.network.network import GROUND, Network, PartKind
 from seqopt.responses.table import force_column
 from seqopt.scene.boxes import boxes
 from seqopt.sequence.steps import Step
@@ -82,12 +82,6 @@ def structure_data(network: Network) -> dict[str, object]:
     """
     scene = network.scene
     corners = boxes(scene.placed).corners()
-    springs = network.springs
-    carried = []
-    for node in range(len(network.node_kind)):
-        brick, spring = int(network.node_brick[node]), int(network.node_spring[node])
-        both = [brick] if brick >= 0 else [int(b) for b in springs.bodies[spring] if b != GROUND]
-        carried.append(both if network.node_kind[node] < 2 else [])
     ends = [[int(i) for i in row] for row in network.edge_nodes]
     return {
         "name": scene.name,
@@ -106,7 +100,7 @@ def structure_data(network: Network) -> dict[str, object]:
             for node in brick.nodes
         },
         "points": [_rounded(point) for point in network.node_position],
-        "carried": carried,
+        "carried": _carried(network),
         "edges": [[*ends[e], int(network.edge_since[e])] for e in range(len(network.edge_nodes))],
         "grounds": [
             {"at": _rounded(np.array(ground.anchor)), "brick": ground.brick}
@@ -118,6 +112,21 @@ def structure_data(network: Network) -> dict[str, object]:
         ],
         "up": list(scene.up),
     }
+
+
+def _carried(network: Network) -> list[list[int]]:
+    """Return the bricks that every node moves with, none for those that are fixed."""
+    out = []
+    for kind, brick, spring in zip(
+        network.node_kind.tolist(),
+        network.node_brick.tolist(),
+        network.node_spring.tolist(),
+        strict=True,
+    ):
+        bodies = [brick] if brick >= 0 else network.springs.bodies[spring].tolist()
+        fixed = kind == PartKind.BASE.value
+        out.append([] if fixed else [body for body in bodies if body != GROUND])
+    return out
 
 
 def build_data(engine: Engine, build: Build, *, fields: bool = True) -> dict[str, object]:
