@@ -25,7 +25,7 @@ import numpy as np
 from seqopt.arrays import Bools, Floats
 from seqopt.placement.formulation import FormulationKind
 from seqopt.placement.front import FrontProblem, FrontSelection
-from seqopt.placement.schedule_formulation import ScheduleFormulation
+from seqopt.placement.schedule_formulation import Finds, ScheduleFormulation
 
 
 def solve(
@@ -110,4 +110,5 @@ FORMULATION = ScheduleFormulation(
     "all plans that none beats in every response, zone by zone",
     FormulationKind.EXACT,
     solve,
+    Finds.FRONT,
 )

@@ -40,15 +40,21 @@ from seqopt.placement.free_problem import FreeProblem
 from seqopt.placement.schedule_formulation import ScheduleFormulation
 from seqopt.placement.schedule_selection import ScheduleSelection
 from seqopt.placement.sturdiest import best_margin
+from seqopt.work.memory import free_memory
 
 FAR_BELOW = 4.0  # what the narrow search finds, over the first threshold
-
+COPIES = 2.0  # of what is kept, that are needed at once while it grows
 
 Tell = Callable[[StateGraph], None]
 
 
-class _TimeUpError(Exception):
-    """The time that was given is used up."""
+class _StopError(Exception):
+    """Time or memory that was given is used up; says which."""
+
+    def too_little(self) -> ProblemError:
+        """Return what to say where no plan was found before."""
+        option = {"time": "seconds", "memory": "max_memory"}[str(self)]
+        return ProblemError(f"option {option}: it is too little to find a plan; give more")
 
 
 def solve(
@@ -57,6 +63,7 @@ def solve(
     width: int = 50,
     growth: float = 1.1,
     seconds: float = np.inf,
+    max_memory: float = np.inf,
     progress: Callable[[str], None] = lambda _: None,
 ) -> ScheduleSelection:
     """Return the best free schedule.
@@ -70,20 +77,23 @@ def solve(
         By how much the threshold rises from one search to the next, over itself.
     seconds : float, optional
         After which the best plan found is returned, and what is proven by then.
+    max_memory : float, optional
+        Bytes that states, moves and responses may take, about; then likewise. By default as many as
+        are free.
     progress : callable, optional
         Told in a few words how far the search is.
 
     Returns
     -------
     ScheduleSelection
-        Its bounds are its values, unless time was up or the search was interrupted.
+        Its bounds are its values, unless time or memory was used up or it was interrupted.
 
     Raises
     ------
     InfeasibleError
         If no plan is allowed.
     ProblemError
-        If the width is not positive, or time is up before any plan is found.
+        If the width is not positive, or time or memory is up before any plan is found.
     """
     if width < 1 or not growth > 1:
         raise ProblemError(
@@ -91,16 +101,29 @@ def solve(
             "number above 1"
         )
     _require_order(problem)
-    end = time.perf_counter() + seconds
     reached: list[StateGraph] = []
+    tell = _watch(problem, (time.perf_counter() + seconds, max_memory), progress, reached)
+    return _search(problem, (width, growth), tell, reached)
+
+
+def _watch(
+    problem: FreeProblem,
+    most: tuple[float, float],
+    progress: Callable[[str], None],
+    reached: list[StateGraph],
+) -> Tell:
+    """Return what is told every level: it keeps the states and ends the search in time."""
 
     def tell(graph: StateGraph) -> None:
         progress(f"{len(graph.levels) - 1} of {problem.space.bricks} bricks")
         reached[:] = [graph]
-        if time.perf_counter() > end:
-            raise _TimeUpError
+        if time.perf_counter() > most[0]:
+            raise _StopError("time")
+        room = min(most[1], free_memory() + graph.nbytes)
+        if COPIES * (graph.nbytes + problem.sets.nbytes) > room:
+            raise _StopError("memory")
 
-    return _search(problem, (width, growth), tell, reached)
+    return tell
 
 
 def _require_order(problem: FreeProblem) -> None:
@@ -115,33 +138,40 @@ def _search(
 ) -> ScheduleSelection:
     """Return the best free schedule, or the first one found where the search is stopped."""
     if problem.goals[0].of_margins:
-        value, bound, rest = best_margin(problem, tell)
+        try:
+            value, bound, rest = best_margin(problem, tell)
+        except _StopError as stop:
+            raise stop.too_little() from None
         after = _search(rest, options, tell, reached)
         if len(problem.goals) == 1:  # what was chosen after it was nobody's wish
             after = replace(after, objective=(), bound=())
         return replace(after, objective=(value, *after.objective), bound=(bound, *after.bound))
-    found = None
+    found, proven = None, [-np.inf]
     try:
         narrow = explore(problem, width=options[0], tell=tell)
+        reached.clear()  # of which nothing is proven, and which is used up
         found = _selection(narrow) if narrow.whole else None
-        graph = _below(problem, found.objective[0] if found else np.inf, options[1], tell)
-    except (_TimeUpError, KeyboardInterrupt) as stop:
-        if found is None and isinstance(stop, KeyboardInterrupt):
-            raise
+        ceiling = found.objective[0] if found else np.inf
+        graph = _below(problem, (ceiling, options[1]), tell, proven)
+    except (_StopError, KeyboardInterrupt) as stop:
+        if found is None and isinstance(stop, _StopError):
+            raise stop.too_little() from None
         if found is None:
-            raise ProblemError(
-                "option seconds: they are too few to find a plan; give more"
-            ) from None
-        why = "time" if isinstance(stop, _TimeUpError) else "interrupt"
-        return _unproven(found, reached[-1], why)
+            raise
+        return _unproven(found, reached, proven[-1], str(stop) or "interrupt")
     if not graph.whole:
         raise InfeasibleError("no plan of the free schedule is allowed")
     return _selection(graph)
 
 
-def _below(problem: FreeProblem, ceiling: float, growth: float, tell: Tell) -> StateGraph:
-    """Return the states below the lowest threshold of a rising row that connects start to end."""
-    threshold = -np.inf
+def _below(
+    problem: FreeProblem, options: tuple[float, float], tell: Tell, proven: list[float]
+) -> StateGraph:
+    """Return the states below the lowest threshold of a rising row that connects start to end.
+
+    What is proven of the first goal is added to a list on the way.
+    """
+    threshold, (ceiling, growth) = -np.inf, options
     if np.isfinite(ceiling) or problem.goals[0].measure is not Measure.PEAK:
         threshold = ceiling / FAR_BELOW
     while True:
@@ -149,7 +179,9 @@ def _below(problem: FreeProblem, ceiling: float, growth: float, tell: Tell) -> S
         graph = explore(problem, tied, tell=tell)
         if graph.whole or threshold >= ceiling or graph.excluded == np.inf:
             return graph
+        proven.append(graph.excluded)  # of a state that every plan would have to pass, or a larger
         threshold = min(ceiling, max(graph.excluded, threshold * growth))
+        del graph  # or two of them would need memory at once
 
 
 def _selection(graph: StateGraph) -> ScheduleSelection:
@@ -163,11 +195,14 @@ def _selection(graph: StateGraph) -> ScheduleSelection:
     return ScheduleSelection(states, tuple(values), tuple(values))
 
 
-def _unproven(found: ScheduleSelection, reached: StateGraph, why: str) -> ScheduleSelection:
-    """Return the first plan, and what the levels that were reached prove of the first goal."""
-    bound = float(least_from_start(reached, 0)[-1].min())
-    if reached.problem.goals[0].measure is Measure.PEAK:
-        bound = min(bound, found.objective[0])
+def _unproven(
+    found: ScheduleSelection, reached: list[StateGraph], proven: float, why: str
+) -> ScheduleSelection:
+    """Return the first plan, and what thresholds and the levels reached prove of the first goal."""
+    bound = proven
+    for graph in reached:
+        bound = max(bound, float(least_from_start(graph, 0)[-1].min()))
+    bound = min(bound, found.objective[0])
     rest = (-np.inf,) * (len(found.objective) - 1)
     return ScheduleSelection(found.states, found.objective, (bound, *rest), stopped=why)
 

@@ -6,56 +6,100 @@ import time
 from collections.abc import Sequence
 from dataclasses import fields, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, overload
 
-from seqopt.engines.interface import Engine
 from seqopt.engines.registry import make_engine
 from seqopt.errors import ProblemError, did_you_mean
 from seqopt.network.build import build_network
+from seqopt.placement.criteria import WORST_OVER_METHODS
+from seqopt.placement.free_plan import FreePlan
+from seqopt.placement.free_problem import FreeProblem, pose_free
 from seqopt.placement.plan import Plan
 from seqopt.placement.problem import pose
 from seqopt.placement.requirements import Criterion, Limit
 from seqopt.placement.solving import solve
 from seqopt.responses.resources import Resources
+from seqopt.scene.checks import short
+from seqopt.scene.orders import in_order
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import load_scene
+from seqopt.sequence.free_rules import FREE, FreeRules, with_robots
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.schedule_file import find_schedule
 from seqopt.study.presets import CRITERIA, EQUATIONS
+
+FREE_WORDS = ("aim", "rules", "robots", "stands")
+"""Options that the free schedule alone has.
+
+``robots`` are names, or how many take part: further ones than the scene's are mobile.
+"""
+DEFAULTS: dict[str, tuple[Criterion, str]] = {
+    FREE: (WORST_OVER_METHODS, "schedule_search"),
+    "any other": (EQUATIONS, "overlap_dp"),
+}
+"""Criterion and formulation by schedule, where none is given."""
+Asked = tuple[Criterion | str | None, str | None, str]  # criterion, formulation, engine
+
+
+@overload
+def optimize(
+    scene: Scene | str | Path,
+    schedule: Literal["free"],
+    criterion: Criterion | str | None = None,
+    formulation: str | None = None,
+    engine: str = "auto",
+    *,
+    limits: Sequence[Limit] = (),
+    **options: Any,
+) -> FreePlan: ...
+
+
+@overload
+def optimize(
+    scene: Scene | str | Path,
+    schedule: Schedule | Path | str = "three-robot",
+    criterion: Criterion | str | None = None,
+    formulation: str | None = None,
+    engine: str = "auto",
+    *,
+    limits: Sequence[Limit] = (),
+    **options: Any,
+) -> Plan: ...
 
 
 def optimize(
     scene: Scene | str | Path,
     schedule: Schedule | Path | str = "three-robot",
-    criterion: Criterion | str = EQUATIONS,
-    formulation: str = "overlap_dp",
+    criterion: Criterion | str | None = None,
+    formulation: str | None = None,
     engine: str = "auto",
     *,
     limits: Sequence[Limit] = (),
     **options: Any,
-) -> Plan:
-    """Choose where robots hold over a whole build.
+) -> Plan | FreePlan:
+    """Choose where robots hold over a whole build, or with a free schedule every step of it.
 
     Parameters
     ----------
     scene : Scene, str or pathlib.Path
         Or the name of a built-in scene, or a scene file.
     schedule : Schedule, pathlib.Path or str
-        A key of `seqopt.sequence.three_robots.SCHEDULES`, a schedule file, or a schedule.
-    criterion : Criterion or str
-        What a step costs; or a name of `seqopt.CRITERIA`.
-    formulation : str
-        One of `seqopt.formulations`.
+        Or its file, or a key of `seqopt.sequence.three_robots.SCHEDULES`; ``"free"``.
+    criterion : Criterion or str, optional
+        What a step costs; or a name of `seqopt.CRITERIA`, by default that of `DEFAULTS`.
+    formulation : str, optional
+        One of `seqopt.formulations`; the free schedule has its own; by default of `DEFAULTS`.
     engine : str
         A key of `seqopt.engines.registry.ENGINES`; ``"auto"`` models no more than is needed.
     limits : sequence of Limit
-        What no open step may exceed.
+        What no open step may exceed; of the free schedule no step.
     **options
-        Of `seqopt.responses.Resources` (as ``workers=2``), `seqopt.solve` and the formulation.
+        Of `seqopt.solve`, the formulation, `seqopt.responses.Resources` (as ``workers=2``); an
+        ``order``; of the free schedule ``robots``, and what `seqopt.pose_free` takes.
 
     Returns
     -------
-    Plan
+    Plan or FreePlan
 
     Raises
     ------
@@ -65,29 +109,78 @@ def optimize(
     Examples
     --------
     >>> import seqopt
-    >>> plan = seqopt.optimize("arch25", criterion="worst-ratio-published", formulation="minimax")
-    >>> round(plan.certificate.objective, 3)
-    1.185
+    >>> seqopt.optimize("arch25", "free", "worst-ratio-published", aim="minmax,steps")
+    FreePlan('arch25', 50 steps, minmax 0.840088, steps 50, optimal)
     """
-    start = time.perf_counter()
-    parts = *_assemble(scene, schedule, engine), find_criterion(criterion), limits, ()
+    found = load_scene(scene) if isinstance(scene, str | Path) else scene
+    made = in_order(found, options.pop("order", None))
+    if isinstance(schedule, str) and schedule == FREE:
+        return _optimize_free(made, (criterion, formulation, engine), limits, options)
+    return _optimize(made, schedule, (criterion, formulation, engine), limits, options)
+
+
+def _optimize(
+    scene: Scene,
+    schedule: Schedule | Path | str,
+    asked: Asked,
+    limits: Sequence[Limit],
+    options: dict[str, Any],
+) -> Plan:
+    """Return the plan of a schedule with open grips."""
+    start, (criterion, formulation) = time.perf_counter(), DEFAULTS["any other"]
+    _refuse(options, FREE_WORDS, f"only the free schedule has it; give schedule={FREE!r}")
+    network = build_network(scene)
+    engine, found = make_engine(asked[2], network), find_schedule(network, schedule)
+    chosen, resources = find_criterion(asked[0] or criterion), _resources(options)
+    problem = pose(engine, found, chosen, limits, (), resources)
     assemble = time.perf_counter() - start
-    plan = solve(pose(*parts, _resources(options)), formulation, **options)
+    plan = solve(problem, asked[1] or formulation, **options)
     return replace(plan, seconds={"assemble": assemble, **plan.seconds})
+
+
+def _optimize_free(
+    scene: Scene, asked: Asked, limits: Sequence[Limit], options: dict[str, Any]
+) -> FreePlan:
+    """Return the plan of the free schedule."""
+    start, (criterion, formulation) = time.perf_counter(), DEFAULTS[FREE]
+    problem = _pose_free(scene, (asked[0] or criterion, asked[2]), limits, options)
+    assemble = time.perf_counter() - start
+    plan = solve(problem, asked[1] or formulation, **options)
+    return replace(plan, seconds={"assemble": assemble, **plan.seconds})
+
+
+def _pose_free(
+    scene: Scene,
+    asked: tuple[Criterion | str, str],
+    limits: Sequence[Limit],
+    options: dict[str, Any],
+) -> FreeProblem:
+    """Return the problem of a free schedule; what options say of it is taken out of them."""
+    own = [field.name for field in fields(Resources) if field.name != "max_memory"]
+    _refuse(options, own, "the free schedule has no such; leave it out")
+    aim, stands = options.pop("aim", "minmax"), options.pop("stands", None)
+    rules, robots = options.pop("rules", FreeRules()), options.pop("robots", ())
+    if not isinstance(rules, FreeRules):
+        raise ProblemError(f"rules {short(rules)}: give a seqopt.FreeRules")
+    if isinstance(robots, int):
+        scene = with_robots(scene, robots)
+    elif robots:
+        rules = replace(rules, robots=robots)
+    engine = make_engine(asked[1], build_network(scene))
+    return pose_free(engine, rules, find_criterion(asked[0]), aim, limits, stands)
+
+
+def _refuse(options: dict[str, Any], names: Sequence[str], why: str) -> None:
+    """Raise an error if an option is given that does not go with the schedule."""
+    for name in names:
+        if name in options:
+            raise ProblemError(f"option {name}: {why}")
 
 
 def _resources(options: dict[str, Any]) -> Resources:
     """Take out of options what they say of resources."""
     given = {field.name for field in fields(Resources)} & options.keys()
     return Resources(**{name: options.pop(name) for name in given})
-
-
-def _assemble(
-    scene: Scene | str | Path, schedule: Schedule | Path | str, engine: str
-) -> tuple[Engine, Schedule]:
-    """Return the engine and the schedule of a scene."""
-    network = build_network(load_scene(scene) if isinstance(scene, str | Path) else scene)
-    return make_engine(engine, network), find_schedule(network, schedule)
 
 
 def find_criterion(criterion: Criterion | str) -> Criterion:

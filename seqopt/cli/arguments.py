@@ -17,7 +17,6 @@ from seqopt.cli.common_arguments import (
     robust_arguments,
     strict_argument,
 )
-from seqopt.cli.free import FREE
 from seqopt.cli.free_arguments import add_pareto, add_rules
 from seqopt.cli.hints import nearest
 from seqopt.cli.status import Status
@@ -26,7 +25,9 @@ from seqopt.contact.mortar import MORTARS
 from seqopt.engines.registry import ENGINES
 from seqopt.placement.formulation import formulation_names
 from seqopt.responses.staged import Placing
+from seqopt.scene.orders import ORDERS
 from seqopt.scene.scene_file import builtin_scenes
+from seqopt.sequence.free_rules import FREE
 from seqopt.sequence.three_robots import SCHEDULES
 from seqopt.sequence.two_robots import METHODS
 from seqopt.study.published import PUBLISHED
@@ -87,6 +88,13 @@ def _scene_argument() -> _Parser:
         default="arch25",
         metavar="SCENE",
         help=f"a built-in scene ({', '.join(builtin_scenes())}) or a JSON file; arch25 by default",
+    )
+    scene.add_argument(
+        "--order",
+        metavar="ORDER",
+        help=f"in which bricks are placed, in the place of the scene's own: {', '.join(ORDERS)} "
+        "(all ground ends at once), or their names, as 1..12,25..13; "
+        "with a free schedule: search, for the best",
     )
     return scene
 

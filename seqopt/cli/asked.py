@@ -15,13 +15,49 @@ from seqopt.contact.mortar import MORTARS
 from seqopt.engines.auto import AutoEngine
 from seqopt.engines.interface import Engine, Fields
 from seqopt.engines.registry import make_engine
-from seqopt.errors import SceneError
+from seqopt.errors import ProblemError, SceneError
 from seqopt.network.network import Network
 from seqopt.placement.promises import overloads
 from seqopt.responses.staged import staged_fields
 from seqopt.responses.table import step_fields
+from seqopt.scene.orders import in_order
 from seqopt.scene.scene import Scene
+from seqopt.scene.scene_file import dump_scene, load_scene
 from seqopt.sequence.steps import AnyStep, Step, idle_robots
+
+
+def asked_scene(options: argparse.Namespace) -> Scene:
+    """Return the scene that a command is asked for, in the order that it is asked for.
+
+    Parameters
+    ----------
+    options : argparse.Namespace
+        With ``scene`` and ``order``.
+
+    Returns
+    -------
+    Scene
+    """
+    if options.order == "search":
+        raise ProblemError("--order search: the free schedule of optimize has it alone")
+    return in_order(load_scene(options.scene), options.order)
+
+
+def scene_file(options: argparse.Namespace, scene: Scene) -> dict[str, bytes | str]:
+    """Return the scene by its file's name where robots or order are not those of the one named.
+
+    Parameters
+    ----------
+    options : argparse.Namespace
+        With ``scene``.
+    scene : Scene
+
+    Returns
+    -------
+    dict of str to (bytes or str)
+        None otherwise: what is written goes with the scene that was named.
+    """
+    return {} if scene == load_scene(options.scene) else {"scene.json": dump_scene(scene)}
 
 
 def asked_engine(options: argparse.Namespace, network: Network) -> Engine:

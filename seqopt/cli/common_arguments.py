@@ -125,7 +125,7 @@ def resources_arguments(command: argparse.ArgumentParser) -> None:
         "--max-memory",
         metavar="SIZE",
         help="what responses and costs may take, as 500MB or 2GB (default: four fifths of what is "
-        "free)",
+        "free); of a free schedule states and moves, with a bound where it ends",
     )
 
 

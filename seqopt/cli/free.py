@@ -10,10 +10,13 @@ from typing import Any
 
 import pandas as pd
 
-from seqopt.cli.asked import asked_engine
+from seqopt.cli.asked import asked_engine, asked_scene, scene_file
 from seqopt.cli.criteria import parse_criterion
+from seqopt.cli.free_files import free_files
+from seqopt.cli.means import parse_size
+from seqopt.cli.order import SEARCH, optimize_order
 from seqopt.cli.outputs import require_matplotlib, write_outputs
-from seqopt.cli.pages import PAGE, front_page, plan_page
+from seqopt.cli.pages import PAGE, front_page
 from seqopt.cli.rules import parse_rules, parse_standing
 from seqopt.cli.status import Status
 from seqopt.cli.terminal import complain, progress, say
@@ -36,12 +39,9 @@ from seqopt.report.fronts import shown_table, worst_of
 from seqopt.report.methods import method_tables
 from seqopt.responses.table import analyze
 from seqopt.scene.scene import Scene
-from seqopt.scene.scene_file import dump_scene, load_scene
-from seqopt.sequence.free_rules import with_robots
+from seqopt.sequence.free_rules import FREE, with_robots
 from seqopt.sequence.schedule_file import find_schedule
 from seqopt.sequence.steps import Step, idle_robots
-
-FREE = "free"  # the schedule that is no list of steps
 
 
 def optimize_free(options: argparse.Namespace) -> Status:
@@ -57,27 +57,23 @@ def optimize_free(options: argparse.Namespace) -> Status:
     Status
     """
     _require_free(options)
+    if options.order == SEARCH:
+        options.order = None
+        return optimize_order(options, _posed(options, options.aim or "minmax")[1])
     formulation = find_schedule_formulation(options.formulation or "schedule_search")
     numbers = parse_numbers("--option", options.option, formulation.options)
     scene, problem = _posed(options, options.aim or "minmax")
     require_folder(options.out)
     whole = {name: type(formulation.options[name])(value) for name, value in numbers.items()}
     limit = parse_time_limit(options.time_limit)
+    if options.max_memory is not None:
+        whole["max_memory"] = parse_size(options.max_memory)
     how: dict[str, Any] = {"proof": not options.no_proof, "lazy": options.lazy, **whole}
     plan = solve(problem, formulation, time_limit=limit, progress=progress, **how)
     table = plan.responses()
-    files = {
-        "plan.csv": csv_text(table),
-        "summary.json": json.dumps(plan.summary(), indent=2) + "\n",
-    }
-    stands: list[str] = []
-    if problem.standing is not None:
-        verdicts = plan.stability()
-        files["stability.csv"] = csv_text(verdicts)
-        stands = [str(verdict) for verdict in verdicts["verdict"]]
     said = f"{', '.join(map(str, problem.goals))}; {plan.status}"
-    files[PAGE] = plan_page(problem.engine, "free schedule", table, said, stands)
-    write_outputs(options, files | _scene_file(options, scene))
+    files = free_files(plan, plan.summary(), "free schedule", said)
+    write_outputs(options, files | scene_file(options, scene))
     values = ", ".join(f"{name} {value:.6g}" for name, value in plan.objective.items())
     say(
         f"{formulation.name} ({formulation.kind.value}): {values}, {plan.status}; "
@@ -123,7 +119,7 @@ def pareto(options: argparse.Namespace) -> Status:
         values = shown_table(front.table).iloc[chosen]
         row = ", ".join(f"{name} {value:.6g}" for name, value in values.items())
         said += f"; picked row {chosen + 1}: {row}"
-    write_outputs(options, files | _scene_file(options, scene))
+    write_outputs(options, files | scene_file(options, scene))
     say(f"{said}; written to {options.out}")
     return Status.DONE
 
@@ -152,7 +148,7 @@ def require_loop(options: argparse.Namespace) -> None:
 
 def _require_free(options: argparse.Namespace) -> None:
     """Raise an error if options that the free schedule does not have are given with it."""
-    unknown = ("budget", "candidates", "cache", "max_memory", "ranked", "among")
+    unknown = ("budget", "candidates", "cache", "ranked", "among")
     given = [name for name in unknown if getattr(options, name)]
     given += ["workers"] if options.workers != "1" else []
     if given:
@@ -163,7 +159,7 @@ def _require_free(options: argparse.Namespace) -> None:
 
 def _posed(options: argparse.Namespace, aim: str) -> tuple[Scene, FreeProblem]:
     """Return the scene with its robots, and the problem of its free schedule."""
-    scene = load_scene(options.scene)
+    scene = asked_scene(options)
     names = parse_robots(options.robots)
     if options.robots.isdecimal():
         scene, names = with_robots(scene, int(options.robots)), ()
@@ -233,9 +229,3 @@ def _under(texts: Sequence[str], methods: Mapping[str, pd.DataFrame]) -> dict[st
         for name, value in bounds.items():
             out[name] = min(value, out.get(name, value))
     return out
-
-
-def _scene_file(options: argparse.Namespace, scene: Scene) -> dict[str, bytes | str]:
-    """Return the scene where its robots are others than those of the scene that was named."""
-    same = len(load_scene(options.scene).robots) == len(scene.robots)
-    return {} if same else {"scene.json": dump_scene(scene)}

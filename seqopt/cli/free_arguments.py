@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from seqopt.cli.free import FREE
+from seqopt.sequence.free_rules import FREE
 from seqopt.sequence.three_robots import SCHEDULES
 
 RULES = (
@@ -83,7 +83,7 @@ def add_pareto(
         "--aim",
         default=FOUR,
         metavar="NAME,NAME",
-        help="what is to be small: responses and, of the free schedule, steps or regrips "
+        help="what is to be small: responses and, of the free schedule, steps and regrips "
         "(default: %(default)s)",
     )
     command.add_argument(

@@ -10,7 +10,14 @@ from contextlib import suppress
 import numpy as np
 
 from seqopt.cli.arguments import parser
-from seqopt.cli.asked import asked_engine, payloads_hold, say_idle, say_levels, step_answers
+from seqopt.cli.asked import (
+    asked_engine,
+    asked_scene,
+    payloads_hold,
+    say_idle,
+    say_levels,
+    step_answers,
+)
 from seqopt.cli.criteria import asked_criterion
 from seqopt.cli.free import pareto
 from seqopt.cli.hints import EXAMPLES
@@ -97,7 +104,7 @@ def _run(arguments: Sequence[str] | None) -> int:
 
 
 def _compare(options: argparse.Namespace) -> Status:
-    scene = load_scene(options.scene)
+    scene = asked_scene(options)
     engine = asked_engine(options, build_network(scene))
     criterion = asked_criterion(options)
     if options.out is not None:
@@ -115,7 +122,7 @@ def _compare(options: argparse.Namespace) -> Status:
 
 def _analyze(options: argparse.Namespace) -> Status:
     keep_apart(options, options.out, options.fields)
-    scene = load_scene(options.scene)
+    scene = asked_scene(options)
     network = build_network(scene)
     engine, steps = asked_engine(options, network), _steps(scene, options)
     table = response_table(network, step_answers(options, engine, steps))
@@ -133,7 +140,7 @@ def _analyze(options: argparse.Namespace) -> Status:
 
 def _assess(options: argparse.Namespace) -> Status:
     keep_apart(options, options.out)
-    scene = load_scene(options.scene)
+    scene = asked_scene(options)
     mortar = parse_mortar(options)
     network = build_network(scene)
     steps = _steps(scene, options)
@@ -176,7 +183,7 @@ def _steps(scene: Scene, options: argparse.Namespace) -> tuple[Step, ...]:
 
 
 def _report(options: argparse.Namespace) -> None:
-    engine = asked_engine(options, build_network(load_scene(options.scene)))
+    engine = asked_engine(options, build_network(asked_scene(options)))
     path = options.folder / PAGE if options.out is None else options.out
     keep_apart(options, path)
     write_text(path, folder_page(engine, options.folder))
@@ -192,7 +199,7 @@ def _scene(options: argparse.Namespace) -> None:
             _line(kind.about)
         return
     keep_apart(options, options.export)
-    scene = load_scene(options.scene)
+    scene = asked_scene(options)
     parts = build_network(scene)
     count = len(scene.bricks)
     parts_of = f"{count} bricks, {len(scene.joints)} joints, {len(scene.grounds)} ground ends"

@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 import time
 
-from seqopt.cli.asked import payloads_hold, say_idle, say_levels
-from seqopt.cli.free import FREE, optimize_free, require_loop
+from seqopt.cli.asked import payloads_hold, say_idle, say_levels, scene_file
+from seqopt.cli.free import optimize_free, require_loop
 from seqopt.cli.outputs import plan_files, worth, write_outputs
 from seqopt.cli.pages import PAGE, plan_page
 from seqopt.cli.posing import asked_problem
@@ -16,6 +16,7 @@ from seqopt.cli.terminal import complain, progress, say, tell
 from seqopt.cli.values import parse_options, parse_time_limit
 from seqopt.placement.formulation import End, find_formulation
 from seqopt.placement.solving import solve
+from seqopt.sequence.free_rules import FREE
 from seqopt.sequence.schedule import Schedule
 from seqopt.study.published import paper_models
 
@@ -53,19 +54,21 @@ def optimize(options: argparse.Namespace) -> Status:
         "seconds": {"assemble": assemble, **plan.seconds},
     }
     table = plan.responses()
+    scene = problem.schedule.scene
     page = plan_page(problem.engine, formulation.name, table, worth(plan))
-    write_outputs(options, plan_files(plan, report) | {PAGE: page})
+    files = plan_files(plan, report) | {PAGE: page} | scene_file(options, scene)
+    write_outputs(options, files)
     say(
         f"{formulation.name} ({formulation.kind.value}): {worth(plan)}, "
         f"{plan.models} models; written to {options.out}"
     )
     for excess in plan.overloads:
         say(f"payload exceeded: {excess}")
-    say_idle(problem.schedule.scene, plan.steps)
+    say_idle(scene, plan.steps)
     if plan.selection.end is End.INTERRUPTED:
         complain("seqopt: interrupted; the plan is the best that was met")
         return Status.INTERRUPTED
-    return payloads_hold(options, problem.schedule.scene, table)
+    return payloads_hold(options, scene, table)
 
 
 def _paper_count(schedule: Schedule) -> dict[str, int] | None:

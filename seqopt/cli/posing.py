@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from seqopt.cli.asked import asked_engine
+from seqopt.cli.asked import asked_engine, asked_scene
 from seqopt.cli.budgets import parse_budgets, with_budgets
 from seqopt.cli.criteria import asked_criterion
 from seqopt.cli.means import parse_resources
@@ -13,7 +13,6 @@ from seqopt.cli.values import parse_limits, parse_robots
 from seqopt.files import require_folder
 from seqopt.network.build import build_network
 from seqopt.placement.problem import Problem, pose
-from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.schedule_file import find_schedule
 from seqopt.sequence.thinning import thin
 
@@ -31,7 +30,7 @@ def asked_problem(options: argparse.Namespace) -> Problem:
     Problem
     """
     criterion = asked_criterion(options)
-    scene = load_scene(options.scene)
+    scene = asked_scene(options)
     limits = parse_limits(options.limit, scene)
     resources = parse_resources(options, progress)
     budgets = parse_budgets(options.budget)

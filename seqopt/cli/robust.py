@@ -8,7 +8,7 @@ import math
 import time
 from collections.abc import Mapping
 
-from seqopt.cli.asked import payloads_hold, say_idle, say_levels
+from seqopt.cli.asked import payloads_hold, say_idle, say_levels, scene_file
 from seqopt.cli.outputs import write_outputs
 from seqopt.cli.posing import asked_problem
 from seqopt.cli.status import Status
@@ -88,7 +88,7 @@ def optimize_robust(options: argparse.Namespace) -> Status:
         "scenarios.csv": csv_text(trial.table),
         "summary.json": json.dumps(_plain(report), indent=2) + "\n",
     }
-    write_outputs(options, files)
+    write_outputs(options, files | scene_file(options, problem.schedule.scene))
     worth = trial.summary()["unseen"]
     say(
         f"{aim}: {plan.objective:.6g} over {count} scenarios, gap {100 * plan.gap:.3g} %; over "

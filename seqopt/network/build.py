@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +10,7 @@ import numpy as np
 from seqopt.arrays import Ints
 from seqopt.errors import SceneError
 from seqopt.network.network import GROUND, Network, PartKind, Springs
+from seqopt.scene.orders import in_order
 from seqopt.scene.parts import Brick, Ground, Joint
 from seqopt.scene.scene import Scene
 
@@ -34,21 +36,24 @@ class _Edge:
     spring: int = -1
 
 
-def build_network(scene: Scene) -> Network:
+def build_network(scene: Scene, order: Sequence[int] | str | None = None) -> Network:
     """Return the network of a whole scene.
 
     Parameters
     ----------
     scene : Scene
+    order : sequence of int or str, optional
+        As `seqopt.scene.orders.in_order` takes it; by default the scene's own.
 
     Returns
     -------
     Network
+        Its scene has this order.
 
     Raises
     ------
     SceneError
-        If it is none.
+        If it is none, or the order does not name every brick once.
 
     Examples
     --------
@@ -56,27 +61,19 @@ def build_network(scene: Scene) -> Network:
     >>> build_network(load_scene("arch25"))
     <Network arch25: 25 bricks, 26 springs, 78 nodes, 77 edges>
     """
-    index_of = _indices(scene)
+    scene = in_order(_checked(scene), order)
+    index_of = {brick.name: i for i, brick in enumerate(scene.placed)}
     springs = _springs(scene, index_of)
     names = _joint_names(springs)
-    nodes, edges = [], []
-    for i, brick in enumerate(scene.placed):
-        for number in brick.nodes:
-            nodes.append(_Node(number, PartKind.INNER, i + 1, brick.node_position(number), brick=i))
-        edges.append(_Edge(brick.nodes, PartKind.INNER, i + 1, brick=i))
+    nodes, edges = _of_bricks(scene)
     for s, (spring, since) in enumerate(springs):
         ends = spring.bricks if isinstance(spring, Joint) else (spring.brick,)
-        name = names[s]
-        nodes.append(
-            _Node(name, PartKind.JOINT, min(index_of[b] for b in ends) + 1, spring.position, s)
-        )
+        name, first = names[s], min(index_of[b] for b in ends) + 1
+        nodes.append(_Node(name, PartKind.JOINT, first, spring.position, s))
         for b in ends:
             brick = scene.placed[index_of[b]]
-            edges.append(
-                _Edge(
-                    (_nearest(brick, spring), name), PartKind.JOINT, index_of[b] + 1, index_of[b], s
-                )
-            )
+            met = (_nearest(brick, spring), name)
+            edges.append(_Edge(met, PartKind.JOINT, index_of[b] + 1, index_of[b], s))
         if isinstance(spring, Ground):
             base = ("base", *name[1:])
             nodes.append(_Node(base, PartKind.BASE, since, spring.anchor, s))
@@ -84,6 +81,16 @@ def build_network(scene: Scene) -> Network:
     nodes.sort(key=lambda node: node.since)
     edges.sort(key=lambda edge: edge.since)
     return _arrays(scene, index_of, springs, nodes, edges)
+
+
+def _of_bricks(scene: Scene) -> tuple[list[_Node], list[_Edge]]:
+    """Return the inner nodes and edges."""
+    nodes, edges = [], []
+    for i, brick in enumerate(scene.placed):
+        for number in brick.nodes:
+            nodes.append(_Node(number, PartKind.INNER, i + 1, brick.node_position(number), brick=i))
+        edges.append(_Edge(brick.nodes, PartKind.INNER, i + 1, brick=i))
+    return nodes, edges
 
 
 def network_of(given: Network | Scene) -> Network:
@@ -108,12 +115,11 @@ def network_of(given: Network | Scene) -> Network:
     raise SceneError(f"a {kind} is no network; give build_network(scene), or the scene itself")
 
 
-def _indices(scene: Scene) -> dict[int, int]:
-    """Return the indices of bricks in build order by their names."""
+def _checked(scene: Scene) -> Scene:
     if not isinstance(scene, Scene):
         kind = type(scene).__name__
         raise SceneError(f"a {kind} is no scene; give one, as load_scene('arch25') returns it")
-    return {brick.name: i for i, brick in enumerate(scene.placed)}
+    return scene
 
 
 def _springs(scene: Scene, index_of: dict[int, int]) -> list[tuple[Joint | Ground, int]]:

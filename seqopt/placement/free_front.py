@@ -11,13 +11,15 @@ from scipy.sparse.csgraph import breadth_first_order, shortest_path
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.errors import InfeasibleError, ProblemError
+from seqopt.placement.free_counts import steps_with, with_held
 from seqopt.placement.free_goals import Measure
 from seqopt.placement.free_graph import StateGraph, explore
 from seqopt.placement.free_infeasible import why_impossible
 from seqopt.placement.free_judge import plan_values
-from seqopt.placement.free_paths import below, keep_best, reaches_end, shortest
+from seqopt.placement.free_paths import below, keep_best, least_to_end, reaches_end, shortest
 from seqopt.placement.free_problem import FreeProblem
 from seqopt.placement.free_steps import steps_of
+from seqopt.sequence.free_rules import Ending
 from seqopt.sequence.steps import Step
 
 DIGITS = 9  # after the first
@@ -30,7 +32,7 @@ class FreeFront:
     Parameters
     ----------
     problem : FreeProblem
-        Its goals are responses, and at most one of steps and regrips.
+        Its goals are responses, margins of stability, steps and regrips.
     rounding : mapping of str to float, optional
         What numbers are rounded up to multiples of, by name, SI units; none by default.
 
@@ -42,12 +44,11 @@ class FreeFront:
 
     def __init__(self, problem: FreeProblem, rounding: Mapping[str, float] | None = None) -> None:
         self._problem = problem
-        counted = [m for m in (g.measure for g in problem.goals) if m is not Measure.PEAK]
-        if len(counted) > 1 or {*counted} - {Measure.STEPS, Measure.REGRIPS}:
-            raise ProblemError(
-                "pareto: give responses, and at most one of steps and regrips; of these one "
-                "follows from the other and the grips held at the end"
-            )
+        for goal in problem.goals:
+            if goal.measure not in (Measure.PEAK, Measure.STEPS, Measure.REGRIPS):
+                raise ProblemError(
+                    f"pareto: {goal} adds up along a plan; give responses, steps and regrips"
+                )
         self._round = rounding_steps(self.names, rounding)
 
     @property
@@ -65,10 +66,10 @@ class FreeFront:
         return graph
 
     @cached_property
-    def _counted(self) -> int | None:
-        """Which goal counts moves."""
+    def _counted(self) -> list[int]:
+        """Which goals count moves: bounds on them hold along a path, not state by state."""
         measures = [goal.measure for goal in self._problem.goals]
-        return next((k for k, m in enumerate(measures) if m is not Measure.PEAK), None)
+        return [k for k, measure in enumerate(measures) if measure is not Measure.PEAK]
 
     def best_below(self, bounds: Floats) -> tuple[Floats, object] | None:
         """Return a plan that none beats among those below bounds.
@@ -86,21 +87,37 @@ class FreeFront:
         graph = below(self._graph, self._peaks(bounds))
         if graph is None or not reaches_end(graph):
             return None
+        if len(self._counted) > 1:
+            graph = self._fewest(graph, bounds)
         point = np.zeros(len(bounds))
-        order = [*range(len(bounds))]
-        if self._counted is not None:  # a count is bounded along a path, not state by state
-            order = sorted(order, key=lambda k: k != self._counted)
-        for k in order:
+        for k in sorted(range(len(bounds)), key=lambda k: k not in self._counted):
+            if graph is None:
+                return None
             graph, point[k] = keep_best(graph, k)
             if not point[k] < bounds[k]:
                 return None
+        assert graph is not None
         path = shortest(graph)
         return point, tuple((b, *graph.levels[b].states[row].tolist()) for b, row in path)
 
+    def _fewest(self, graph: StateGraph, bounds: Floats) -> StateGraph | None:
+        """Return the paths with as many grips held at the end as those with the fewest moves."""
+        steps, regrips = self._of(Measure.STEPS), self._of(Measure.REGRIPS)
+        found = []
+        for held in range(self._problem.space.robots + 1):
+            part = with_held(graph, held)
+            least = least_to_end(part, regrips)[0]
+            count = steps_with(self._problem, least, np.array([held]))
+            if least[0] < bounds[regrips] and count[0] < bounds[steps]:
+                found.append((count[0], least[0], part))
+        return min(found, key=lambda each: each[:2])[2] if found else None
+
+    def _of(self, measure: Measure) -> int:
+        return next(k for k in self._counted if self._problem.goals[k].measure is measure)
+
     def _peaks(self, bounds: Floats) -> Floats:
         out = bounds.copy()
-        if self._counted is not None:
-            out[self._counted] = np.inf
+        out[self._counted] = np.inf
         return out
 
     def is_empty_below(self, bounds: Floats) -> bool:
@@ -118,18 +135,37 @@ class FreeFront:
         ok = np.asarray((values < self._peaks(bounds)).all(axis=1))
         ok[0] = True
         kept = ok[source] & ok[target]
-        if self._counted is None:
+        if not self._counted:
             graph = sparse.csr_array(
                 (np.ones(kept.sum(), dtype=np.int8), (source[kept], target[kept])), (len(ok),) * 2
             )
             reached = breadth_first_order(graph, 0, return_predecessors=False)
             return not ends[reached].any()
-        steps = self._problem.goals[self._counted].measure is Measure.STEPS
-        cost = np.ones(kept.sum()) if steps else 1.0 + len(ok) * regrip[kept]
-        graph = sparse.csr_array((cost, (source[kept], target[kept])), (len(ok),) * 2)
-        least = shortest_path(graph, indices=0)[ends].min(initial=np.inf)
-        least = least if steps or np.isinf(least) else least // len(ok)
-        return not least < bounds[self._counted]
+        if [self._problem.goals[k].measure for k in self._counted] == [Measure.STEPS]:
+            steps = self._least_moves(kept, np.ones(kept.sum()))
+            return not steps[ends].min(initial=np.inf) < bounds[self._counted[0]]
+        least = self._least_moves(kept, 1.0 + len(ok) * regrip[kept].astype(float))
+        least[np.isfinite(least)] //= len(ok)
+        last = np.flatnonzero(ends)
+        if self._problem.rules.ending is not Ending.HELD:
+            last = np.unique(source[kept & ends[target]])
+        found, held = least[last], self._held[last]
+        room = found < bounds[self._of(Measure.REGRIPS)]
+        if len(self._counted) > 1:
+            room &= steps_with(self._problem, found, held) < bounds[self._of(Measure.STEPS)]
+        return not room.any()
+
+    def _least_moves(self, kept: Bools, cost: Floats) -> Floats:
+        """Return the least cost of a way from the empty site to every state."""
+        source, target, _, values, _ = self._flat
+        graph = sparse.csr_array((cost, (source[kept], target[kept])), (len(values),) * 2)
+        return np.asarray(shortest_path(graph, indices=0))
+
+    @cached_property
+    def _held(self) -> Ints:
+        """How many grips every state holds."""
+        grips = [self._problem.space.grips(level.states) for level in self._graph.levels]
+        return np.concatenate(grips)
 
     @cached_property
     def _flat(self) -> tuple[Ints, Ints, Bools, Floats, Bools]:

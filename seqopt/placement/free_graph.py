@@ -8,12 +8,12 @@ through it.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 from numpy.typing import NDArray
 
-from seqopt.arrays import Bools, Floats, Ints
+from seqopt.arrays import Bools, Floats, Ints, frozen
 from seqopt.placement.free_goals import Measure
 from seqopt.placement.free_problem import FreeProblem
 from seqopt.sequence.free_moves import Moves
@@ -77,6 +77,11 @@ class Level:
     onward: Arcs
 
 
+_NONE: Rows = frozen(np.zeros(0, dtype=np.int32))
+NO_ARCS = Arcs(_NONE, _NONE, frozen(np.zeros(0, dtype=bool)), frozen(np.zeros(0)))
+NOTHING = Level(frozen(np.zeros((0, 0), dtype=int)), frozen(np.zeros((0, 0))), NO_ARCS, NO_ARCS)
+
+
 @dataclass(eq=False)
 class StateGraph:
     """The kept states of all brick counts from none on.
@@ -88,11 +93,14 @@ class StateGraph:
         By brick count; as many as were reached.
     excluded : float
         The least that the first goal takes of a state that was left out for it.
+    held : int or None
+        How many grips are held where the build ends; any number by default.
     """
 
     problem: FreeProblem
     levels: list[Level] = field(default_factory=list)
     excluded: float = np.inf
+    held: int | None = None
 
     @property
     def whole(self) -> bool:
@@ -106,7 +114,19 @@ class StateGraph:
         -------
         (n,) bool
         """
-        return self.problem.space.ended(self.levels[-1].states)
+        states = self.levels[-1].states
+        ends = self.problem.space.ended(states)
+        return ends if self.held is None else ends & (self.problem.space.grips(states) == self.held)
+
+    @property
+    def nbytes(self) -> int:
+        """How much memory states and moves take."""
+        total = 0
+        for level in self.levels:
+            total += level.states.nbytes + level.values.nbytes
+            for arcs in (level.inner, level.onward):
+                total += sum(getattr(arcs, each.name).nbytes for each in fields(arcs))
+        return total
 
     def costs(self, goal: int, level: int, arcs: Arcs) -> Floats:
         """Return what a goal takes of moves to a level.
@@ -157,15 +177,14 @@ def explore(
         With fewer levels where no state of the next one is reached.
     """
     graph, space = StateGraph(problem), problem.space
-    none = _no_arcs()
-    level = Level(space.start(), np.zeros((1, len(problem.goals))), none, none)
+    level = Level(space.start(), np.zeros((1, len(problem.goals))), NO_ARCS, NO_ARCS)
     for bricks in range(1, space.bricks + 1):
         graph.levels.append(level)
         tell(graph)
         moves = space.places(bricks - 1, level.states)
-        following, excluded = _close(problem, bricks, moves.states, (ceiling, width))
+        following, excluded = close_level(problem, bricks, moves.states, (ceiling, width))
         graph.excluded = min(graph.excluded, excluded)
-        level.onward = _arcs(problem, moves, following.states, regrip=False)
+        level.onward = arcs_to(problem, moves, following.states, regrip=False)
         level = following
         if not len(level.states):
             return graph
@@ -174,12 +193,26 @@ def explore(
     return graph
 
 
-def _close(
+def close_level(
     problem: FreeProblem, bricks: int, entry: Ints, most: tuple[float, int | None]
 ) -> tuple[Level, float]:
     """Return the level of all states that can be reached from some without placing a brick.
 
-    Also the least that the first goal takes of a state that was left out.
+    Parameters
+    ----------
+    problem : FreeProblem
+    bricks : int
+    entry : (n, c) int
+        Where the level is entered, some states perhaps more than once.
+    most : tuple of (float, int or None)
+        Ceiling and width of `explore`.
+
+    Returns
+    -------
+    level : Level
+        Without moves onward.
+    excluded : float
+        The least that the first goal takes of a state that was left out.
     """
     space = problem.space
     seen, excluded = np.zeros(0, dtype=np.int64), np.inf
@@ -203,8 +236,10 @@ def _close(
     rank = np.empty_like(order)
     rank[order] = np.arange(len(order))
     states, values = states[order], values[order]
-    arcs = [_arcs(problem, Moves(rank[m.source], *m[1:]), states, regrip=hold) for m, hold in parts]
-    return Level(states, values, _joined(arcs), _no_arcs()), excluded
+    arcs = [
+        arcs_to(problem, Moves(rank[m.source], *m[1:]), states, regrip=hold) for m, hold in parts
+    ]
+    return Level(states, values, _joined(arcs), NO_ARCS), excluded
 
 
 def _chosen(
@@ -220,8 +255,22 @@ def _chosen(
     return states, values, excluded
 
 
-def _arcs(problem: FreeProblem, moves: Moves, states: Ints, *, regrip: bool) -> Arcs:
-    """Return the moves that lead to kept states, which are in the order of their codes."""
+def arcs_to(problem: FreeProblem, moves: Moves, states: Ints, *, regrip: bool) -> Arcs:
+    """Return the moves that lead to kept states.
+
+    Parameters
+    ----------
+    problem : FreeProblem
+    moves : Moves
+    states : (n, c) int
+        Kept ones, in the order of their codes.
+    regrip : bool
+        Whether the moves are regrips.
+
+    Returns
+    -------
+    Arcs
+    """
     known, codes = problem.space.codes(states), problem.space.codes(moves.states)
     at = np.searchsorted(known, codes)
     kept = np.zeros(len(codes), dtype=bool)
@@ -234,11 +283,6 @@ def _arcs(problem: FreeProblem, moves: Moves, states: Ints, *, regrip: bool) -> 
 
 def _joined(parts: list[Arcs]) -> Arcs:
     if not parts:
-        return _no_arcs()
+        return NO_ARCS
     names = ("source", "target", "regrip", "way")
     return Arcs(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
-
-
-def _no_arcs() -> Arcs:
-    none = np.zeros(0, dtype=np.int32)
-    return Arcs(none, none, np.zeros(0, dtype=bool), np.zeros(0))

@@ -8,7 +8,7 @@ import numpy as np
 
 from seqopt.arrays import Bools, Floats
 from seqopt.placement.free_goals import Measure
-from seqopt.placement.free_graph import Arcs, Level, StateGraph
+from seqopt.placement.free_graph import NOTHING, Arcs, Level, Rows, StateGraph
 
 TIED = 1e-9  # of the least: by how much a path may exceed it and still be one of the best
 Join = Callable[[Floats, Floats], Floats]
@@ -35,7 +35,7 @@ def least_from_start(graph: StateGraph, goal: int) -> list[Floats]:
         reached = np.full(len(level.states), np.inf)
         through = join(out[-1][entry.source], graph.costs(goal, b, entry))
         np.minimum.at(reached, entry.target, through)
-        out.append(_settle(reached, level.inner, graph.costs(goal, b, level.inner), join))
+        out.append(settle(reached, level.inner, graph.costs(goal, b, level.inner), join))
     return out
 
 
@@ -67,7 +67,7 @@ def least_to_end(graph: StateGraph, goal: int) -> list[Floats]:
             np.minimum.at(left, onward.source, through)
         inner = level.inner
         back = Arcs(inner.target, inner.source, inner.regrip, inner.way)
-        out.append(_settle(left, back, graph.costs(goal, b, inner), join))
+        out.append(settle(left, back, graph.costs(goal, b, inner), join))
     return out[::-1]
 
 
@@ -77,7 +77,7 @@ def keep_best(graph: StateGraph, goal: int) -> tuple[StateGraph, float]:
     Parameters
     ----------
     graph : StateGraph
-        In which some path leads to the end.
+        In which some path leads to the end; it is used up.
     goal : int
         Its place among the problem's goals.
 
@@ -97,18 +97,15 @@ def keep_best(graph: StateGraph, goal: int) -> tuple[StateGraph, float]:
         return np.asarray(through <= most)
 
     nodes = [join(first, last) <= most for first, last in zip(before, after, strict=True)]
-    levels = [
-        (
-            level.inner.only(tight(b, b, level.inner)),
-            level.onward.only(tight(b, b + 1, level.onward)),
-        )
-        for b, level in enumerate(graph.levels)
-        if b + 1 < len(graph.levels)
-    ]
-    last = graph.levels[-1]
-    b = len(graph.levels) - 1
-    levels.append((last.inner.only(tight(b, b, last.inner)), last.onward))
-    return _reduced(graph, nodes, levels), least
+    rank = _ranks(nodes)
+    levels = []
+    for b, level in enumerate(graph.levels):
+        inner, onward = level.inner.only(tight(b, b, level.inner)), level.onward
+        if b + 1 < len(graph.levels):
+            onward = onward.only(tight(b, b + 1, onward))
+        levels.append(_part(level, nodes[b], (inner, onward), rank[b : b + 2]))
+        graph.levels[b] = NOTHING  # or both graphs would need memory at once
+    return StateGraph(graph.problem, levels, held=graph.held), least
 
 
 def shortest(graph: StateGraph) -> list[tuple[int, int]]:
@@ -148,7 +145,7 @@ def _steps_to_end(graph: StateGraph) -> list[Floats]:
             np.minimum.at(left, level.onward.source, out[-1][level.onward.target] + 1)
         inner = level.inner
         back = Arcs(inner.target, inner.source, inner.regrip, inner.way)
-        out.append(_settle(left, back, np.ones(len(inner.source)), np.add))
+        out.append(settle(left, back, np.ones(len(inner.source)), np.add))
     return out[::-1]
 
 
@@ -156,8 +153,24 @@ def _join(graph: StateGraph, goal: int) -> Join:
     return np.maximum if graph.problem.goals[goal].measure is Measure.PEAK else np.add
 
 
-def _settle(least: Floats, arcs: Arcs, costs: Floats, join: Join) -> Floats:
-    """Return the least at every state of a level, moves among them counted."""
+def settle(least: Floats, arcs: Arcs, costs: Floats, join: Join) -> Floats:
+    """Return the least at every state of a level, moves among them counted.
+
+    Parameters
+    ----------
+    least : (n,) float
+        Where the level is entered.
+    arcs : Arcs
+        Among its states.
+    costs : (m,) float
+        Of the moves.
+    join : callable
+        How costs add up along a way.
+
+    Returns
+    -------
+    (n,) float
+    """
     while len(costs):
         better = least.copy()
         np.minimum.at(better, arcs.target, join(least[arcs.source], costs))
@@ -167,18 +180,19 @@ def _settle(least: Floats, arcs: Arcs, costs: Floats, join: Join) -> Floats:
     return least
 
 
-def _reduced(graph: StateGraph, nodes: list[Bools], arcs: list[tuple[Arcs, Arcs]]) -> StateGraph:
-    """Return the part of a graph with some states and moves."""
-    rank = [np.cumsum(kept, dtype=np.int32) - 1 for kept in nodes]
-    levels = []
-    for b, (level, (within, further)) in enumerate(zip(graph.levels, arcs, strict=True)):
-        inner = Arcs(rank[b][within.source], rank[b][within.target], within.regrip, within.way)
-        onward = further
-        if len(further.source):
-            ends = rank[b][further.source], rank[b + 1][further.target]
-            onward = Arcs(*ends, further.regrip, further.way)
-        levels.append(Level(level.states[nodes[b]], level.values[nodes[b]], inner, onward))
-    return StateGraph(graph.problem, levels)
+def _ranks(nodes: list[Bools]) -> list[Rows]:
+    """Return the rows of kept states among those that are kept, level by level."""
+    return [np.cumsum(kept, dtype=np.int32) - 1 for kept in nodes]
+
+
+def _part(level: Level, kept: Bools, arcs: tuple[Arcs, Arcs], rank: list[Rows]) -> Level:
+    """Return the kept states of a level; of the ranks, its own come first, then the next one's."""
+    inner, onward = arcs
+    inner = Arcs(rank[0][inner.source], rank[0][inner.target], inner.regrip, inner.way)
+    if len(onward.source):
+        ends = rank[0][onward.source], rank[1][onward.target]
+        onward = Arcs(*ends, onward.regrip, onward.way)
+    return Level(level.states[kept], level.values[kept], inner, onward)
 
 
 def below(graph: StateGraph, bounds: Floats) -> StateGraph | None:
@@ -199,14 +213,15 @@ def below(graph: StateGraph, bounds: Floats) -> StateGraph | None:
     nodes[0][:] = True  # the empty site has no values
     if not all(kept.any() for kept in nodes):
         return None
-    arcs = []
+    rank = _ranks(nodes)
+    levels = []
     for b, level in enumerate(graph.levels):
         inner, onward = level.inner, level.onward
-        kept = nodes[b][inner.source] & nodes[b][inner.target]
+        inner = inner.only(nodes[b][inner.source] & nodes[b][inner.target])
         if b + 1 < len(graph.levels):
             onward = onward.only(nodes[b][onward.source] & nodes[b + 1][onward.target])
-        arcs.append((inner.only(kept), onward))
-    return _reduced(graph, nodes, arcs)
+        levels.append(_part(level, nodes[b], (inner, onward), rank[b : b + 2]))
+    return StateGraph(graph.problem, levels, held=graph.held)
 
 
 def reaches_end(graph: StateGraph) -> bool:

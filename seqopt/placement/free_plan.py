@@ -10,7 +10,7 @@ from typing import Any
 
 import pandas as pd
 
-from seqopt.errors import InfeasibleError, ProblemError
+from seqopt.errors import InfeasibleError
 from seqopt.placement.formulation import Formulation
 from seqopt.placement.free_infeasible import why_impossible
 from seqopt.placement.free_judge import TOLERANCE, ScheduleCertificate, judge_schedule
@@ -206,10 +206,7 @@ def solve_free(
         If the answer is not what its formulation claims.
     """
     formulation = find_schedule_formulation(formulation)
-    for name in options:
-        if name not in (*formulation.options, "progress"):
-            known = ", ".join(formulation.options) or "no options"
-            raise ProblemError(f"option {name}: {formulation.name} has {known}")
+    formulation.require_options(options)
     start = time.perf_counter()
     try:
         selection = formulation.solve(problem, **options)

@@ -1,21 +1,24 @@
-"""The proof that no free schedule is better: states that a better one could pass, one by one."""
+"""The proof that no free schedule is better: the states that a better one could pass.
+
+Worst values and numbers of steps are proven for many states at once, by tables of the rules; what
+else adds up over a build is proven state by state.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from functools import reduce
-from operator import or_
+from functools import cached_property
 
 import numpy as np
 
-from seqopt.engines.interface import Fields, Want
-from seqopt.errors import MechanismError
-from seqopt.placement.free_goals import LARGEST, Goal, Measure
+from seqopt.placement.free_answers import ask
+from seqopt.placement.free_goals import Measure
 from seqopt.placement.free_problem import FreeProblem
+from seqopt.placement.free_reach import Reach, counts_alone
+from seqopt.placement.free_tables import RuleTables
 from seqopt.placement.requirements import LIMIT_TOLERANCE
 from seqopt.placement.standing import slack
 from seqopt.placement.standing_proof import StandingProof
-from seqopt.responses.quantities import CHOSEN_BY, lengths
 from seqopt.sequence.free_check import RuleBook
 from seqopt.sequence.free_rules import Ending, Payload
 from seqopt.sequence.steps import Grips, StepKind
@@ -23,7 +26,6 @@ from seqopt.sequence.steps import Grips, StepKind
 BELOW = 1e-9  # by how much a plan must be better, over the size of the value
 ROUNDING = 1e-12  # by how much it may be worse in a goal before, likewise
 REMEMBERED = 50_000  # states of which what follows is kept
-BATCH = 2048  # grip sets whose fields are held at once
 State = tuple[int, Grips, int, Grips]  # bricks, grips, regrips since the last, where robots were
 Label = tuple[float, ...]  # what the goals that add up took so far
 Known = dict[State, list[Label]]
@@ -73,6 +75,22 @@ class Proof:
             return False
         most = [value + ROUNDING * abs(value) for value in values[:k]]
         most.append(self.bound(values, k))
+        if counts_alone(self._problem.goals[: k + 1]):
+            found = self._reach.finds_end(most)
+            self.states += self._reach.states if not k else 0
+            return found
+        return self._finds_end(most)
+
+    @cached_property
+    def _reach(self) -> Reach:
+        """For goals that leave nothing to remember of a way but its length."""
+        payload = np.array([self._most[r] for r in self._book.team])
+        tables = RuleTables(self._book, self._groups)
+        return Reach(self._problem, tables, payload, self._stands)
+
+    def _finds_end(self, most: list[float]) -> bool:
+        """Return whether a plan takes no more than bounds say, state by state."""
+        k = len(most) - 1
         none: Grips = (None,) * len(self._problem.network.scene.robots)
         known: Known = {(0, none, 0, none): [(0.0,) * (k + 1)]}
         for bricks in range(len(self._problem.network.inner) + 1):
@@ -223,48 +241,13 @@ class Proof:
         for bricks, held in sorted(asked):
             if (bricks, held) not in self._worth:
                 alike.setdefault((bricks, len(held)), []).append(held)
-        for (bricks, _), sets in alike.items():
-            for start in range(0, len(sets), BATCH):
-                self._worth |= self._answers(bricks, sets[start : start + BATCH])
-
-    def _answers(
-        self, bricks: int, sets: list[GripSet]
-    ) -> Iterator[tuple[tuple[int, GripSet], tuple[Label, dict[int, float]] | None]]:
-        """Yield what goals take of grip sets and their forces; None where they are not allowed."""
-        named = [CHOSEN_BY[name] for name in self._problem.named if name != LARGEST]
-        want = reduce(or_, (response.needs for response in named), Want(0))
-        try:
-            grips = np.array(sets, dtype=np.int64).reshape(len(sets), -1)
-            fields = self._problem.engine.solve(bricks, grips, want)
-        except MechanismError:
-            if len(sets) == 1:
-                yield (bricks, sets[0]), None
-                return
-            for half in (sets[::2], sets[1::2]):
-                yield from self._answers(bricks, half)
-            return
-        found = {r.name: r.of(self._problem.network, fields) for r in named}
-        force = lengths(fields.grip_force)
-        found[LARGEST] = force.max(axis=1, initial=0.0)
-        allowed = np.ones(len(sets), dtype=bool)
-        for limit in self._problem.limits:
-            allowed &= ~limit.exceeded(found.get(limit.response, np.zeros(len(sets))))
-        goals = [self._costs(goal, found, bricks, fields) for goal in self._problem.goals]
-        for i, held in enumerate(sets):
-            worth = tuple(float(column[i]) for column in goals)
-            forces = dict(zip(held, force[i].tolist(), strict=True))
-            fits = allowed[i] and np.isfinite(worth).all()
-            yield (bricks, held), (worth, forces) if fits else None
-
-    def _costs(
-        self, goal: Goal, found: dict[str, np.ndarray], bricks: int, fields: Fields
-    ) -> np.ndarray:
-        count = len(fields.grip_force)
-        if goal.response and not goal.of_margins:
-            return found[goal.response]
-        if goal.of_states and not goal.of_margins:
-            return np.asarray(self._problem.criterion.costs(found, bricks, count))
-        return np.zeros(count)
+        for (bricks, count), sets in alike.items():
+            grips = np.array(sets, dtype=np.int64).reshape(len(sets), count)
+            found = ask(self._problem, bricks, grips)
+            rows = zip(sets, found.worth.tolist(), found.forces.tolist(), found.fit, strict=True)
+            for held, worth, forces, fits in rows:
+                known = (tuple(worth), dict(zip(held, forces, strict=True))) if fits else None
+                self._worth[bricks, held] = known
 
 
 def _held(state: State) -> GripSet:

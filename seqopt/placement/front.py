@@ -12,7 +12,11 @@ import pandas as pd
 
 from seqopt.arrays import Floats, FrozenValue
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
-from seqopt.placement.schedule_formulation import ScheduleFormulation, find_schedule_formulation
+from seqopt.placement.schedule_formulation import (
+    Finds,
+    ScheduleFormulation,
+    find_schedule_formulation,
+)
 from seqopt.sequence.steps import Step, StepKind
 
 TOLERANCE = 1e-6  # of a value: how far a point may be from what the engine says of its plan
@@ -154,7 +158,7 @@ def find_front(
         If a plan is not worth what is claimed, or the set lacks a point.
     """
     start = time.perf_counter()
-    formulation = find_schedule_formulation(formulation)
+    formulation = find_schedule_formulation(formulation, Finds.FRONT)
     found: FrontSelection = formulation.solve(problem, seconds=seconds, progress=progress)
     if not len(found.points) and not found.stopped:
         raise InfeasibleError("pareto: no plan is within the limits; relax one")

@@ -152,9 +152,9 @@ def solve_robust(
         If no choice is allowed in all scenarios; an answer is not what it is claimed to be.
     """
     layers = problem.layered(problem.aim.aim)
-    joined = largest_of(layers)  # says if no choice is allowed in all scenarios
     minimax = find_formulation(CHOOSES[Aim.PEAK])  # loaded before the time is taken
     watch = Watch(time_limit, progress)
+    joined = largest_of(layers)  # says if no choice is allowed in all scenarios
     if problem.aim.aim is Aim.PEAK:
         found, weights = _least_peak(minimax, joined, layers)
     else:
@@ -176,10 +176,18 @@ def _least_peak(
 ) -> tuple[Searched, Floats]:
     """Return the choice whose worst peak is least; both maxima are one."""
     chosen = select(minimax, CostProblem(joined))
-    peaks = np.array([each.worst(chosen.choice) for each in layers])
     weights = np.zeros(len(layers))
-    weights[int(np.argmax(peaks))] = 1.0
+    weights[_worst_scenario(joined, layers, chosen.choice)] = 1.0
     return Searched(chosen.choice, chosen.objective, chosen.bound), weights
+
+
+def _worst_scenario(joined: LayeredCosts, layers: tuple[LayeredCosts, ...], choice: Choice) -> int:
+    """Return the first scenario in which a choice meets the largest cost that it meets in any."""
+    move, is_shared = divmod(int(np.argmax(joined.parts(choice))), 2)
+    now, before = choice[move], choice[move - 1] if move else 0
+    if is_shared:
+        return int(np.argmax([each.shared[move][before, now] for each in layers]))
+    return int(np.argmax([each.single[move][now] for each in layers]))
 
 
 def _least_total(

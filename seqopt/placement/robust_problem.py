@@ -230,12 +230,19 @@ def largest_of(layers: Sequence[LayeredCosts]) -> LayeredCosts:
     InfeasibleError
         If no choice is allowed in all of them.
     """
-    moves = range(len(layers[0].single))
-    single = tuple(np.max([each.single[k] for each in layers], axis=0) for k in moves)
-    shared = tuple(np.max([each.shared[k] for each in layers], axis=0) for k in moves)
+    single = tuple(map(_largest, zip(*(each.single for each in layers), strict=True)))
+    shared = tuple(map(_largest, zip(*(each.shared for each in layers), strict=True)))
     out = LayeredCosts(single, shared)
     try:
         out.continuable()
     except InfeasibleError as error:
         raise InfeasibleError(f"over all {len(layers)} scenarios, {error}") from error
+    return out
+
+
+def _largest(costs: Sequence[Floats]) -> Floats:
+    """Return the largest of costs, one after the other: all in one array would be a large one."""
+    out = np.array(costs[0])
+    for each in costs[1:]:
+        np.maximum(out, each, out=out)
     return out

@@ -3,15 +3,24 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from importlib.metadata import entry_points
+from enum import Enum
+from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
 from seqopt.errors import ProblemError
 from seqopt.placement.formulation import Formulation, FormulationKind
 
 GROUP = "seqopt.schedule_formulations"
+
+
+class Finds(Enum):
+    """What a formulation of the free schedule answers."""
+
+    PLAN = "one plan"
+    FRONT = "a Pareto set"
+    ORDER = "an order"
 
 
 @dataclass(frozen=True)
@@ -27,12 +36,15 @@ class ScheduleFormulation:
     solve : callable
         Takes the problem and named options, returns a `ScheduleSelection`, or of a Pareto set a
         `seqopt.placement.front.FrontSelection`.
+    finds : Finds, optional
+        Which of the two.
     """
 
     name: str
     summary: str
     kind: FormulationKind
     solve: Callable[..., Any]
+    finds: Finds = Finds.PLAN
 
     @property
     def options(self) -> dict[str, int | float]:
@@ -43,9 +55,27 @@ class ScheduleFormulation:
             if isinstance(parameter.default, int | float)
         }
 
+    def require_options(self, given: Iterable[str]) -> None:
+        """Raise an error unless options are of this formulation.
+
+        Parameters
+        ----------
+        given : iterable of str
+            Their names; ``progress`` goes without saying.
+
+        Raises
+        ------
+        ProblemError
+            Naming the one that is not.
+        """
+        for name in given:
+            if name not in (*self.options, "progress"):
+                known = ", ".join(self.options) or "no options"
+                raise ProblemError(f"option {name}: {self.name} has {known}")
+
 
 def find_schedule_formulation(
-    given: ScheduleFormulation | Formulation | str,
+    given: ScheduleFormulation | Formulation | str, finds: Finds = Finds.PLAN
 ) -> ScheduleFormulation:
     """Return a formulation of the free schedule, by name or itself.
 
@@ -53,6 +83,8 @@ def find_schedule_formulation(
     ----------
     given : ScheduleFormulation or str
         A formulation of another kind is refused.
+    finds : Finds, optional
+        What it has to answer.
 
     Returns
     -------
@@ -61,20 +93,30 @@ def find_schedule_formulation(
     Raises
     ------
     ProblemError
-        If there is none of that name, or it is something else.
+        If there is none of that name, or it is something else, or answers something else.
 
     Examples
     --------
     >>> find_schedule_formulation("schedule_search").kind.value
     'exact'
     """
-    if isinstance(given, ScheduleFormulation):
-        return given
+    found = given if isinstance(given, ScheduleFormulation) else _loaded(given)
+    if found.finds is not finds:
+        able = [name for name in _entries() if _loaded(name).finds is finds]
+        raise ProblemError(
+            f"{found.name} finds {found.finds.value}, and {finds.value} is asked for; "
+            f"use {' or '.join(able)}"
+        )
+    return found
+
+
+def _loaded(given: Formulation | str) -> ScheduleFormulation:
+    """Return the formulation of a name."""
     if isinstance(given, Formulation):
         raise ProblemError(
             f"{given.name}: a free schedule has no moves to choose; use schedule_search"
         )
-    entries = {entry.name: entry for entry in entry_points(group=GROUP)}
+    entries = _entries()
     if not isinstance(given, str) or given not in entries:
         known = ", ".join(sorted(entries))
         raise ProblemError(f"{given!r} is no formulation of the free schedule; give {known}")
@@ -85,3 +127,7 @@ def find_schedule_formulation(
             "entry point name a ScheduleFormulation"
         )
     return found
+
+
+def _entries() -> dict[str, EntryPoint]:
+    return {entry.name: entry for entry in entry_points(group=GROUP)}

@@ -21,7 +21,8 @@ class ScheduleSelection(FrozenValue):
     bound : tuple of float
         Claimed lower bound of every goal, those before it being at their values.
     stopped : str
-        Why the search ended before all was proven: ``time`` or ``interrupt``; empty if it did not.
+        Why the search ended before all was proven: ``time``, ``memory`` or ``interrupt``; empty if
+        it did not.
     """
 
     states: tuple[tuple[int, ...], ...]

@@ -7,7 +7,7 @@ from math import pi
 
 import numpy as np
 
-from seqopt.arrays import Floats, Ints
+from seqopt.arrays import Bools, Floats, Ints
 from seqopt.errors import SolverError
 from seqopt.placement.free_problem import FreeProblem
 from seqopt.placement.standing import Standing, StandingSets, slack
@@ -50,16 +50,36 @@ class StandingProof:
         list of bool
         """
         out = np.ones(len(states), dtype=bool)
+        for bricks in {bricks for bricks, _ in states}:
+            rows = np.array([i for i, (count, _) in enumerate(states) if count == bricks])
+            held, payload = self._rows([states[i][1] for i in rows])
+            out[rows] = self.allows_rows(bricks, held, payload, most)
+        return out.tolist()
+
+    def allows_rows(self, bricks: int, held: Ints, payload: Floats, most: Sequence[float]) -> Bools:
+        """Return the same of states of one brick count.
+
+        Parameters
+        ----------
+        bricks : int
+        held : (S, r) int
+            Nodes held, ascending, as places in build order counted from 1; zeros for none.
+        payload : (S, r) float
+            Largest force of each, N.
+        most : sequence of float
+
+        Returns
+        -------
+        (S,) bool
+        """
         base = self._problem.standing
         asked = base or Standing()
         for goal, value in zip(self._problem.goals, most, strict=False):
             if goal.of_margins:
                 asked = asked.demanding(goal.response, max(value, 0.0))
-        for bricks in {bricks for bricks, _ in states} if base or asked != Standing() else ():
-            rows = np.array([i for i, (count, _) in enumerate(states) if count == bricks])
-            held, payload = self._rows([states[i][1] for i in rows])
-            out[rows] = self._known(asked).may_stand(bricks, held, payload)
-        return out.tolist()
+        if not base and asked == Standing():
+            return np.ones(len(held), dtype=bool)
+        return self._known(asked).may_stand(bricks, held, payload)
 
     def _known(self, asked: Standing) -> StandingSets:
         if asked not in self._sets:

@@ -21,11 +21,12 @@ from seqopt.placement.promises import overloads
 from seqopt.placement.ranking import rank_choice
 from seqopt.placement.requirements import Criterion
 from seqopt.placement.solving import on_the_way, solve
-from seqopt.report.free_row import FREE, free_plan, free_row
+from seqopt.report.free_row import free_plan, free_row
 from seqopt.report.methods import idle_note, method_tables
 from seqopt.responses.quantities import RESPONSES, robot_response
 from seqopt.responses.table import force_column
 from seqopt.scene.scene import Scene
+from seqopt.sequence.free_rules import FREE
 from seqopt.sequence.loops import robot_loop
 from seqopt.sequence.three_robots import modified_sequential
 from seqopt.study.published import (

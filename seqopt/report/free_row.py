@@ -10,9 +10,8 @@ from seqopt.placement.criteria import WORST_OVER_METHODS
 from seqopt.placement.free_plan import FreePlan
 from seqopt.placement.free_problem import pose_free
 from seqopt.placement.solving import solve
-from seqopt.sequence.free_rules import FreeRules
+from seqopt.sequence.free_rules import FREE, FreeRules
 
-FREE = "free"
 PATIENCE = 10.0  # s, after which the best plan so far is the row
 
 

@@ -55,6 +55,11 @@ class GripSets:
         """How many different grip sets were solved."""
         return self._known.count
 
+    @property
+    def nbytes(self) -> int:
+        """How much memory their responses take."""
+        return self._known.nbytes
+
     def answers(self, bricks: int, held: Ints) -> tuple[Floats, Floats]:
         """Return the responses of grip sets and the forces of their grips.
 

@@ -31,6 +31,14 @@ class KnownRows:
         self._known: dict[object, tuple[Ints, Floats]] = {}
         self.count = 0
 
+    @property
+    def nbytes(self) -> int:
+        """How much memory the rows take."""
+        return sum(
+            codes.nbytes + (0 if values is None else values.nbytes)
+            for codes, values in self._known.values()
+        )
+
     def of(self, key: object, codes: Ints, compute: Callable[[Ints], Floats]) -> Floats:
         """Return the rows of codes, those that are new computed now, all together.
 

@@ -75,21 +75,21 @@ def sort_entries(states: Ints, first: int, end: int) -> None:
         states[:, first:end] = -np.sort(-states[:, first:end], axis=1)
 
 
-def join_moves(parts: Sequence[Moves], columns: int) -> Moves:
+def join_moves(parts: Sequence[Moves], states: Ints) -> Moves:
     """Return several moves as one.
 
     Parameters
     ----------
     parts : sequence of Moves
-    columns : int
-        Of a state.
+    states : (n, c) int
+        That they lead from.
 
     Returns
     -------
     Moves
     """
     none = np.zeros(0, dtype=np.int64)
-    whole = [Moves(none, np.zeros((0, columns), dtype=np.int64), np.zeros(0)), *parts]
+    whole = [Moves(none, states[:0], np.zeros(0)), *parts]
     return Moves(*map(np.concatenate, zip(*whole, strict=True)))
 
 
@@ -110,7 +110,10 @@ def number_rows(states: Ints, robots: int, least: int, most: int) -> Ints:
     (n,) int
     """
     further = states.shape[1] > robots
-    out = states[:, -1].copy() if further else np.zeros(len(states), dtype=np.int64)
+    out = np.zeros(len(states), dtype=np.int64)
+    out += states[:, -1] if further else 0
     for column in range(robots):
-        out = out * (1 + most - least) + states[:, column] - least
+        out *= 1 + most - least
+        out += states[:, column]
+        out -= least
     return np.asarray(out)

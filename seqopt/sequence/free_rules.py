@@ -12,6 +12,7 @@ from seqopt.scene.checks import short
 from seqopt.scene.parts import Robot
 from seqopt.scene.scene import Scene
 
+FREE = "free"  # the schedule that is no list of steps
 MOST_ROBOTS = 5
 
 

@@ -84,8 +84,10 @@ class FreeSpace:
         Returns
         -------
         (1, c) int
+            Of the smallest type that holds every node: there may be tens of millions of states.
         """
-        return np.zeros((1, self.robots + self._counts), dtype=np.int64)
+        kind = np.min_scalar_type(-max(2 * self.bricks, self.rules.regrips or 0) - 1)
+        return np.zeros((1, self.robots + self._counts), dtype=kind)
 
     def codes(self, states: Ints) -> Ints:
         """Return a number for every state that no other one of its brick count has.
@@ -114,6 +116,19 @@ class FreeSpace:
         """
         return np.sort(states[:, : self.robots].clip(min=0), axis=1)
 
+    def grips(self, states: Ints) -> Ints:
+        """Return how many grips are held.
+
+        Parameters
+        ----------
+        states : (n, c) int
+
+        Returns
+        -------
+        (n,) int
+        """
+        return np.asarray((states[:, : self.robots] > 0).sum(axis=1))
+
     def places(self, bricks: int, states: Ints) -> Moves:
         """Return the moves that place the next brick; a free robot then holds it.
 
@@ -133,7 +148,7 @@ class FreeSpace:
         for k, kind in enumerate(self.kinds):
             if kind.places:
                 parts += self._take(k, states, nodes[kind.newest[nodes]])
-        moves = join_moves(parts, self.robots + self._counts)
+        moves = join_moves(parts, states)
         if self._counts:
             moves.states[:, -1] = 0
         return self._lawful_only(bricks + 1, moves)
@@ -158,7 +173,7 @@ class FreeSpace:
         parts = []
         for k, kind in enumerate(self.kinds):
             parts += self._take(k, states[rows], np.flatnonzero(kind.reach[: 2 * bricks]))
-        moves = join_moves(parts, self.robots + self._counts)
+        moves = join_moves(parts, states)
         if self._counts:
             moves.states[:, -1] += 1
         return Moves(rows[moves.source], moves.states, moves.way)
@@ -184,7 +199,7 @@ class FreeSpace:
                 new[:, slot] = -new[:, slot] if self.parks else 0
                 sort_entries(new, first, end)
                 parts.append(Moves(rows, new, np.zeros(len(rows))))
-        moves = join_moves(parts, self.robots + self._counts)
+        moves = join_moves(parts, states)
         if bricks < self.bricks or self.rules.ending is not Ending.ONE_BY_ONE:
             moves = self._lawful_only(bricks, moves)
         if bricks < self.bricks or self.rules.ending is Ending.HELD:
@@ -204,8 +219,7 @@ class FreeSpace:
         (n,) bool
         """
         held = states[:, : self.robots]
-        grips = (held > 0).sum(axis=1)
-        ok = np.asarray(grips >= (self.rules.least_grips if bricks > 1 else 0))
+        ok = np.asarray(self.grips(states) >= (self.rules.least_grips if bricks > 1 else 0))
         if self.rules.newest is not Newest.FREE:
             nodes = 2 * bricks + np.array([-1, 0])
             newest = np.zeros(len(states), dtype=bool)
@@ -239,7 +253,7 @@ class FreeSpace:
             none = states[rows]
             none[:, : self.robots] = 0
             parts = [moves, Moves(rows, none, np.zeros(len(rows)))]
-            moves = join_moves(parts, self.robots + self._counts)
+            moves = join_moves(parts, states)
         bare = (moves.states[:, : self.robots] <= 0).all(axis=1)
         moves.states[bare, : self.robots] = 0
         return moves

@@ -43,10 +43,8 @@ def free_space(
     >>> import seqopt
     >>> network = seqopt.build_network(seqopt.load_scene("arch25"))
     >>> space = free_space(network, FreeRules())
-    >>> space.places(0, space.start()).states  # node 0 of its first brick is blocked
-    array([[2, 0, 0],
-           [0, 2, 0],
-           [0, 0, 2]])
+    >>> space.places(0, space.start()).states.tolist()  # node 0 of its first brick is blocked
+    [[2, 0, 0], [0, 2, 0], [0, 0, 2]]
     """
     space = FreeSpace(network, rules, sort_robots(network, rules, caps), parks)
     base = 1 + (2 if parks else 1) * 2 * space.bricks

@@ -159,3 +159,36 @@ def test_pareto_of_a_loop_and_methods_to_beat(capsys, tmp_path, arch):
     status, _, error = run(capsys, "pareto", arch, *loop, "--rule", "regrips=0", *out)
     assert status == 2
     assert "go with free" in error
+
+
+def test_the_best_order_is_written_with_its_scene(capsys, tmp_path, arch):
+    out = tmp_path / "out"
+    words = ["--schedule", "free", "--order", "search", "--aim", "F_largest,steps"]
+    status, said, _ = run(capsys, "optimize", arch, *words, "--out", str(out))
+    assert status == 0
+    assert "order_search (optimal): F_largest" in said
+    summary = json.loads((out / "summary.json").read_text())
+    scene = load_scene(out / "scene.json")
+    assert [*scene.build_order] == summary["order"] != [*load_scene(arch).build_order]
+    assert summary["order_bound"] == pytest.approx(summary["objective"]["F_largest"])
+    assert len(read_plan(scene, out / "plan.csv")) == summary["steps"]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (
+            ["--schedule", "loop", "--formulation", "minimax"],
+            "--order search: the free schedule of",
+        ),
+        (["--schedule", "free", "--max-memory", "2GB"], "--max-memory: the search of orders has"),
+        (["--schedule", "free", "--aim", "steps"], "an order is chosen by a worst step"),
+        (["--schedule", "free", "--option", "depth=3"], "depth"),
+    ],
+)
+def test_what_does_not_go_with_the_search_of_orders(capsys, tmp_path, arch, words, said):
+    out = str(tmp_path / "out")
+    status, _, err = run(capsys, "optimize", arch, "--order", "search", *words, "--out", out)
+    assert status == 2
+    assert said in err
+    assert err.count("\n") == 1

@@ -30,6 +30,7 @@ from experiments.placement import (
     decision_sensitivity,
     degenerate_placement,
     formulation_cost,
+    free_growth,
     heuristic_gaps,
     program_shapes,
     robust_placement,
@@ -133,6 +134,7 @@ def checks() -> dict[str, tuple[Check, Tables, Callable[..., Iterator[tuple[Any,
             spoil_contrast,
         ),
         "fuzz": (fuzz.holds, (rows("fuzz"), rows("fuzz_kills")), spoil_fuzz),
+        "free_growth": (free_growth.holds, (rows("free_growth"),), spoil_free_growth),
         "heuristic_gaps": (heuristic_gaps.holds, (rows("heuristic_gaps"),), spoil_gaps),
         "identify_arch25": (
             lambda table: arch_scores.holds(table, quick=False),
@@ -161,8 +163,10 @@ def checks() -> dict[str, tuple[Check, Tables, Callable[..., Iterator[tuple[Any,
             spoil_robust,
         ),
         "speed_accuracy": (
-            lambda table: all(speed_accuracy.holds(table).values()),
-            (rows("runs"),),
+            lambda table, ratios: all(
+                (speed_accuracy.holds(table) | speed_accuracy.free_pays(ratios)).values()
+            ),
+            (rows("runs"), rows("worst_ratios")),
             spoil_runs,
         ),
         "staged_construction": (
@@ -380,17 +384,26 @@ def spoil_peers(models, ways):
     yield models, spoiled(ways, "gap", 1e-3, tool="networkx, Dijkstra")
 
 
-def spoil_runs(table):
+def spoil_free_growth(table):
+    yield (spoiled(table, "status", "feasible", bricks=49, robots=4),)
+    yield (spoiled(table, "seconds", 5000.0, bricks=145),)
+    yield (spoiled(table, "memory_MB", 2100.0, bricks=19),)
+    yield (spoiled(table, "bound", 0.1, status="feasible"),)
+
+
+def spoil_runs(table, ratios):
     own = {"engine": "rigid bricks", "formulation": "overlap_dp"}
-    yield (spoiled(table, "gap", 1e-3, **own),)
-    yield (spoiled(table, "total", 9.0, **own),)
-    yield (spoiled(table, "total", 1e-3, engine="auto", formulation="overlap_dp"),)
+    yield (spoiled(table, "gap", 1e-3, **own), ratios)
+    yield (spoiled(table, "total", 9.0, **own), ratios)
+    yield (spoiled(table, "total", 1e-3, engine="auto", formulation="overlap_dp"), ratios)
     frame = {"engine": "frame 1e7", "formulation": "overlap_dp"}
-    yield (spoiled(table, "total", 0.05, scene="chain7", **frame),)
-    yield (spoiled(table, "total", 2.0, scene="arch25", **frame),)
+    yield (spoiled(table, "total", 0.05, scene="chain7", **frame), ratios)
+    yield (spoiled(table, "total", 2.0, scene="arch25", **frame), ratios)
     proven = {"formulation": "rank_search, no proof", "scene": "arch25"}
-    yield (spoiled(table, "total", 1e-3, engine="rigid bricks", **proven),)
-    yield (spoiled(table, "total", 99.0, engine="frame 1e7", **proven),)
+    yield (spoiled(table, "total", 1e-3, engine="rigid bricks", **proven), ratios)
+    yield (spoiled(table, "total", 99.0, engine="frame 1e7", **proven), ratios)
+    yield (table, spoiled(ratios, "seconds", 60.0, way="free, 3 robots"))
+    yield (table, spoiled(ratios, "worst_ratio", 1.0, way="free, 3 robots"))
 
 
 def largest(table):

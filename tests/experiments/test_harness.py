@@ -22,6 +22,7 @@ from experiments.placement.parts.speed_charts import headline, profile_charts
 from experiments.placement.speed_accuracy import (
     COMPARED,
     KEY,
+    RATIOS,
     collect,
     holds,
     measure,
@@ -123,7 +124,7 @@ def test_charts_and_table_come_from_rows(smoke, monkeypatch):
         lambda figure, name: saved.append((name, figure)),
     )
     table = smoke.assign(scene="arch25")
-    headline(table)
+    headline(table, pd.read_csv(RATIOS))
     profile_charts(table)
     assert [name for name, _ in saved] == ["speed_accuracy.png", "profiles.png"]
     for _, figure in saved:

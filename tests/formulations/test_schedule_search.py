@@ -17,12 +17,15 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, MechanismError, ProblemError
 from seqopt.network.build import build_network
 from seqopt.placement.criteria import WorstRatio
+from seqopt.placement.free_counts import steps_with, with_held
 from seqopt.placement.free_front import FreeFront
+from seqopt.placement.free_graph import explore
+from seqopt.placement.free_paths import keep_best, least_to_end, shortest
 from seqopt.placement.free_problem import pose_free
 from seqopt.placement.front import find_front, pick, upper_bounds
 from seqopt.placement.loop_front import LoopFront
 from seqopt.placement.requirements import LIMIT_TOLERANCE, Limit
-from seqopt.placement.schedule_formulation import find_schedule_formulation
+from seqopt.placement.schedule_formulation import Finds, find_schedule_formulation
 from seqopt.responses.quantities import CHOSEN_BY, lengths
 from seqopt.sequence.free_check import RuleBook
 from seqopt.sequence.free_rules import FreeRules, Payload, with_robots
@@ -194,6 +197,67 @@ def test_pareto_sets_equal_brute_force(build):
     assert found.table[["F_largest", "M_sup"]].to_numpy() == pytest.approx(np.array(expected))
 
 
+def counted_front(graph, start, worst):
+    """All (worst, steps, regrips) that no plan dominates, by labels at every state."""
+    labels = {start: [(0.0, 0, 0)]}
+    work = [(start, (0.0, 0, 0))]
+    while work:
+        state, (peak, steps, regrips) = work.pop()
+        for _, after, data in graph.edges(state, data=True):
+            at_end = after == "end"
+            more = 0 if at_end else 1
+            new = (max(peak, worst.get(after, 0.0)), steps + more, regrips + int(data["regrip"]))
+            known = labels.setdefault(after, [])
+            if not any(all(a <= b for a, b in zip(old, new, strict=True)) for old in known):
+                labels[after] = [new, *(o for o in known if not all(map(np.less_equal, new, o)))]
+                if not at_end:
+                    work.append((after, new))
+    return sorted(labels.get("end", []))
+
+
+@pytest.mark.slow
+@given(build=free_builds(most_bricks=4, most_robots=4))
+@settings(max_examples=15, deadline=None)
+def test_steps_and_regrips_in_one_set_equal_brute_force(build):
+    scene, rules = build
+    engine = ComplianceEngine(build_network(scene))
+    graph, start = whole_graph(engine, rules)
+    worst = {
+        n: float(np.ceil(d["worst"][0] / 10 - 1e-9) * 10)
+        for n, d in graph.nodes(data=True)
+        if n != "end"
+    }
+    expected = counted_front(graph, start, worst)
+    for aim in ("F_largest,steps,regrips", "regrips,F_largest,steps"):
+        front = FreeFront(pose_free(engine, rules, ONES, aim), {"F_largest": 10.0})
+        if not expected:
+            with pytest.raises(InfeasibleError):
+                find_front(front)
+            continue
+        found = find_front(front)
+        assert found.complete
+        rows = found.table[["F_largest", "steps", "regrips"]].to_numpy().tolist()
+        assert np.array(sorted(map(tuple, rows))) == pytest.approx(np.array(expected))
+
+
+def test_who_holds_more_at_the_end_has_fewer_steps():
+    """Of every number of grips held at the end the plan with the fewest moves, step by step."""
+    for rules in (FreeRules(least_grips=1), FreeRules(least_grips=1, ending="held")):
+        problem = pose_free(
+            ComplianceEngine(build_network(with_robots(small_arch(4), 4))), rules, ONES, "regrips"
+        )
+        found = []
+        for held in range(5):
+            part = with_held(explore(problem), held)
+            least = least_to_end(part, 0)[0]
+            if np.isfinite(least[0]):
+                part, _ = keep_best(part, 0)
+                found.append(held)
+                steps = len(shortest(part))
+                assert steps == steps_with(problem, least, np.array([held]))[0]
+        assert found == [1, 2, 3, 4]
+
+
 @given(
     points=st.lists(st.tuples(*[st.integers(0, 4)] * 3), min_size=1, max_size=6),
     z=st.tuples(*[st.integers(0, 5)] * 3),
@@ -232,8 +296,6 @@ def pose_goals(text):
 
 
 def test_all_states_of_the_arch_are_counted(arch):
-    from seqopt.placement.free_graph import explore  # noqa: PLC0415
-
     graph = explore(arch)
     assert sum(len(level.states) for level in graph.levels) == 71035  # start and end among them
 
@@ -251,10 +313,25 @@ def test_time_and_interrupts_leave_a_plan_and_a_bound(arch, monkeypatch):
     assert plan.selection.stopped == "interrupt"
     assert 0 < plan.selection.bound[0] <= 0.8401 <= plan.selection.objective[0] + 1e-4
     assert plan.certificate.gap == np.inf
-    with pytest.raises(ProblemError, match="too few to find a plan"):
+    with pytest.raises(ProblemError, match="too little to find a plan"):
         seqopt.solve(arch, "schedule_search", seconds=0.0)
     with pytest.raises(ProblemError, match="option speed: schedule_search has width"):
         seqopt.solve(arch, "schedule_search", speed=2)
+
+
+def test_where_memory_ends_there_is_a_bound(arch):
+    best = seqopt.solve(arch, "schedule_search").selection.objective[0]
+    short = seqopt.solve(replace(arch), "schedule_search", max_memory=1e6)
+    assert (short.status, short.selection.stopped) == ("feasible", "memory")
+    assert best / 2 < short.selection.bound[0] <= best <= short.selection.objective[0]
+    for words, said in (
+        ({"max_memory": 1e3}, "max_memory: it is too"),
+        ({"seconds": 0}, "seconds"),
+    ):
+        for aim in ("minmax", "tilt,minmax"):
+            problem = replace(arch, goals=pose_goals(aim))
+            with pytest.raises(ProblemError, match=said):
+                seqopt.solve(problem, "schedule_search", **words)
 
 
 def test_travel_is_that_of_the_steps():
@@ -305,8 +382,8 @@ def test_steps_can_be_among_what_is_to_be_small(arch, engine25):
     steps = front.table["steps"].to_numpy()
     assert steps.min() == 48
     assert len({*steps}) > 1
-    with pytest.raises(ProblemError, match="at most one of steps and regrips"):
-        FreeFront(pose_free(engine25, FreeRules(), arch.criterion, "steps,regrips"))
+    with pytest.raises(ProblemError, match="pareto: travel adds up along a plan"):
+        FreeFront(pose_free(engine25, FreeRules(), arch.criterion, "steps,travel"))
 
 
 def test_the_front_of_the_loop_holds_its_best_peak(engine25):
@@ -321,9 +398,44 @@ def test_the_front_of_the_loop_holds_its_best_peak(engine25):
     assert front.table["F_largest"].min() == pytest.approx(least)
 
 
+def test_the_short_cut_does_what_the_long_way_does():
+    scene, limits = small_arch(5), [Limit("F_largest", 250.0)]
+    rules = FreeRules(ending="held")
+    engine = ComplianceEngine(build_network(with_robots(scene, 4)))
+    problem = pose_free(engine, rules, ONES, "minmax,steps", limits, "bond=1e5")
+    plan = seqopt.solve(problem, "schedule_search")
+    words = {"aim": "minmax,steps", "rules": rules, "robots": 4, "stands": "bond=1e5"}
+    short = seqopt.optimize(scene, "free", ONES, engine="compliance", limits=limits, **words)
+    assert (short.steps, short.objective) == (plan.steps, plan.objective)
+    assert [*short.seconds] == ["assemble", "solve", "verify"]
+    alone = seqopt.optimize(scene, "free", robots=["rob1", "rob3"], rules=FreeRules(least_grips=1))
+    assert alone.problem.criterion.name == "worst-ratio"
+    assert alone.summary()["rules"]["robots"] == ["rob1", "rob3"]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ({"criterion": "equations-2-3"}, "equations-2-3: it ranks the choices of a move"),
+        ({"formulation": "overlap_dp"}, "'overlap_dp' is no formulation of the free schedule"),
+        ({"formulation": "pareto_zones"}, "one plan is asked for; use schedule_search"),
+        ({"workers": 2}, "option workers: the free schedule has no such"),
+        ({"rules": {"regrips": 0}}, "rules {'regrips': 0}: give a seqopt.FreeRules"),
+        ({"robots": 9}, "9 robots: the free schedule takes two to 5"),
+        ({"robots": "rob9"}, "robot 'rob9': there is no such; give some of rob1"),
+        ({"width": 3, "depth": 1}, "option depth: schedule_search has width"),
+        ({"schedule": "loop", "aim": "steps"}, "option aim: only the free schedule has it"),
+    ],
+)
+def test_the_short_cut_says_in_a_line_what_does_not_fit(words, said):
+    with pytest.raises(seqopt.SeqoptError, match=said) as caught:
+        seqopt.optimize(**{"scene": small_arch(4), "schedule": "free"} | words)
+    assert "\n" not in str(caught.value)
+
+
 def test_formulations_are_found_by_name():
-    assert find_schedule_formulation("pareto_zones").kind.value == "exact"
+    assert find_schedule_formulation("pareto_zones", Finds.FRONT).kind.value == "exact"
     with pytest.raises(
-        ProblemError, match="no formulation of the free schedule; give pareto_zones"
+        ProblemError, match=r"no formulation of the free schedule; give .*pareto_zones"
     ):
         find_schedule_formulation("overlap_dp")

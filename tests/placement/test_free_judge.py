@@ -18,7 +18,11 @@ from seqopt.placement.free_judge import judge_schedule
 from seqopt.placement.free_problem import pose_free
 from seqopt.placement.front import FrontSelection, find_front
 from seqopt.placement.requirements import Limit
-from seqopt.placement.schedule_formulation import ScheduleFormulation, find_schedule_formulation
+from seqopt.placement.schedule_formulation import (
+    Finds,
+    ScheduleFormulation,
+    find_schedule_formulation,
+)
 from seqopt.placement.solving import solve
 from seqopt.sequence.free_rules import FreeRules
 from tests.builders import small_arch
@@ -94,6 +98,12 @@ def test_problems_go_to_their_own_formulations(plan):
         solve(plan.problem, "minimax")
     with pytest.raises(ProblemError, match="a free schedule has no moves to choose"):
         solve(plan.problem, seqopt.formulations()["minimax"])
+    with pytest.raises(
+        ProblemError, match="a Pareto set, and one plan is asked for; use schedule_"
+    ):
+        solve(plan.problem, "pareto_zones")
+    with pytest.raises(ProblemError, match="one plan, and a Pareto set is asked for; use pareto_"):
+        find_front(FreeFront(posed("F_largest")), "schedule_search")
     with pytest.raises(ProblemError, match="is for free schedules"):
         solve(object(), find_schedule_formulation("schedule_search"))
 
@@ -131,7 +141,7 @@ class Changed:
         self.change = change
 
     def __call__(self, problem, **options):
-        found = find_schedule_formulation("pareto_zones").solve(problem, **options)
+        found = find_schedule_formulation("pareto_zones", Finds.FRONT).solve(problem, **options)
         return self.change(found)
 
 
@@ -142,7 +152,9 @@ def front_of(engine25):
     front = FreeFront(problem, {"F_largest": 20.0, "M_sup": 2.0})
 
     def judged(change):
-        formulation = ScheduleFormulation("changed", "", FormulationKind.EXACT, Changed(change))
+        formulation = ScheduleFormulation(
+            "changed", "", FormulationKind.EXACT, Changed(change), Finds.FRONT
+        )
         return find_front(front, formulation)
 
     return judged

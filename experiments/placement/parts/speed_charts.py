@@ -22,20 +22,31 @@ COLORS = {
     "overlap_mip": "#7b3294",
 }
 MARKERS = {"rigid bricks": "o", "auto": "P", "frame 1e7": "s", "frame 1e3": "^", "discrete": "D"}
+FREE_COLOR = "#1b7837"
+ASIDE = {  # points: where words stand
+    "free, 3 robots": (-7, -10),
+    "free, fewest steps": (7, 4),
+    "loop, sum of ratios": (7, -11),
+    "loop, ranks": (7, 2),
+    "loop, worst ratio": (7, 3),
+    "sequential": (2, -12),
+}
+TOP = 2.0  # worst ratio up to which points are drawn
 OPEN = "#555555"  # edge of what has no proof
 EXACT = 1e-13  # errors below are drawn there
 
 
-def headline(runs: pd.DataFrame) -> None:
-    """Draw time against gap and against error on the reference arch, and growth with the bricks."""
+def headline(runs: pd.DataFrame, ratios: pd.DataFrame) -> None:
+    """Draw time against gap, error, worst ratio on the reference arch, and growth with bricks."""
     table = runs[(runs["scene"] == "arch25") & (runs["criterion"] == "equations-2-3")]
     table = table.assign(gap=100 * table["gap"])
-    figure = new_figure(12, 4.6)
-    gaps, errors, growth = figure.subplots(1, 3, width_ratios=[1.2, 1, 1])
+    figure = new_figure(10.5, 8.4)
+    (gaps, errors), (worst, growth) = figure.subplots(2, 2)
     _gaps(gaps, table)
     _errors(errors, table[table["formulation"] == "overlap_dp"])
+    _ratios(worst, ratios)
     _growth(growth, runs)
-    for part in (gaps, errors, growth):
+    for part in (gaps, errors, worst, growth):
         part.spines[["top", "right"]].set_visible(False)
         part.grid(visible=True, lw=0.2)
         part.minorticks_off()
@@ -81,6 +92,31 @@ def _errors(axes: Axes, table: pd.DataFrame) -> None:
     axes.set(xscale="log", yscale="log", xlabel="time from scene to plan [s]")
     axes.set(ylabel="largest error of a response", title="engines, with overlap_dp")
     axes.set(ylim=(EXACT / 10, 1))
+
+
+def _ratios(axes: Axes, ratios: pd.DataFrame) -> None:
+    """Draw time against the worst ratio of ways with and without a schedule that is given."""
+    table = ratios.assign(total=ratios["seconds"])
+    fixed = table["proven"].fillna("") == ""
+    for rows, color, label in (
+        (table[fixed], "white", "fixed sequence"),
+        (table[~fixed & table["way"].str.startswith("loop")], COLORS["overlap_dp"], "loop"),
+        (table[table["way"].str.startswith("free")], FREE_COLOR, "free schedule"),
+    ):
+        axes.scatter(
+            rows["total"], rows["worst_ratio"], s=46, c=color, edgecolors=OPEN, lw=0.8, label=label
+        )
+    for _, row in table.iterrows():
+        at, shift = (row["total"], min(row["worst_ratio"], TOP)), ASIDE.get(row["way"], (7, -3))
+        words = row["way"].removeprefix("free, ").removeprefix("loop, ")
+        words += f": {row['worst_ratio']:.3g}, above" if row["worst_ratio"] > TOP else ""
+        side = "left" if shift[0] > 0 else "right"
+        axes.annotate(words, at, shift, textcoords="offset points", fontsize=7, ha=side)
+    _front(axes, table[~fixed], "worst_ratio")
+    axes.axhline(1, color=OPEN, lw=0.8, ls=":")
+    axes.set(xscale="log", xlabel="time from scene to plan [s]", xlim=(None, 120), ylim=(0.6, TOP))
+    axes.set(ylabel="worst ratio to the best published maxima", title="arch25, all four responses")
+    axes.legend(frameon=False, fontsize=8)
 
 
 def _front(axes: Axes, table: pd.DataFrame, column: str) -> None:

@@ -1,0 +1,117 @@
+"""Claim: the free schedule is proven best within 2 GB for 145 bricks by three robots, 73 by four.
+
+By five it is for 19. Time grows at most as the third power of the brick count with three robots and
+as the fourth with four. Where memory ends a plan is left, and a bound of at least half of its worst
+step.
+
+Method: the smallest worst step over what the scene's own fixed methods reach, then its proof, on
+arches in the shape of `arch25` with 7 to 145 bricks (twice the bricks, twice the payload), by its
+three robots and further mobile ones. Every run has a process of its own on one core, and may take
+1.7 GB for states, moves and responses beside what the program takes without any; seconds of that
+core are counted, and the largest memory of the process. Exponents are fitted over 25 bricks and
+more, where a plan is proven.
+
+Inputs: the shipped scenes. Command: ``python -m experiments.placement.free_growth [--quick]``.
+Writes ``experiments/results/free_growth.csv`` and ``docs/figures/free_growth.png``.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pandas as pd
+
+from experiments.harness.claim import Claim, Finding, Options, Times, on_this_run
+from experiments.harness.plotting import RESULTS, new_figure, save_figure
+
+SIZES = {3: (7, 13, 25, 49, 73, 97, 145), 4: (7, 13, 25, 37, 49, 73), 5: (7, 13, 19, 25)}
+QUICK = {3: (7, 13), 4: (7,)}
+SOLVED = {3: 145, 4: 73, 5: 19}  # bricks up to which a plan is proven, by robots
+STEEPEST = {3: 3.0, 4: 4.0}  # exponents of time that are claimed
+FROM = 25  # bricks from which on exponents are fitted
+MOST = 2048.0  # MB
+STYLE = {3: ("o-", "#2166ac"), 4: ("s-", "#e08214"), 5: ("^-", "#b2182b")}
+
+
+def run_apart(bricks: int, robots: int) -> dict[str, object]:
+    """Return the row of a run in a process of its own."""
+    threads = {f"{library}_NUM_THREADS": "1" for library in ("OPENBLAS", "OMP", "MKL")}
+    module = "experiments.placement.parts.free_growth_run"
+    done = subprocess.run(
+        [sys.executable, "-m", module, str(bricks), str(robots)],
+        env=os.environ | threads,
+        capture_output=True,
+        check=True,
+        text=True,
+    )
+    row: dict[str, object] = json.loads(done.stdout.splitlines()[-1])
+    return row
+
+
+def exponents(table: pd.DataFrame, column: str) -> dict[int, float]:
+    """Return the slopes over the brick count, by how many robots there are."""
+    out = {}
+    mine = table[(table["status"] == "optimal") & (table["bricks"] >= FROM)]
+    for robots, rows in mine.groupby("robots"):
+        if len(rows) > 1:
+            slope = np.polyfit(np.log(rows["bricks"]), np.log(rows[column]), 1)[0]
+            out[int(robots)] = float(slope)  # type: ignore[call-overload]
+    return out
+
+
+def holds(table: pd.DataFrame) -> bool:
+    """Return whether what is claimed to be solved is, within memory, and the rest has bounds."""
+    small = table[table["bricks"] <= table["robots"].map(SOLVED)]
+    solved = bool((small["status"] == "optimal").all())
+    ended = table[table["status"] != "optimal"]
+    bounded = bool((ended["bound"] >= ended["worst"] / 2).all())
+    steep = exponents(table, "seconds")
+    slow = any(steep[robots] > most for robots, most in STEEPEST.items() if robots in steep)
+    return solved and bounded and not slow and bool((table["memory_MB"] <= MOST).all())
+
+
+def chart(table: pd.DataFrame) -> None:
+    figure = new_figure(10, 3.6)
+    parts = figure.subplots(1, 3)
+    columns = ("states", "seconds", "memory_MB")
+    labels = ("states in the proof", "time on one core [s]", "peak memory [MB]")
+    table = table.assign(states=table["states"].where(table["status"] == "optimal"))
+    for axes, column, label in zip(parts, columns, labels, strict=True):
+        for robots, rows in table.groupby("robots"):
+            line, color = STYLE[int(robots)]  # type: ignore[call-overload]
+            axes.loglog(rows["bricks"], rows[column], line, color=color, ms=5, label=f"{robots}")
+            ended = rows[rows["status"] != "optimal"]
+            axes.loglog(ended["bricks"], ended[column], line[0], color="white", mec=color, ms=5)
+        axes.set(xlabel="bricks", ylabel=label)
+        axes.set_xticks([7, 13, 25, 49, 97], ["7", "13", "25", "49", "97"])
+        axes.minorticks_off()
+        axes.grid(visible=True, lw=0.2)
+        axes.spines[["top", "right"]].set_visible(False)
+    parts[2].axhline(MOST, color="k", lw=0.8, ls=":")
+    parts[0].legend(
+        frameon=False, fontsize=8, title="robots (open: memory ended)", title_fontsize=8
+    )
+    save_figure(figure, "free_growth.png")
+
+
+def experiment(options: Options) -> Finding:
+    sizes = QUICK if options.quick else SIZES
+    rows = [run_apart(bricks, robots) for robots, counts in sizes.items() for bricks in counts]
+    table = pd.DataFrame(rows)
+    print(table.to_string(index=False, float_format="%.4g"))
+    for column in ("states", "models", "seconds"):
+        print("exponents of", column, exponents(table, column))
+    if not options.quick:
+        table.to_csv(RESULTS / "free_growth.csv", index=False, float_format="%.4g")
+        chart(table)
+    return on_this_run(holds=holds(table))
+
+
+CLAIM = Claim(experiment, quick="small arches, nothing written", times=Times.SHOWN)
+
+if __name__ == "__main__":
+    CLAIM.main()

@@ -1,0 +1,114 @@
+"""One way to a plan of the reference arch: its time, and its worst ratio over the published maxima.
+
+Plans of the loop and of the free schedule make different sums least and have different steps. What
+all of them have is a worst step: the largest of grip force, M_sup, T_max and D_max over the best
+maxima that any published method reaches, one after the other, as exactly rigid bricks answer. Times
+run from the scene to the plan, with its proof; of several repeats the median, after one that does
+not count.
+
+Command: ``python -m experiments.placement.parts.worst_ratios WAY`` prints the row of a way as JSON.
+"""
+
+from __future__ import annotations
+
+import json
+import statistics
+import sys
+import time
+from collections.abc import Callable, Sequence
+from functools import partial
+
+import numpy as np
+
+import seqopt
+from seqopt.placement.free_judge import state_columns
+from seqopt.placement.free_plan import FreePlan
+from seqopt.placement.free_problem import pose_free
+from seqopt.placement.plan import Plan
+from seqopt.sequence.free_rules import with_robots
+from seqopt.sequence.steps import Step
+from seqopt.study.presets import WORST_RATIO
+from seqopt.study.published import published_plan
+
+Steps = Sequence[Step]
+Row = dict[str, object]
+SCENE, ENGINE = "arch25", "compliance"
+REPEATED = 5  # times, where one takes less than a second
+BEST = [seqopt.Limit(name, bound) for name, bound in WORST_RATIO.limits]
+
+
+def fixed(method: str) -> tuple[Steps, str]:
+    """Return the steps of a method that leaves no grip open, and that nothing is proven."""
+    network = seqopt.build_network(seqopt.load_scene(SCENE))
+    made = {"sequential": seqopt.sequential, "cantilever": seqopt.cantilever}
+    steps = made[method](network) if method in made else published_plan(network.scene)
+    seqopt.analyze(seqopt.make_engine(ENGINE, network), steps)
+    return steps, ""
+
+
+def chosen(criterion: str, formulation: str) -> tuple[Steps, str]:
+    """Return the steps of the loop whose open grips are chosen, and what is proven least."""
+    plan: Plan = seqopt.optimize(SCENE, "three-robot", criterion, formulation, ENGINE)
+    return plan.steps, criterion
+
+
+def free(aim: str, robots: int = 3, **words: object) -> tuple[Steps, str]:
+    """Return the steps of the free schedule, and what is proven least."""
+    own = {"aim": aim, "robots": robots, **words}
+    plan: FreePlan = seqopt.optimize(SCENE, "free", WORST_RATIO, engine=ENGINE, **own)
+    assert plan.status == "optimal"
+    return plan.steps, aim
+
+
+WAYS: dict[str, Callable[[], tuple[Steps, str]]] = {
+    "sequential": partial(fixed, "sequential"),
+    "cantilever": partial(fixed, "cantilever"),
+    "published": partial(fixed, "published"),
+    "loop, ranks": partial(chosen, "equations-2-3", "overlap_dp"),
+    "loop, sum of ratios": partial(chosen, "weighted-published", "overlap_dp"),
+    "loop, worst ratio": partial(chosen, WORST_RATIO.name, "minimax"),
+    "free, 3 robots": partial(free, "minmax"),
+    "free, fewest steps": partial(free, "steps,minmax", limits=BEST),
+    "free, dry": partial(free, "minmax", stands="dry"),
+    "free, 4 robots": partial(free, "minmax", 4),
+    "free, 5 robots": partial(free, "minmax", 5),
+}
+
+
+def row(way: str) -> Row:
+    """Return what a way takes, and what its plan is worth."""
+    seconds, (steps, least) = timed(WAYS[way])
+    if seconds < 1:
+        times = [timed(WAYS[way])[0] for _ in range(REPEATED)]
+        seconds = statistics.median(times)
+    robots = len(steps[0].grips)
+    return {
+        "way": way,
+        "robots": robots,
+        "proven": least,
+        "seconds": seconds,
+        "worst_ratio": worst_ratio(steps, robots),
+        "steps": len(steps),
+    }
+
+
+def timed(call: Callable[[], tuple[Steps, str]]) -> tuple[float, tuple[Steps, str]]:
+    """Return the seconds of a call, and what it returns."""
+    start = time.perf_counter()
+    made = call()
+    return time.perf_counter() - start, made
+
+
+def worst_ratio(steps: Steps, robots: int) -> float:
+    """Return the largest response of any step over the best published maximum of its kind."""
+    scene = seqopt.load_scene(SCENE)
+    if robots != len(scene.robots):
+        scene = with_robots(scene, robots)
+    engine = seqopt.make_engine(ENGINE, seqopt.build_network(scene))
+    problem = pose_free(engine, seqopt.FreeRules(), WORST_RATIO)
+    columns = state_columns(problem, seqopt.analyze(engine, steps))
+    return float(np.max(WORST_RATIO.costs(columns, 1, len(steps))))
+
+
+if __name__ == "__main__":
+    print(json.dumps(row(sys.argv[1])))

@@ -1,0 +1,232 @@
+r"""The order in which bricks are placed, by all sets of bricks, or where these are many by trying.
+
+What an order :math:`\pi` is worth is the least worst step of any schedule of it. Orders share what
+they have in common: with the set :math:`S` of bricks standing and the newest :math:`b \in S` known,
+neither the responses nor the moves depend on how the rest was placed. The best order is therefore a
+bottleneck path
+
+.. math::
+
+   \min_{\pi} \; \min_{s_1, \dots, s_N} \; \max_i v(s_i),
+   \qquad s_i = (S_i, b_i, \text{who holds which node}),
+
+from the empty site to all bricks. A threshold rises, as for one order, until states below it
+connect both; what no order stays below is then the least. An arch of :math:`n` bricks that is built
+from its ends has some :math:`n^2` pairs :math:`(S, b)`, and any order of it is one of them.
+
+Where there are more than ``most`` pairs it goes on as a *heuristic*: from the best of a few orders
+it moves single bricks and runs of them to other places, as long as some schedule of the new order
+has a smaller worst step. The sets that were looked at leave a lower bound, and so does the whole
+structure, with which every order ends.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from seqopt.errors import InfeasibleError, ProblemError
+from seqopt.placement.formulation import FormulationKind
+from seqopt.placement.free_graph import explore
+from seqopt.placement.free_paths import TIED, least_to_end
+from seqopt.placement.free_problem import FreeProblem
+from seqopt.placement.order_bound import whole_bound
+from seqopt.placement.order_graph import Key, OrderGraph, explore_orders
+from seqopt.placement.order_problem import OrderProblem, OrderSelection
+from seqopt.placement.schedule_formulation import Finds, ScheduleFormulation
+from seqopt.scene.orders import ORDERS, Order
+
+FAR_BELOW = 4.0  # the best order known, over the first threshold
+GROWTH = 1.1  # of the threshold
+NARROW = 50  # states of a brick count with which an order is tried first
+BETTER = 1e-9  # share by which an order must be better
+
+
+class _StopError(Exception):
+    """Time is used up."""
+
+
+@dataclass
+class _Search:
+    """What was found so far."""
+
+    problem: OrderProblem
+    end: float
+    progress: Callable[[str], None]
+    order: Order = ()
+    value: float = np.inf
+    bound: float = -np.inf
+    evaluated: int = 0
+    problems: dict[Key, FreeProblem] = field(default_factory=dict)
+
+    def tell(self, what: str) -> None:
+        """Say how far it is; end the search in time."""
+        self.progress(what)
+        if time.perf_counter() > self.end:
+            raise _StopError
+
+    def tell_bricks(self, bricks: int) -> None:
+        """Say how far all orders are looked at."""
+        self.tell(f"all orders: {bricks} bricks, {len(self.problems)} sets")
+
+    def try_order(self, order: Order) -> bool:
+        """Return whether an order is better than the best so far, and keep it if it is."""
+        if not self.problem.allows(order):
+            return False
+        self.tell(f"{self.evaluated} orders, {self.value:.6g}")
+        self.evaluated += 1
+        problem = self.problem.judging(order)
+        ceiling = self.value * (1 - BETTER) if np.isfinite(self.value) else np.inf
+        for width in (NARROW, None):
+            graph = explore(problem, ceiling, width)
+            if graph.whole:
+                ceiling = float(least_to_end(graph, 0)[0].min())
+                self.order, self.value = order, ceiling
+        return self.order == order
+
+
+def solve(
+    problem: OrderProblem,
+    *,
+    most: int = 5000,
+    tries: int = 200,
+    seed: int = 0,
+    seconds: float = np.inf,
+    progress: Callable[[str], None] = lambda _: None,
+) -> OrderSelection:
+    """Return the best order, or a good one and a bound.
+
+    Parameters
+    ----------
+    problem : OrderProblem
+    most : int, optional
+        Pairs of a set of bricks and a newest one, up to which all orders are looked at.
+    tries : int, optional
+        How many orders are tried where there are more.
+    seed : int, optional
+        In which turn.
+    seconds : float, optional
+        After which the best order found is returned.
+    progress : callable, optional
+        Told in a few words how far it is.
+
+    Returns
+    -------
+    OrderSelection
+
+    Raises
+    ------
+    InfeasibleError, ProblemError
+        If no order has a plan; a number is none, or no plan was found by the end of the search.
+    """
+    if most < 0 or tries < 0:
+        raise ProblemError(f"options most={most}, tries={tries}: give whole numbers from 0 on")
+    search = _Search(problem, time.perf_counter() + seconds, progress)
+    try:
+        why = _run(search, most, tries, np.random.default_rng(seed))
+    except (_StopError, KeyboardInterrupt) as stop:
+        if not search.order and isinstance(stop, KeyboardInterrupt):
+            raise
+        why = "time" if isinstance(stop, _StopError) else "interrupt"
+    if not search.order:
+        raise ProblemError(
+            "options most, tries, seconds: no order was found with a plan; give more"
+        )
+    bound = min(search.bound, search.value)
+    return OrderSelection(search.order, search.value, bound, search.evaluated, why)
+
+
+def _run(search: _Search, most: int, tries: int, rng: np.random.Generator) -> str:
+    """Search all orders, or try some; return why not all were looked at."""
+    own, *named = _first_orders(search.problem)
+    search.try_order(own)
+    search.bound = whole_bound(search.problem)
+    if search.bound >= search.value * (1 - BETTER) or _all_orders(search, most):
+        return ""
+    for order in named:
+        search.try_order(order)
+    _neighbors(search, tries, rng)
+    return "size"
+
+
+def _first_orders(problem: OrderProblem) -> Iterator[Order]:
+    """Yield the scene's own order, and those that have names as far as they are allowed."""
+    own = problem.scene.build_order
+    yield own
+    for order in dict.fromkeys(make(problem.scene) for make in ORDERS.values()):
+        if order != own and problem.allows(order):
+            yield order
+
+
+def _all_orders(search: _Search, most: int) -> bool:
+    """Return whether all orders were looked at below a rising threshold; then the best is known."""
+    ceiling, threshold = search.value, search.value / FAR_BELOW
+    if np.isfinite(ceiling):
+        threshold = max(threshold, search.bound)
+    while True:
+        tied = threshold + TIED * abs(threshold) if np.isfinite(threshold) else threshold
+        graph = explore_orders(search.problem, search.problems, tied, most, search.tell_bricks)
+        search.evaluated = max(search.evaluated, len(search.problems) - 1)
+        ended = _ended(graph, search)
+        if ended is not None:
+            return ended
+        threshold = min(ceiling, max(graph.excluded, threshold * GROWTH))
+
+
+def _ended(graph: OrderGraph, search: _Search) -> bool | None:
+    """Return True if the best order is known, False if sets are too many; None to go on."""
+    search.bound = max(search.bound, graph.bound)
+    best = graph.best()
+    if best is not None:
+        if best[0] < search.value * (1 - BETTER):  # of orders that are as good the one known stays
+            search.value, search.order = best[0], graph.order(*best)
+        search.bound = search.value
+        return True
+    if graph.cut:
+        return False
+    if np.isinf(graph.excluded):
+        raise InfeasibleError(
+            "no order of the bricks has a plan; extend a reach, loosen a rule or raise a limit"
+        )
+    return None
+
+
+def _neighbors(search: _Search, tries: int, rng: np.random.Generator) -> None:
+    """Try orders beside the best, until none of them is better or all tries are made."""
+    if not search.order:
+        return
+    left = tries
+    while left > 0:
+        better = False
+        for order in _beside(search.order, search.problem, rng):
+            better = search.try_order(order)
+            left -= 1
+            if better or left <= 0:
+                break
+        if not better:
+            return
+
+
+def _beside(order: Order, problem: OrderProblem, rng: np.random.Generator) -> Iterator[Order]:
+    """Yield allowed orders in which one brick, or two or three in a row, stand elsewhere."""
+    count = len(order)
+    runs = [(a, size) for size in (1, 2, 3) for a in range(count - size + 1)]
+    moves = [(a, size, to) for a, size in runs for to in range(count - size + 1) if to != a]
+    for i in rng.permutation(len(moves)).tolist():
+        start, size, to = moves[i]
+        run, rest = order[start : start + size], order[:start] + order[start + size :]
+        changed = rest[:to] + run + rest[to:]
+        if problem.allows(changed):
+            yield changed
+
+
+FORMULATION = ScheduleFormulation(
+    "order_search",
+    "the order in which bricks are placed, by all sets of bricks or by trying",
+    FormulationKind.EXACT,
+    solve,
+    Finds.ORDER,
+)

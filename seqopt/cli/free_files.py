@@ -1,0 +1,42 @@
+"""What commands write of a free schedule."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+
+from seqopt.cli.pages import PAGE, plan_page
+from seqopt.files import csv_text
+from seqopt.placement.free_plan import FreePlan
+
+
+def free_files(
+    plan: FreePlan, summary: Mapping[str, object], name: str, said: str
+) -> dict[str, bytes | str]:
+    """Return the files of a free schedule by name.
+
+    Parameters
+    ----------
+    plan : FreePlan
+    summary : mapping of str to object
+    name : str
+        What the plan is called on its page.
+    said : str
+        What it is worth, in words.
+
+    Returns
+    -------
+    dict of str to (bytes or str)
+    """
+    table = plan.responses()
+    files: dict[str, bytes | str] = {
+        "plan.csv": csv_text(table),
+        "summary.json": json.dumps(summary, indent=2) + "\n",
+    }
+    stands: list[str] = []
+    if plan.problem.standing is not None:
+        verdicts = plan.stability()
+        files["stability.csv"] = csv_text(verdicts)
+        stands = [str(verdict) for verdict in verdicts["verdict"]]
+    files[PAGE] = plan_page(plan.problem.engine, name, table, said, stands)
+    return files

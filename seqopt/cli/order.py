@@ -1,0 +1,72 @@
+"""The order that a free schedule is best in, on the command line."""
+
+from __future__ import annotations
+
+import argparse
+from math import isfinite
+
+from seqopt.cli.asked import scene_file
+from seqopt.cli.free_files import free_files
+from seqopt.cli.outputs import write_outputs
+from seqopt.cli.status import Status
+from seqopt.cli.terminal import progress, say
+from seqopt.cli.values import parse_numbers, parse_time_limit
+from seqopt.errors import ProblemError
+from seqopt.files import require_folder
+from seqopt.placement.free_problem import FreeProblem
+from seqopt.placement.order_plan import OrderPlan, solve_order
+from seqopt.placement.order_problem import OrderProblem
+from seqopt.placement.schedule_formulation import Finds, find_schedule_formulation
+
+SEARCH = "search"  # the order that is sought
+
+
+def optimize_order(options: argparse.Namespace, free: FreeProblem) -> Status:
+    """Find the order whose best free schedule is best, and write its plan.
+
+    Parameters
+    ----------
+    options : argparse.Namespace
+        Of the command ``optimize``.
+    free : FreeProblem
+        In the scene's own order.
+
+    Returns
+    -------
+    Status
+
+    Raises
+    ------
+    ProblemError
+        If an option does not go with it.
+    """
+    if options.max_memory is not None:
+        raise ProblemError(
+            "--max-memory: the search of orders has none; leave it out, or give --option most=N"
+        )
+    formulation = find_schedule_formulation(options.formulation or "order_search", Finds.ORDER)
+    numbers = parse_numbers("--option", options.option, formulation.options)
+    whole = {name: type(formulation.options[name])(value) for name, value in numbers.items()}
+    problem = OrderProblem(free)
+    require_folder(options.out)
+    limit = parse_time_limit(options.time_limit)
+    found = solve_order(
+        problem,
+        formulation,
+        proof=not options.no_proof,
+        progress=progress,
+        **{"seconds": limit, **whole},
+    )
+    plan = found.plan
+    files = free_files(plan, found.summary(), "best order", _said(found))
+    write_outputs(options, files | scene_file(options, plan.problem.network.scene))
+    say(f"{formulation.name} {_said(found)}; written to {options.out}")
+    say(f"order: {', '.join(map(str, found.order))}")
+    return Status.INTERRUPTED if found.selection.stopped == "interrupt" else Status.DONE
+
+
+def _said(found: OrderPlan) -> str:
+    values = ", ".join(f"{name} {value:.6g}" for name, value in found.plan.objective.items())
+    bound = found.selection.bound
+    below = f"no order below {bound:.6g}" if isfinite(bound) else "others are not looked at yet"
+    return f"({found.status}): {values}, {below}; {len(found.plan.steps)} steps"

@@ -1,0 +1,60 @@
+"""Steps and regrips of a free schedule together: how they follow from the grips held at the end.
+
+Every grip that is taken, by placing a brick or as a regrip, is let go alone or held at the end. Of
+B bricks, r regrips and h grips held before the end, a plan therefore has 2 B + 2 r - h steps, and
+one more where all are let go at once. Among plans with the same h both are least at once; which h
+is best is tried out, since there are no more than robots.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from seqopt.arrays import Floats, Ints
+from seqopt.placement.free_graph import StateGraph
+from seqopt.placement.free_problem import FreeProblem
+from seqopt.sequence.free_rules import Ending
+
+
+def steps_with(problem: FreeProblem, regrips: Floats, held: Ints) -> Floats:
+    """Return how many steps plans have.
+
+    Parameters
+    ----------
+    problem : FreeProblem
+    regrips : (n,) float
+        Infinite where there is no plan.
+    held : (n,) int
+        How many grips are held at the end, or before the last step where that lets all go.
+
+    Returns
+    -------
+    (n,) float
+    """
+    released = problem.rules.ending is not Ending.HELD
+    return np.asarray(2 * problem.space.bricks + 2 * regrips - held + released)
+
+
+def with_held(graph: StateGraph, held: int) -> StateGraph:
+    """Return a graph whose paths end with so many grips held, or let so many go last.
+
+    Parameters
+    ----------
+    graph : StateGraph
+        With all levels.
+    held : int
+
+    Returns
+    -------
+    StateGraph
+    """
+    levels = [*graph.levels]
+    if graph.problem.rules.ending is Ending.HELD:
+        return StateGraph(graph.problem, levels, held=held)
+    last = levels[-1]
+    ends = graph.ends()[last.inner.target]
+    grips = graph.problem.space.grips(last.states)[last.inner.source]
+    levels[-1] = replace(last, inner=last.inner.only(~ends | (grips == held)))
+    return StateGraph(graph.problem, levels)

@@ -1,0 +1,140 @@
+"""The plan of a free order: found, checked, and what there is to say about it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from seqopt.errors import SolverError
+from seqopt.placement.free_judge import TOLERANCE
+from seqopt.placement.free_plan import FreePlan, solve_free
+from seqopt.placement.order_problem import OrderProblem, OrderSelection
+from seqopt.placement.schedule_formulation import (
+    Finds,
+    ScheduleFormulation,
+    find_schedule_formulation,
+)
+from seqopt.scene.orders import Order, in_order
+
+
+@dataclass(frozen=True, repr=False)
+class OrderPlan:
+    """An order, the best plan of it, and what is known of all others.
+
+    Attributes
+    ----------
+    problem : OrderProblem
+        What was solved.
+    selection : OrderSelection
+        What the formulation claims.
+    plan : FreePlan
+        The best of this order, with its own certificate.
+    seconds : mapping of str to float
+        By stage, s: ``order``, and those of the plan.
+    """
+
+    problem: OrderProblem
+    selection: OrderSelection
+    plan: FreePlan
+    seconds: Mapping[str, float]
+
+    def __repr__(self) -> str:
+        worth = f"{self.problem.free.goals[0]} {self.selection.objective:.6g}, {self.status}"
+        return f"OrderPlan({self.problem.scene.name!r}, {worth})"
+
+    @property
+    def order(self) -> Order:
+        """Names of the bricks as they are placed."""
+        return self.selection.order
+
+    @property
+    def gap(self) -> float:
+        """What the bound leaves open, over the value."""
+        value = self.selection.objective
+        return max(0.0, value - self.selection.bound) / max(abs(value), TOLERANCE)
+
+    @property
+    def status(self) -> str:
+        """``optimal`` where no order is better, else ``heuristic``: there is a bound alone."""
+        return "optimal" if self.gap <= TOLERANCE else "heuristic"
+
+    def summary(self) -> dict[str, object]:
+        """Return what there is to say about it, ready for JSON.
+
+        Returns
+        -------
+        dict
+            That of the plan, and ``order``, ``orders`` (among which), ``order_status``,
+            ``order_bound`` (on the first aim, of any order), ``order_evaluated`` and
+            ``order_stopped``.
+        """
+        return {
+            **self.plan.summary(),
+            "order": [*self.order],
+            "orders": self.problem.among.value,
+            "order_status": self.status,
+            "order_bound": self.selection.bound if self.selection.bound > -float("inf") else None,
+            "order_evaluated": self.selection.evaluated,
+            "order_stopped": self.selection.stopped,
+            "seconds": dict(self.seconds),
+        }
+
+
+def solve_order(
+    problem: OrderProblem,
+    formulation: ScheduleFormulation | str = "order_search",
+    *,
+    proof: bool = True,
+    **options: Any,
+) -> OrderPlan:
+    """Return the best order, or a good one with a bound, and its best plan.
+
+    The plan is found anew, by the search of schedules for one order, and judged by its own
+    certificate; it must be worth what the order is claimed to be.
+
+    Parameters
+    ----------
+    problem : OrderProblem
+    formulation : ScheduleFormulation or str
+    proof : bool, optional
+        False leaves out the proof that the order has no better plan.
+    **options
+        Of the formulation; ``progress`` is told in a few words how far it is.
+
+    Returns
+    -------
+    OrderPlan
+
+    Raises
+    ------
+    InfeasibleError
+        If no order has a plan.
+    ProblemError
+        If there is no such formulation or option.
+    SolverError
+        If the order is none of those that were asked for, or not worth what is claimed.
+    """
+    found = find_schedule_formulation(formulation, Finds.ORDER)
+    found.require_options(options)
+    start = time.perf_counter()
+    selection: OrderSelection = found.solve(problem, **options)
+    seconds = {"order": time.perf_counter() - start}
+    in_order(problem.scene, selection.order)  # names every brick once
+    if not problem.allows(selection.order):
+        raise SolverError(f"{found.name}: its order places a brick that nothing ties")
+    plan = solve_free(problem.at(selection.order), "schedule_search", proof=proof)
+    _require_worth(found.name, plan.selection.objective[0], selection)
+    return OrderPlan(problem, selection, plan, {**seconds, **plan.seconds})
+
+
+def _require_worth(name: str, value: float, selection: OrderSelection) -> None:
+    """Raise an error if an order is not worth what is claimed, or less than its bound."""
+    claimed, bound = selection.objective, selection.bound
+    most = TOLERANCE * max(abs(value), abs(claimed))
+    if not abs(value - claimed) <= most or bound > value + most:
+        raise SolverError(
+            f"{name}: the order is worth {value:.9g}; claimed are {claimed:.9g} and a bound of "
+            f"{bound:.9g}"
+        )

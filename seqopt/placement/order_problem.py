@@ -1,0 +1,175 @@
+"""The problem of an order: in which the bricks are placed, so that the best plan is best."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from enum import Enum
+from functools import cached_property
+
+from seqopt.arrays import FrozenValue
+from seqopt.engines.recipe import recipe_of
+from seqopt.engines.registry import make_engine
+from seqopt.errors import ProblemError
+from seqopt.network.build import build_network
+from seqopt.placement.free_goals import Measure
+from seqopt.placement.free_problem import FreeProblem
+from seqopt.scene.orders import Order
+from seqopt.scene.scene import Scene
+
+
+class Orders(Enum):
+    """Among which orders the best is sought."""
+
+    TIED = "tied"  # a joint or ground end ties every brick to what stands when it is placed
+    ANY = "any"
+
+
+@dataclass(frozen=True, repr=False)
+class OrderProblem:
+    """The free schedule of a scene whose order is free too.
+
+    What an order is worth is the first goal of its best plan; the criterion keeps the numbers that
+    it has in the scene's own order.
+
+    Parameters
+    ----------
+    free : FreeProblem
+        In the scene's own order, of `seqopt.pose_free`; its first goal is about a worst step.
+    among : Orders or str, optional
+
+    Raises
+    ------
+    ProblemError
+        If the first goal is another, the engine was not made by name, or there are no such orders.
+    """
+
+    free: FreeProblem
+    among: Orders = Orders.TIED
+
+    def __post_init__(self) -> None:
+        try:
+            object.__setattr__(self, "among", Orders(self.among))
+        except ValueError:
+            known = ", ".join(each.value for each in Orders)
+            raise ProblemError(f"orders {self.among!r}: give one of {known}") from None
+        goal = self.free.goals[0]
+        if goal.measure is not Measure.PEAK or goal.of_margins:
+            raise ProblemError(
+                f"aim {goal}: an order is chosen by a worst step; name minmax or a response first"
+            )
+        if recipe_of(self.free.engine) is None:
+            raise ProblemError(
+                f"engine {type(self.free.engine).__name__}: orders need engines of their own; take "
+                "one of seqopt.make_engine"
+            )
+
+    def __repr__(self) -> str:
+        return f"OrderProblem({self.scene.name!r}, {self.free.goals[0]}, {self.among.value} orders)"
+
+    @property
+    def scene(self) -> Scene:
+        """What is built."""
+        return self.free.network.scene
+
+    @cached_property
+    def ties(self) -> dict[int, frozenset[int]]:
+        """By brick, those that a joint ties to it; zero joints tie nothing."""
+        out: dict[int, set[int]] = {name: set() for name in self.scene.build_order}
+        for joint in self.scene.joints:
+            if any((*joint.translational_stiffness, *joint.rotational_stiffness)):
+                first, second = joint.bricks
+                out[first].add(second)
+                out[second].add(first)
+        return {name: frozenset(others) for name, others in out.items()}
+
+    def next_bricks(self, placed: frozenset[int]) -> tuple[int, ...]:
+        """Return the bricks that may be placed next.
+
+        Parameters
+        ----------
+        placed : frozenset of int
+            Names of those that stand.
+
+        Returns
+        -------
+        tuple of int
+        """
+        left = [name for name in self.scene.build_order if name not in placed]
+        if self.among is Orders.ANY:
+            return tuple(left)
+        return tuple(b for b in left if self.ties[b] & placed or self._on_ground(b, placed))
+
+    def _on_ground(self, brick: int, placed: frozenset[int]) -> bool:
+        grounds = (ground for ground in self.scene.grounds if ground.brick == brick)
+        return any(g.closes_with is None or g.closes_with in {*placed, brick} for g in grounds)
+
+    def allows(self, order: Sequence[int]) -> bool:
+        """Return whether an order is one of those among which the best is sought.
+
+        Parameters
+        ----------
+        order : sequence of int
+            Names of all bricks.
+
+        Returns
+        -------
+        bool
+        """
+        return all(b in self.next_bricks(frozenset(order[:k])) for k, b in enumerate(order))
+
+    def judging(self, order: Order) -> FreeProblem:
+        """Return the free schedule of one order with the goal that orders are judged by alone.
+
+        Parameters
+        ----------
+        order : tuple of int
+
+        Returns
+        -------
+        FreeProblem
+        """
+        return replace(self.at(order), goals=self.free.goals[:1])
+
+    def at(self, order: Order) -> FreeProblem:
+        """Return the free schedule of one order.
+
+        Parameters
+        ----------
+        order : tuple of int
+
+        Returns
+        -------
+        FreeProblem
+        """
+        recipe = recipe_of(self.free.engine)
+        assert recipe is not None
+        network = build_network(self.scene, order)
+        engine = make_engine(recipe.engine, network, **recipe.options)  # type: ignore[arg-type]
+        return replace(self.free, engine=engine)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class OrderSelection(FrozenValue):
+    """An order, and what its formulation claims of it.
+
+    Attributes
+    ----------
+    order : tuple of int
+        Names of all bricks.
+    objective : float
+        Claimed value of the first goal of its best plan.
+    bound : float
+        Claimed lower bound over all orders; the value itself where it is proven the least.
+    evaluated : int
+        How many orders, or sets of bricks with a newest one, were looked at.
+    stopped : str
+        Why the search ended before all was proven: ``size``, ``time`` or ``interrupt``; empty if it
+        did not.
+    """
+
+    order: Order
+    objective: float
+    bound: float
+    evaluated: int
+    stopped: str = ""

@@ -1,0 +1,188 @@
+"""The best order against brute force on small builds; what is tried where they are large."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import permutations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+
+import seqopt
+from formulations.order_search import FORMULATION
+from seqopt.errors import InfeasibleError, ProblemError, SolverError
+from seqopt.placement.criteria import WorstRatio
+from seqopt.placement.free_problem import pose_free
+from seqopt.placement.order_bound import whole_bound
+from seqopt.placement.order_plan import solve_order
+from seqopt.placement.order_problem import OrderProblem
+from seqopt.placement.schedule_formulation import find_schedule_formulation
+from seqopt.placement.solving import solve
+from seqopt.scene.library.wall import WallShape, wall
+from seqopt.sequence.free_rules import FreeRules
+from tests.builders import small_arch
+from tests.strategies import free_builds
+
+ONES = WorstRatio("ones", (("F_largest", 100.0), ("M_sup", 10.0), ("T_max", 30.0), ("D_max", 1e-5)))
+
+
+def posed(scene, rules=None, aim="minmax", among="tied", limits=()):
+    engine = seqopt.make_engine("compliance", scene)
+    return OrderProblem(pose_free(engine, rules or FreeRules(), ONES, aim, limits), among)
+
+
+def brute_force(problem):
+    """What the best plan of every order is worth, one order after the other."""
+    worths = {}
+    search = find_schedule_formulation("schedule_search")
+    for order in permutations(problem.scene.build_order):
+        try:
+            worths[order] = search.solve(problem.judging(order)).objective[0]
+        except InfeasibleError:
+            continue
+    return worths
+
+
+def check_against_brute_force(scene, rules, aim="minmax"):
+    problem = posed(scene, rules, aim)
+    worths = brute_force(problem)
+    for among in ("tied", "any"):  # what nothing ties cannot be held
+        if not worths:
+            with pytest.raises(InfeasibleError, match="no order of the bricks has a plan"):
+                solve_order(replace(problem, among=among), FORMULATION)
+            continue
+        found = solve_order(replace(problem, among=among), FORMULATION)
+        assert found.status == "optimal"
+        assert found.selection.objective == pytest.approx(min(worths.values()), rel=1e-8)
+        assert worths[found.order] == pytest.approx(found.selection.objective, rel=1e-8)
+
+
+@given(build=free_builds(most_bricks=3, most_robots=3))
+@settings(max_examples=4, deadline=None)
+def test_it_equals_brute_force(build):
+    check_against_brute_force(*build)
+
+
+@pytest.mark.slow
+@given(build=free_builds(most_bricks=5, most_robots=3))
+@settings(max_examples=6, deadline=None)
+def test_it_equals_brute_force_on_more_bricks(build):
+    check_against_brute_force(*build)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("columns", "courses"), [(2, 2), (1, 4)])
+def test_it_equals_brute_force_on_walls(columns, courses):
+    scene = wall(WallShape(columns=columns, courses=courses))
+    check_against_brute_force(scene, FreeRules(), "M_sup")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("count", [5])
+def test_it_equals_brute_force_on_arches(count):
+    check_against_brute_force(small_arch(count), FreeRules())
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_heuristic_order_is_on_the_right_side(seed):
+    problem = posed(small_arch(5), aim="F_largest")
+    best = solve_order(problem, FORMULATION).selection.objective
+    tried = solve_order(problem, FORMULATION, most=6, tries=20, seed=seed)
+    assert tried.selection.stopped == "size"
+    assert tried.selection.bound <= best * (1 + 1e-9)
+    assert best <= tried.selection.objective * (1 + 1e-9)
+    assert tried.status == ("heuristic" if tried.gap > 1e-6 else "optimal")
+    own = solve(problem.free, "schedule_search").selection.objective[0]
+    assert tried.selection.objective <= own * (1 + 1e-9)
+    assert tried.summary()["order_status"] == tried.status
+
+
+def test_the_aims_after_the_first_are_those_of_the_plan():
+    found = solve_order(posed(small_arch(5), aim="T_max,steps"), FORMULATION)
+    assert found.plan.certificate.gap == 0
+    assert [*found.plan.objective] == ["T_max", "steps"]
+    assert found.plan.problem.network.scene.build_order == found.order
+
+
+def test_time_leaves_an_order_and_a_bound():
+    problem = posed(small_arch(8))
+
+    def interrupt(told):
+        if told.startswith("all orders: 3"):
+            raise KeyboardInterrupt
+
+    found = solve_order(problem, FORMULATION, progress=interrupt)
+    assert found.selection.stopped == "interrupt"
+    assert found.status == "heuristic"
+    assert found.selection.bound <= found.selection.objective
+    with pytest.raises(ProblemError, match="no order was found with a plan; give more"):
+        solve_order(problem, FORMULATION, seconds=0.0)
+
+
+def test_an_order_that_the_check_refuses_is_seen():
+    problem = posed(small_arch(4))
+    found = solve_order(problem, FORMULATION)
+    for change, said in (
+        ({"objective": 0.9 * found.selection.objective}, "the order is worth"),
+        ({"bound": 1.1 * found.selection.objective}, "and a bound of"),
+        ({"order": (2, 1, 3, 4)}, "places a brick that nothing ties"),
+        ({"order": (1, 2, 3)}, "1 bricks are missing"),
+    ):
+        claimed = replace(found.selection, **change)
+        liar = replace(FORMULATION, solve=lambda _, claimed=claimed: claimed)
+        with pytest.raises((SolverError, seqopt.SeqoptError), match=said):
+            solve_order(problem, liar)
+
+
+def test_a_wall_is_as_bad_as_it_is_whole_in_any_order():
+    """The released wall is the worst step of every order; nothing else has to be looked at."""
+    problem = posed(wall(WallShape(columns=4, courses=3)))
+    found = solve_order(problem, FORMULATION)
+    assert found.status == "optimal"
+    assert found.selection.evaluated == 1
+    assert found.selection.bound == pytest.approx(whole_bound(problem))
+
+
+@given(build=free_builds(most_bricks=4, most_robots=3))
+@settings(max_examples=5, deadline=None)
+def test_no_plan_stays_below_the_whole_structure(build):
+    problem = posed(*build)
+    try:
+        best = solve(problem.free, "schedule_search").selection.objective[0]
+    except InfeasibleError:
+        return
+    assert whole_bound(problem) <= best * (1 + 1e-9)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ({"aim": "steps,minmax"}, "aim steps: an order is chosen by a worst step"),
+        ({"aim": "tilt,minmax"}, "aim tilt: an order is chosen by a worst step"),
+        ({"among": "all"}, "orders 'all': give one of tied, any"),
+    ],
+)
+def test_what_is_no_problem_gets_one_line(words, said):
+    with pytest.raises(ProblemError, match=said):
+        posed(small_arch(4), **words)
+    with pytest.raises(ProblemError, match="option depth: order_search has most"):
+        solve_order(posed(small_arch(4)), FORMULATION, depth=1)
+
+
+def test_limits_hold_in_the_best_order():
+    limits = [seqopt.Limit("F_largest", 150.0)]
+    found = solve_order(posed(small_arch(5), limits=limits), FORMULATION)
+    forces = found.plan.responses().filter(regex="^F_rob").abs().to_numpy()
+    assert np.nanmax(forces) <= 150.0 * (1 + 1e-9)
+
+
+@pytest.mark.slow
+def test_the_arch_of_the_paper_in_its_best_order(arch25):
+    """Two bricks from one end, the rest from the other: 0.7693 instead of 0.8401."""
+    criterion = seqopt.CRITERIA["worst-ratio-published"]
+    engine = seqopt.make_engine("compliance", arch25)
+    found = solve_order(OrderProblem(pose_free(engine, FreeRules(), criterion)), FORMULATION)
+    assert found.status == "optimal"
+    assert found.selection.objective == pytest.approx(0.76929, abs=1e-5)
+    assert found.order == (1, 2, *range(25, 2, -1))

@@ -1,0 +1,67 @@
+"""Orders of a scene: by name, by words, and what is said of those that are none."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+import seqopt
+from seqopt.cli.main import main
+from seqopt.errors import SceneError
+from seqopt.scene.library.wall import WallShape, wall
+from seqopt.scene.orders import from_all_ends, in_order, parse_order
+from seqopt.sequence.support import islands
+from tests.builders import small_arch
+
+
+def test_orders_by_name():
+    scene = small_arch(5)
+    assert parse_order(scene, "reversed") == (5, 4, 3, 2, 1)
+    assert parse_order(scene, "ends") == (1, 5, 2, 4, 3)
+    assert parse_order(scene, "1..2, 5..4,3") == (1, 2, 5, 4, 3)
+    assert in_order(scene, None) is scene
+    network = seqopt.build_network(scene, (2, 1, 3, 4, 5))
+    assert network.scene.build_order == (2, 1, 3, 4, 5)
+    assert [len(islands(network, count)) for count in (1, 2)] == [1, 0]
+
+
+def test_from_all_ends_leaves_nothing_that_hangs():
+    scene = wall(WallShape(courses=3, columns=3))
+    network = seqopt.build_network(scene, "ends")
+    assert sorted(from_all_ends(scene)) == sorted(scene.build_order)
+    assert not any(islands(network, count) for count in range(1, len(scene.bricks) + 1))
+
+
+@pytest.mark.parametrize(
+    ("order", "said"),
+    [
+        ("backwards", "order 'backwards': give reversed, ends, or names of bricks"),
+        ("1..9", "1..9 are more bricks than the scene has"),
+        ("1,2,3", "order: 2 bricks are missing, 4 among them"),
+        ("1,2,3,4,4", "order: 4 occurs twice"),
+        ((1, 2, 3, 4, 7), "order: 7 is no brick"),
+        ((1, 2.5), "give a whole number"),
+        (7, "order is 7; give whole numbers"),
+    ],
+)
+def test_what_is_no_order_gets_one_line(order, said):
+    with pytest.raises(SceneError, match=said) as caught:
+        seqopt.build_network(small_arch(5), order)
+    assert "\n" not in str(caught.value)
+
+
+def test_the_order_is_an_argument_of_the_short_cut_and_of_commands(tmp_path, capsys):
+    scene, order = small_arch(5), (1, 5, 2, 4, 3)
+    plan = seqopt.optimize(scene, "free", order="ends")
+    assert plan.problem.network.scene.build_order == order
+    path, out = tmp_path / "arch.json", tmp_path / "out"
+    seqopt.save_scene(scene, path)
+    words = ["--schedule", "free", "--order", "1,5,2,4..3", "--out", str(out)]
+    assert main(["optimize", str(path), *words]) == 0
+    assert json.loads((out / "scene.json").read_text())["build_order"] == [*order]
+    built = seqopt.load_scene(out / "scene.json")
+    assert seqopt.read_plan(built, out / "plan.csv") == plan.steps
+    capsys.readouterr()
+    assert main(["analyze", str(path), "--method", "sequential", "--order", "1..9"]) == 2
+    assert "more bricks than the scene has" in capsys.readouterr().err
