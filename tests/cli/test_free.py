@@ -57,6 +57,7 @@ def test_more_robots_come_with_their_scene(capsys, tmp_path, arch):
     assert len(steps[-2].held) == 1
 
 
+@pytest.mark.slow
 def test_states_that_must_stand(capsys, tmp_path, arch):
     out = tmp_path / "out"
     words = ["--stands", "dry", "--tilt", "2", "--aim", "steps,minmax"]

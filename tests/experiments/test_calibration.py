@@ -181,6 +181,7 @@ def test_what_is_left_of_the_lead():
     assert test.pvalue > 0.5
 
 
+@pytest.mark.slow
 def test_only_the_lower_bound_of_the_rotational_stiffness_is_firm():
     bounds = rotational(VAULTS)
     low, high = bounds["k_r_from"] / 1e9, bounds["k_r_to"] / 1e9

@@ -124,6 +124,7 @@ def test_differences_and_errors_follow_from_the_values():
     assert (STORED["error_pct"] <= 100 * (gap.abs() + 1e-3) / size).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("label", sorted(set(COUNTERPARTS) - DEEP))
 def test_stored_values_are_computed_anew(own, label):
     now, then = tabulate(label, own), STORED[STORED["id"] == label]

@@ -23,6 +23,7 @@ def mutator():
     return Mutator()
 
 
+@pytest.mark.slow
 def test_changed_input_leaves_no_fault():
     rows = list(run(0, CASES))
     assert [row for row in rows if row["fault"]] == []

@@ -174,6 +174,7 @@ def test_a_verdict_is_the_last_line_of_a_run_that_ended_well(monkeypatch, printe
     assert run("figures")[0] == verdict
 
 
+@pytest.mark.slow
 def test_all_claims_are_listed():
     listed = subprocess.run(
         [sys.executable, "-m", "experiments"], cwd=ROOT, capture_output=True, text=True, check=True

@@ -349,6 +349,7 @@ def test_travel_is_that_of_the_steps():
     assert plan.certificate.objective[1] == pytest.approx(ways)
 
 
+@pytest.mark.slow
 def test_refusals_name_the_brick_and_what_opens_a_way(arch, engine25):
     two = FreeRules(robots=("rob1", "rob2"))
     said = r"brick 3 \(3 of 25\) is never placed; a way opens with least_grips=1 together with"

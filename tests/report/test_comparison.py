@@ -9,6 +9,7 @@ from seqopt.report.comparison import compare
 from seqopt.study.presets import EQUATIONS
 
 
+@pytest.mark.slow
 def test_all_methods_and_formulations_are_rows(engine25):
     result = compare(engine25, EQUATIONS)
     assert {"sequential", "cantilever", "published", "modified-sequential"} <= set(
