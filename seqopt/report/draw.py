@@ -14,9 +14,13 @@ from matplotlib.patheffects import withStroke
 from seqopt.arrays import Floats, Ints
 from seqopt.network.network import Network, PartKind
 from seqopt.report.occlusion import drawing_order
+from seqopt.scene.blocks import vertices_of
 from seqopt.scene.boxes import boxes
+from seqopt.scene.parts import Brick
+from seqopt.scene.shape import normal_of
 
-FACES = ((0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (1, 3, 7, 5))
+Faces = tuple[tuple[int, ...], ...]
+FACES: Faces = ((0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (1, 3, 7, 5))
 CLAY = np.array([0.80, 0.52, 0.38])
 MARKED = np.array([0.46, 0.63, 0.76])
 INK, TENSION, COMPRESSION = "#2b2b2b", "#c8102e", "#1f5fa8"
@@ -63,7 +67,7 @@ def draw_bricks(  # noqa: PLR0913  # what is drawn, and how, each by its name
     alpha: float = 1.0,
     marked: Collection[int] = (),
 ) -> None:
-    """Draw the first bricks as shaded boxes, in place or moved.
+    """Draw the first bricks, boxes or not, shaded, in place or moved.
 
     Parameters
     ----------
@@ -84,14 +88,17 @@ def draw_bricks(  # noqa: PLR0913  # what is drawn, and how, each by its name
     marked : collection of int
         Names of bricks that are drawn in another color.
     """
-    corners = _moved(network, bricks, twist, magnify)
-    seen = corners @ view.axes().T
+    boxed = _moved(network, bricks, twist, magnify)
     polygons, colors = [], []
-    for b in drawing_order(corners, view.axes()):
-        own = MARKED if network.scene.placed[b].name in marked else CLAY
-        for face in sorted(FACES, key=lambda face: float(seen[b, list(face), 2].mean())):
-            polygons.append(seen[b, list(face), :2])
-            colors.append((*(_light(corners[b], face) * own), alpha))
+    for b in drawing_order(boxed, view.axes()):
+        own = MARKED if (brick := network.scene.placed[b]).name in marked else CLAY
+        points, faces = boxed[b], FACES
+        if brick.shape is not None:
+            points, faces = _shape(brick, None if twist is None else magnify * twist[b], view)
+        seen = points @ view.axes().T
+        for face in sorted(faces, key=lambda face: float(seen[list(face), 2].mean())):
+            polygons.append(seen[list(face), :2])
+            colors.append((*(_light(points, face) * own), alpha))
     axes.add_collection(
         PolyCollection(
             polygons,
@@ -249,9 +256,19 @@ def _moved(network: Network, bricks: int, twist: Floats | None, magnify: float) 
     return np.asarray(corners + magnify * (twist[:bricks, None, :3] + turned))
 
 
+def _shape(brick: Brick, motion: Floats | None, view: View) -> tuple[Floats, Faces]:
+    """Return the vertices (V, 3) of a block, m, moved by a twist, and its faces that are seen."""
+    points, faces = vertices_of(brick)
+    toward = view.axes()[2]
+    facing = tuple(tuple(f) for f in faces if normal_of(points[list(f)]) @ toward > 0)
+    if motion is not None:
+        points = points + motion[:3] + np.cross(motion[3:], points - brick.position)
+    return points, facing
+
+
 def _light(corners: Floats, face: tuple[int, ...]) -> float:
-    """Return how bright a face of corners (8, 3) is, from 0.55 to 1."""
-    normal = np.cross(corners[face[1]] - corners[face[0]], corners[face[2]] - corners[face[0]])
+    """Return how bright a face of corners (V, 3) is, from 0.55 to 1."""
+    normal = normal_of(corners[list(face)])
     return float(0.55 + 0.45 * abs(normal @ [0.3, -0.5, 0.8]) / np.linalg.norm(normal))
 
 

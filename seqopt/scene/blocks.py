@@ -1,0 +1,119 @@
+"""Bricks of any shape from their vertices and faces."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from seqopt.arrays import Floats, Vector
+from seqopt.scene.parts import Brick
+from seqopt.scene.shape import Polyhedron
+
+
+def block_brick(
+    name: int,
+    shape: Polyhedron,
+    density: float,
+    *,
+    nodes: tuple[int, int] | None = None,
+    grips: tuple[Vector, Vector] | None = None,
+) -> Brick:
+    """Return a brick of any shape.
+
+    Parameters
+    ----------
+    name : int
+        Number of the brick, unique in its scene.
+    shape : Polyhedron
+        Its vertices where they are in the scene, m.
+    density : float
+        kg/m³.
+    nodes : tuple of 2 int, optional
+        Numbers of its inner nodes; twice the name, and one more, by default.
+    grips : tuple of 2 Vector, optional
+        Where a robot may hold, in the scene, m; by default `Polyhedron.nodes`, on either side of
+        the centroid.
+
+    Returns
+    -------
+    Brick
+        About its centroid. It is placed by its second node.
+
+    Raises
+    ------
+    SceneError
+        If a value is none, or not consistent.
+
+    Examples
+    --------
+    >>> corners = ((0, 0, 0), (2, 0, 0), (2, 1, 0), (0, 1, 0), (1, 0.5, 1))
+    >>> faces = ((3, 2, 1, 0), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4))
+    >>> brick = block_brick(1, Polyhedron(corners, faces), 2400.0)
+    >>> round(brick.mass, 6), [round(x, 6) for x in brick.position], brick.nodes
+    (1600.0, [1.0, 0.5, 0.25], (2, 3))
+    """
+    center = shape.centroid
+    own = replace(shape, vertices=as_vectors(shape.points - center))
+    axes = own.axes
+    length, width, thickness = own.extents(axes).tolist()
+    offsets = own.nodes() if grips is None else as_vectors(np.array(grips, dtype=float) - center)
+    first, second = (2 * name, 2 * name + 1) if nodes is None else nodes
+    (position,) = as_vectors(center[None])
+    length_axis, width_axis = as_vectors(axes[:2])
+    return Brick(
+        name=name,
+        position=position,
+        length_axis=length_axis,
+        width_axis=width_axis,
+        dimensions=(length, width, thickness),
+        density=density,
+        nodes=(first, second),
+        placing_node=second,
+        shape=own,
+        node_offsets=(offsets[0], offsets[1]),
+    )
+
+
+def as_vectors(points: Floats) -> tuple[Vector, ...]:
+    """Return the rows of an array as tuples.
+
+    Parameters
+    ----------
+    points : (k, 3) float
+
+    Returns
+    -------
+    tuple of Vector
+    """
+    return tuple((x, y, z) for x, y, z in points.tolist())
+
+
+def vertices_of(brick: Brick) -> tuple[Floats, Sequence[Sequence[int]]]:
+    """Return the vertices of a brick, box or not, and its faces.
+
+    Parameters
+    ----------
+    brick : Brick
+
+    Returns
+    -------
+    vertices : (V, 3) float
+        In the scene, m.
+    faces : sequence of sequence of int
+        Places among them, counterclockwise from outside.
+    """
+    if brick.shape is not None:
+        return np.asarray(brick.shape.points + np.array(brick.position)), brick.shape.faces
+    length, width = np.array(brick.length_axis), np.array(brick.width_axis)
+    half = (
+        0.5
+        * np.array(brick.dimensions)[:, None]
+        * np.stack([length, width, np.cross(length, width)])
+    )
+    return np.asarray(np.array(brick.position) + BOX_CORNERS @ half), BOX_FACES
+
+
+BOX_CORNERS = np.array([[a, b, c] for a in (-1.0, 1.0) for b in (-1.0, 1.0) for c in (-1.0, 1.0)])
+BOX_FACES = ((0, 1, 3, 2), (6, 7, 5, 4), (4, 5, 1, 0), (2, 3, 7, 6), (0, 2, 6, 4), (5, 7, 3, 1))
