@@ -92,20 +92,15 @@ def draw_bricks(  # noqa: PLR0913  # what is drawn, and how, each by its name
     polygons, colors = [], []
     for b in drawing_order(boxed, view.axes()):
         own = MARKED if (brick := network.scene.placed[b]).name in marked else CLAY
-        points, faces = boxed[b], FACES
-        if brick.shape is not None:
-            points, faces = _shape(brick, None if twist is None else magnify * twist[b], view)
+        motion = None if twist is None else magnify * twist[b]
+        points, faces = (boxed[b], FACES) if brick.shape is None else _shape(brick, motion, view)
         seen = points @ view.axes().T
         for face in sorted(faces, key=lambda face: float(seen[list(face), 2].mean())):
             polygons.append(seen[list(face), :2])
             colors.append((*(_light(points, face) * own), alpha))
+    edge = (0.25, 0.15, 0.1, alpha)
     axes.add_collection(
-        PolyCollection(
-            polygons,
-            facecolors=colors,
-            edgecolors=(0.25, 0.15, 0.1, alpha),
-            linewidths=0.4,
-        )
+        PolyCollection(polygons, facecolors=colors, edgecolors=edge, linewidths=0.4)
     )
     _frame(axes)
 
