@@ -20,6 +20,7 @@ from seqopt.scene.parts import Brick
 from seqopt.scene.shape import normal_of
 
 Faces = tuple[tuple[int, ...], ...]
+Color = tuple[float, float, float, float]
 FACES: Faces = ((0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (1, 3, 7, 5))
 CLAY = np.array([0.80, 0.52, 0.38])
 MARKED = np.array([0.46, 0.63, 0.76])
@@ -92,16 +93,15 @@ def draw_bricks(  # noqa: PLR0913  # what is drawn, and how, each by its name
     polygons, colors = [], []
     for b in drawing_order(boxed, view.axes()):
         own = MARKED if (brick := network.scene.placed[b]).name in marked else CLAY
-        motion = None if twist is None else magnify * twist[b]
-        points, faces = (boxed[b], FACES) if brick.shape is None else _shape(brick, motion, view)
+        points, faces = boxed[b], FACES
+        if brick.shape is not None:
+            points, faces = _shape(brick, None if twist is None else magnify * twist[b], view)
         seen = points @ view.axes().T
         for face in sorted(faces, key=lambda face: float(seen[list(face), 2].mean())):
             polygons.append(seen[list(face), :2])
-            colors.append((*(_light(points, face) * own), alpha))
-    edge = (0.25, 0.15, 0.1, alpha)
-    axes.add_collection(
-        PolyCollection(polygons, facecolors=colors, edgecolors=edge, linewidths=0.4)
-    )
+            red, green, blue = (_light(points, face) * own).tolist()
+            colors.append((red, green, blue, alpha))
+    _fill(axes, polygons, colors, alpha)
     _frame(axes)
 
 
@@ -249,6 +249,14 @@ def _moved(network: Network, bricks: int, twist: Floats | None, magnify: float) 
     arm = corners - corners.mean(axis=1, keepdims=True)
     turned = np.cross(twist[:bricks, None, 3:], arm)
     return np.asarray(corners + magnify * (twist[:bricks, None, :3] + turned))
+
+
+def _fill(axes: Axes, polygons: list[Floats], colors: list[Color], alpha: float) -> None:
+    """Draw polygons (m, 2) with an edge around each."""
+    edge = (0.25, 0.15, 0.1, alpha)
+    axes.add_collection(
+        PolyCollection(polygons, facecolors=colors, edgecolors=edge, linewidths=0.4)
+    )
 
 
 def _shape(brick: Brick, motion: Floats | None, view: View) -> tuple[Floats, Faces]:
