@@ -93,11 +93,9 @@ def draw_bricks(  # noqa: PLR0913  # what is drawn, and how, each by its name
     polygons, colors = [], []
     for b in drawing_order(boxed, view.axes()):
         own = MARKED if (brick := network.scene.placed[b]).name in marked else CLAY
-        points, faces = boxed[b], FACES
-        if brick.shape is not None:
-            points, faces = _shape(brick, None if twist is None else magnify * twist[b], view)
+        points, faces = _solid(brick, boxed[b], None if twist is None else magnify * twist[b])
         seen = points @ view.axes().T
-        for face in sorted(faces, key=lambda face: float(seen[list(face), 2].mean())):
+        for face in _in_order(faces, seen, whole=brick.shape is None):
             polygons.append(seen[list(face), :2])
             red, green, blue = (_light(points, face) * own).tolist()
             colors.append((red, green, blue, alpha))
@@ -259,14 +257,23 @@ def _fill(axes: Axes, polygons: list[Floats], colors: list[Color], alpha: float)
     )
 
 
-def _shape(brick: Brick, motion: Floats | None, view: View) -> tuple[Floats, Faces]:
-    """Return the vertices (V, 3) of a block, m, moved by a twist, and its faces that are seen."""
+def _solid(brick: Brick, corners: Floats, motion: Floats | None) -> tuple[Floats, Faces]:
+    """Return vertices (V, 3), m, and faces of a brick: the corners of its box, or of its shape.
+
+    Those of a shape are moved by a twist if given; those of a box are.
+    """
+    if brick.shape is None:
+        return corners, FACES
     points, faces = vertices_of(brick)
-    toward = view.axes()[2]
-    facing = tuple(tuple(f) for f in faces if normal_of(points[list(f)]) @ toward > 0)
     if motion is not None:
         points = points + motion[:3] + np.cross(motion[3:], points - brick.position)
-    return points, facing
+    return points, tuple(map(tuple, faces))
+
+
+def _in_order(faces: Faces, seen: Floats, *, whole: bool) -> list[tuple[int, ...]]:
+    """Return faces, as vertices (V, 3) are seen, the farthest first; turned away ones if whole."""
+    drawn = [face for face in faces if whole or normal_of(seen[list(face)])[2] > 0]
+    return sorted(drawn, key=lambda face: float(seen[list(face), 2].mean()))
 
 
 def _light(corners: Floats, face: tuple[int, ...]) -> float:

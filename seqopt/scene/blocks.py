@@ -25,7 +25,6 @@ def block_brick(
     Parameters
     ----------
     name : int
-        Number of the brick, unique in its scene.
     shape : Polyhedron
         Its vertices where they are in the scene, m.
     density : float
@@ -41,27 +40,18 @@ def block_brick(
     Brick
         About its centroid. It is placed by its second node.
 
-    Raises
-    ------
-    SceneError
-        If a value is none, or not consistent.
-
     Examples
     --------
     >>> corners = ((0, 0, 0), (2, 0, 0), (2, 1, 0), (0, 1, 0), (1, 0.5, 1))
     >>> faces = ((3, 2, 1, 0), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4))
-    >>> brick = block_brick(1, Polyhedron(corners, faces), 2400.0)
-    >>> round(brick.mass, 6), [round(x, 6) for x in brick.position], brick.nodes
-    (1600.0, [1.0, 0.5, 0.25], (2, 3))
+    >>> block_brick(1, Polyhedron(corners, faces), 2400.0).mass.__round__(6)
+    1600.0
     """
-    center = shape.centroid
-    own = replace(shape, vertices=as_vectors(shape.points - center))
-    axes = own.axes
-    length, width, thickness = own.extents(axes).tolist()
-    offsets = own.nodes() if grips is None else as_vectors(np.array(grips, dtype=float) - center)
+    own = replace(shape, vertices=as_vectors(shape.points - shape.centroid))
+    length, width, thickness = own.extents(own.axes).tolist()
+    position, length_axis, width_axis = as_vectors(np.vstack([shape.centroid, own.axes[:2]]))
+    held = own.nodes() if grips is None else as_vectors(np.array(grips) - shape.centroid)
     first, second = (2 * name, 2 * name + 1) if nodes is None else nodes
-    (position,) = as_vectors(center[None])
-    length_axis, width_axis = as_vectors(axes[:2])
     return Brick(
         name=name,
         position=position,
@@ -72,7 +62,7 @@ def block_brick(
         nodes=(first, second),
         placing_node=second,
         shape=own,
-        node_offsets=(offsets[0], offsets[1]),
+        node_offsets=(held[0], held[1]),
     )
 
 
