@@ -32,7 +32,7 @@ from seqopt.engines.rigid.spanning_tree import grow_tree
 from seqopt.network.build import build_network
 from seqopt.network.statics import build_statics
 from seqopt.scene.boxes import boxes
-from seqopt.scene.detection import touching_faces
+from seqopt.scene.detection import Surface, touching_faces
 from seqopt.scene.face_joints import flat_face
 from seqopt.scene.library.meeting import meeting
 from seqopt.stability.assessment import assess, bonded
@@ -63,7 +63,7 @@ def values(arch25):
     every = (
         *(maps, ResponseMaps(maps, 2)),
         *(shapes, joined, joined.shared, joined.faces[0]),
-        *(touching, flat_face(touching.corners)),
+        *(touching, flat_face(touching.corners), Surface(np.zeros((3, 3)), ((0, 1, 2),))),
         *(network, network.springs, build_statics(network)),
         *(assembly, face_quadrature(assembly), find_elastic_limits(network, EPOXY)),
         *(SPACE, plane, tree, OperatorBuilder(network, tree).operator(2), parts),

@@ -16,6 +16,7 @@ from seqopt.cli.common_arguments import (
     robust_arguments,
     strict_argument,
 )
+from seqopt.cli.exchange import add_export, add_import
 from seqopt.cli.free import FREE
 from seqopt.cli.free_arguments import add_pareto, add_rules
 from seqopt.cli.status import Status
@@ -65,6 +66,8 @@ def parser() -> argparse.ArgumentParser:
     add_pareto(commands, [scene, engine], limit_argument)
     _add_assess(commands, [scene])
     _add_scene(commands, [scene])
+    add_import(commands)
+    add_export(commands)
     return whole
 
 

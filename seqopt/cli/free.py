@@ -67,10 +67,11 @@ def optimize_free(options: argparse.Namespace) -> Status:
     files = {
         "plan.csv": csv_text(table),
         "summary.json": json.dumps(plan.summary(), indent=2) + "\n",
+        "scene.json": dump_scene(scene),
     }
     if problem.standing is not None:
         files["stability.csv"] = csv_text(plan.stability())
-    write_outputs(options, files | _scene_file(options, scene))
+    write_outputs(options, files)
     values = ", ".join(f"{name} {value:.6g}" for name, value in plan.objective.items())
     say(
         f"{formulation.name} ({formulation.kind.value}): {values}, {plan.status}; "

@@ -1,4 +1,4 @@
-"""The command line: ``seqopt compare | optimize | pareto | analyze | assess | scene``."""
+"""The command line: ``seqopt import | scene | analyze | assess | optimize | compare | …``."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import numpy as np
 from seqopt.cli.arguments import parser
 from seqopt.cli.asked import asked_engine, payloads_hold, say_idle, say_levels, step_answers
 from seqopt.cli.criteria import asked_criterion
+from seqopt.cli.exchange import export_folder, import_file
 from seqopt.cli.free import pareto
 from seqopt.cli.optimize import optimize
 from seqopt.cli.outputs import (
@@ -205,4 +206,6 @@ COMMANDS: dict[str, Callable[[argparse.Namespace], int | None]] = {
     "pareto": pareto,
     "assess": _assess,
     "scene": _scene,
+    "import": import_file,
+    "export": export_folder,
 }

@@ -51,7 +51,7 @@ def optimize(options: argparse.Namespace) -> Status:
         "seconds": {"assemble": assemble, **plan.seconds},
     }
     table = plan.responses()
-    write_outputs(options, plan_files(plan, report))
+    write_outputs(options, plan_files(plan, problem.schedule.scene, report))
     say(
         f"{formulation.name} ({formulation.kind.value}): {worth(plan)}, "
         f"{plan.models} models; written to {options.out}"

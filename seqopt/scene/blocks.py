@@ -32,8 +32,7 @@ def block_brick(
     nodes : tuple of 2 int, optional
         Numbers of its inner nodes; twice the name, and one more, by default.
     grips : tuple of 2 Vector, optional
-        Where a robot may hold, in the scene, m; by default `Polyhedron.nodes`, on either side of
-        the centroid.
+        Where a robot may hold, in the scene, m; `Polyhedron.nodes` by default.
 
     Returns
     -------
@@ -44,14 +43,14 @@ def block_brick(
     --------
     >>> corners = ((0, 0, 0), (2, 0, 0), (2, 1, 0), (0, 1, 0), (1, 0.5, 1))
     >>> faces = ((3, 2, 1, 0), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4))
-    >>> block_brick(1, Polyhedron(corners, faces), 2400.0).mass.__round__(6)
-    1600.0
+    >>> round(block_brick(1, Polyhedron(corners, faces), 2400.0).mass)
+    1600
     """
     own = replace(shape, vertices=as_vectors(shape.points - shape.centroid))
     length, width, thickness = own.extents(own.axes).tolist()
     position, length_axis, width_axis = as_vectors(np.vstack([shape.centroid, own.axes[:2]]))
     held = own.nodes() if grips is None else as_vectors(np.array(grips) - shape.centroid)
-    first, second = (2 * name, 2 * name + 1) if nodes is None else nodes
+    numbers = (2 * name, 2 * name + 1) if nodes is None else nodes
     return Brick(
         name=name,
         position=position,
@@ -59,8 +58,8 @@ def block_brick(
         width_axis=width_axis,
         dimensions=(length, width, thickness),
         density=density,
-        nodes=(first, second),
-        placing_node=second,
+        nodes=numbers,
+        placing_node=numbers[1],
         shape=own,
         node_offsets=(held[0], held[1]),
     )

@@ -11,16 +11,18 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from importlib.util import find_spec
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from seqopt.arrays import Floats, FrozenValue, Ints
-from seqopt.errors import FileError
-from seqopt.scene.shape import Polyhedron, normal_of
+from seqopt.errors import FileError, SceneError
+from seqopt.scene.checks import short
+from seqopt.scene.shape import normal_of
 
 OPPOSED = np.cos(np.radians(5.0))  # cosine from which on normals are against each other
 LEVEL = 1 - 1e-6  # cosine from which on faces are in one plane
+MOST_PAIRS = 300_000  # of blocks that are near each other
 SLIVER = 1e-6  # overlap that is none, over the smaller of two faces
 GRAIN = 1e-9  # length to which corners are rounded, over the size of what overlaps
 
@@ -44,6 +46,34 @@ class TouchingFace(FrozenValue):
     blocks: tuple[int, int]
     corners: Floats
     normal: Floats
+
+
+class Solid(Protocol):
+    """What has faces: a polyhedron, or a surface that is not closed."""
+
+    @property
+    def points(self) -> Floats:
+        """Vertices, (V, 3), m."""
+
+    @property
+    def faces(self) -> Sequence[Sequence[int]]:
+        """Places among the vertices, once around each face."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Surface(FrozenValue):
+    """A surface that is not closed, as of a support; both of its sides are faces.
+
+    Attributes
+    ----------
+    points : (V, 3) float
+        m.
+    faces : tuple of tuple of int
+        Places among the vertices.
+    """
+
+    points: Floats
+    faces: tuple[tuple[int, ...], ...]
 
 
 @dataclass(frozen=True)
@@ -72,12 +102,12 @@ def require_polygons(what: str) -> None:
         raise FileError(f"{what} needs shapely; pip install 'seqopt[blocks]'")
 
 
-def touching_faces(shapes: Sequence[Polyhedron], gap: float) -> tuple[TouchingFace, ...]:
+def touching_faces(shapes: Sequence[Solid], gap: float) -> tuple[TouchingFace, ...]:
     """Return the faces over which blocks touch.
 
     Parameters
     ----------
-    shapes : sequence of Polyhedron
+    shapes : sequence of Polyhedron or Surface
         Where they are in the scene.
     gap : float
         Most that may lie between two faces, or by which they may interpenetrate, m.
@@ -91,9 +121,12 @@ def touching_faces(shapes: Sequence[Polyhedron], gap: float) -> tuple[TouchingFa
     ------
     FileError
         If shapely is not installed.
+    SceneError
+        If more than `MOST_PAIRS` blocks are near each other.
 
     Examples
     --------
+    >>> from seqopt.scene.shape import Polyhedron
     >>> corners = ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0.5, 0.5, 1))
     >>> sides = ((0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4))
     >>> up = Polyhedron(corners, (*sides, (3, 2, 1, 0)))
@@ -107,7 +140,9 @@ def touching_faces(shapes: Sequence[Polyhedron], gap: float) -> tuple[TouchingFa
     require_polygons("finding where blocks touch")
     facets = [_facets(shape) for shape in shapes]
     found: list[TouchingFace] = []
-    for i, j in _near(shapes, gap):
+    for tries, (i, j) in enumerate(_near(shapes, gap)):
+        if tries == MOST_PAIRS:
+            raise SceneError(f"more than {MOST_PAIRS} pairs of blocks are in one place; part them")
         for polygons, (origin, axes) in _overlaps(facets[i], facets[j], gap):
             found += [
                 TouchingFace((i, j), origin + piece @ axes[1:], axes[0])
@@ -127,8 +162,20 @@ def convex_pieces(polygons: Sequence[Any]) -> Iterator[Floats]:
     ------
     (m, 2) float
         Corners counterclockwise, m.
+
+    Raises
+    ------
+    SceneError
+        If polygons are too degenerate to be cut.
     """
-    shapely = import_module("shapely")
+    try:
+        yield from _pieces(import_module("shapely"), polygons)
+    except import_module("shapely.errors").ShapelyError as error:
+        raise SceneError(f"a face where blocks touch cannot be cut: {short(error, 80)}") from error
+
+
+def _pieces(shapely: Any, polygons: Sequence[Any]) -> Iterator[Floats]:
+    """Yield the convex pieces of a union of polygons, without a word where that fails."""
     size = max((max(abs(x) for x in polygon.bounds) for polygon in polygons), default=1.0)
     whole = shapely.unary_union(list(polygons), grid_size=GRAIN * size).simplify(GRAIN * size)
     for part in getattr(whole, "geoms", [whole]):
@@ -170,14 +217,14 @@ def _corners(polygon: Any) -> Floats:
     return np.array(hull.exterior.coords)[:-1]
 
 
-def _facets(shape: Polyhedron) -> _Facets:
+def _facets(shape: Solid) -> _Facets:
     corners = tuple(shape.points[list(face)] for face in shape.faces)
     normals = np.array([normal_of(face) for face in corners])
     size = np.linalg.norm(normals, axis=1, keepdims=True)
     return _Facets(corners, normals / size, np.array([face.mean(axis=0) for face in corners]))
 
 
-def _near(shapes: Sequence[Polyhedron], gap: float) -> Iterator[tuple[int, int]]:
+def _near(shapes: Sequence[Solid], gap: float) -> Iterator[tuple[int, int]]:
     """Yield pairs of blocks whose boxes along the axes are no farther apart than a gap."""
     low = np.array([shape.points.min(axis=0) for shape in shapes]).reshape(-1, 3) - gap
     high = np.array([shape.points.max(axis=0) for shape in shapes]).reshape(-1, 3)

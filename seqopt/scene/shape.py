@@ -228,15 +228,15 @@ def _require_corners(count: int, faces: tuple[tuple[int, ...], ...]) -> None:
 
 
 def _require_closed(faces: tuple[tuple[int, ...], ...]) -> None:
-    """Require every edge to be passed as often each way."""
+    """Require every edge to be passed once each way."""
     edges = Counter(
         (a, b) for face in faces for a, b in zip(face, (*face[1:], face[0]), strict=True)
     )
     for (a, b), times in edges.items():
-        if edges[b, a] == 0:
+        if times == 1 and not edges[b, a]:
             raise SceneError(f"shape: edge {a}-{b} has a face on one side only; close the shape")
-        if times != edges[b, a]:
+        if times > 1:
             raise SceneError(
-                f"shape: faces beside edge {a}-{b} do not agree which side is outside; "
-                "list their vertices counterclockwise as seen from outside"
+                f"shape: at edge {a}-{b} faces do not agree which side is outside, or more than "
+                "two meet; list vertices counterclockwise as seen from outside"
             )
