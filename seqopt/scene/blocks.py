@@ -11,14 +11,12 @@ from seqopt.arrays import Floats, Vector
 from seqopt.scene.parts import Brick
 from seqopt.scene.shape import Polyhedron
 
+Numbers = tuple[int, int] | None
+Places = tuple[Vector, Vector] | None
+
 
 def block_brick(
-    name: int,
-    shape: Polyhedron,
-    density: float,
-    *,
-    nodes: tuple[int, int] | None = None,
-    grips: tuple[Vector, Vector] | None = None,
+    name: int, shape: Polyhedron, density: float, *, nodes: Numbers = None, grips: Places = None
 ) -> Brick:
     """Return a brick of any shape.
 
@@ -26,37 +24,37 @@ def block_brick(
     ----------
     name : int
     shape : Polyhedron
-        Its vertices where they are in the scene, m.
+        Where it is in the scene, m.
     density : float
         kg/m³.
     nodes : tuple of 2 int, optional
-        Numbers of its inner nodes; twice the name, and one more, by default.
+        Numbers of its nodes; twice the name, and one more, by default.
     grips : tuple of 2 Vector, optional
-        Where a robot may hold, in the scene, m; `Polyhedron.nodes` by default.
+        Where these are, in the scene, m; `Polyhedron.nodes` by default.
 
     Returns
     -------
     Brick
-        About its centroid. It is placed by its second node.
+        Placed by its second node.
 
     Examples
     --------
-    >>> corners = ((0, 0, 0), (2, 0, 0), (2, 1, 0), (0, 1, 0), (1, 0.5, 1))
-    >>> faces = ((3, 2, 1, 0), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4))
-    >>> round(block_brick(1, Polyhedron(corners, faces), 2400.0).mass)
-    1600
+    >>> corners = ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 3))
+    >>> wedge = Polyhedron(corners, ((0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)))
+    >>> round(block_brick(1, wedge, 2400.0).mass)
+    1200
     """
     own = replace(shape, vertices=as_vectors(shape.points - shape.centroid))
-    length, width, thickness = own.extents(own.axes).tolist()
-    position, length_axis, width_axis = as_vectors(np.vstack([shape.centroid, own.axes[:2]]))
+    x, y, z = own.extents(own.axes).tolist()
+    at, first, second = as_vectors(np.vstack([shape.centroid, own.axes[:2]]))
     held = own.nodes() if grips is None else as_vectors(np.array(grips) - shape.centroid)
-    numbers = (2 * name, 2 * name + 1) if nodes is None else nodes
+    numbers = nodes or (2 * name, 2 * name + 1)
     return Brick(
         name=name,
-        position=position,
-        length_axis=length_axis,
-        width_axis=width_axis,
-        dimensions=(length, width, thickness),
+        position=at,
+        length_axis=first,
+        width_axis=second,
+        dimensions=(x, y, z),
         density=density,
         nodes=numbers,
         placing_node=numbers[1],

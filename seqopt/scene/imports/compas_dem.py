@@ -39,7 +39,11 @@ def read_model(document: Any, source: str) -> Content:
     if kind(document) == "problem":
         law = _law(source, held.get("contact_properties"))
         said.append("loads of the problem are left out; blocks carry their weight")
-        held = mapping(f"{source}: model", payload(entry(source, held, "model")))
+        if "model" not in held:  # some versions keep its identifier alone
+            raise SceneError(
+                f"{source}: the problem does not hold its model; give the model itself"
+            )
+        held = mapping(f"{source}: model", payload(held["model"]))
     elements = _elements(source, held)
     densities = _densities(source, held)
     blocks = [

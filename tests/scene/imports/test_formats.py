@@ -241,6 +241,7 @@ def test_what_can_be_mended_is_mended_and_said(read):
         ("a.json", '{"node": ' + "9" * 5000 + "}", METERS, "too many digits"),
         ("a.json", {"format": "seqopt-scene"}, METERS, "a scene of seqopt already"),
         ("a.json", {"stones": 3}, METERS, "no assembly that is known"),
+        ("a.json", {"dtype": "compas_dem.problem/Problem", "data": {}}, METERS, "give the model"),
         ("a.json", {"node": {}, "edge": {}}, METERS, "it has no blocks"),
         ("a.json", {"node": {"0": {"block": None}}}, METERS, "block 0 is None"),
         (
