@@ -41,10 +41,7 @@ def upward_order(
     >>> upward_order([(0,), (2,), (1,)], [(0, 2), (2, 1)], [0], "abc")
     [0, 2, 1]
     """
-    beside: list[set[int]] = [set() for _ in rank]
-    for a, b in pairs:
-        beside[a].add(b)
-        beside[b].add(a)
+    beside = _beside(len(rank), pairs)
     ready = [(rank[i], i) for i in sorted(set(starts))]
     heapq.heapify(ready)
     seen, order = {i for _, i in ready}, list[int]()
@@ -61,3 +58,12 @@ def upward_order(
             f"{', '.join(lost[:5])}; name supports, or allow a wider gap between faces"
         )
     return order
+
+
+def _beside(count: int, pairs: Iterable[tuple[int, int]]) -> list[set[int]]:
+    """Return what each of so many blocks touches."""
+    out: list[set[int]] = [set() for _ in range(count)]
+    for a, b in pairs:
+        out[a].add(b)
+        out[b].add(a)
+    return out
