@@ -2,7 +2,7 @@
 
 Method: draw `arch25` with its network; the twisting step 35 of the sequential method beside the
 cantilever method at the same step; responses along all methods; printed against computed ones;
-`vault338` while it grows and from above; a scene of each generator of the library; the Pareto sets
+`vault338` while it grows and from above; scenes of the library's generators; the Pareto sets
 of the free schedule and of the loop.
 Every picture is held against the stored one before it takes its place: gray means over squares of
 16 pixels, so that fonts do not count, may differ by a fifth of what tells the stored picture from a
@@ -180,6 +180,26 @@ def library(_: Engine) -> Figure:
     return figure
 
 
+WORDS = (
+    "arch:span=2,rise=0.8",
+    "arch:span=2,rise=1.2,curve=catenary,pattern=VLR",
+    "arch:span=2,rise=1.3,curve=pointed,dimensions=0.12x0.1x0.06",
+    "barrel:test=2",
+    "wall:columns=6,courses=8,corbel=-0.03,gap=0.005",
+    "dome:courses=6,around=16,rise=0.8,thickness=0.06",
+)
+
+
+def scenes_in_words(_: Engine) -> Figure:
+    """Draw scenes that a few words describe."""
+    figure = new_figure(10, 6.4)
+    for panel, words in zip(figure.subplots(2, 3).ravel(), WORDS, strict=True):
+        scene = load_scene(words)
+        draw_bricks(panel, build_network(scene), len(scene.bricks), VIEW)
+        panel.set_title(words.replace(",curve", ",\ncurve"), fontsize=8)
+    return figure
+
+
 def free_front(engine: Engine) -> Figure:
     """Draw the Pareto sets of the free schedule and of the loop, and the methods of the paper."""
     names = [*ROUNDED]
@@ -203,6 +223,7 @@ PICTURES: dict[str, Callable[[Engine], Figure]] = {
     "agreement.png": printed_against_computed,
     "vault338.png": vault,
     "library.png": library,
+    "words.png": scenes_in_words,
     "free_front.png": free_front,
 }
 

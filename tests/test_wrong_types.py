@@ -15,7 +15,7 @@ from seqopt.engines.planar import PlanarEngine
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import SeqoptError
 from seqopt.placement.certificate import judge
-from seqopt.placement.solving import require_fit
+from seqopt.placement.fitting import require_fit
 from seqopt.scene.parts import Robot
 from seqopt.scene.reach import Anywhere
 from tests.builders import six_bricks

@@ -34,9 +34,9 @@ from experiments.harness.plotting import RESULTS
 from experiments.placement.parts.degenerate_cases import CASES, Case, Size, enumerated
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.placement.certificate import judge as certified
+from seqopt.placement.fitting import require_fit
 from seqopt.placement.formulation import Formulation, FormulationKind, formulations
 from seqopt.placement.interface import PlacementProblem
-from seqopt.placement.solving import require_fit
 
 FULL, SMALL = Size(5, 4, 7), Size(3, 3, 6)
 DRAWS = 20

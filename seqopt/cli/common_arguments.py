@@ -130,7 +130,7 @@ def resources_arguments(command: argparse.ArgumentParser) -> None:
 
 
 def proof_argument(command: argparse.ArgumentParser) -> None:
-    """Add the argument that does without a proof.
+    """Add the arguments that do without a proof, or prove with fewer models.
 
     Parameters
     ----------
@@ -141,6 +141,12 @@ def proof_argument(command: argparse.ArgumentParser) -> None:
         action="store_true",
         help="with cascade or rank_search: solve only the models that the search meets, a fifth "
         "or so; how far the choice is from the optimum stays unknown",
+    )
+    command.add_argument(
+        "--lazy",
+        action="store_true",
+        help="with an exact formulation: solve only the models that the proof needs; stopped "
+        "before it is done, it leaves its best choice and a bound",
     )
 
 

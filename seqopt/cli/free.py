@@ -6,6 +6,7 @@ import argparse
 import io
 import json
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import pandas as pd
 
@@ -61,8 +62,8 @@ def optimize_free(options: argparse.Namespace) -> Status:
     require_folder(options.out)
     whole = {name: type(formulation.options[name])(value) for name, value in numbers.items()}
     limit = parse_time_limit(options.time_limit)
-    proof = not options.no_proof
-    plan = solve(problem, formulation, proof=proof, time_limit=limit, progress=progress, **whole)
+    how: dict[str, Any] = {"proof": not options.no_proof, "lazy": options.lazy, **whole}
+    plan = solve(problem, formulation, time_limit=limit, progress=progress, **how)
     table = plan.responses()
     files = {
         "plan.csv": csv_text(table),

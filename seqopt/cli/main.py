@@ -46,6 +46,7 @@ from seqopt.network.build import build_network
 from seqopt.report.comparison import compare
 from seqopt.report.text import format_comparison
 from seqopt.responses.table import archive, response_table
+from seqopt.scene.library.by_words import KINDS
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import about, builtin_scenes, dump_scene, load_scene
 from seqopt.sequence.plan_file import read_plan
@@ -174,6 +175,8 @@ def _scene(options: argparse.Namespace) -> None:
         for name in builtin_scenes():
             scene = load_scene(name)
             _line(f"{name}: {len(scene.bricks)} bricks, {len(scene.joints)} joints; {about(name)}")
+        for kind in KINDS.values():
+            _line(kind.about)
         return
     keep_apart(options, options.export)
     scene = load_scene(options.scene)

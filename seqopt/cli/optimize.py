@@ -39,11 +39,12 @@ def optimize(options: argparse.Namespace) -> Status:
     require_loop(options)
     formulation = find_formulation(options.formulation)
     chosen = parse_options(formulation, options.option)
-    limit, proof = parse_time_limit(options.time_limit), not options.no_proof
+    limit = parse_time_limit(options.time_limit)
+    how = {"proof": not options.no_proof, "lazy": options.lazy}
     start = time.perf_counter()
     problem = asked_problem(options)
     assemble = time.perf_counter() - start
-    plan = solve(problem, formulation, proof=proof, time_limit=limit, progress=tell, **chosen)
+    plan = solve(problem, formulation, **how, time_limit=limit, progress=tell, **chosen)
     progress("")
     say_levels(problem.engine)
     report = plan.summary() | {

@@ -27,7 +27,7 @@ from seqopt.scene.scene_file import dump_scene
 from seqopt.sequence.steps import idle_robots
 
 ALONE = ("scenarios", "unseen", "seed", "vary")  # options that mean something with --robust alone
-NOT_WITH = ("formulation", "option", "no_proof", "budget", "aim", "rule")
+NOT_WITH = ("formulation", "option", "no_proof", "lazy", "budget", "aim", "rule")
 COUNT = 30
 SPREADS = ("stiffness", "density", "position")
 

@@ -19,6 +19,7 @@ from seqopt.placement.formulation import (
     as_formulation,
 )
 from seqopt.placement.interface import Aim, PlacementProblem
+from seqopt.placement.partial_costs import PartialCosts, least_possible
 
 TOLERANCE = 1e-6  # of the costs that a choice meets: how far a claim may be from what the data say
 
@@ -106,6 +107,44 @@ def certify(problem: PlacementProblem, selection: Selection, aim: Aim) -> Certif
         bound = max(bound, least_within(problem, value, selection.prices, scale))
     gap, claimed = (max(0.0, value - b) / scale for b in (bound, max(bound, selection.bound)))
     return Certificate(value, bound, gap, claimed, spent)
+
+
+def certify_partial(costs: PartialCosts, selection: Selection, objective: float) -> Certificate:
+    """Check a selection of which not all pairs are known, from those that are.
+
+    Parameters
+    ----------
+    costs : PartialCosts
+        What was looked at.
+    selection : Selection
+        What is claimed.
+    objective : float
+        What the steps that the selection meets cost, solved anew.
+
+    Returns
+    -------
+    Certificate
+
+    Raises
+    ------
+    SolverError
+        If the selection is not worth what was claimed, or its bound is not that of the pairs.
+    """
+    scale = max(abs(objective), TINY)
+    if not abs(objective - selection.objective) <= TOLERANCE * scale:
+        raise SolverError(
+            f"the objective is {objective:.9g}, not {selection.objective:.9g} as claimed"
+        )
+    bound = least_possible(costs)
+    if not selection.bound <= bound + TOLERANCE * scale:
+        raise SolverError(f"the claimed bound {selection.bound:.9g} exceeds {bound:.9g}")
+    bound = min(bound, objective)
+    gap = (objective - bound) / scale
+    if selection.end is End.DONE and gap > TOLERANCE:
+        raise SolverError(
+            f"the choice is worth {objective:.9g}, and no more than {bound:.9g} is proven"
+        )
+    return Certificate(objective, bound, gap, gap, {})
 
 
 def _value(costs: LayeredCosts, choice: tuple[int, ...], aim: Aim) -> float:

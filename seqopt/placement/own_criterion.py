@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from numbers import Real
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from seqopt.placement.formulation import said
 from seqopt.placement.requirements import ChoiceResponses
 from seqopt.placement.scales import SceneFacts
 from seqopt.placement.terms import present, spell_out
+from seqopt.scene.checks import short
 
 StepFunction = Callable[[Mapping[str, Floats], int], Floats]
 """Takes responses by name, (C,) or (C, D) in SI units, and the brick count; returns their costs."""
@@ -36,6 +38,8 @@ class StepCost:
     function : callable
         Of responses by name, each (C,) or (C, D), N, N m or m, and of the bricks placed when the
         move is made; returns costs of the same shape, finite or, for what is not allowed, infinite.
+    least : float, optional
+        What a step costs at least, from zero: a lazy search needs it to rule pairs out.
 
     Raises
     ------
@@ -56,6 +60,7 @@ class StepCost:
     name: str
     responses: tuple[str, ...]
     function: StepFunction
+    least: float | None = None
 
     def __post_init__(self) -> None:
         if isinstance(self.responses, str) or not self.responses or not callable(self.function):
@@ -64,6 +69,10 @@ class StepCost:
                 "function of them"
             )
         object.__setattr__(self, "responses", tuple(self.responses))
+        if not (self.least is None or (isinstance(self.least, Real) and 0 <= self.least < np.inf)):
+            raise ProblemError(
+                f"criterion {self.name}: least is {short(self.least)}; give a number from 0"
+            )
 
     @property
     def settings(self) -> Mapping[str, object]:
@@ -142,5 +151,10 @@ class StepCost:
             raise ProblemError(
                 f"criterion {self.name}: its function returned {found[wrong][0]} for a possible "
                 f"choice at {bricks} bricks; give a number, or inf for what is not allowed"
+            )
+        if self.least is not None and (found[~impossible] < self.least).any():
+            raise ProblemError(
+                f"criterion {self.name}: its function returned {found[~impossible].min():.6g} at "
+                f"{bricks} bricks, below its least, {self.least:.6g}; state a lower one"
             )
         return np.where(impossible, np.nan, found)

@@ -47,7 +47,9 @@ class Plan:
     seconds : mapping of str to float
         By stage, s: respond, rank, compile (writing a program down for a solver), solve, verify.
     search : WindowSearch or None
-        What was looked at where no proof was asked for.
+        What was looked at along the choice where not all models were solved.
+    looked_at : int or None
+        How many models were solved where a lazy search did not need them all.
 
     Examples
     --------
@@ -66,6 +68,7 @@ class Plan:
     steps: tuple[Step, ...]
     seconds: Mapping[str, float] = field(compare=False, hash=False)
     search: WindowSearch | None = None
+    looked_at: int | None = None
 
     def __repr__(self) -> str:
         counts = f"{len(self.steps)} steps, {len(self.selection.choice)} moves"
@@ -92,6 +95,8 @@ class Plan:
     @property
     def models(self) -> int:
         """How many different models it looked at."""
+        if self.looked_at is not None:
+            return self.looked_at
         return self._posed.evaluation.models if self.search is None else self._window_models
 
     @property
@@ -236,7 +241,7 @@ class Plan:
             as of `split_gap`, for heuristics. None without proof or without ranks.
         """
         none: dict[str, dict[str, float | None] | None] = {"objectives": None, "gap_parts": None}
-        if self.certificate is None:
+        if self.certificate is None or self.search is not None:
             return none
         values = under_both(self._posed, self.selection.choice)
         if None in values.values():

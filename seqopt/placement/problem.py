@@ -20,7 +20,7 @@ from seqopt.placement.kinds import robots_of
 from seqopt.placement.possible import compared, spread_over_pairs
 from seqopt.placement.requirements import Criterion, Limit, ResponsesAsked
 from seqopt.placement.scales import SceneFacts
-from seqopt.placement.windows import by_move, window_anew, window_kept
+from seqopt.placement.windows import by_move, possible_after, window_anew, window_kept
 from seqopt.responses.choices import CHOICE_RESPONSES, Evaluation, StepChoices
 from seqopt.responses.quantities import robot_response
 from seqopt.responses.resources import HERE, Resources
@@ -140,7 +140,7 @@ class Problem:
             faced = compared(choices, self.schedule, self.criterion, before)
             if len(faced.moves) == 2:
                 out = out + self.step_costs(faced)
-        return out
+        return np.where(possible_after(self.schedule, move, before), out, np.inf)
 
     def window_choices(self, move: int, before: int) -> tuple[StepChoices, ...]:
         """Return the steps that a move decides, for its candidates alone.

@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from seqopt.engines.interface import Engine
-from seqopt.errors import ProblemError, StepError
+from seqopt.errors import MechanismError, ProblemError, StepError
 from seqopt.network.network import Network
 from seqopt.responses.quantities import RESPONSES, robot_response
 from seqopt.responses.table import analyze, force_column
@@ -150,13 +150,13 @@ class SceneFacts:
         Raises
         ------
         ProblemError
-            If no fixed method can build the scene.
+            If no fixed method can build the scene, or none stands on the way.
         """
         found: list[dict[str, float]] = []
         for method in METHODS.values():
             try:
                 found.append(self._largest(method(self.engine.network)))
-            except StepError as error:
+            except (StepError, MechanismError) as error:
                 refused = error
         if not found:
             raise ProblemError(

@@ -7,14 +7,14 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
-from numbers import Real
 from typing import Any, overload
 
 import numpy as np
 
 from seqopt.errors import InfeasibleError, ProblemError
-from seqopt.placement.certificate import judge, least_sum
+from seqopt.placement.certificate import certify_partial, judge, least_sum
 from seqopt.placement.conflicts import refusal
+from seqopt.placement.fitting import require_fit, require_proof, require_time
 from seqopt.placement.formulation import (
     End,
     Formulation,
@@ -25,6 +25,7 @@ from seqopt.placement.formulation import (
 from seqopt.placement.free_plan import FreePlan, solve_free
 from seqopt.placement.free_problem import FreeProblem
 from seqopt.placement.interface import Handed, PlacementProblem
+from seqopt.placement.pair_search import search_pairs
 from seqopt.placement.plan import Plan
 from seqopt.placement.problem import Problem
 from seqopt.placement.promises import require_possible
@@ -33,15 +34,16 @@ from seqopt.placement.schedule_formulation import ScheduleFormulation
 from seqopt.placement.selecting import select
 from seqopt.placement.watch import Finding, Watch
 from seqopt.placement.window_search import search_windows
-from seqopt.scene.checks import short
 
 
 @dataclass(frozen=True)
 class _Run:
-    """How long a formulation may take, and who is told what it finds."""
+    """How long a formulation may take, who is told what it finds, and which models it is given."""
 
     time_limit: float
-    progress: Callable[[Finding], object] | None
+    progress: Callable[[Any], object] | None
+    proof: bool
+    lazy: bool
 
 
 @overload
@@ -50,6 +52,7 @@ def solve(
     formulation: Formulation | str,
     *,
     proof: bool = True,
+    lazy: bool = False,
     time_limit: float = math.inf,
     progress: Callable[[Finding], object] | None = None,
     **options: Any,
@@ -73,6 +76,7 @@ def solve(
     formulation: Formulation | ScheduleFormulation | str,
     *,
     proof: bool = True,
+    lazy: bool = False,
     time_limit: float = math.inf,
     progress: Callable[[Any], object] | None = None,
     **options: Any,
@@ -88,6 +92,8 @@ def solve(
         Or its name, of `seqopt.formulations`; ``schedule_search`` for the free schedule.
     proof : bool, optional
         False: ``cascade`` or ``rank_search`` solve only what they meet, and no gap is known.
+    lazy : bool, optional
+        Solve only the models that the proof needs; for exact formulations without budgets.
     time_limit : float, optional
         After which, or at an interrupt, it stops choosing, with its best choice and a bound, s.
     progress : callable, optional
@@ -110,14 +116,36 @@ def solve(
     >>> seqopt.solve(seqopt.optimize("arch25").problem, "overlap_dp").certificate.gap
     0.0
     """
+    run = _Run(time_limit, progress, proof, lazy)
     if isinstance(problem, FreeProblem):
-        options |= {} if progress is None else {"progress": progress}
-        options |= {} if math.isinf(time_limit) else {"seconds": time_limit}
-        return solve_free(problem, formulation, proof=proof, **options)
+        return _solve_free(problem, formulation, run, options)
     found = _fitting(problem, formulation, time_limit, options)
-    if proof:
-        return _solve_all(problem, found, _Run(time_limit, progress), options)
-    return _solve_windows(problem, found, options)
+    return _solve_loop(problem, found, run, options)
+
+
+def _solve_loop(
+    problem: PlacementProblem, formulation: Formulation, run: _Run, options: Mapping[str, Any]
+) -> Plan:
+    """Return the plan of a schedule with open grips."""
+    if run.lazy:
+        require_proof(run.proof)
+        return _solve_lazily(problem, formulation, run, options)
+    if run.proof:
+        return _solve_all(problem, formulation, run, options)
+    return _solve_windows(problem, formulation, options)
+
+
+def _solve_free(
+    problem: FreeProblem,
+    formulation: Formulation | ScheduleFormulation | str,
+    run: _Run,
+    options: dict[str, Any],
+) -> FreePlan:
+    """Return the plan of a free schedule."""
+    options |= {} if run.progress is None else {"progress": run.progress}
+    options |= {} if math.isinf(run.time_limit) else {"seconds": run.time_limit}
+    options |= {"lazy": True} if run.lazy else {}
+    return solve_free(problem, formulation, proof=run.proof, **options)
 
 
 def on_the_way(plan: Plan) -> Plan:
@@ -156,47 +184,10 @@ def _fitting(
             f"a {type(problem).__name__} is no problem; give one that seqopt.pose made"
         )
     require_fit(problem, found, options)
-    _require_time(found, time_limit)
+    require_time(found, time_limit)
     if isinstance(problem, Problem):
         require_possible(problem)
     return found
-
-
-def require_fit(
-    problem: PlacementProblem, formulation: Formulation | str, options: Mapping[str, object]
-) -> None:
-    """Raise an error unless a formulation is for such a problem and has such options.
-
-    Parameters
-    ----------
-    problem : PlacementProblem
-    formulation : Formulation
-    options : mapping of str to object
-
-    Raises
-    ------
-    ProblemError
-        If the problem has budgets that the formulation does not take, or an option is not its own.
-    """
-    formulation = as_formulation(formulation)
-    if problem.budgets and not formulation.takes_budgets:
-        able = [name for name, other in formulations().items() if other.takes_budgets]
-        raise ProblemError(
-            f"{formulation.name}: the budget {problem.budgets[0].name!r} couples all moves; "
-            f"use {' or '.join(able)}"
-        )
-    for name in options:
-        if name not in formulation.options:
-            known = ", ".join(formulation.options) or "no options"
-            raise ProblemError(f"option {name}: {formulation.name} has {known}")
-
-
-def _require_time(formulation: Formulation, time_limit: float) -> None:
-    """Raise an error unless a time limit is one, and the formulation can keep it."""
-    if not isinstance(time_limit, Real) or not time_limit >= 0:
-        raise ProblemError(f"time_limit is {short(time_limit)}; give seconds from 0")
-    if np.isfinite(time_limit) and not formulation.watched:
-        raise ProblemError(f"{formulation.name} takes no time limit; leave it out")
 
 
 def _solve_all(
@@ -248,6 +239,32 @@ def _solve_windows(
         steps = problem.steps(found.choice)
     stages = {"respond": respond, "rank": seconds["search"] - respond, "verify": seconds["verify"]}
     return Plan(problem, formulation, Selection(found.choice, np.nan), None, steps, stages, found)
+
+
+def _solve_lazily(
+    problem: PlacementProblem, formulation: Formulation, run: _Run, options: Mapping[str, Any]
+) -> Plan:
+    """Return the certified plan of a search that solves only the models that the proof needs."""
+    if not isinstance(problem, Problem):
+        raise ProblemError("the costs of all choices are given; nothing is saved by a lazy search")
+    if options:
+        raise ProblemError(f"option {min(options)}: a lazy search has no options; leave it out")
+    seconds: dict[str, float] = {}
+    with _timed(seconds, "search"):
+        found = search_pairs(problem, formulation, Watch(run.time_limit, run.progress))
+    with _timed(seconds, "verify"):
+        certificate = certify_partial(found.costs, found.selection, found.objective)
+        steps = problem.steps(found.selection.choice)
+    return Plan(
+        problem,
+        formulation,
+        found.selection,
+        certificate,
+        steps,
+        seconds,
+        found.along,
+        found.models,
+    )
 
 
 @contextmanager

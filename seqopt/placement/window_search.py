@@ -20,7 +20,7 @@ from seqopt.arrays import Floats
 from seqopt.errors import MemoryShortError, SolverError
 from seqopt.placement.joining import Joined
 from seqopt.placement.problem import Problem
-from seqopt.placement.windows import window
+from seqopt.placement.windows import possible_after, window
 from seqopt.responses.choices import StepChoices
 from seqopt.responses.resources import Resources
 from seqopt.sequence.schedule import Schedule
@@ -150,6 +150,8 @@ class _Walk:
     def _choose(self, k: int) -> None:
         move = self._schedule.moves[k]
         costs = self._own.single(k) + self.shared[k].singles[0]
+        if k:
+            costs = np.where(possible_after(self._schedule, k, self.choice[-1]), costs, np.inf)
         if not np.isfinite(costs).any():
             raise SolverError(
                 f"move {k + 1}, step {move.step}: {move.robot} has no allowed grip after the "

@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+import numpy as np
+
+from seqopt.arrays import Bools, Ints
 from seqopt.responses.choices import Evaluation, StepChoices
 from seqopt.sequence.schedule import OpenGrip, Schedule
 
@@ -44,6 +47,27 @@ def window(
         for step in sorted(found, key=lambda step: step.number)
     ]
     return replace(schedule, steps=tuple(steps), moves=(schedule.moves[move],))
+
+
+def possible_after(schedule: Schedule, move: int, before: int) -> Bools:
+    """Return which candidates of a move are possible while the choice before is still held.
+
+    Responses do not tell where all candidates are impossible: then nothing is known of any.
+
+    Parameters
+    ----------
+    schedule : Schedule
+    move, before : int
+        A move, and the candidate chosen for the move before it.
+
+    Returns
+    -------
+    (C_k,) bool
+    """
+    candidates = np.array(schedule.moves[move].candidates)
+    if (move - 1, move) not in schedule.steps_of:
+        return np.ones(len(candidates), dtype=bool)
+    return np.asarray(candidates != schedule.moves[move - 1].candidates[before])
 
 
 def window_anew(evaluation: Evaluation, move: int, before: int) -> tuple[StepChoices, ...]:
@@ -109,3 +133,32 @@ def window_kept(decided: Sequence[StepChoices], before: int) -> tuple[StepChoice
         responses = {name: values[row] for name, values in choices.responses.items()}
         out.append(StepChoices(choices.step, choices.moves, responses))
     return tuple(out)
+
+
+def pairs_as_moves(
+    schedule: Schedule, asked: Sequence[tuple[int, int]], wanted: Sequence[Ints]
+) -> Schedule:
+    """Return the steps of pairs as a schedule with a move for every row.
+
+    Parameters
+    ----------
+    schedule : Schedule
+    asked : sequence of (int, int)
+        A move, and a candidate of the move before it.
+    wanted : sequence of (c,) int
+        The candidates of the move that are looked at.
+
+    Returns
+    -------
+    Schedule
+    """
+    moves, steps = [], []
+    for n, ((k, before), some) in enumerate(zip(asked, wanted, strict=True)):
+        move = schedule.moves[k]
+        moves.append(replace(move, candidates=tuple(move.candidates[i] for i in some)))
+        node = schedule.moves[k - 1].candidates[before]
+        takes: dict[object, int | OpenGrip] = {OpenGrip(k): OpenGrip(n), OpenGrip(k - 1): node}
+        for step in schedule.steps_of[k - 1, k]:
+            grips = tuple(takes[g] if isinstance(g, OpenGrip) else g for g in step.grips)
+            steps.append(replace(step, grips=grips))
+    return replace(schedule, steps=tuple(steps), moves=tuple(moves))

@@ -16,6 +16,7 @@ from seqopt.files import read_text, write_text
 from seqopt.scene.checks import short
 from seqopt.scene.doubts import doubts
 from seqopt.scene.library.builtin import ABOUT, GENERATED
+from seqopt.scene.library.by_words import KINDS, scene_by_words
 from seqopt.scene.parts import Brick, Ground, Joint, Robot
 from seqopt.scene.reach import Anywhere, Reach, Side, Sphere
 from seqopt.scene.scene import Scene
@@ -82,12 +83,13 @@ def _load_stored(name: str) -> Scene:
 
 
 def load_scene(name: str | Path) -> Scene:
-    """Return a built-in scene by name, or the scene of a JSON file.
+    """Return a built-in scene by name, the scene of a JSON file, or one from a few words.
 
     Parameters
     ----------
     name : str or pathlib.Path
-        One of `builtin_scenes`, or the path of a file.
+        One of `builtin_scenes`, the path of a file, or what
+        `seqopt.scene.library.by_words.scene_by_words` reads, as ``arch:span=2,rise=0.7``.
 
     Returns
     -------
@@ -117,10 +119,15 @@ def load_scene(name: str | Path) -> Scene:
         return GENERATED[name](_load_stored)
     if name in _stored():
         return _load_stored(name)
+    if ":" in name and name.partition(":")[0] in KINDS:
+        return scene_by_words(name)
     path = Path(name)
     if not path.suffix and not os.path.lexists(path):
         known = ", ".join(builtin_scenes())
-        raise SceneError(f"scene {name}: no such built-in scene or file; built in: {known}")
+        raise SceneError(
+            f"scene {name}: no such built-in scene or file; built in: {known}; or in words, as "
+            "arch:span=2,rise=0.7"
+        )
     scene = parse_scene(read_text(path), name)
     for doubt in doubts(scene):
         warnings.warn(f"scene {name}: {doubt}", SceneWarning, stacklevel=2)

@@ -169,7 +169,9 @@ def test_an_interrupt_names_what_was_chosen(tmp_path, workers):
 def test_a_killed_worker_is_replaced(tmp_path):
     """By the slow engine: most of the work is still to be done when the first answer is there."""
     words = [*WORDS, "cascade", "--no-proof", "--engine", "frame"]
-    run = start(*words, "--out", tmp_path / "out", "--workers", "2", "--cache", tmp_path / "answers")
+    run = start(
+        *words, "--out", tmp_path / "out", "--workers", "2", "--cache", tmp_path / "answers"
+    )
     try:
         until = time.monotonic() + 60
         while not list(tmp_path.glob("answers/*/*.npz")) and time.monotonic() < until:

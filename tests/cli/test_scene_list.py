@@ -5,13 +5,16 @@ from __future__ import annotations
 import pytest
 
 from seqopt.cli.main import main
+from seqopt.scene.library.by_words import KINDS
 from seqopt.scene.scene_file import about, builtin_scenes, load_scene
 
 
 def test_all_built_in_scenes_are_listed_a_line_each(capsys):
     assert main(["scene", "--list"]) == 0
     out, err = capsys.readouterr()
-    lines = out.splitlines()
+    count = len(builtin_scenes())
+    lines, words = out.splitlines()[:count], out.splitlines()[count:]
+    assert words == [kind.about for kind in KINDS.values()]
     assert err == ""
     assert [line.split(":")[0] for line in lines] == [*builtin_scenes()]
     assert {"arch25", "dome163", "vault338"} <= {*builtin_scenes()}

@@ -15,7 +15,9 @@ from seqopt.engines.planar import PlanarEngine
 from seqopt.engines.rigid import compliance
 from seqopt.engines.rigid.compliance import CANCEL, EVEN, ComplianceEngine, cancels, solve_batch
 from seqopt.engines.rigid.loads import load_matrix
+from seqopt.engines.rigid.mixed import solve_mixed
 from seqopt.engines.rigid.operator import OperatorBuilder
+from seqopt.engines.rigid.refinement import Corrector
 from seqopt.engines.rigid.spanning_tree import grow_tree
 from seqopt.network.build import build_network
 from tests.builders import from_both_sides, six_bricks, small_arch
@@ -128,6 +130,33 @@ def test_what_was_corrected_before_for_other_bricks_is_no_help():
         assert engine.solve(bricks, grips, Want.ALL) == own
 
 
+def test_what_is_only_compared_is_corrected_once_and_right_to_six_digits(monkeypatch):
+    """Grips close to the tip of a long chain, against the refined mixed system."""
+    bricks, made = 120, []
+
+    class Counted(Corrector):
+        def _correction(self, *arguments):
+            made.append(len(arguments[0]))
+            return super()._correction(*arguments)
+
+    monkeypatch.setattr("seqopt.engines.rigid.refinement.Corrector", Counted)
+    net = build_network(chain(bricks))
+    nodes = np.array([brick.nodes for brick in net.scene.placed])
+    pairs = [(i, j) for i in (1, 2, 3) for j in (4, 6, 9)]
+    sets = np.array([[nodes[-1, 1], nodes[-1 - i, 0], nodes[-1 - j, 1]] for i, j in pairs])
+    engine = ComplianceEngine(net)
+    exact = solve_mixed(net, bricks, grip_columns(net, bricks, sets))
+    size = np.abs(exact.edge_force).max(axis=1)
+    taken = {}
+    for want, most in ((Want.RESPONSES, 1e-9), (Want.RESPONSES | Want.SCREEN, 1e-6)):
+        monkeypatch.setattr(compliance, "UNSEEN", 1.0)  # nothing is trusted
+        made.clear()
+        off = np.abs(engine.solve(bricks, sets, want).edge_force - exact.edge_force).max(axis=1)
+        assert (off <= most * size).all()
+        taken[most] = sum(made)
+    assert taken[1e-6] == len(sets) < taken[1e-9]
+
+
 def test_a_correction_is_kept_for_the_same_bricks_and_gets_their_operator(monkeypatch):
     made, helped = [], []
 
@@ -136,9 +165,9 @@ def test_a_correction_is_kept_for_the_same_bricks_and_gets_their_operator(monkey
             made.append(bricks)
             super().__init__(network, bricks, *more)
 
-        def solve(self, columns, operator):
+        def solve(self, columns, operator, largest):
             helped.append(operator is not None)
-            return super().solve(columns, operator)
+            return super().solve(columns, operator, largest)
 
     monkeypatch.setattr(compliance, "Refinement", Watched)
     engine = ComplianceEngine(build_network(loosened(chain(16), 1e-9, only_turning=True)))

@@ -288,6 +288,8 @@ def spoil_growth(table):
         cube = 1e-4 * table["bricks"] ** 3 + table["memory_MB"].min()
         yield (table.assign(**{column: table[column].where(table["version"] != "this", cube)}),)
     yield (spoiled(table, "seconds", np.nan, version="this", scene="vault338"),)
+    yield (spoiled(table, "error", 2e-9, version="this", scene="chain338"),)
+    yield (spoiled(table, "screen_error", 2e-6, version="this", scene="chain338"),)
 
 
 def spoil_limits(table):

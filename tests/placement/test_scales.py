@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -11,13 +12,15 @@ from hypothesis import strategies as st
 
 import seqopt
 from experiments.harness.walls import running_bond
+from seqopt.contact.mortar import bond_mortar
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.errors import ProblemError
+from seqopt.errors import MechanismError, ProblemError
 from seqopt.network.build import build_network
 from seqopt.placement.criteria import OVER_METHODS, RankSum, WeightedSum
 from seqopt.placement.scales import NEVER, ROUNDED, SceneFacts, crown
 from seqopt.placement.terms import equal
 from seqopt.scene.arch import ArchShape, arch_scene
+from seqopt.sequence.two_robots import METHODS
 from seqopt.study.presets import CLOSEST, EQUATIONS, RESOLUTION
 from tests.builders import far_reaching, rescaled, small_arch
 from tests.strategies import arches
@@ -83,6 +86,24 @@ def test_scales_are_those_of_the_scenes_own_methods(arch25):
     )
     for name, value in facts.reference.items():
         assert heavy.reference[name] == pytest.approx(2 * value)
+
+
+def test_a_method_that_falls_on_its_way_gives_no_scales():
+    network = build_network(small_arch(9))
+    for strength, falls in ((1.5e5, {"cantilever"}), (3e4, {*METHODS})):
+        engine = seqopt.make_engine("auto", network, bond_mortar(strength))
+        stand = {}
+        for name, method in METHODS.items():
+            with suppress(MechanismError):
+                stand[name] = seqopt.analyze(engine, method(network))
+        assert METHODS.keys() - stand.keys() == falls
+        facts = SceneFacts(engine)
+        if stand:
+            (table,) = stand.values()
+            assert facts.reference["M_sup"] == table["M_sup_Nm"].max()
+        else:
+            with pytest.raises(ProblemError, match="no fixed method gives scales for this scene"):
+                _ = facts.reference
 
 
 def test_a_response_without_a_scale_is_named(arch25):

@@ -32,6 +32,7 @@ from seqopt.engines.interface import (
 from seqopt.engines.rigid.grip_equations import grip_forces, share_pairs
 from seqopt.engines.rigid.kept import Kept
 from seqopt.engines.rigid.loads import load_matrix
+from seqopt.engines.rigid.mixed import LAST_CORRECTION
 from seqopt.engines.rigid.operator import ComplianceOperator, OperatorBuilder
 from seqopt.engines.rigid.refinement import Refinement
 from seqopt.engines.rigid.spanning_tree import grow_tree
@@ -45,6 +46,7 @@ KEPT = 32e6  # bytes of operators that may stay when another is made
 CHUNK = 2048  # grip sets per pass: keeps the work arrays in the processor's cache
 ACCURACY = 1e-9  # largest error of fields over the largest of each
 SCREEN = 1e-6  # the same, of what is only to be compared
+ONCE = 10.0  # of that: after so small a correction the next is smaller than it, and is not made
 UNSEEN = 100 * np.finfo(float).eps  # largest error that was met over what is read off the equations
 EVEN = 5e-5  # softest over stiffest joint from which on pivots tell the whole error
 CANCEL = 10.0  # what the grips undo over what is left, where pivots do not
@@ -102,7 +104,7 @@ class ComplianceEngine:
         """
         columns = grip_columns(self._network, bricks, grips)
         if bricks > len(self._tree.spring):
-            answer = keep_wanted(self._refined(bricks, columns), want)
+            answer = keep_wanted(self._refined(bricks, columns, want), want)
             return require_finite(answer, bricks, grips)
         operator = self._operator(bricks, columns)
         accuracy = max(SCREEN, self._accuracy) if want & Want.SCREEN else self._accuracy
@@ -111,7 +113,7 @@ class ComplianceEngine:
         if self._basis is not SPACE:
             found["grip_force"] = found["grip_force"] @ self._basis.force
         if not trusted.all():
-            better = keep_wanted(self._refined(bricks, columns[~trusted]), want)
+            better = keep_wanted(self._refined(bricks, columns[~trusted], want), want)
             for name, values in found.items():
                 values[~trusted] = getattr(better, name)
         return require_finite(Fields(**found), bricks, grips)
@@ -141,15 +143,16 @@ class ComplianceEngine:
         """Made when the first operator is: a scene that is loose from the start has none."""
         return OperatorBuilder(self._network, self._tree, self._basis)
 
-    def _refined(self, bricks: int, columns: Ints) -> Fields:
+    def _refined(self, bricks: int, columns: Ints, want: Want) -> Fields:
         """Return the fields of grip sets that the operator alone does not answer well enough."""
+        largest = ONCE * SCREEN if want & Want.SCREEN else LAST_CORRECTION
         operator = None
         if self._basis is SPACE and bricks <= len(self._tree.spring):
             operator = self._operator(bricks, columns)
         with one_thread():
             if self._refinement is None or self._refinement.bricks != bricks:
                 self._refinement = Refinement(self._network, bricks, self._statics)
-            return self._refinement.solve(columns, operator)
+            return self._refinement.solve(columns, operator, largest)
 
 
 def solve_batch(

@@ -10,7 +10,6 @@ resist them, mostly not at all.
 from __future__ import annotations
 
 import numpy as np
-from scipy import sparse
 
 from seqopt.arrays import Floats
 from seqopt.engines.rigid.loads import inner_edges
@@ -20,23 +19,6 @@ from seqopt.engines.rigid.operator import ComplianceOperator
 from seqopt.engines.rigid.response_maps import ResponseMaps, scene_maps
 
 TIED = 0.1  # most that what resists loose motions may be of the springs that they stand on
-
-
-def inner_motion(parts: Ungripped) -> sparse.csr_array:
-    """Return the displacements of the inner nodes for scaled twists.
-
-    Parameters
-    ----------
-    parts : Ungripped
-
-    Returns
-    -------
-    (6b, 6b) sparse
-        In the order of ``network.inner``, m.
-    """
-    inner = parts.network.inner[: parts.bricks].ravel()
-    rows = parts.motion[(3 * inner[:, None] + np.arange(3)).ravel()]
-    return sparse.csr_array(rows @ sparse.diags_array(parts.twist_unit))
 
 
 def held_operator(system: HeldSystem) -> ComplianceOperator:
@@ -53,7 +35,7 @@ def held_operator(system: HeldSystem) -> ComplianceOperator:
     """
     parts, loose = system.parts, system.loose
     joints, loads = len(parts.wrench_unit), 6 * parts.bricks
-    inner = inner_motion(parts)
+    inner = parts.inner
     right = np.zeros((loads + loose, joints + loads))
     right[:loads, joints:] = inner.toarray() / parts.unit
     moved = np.zeros((loads + loose, loose))

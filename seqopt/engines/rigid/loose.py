@@ -23,6 +23,7 @@ from seqopt.network.kinematics import point_motion
 from seqopt.network.network import GROUND
 
 NEAR = 0.1  # of the largest: a pivot that large is taken if it fills less, and corrected after
+PANEL = 4  # columns that are eliminated together: few, since each meets few others
 SOFT = 1e-7  # stiffness over the typical one below which a direction ties nothing
 
 
@@ -94,7 +95,12 @@ def hold_loose(parts: Ungripped) -> HeldSystem:
         matrix = sparse.block_array([[matrix, -wide.T], [wide, None]], format="csr")
     try:
         # springs first, then bricks as they are built: neighbors stand near each other
-        factors = splu(sparse.csc_array(matrix), permc_spec="NATURAL", diag_pivot_thresh=NEAR)
+        factors = splu(
+            sparse.csc_array(matrix),
+            permc_spec="NATURAL",
+            diag_pivot_thresh=NEAR,
+            panel_size=PANEL,
+        )
     except RuntimeError as error:  # SuperLU met an exactly zero pivot
         raise SolverError(
             f"{parts.bricks} bricks: exactly singular in double precision; stiffen what is soft"

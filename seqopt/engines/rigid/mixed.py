@@ -114,7 +114,9 @@ def solve_load(parts: Ungripped, grips: Ints, pull: Floats) -> Solution:
     return Solution(twist, wrench, force)
 
 
-def unchanged(parts: Ungripped, states: Floats, corrections: Floats) -> Bools:
+def unchanged(
+    parts: Ungripped, states: Floats, corrections: Floats, largest: float = LAST_CORRECTION
+) -> Bools:
     """Return whether corrections are small beside forces, moments, shifts and turns each.
 
     Where nothing moves, as where robots hold every brick at both nodes, what is left is rounding:
@@ -125,6 +127,8 @@ def unchanged(parts: Ungripped, states: Floats, corrections: Floats) -> Bools:
     parts : Ungripped
     states, corrections : (S, 6s + 6b) float
         Scaled wrenches and twists.
+    largest : float, optional
+        That counts as small.
 
     Returns
     -------
@@ -133,7 +137,7 @@ def unchanged(parts: Ungripped, states: Floats, corrections: Floats) -> Bools:
     size, change = _sizes(parts, states), _sizes(parts, corrections)
     other = size.reshape(-1, 2, 2).max(axis=2).repeat(2, axis=1)
     least = np.maximum(EMPTY * other, LIGHT * np.abs(parts.load).max())
-    return np.asarray((change <= LAST_CORRECTION * np.maximum(size, least)).all(axis=1))
+    return np.asarray((change <= largest * np.maximum(size, least)).all(axis=1))
 
 
 def _sizes(parts: Ungripped, states: Floats) -> Floats:

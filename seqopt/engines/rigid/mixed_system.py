@@ -18,7 +18,7 @@ from scipy import linalg, sparse
 from scipy.sparse.linalg import SuperLU, splu
 
 from seqopt.arrays import Floats, FrozenValue, Ints
-from seqopt.network.kinematics import deformation, node_motion
+from seqopt.network.kinematics import deformation, node_motion, point_motion
 from seqopt.network.network import Network
 from seqopt.network.statics import Statics, build_statics
 
@@ -33,6 +33,8 @@ class Ungripped(FrozenValue):
     bricks : int
     motion : (3n, 6b) sparse
         Displacements of the nodes for unit twists.
+    inner : (6b, 6b) sparse
+        Those of the inner nodes for scaled twists, in the order of ``network.inner``, m.
     statics : Statics
         Of the network.
     deformation : (6s, 6b) sparse
@@ -53,6 +55,7 @@ class Ungripped(FrozenValue):
     network: Network
     bricks: int
     motion: sparse.csr_array
+    inner: sparse.csr_array
     statics: Statics
     deformation: sparse.csr_array
     stiffness: Floats
@@ -107,23 +110,18 @@ def ungripped_system(network: Network, bricks: int, statics: Statics | None = No
     stiffness = raw / unit
     twist_unit = np.tile(1 / lever, bricks)
     gap = _scaled_gap(network, bricks, lever)
-    row = 1 / np.maximum(1.0, stiffness)  # keeps a stiff joint's equation of order one
-    blocks = [
-        [sparse.diags_array(row), sparse.diags_array(row * stiffness) @ gap],
-        [-gap.T, None],
-    ]
-    motion = node_motion(network, bricks)
-    inner = (3 * network.inner[:bricks].ravel()[:, None] + np.arange(3)).ravel()
+    inner = _inner_motion(network, bricks, twist_unit)
     weight = network.inner_weight[: 2 * bricks].ravel()
     return Ungripped(
         network=network,
         bricks=bricks,
-        motion=motion,
+        motion=node_motion(network, bricks),
+        inner=inner,
         statics=build_statics(network) if statics is None else statics,
         deformation=gap,
         stiffness=stiffness,
-        matrix=sparse.csr_array(sparse.block_array(blocks)),
-        load=motion[inner].T @ weight * twist_unit / unit,
+        matrix=_side_by_side(gap, stiffness),
+        load=inner.T @ weight / unit,
         acting=acting,
         twist_unit=twist_unit,
         wrench_unit=unit * np.tile(lever, len(acting)),
@@ -139,6 +137,37 @@ def _scaled_gap(network: Network, bricks: int, lever: Floats) -> sparse.csr_arra
     gap.data *= np.repeat(np.tile(lever, len(mine)), np.diff(gap.indptr))
     gap.data /= np.tile(lever, bricks)[gap.indices]
     return gap
+
+
+def _inner_motion(network: Network, bricks: int, twist_unit: Floats) -> sparse.csr_array:
+    """Return the displacements (6b, 6b) of the inner nodes for scaled twists, m."""
+    brick = np.repeat(np.arange(bricks), 2)
+    node = network.inner[:bricks].ravel()
+    block = point_motion(network.node_position[node] - network.centroid[brick])
+    block = block * twist_unit.reshape(bricks, 1, 6)[brick]
+    column = np.broadcast_to(6 * brick[:, None, None] + np.arange(6), block.shape)
+    rows = np.arange(0, block.size + 1, 6)
+    return sparse.csr_array((block.ravel(), column.ravel(), rows), shape=(6 * bricks, 6 * bricks))
+
+
+def _side_by_side(gap: sparse.csr_array, stiffness: Floats) -> sparse.csr_array:
+    """Return the system without grips, row by row, from the scaled deformation (6s, 6b)."""
+    row = 1 / np.maximum(1.0, stiffness)  # keeps a stiff joint's equation of order one
+    joints, moves = gap.shape
+    pulled = np.repeat(row * stiffness, np.diff(gap.indptr)) * gap.data
+    carried = gap.tocsc()
+    return sparse.csr_array(
+        (
+            np.concatenate([np.insert(pulled, gap.indptr[:-1], row), -carried.data]),
+            np.concatenate(
+                [np.insert(gap.indices + joints, gap.indptr[:-1], range(joints)), carried.indices]
+            ),
+            np.concatenate(
+                [gap.indptr + np.arange(joints + 1), carried.indptr[1:] + gap.nnz + joints]
+            ),
+        ),
+        shape=(joints + moves, joints + moves),
+    )
 
 
 def mixed_system(parts: Ungripped, grips: Ints, shift: Floats | None = None) -> MixedSystem:

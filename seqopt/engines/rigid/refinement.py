@@ -17,11 +17,11 @@ from scipy import sparse
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.engines.interface import Fields, join_sets, merge_sets, no_sets
 from seqopt.engines.rigid.grip_equations import grip_forces, still_forces
-from seqopt.engines.rigid.held_operator import held_operator, inner_motion
+from seqopt.engines.rigid.held_operator import held_operator
 from seqopt.engines.rigid.loads import load_matrix
 from seqopt.engines.rigid.loose import HeldSystem, hold_loose
 from seqopt.engines.rigid.mechanism import require_resistance
-from seqopt.engines.rigid.mixed import solve_mixed, unchanged
+from seqopt.engines.rigid.mixed import LAST_CORRECTION, solve_mixed, unchanged
 from seqopt.engines.rigid.mixed_system import rescaled, ungripped_system, unscaled
 from seqopt.engines.rigid.operator import ComplianceOperator
 from seqopt.engines.rigid.recovery import Solution, respond
@@ -49,7 +49,7 @@ class Refinement:
         self.network, self.bricks = network, bricks
         self.parts = ungripped_system(network, bricks, statics)
         self.held: HeldSystem = hold_loose(self.parts)
-        self.inner = inner_motion(self.parts)
+        self.inner = self.parts.inner
         weighed = sparse.csr_array(self.parts.load[None])
         self.pulls = sparse.vstack([self.inner / self.parts.unit, weighed], format="csr")
 
@@ -58,7 +58,12 @@ class Refinement:
         """Of all nodes and directions, from the factored system; for where something is loose."""
         return held_operator(self.held)
 
-    def solve(self, columns: Ints, operator: ComplianceOperator | None = None) -> Fields:
+    def solve(
+        self,
+        columns: Ints,
+        operator: ComplianceOperator | None = None,
+        largest: float = LAST_CORRECTION,
+    ) -> Fields:
         """Return all fields of grip sets.
 
         Parameters
@@ -68,6 +73,8 @@ class Refinement:
         operator : ComplianceOperator, optional
             Of all directions of space, with wrenches and twists, if there is one for these grips;
             it serves if nothing is loose.
+        largest : float, optional
+            Correction of a set after which it needs no other, over the largest of each kind.
 
         Returns
         -------
@@ -80,7 +87,9 @@ class Refinement:
         """
         empty = no_sets(self.network, self.bricks, columns.shape[1])
         starts = range(0, len(columns), TOGETHER)
-        corrector = Corrector(self, self.own if operator is None or self.held.loose else operator)
+        corrector = Corrector(
+            self, self.own if operator is None or self.held.loose else operator, largest
+        )
         parts = (corrector.together(columns[i : i + TOGETHER]) for i in starts)
         return join_sets([empty, *parts])
 
@@ -93,12 +102,16 @@ class Corrector:
     system : Refinement
     operator : ComplianceOperator
         Of all directions of space.
+    largest : float
+        Correction of a set after which it needs no other.
     """
 
-    def __init__(self, system: Refinement, operator: ComplianceOperator) -> None:
+    def __init__(
+        self, system: Refinement, operator: ComplianceOperator, largest: float = LAST_CORRECTION
+    ) -> None:
         self.network, self.bricks, self.parts = system.network, system.bricks, system.parts
         self.held, self.inner, self.pulls = system.held, system.inner, system.pulls
-        self.operator = operator
+        self.operator, self.largest = operator, largest
 
     def together(self, columns: Ints) -> Fields:
         """Return the fields of a few sets.
@@ -145,7 +158,7 @@ class Corrector:
             change, more = self._correction(columns[left], index[left], state, force)
             answers.states[left] = state + change
             answers.force[left] = force + more
-            done[left] = unchanged(self.parts, state, change)
+            done[left] = unchanged(self.parts, state, change, self.largest)
             left = left[~done[left] & np.isfinite(change).all(axis=1)]
         return done
 

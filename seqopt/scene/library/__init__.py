@@ -1,4 +1,4 @@
-"""Scenes from numbers: chains, walls, domes and vaults of any size.
+"""Scenes from numbers: arches, walls, domes and vaults of any size.
 
 Each generator takes the numbers that shape what it builds and returns a checked scene in which no
 two bricks are in one place and every joint lies between the faces of its bricks:
@@ -11,6 +11,14 @@ two bricks are in one place and every joint lies between the faces of its bricks
 >>> dome(DomeShape(courses=6, around=20, bond="herringbone")).grounds[0].brick
 1
 
+An arch by its span and rise stands on level supports; a wall may be corbelled:
+
+>>> from seqopt.scene.library import ArchForm, arch
+>>> arch(ArchForm(span=2.0, rise=0.8, curve="catenary"))
+<Scene catenary arch 2 x 0.8: 13 bricks, 12 joints, 2 ground ends, 3 robots>
+>>> wall(WallShape(columns=6, courses=4, corbel=0.02)).placed[-1].position[1]
+0.06
+
 A vault grows in herringbone from an arch that stands in its middle:
 
 >>> from seqopt.scene import load_scene
@@ -18,9 +26,15 @@ A vault grows in herringbone from an arch that stands in its middle:
 >>> herringbone_vault(load_scene("arch25"), VaultShape(bricks=100))
 <Scene vault 100: 100 bricks, 241 joints, 6 ground ends, 3 robots>
 
-Arches of other shapes come from `seqopt.scene.arch_scene`.
+`barrel_vault` has the eight tested vaults of the paper's calibration. Arches of other shapes come
+from `seqopt.scene.arch_scene`. The same in words, wherever a scene is named:
+
+>>> load_scene("dome:courses=4,around=12")
+<Scene dome 39: 39 bricks, 82 joints, 12 ground ends, 3 robots>
 """
 
+from seqopt.scene.library.arch_form import ArchForm, arch
+from seqopt.scene.library.barrel_vault import barrel_vault
 from seqopt.scene.library.chain import chain
 from seqopt.scene.library.dome import dome
 from seqopt.scene.library.dome_shape import DomeShape
@@ -30,10 +44,13 @@ from seqopt.scene.library.vault_surface import VaultShape
 from seqopt.scene.library.wall import WallShape, wall
 
 __all__ = [
+    "ArchForm",
     "DomeShape",
     "JointLaw",
     "VaultShape",
     "WallShape",
+    "arch",
+    "barrel_vault",
     "chain",
     "dome",
     "herringbone_vault",

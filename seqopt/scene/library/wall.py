@@ -1,4 +1,4 @@
-"""Straight walls in running bond."""
+"""Walls in running bond: upright, or corbelled, each course beyond the one below."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from seqopt.arrays import Vector
 from seqopt.errors import SceneError
-from seqopt.scene.checks import positive, vector
+from seqopt.scene.checks import finite, positive, vector
 from seqopt.scene.library.joints import ground_under, joints_between
 from seqopt.scene.library.law import MASONRY, JointLaw
 from seqopt.scene.library.laying import joint_width, mobile_robots, whole_number
@@ -33,6 +33,8 @@ class WallShape:
         Length, width and height of a brick, m.
     gap : float
         Width of the joints, m; 0 where bricks are laid dry.
+    corbel : float
+        How far each course projects beyond the one below it, across the wall, m.
     density : float
         kg/m³.
     law : JointLaw
@@ -53,6 +55,7 @@ class WallShape:
     courses: int
     dimensions: Vector = (0.2, 0.1, 0.06)
     gap: float = 0.0
+    corbel: float = 0.0
     density: float = 2000.0
     law: JointLaw = MASONRY
 
@@ -68,12 +71,18 @@ class WallShape:
                 f"wall: gap is {self.gap:g} m, half a brick or more; give less than "
                 f"{0.5 * self.dimensions[0]:g}"
             )
+        _set(self, "corbel", finite("wall: corbel", self.corbel))
+        if abs(self.corbel) >= self.dimensions[1]:
+            raise SceneError(
+                f"wall: corbel is {self.corbel:g} m, a brick's width or more, and courses would "
+                f"not lie on each other; give less than {self.dimensions[1]:g}"
+            )
 
 
 def wall(shape: WallShape, name: str = "", *, robots: Sequence[Robot] | None = None) -> Scene:
     """Return the scene of a wall that is built course by course, from left to right.
 
-    It runs towards +x in the plane y = 0 and stands on z = 0. A brick has joints with those beside
+    It runs towards +x from y = 0 and stands on z = 0. A brick has joints with those beside
     it and those that it lies on: nearly every one closes a loop.
 
     Parameters
@@ -121,7 +130,7 @@ def _brick(shape: WallShape, course: int, column: int) -> Brick:
     along = (length + shape.gap) * (column + 0.5 * (course % 2))
     return Brick(
         name=name,
-        position=(along, 0.0, height * (course + 0.5) + shape.gap * course),
+        position=(along, shape.corbel * course, height * (course + 0.5) + shape.gap * course),
         length_axis=(1.0, 0.0, 0.0),
         width_axis=(0.0, 1.0, 0.0),
         dimensions=shape.dimensions,

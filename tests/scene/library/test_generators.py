@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given, reject, settings
 from hypothesis import strategies as st
 
 from seqopt.contact.faces import bare_assembly
@@ -20,10 +20,12 @@ from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.boxes import separations
 from seqopt.scene.doubts import doubts
 from seqopt.scene.library import (
+    ArchForm,
     DomeShape,
     JointLaw,
     VaultShape,
     WallShape,
+    arch,
     chain,
     dome,
     herringbone_vault,
@@ -50,8 +52,29 @@ def small_walls(draw):
             courses=draw(st.integers(1, 5)),
             dimensions=draw(st.tuples(*[st.floats(0.05, 0.4)] * 3)),
             gap=draw(st.sampled_from([0.0, 0.002, 0.01])),
+            corbel=draw(st.sampled_from([0.0, 0.01])),
         )
     )
+
+
+@st.composite
+def small_arches(draw):
+    """Arches by span and rise whose bricks fit; those that do not are refused in a line."""
+    span, curve = (
+        draw(st.floats(1.0, 4.0)),
+        draw(st.sampled_from(["circular", "catenary", "pointed"])),
+    )
+    steep = (0.52, 1.0) if curve == "pointed" else (0.15, 0.5)
+    form = ArchForm(
+        span=span,
+        rise=span * draw(st.floats(*steep)),
+        curve=curve,
+        pattern=draw(st.sampled_from(["V", "VLR"])),
+    )
+    try:
+        return arch(form)
+    except SceneError:
+        reject()
 
 
 @st.composite
@@ -83,7 +106,7 @@ def small_vaults(draw):
 
 
 chains = st.builds(chain, st.integers(7, 40), pattern=st.sampled_from(["VLR", "V", "LR", "VL"]))
-GENERATED = st.one_of(chains, small_walls(), small_domes(), small_vaults())
+GENERATED = st.one_of(chains, small_arches(), small_walls(), small_domes(), small_vaults())
 
 
 @given(scene=GENERATED)
@@ -178,6 +201,31 @@ def test_compliance_agrees_with_independent_routes(scene, share):
         (
             lambda: dome(DomeShape(courses=40, around=24, opening=0.1)),
             "dome: a brick in course 34 would be .* mm long and .* mm high; give fewer around",
+        ),
+        (lambda: WallShape(columns=1, courses=1, corbel=0.1), "wall: corbel is 0.1 m, a brick's"),
+        (lambda: ArchForm(span=0.0, rise=1.0), "arch: span is 0.0; give a positive number of m"),
+        (lambda: ArchForm(span=2.0, rise=1.0, curve="x"), "arch: curve is 'x'; give one of circ"),
+        (lambda: ArchForm(span=2.0, rise=1.0, pattern="VX"), "arch: pattern is 'VX'; give letters"),
+        (lambda: ArchForm(span=2.0, rise=1.0, bricks=1), "arch: bricks is 1; give a whole number"),
+        (
+            lambda: arch(ArchForm(span=2.0, rise=1.2)),
+            "arch: rise is 1.2 m; a circular arch rises at most half of its span, 1: give less",
+        ),
+        (
+            lambda: arch(ArchForm(span=2.0, rise=1.0, curve="pointed")),
+            "arch: rise is 1 m; a pointed arch rises more than half of its span, 1: give more",
+        ),
+        (
+            lambda: arch(ArchForm(span=2.0, rise=0.7, bricks=40)),
+            "arch: 40 bricks are longer than its curve; give fewer than 40",
+        ),
+        (
+            lambda: arch(ArchForm(span=2.0, rise=0.7, bricks=5)),
+            "arch: joints between 5 bricks would be wider than 30 mm; give more than 5",
+        ),
+        (
+            lambda: arch(ArchForm(span=1.0, rise=0.5, bricks=7, dimensions=(0.2, 0.1, 0.15))),
+            "arch of 7: bricks . and . interpenetrate by .* mm; give another number of bricks",
         ),
         (lambda: VaultShape(bricks=0), "vault: bricks is 0; give a whole number from 1"),
         (lambda: VaultShape(bricks=30, skew=math.inf), "vault: skew is inf; give a finite number"),

@@ -1,0 +1,264 @@
+"""The proof of an optimum from some of the pairs: those that could still be better.
+
+Where all pairs of candidates are too many to be looked at, most need not be. The search begins with
+the choices that are made move by move, which tell what can be had. A pair that was not looked at
+counts as if it cost next to nothing; while that makes a choice look better than the best one known,
+the pairs that promise most are looked at, some of every move at once. When none is left, the best
+choice known is proven; whoever ends the search before has a bound.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections import Counter
+from collections.abc import Sequence
+from contextlib import closing
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from seqopt.arrays import Floats, Ints
+from seqopt.errors import InfeasibleError, ProblemError, SolverError
+from seqopt.interrupts import answered
+from seqopt.placement.criteria import WeightedSum, WorstRatio
+from seqopt.placement.floors import floor_of
+from seqopt.placement.formulation import End, Formulation, FormulationKind, Selection
+from seqopt.placement.interface import Aim, CostProblem
+from seqopt.placement.joining import Joined
+from seqopt.placement.partial_costs import PartialCosts
+from seqopt.placement.problem import Problem
+from seqopt.placement.selecting import select
+from seqopt.placement.watch import Watch
+from seqopt.placement.window_search import WindowSearch, search_windows
+from seqopt.placement.windows import pairs_as_moves, possible_after, window
+from seqopt.responses.resources import Resources
+from seqopt.sequence.schedule import Schedule
+
+FIRST = 2  # rows of every move that are asked for at first
+MORE = 1.5  # by which that grows from one round to the next
+BROAD = 1  # round after which a search for the least peak looks where its way ends alone
+AT_END = 8  # rows there, for every one of a move
+EQUAL = 1e-9  # of a value: two that differ by less are one, found in another order
+
+
+@dataclass(frozen=True)
+class PairSearch:
+    """What a search among pairs found.
+
+    Attributes
+    ----------
+    costs : PartialCosts
+        All that it looked at.
+    selection : Selection
+        The best choice of which all pairs are known; its trace tells how choice and bound met.
+    along : WindowSearch
+        The steps that the choice meets, move by move, to be solved anew.
+    models : int
+        How many models were solved.
+    """
+
+    costs: PartialCosts
+    selection: Selection
+    along: WindowSearch
+    models: int
+
+    @property
+    def objective(self) -> float:
+        """What the steps cost that the choice meets."""
+        aim, choice = self.costs.aim, self.selection.choice
+        parts = [
+            aim.costs(problem).single for problem in (self.along.alone, *self.along.shared[1:])
+        ]
+        met = [own[now] for own, now in zip(parts[0], choice, strict=True)]
+        met += [row[now] for (row,), now in zip(parts[1:], choice[1:], strict=True)]
+        return float(sum(met) if aim is Aim.SUM else max(met))
+
+
+def search_pairs(problem: Problem, formulation: Formulation, watch: Watch) -> PairSearch:
+    """Solve a problem exactly, looking only at pairs that could be better than what is known.
+
+    Parameters
+    ----------
+    problem : Problem
+        Its own responses are not computed.
+    formulation : Formulation
+        Exact; it is given what is known.
+    watch : Watch
+        Says when to stop, and is told every better choice and bound.
+
+    Returns
+    -------
+    PairSearch
+
+    Raises
+    ------
+    InfeasibleError
+        If no choice is allowed.
+    ProblemError
+        If the formulation is not exact, there are budgets, or costs have no floor.
+    SolverError
+        If it is stopped before a choice is known.
+    """
+    floor = _floor(problem, formulation)
+    walk = _Pairs(problem, formulation.aim, floor)
+    with answered(watch.interrupt):
+        walk.look_until_proven(watch)
+    costs = walk.costs
+    if math.isinf(costs.best):
+        if watch.over:
+            raise SolverError("it ended before any choice was met; give it more time")
+        raise InfeasibleError("no choice is allowed; relax a limit or widen a reach")
+    selection = _best_known(costs, formulation, watch)
+    return PairSearch(costs, selection, walk.along(selection.choice), walk.models)
+
+
+def _best_known(costs: PartialCosts, formulation: Formulation, watch: Watch) -> Selection:
+    """Return what the formulation makes of the pairs that are known."""
+    known, candidates = costs.known()
+    found = select(formulation, CostProblem(known))
+    choice = tuple(left[index] for left, index in zip(candidates, found.choice, strict=True))
+    end = End.DONE
+    if not _proven(costs):
+        end = End.INTERRUPTED if watch.interrupted else End.STOPPED
+    watch.tell(found.objective, costs.bound)
+    return replace(
+        found,
+        choice=choice,
+        bound=min(found.objective, costs.bound),
+        end=end,
+        trace=watch.trace,
+    )
+
+
+def _proven(costs: PartialCosts) -> bool:
+    return costs.best - costs.bound <= EQUAL * max(abs(costs.best), abs(costs.bound))
+
+
+def _floor(problem: Problem, formulation: Formulation) -> float:
+    """Return what any pair costs at least; raise an error where that is not known."""
+    if formulation.kind is not FormulationKind.EXACT:
+        raise ProblemError(f"{formulation.name}: the lazy search proves; give an exact formulation")
+    if problem.budgets:
+        raise ProblemError("the lazy search takes no budgets; leave them out, or solve all pairs")
+    criterion = problem.criterion
+    floor = floor_of(criterion)
+    if floor is None:
+        raise ProblemError(
+            f"criterion {criterion.name}: nothing is known of a pair before all are solved; rank "
+            "given the choice before, take sums of responses, or state the least cost"
+        )
+    return floor
+
+
+class _Pairs:
+    """A search on its way: the costs that are known."""
+
+    def __init__(self, problem: Problem, aim: Aim, floor: float) -> None:
+        self._problem, self._schedule, self._aim = problem, problem.schedule, aim
+        self._each = isinstance(problem.criterion, WeightedSum | WorstRatio)  # pair by pair
+        first = search_windows(problem)
+        self._alone = first.alone
+        sizes = [len(move.candidates) for move in self._schedule.moves]
+        free = [(k - 1, k) not in self._schedule.steps_of for k in range(len(sizes))]
+        rows: list[dict[int, Floats]] = [{}]
+        for k in range(1, len(sizes)):
+            whole = {before: np.zeros(sizes[k]) for before in range(sizes[k - 1])}
+            before = first.choice[k - 1]
+            met = {before: self._allowed(k, before, _own(first.shared[k], aim)[0])}
+            rows.append(whole if free[k] else met)
+        self.costs = PartialCosts(_own(first.alone, aim), tuple(rows), floor, aim)
+        self.models = sum(part.evaluation.models for part in (first.alone, *first.shared))
+
+    def look_until_proven(self, watch: Watch) -> None:
+        """Look at more and more pairs until none could be better, or time is over."""
+        watch.tell(self.costs.best, self.costs.bound)
+        for count in itertools.count():
+            most = math.ceil(FIRST * MORE**count)
+            if _proven(self.costs) or watch.over:
+                return
+            ends = self._aim is Aim.PEAK and count >= BROAD
+            asked = self._where_it_ends(AT_END * most) if ends else self._everywhere(most)
+            if not asked:
+                return
+            self._look(asked, watch)
+            watch.tell(self.costs.best, self.costs.bound)
+
+    def _everywhere(self, most: int) -> list[tuple[int, int]]:
+        """Return the rows of every move that promise most."""
+        out = []
+        for k in range(1, len(self._schedule.moves)):
+            promise = self.costs.promise(k)
+            order = np.lexsort((self.costs.reached[k - 1], promise))[:most]
+            out += [(k, int(i)) for i in order if promise[i] < self.costs.best]
+        return out
+
+    def _where_it_ends(self, most: int) -> list[tuple[int, int]]:
+        """Return rows of the candidates that known pairs lead to below the best, the last first.
+
+        If all such rows are known, no choice has a lower peak than the best.
+        """
+        out: list[tuple[int, int]] = []
+        for k in range(len(self._schedule.moves) - 1, 0, -1):
+            promise = self.costs.promise(k)
+            below = (self.costs.arrived[k - 1] < self.costs.best) & (promise < self.costs.best)
+            order = np.argsort(promise, kind="stable")
+            out += [(k, int(i)) for i in order if below[i]][: most - len(out)]
+        return out
+
+    def _look(self, asked: Sequence[tuple[int, int]], watch: Watch) -> None:
+        """Solve rows of pairs, and learn from those that were done before time was over."""
+        wanted = [self._wanted(k, before) for k, before in asked]
+        schedule = pairs_as_moves(self._schedule, asked, wanted)
+        problem = _of(self._problem, schedule)
+        joined = Joined([len(move.candidates) for move in schedule.moves], self.costs.join)
+        left = Counter(step.moves[0] for step in schedule.steps)
+        with closing(problem.evaluation.levels()) as levels:
+            for steps in levels:
+                for choices in steps:
+                    joined.add(choices.moves, problem.step_costs(choices))
+                    left[choices.moves[0]] -= 1
+                    self.models += len(schedule.moves[choices.moves[0]].candidates)
+                if watch.over:
+                    break
+        rows = [dict(row) for row in self.costs.rows]
+        for n, ((k, before), some) in enumerate(zip(asked, wanted, strict=True)):
+            if not left[n]:
+                row = np.full(len(self._schedule.moves[k].candidates), np.nan)
+                row[some] = joined.single(n)
+                rows[k][before] = self._allowed(k, before, row)
+        self.costs = replace(self.costs, rows=tuple(rows))
+
+    def _allowed(self, move: int, before: int, row: Floats) -> Floats:
+        """Return a row of pairs, infinite where both would be one node."""
+        return np.where(possible_after(self._schedule, move, before), row, np.inf)
+
+    def _wanted(self, move: int, before: int) -> Ints:
+        """Return the candidates of a move that are looked at after one of the move before."""
+        possible = possible_after(self._schedule, move, before)
+        if self._each:
+            return np.flatnonzero(possible & self.costs.worth_a_look(move, before))
+        return np.arange(len(possible))  # what one costs depends on the others
+
+    def along(self, choice: tuple[int, ...]) -> WindowSearch:
+        """Return the steps that a choice meets, as a search move by move would have."""
+        few = self._problem.evaluation.resources.alone()
+        nodes = self._problem.nodes(choice)
+        shared = []
+        for k in range(len(choice)):
+            steps = window(self._schedule, k, nodes[:k])
+            shared.append(_of(self._problem, steps, few))
+        return WindowSearch(self._alone, tuple(shared), choice)
+
+
+def _own(problem: Problem, aim: Aim) -> tuple[Floats, ...]:
+    """Return the costs of each move's candidates where it alone is open."""
+    return aim.costs(problem).single
+
+
+def _of(problem: Problem, schedule: Schedule, resources: Resources | None = None) -> Problem:
+    """Return the problem of another schedule, everything else being the same."""
+    evaluation = replace(problem.evaluation, schedule=schedule)
+    if resources is not None:
+        evaluation = replace(evaluation, resources=resources)
+    return replace(problem, evaluation=evaluation)

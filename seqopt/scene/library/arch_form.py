@@ -1,0 +1,223 @@
+"""Arches by span and rise: circular, catenary or pointed, of any brick, with level supports."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from seqopt.arrays import Floats, Vector
+from seqopt.errors import SceneError
+from seqopt.scene.arch import LETTERS, ArchShape, arch_scene
+from seqopt.scene.boxes import require_apart
+from seqopt.scene.checks import positive, short, vector
+from seqopt.scene.library.arch_curve import CURVES, Line, chords
+from seqopt.scene.library.law import MASONRY, JointLaw
+from seqopt.scene.library.laying import joint_width, whole_number
+from seqopt.scene.parts import THICKEST, Robot
+from seqopt.scene.scene import Scene
+
+REMEDY = "give another number of bricks, or shorter or thinner ones"
+TRIED = 8  # numbers of bricks, where none is given
+
+
+@dataclass(frozen=True, kw_only=True)
+class ArchForm:
+    """The numbers that shape an arch; lengths in m.
+
+    The joints lie on the curve, the first and the last at its springings, which are level. They are
+    as wide as it takes for the bricks to fill the curve.
+
+    Parameters
+    ----------
+    span, rise : float
+        Between the springings, and from there to the crown.
+    curve : str
+        ``circular``, ``catenary`` or ``pointed``.
+    bricks : int, optional
+        By default as many as make the joints most nearly as wide as ``gap``.
+    pattern : str
+        A letter per brick, repeated: ``V`` lies along the arch, ``L`` and ``R`` lie across it and
+        stick out to the left and to the right.
+    dimensions : Vector
+        Length, width and thickness of a brick.
+    gap : float
+        How wide joints are to be where the number of bricks is not given.
+    density : float
+        kg/m³.
+    law : JointLaw
+        How stiff joints are.
+
+    Raises
+    ------
+    SceneError
+        Naming the number that cannot be.
+
+    Examples
+    --------
+    >>> ArchForm(span=2.0, rise=0.7).curve
+    'circular'
+    """
+
+    span: float
+    rise: float
+    curve: str = "circular"
+    bricks: int | None = None
+    pattern: str = "V"
+    dimensions: Vector = (0.2, 0.1, 0.06)
+    gap: float = 0.01
+    density: float = 2000.0
+    law: JointLaw = MASONRY
+
+    def __post_init__(self) -> None:
+        for name in ("span", "rise", "density"):
+            unit = "kg/m³" if name == "density" else "m"
+            _set(self, name, positive(f"arch: {name}", getattr(self, name), unit))
+        if self.curve not in CURVES:
+            raise SceneError(f"arch: curve is {short(self.curve)}; give one of {', '.join(CURVES)}")
+        if self.bricks is not None:
+            _set(self, "bricks", whole_number("arch: bricks", self.bricks, 2))
+        if not isinstance(self.pattern, str) or not self.pattern or {*self.pattern} - {*LETTERS}:
+            raise SceneError(
+                f"arch: pattern is {short(self.pattern)}; give letters of {', '.join(LETTERS)}"
+            )
+        _set(self, "dimensions", vector("arch: dimensions", self.dimensions))
+        for length in self.dimensions:
+            positive("arch: dimensions", length, "m")
+        _set(self, "gap", joint_width("arch: gap", self.gap))
+
+    @property
+    def line(self) -> Line:
+        """The curve."""
+        return CURVES[self.curve](self.span, self.rise)
+
+    def lengths(self, bricks: int) -> Floats:
+        """Return how much of the arch each brick covers, without joints.
+
+        Parameters
+        ----------
+        bricks : int
+
+        Returns
+        -------
+        (n,) float
+            m.
+        """
+        along, across, _ = self.dimensions
+        letters = (self.pattern * bricks)[:bricks]
+        return np.array([along if letter == "V" else across for letter in letters])
+
+
+def arch(form: ArchForm, name: str = "", *, robots: Sequence[Robot] | None = None) -> Scene:
+    """Return the scene of an arch that is built from one springing to the other.
+
+    It stands on both, at z = 0, and runs towards +x in the plane y = 0.
+
+    Parameters
+    ----------
+    form : ArchForm
+    name : str, optional
+        By default the curve, the span and the rise.
+    robots : sequence of Robot, optional
+        By default two beside the arch and a mobile one; each can bear the whole weight.
+
+    Returns
+    -------
+    Scene
+
+    Raises
+    ------
+    SceneError
+        If the bricks do not fill the curve, or interpenetrate.
+
+    Examples
+    --------
+    >>> arch(ArchForm(span=2.0, rise=0.7, bricks=12))
+    <Scene circular arch 2 x 0.7: 12 bricks, 11 joints, 2 ground ends, 3 robots>
+    """
+    refused: SceneError | None = None
+    for count in [form.bricks] if form.bricks else _counts(form)[:TRIED]:
+        try:
+            return _arch(form, count, name, robots)
+        except SceneError as error:
+            refused = refused or error
+    raise refused or SceneError("arch: no number of bricks fills its curve; give one")
+
+
+def _arch(form: ArchForm, count: int, name: str, robots: Sequence[Robot] | None) -> Scene:
+    """Return the scene of so many bricks."""
+    gap, points = _laid(form, form.line, count)
+    step = np.diff(points, axis=0)
+    length, width, thickness = form.dimensions
+    area = width * thickness
+    moments = (area * thickness**2 / 12, area * width**2 / 12)
+    shift, turn = form.law.stiffness(area, moments)
+    shape = ArchShape(
+        pitch=np.arctan2(step[:, 1], step[:, 0]).tolist(),
+        pattern=form.pattern,
+        gap=gap,
+        overhang=0.25 * length,  # an inner node of a brick across lies on the line
+        stub=0.5 * length,
+        translational_stiffness=shift,
+        rotational_stiffness=turn,
+        dimensions=form.dimensions,
+        density=form.density,
+    )
+    scene = arch_scene(
+        shape,
+        name or f"{form.curve} arch {form.span:g} x {form.rise:g}",
+        robots=robots,
+        provenance="Generated by seqopt.scene.library.arch_form.",
+    )
+    require_apart(f"arch of {count}", scene.bricks, REMEDY)
+    return scene
+
+
+def _counts(form: ArchForm) -> list[int]:
+    """Return numbers of bricks, first those whose joints are most nearly as wide as asked for."""
+    points = np.array([form.line(at) for at in np.linspace(0, 1, 2001)])
+    way = float(np.hypot(*np.diff(points, axis=0).T).sum())
+    most = math.ceil(2 * way / (form.lengths(len(form.pattern)) + form.gap).min()) + 2
+    over = np.cumsum(form.lengths(most) + form.gap) - way
+    off = np.abs(over) / np.arange(1, most + 1)  # what each joint is wider, or narrower
+    return [int(count) + 2 for count in np.argsort(off[1:], kind="stable")]
+
+
+def _laid(form: ArchForm, line: Line, count: int) -> tuple[float, Floats]:
+    """Return the width of the joints, and the points (n + 1, 2) between bricks that fill a curve.
+
+    The first brick begins at a springing and the last one ends at the other, half a joint behind
+    and before.
+    """
+    from scipy.optimize import brentq  # noqa: PLC0415  # slow to import, for arches only
+
+    lengths = form.lengths(count)
+
+    def left(gap: float) -> float:
+        points = chords(line, lengths[:-1] + gap)
+        if points is None:
+            return -form.span
+        return math.dist(points[-1], line(1.0)) - float(lengths[-1]) - gap
+
+    widest = THICKEST * min(form.dimensions)
+    if left(0.0) < 0:
+        raise SceneError(
+            f"arch: {count} bricks are longer than its curve; give fewer than {count}, or shorter "
+            "ones"
+        )
+    if left(widest) > 0:
+        raise SceneError(
+            f"arch: joints between {count} bricks would be wider than {1e3 * widest:.3g} mm; give "
+            f"more than {count}, or longer ones"
+        )
+    gap = float(brentq(left, 0.0, widest, xtol=1e-15))
+    points = chords(line, lengths[:-1] + gap)
+    if points is None:  # by rounding alone
+        raise SceneError(f"arch: {count} bricks do not fill its curve; give another number")
+    return gap, np.vstack([points, line(1.0)])
+
+
+def _set(value: object, name: str, content: object) -> None:
+    object.__setattr__(value, name, content)

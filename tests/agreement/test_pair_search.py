@@ -1,0 +1,201 @@
+"""The proof from some of the pairs, against all pairs solved."""
+
+from __future__ import annotations
+
+import signal
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from seqopt.cli.main import main
+from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.errors import InfeasibleError, ProblemError, SolverError
+from seqopt.network.build import build_network
+from seqopt.placement.certificate import certify_partial
+from seqopt.placement.costs import LayeredCosts
+from seqopt.placement.formulation import End, Selection
+from seqopt.placement.interface import Aim, CostProblem
+from seqopt.placement.own_criterion import StepCost
+from seqopt.placement.partial_costs import PartialCosts, least_possible
+from seqopt.placement.problem import pose
+from seqopt.placement.ranks import Among, Ranked
+from seqopt.placement.requirements import Limit
+from seqopt.placement.solving import solve
+from seqopt.sequence.three_robots import three_robot_loop
+from seqopt.study.presets import EQUATIONS, WEIGHTED, WORST_RATIO
+from tests.builders import far_reaching
+from tests.strategies import arches, problems
+
+CONDITIONAL = replace(EQUATIONS, ranked=Ranked.CONDITIONAL)
+
+
+def squares(responses, bricks):
+    return 0.5 + (responses["F_largest"] / 270) ** 2 + (responses["T_max"] / 87.7) ** 2
+
+
+OWN = StepCost("squares", ("F_largest", "T_max"), squares, least=0.5)
+
+
+def posed(engine, criterion, limits=()):
+    return pose(engine, three_robot_loop(engine.network), criterion, limits)
+
+
+@pytest.mark.parametrize("name", ["overlap_dp", "minimax", "overlap_mip"])
+@pytest.mark.parametrize(
+    "criterion", [CONDITIONAL, WEIGHTED, WORST_RATIO, OWN], ids=lambda c: c.name
+)
+def test_the_optimum_is_that_of_all_pairs(engine25, name, criterion):
+    problem = posed(engine25, criterion)
+    lazy, whole = solve(posed(engine25, criterion), name, lazy=True), solve(problem, name)
+    assert lazy.certificate.objective == pytest.approx(whole.certificate.objective, rel=1e-9)
+    assert lazy.certificate.gap <= 1e-9
+    assert lazy.selection.end is End.DONE
+    value = whole.formulation.aim.worth(whole.formulation.aim.costs(problem), lazy.selection.choice)
+    assert value == pytest.approx(lazy.certificate.objective, rel=1e-12)
+    assert lazy.models < whole.models
+    assert lazy.summary()["status"] == "optimal"
+    assert len(lazy.table()) == len(whole.table())
+    assert set(lazy.alternatives()["step"]) == set(whole.alternatives()["step"])
+
+
+@pytest.mark.parametrize("name", ["overlap_dp", pytest.param("minimax", marks=pytest.mark.slow)])
+@given(scene=arches(min_bricks=4, max_bricks=7).map(far_reaching), data=st.data())
+def test_on_any_chain(name, scene, data):
+    engine = ComplianceEngine(build_network(scene))
+    criterion = data.draw(st.sampled_from([CONDITIONAL, WEIGHTED, OWN]))
+    lazy = solve(posed(engine, criterion), name, lazy=True)
+    whole = solve(posed(engine, criterion), name)
+    assert lazy.certificate.objective == pytest.approx(whole.certificate.objective, rel=1e-9)
+    assert lazy.certificate.gap <= 1e-9
+
+
+def test_under_a_limit(engine25):
+    limits = [Limit("F_largest", 300.0)]
+    lazy = solve(posed(engine25, WEIGHTED, limits), "overlap_dp", lazy=True)
+    whole = solve(posed(engine25, WEIGHTED, limits), "overlap_dp")
+    free = solve(posed(engine25, WEIGHTED), "overlap_dp")
+    assert lazy.certificate.objective == pytest.approx(whole.certificate.objective, rel=1e-9)
+    assert lazy.certificate.objective > free.certificate.objective * (1 + 1e-6)
+    with pytest.raises((InfeasibleError, SolverError)):
+        solve(posed(engine25, WEIGHTED, [Limit("F_largest", 1.0)]), "overlap_dp", lazy=True)
+
+
+@pytest.mark.parametrize("name", ["overlap_dp", "minimax"])
+def test_stopped_before_it_has_a_choice_and_a_bound(engine25, name):
+    stopped = solve(posed(engine25, WEIGHTED), name, lazy=True, time_limit=0)
+    best = solve(posed(engine25, WEIGHTED), name).certificate.objective
+    found = stopped.certificate
+    assert stopped.selection.end is End.STOPPED
+    assert found.bound <= best < found.objective
+    assert found.gap == pytest.approx((found.objective - found.bound) / found.objective)
+    assert stopped.summary()["status"] == "feasible"
+
+
+def test_an_interrupt_leaves_a_choice_and_a_bound(engine25):
+    def interrupt(_):
+        if not came:
+            came.append(1)
+            signal.raise_signal(signal.SIGINT)
+
+    came: list[int] = []
+    found = solve(posed(engine25, WEIGHTED), "overlap_dp", lazy=True, progress=interrupt)
+    assert found.selection.end is End.INTERRUPTED
+    assert 0 < found.certificate.bound < found.certificate.objective
+
+
+def test_bound_and_choice_meet_from_both_sides(engine25):
+    trace = solve(posed(engine25, WEIGHTED), "overlap_dp", lazy=True).selection.trace
+    assert len(trace) > 2
+    assert all(a.bound <= b.bound and a.objective >= b.objective for a, b in pairwise(trace))
+
+
+@given(problem=problems(), data=st.data(), aim=st.sampled_from(Aim))
+def test_what_some_pairs_prove(problem, data, aim):
+    """Whatever pairs are known, bound and best enclose the optimum; with all they meet."""
+    sums = problem.sums
+    lift = -min(
+        0.0, *(float(a[np.isfinite(a)].min(initial=0.0)) for a in (*sums.single, *sums.shared))
+    )
+    costs = LayeredCosts(
+        tuple(single + lift for single in sums.single),
+        (np.zeros((1, sums.sizes[0])), *(shared + lift for shared in sums.shared[1:])),
+    )
+    whole = [dict(enumerate(shared)) if k else {} for k, shared in enumerate(costs.shared)]
+    seen = [
+        {
+            before: np.where(
+                data.draw(st.lists(st.booleans(), min_size=len(r), max_size=len(r))), r, np.nan
+            )
+            for before, r in rows.items()
+            if data.draw(st.booleans())
+        }
+        for rows in whole
+    ]
+    everything = PartialCosts(costs.single, tuple(whole), 0.0, aim)
+    best = everything.best
+    close = {"rel": 1e-9, "abs": 1e-9}
+    assert everything.bound == pytest.approx(best, **close)
+    part = PartialCosts(costs.single, tuple(seen), 0.0, aim)
+    assert part.bound <= best + 1e-9 * abs(best) or np.isinf(best)
+    assert part.best >= best - 1e-9 * abs(best) or np.isinf(part.best)
+    assert least_possible(part) == pytest.approx(part.bound, **close)
+    if np.isfinite(best):
+        plan = solve(CostProblem(costs), "overlap_dp" if aim is Aim.SUM else "minimax")
+        assert plan.certificate.objective == pytest.approx(best, **close)
+
+
+def test_a_claim_that_is_not_proven_is_refused(engine25):
+    row = np.array([3.0, np.nan])
+    part = PartialCosts((np.zeros(2), np.ones(2)), ({}, {0: row}), 1.0, Aim.SUM)
+    assert (part.bound, part.best) == (2.0, 4.0)
+    good = Selection((0, 0), 4.0, bound=2.0, end=End.STOPPED)
+    assert certify_partial(part, good, 4.0).gap == 0.5
+    for wrong in (
+        replace(good, bound=3.0),
+        replace(good, objective=3.0),
+        replace(good, end=End.DONE),
+        replace(good, bound=np.nan),
+    ):
+        with pytest.raises(SolverError):
+            certify_partial(part, wrong, 4.0)
+
+
+def test_a_criterion_that_lies_about_its_least_cost_is_refused(engine25):
+    with pytest.raises(ProblemError, match=r"below its least, 50; state a lower one"):
+        solve(posed(engine25, replace(OWN, least=50.0)), "overlap_dp", lazy=True)
+    with pytest.raises(ProblemError, match=r"least is -1; give a number from 0"):
+        replace(OWN, least=-1)
+
+
+@pytest.mark.parametrize(
+    ("criterion", "name", "options", "said"),
+    [
+        (EQUATIONS, "overlap_dp", {}, "nothing is known of a pair before all are solved"),
+        (replace(CONDITIONAL, among=Among.POSSIBLE), "overlap_dp", {}, "nothing is known"),
+        (replace(OWN, least=None), "overlap_dp", {}, "state the least cost"),
+        (WEIGHTED, "cascade", {}, "give an exact formulation"),
+        (WEIGHTED, "overlap_dp", {"proof": False}, "a lazy search proves"),
+    ],
+)
+def test_what_cannot_be_searched_lazily_is_refused(engine25, criterion, name, options, said):
+    with pytest.raises(ProblemError, match=said):
+        solve(posed(engine25, criterion), name, lazy=True, **options)
+
+
+def test_costs_that_are_given_and_free_schedules_have_nothing_to_save():
+    costs = CostProblem(LayeredCosts((np.ones(2),), (np.zeros((1, 2)),)))
+    with pytest.raises(ProblemError, match="nothing is saved"):
+        solve(costs, "overlap_dp", lazy=True)
+
+
+def test_from_the_command_line(capsys, tmp_path):
+    words = ["optimize", "--formulation", "minimax", "--criteria", "worst-ratio", "--lazy"]
+    assert main([*words, "--out", str(tmp_path / "out")]) == 0
+    assert "gap 0 %" in capsys.readouterr().out
+    assert main([*words[:3], "--lazy", "--out", str(tmp_path / "no")]) == 2
+    assert "rank given the choice before" in capsys.readouterr().err
+    assert not (tmp_path / "no").exists()

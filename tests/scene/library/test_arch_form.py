@@ -1,0 +1,178 @@
+"""Arches by span and rise and the tested vaults, against their closed forms; scenes in words."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, reject
+from hypothesis import strategies as st
+
+from seqopt.cli.main import main
+from seqopt.errors import SceneError
+from seqopt.scene.library import (
+    ArchForm,
+    DomeShape,
+    WallShape,
+    arch,
+    barrel_vault,
+    chain,
+    dome,
+    wall,
+)
+from seqopt.scene.library.by_words import KINDS, scene_by_words
+from seqopt.scene.scene_file import dump_scene, load_scene, parse_scene
+
+
+def off_circle(x, z, span, rise):
+    radius = (span**2 / 4 + rise**2) / (2 * rise)
+    return np.hypot(x - span / 2, z - (rise - radius)) - radius
+
+
+def off_catenary(x, z, span, rise):
+    """With the scale a found from the points themselves: cosh((x - c) / a) = 1 + (rise - z) / a."""
+    low, high = 1e-3 * span, 1e3 * span
+    for _ in range(200):  # bisection on the springing
+        a = math.sqrt(low * high)
+        low, high = (a, high) if a * (math.cosh(span / (2 * a)) - 1) > rise else (low, a)
+    return z - (rise - a * (np.cosh((x - span / 2) / a) - 1))
+
+
+def off_pointed(x, z, span, rise):
+    radius = (span**2 / 4 + rise**2) / span
+    near = np.minimum(x, span - x)
+    return np.hypot(near - radius, z) - radius
+
+
+OFF = {"circular": off_circle, "catenary": off_catenary, "pointed": off_pointed}
+
+
+@given(
+    span=st.floats(0.8, 6.0),
+    share=st.floats(0.1, 1.0),
+    curve=st.sampled_from([*OFF]),
+    pattern=st.sampled_from(["V", "VL", "VLR"]),
+)
+def test_joints_lie_on_the_curve_and_supports_are_level_at_the_span(span, share, curve, pattern):
+    low, high = (0.52, 1.1) if curve == "pointed" else (0.12, 0.5)
+    form = ArchForm(
+        span=span, rise=span * (low + share * (high - low)), curve=curve, pattern=pattern
+    )
+    try:
+        scene = arch(form)
+    except SceneError:  # bricks that do not fit this curve
+        reject()
+    first, last = (np.array(ground.position) for ground in scene.grounds)
+    assert first == pytest.approx(0, abs=1e-12)
+    assert last == pytest.approx([span, 0, 0], abs=1e-9 * span)
+    x, y, z = np.array([joint.position for joint in scene.joints]).T
+    assert y == pytest.approx(0, abs=1e-12)
+    assert OFF[curve](x, z, span, form.rise) == pytest.approx(0, abs=1e-9 * span)
+    assert not np.allclose(OFF[curve](x, z + 1e-3 * span, span, form.rise), 0, atol=1e-5 * span)
+    assert len({joint.thickness for joint in scene.joints}) == 1
+
+
+def test_the_number_of_bricks_is_that_whose_joints_are_as_wide_as_asked():
+    forms = [ArchForm(span=6.0, rise=2.0, gap=gap) for gap in (0.006, 0.015, 0.025)]
+    counts = [len(arch(form).bricks) for form in forms]
+    assert counts[0] > counts[1] > counts[2]
+    assert len(arch(ArchForm(span=3.0, rise=1.0, bricks=17)).bricks) == 17
+
+
+@pytest.mark.parametrize(
+    ("test", "span", "rise", "bricks", "mass"),
+    [
+        (1, 2.18, 1.09, 46, 2000 * 1.69),
+        (2, 1.6, 0.8, 31, 2100 * 1.0),
+        (5, 5.45, 1.47, 81, 2400 * 3.01),
+    ],
+)
+def test_a_tested_vault_has_the_printed_inner_face(test, span, rise, bricks, mass):
+    """Table of experiments of Bruun et al.: L, r (the rise), bricks, density times width."""
+    scene = barrel_vault(test)
+    assert len(scene.bricks) == bricks
+    inner = []
+    for brick in (scene.bricks[0], scene.bricks[bricks // 2], scene.bricks[-1]):
+        length, _, thickness = brick.dimensions
+        along = np.array(brick.length_axis)
+        outward = np.cross(along, brick.width_axis)
+        for side in (-0.5, 0.5):
+            inner.append(
+                np.array(brick.position) + side * length * along - 0.5 * thickness * outward
+            )
+    ends = inner[0], inner[-1]
+    assert ends[1][0] - ends[0][0] == pytest.approx(span, rel=0.02)
+    assert max(point[2] for point in inner) - ends[0][2] == pytest.approx(rise, rel=0.02)
+    radius = (span**2 / 4 + rise**2) / (2 * rise)
+    ring = (math.pi if rise == span / 2 else 4 * math.atan(2 * rise / span)) * thickness * radius
+    assert sum(brick.mass for brick in scene.bricks) == pytest.approx(mass * ring, rel=0.05)
+
+
+def test_a_corbelled_wall_steps_out_and_shares_less_face():
+    shape = WallShape(columns=3, courses=4)
+    upright, out = wall(shape), wall(replace(shape, corbel=0.025))
+    assert [b.position[1] for b in out.placed[::3]] == pytest.approx([0, 0.025, 0.05, 0.075])
+    beds = [
+        (one.translational_stiffness[0], other.translational_stiffness[0])
+        for one, other in zip(upright.joints, out.joints, strict=True)
+        if abs(one.along[2]) > 0.5
+    ]
+    assert beds
+    for straight, corbelled in beds:
+        assert corbelled == pytest.approx(0.75 * straight)  # of a width of 0.1 m
+
+
+@pytest.mark.parametrize(
+    ("words", "made"),
+    [
+        ("arch:span=2,rise=0.7,bricks=12", lambda: arch(ArchForm(span=2, rise=0.7, bricks=12))),
+        (
+            "arch:span=2,rise=1.2,curve=pointed,dimensions=0.24x0.11x0.05",
+            lambda: arch(
+                ArchForm(span=2, rise=1.2, curve="pointed", dimensions=(0.24, 0.11, 0.05))
+            ),
+        ),
+        ("barrel:test=3", lambda: barrel_vault(3)),
+        ("chain:bricks=30,pattern=V", lambda: chain(30, pattern="V")),
+        ("dome:courses=4,around=12", lambda: dome(DomeShape(courses=4, around=12))),
+        ("wall:columns=4,courses=3", lambda: wall(WallShape(columns=4, courses=3))),
+    ],
+)
+def test_scenes_in_words_are_those_of_the_library(words, made):
+    scene = load_scene(words)
+    assert replace(scene, provenance="") == replace(made(), provenance="")
+    assert scene.provenance.endswith(f"In words: {words}.")
+    assert parse_scene(dump_scene(scene)) == scene
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("tower:a=1", "'tower' is no kind; give one of arch, barrel, chain, dome, wall"),
+        ("arch:spn=2", "'spn' is none of its numbers; 'span' is meant?"),
+        ("arch:span=2,span=2", "'span' is given twice; give span, rise"),
+        ("arch:span=x", "span is 'x'; give it as 0.5"),
+        ("arch:span=2,rise=1,dimensions=1x2", "dimensions is '1x2'; give it as 0.2x0.1x0.06"),
+        ("wall:columns=2.5", "columns is '2.5'; give it as 12"),
+        ("wall:columns=4", "courses is missing; a wall in running bond"),
+        ("barrel:test=9", "barrel vault: test is 9; give 1 to 8"),
+    ],
+)
+def test_words_that_make_no_scene(words, said):
+    with pytest.raises(SceneError) as caught:
+        scene_by_words(words)
+    assert said in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_words_on_the_command_line(capsys, tmp_path):
+    words = "wall:columns=3,courses=2"
+    assert main(["scene", words, "--export", str(tmp_path / "wall.json")]) == 0
+    assert load_scene(tmp_path / "wall.json") == load_scene(words)
+    assert main(["scene", "arch:span=2"]) == 2
+    assert "rise is missing" in capsys.readouterr().err
+    assert main(["scene", "--list"]) == 0
+    out = capsys.readouterr().out
+    assert all(kind.about in out for kind in KINDS.values())
