@@ -26,6 +26,7 @@ import hashlib
 import io
 import json
 import tempfile
+import warnings
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
@@ -41,6 +42,7 @@ from formulations.limit_analysis import compile_equilibrium
 from seqopt.cli.main import main
 from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import EPOXY
+from seqopt.errors import SceneWarning
 from seqopt.network.build import build_network
 from seqopt.scene.imports.formats import read_content, sniffed
 from seqopt.scene.scene import Scene
@@ -75,7 +77,7 @@ def row_of(outside: Outside, path: Path, folder: Path) -> dict[str, object]:
     if status:
         said = said.replace(str(path), path.name)
         return row | {"outcome": LACKS if not scene_file.exists() else "half", "said": said}
-    scene = load_scene(scene_file)
+    scene = _loaded(scene_file)
     row |= {
         "format": _format(path),
         "bricks": len(scene.bricks),
@@ -86,7 +88,9 @@ def row_of(outside: Outside, path: Path, folder: Path) -> dict[str, object]:
     if status:
         return row | {"outcome": "no plan", "said": said}
     summary = json.loads((plan / "summary.json").read_text(encoding="utf-8"))
-    again, steps = read_folder(plan)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SceneWarning)
+        again, steps = read_folder(plan)
     exported = [
         run("export", str(plan), "--format", form, "--out", str(folder / form))[0]
         for form in EXPORTS
@@ -97,6 +101,13 @@ def row_of(outside: Outside, path: Path, folder: Path) -> dict[str, object]:
         "steps": len(steps),
         **verdicts(again, steps),
     }
+
+
+def _loaded(path: Path) -> Scene:
+    """Return a scene; what seems odd in it has been said when it was imported."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SceneWarning)
+        return load_scene(path)
 
 
 def _format(path: Path) -> str:
@@ -123,7 +134,7 @@ def found_again(outside: Outside, path: Path, scene: Scene, folder: Path) -> flo
         return 0.0
     stiff = [
         sum(spring.translational_stiffness[0] for spring in (*held.joints, *held.grounds))
-        for held in (load_scene(other), scene)
+        for held in (_loaded(other), scene)
     ]
     return stiff[0] / stiff[1]
 

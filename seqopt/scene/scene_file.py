@@ -13,14 +13,13 @@ from typing import Any
 
 from seqopt.errors import SceneError, SceneWarning
 from seqopt.files import read_text, write_text
-from seqopt.scene.checks import short
 from seqopt.scene.doubts import doubts
 from seqopt.scene.library.builtin import ABOUT, GENERATED
 from seqopt.scene.library.by_words import KINDS, scene_by_words
 from seqopt.scene.parts import Brick, Ground, Joint, Robot
 from seqopt.scene.reach import Anywhere, Reach, Side, Sphere
 from seqopt.scene.scene import Scene
-from seqopt.scene.shape import Polyhedron
+from seqopt.scene.shape import with_shape
 
 VERSION = 1
 UNSAID = ("thickness", "face", "shape", "node_offsets")  # left out of a file where there is none
@@ -195,7 +194,7 @@ def scene_from_dict(document: dict[str, Any]) -> Scene:
         If its parts do not fit together.
     """
     content = {key: value for key, value in document.items() if key not in ("format", "version")}
-    content["bricks"] = [Brick(**_with_shape(brick)) for brick in content["bricks"]]
+    content["bricks"] = [Brick(**with_shape(brick)) for brick in content["bricks"]]
     content["joints"] = [Joint(**joint) for joint in content["joints"]]
     content["grounds"] = [Ground(**ground) for ground in content["grounds"]]
     content["robots"] = [
@@ -272,17 +271,6 @@ def save_scene(scene: Scene, path: Path) -> None:
     True
     """
     write_text(path, dump_scene(scene))
-
-
-def _with_shape(entry: dict[str, Any]) -> dict[str, Any]:
-    """Return the entry of a brick with its shape, if it has one, as a value."""
-    shape = entry.get("shape")
-    if shape is None:
-        return entry
-    try:
-        return {**entry, "shape": Polyhedron(**shape)}
-    except SceneError as error:
-        raise SceneError(f"brick {short(entry['name'])}: {error}") from error
 
 
 def _reach(entry: dict[str, Any]) -> Reach:

@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -210,6 +211,31 @@ def bend(corners: Floats) -> float:
     if not size > 0:
         return np.inf
     return float(np.abs((corners - corners.mean(axis=0)) @ normal).max() / size)
+
+
+def with_shape(entry: dict[str, Any]) -> dict[str, Any]:
+    """Return the entry of a brick in a document with its shape, if it has one, as a value.
+
+    Parameters
+    ----------
+    entry : dict
+        With ``name`` and perhaps ``shape``.
+
+    Returns
+    -------
+    dict
+
+    Raises
+    ------
+    SceneError
+        Naming the brick, if its shape is no polyhedron.
+    """
+    if entry.get("shape") is None:
+        return entry
+    try:
+        return {**entry, "shape": Polyhedron(**entry["shape"])}
+    except SceneError as error:
+        raise SceneError(f"brick {short(entry['name'])}: {error}") from error
 
 
 def _require_corners(count: int, faces: tuple[tuple[int, ...], ...]) -> None:
