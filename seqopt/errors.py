@@ -10,10 +10,10 @@ class SeqoptError(Exception):
     --------
     >>> import seqopt
     >>> try:
-    ...     seqopt.load_scene("arch26")
+    ...     seqopt.load_scene("wall:columns=x,courses=4")
     ... except seqopt.SeqoptError as error:
     ...     print(error)
-    scene arch26: no such built-in scene or file; built in: arch25, dome163, vault338
+    scene wall:columns=x,courses=4: columns is 'x'; give it as 12
     """
 
 

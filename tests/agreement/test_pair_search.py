@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from seqopt.cli.main import main
@@ -44,9 +44,17 @@ def posed(engine, criterion, limits=()):
     return pose(engine, three_robot_loop(engine.network), criterion, limits)
 
 
-@pytest.mark.parametrize("name", ["overlap_dp", "minimax", "overlap_mip"])
+QUICK = {("overlap_dp", CONDITIONAL), ("minimax", WORST_RATIO), ("overlap_dp", OWN)}
+
+
 @pytest.mark.parametrize(
-    "criterion", [CONDITIONAL, WEIGHTED, WORST_RATIO, OWN], ids=lambda c: c.name
+    ("name", "criterion"),
+    [
+        pytest.param(name, criterion, marks=() if (name, criterion) in QUICK else pytest.mark.slow)
+        for name in ("overlap_dp", "minimax", "overlap_mip")
+        for criterion in (CONDITIONAL, WEIGHTED, WORST_RATIO, OWN)
+    ],
+    ids=lambda given: getattr(given, "name", given),
 )
 def test_the_optimum_is_that_of_all_pairs(engine25, name, criterion):
     problem = posed(engine25, criterion)
@@ -63,6 +71,7 @@ def test_the_optimum_is_that_of_all_pairs(engine25, name, criterion):
 
 
 @pytest.mark.parametrize("name", ["overlap_dp", pytest.param("minimax", marks=pytest.mark.slow)])
+@settings(max_examples=15)
 @given(scene=arches(min_bricks=4, max_bricks=7).map(far_reaching), data=st.data())
 def test_on_any_chain(name, scene, data):
     engine = ComplianceEngine(build_network(scene))

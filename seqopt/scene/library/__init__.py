@@ -15,7 +15,7 @@ An arch by its span and rise stands on level supports; a wall may be corbelled:
 
 >>> from seqopt.scene.library import ArchForm, arch
 >>> arch(ArchForm(span=2.0, rise=0.8, curve="catenary"))
-<Scene catenary arch 2 x 0.8: 13 bricks, 12 joints, 2 ground ends, 3 robots>
+<Scene catenary arch 2 x 0.8: 12 bricks, 11 joints, 2 ground ends, 3 robots>
 >>> wall(WallShape(columns=6, courses=4, corbel=0.02)).placed[-1].position[1]
 0.06
 
