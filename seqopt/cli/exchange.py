@@ -54,7 +54,7 @@ def add_import(commands: argparse._SubParsersAction) -> None:  # type: ignore[ty
     command.add_argument(
         "--gap",
         metavar="M",
-        help="most that may lie between faces that touch (default: a hundredth of the thinnest "
+        help="most that may lie between faces that touch (default: a twentieth of the thinnest "
         "block)",
     )
     command.add_argument(

@@ -20,7 +20,7 @@ from seqopt.errors import FileError, SceneError
 from seqopt.scene.checks import short
 from seqopt.scene.shape import normal_of
 
-OPPOSED = np.cos(np.radians(5.0))  # cosine from which on normals are against each other
+OPPOSED = np.cos(np.radians(15.0))  # cosine from which on normals are against each other
 LEVEL = 1 - 1e-6  # cosine from which on faces are in one plane
 MOST_PAIRS = 300_000  # of blocks that are near each other
 SLIVER = 1e-6  # overlap that is none, over the smaller of two faces

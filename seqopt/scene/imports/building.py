@@ -13,8 +13,8 @@ from seqopt.scene.checks import LARGEST_NUMBER, positive, short
 from seqopt.scene.face_joints import face_ground, face_joint
 from seqopt.scene.imports.content import MOST_CORNERS, UNITS, Content, FileJoint, Given
 from seqopt.scene.imports.ordering import upward_order
-from seqopt.scene.imports.tidying import tidy_shape
-from seqopt.scene.imports.touching import GROUND, Shape, Touching, find_touching
+from seqopt.scene.imports.tidying import Tidied, tidy_shape
+from seqopt.scene.imports.touching import GROUND, Touching, find_touching
 from seqopt.scene.library.law import MASONRY, JointLaw
 from seqopt.scene.library.laying import mobile_robots, whole_number
 from seqopt.scene.parts import Brick, Ground, Joint
@@ -51,9 +51,9 @@ def build_scene(content: Content, given: Given, source: str) -> Scene:
         _check_size(content)
         content = content.scaled(_factor(content, given, said))
         supports = _supports(content, given, said)
-        solids = _solids(content, supports, said)
-        bricks = _bricks(content, given, dict(enumerate(solids)), supports, said)
-        touching = find_touching(content, given, solids, bricks)
+        blocks = _tidied(content, supports, said)
+        bricks = _bricks(content, given, blocks, supports, said)
+        touching = find_touching(content, given, blocks, bricks)
         said += touching.said
         law = _law(content, given, touching, said)
         springs = _springs(touching, bricks, law)
@@ -115,22 +115,18 @@ def _supports(content: Content, given: Given, said: list[str]) -> set[int]:
     return {place[key] for key in keys}
 
 
-def _solids(content: Content, supports: set[int], said: list[str]) -> list[Shape]:
+def _tidied(content: Content, supports: set[int], said: list[str]) -> list[Tidied]:
     """Return the blocks as polyhedra, and say what was mended."""
-    total: Counter[str] = Counter()
-    solids = []
-    for i, block in enumerate(content.blocks):
-        solid, mended = tidy_shape(block, may_be_open=i in supports)
-        solids.append(solid)
-        total += mended
+    blocks = [tidy_shape(b, may_be_open=i in supports) for i, b in enumerate(content.blocks)]
+    total = sum((block.mended for block in blocks), Counter[str]())
     said += [f"{text}: {count}" for text, count in total.items()]
-    return solids
+    return blocks
 
 
 def _bricks(
     content: Content,
     given: Given,
-    solids: Mapping[int, Shape],
+    blocks: Sequence[Tidied],
     supports: set[int],
     said: list[str],
 ) -> dict[int, Brick]:
@@ -147,9 +143,9 @@ def _bricks(
     if silent:
         said.append(f"density of {len(silent)} blocks is {density:g} kg/m³, as given")
     return {
-        i: block_brick(numbers[i], solid, content.blocks[i].density or density or 0.0)
-        for i, solid in solids.items()
-        if i not in supports and isinstance(solid, Polyhedron)
+        i: block_brick(numbers[i], block.solid, content.blocks[i].density or density or 0.0)
+        for i, block in enumerate(blocks)
+        if i not in supports and isinstance(block.solid, Polyhedron)
     }
 
 

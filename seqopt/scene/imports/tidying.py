@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter, defaultdict
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -24,9 +25,26 @@ OPEN = "supports are surfaces that are not closed"
 TURNED = "faces are turned so that all agree which side is outside"
 
 
-def tidy_shape(
-    block: FileBlock, *, may_be_open: bool = False
-) -> tuple[Polyhedron | Surface, Counter[str]]:
+@dataclass(frozen=True)
+class Tidied:
+    """A block whose faces are in order.
+
+    Attributes
+    ----------
+    solid : Polyhedron or Surface
+        A surface where a support is not closed.
+    facets : Surface
+        Its faces as the file has them, also those that are not flat: where it touches others.
+    mended : Counter of str
+        What was done, and to how many faces or vertices.
+    """
+
+    solid: Polyhedron | Surface
+    facets: Surface
+    mended: Counter[str]
+
+
+def tidy_shape(block: FileBlock, *, may_be_open: bool = False) -> Tidied:
     """Return a block as a polyhedron, or a support that is not closed as a surface.
 
     Parameters
@@ -38,9 +56,7 @@ def tidy_shape(
 
     Returns
     -------
-    shape : Polyhedron or Surface
-    mended : Counter of str
-        What was done, and to how many faces or vertices.
+    Tidied
 
     Raises
     ------
@@ -52,19 +68,20 @@ def tidy_shape(
     size = float(np.ptp(points, axis=0).max(initial=0.0)) if len(points) else 0.0
     if _open_edges(faces):
         points, faces = _welded(points, faces, WELD * size, mended)
-    faces = _once(faces, mended)
-    faces = [part for face in faces if len(face) > 2 for part in _flat(points, face, size, mended)]
+    faces = [face for face in _once(faces, mended) if len(face) > 2]
     faces = _agreeing(points, faces, mended)
+    facets = Surface(points, tuple(face for face in faces if bend(points[list(face)]) < np.inf))
+    faces = [part for face in faces for part in _flat(points, face, size, mended)]
     used = sorted({v for face in faces for v in face})
     place = {v: i for i, v in enumerate(used)}
     try:
-        return Polyhedron(
-            as_vectors(points[used]), tuple(tuple(place[v] for v in face) for face in faces)
-        ), mended
+        named = tuple(tuple(place[v] for v in face) for face in faces)
+        return Tidied(Polyhedron(as_vectors(points[used]), named), facets, mended)
     except SceneError as error:
         if may_be_open and faces:
             mended[OPEN] += 1
-            return Surface(points, (*faces, *(face[::-1] for face in faces))), mended
+            both = Surface(points, (*facets.faces, *(face[::-1] for face in facets.faces)))
+            return Tidied(both, both, mended)
         raise SceneError(f"block {block.key}: {error}") from error
 
 

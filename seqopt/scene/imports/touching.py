@@ -19,10 +19,11 @@ from seqopt.scene.detection import (
 )
 from seqopt.scene.face_joints import FlatFace, flat_face
 from seqopt.scene.imports.content import Content, FileJoint, Given
+from seqopt.scene.imports.tidying import Tidied
 from seqopt.scene.parts import Brick
 from seqopt.scene.shape import Polyhedron
 
-GAP = 0.01  # between faces that touch, over the thinnest block
+GAP = 0.05  # between faces that touch, over the thinnest block
 ASIDE = 1e-2  # how far beside a face a point is that tells on which side of it a block lies
 GROUND = -1
 DOWN = np.array([0.0, 0.0, -1.0])
@@ -57,7 +58,7 @@ class Touching:
 
 
 def find_touching(
-    content: Content, given: Given, solids: Sequence[Shape], bricks: Mapping[int, Brick]
+    content: Content, given: Given, blocks: Sequence[Tidied], bricks: Mapping[int, Brick]
 ) -> Touching:
     """Return where blocks touch each other and the ground.
 
@@ -66,8 +67,8 @@ def find_touching(
     content : Content
         In m.
     given : Given
-    solids : sequence of Polyhedron or Surface
-        All blocks of the file.
+    blocks : sequence of Tidied
+        All of the file.
     bricks : mapping of int to Brick
         Those that are built, by their places in the file; others are the ground.
 
@@ -81,6 +82,7 @@ def find_touching(
         If shapely is not installed.
     """
     require_polygons("finding where blocks touch")
+    solids, facets = [block.solid for block in blocks], [block.facets for block in blocks]
     thin = min(min(brick.dimensions) for brick in bricks.values())
     gap = GAP * thin if given.gap is None else positive("gap", given.gap, "m")
     if content.faces and not given.detect:
@@ -89,7 +91,7 @@ def find_touching(
     elif content.joints and all(joint.translational for joint in content.joints):
         found, said = [], ["joints are those of a frame; none has a face"]
     else:
-        found = [(f.blocks, flat_face(f.corners, f.normal)) for f in touching_faces(solids, gap)]
+        found = [(f.blocks, flat_face(f.corners, f.normal)) for f in touching_faces(facets, gap)]
         said = [f"faces are found where blocks are no more than {1e3 * gap:.3g} mm apart"]
     faces = [held for pair, face in found for held in _on_ground(pair, face, bricks)]
     known = {frozenset(pair) for pair, _ in faces}
@@ -98,7 +100,7 @@ def find_touching(
         said.append(f"joints of the file between blocks without a face: {len(joints)}")
     everywhere = len(bricks) == len(solids)
     if everywhere and not any(GROUND in joint.blocks for joint in joints):
-        standing = [*_standing(bricks, solids, gap)]
+        standing = [*_standing(bricks, facets, gap)]
         faces += standing
         said.append("no supports are named: blocks with a face at the lowest level stand there")
     return Touching(tuple(faces), tuple(joints), tuple(said))

@@ -80,7 +80,7 @@ def test_what_is_assumed_is_said(read):
     assert "supports are blocks 0, as the file says: the ground" in said
     assert "faces are those of the file: 2" in said
     said = read("meshes.json", DOCUMENTS["meshes"]).provenance
-    assert "faces are found where blocks are no more than 5 mm apart" in said
+    assert "faces are found where blocks are no more than 25 mm apart" in said
     assert "blocks with a face at the lowest level stand there" in said
 
 
