@@ -8,7 +8,10 @@ from dataclasses import replace
 import numpy as np
 
 from seqopt.arrays import Floats, Vector
+from seqopt.errors import SceneError
+from seqopt.scene.checks import short, vector, whole
 from seqopt.scene.parts import Brick
+from seqopt.scene.polygon import rows
 from seqopt.scene.shape import Polyhedron
 
 Numbers = tuple[int, int] | None
@@ -44,11 +47,13 @@ def block_brick(
     >>> round(block_brick(1, wedge, 2400.0).mass)
     1200
     """
+    if not isinstance(shape, Polyhedron):
+        raise SceneError(f"brick {short(name)}: shape is {short(shape)}; give a Polyhedron")
     own = replace(shape, vertices=as_vectors(shape.points - shape.centroid))
     x, y, z = own.extents(own.axes).tolist()
     at, first, second = as_vectors(np.vstack([shape.centroid, own.axes[:2]]))
-    held = own.nodes() if grips is None else as_vectors(np.array(grips) - shape.centroid)
-    numbers = nodes or (2 * name, 2 * name + 1)
+    held = own.nodes() if grips is None else _from(shape.centroid, name, grips)
+    numbers = nodes or (2 * whole("brick: its name", name), 2 * name + 1)
     return Brick(
         name=name,
         position=at,
@@ -57,10 +62,20 @@ def block_brick(
         dimensions=(x, y, z),
         density=density,
         nodes=numbers,
-        placing_node=numbers[1],
+        placing_node=numbers[-1],
         shape=own,
-        node_offsets=(held[0], held[1]),
+        node_offsets=held,
     )
+
+
+def _from(center: Floats, name: int, grips: Places) -> tuple[Vector, Vector]:
+    """Return where grips are from a center."""
+    where = f"brick {name}: grips"
+    found = [vector(where, row) for row in rows(where, grips or ())]
+    if len(found) != 2:
+        raise SceneError(f"{where} are {short(grips)}; give two points")
+    first, second = as_vectors(np.array(found) - center)
+    return first, second
 
 
 def as_vectors(points: Floats) -> tuple[Vector, ...]:

@@ -17,7 +17,7 @@ import numpy as np
 
 from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.errors import FileError, SceneError
-from seqopt.scene.checks import short
+from seqopt.scene.checks import positive, short
 from seqopt.scene.shape import normal_of
 
 OPPOSED = np.cos(np.radians(15.0))  # cosine from which on normals are against each other
@@ -122,7 +122,7 @@ def touching_faces(shapes: Sequence[Solid], gap: float) -> tuple[TouchingFace, .
     FileError
         If shapely is not installed.
     SceneError
-        If more than `MOST_PAIRS` blocks are near each other.
+        If the gap is not positive, or more than `MOST_PAIRS` blocks are near each other.
 
     Examples
     --------
@@ -138,8 +138,11 @@ def touching_faces(shapes: Sequence[Solid], gap: float) -> tuple[TouchingFace, .
     [((0, 1), [0.0, 0.0, -1.0])]
     """
     require_polygons("finding where blocks touch")
-    facets = [_facets(shape) for shape in shapes]
-    found: list[TouchingFace] = []
+    gap = positive("gap", gap, "m")
+    for shape in shapes:
+        if not hasattr(shape, "points") or not hasattr(shape, "faces"):
+            raise SceneError(f"shapes: {short(shape)} is none; give each as Polyhedron(...)")
+    facets, found = [_facets(shape) for shape in shapes], list[TouchingFace]()
     for tries, (i, j) in enumerate(_near(shapes, gap)):
         if tries == MOST_PAIRS:
             raise SceneError(f"more than {MOST_PAIRS} pairs of blocks are in one place; part them")

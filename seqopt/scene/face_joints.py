@@ -9,6 +9,7 @@ import numpy as np
 from seqopt.arrays import Floats, FrozenValue, Vector
 from seqopt.errors import SceneError
 from seqopt.scene.blocks import as_vectors
+from seqopt.scene.checks import short
 from seqopt.scene.library.law import JointLaw
 from seqopt.scene.parts import Ground, Joint
 from seqopt.scene.shape import normal_of
@@ -66,10 +67,11 @@ def flat_face(corners: Floats, normal: Floats | None = None) -> FlatFace:
     >>> face.area, face.axes[0].tolist(), [round(m, 4) for m in face.moments]
     (2.0, [0.0, 0.0, 1.0], [0.1667, 0.6667])
     """
-    across = normal_of(corners)
+    corners = np.asarray(corners, dtype=float).reshape(-1, 3)
+    across = normal_of(corners) if len(corners) > 2 else np.zeros(3)
     size = float(np.linalg.norm(across))
     if not size > 0:
-        raise SceneError(f"a face has no area; its first corner is {corners[0].tolist()}")
+        raise SceneError(f"a face has no area; its corners are {short(corners.tolist())}")
     across = across / size
     if normal is not None and across @ normal < 0:
         across, corners = -across, corners[::-1]

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from seqopt.errors import SceneError
 from seqopt.scene.blocks import as_vectors
 from seqopt.scene.detection import touching_faces
 from seqopt.scene.face_joints import face_ground, face_joint, flat_face
@@ -71,6 +72,21 @@ def test_triangles_make_the_face_that_they_are_parts_of():
     (face,) = touching_faces([mesh, above], GAP)
     assert flat_face(face.corners, face.normal).area == pytest.approx(1.5)
     assert len(face.corners) == 4
+
+
+def test_what_cannot_touch_is_one_line():
+    with pytest.raises(SceneError, match="gap is 'x'; give a positive number"):
+        touching_faces([box((1, 1, 1))], "x")
+    with pytest.raises(SceneError, match="shapes: 3 is none; give each as Polyhedron"):
+        touching_faces([3], GAP)
+    with pytest.raises(SceneError, match="a face has no area"):
+        flat_face([[0, 0, 0], [1, 0, 0], [2, 0, 0]])
+
+
+def test_blocks_without_number_in_one_place_are_refused(monkeypatch):
+    monkeypatch.setattr("seqopt.scene.detection.MOST_PAIRS", 5)
+    with pytest.raises(SceneError, match="more than 5 pairs of blocks are in one place"):
+        touching_faces([box((1, 1, 1))] * 4, GAP)
 
 
 def test_a_turned_assembly_touches_as_it_did():

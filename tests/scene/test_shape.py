@@ -122,6 +122,21 @@ def test_what_is_no_polyhedron_is_refused(vertices, faces, said):
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize(
+    ("name", "shape", "more", "said"),
+    [
+        (1, "box", {}, "brick 1: shape is 'box'; give a Polyhedron"),
+        ("a", CUBE, {}, "its name is 'a'; give a whole number"),
+        (1, CUBE, {"grips": ((0, 0, 0),)}, r"grips are \(\(0, 0, 0\),\); give two points"),
+        (1, CUBE, {"grips": 3}, "grips is 3; give a list"),
+        (1, CUBE, {"nodes": (1,)}, r"nodes are \[1\]; give two different numbers"),
+    ],
+)
+def test_what_makes_no_brick_is_one_line(name, shape, more, said):
+    with pytest.raises(SceneError, match=said):
+        block_brick(name, shape, 2000.0, **more)
+
+
 def test_a_brick_and_its_shape_agree():
     brick = block_brick(1, CUBE, 2000.0)
     with pytest.raises(SceneError, match="centroid of its shape is"):

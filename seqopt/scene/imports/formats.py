@@ -63,6 +63,10 @@ def import_scene(path: str | Path, form: str | None = None, given: Given | None 
     ...     import_scene(path, given=Given(unit="m", density=2000.0))
     <Scene two: 2 bricks, 1 joints, 1 ground ends, 3 robots>
     """
+    if not isinstance(path, str | Path):
+        raise SceneError(f"a {type(path).__name__} is no file; give a path")
+    if not isinstance(given, Given | None):
+        raise SceneError(f"given is {short(given)}; give Given(unit=..., density=...)")
     where = Path(path)
     content = read_content(where, form)
     return build_scene(content, given or Given(), printable("file", where.stem or "file"))
