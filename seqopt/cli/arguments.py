@@ -65,6 +65,7 @@ def parser() -> argparse.ArgumentParser:
     _add_optimize(commands, [scene, engine])
     add_pareto(commands, [scene, engine], limit_argument)
     _add_assess(commands, [scene])
+    _add_report(commands, [scene, engine])
     _add_scene(commands, [scene])
     add_import(commands)
     add_export(commands)
@@ -234,6 +235,22 @@ def _add_optimize(commands: Commands, parents: list[_Parser]) -> None:
     resources_arguments(command)
     command.add_argument("--out", type=Path, metavar="DIR", required=True, help="folder to write")
     strict_argument(command)
+
+
+def _add_report(commands: Commands, parents: list[_Parser]) -> None:
+    command = commands.add_parser(
+        "report",
+        parents=parents,
+        help="show plans step by step, as a page for the browser",
+        description="Write a page with a step viewer of the plans in a folder: the structure in "
+        "three dimensions, who holds what, axial forces, displacements and responses along the "
+        "build. It is one file and needs no network.",
+        epilog="example: seqopt report arch25 best",
+    )
+    command.add_argument("folder", type=Path, metavar="DIR", help="folder that holds plans as CSV")
+    command.add_argument(
+        "--out", type=Path, metavar="FILE", help="page to write (default: report.html in DIR)"
+    )
 
 
 def _add_scene(commands: Commands, parents: list[_Parser]) -> None:

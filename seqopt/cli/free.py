@@ -13,6 +13,7 @@ import pandas as pd
 from seqopt.cli.asked import asked_engine
 from seqopt.cli.criteria import parse_criterion
 from seqopt.cli.outputs import require_matplotlib, write_outputs
+from seqopt.cli.pages import PAGE, front_page, plan_page
 from seqopt.cli.rules import parse_rules, parse_standing
 from seqopt.cli.status import Status
 from seqopt.cli.terminal import complain, progress, say
@@ -70,8 +71,13 @@ def optimize_free(options: argparse.Namespace) -> Status:
         "summary.json": json.dumps(plan.summary(), indent=2) + "\n",
         "scene.json": dump_scene(scene),
     }
+    stands: list[str] = []
     if problem.standing is not None:
-        files["stability.csv"] = csv_text(plan.stability())
+        verdicts = plan.stability()
+        files["stability.csv"] = csv_text(verdicts)
+        stands = [str(verdict) for verdict in verdicts["verdict"]]
+    said = f"{', '.join(map(str, problem.goals))}; {plan.status}"
+    files[PAGE] = plan_page(problem.engine, "free schedule", table, said, stands)
     write_outputs(options, files)
     values = ", ".join(f"{name} {value:.6g}" for name, value in plan.objective.items())
     say(
@@ -212,6 +218,7 @@ def _front_files(
     numbered = shown_table(front.table)
     numbered.insert(0, "point", range(1, len(numbered) + 1))
     return {
+        PAGE: front_page(engine, shown_table(front.table), [known[steps] for steps in front.steps]),
         "pareto.csv": csv_text(numbered),
         "plans.csv": csv_text(pd.concat(plans, ignore_index=True)),
         "pareto.png": buffer.getvalue(),

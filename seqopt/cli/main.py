@@ -1,4 +1,4 @@
-"""The command line: ``seqopt import | scene | analyze | assess | optimize | compare | …``."""
+"""The command line: ``seqopt import | scene | analyze | assess | optimize | report | …``."""
 
 from __future__ import annotations
 
@@ -21,6 +21,7 @@ from seqopt.cli.outputs import (
     require_matplotlib,
     write_outputs,
 )
+from seqopt.cli.pages import PAGE, comparison_page, folder_page
 from seqopt.cli.status import Status, status_of
 from seqopt.cli.terminal import (
     flush,
@@ -103,7 +104,8 @@ def _compare(options: argparse.Namespace) -> Status:
     say_levels(engine)
     show(format_comparison(result, scene, criterion) + "\n")
     if options.out is not None and result.loop is not None:
-        write_outputs(options, comparison_files(result))
+        files = comparison_files(result) | {PAGE: comparison_page(engine, result)}
+        write_outputs(options, files)
         say(f"tables and figures written to {options.out}")
     return payloads_hold(options, scene, *result.tables.values())
 
@@ -170,6 +172,14 @@ def _steps(scene: Scene, options: argparse.Namespace) -> tuple[Step, ...]:
     return published_plan(scene)
 
 
+def _report(options: argparse.Namespace) -> None:
+    engine = asked_engine(options, build_network(load_scene(options.scene)))
+    path = options.folder / PAGE if options.out is None else options.out
+    keep_apart(options, path)
+    write_text(path, folder_page(engine, options.folder))
+    say(f"written to {path}")
+
+
 def _scene(options: argparse.Namespace) -> None:
     if options.list:
         for name in builtin_scenes():
@@ -208,6 +218,7 @@ COMMANDS: dict[str, Callable[[argparse.Namespace], int | None]] = {
     "optimize": optimize,
     "pareto": pareto,
     "assess": _assess,
+    "report": _report,
     "scene": _scene,
     "import": import_file,
     "export": export_folder,

@@ -8,6 +8,7 @@ import time
 from seqopt.cli.asked import payloads_hold, say_idle, say_levels
 from seqopt.cli.free import FREE, optimize_free, require_loop
 from seqopt.cli.outputs import plan_files, worth, write_outputs
+from seqopt.cli.pages import PAGE, plan_page
 from seqopt.cli.posing import asked_problem
 from seqopt.cli.robust import optimize_robust, require_no_scenarios
 from seqopt.cli.status import Status
@@ -52,7 +53,8 @@ def optimize(options: argparse.Namespace) -> Status:
         "seconds": {"assemble": assemble, **plan.seconds},
     }
     table = plan.responses()
-    write_outputs(options, plan_files(plan, problem.schedule.scene, report))
+    page = plan_page(problem.engine, formulation.name, table, worth(plan))
+    write_outputs(options, plan_files(plan, problem.schedule.scene, report) | {PAGE: page})
     say(
         f"{formulation.name} ({formulation.kind.value}): {worth(plan)}, "
         f"{plan.models} models; written to {options.out}"

@@ -1,0 +1,173 @@
+"""The page with the step viewer that commands write beside their tables."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import pandas as pd
+
+from seqopt.engines.interface import Engine
+from seqopt.errors import FileError, StepError
+from seqopt.files import csv_text
+from seqopt.report.comparison import LARGEST, Comparison, largest
+from seqopt.report.methods import method_tables
+from seqopt.report.page import report_page
+from seqopt.report.page_data import Build
+from seqopt.responses.table import analyze
+from seqopt.scene.scene import Scene
+from seqopt.sequence.plan_file import parse_plan, read_plan
+
+PAGE = "report.html"
+WORDS = {
+    "F_rob": "grip force, N",
+    "M_sup": "support moment, N m",
+    "T_max": "tension, N",
+    "D_max": "displacement, 1e-3 mm",
+}  # as of seqopt.report.comparison.LARGEST
+PLANS = ("plan.csv", "pick.csv", "steps_*.csv")  # of optimize, pareto and compare
+SMALL = 60  # bricks up to which a plan is shown beside the fixed methods
+
+Tables = Mapping[str, pd.DataFrame]
+
+
+def plan_page(
+    engine: Engine, name: str, table: pd.DataFrame, said: str, stands: Sequence[str] = ()
+) -> str:
+    """Return the page of a plan, beside the fixed methods where the scene is small.
+
+    Parameters
+    ----------
+    engine : Engine
+    name : str
+        What found it.
+    table : pandas.DataFrame
+        Responses of its steps.
+    said : str
+        What it is worth, in words.
+    stands : sequence of str, optional
+        Of every step, whether it stands.
+
+    Returns
+    -------
+    str
+    """
+    scene = engine.network.scene
+    tables = {name: table}
+    if len(scene.bricks) <= SMALL:
+        tables |= _methods(engine)
+    builds = [
+        _build(scene, key, each, stands if key == name else ()) for key, each in tables.items()
+    ]
+    values = largest(scene, table)
+    worst = ", ".join(
+        f"{word.split(',')[0]} {values[key]:.4g} {LARGEST[key]}" for key, word in WORDS.items()
+    )
+    robots = sum(table[f"{robot.name}_node"].notna().any() for robot in scene.robots)
+    sentence = (
+        f"{robots} robots build {scene.name} in {len(table)} steps ({name}: {said}). "
+        f"The largest of any step: {worst}."
+    )
+    return report_page(engine, builds, sentence, [("Largest responses", _worst(scene, tables))])
+
+
+def comparison_page(engine: Engine, result: Comparison) -> str:
+    """Return the page of a comparison.
+
+    Parameters
+    ----------
+    engine : Engine
+    result : Comparison
+
+    Returns
+    -------
+    str
+    """
+    scene = engine.network.scene
+    builds = [_build(scene, name, table) for name, table in result.tables.items()]
+    columns = ["problem", "objective", "gap", *WORDS, "overloaded", "models", "seconds"]
+    shown = result.table[columns].rename(columns=WORDS)
+    shown["overloaded"] = shown["overloaded"].map({True: "yes", False: ""})
+    shown = shown.rename_axis("method or formulation").reset_index()
+    tables = [("Methods and formulations; a click shows the build", shown)]
+    if result.printed is not None:
+        printed = result.printed.add_suffix(", printed").rename_axis("largest").reset_index()
+        tables.append(("What the paper prints", printed))
+    sentence = f"{len(builds)} ways to build {scene.name}, step by step and side by side."
+    return report_page(engine, builds, sentence, tables)
+
+
+def folder_page(engine: Engine, folder: Path) -> str:
+    """Return the page of the plans in a folder that a command has written.
+
+    Parameters
+    ----------
+    engine : Engine
+    folder : pathlib.Path
+
+    Returns
+    -------
+    str
+
+    Raises
+    ------
+    FileError, StepError
+        If there are no plans in it, or they are not for the engine's scene.
+    """
+    scene = engine.network.scene
+    paths = [path for name in PLANS for path in sorted(folder.glob(name))]
+    if not paths:
+        raise FileError(
+            f"folder {folder}: there is no plan in it; give one that optimize, pareto --pick or "
+            "compare has written"
+        )
+    plans = {path.stem.removeprefix("steps_"): read_plan(scene, path) for path in paths}
+    tables = {name: analyze(engine, steps) for name, steps in plans.items()}
+    builds = [Build(name, plans[name], table) for name, table in tables.items()]
+    sentence = f"{scene.name}, built in {len(builds)} way{'s' * (len(builds) > 1)}, step by step."
+    return report_page(engine, builds, sentence, [("Largest responses", _worst(scene, tables))])
+
+
+def front_page(engine: Engine, table: pd.DataFrame, plans: Sequence[pd.DataFrame]) -> str:
+    """Return the page of a Pareto set.
+
+    Parameters
+    ----------
+    engine : Engine
+    table : pandas.DataFrame
+        A row per point.
+    plans : sequence of pandas.DataFrame
+        Responses of the steps of each.
+
+    Returns
+    -------
+    str
+    """
+    scene = engine.network.scene
+    names = [f"point {number}" for number in range(1, len(plans) + 1)]
+    builds = [_build(scene, name, plan) for name, plan in zip(names, plans, strict=True)]
+    shown = table.copy()
+    shown.insert(0, "plan", names)
+    sentence = (
+        f"{len(plans)} plans for {scene.name}, none of which is better than another in everything."
+    )
+    return report_page(engine, builds, sentence, [("The Pareto set; a click shows a plan", shown)])
+
+
+def _build(scene: Scene, name: str, table: pd.DataFrame, stands: Sequence[str] = ()) -> Build:
+    return Build(name, parse_plan(scene, csv_text(table), name), table, stands)
+
+
+def _methods(engine: Engine) -> dict[str, pd.DataFrame]:
+    try:
+        return method_tables(engine)[0]
+    except StepError:
+        return {}
+
+
+def _worst(scene: Scene, tables: Tables) -> pd.DataFrame:
+    """Return the largest responses of builds, a row each."""
+    rows = {name: largest(scene, table) for name, table in tables.items()}
+    found = pd.DataFrame.from_dict(rows, orient="index")
+    found.insert(0, "steps", [len(table) for table in tables.values()])
+    return found.rename(columns=WORDS).rename_axis("build").reset_index()

@@ -1,0 +1,2 @@
+export { AmbientLight, BufferGeometry, Color, ConeGeometry, DirectionalLight, EdgesGeometry, Float32BufferAttribute, Group, HemisphereLight, LineBasicMaterial, LineSegments, Mesh, MeshLambertMaterial, OrthographicCamera, PerspectiveCamera, Scene, SphereGeometry, CylinderGeometry, InstancedMesh, Matrix4, Quaternion, Box3, Vector3, WebGLRenderer, MeshBasicMaterial, DoubleSide, Sphere } from "three";
+export { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";

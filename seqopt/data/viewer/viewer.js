@@ -1,0 +1,406 @@
+"use strict";
+(async () => {
+  const data = JSON.parse(document.getElementById("data").textContent);
+  const { structure, builds, responses } = data;
+  const byId = (id) => document.getElementById(id);
+  const KINDS = { place: "place", release: "release", reposition: "reposition" };
+  const CLAY = 0xcc8560, NEW = 0xe8b04a, TENSION = 0xc8102e, COMPRESSION = 0x1f5fa8, LARGEST = 32767;
+
+  // fields come as whole numbers, compressed
+  async function unpack(field) {
+    if (!field) return;
+    const bytes = Uint8Array.from(atob(field.data), (c) => c.charCodeAt(0));
+    const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
+    field.values = new Int16Array(await new Response(stream).arrayBuffer());
+  }
+  const value = (field, step, i) => (field ? field.values[step * field.width + i] * field.scale[step] : 0);
+
+  // one view of one build
+  class Pane {
+    constructor(place) {
+      this.box = document.createElement("div");
+      this.box.className = "pane";
+      this.tag = document.createElement("div");
+      this.tag.className = "tag";
+      this.canvas = document.createElement("canvas");
+      this.canvas.setAttribute("role", "img");
+      this.box.append(this.canvas, this.tag);
+      place.append(this.box);
+      this.scene = new THREE.Scene();
+      this.scene.background = new THREE.Color(0xfbfaf8);
+      this.scene.add(new THREE.HemisphereLight(0xffffff, 0xb8a898, 2.4));
+      const sun = new THREE.DirectionalLight(0xffffff, 1.4);
+      sun.position.set(-0.6, -1, 1.4);
+      this.scene.add(sun);
+      this.camera = new THREE.PerspectiveCamera(35, 1, 0.01, 1000);
+      this.camera.up.set(...structure.up);
+      this.renderer = new THREE.WebGLRenderer({ canvas: this.canvas, antialias: true, preserveDrawingBuffer: true });
+      this.renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2));
+      this.controls = new THREE.OrbitControls(this.camera, this.canvas);
+      this.controls.addEventListener("start", () => panes.forEach((pane) => { pane.turned = true; }));
+      this.controls.addEventListener("change", () => { this.draw(); mirror(this); });
+      this.makeBricks();
+      this.makeEdges();
+      this.makeGrips();
+      this.look();
+      new ResizeObserver(() => this.resize()).observe(this.box);
+      this.resize();
+    }
+    makeBricks() {
+      this.bricks = structure.bricks.map((brick) => {
+        const places = [], at = new Map();
+        const triangles = brick.faces.flatMap((f) => f.slice(2).map((_, k) => [f[0], f[k + 1], f[k + 2]]));
+        triangles.flat().forEach((i) => places.push(i));
+        const geometry = new THREE.BufferGeometry();
+        geometry.setAttribute("position", new THREE.Float32BufferAttribute(new Float32Array(places.length * 3), 3));
+        const mesh = new THREE.Mesh(geometry, new THREE.MeshLambertMaterial({ color: CLAY, side: THREE.DoubleSide }));
+        const rims = brick.faces.flatMap((f) => f.map((a, k) => [a, f[(k + 1) % f.length]]))
+          .filter(([a, b]) => { const key = Math.min(a, b) + ":" + Math.max(a, b); const seen = at.has(key); at.set(key, 1); return !seen; }).flat();
+        const lines = new THREE.BufferGeometry();
+        lines.setAttribute("position", new THREE.Float32BufferAttribute(new Float32Array(rims.length * 3), 3));
+        const outline = new THREE.LineSegments(lines, new THREE.LineBasicMaterial({ color: 0x4a2f22 }));
+        this.scene.add(mesh, outline);
+        return { brick, mesh, outline, places, rims };
+      });
+    }
+    makeEdges() {
+      const bar = new THREE.CylinderGeometry(1, 1, 1, 8);
+      this.edges = new THREE.InstancedMesh(bar, new THREE.MeshBasicMaterial({ depthTest: false, transparent: true }), structure.edges.length);
+      this.edges.renderOrder = 2;
+      this.edges.visible = false;
+      this.edges.frustumCulled = false;
+      this.scene.add(this.edges);
+    }
+    makeGrips() {
+      const size = radius * 0.026;
+      this.grips = structure.robots.map((robot) => {
+        const ball = new THREE.Mesh(new THREE.SphereGeometry(size, 20, 14), new THREE.MeshBasicMaterial({ color: robot.color, depthTest: false, transparent: true }));
+        ball.renderOrder = 3;
+        this.scene.add(ball);
+        return ball;
+      });
+      for (const ground of structure.grounds) {
+        const foot = new THREE.Mesh(new THREE.ConeGeometry(size * 1.3, size * 2.2, 4), new THREE.MeshLambertMaterial({ color: 0x555555 }));
+        foot.position.set(...ground.at);
+        foot.quaternion.setFromUnitVectors(new THREE.Vector3(0, 1, 0), new THREE.Vector3(...structure.up));
+        this.scene.add(foot);
+      }
+    }
+    look() {
+      const up = new THREE.Vector3(...structure.up);
+      const side = Math.abs(up.z) > 0.9 ? new THREE.Vector3(0.35, -1, 0.3) : new THREE.Vector3(1, 0.4, 0.5);
+      this.camera.position.copy(middle).addScaledVector(side.normalize(), (radius * 2.75) / Math.min(1, this.camera.aspect));
+      this.controls.target.copy(middle);
+      this.controls.update();
+    }
+    resize() {
+      const { clientWidth: w, clientHeight: h } = this.box;
+      if (!w || !h) return;
+      this.renderer.setSize(w, h, false);
+      this.camera.aspect = w / h;
+      this.camera.updateProjectionMatrix();
+      if (!this.turned) this.look();
+      this.draw();
+    }
+    moved(build, s, i, point, by, out) {
+      const c = structure.bricks[i].center, t = [0, 1, 2, 3, 4, 5].map((k) => by * value(build.twist, s, 6 * i + k));
+      const r = [point[0] - c[0], point[1] - c[1], point[2] - c[2]];
+      out[0] = point[0] + t[0] + t[4] * r[2] - t[5] * r[1];
+      out[1] = point[1] + t[1] + t[5] * r[0] - t[3] * r[2];
+      out[2] = point[2] + t[2] + t[3] * r[1] - t[4] * r[0];
+      return out;
+    }
+    show(build, at, options) {
+      const s = Math.min(at, build.steps.length - 1), step = build.steps[s], p = [0, 0, 0];
+      this.tag.textContent = `${build.name}: step ${step.number}, ${KINDS[step.kind] || step.kind}`;
+      this.canvas.setAttribute("aria-label", `${structure.name}, ${this.tag.textContent}, ${step.bricks} bricks`);
+      this.bricks.forEach(({ brick, mesh, outline, places, rims }, i) => {
+        mesh.visible = outline.visible = i < step.bricks;
+        if (i >= step.bricks) return;
+        const here = brick.corners.map((corner) => [...this.moved(build, s, i, corner, options.magnify, p)]);
+        for (const [object, order] of [[mesh, places], [outline, rims]]) {
+          const array = object.geometry.attributes.position.array;
+          order.forEach((corner, k) => array.set(here[corner], 3 * k));
+          object.geometry.attributes.position.needsUpdate = true;
+        }
+        mesh.geometry.computeVertexNormals();
+        mesh.geometry.computeBoundingSphere();
+        outline.geometry.computeBoundingSphere();
+        mesh.material.color.set(step.kind === "place" && i === step.bricks - 1 ? NEW : CLAY);
+        mesh.material.transparent = options.forces;
+        mesh.material.opacity = options.forces ? 0.25 : 1;
+      });
+      this.edges.visible = options.forces && build.edge !== null;
+      if (this.edges.visible) this.showForces(build, s, step, options);
+      this.grips.forEach((ball, r) => {
+        const node = step.grips[r];
+        ball.visible = node !== null && node !== undefined;
+        if (!ball.visible) return;
+        const { at: place, brick } = structure.nodes[node];
+        ball.position.set(...this.moved(build, s, brick, place, options.magnify, p));
+      });
+      this.draw();
+    }
+    showForces(build, s, step, options) {
+      let largest = 1e-30;
+      structure.edges.forEach((_, e) => { largest = Math.max(largest, Math.abs(value(build.edge, s, e))); });
+      const p = [0, 0, 0], tint = new THREE.Color(), pale = new THREE.Color(0xd8d8d8);
+      const turn = new THREE.Quaternion(), whole = new THREE.Matrix4(), upright = new THREE.Vector3(0, 1, 0);
+      structure.edges.forEach(([a, b, since], e) => {
+        const [start, end] = [a, b].map((node) => {
+          const point = structure.points[node], bricks = structure.carried[node].filter((i) => i < step.bricks);
+          const at = new THREE.Vector3();
+          bricks.forEach((i) => { this.moved(build, s, i, point, options.magnify, p); at.add(new THREE.Vector3(...p)); });
+          return bricks.length ? at.divideScalar(bricks.length) : at.set(...point);
+        });
+        const force = value(build.edge, s, e), share = Math.abs(force) / largest;
+        const along = end.clone().sub(start), length = along.length() || 1e-9;
+        const thick = since <= step.bricks ? radius * (0.002 + 0.011 * Math.sqrt(share)) : 0;
+        turn.setFromUnitVectors(upright, along.divideScalar(length));
+        whole.compose(start.add(end).multiplyScalar(0.5), turn, new THREE.Vector3(thick, thick ? length : 0, thick));
+        this.edges.setMatrixAt(e, whole);
+        tint.set(force >= 0 ? TENSION : COMPRESSION).lerp(pale, 1 - Math.sqrt(share));
+        this.edges.setColorAt(e, tint);
+      });
+      this.edges.instanceMatrix.needsUpdate = true;
+      this.edges.instanceColor.needsUpdate = true;
+    }
+    draw() { this.renderer.render(this.scene, this.camera); }
+  }
+
+  // where everything is
+  const corners = structure.bricks.flatMap((brick) => brick.corners).map((c) => new THREE.Vector3(...c));
+  const around = new THREE.Box3().setFromPoints(corners).getBoundingSphere(new THREE.Sphere());
+  const middle = around.center, radius = around.radius || 1;
+  const panes = [];
+  let mirroring = false;
+  function mirror(from) {
+    if (mirroring) return;
+    mirroring = true;
+    for (const pane of panes) {
+      if (pane === from) continue;
+      pane.camera.position.copy(from.camera.position);
+      pane.controls.target.copy(from.controls.target);
+      pane.controls.update();
+      pane.draw();
+    }
+    mirroring = false;
+  }
+
+  // what is read of a step
+  const column = (build, name) => build.columns.indexOf(name);
+  function number(build, s, name) {
+    const i = column(build, name);
+    return i < 0 || build.rows[s][i] === "" ? null : Number(build.rows[s][i]);
+  }
+  function largest(build, s) {
+    const forces = build.forces.map((name) => number(build, s, name)).filter((f) => f !== null).map(Math.abs);
+    return forces.length ? Math.max(...forces) : null;
+  }
+  const responseAt = (build, s, name) => (name === "F_largest" ? largest(build, s) : number(build, s, name));
+  const text = (tag, content, name) => { const e = document.createElement(tag); e.textContent = content; if (name) e.className = name; return e; };
+
+  function table(build, at) {
+    const s = Math.min(at, build.steps.length - 1), step = build.steps[s], out = document.createElement("div");
+    out.append(text("h2", `${build.name}, step ${step.number} of ${build.steps.length}`));
+    const newest = structure.bricks[step.bricks - 1];
+    const what = step.kind === "place" ? `Brick ${newest.name} is placed` : step.kind === "release" ? "A robot lets go" : "A robot takes a new grip";
+    out.append(text("p", `${what}; ${step.bricks} of ${structure.bricks.length} bricks stand.` + (build.stands[s] ? ` It ${build.stands[s]}.` : "")));
+    const grips = document.createElement("table"), rows = document.createElement("table");
+    grips.innerHTML = "<tr><th>robot</th><th>brick</th><th>node</th><th>force, N</th></tr>";
+    structure.robots.forEach((robot, r) => {
+      const row = document.createElement("tr"), name = document.createElement("td"), swatch = text("span", "", "swatch");
+      swatch.style.background = robot.color;
+      name.append(swatch, robot.name);
+      const node = step.grips[r], i = column(build, build.forces[r]);
+      const force = build.rows[s][i];
+      row.append(name, text("td", node === null ? "–" : structure.bricks[structure.nodes[node].brick].name), text("td", node === null ? "–" : node));
+      row.append(text("td", force === "" ? "–" : force, force !== "" && Math.abs(Number(force)) > robot.payload ? "over" : ""));
+      grips.append(row);
+    });
+    build.columns.forEach((name, i) => {
+      if (["step", "type", "bricks"].includes(name) || /_(node|brick)$/.test(name) || build.forces.includes(name) || build.rows[s][i] === "") return;
+      const row = document.createElement("tr"), bound = build.bounds[name];
+      row.append(text("td", name.replace("_1e-3mm", ", 1e-3 mm").replace(/_N(m?)$/, (_, m) => `, N${m ? " m" : ""}`).replace("_pct", ", %")));
+      row.append(text("td", build.rows[s][i], bound !== undefined && Number(build.rows[s][i]) > bound ? "over" : ""));
+      rows.append(row);
+    });
+    out.append(grips, rows);
+    return out;
+  }
+
+  // charts along the build
+  const SVG = "http://www.w3.org/2000/svg";
+  function draw(tag, attributes, parent, content) {
+    const e = document.createElementNS(SVG, tag);
+    for (const [key, v] of Object.entries(attributes)) e.setAttribute(key, v);
+    if (content !== undefined) e.textContent = content;
+    parent.append(e);
+    return e;
+  }
+  const cursors = [];
+  function frame(title, width, height, left, steps) {
+    const box = document.createElement("div");
+    box.className = "chart";
+    const svg = draw("svg", { viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": title }, box);
+    draw("text", { x: left, y: 13, style: "font-weight:600" }, svg, title);
+    const x = (s) => left + ((s + 0.5) * (width - left - 10)) / steps;
+    const cursor = draw("line", { class: "cursor", y1: 18, y2: height - 18 }, svg);
+    cursors.push((s) => { const at = x(Math.min(s, steps - 1)); cursor.setAttribute("x1", at); cursor.setAttribute("x2", at); });
+    svg.classList.add("hit");
+    svg.addEventListener("click", (event) => {
+      const at = (event.clientX - svg.getBoundingClientRect().left) * (width / svg.getBoundingClientRect().width);
+      go(Math.floor(((at - left) * steps) / (width - left - 10)));
+    });
+    draw("text", { x: width - 10, y: height - 4, "text-anchor": "end" }, svg, `step ${steps}`);
+    draw("text", { x: left, y: height - 4 }, svg, "step 1");
+    return { box, svg, x, cursor };
+  }
+  function gantt(build) {
+    const steps = build.steps.length, rows = structure.robots.length, width = 1180, height = 40 + 26 * rows, left = 70;
+    const { box, svg, x, cursor } = frame(`${build.name}: which brick each robot holds; darker where it carries more`, width, height, left, steps);
+    const most = Math.max(1e-30, ...build.steps.flatMap((_, s) => build.forces.map((name) => Math.abs(number(build, s, name) || 0))));
+    structure.robots.forEach((robot, r) => {
+      const y = 22 + 26 * r;
+      draw("text", { x: left - 6, y: y + 14, "text-anchor": "end" }, svg, robot.name);
+      let s = 0;
+      while (s < steps) {
+        const node = build.steps[s].grips[r];
+        let end = s;
+        while (end + 1 < steps && build.steps[end + 1].grips[r] === node) end += 1;
+        if (node !== null) {
+          for (let k = s; k <= end; k += 1) {
+            const share = Math.abs(number(build, k, build.forces[r]) || 0) / most;
+            draw("rect", { x: x(k - 0.5), y, width: x(1) - x(0) + 0.3, height: 20, fill: robot.color, "fill-opacity": 0.15 + 0.85 * share }, svg);
+          }
+          const name = structure.bricks[structure.nodes[node].brick].name, span = x(end + 0.5) - x(s - 0.5);
+          const mine = draw("rect", { x: x(s - 0.5), y, width: span, height: 20, fill: "none", stroke: "#222", "stroke-width": 0.7 }, svg);
+          draw("title", {}, mine, `${robot.name} holds brick ${name} at node ${node}, steps ${build.steps[s].number} to ${build.steps[end].number}`);
+          if (span > 9 * String(name).length) {
+            draw("rect", { x: (x(s - 0.5) + x(end + 0.5)) / 2 - 4 * String(name).length - 1, y: y + 4, width: 8 * String(name).length + 2, height: 13, fill: "#fff", "fill-opacity": 0.85, rx: 2 }, svg);
+            draw("text", { x: (x(s - 0.5) + x(end + 0.5)) / 2, y: y + 14.5, "text-anchor": "middle" }, svg, name);
+          }
+        }
+        s = end + 1;
+      }
+    });
+    svg.append(cursor);
+    box.classList.add("wide");
+    return box;
+  }
+  const STYLES = [["#1f5fa8", ""], ["#c8102e", "6 3"], ["#0b7a75", "2 2"], ["#7b2d8b", "8 3 2 3"], ["#8a5a00", "4 4"], ["#444", "1 3"]];
+  // lines of at most so many builds: those shown, then the first others
+  const MOST = 6;
+  const drawn = () => [...new Set([...shown(), ...(builds.length > MOST ? [] : builds)])];
+  function lines(name, title) {
+    const builds = drawn(), steps = Math.max(...builds.map((b) => b.steps.length)), width = 430, height = 190, left = 44;
+    const { box, svg, x, cursor } = frame(title, width, height, left, steps);
+    const values = builds.map((build) => build.steps.map((_, s) => responseAt(build, s, name)));
+    const bound = builds.map((build) => build.bounds[name]).find((b) => b !== undefined);
+    const top = 1.06 * Math.max(1e-12, bound || 0, ...values.flat().filter((v) => v !== null));
+    const y = (v) => height - 18 - (v / top) * (height - 40);
+    for (const share of [0, 0.5, 1]) {
+      draw("line", { class: "axis", x1: left, x2: width - 10, y1: y((share * top) / 1.06), y2: y((share * top) / 1.06), "stroke-opacity": share ? 0.25 : 1 }, svg);
+      draw("text", { x: left - 5, y: y((share * top) / 1.06) + 4, "text-anchor": "end" }, svg, Number(((share * top) / 1.06).toPrecision(3)));
+    }
+    if (bound) draw("line", { x1: left, x2: width - 10, y1: y(bound), y2: y(bound), stroke: "#a40018", "stroke-dasharray": "3 3" }, svg);
+    builds.forEach((build, b) => {
+      const [color, dash] = STYLES[b % STYLES.length];
+      const points = values[b].map((v, s) => (v === null ? null : `${x(s)},${y(v)}`)).filter(Boolean).join(" ");
+      draw("polyline", { points, fill: "none", stroke: color, "stroke-width": 1.5, "stroke-dasharray": dash }, svg);
+    });
+    svg.append(cursor);
+    return box;
+  }
+  function legend() {
+    const out = document.createElement("p"), builds = drawn();
+    builds.forEach((build, b) => {
+      const [color, dash] = STYLES[b % STYLES.length], svg = document.createElementNS(SVG, "svg"), span = document.createElement("span");
+      svg.setAttribute("width", 34); svg.setAttribute("height", 10);
+      draw("line", { x1: 2, x2: 30, y1: 5, y2: 5, stroke: color, "stroke-width": 2, "stroke-dasharray": dash }, svg);
+      span.className = "key";
+      span.append(svg, " " + build.name);
+      out.append(span);
+    });
+    return out;
+  }
+
+  // controls
+  const slider = byId("step");
+  let timer = null;
+  const shown = () => [builds[byId("first").value], byId("second").value === "" ? null : builds[byId("second").value]].filter(Boolean);
+  const options = () => ({ magnify: Number(byId("magnify").value) || 0, forces: byId("forces").checked });
+  function refresh() {
+    const pair = shown(), at = Number(slider.value);
+    slider.max = Math.max(...pair.map((build) => build.steps.length)) - 1;
+    while (panes.length < pair.length) panes.push(new Pane(byId("panes")));
+    panes.forEach((pane, i) => { pane.box.hidden = i >= pair.length; pane.box.style.display = i < pair.length ? "" : "none"; });
+    pair.forEach((build, i) => panes[i].show(build, at, options()));
+    byId("where").textContent = `step ${at + 1} of ${Number(slider.max) + 1}`;
+    byId("now").replaceChildren(...pair.map((build) => table(build, at)));
+    cursors.forEach((move) => move(at));
+  }
+  function go(s) { slider.value = Math.max(0, Math.min(Number(slider.max), s)); refresh(); }
+  function pause() { clearInterval(timer); timer = null; byId("play").textContent = "play"; }
+  function play() {
+    if (timer) return pause();
+    if (Number(slider.value) >= Number(slider.max)) go(0);
+    byId("play").textContent = "pause";
+    timer = setInterval(() => { if (Number(slider.value) >= Number(slider.max)) pause(); else go(Number(slider.value) + 1); }, 450);
+  }
+  function drawCharts() {
+    cursors.length = 0;
+    const grid = document.createElement("div");
+    grid.className = "grid";
+    for (const [name, title] of Object.entries(responses)) grid.append(lines(name, title));
+    byId("charts").replaceChildren(...shown().map(gantt), ...(builds.length > 1 ? [legend()] : []), grid);
+  }
+
+  // rows that name a build show it
+  function choose(name) {
+    const i = builds.findIndex((build) => build.name === name);
+    byId("first").value = i;
+    drawCharts();
+    refresh();
+    for (const row of document.querySelectorAll("#tables tr[data-build]")) row.classList.toggle("chosen", row.dataset.build === name);
+  }
+  for (const row of document.querySelectorAll("#tables tbody tr")) {
+    const cell = row.cells[0], name = cell ? cell.textContent : "";
+    if (!builds.some((build) => build.name === name)) continue;
+    const button = text("button", name, "link");
+    button.type = "button";
+    button.addEventListener("click", () => choose(name));
+    cell.replaceChildren(button);
+    row.dataset.build = name;
+  }
+
+  byId("name").textContent = `${structure.name}, step by step`;
+  byId("note").textContent = data.note;
+  builds.forEach((build, i) => {
+    byId("first").append(new Option(build.name, i));
+    byId("second").append(new Option(build.name, i));
+  });
+  byId("second").prepend(new Option("nothing", "", true, true));
+  byId("second").value = "";
+  await Promise.all(builds.flatMap((build) => [unpack(build.twist), unpack(build.edge)]));
+  for (const id of ["first", "second"]) byId(id).addEventListener("change", () => { drawCharts(); refresh(); });
+  for (const id of ["magnify", "forces"]) byId(id).addEventListener("input", refresh);
+  slider.addEventListener("input", refresh);
+  byId("back").addEventListener("click", () => go(Number(slider.value) - 1));
+  byId("on").addEventListener("click", () => go(Number(slider.value) + 1));
+  byId("play").addEventListener("click", play);
+  document.addEventListener("keydown", (event) => {
+    if (["SELECT", "INPUT", "BUTTON"].includes(event.target.tagName) && event.target !== slider) return;
+    const keys = { ArrowLeft: () => go(Number(slider.value) - 1), ArrowRight: () => go(Number(slider.value) + 1), Home: () => go(0), End: () => go(Number(slider.max)), " ": play };
+    if (keys[event.key]) { event.preventDefault(); keys[event.key](); }
+  });
+  const asked = new URLSearchParams(location.hash.slice(1));
+  if (asked.has("build")) byId("first").value = Math.max(0, builds.findIndex((build) => build.name === asked.get("build")));
+  if (asked.has("beside")) byId("second").value = builds.findIndex((build) => build.name === asked.get("beside"));
+  if (asked.has("magnify")) byId("magnify").value = asked.get("magnify");
+  byId("forces").checked = asked.has("forces");
+  drawCharts();
+  slider.max = Math.max(...shown().map((build) => build.steps.length)) - 1;
+  go(asked.has("step") ? Number(asked.get("step")) - 1 : Number(slider.max));
+  document.body.dataset.ready = "true";
+})();

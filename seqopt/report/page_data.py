@@ -1,0 +1,202 @@
+"""What the step viewer shows, as numbers: the structure once, and every step of one or more builds.
+
+Fields are kept as whole numbers of a step's largest value over 32,767: three digits more than a
+picture can show. Numbers that are read are those of the tables, digit by digit.
+"""
+
+from __future__ import annotations
+
+import base64
+import gzip
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import pandas as pd
+
+from seqopt.arrays import Floats
+from seqopt.engines.interface import Engine, Want
+from seqopt.files import csv_text
+from seqopt.network.network import GROUND, Network, PartKind
+from seqopt.responses.table import force_column
+from seqopt.scene.boxes import boxes
+from seqopt.sequence.steps import Step
+
+LARGEST = 32767
+ROBOT_COLORS = ("#0b7a75", "#7b2d8b", "#b85c00", "#444444", "#1f5fa8")
+FACES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
+
+
+@dataclass(frozen=True, eq=False)
+class Build:
+    """A build that is shown step by step.
+
+    Attributes
+    ----------
+    name : str
+        What it is called.
+    steps : sequence of Step
+    table : pandas.DataFrame
+        Responses of these, as `seqopt.analyze` makes them.
+    stands : sequence of str, optional
+        Of every step, whether it stands; empty where that was not asked.
+    bounds : mapping of str to float, optional
+        Limits by column of the table, or ``F_largest``; drawn beside the responses.
+    """
+
+    name: str
+    steps: Sequence[Step]
+    table: pd.DataFrame
+    stands: Sequence[str] = ()
+    bounds: Mapping[str, float] = field(default_factory=dict)
+
+
+def size_of(network: Network, build: Build) -> int:
+    """Return how many numbers the fields of a build are.
+
+    Parameters
+    ----------
+    network : Network
+    build : Build
+
+    Returns
+    -------
+    int
+    """
+    return len(build.steps) * (6 * len(network.inner) + len(network.edge_nodes))
+
+
+def structure_data(network: Network) -> dict[str, object]:
+    """Return a structure as lists, ready for JSON.
+
+    Parameters
+    ----------
+    network : Network
+
+    Returns
+    -------
+    dict
+        ``bricks`` in build order with ``name``, ``corners``, ``faces`` and ``center``; ``nodes``
+        with the place of each and its brick; ``edges`` with the points at their ends, the bricks
+        that carry these, and the brick count from which they are there; ``grounds``; ``robots``.
+    """
+    scene = network.scene
+    corners = boxes(scene.placed).corners()
+    ends = [[int(i) for i in row] for row in network.edge_nodes]
+    return {
+        "name": scene.name,
+        "bricks": [
+            {
+                "name": brick.name,
+                "center": _rounded(network.centroid[i]),
+                "corners": _rounded(corners[i]),
+                "faces": FACES,
+            }
+            for i, brick in enumerate(scene.placed)
+        ],
+        "nodes": {
+            str(node): {"at": _rounded(np.array(scene.node_position(node))), "brick": i}
+            for i, brick in enumerate(scene.placed)
+            for node in brick.nodes
+        },
+        "points": [_rounded(point) for point in network.node_position],
+        "carried": _carried(network),
+        "edges": [[*ends[e], int(network.edge_since[e])] for e in range(len(network.edge_nodes))],
+        "grounds": [
+            {"at": _rounded(np.array(ground.anchor)), "brick": ground.brick}
+            for ground in scene.grounds
+        ],
+        "robots": [
+            {"name": robot.name, "payload": robot.payload, "color": color}
+            for robot, color in zip(scene.robots, _colors(len(scene.robots)), strict=True)
+        ],
+        "up": list(scene.up),
+    }
+
+
+def _carried(network: Network) -> list[list[int]]:
+    """Return the bricks that every node moves with, none for those that are fixed."""
+    out = []
+    for kind, brick, spring in zip(
+        network.node_kind.tolist(),
+        network.node_brick.tolist(),
+        network.node_spring.tolist(),
+        strict=True,
+    ):
+        bodies = [brick] if brick >= 0 else network.springs.bodies[spring].tolist()
+        fixed = kind == PartKind.BASE.value
+        out.append([] if fixed else [body for body in bodies if body != GROUND])
+    return out
+
+
+def build_data(engine: Engine, build: Build, *, fields: bool = True) -> dict[str, object]:
+    """Return the steps of a build as lists, ready for JSON.
+
+    Parameters
+    ----------
+    engine : Engine
+        What computes fields.
+    build : Build
+    fields : bool, optional
+        Whether displacements and axial forces are among what is returned.
+
+    Returns
+    -------
+    dict
+        ``name`` and ``bounds``; ``steps`` with number, kind, bricks and the node that each robot
+        holds; ``columns`` and ``rows`` of the table of responses, as text, ``forces`` the columns
+        of the robots, and whether each step ``stands``; packed fields ``twist`` and ``edge`` with
+        the ``scale`` of each step, or None.
+    """
+    lines = [line.split(",") for line in csv_text(build.table).splitlines()]
+    twist, edge = _fields(engine, build) if fields else (None, None)
+    return {
+        "name": build.name,
+        "bounds": dict(build.bounds),
+        "stands": list(build.stands),
+        "steps": [
+            {
+                "number": step.number,
+                "kind": step.kind.value,
+                "bricks": step.bricks,
+                "grips": [None if grip is None else int(grip) for grip in step.grips],
+            }
+            for step in build.steps
+        ],
+        "columns": lines[0],
+        "rows": lines[1:],
+        "forces": [force_column(robot) for robot in engine.network.scene.robots],
+        "twist": None if twist is None else _packed(twist),
+        "edge": None if edge is None else _packed(edge),
+    }
+
+
+def _fields(engine: Engine, build: Build) -> tuple[Floats, Floats]:
+    """Return the twists (steps, B, 6) of all bricks, and the forces (steps, E) of all edges."""
+    network = engine.network
+    twist = np.zeros((len(build.steps), len(network.inner), 6))
+    edge = np.zeros((len(build.steps), len(network.edge_nodes)))
+    for i, step in enumerate(build.steps):
+        held = np.array([step.held], dtype=np.int64).reshape(1, -1)
+        found = engine.solve(step.bricks, held, Want.EDGES | Want.BRICKS)
+        twist[i, : step.bricks] = found.brick_twist[0]
+        edge[i, : found.edge_force.shape[1]] = found.edge_force[0]
+    return twist, edge
+
+
+def _packed(values: Floats) -> dict[str, object]:
+    """Return fields (steps, …) as compressed whole numbers, and what one is worth in each step."""
+    flat = values.reshape(len(values), -1)
+    size = np.abs(flat).max(axis=1, initial=0.0)
+    scale = np.where(size > 0, size / LARGEST, 1.0)
+    numbers = np.round(flat / scale[:, None]).astype("<i2")
+    data = base64.b64encode(gzip.compress(numbers.tobytes(), 9, mtime=0)).decode("ascii")
+    return {"scale": [float(f"{s:.6g}") for s in scale], "width": flat.shape[1], "data": data}
+
+
+def _colors(count: int) -> list[str]:
+    return [ROBOT_COLORS[i % len(ROBOT_COLORS)] for i in range(count)]
+
+
+def _rounded(values: Floats) -> object:
+    return np.round(values, 6).tolist()

@@ -1,0 +1,178 @@
+"""The page with the step viewer: its numbers are those of the tables, and a browser shows them."""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import json
+import os
+import re
+import shutil
+import subprocess
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from seqopt.cli.main import main
+from seqopt.engines.interface import Want
+from seqopt.errors import ProblemError
+from seqopt.files import csv_text
+from seqopt.report import page
+from seqopt.report.page import report_page
+from seqopt.report.page_data import LARGEST, Build, build_data, structure_data
+from seqopt.responses.table import analyze
+from seqopt.sequence.two_robots import cantilever, sequential
+
+BROWSER = next(filter(None, map(shutil.which, ("chromium", "google-chrome"))), None)
+browser = pytest.mark.skipif(BROWSER is None, reason="there is no Chromium")
+
+
+@pytest.fixture(scope="module")
+def builds(engine25):
+    found = {}
+    for method in (sequential, cantilever):
+        steps = method(engine25.network)
+        found[method.__name__] = Build(method.__name__, steps, analyze(engine25, steps))
+    return found
+
+
+def unpacked(field, count):
+    numbers = np.frombuffer(gzip.decompress(base64.b64decode(field["data"])), dtype="<i2")
+    return numbers.reshape(count, field["width"]) * np.array(field["scale"])[:, None]
+
+
+def data_of(text):
+    found = re.search(r'<script id="data" type="application/json">(.*?)</script>', text, re.S)
+    return json.loads(found[1])
+
+
+def test_what_is_read_is_the_table_digit_by_digit(engine25, builds):
+    build = builds["sequential"]
+    data = build_data(engine25, build)
+    lines = csv_text(build.table).splitlines()
+    assert [",".join(row) for row in [data["columns"], *data["rows"]]] == lines
+    assert [step["grips"] for step in data["steps"]] == [list(step.grips) for step in build.steps]
+    assert {*data["forces"]} <= {*data["columns"]}
+
+
+def test_what_is_drawn_is_what_the_engine_answers(engine25, builds):
+    build = builds["cantilever"]
+    data, count = build_data(engine25, build), len(build.steps)
+    twist, edge = (unpacked(data[name], count) for name in ("twist", "edge"))
+    for i in (0, 7, count - 1):
+        step = build.steps[i]
+        held = np.array([step.held], dtype=int).reshape(1, -1)
+        fields = engine25.solve(step.bricks, held, Want.EDGES | Want.BRICKS)
+        for found, exact in (
+            (twist[i], fields.brick_twist.ravel()),
+            (edge[i], fields.edge_force.ravel()),
+        ):
+            assert np.abs(found[: len(exact)] - exact).max() <= np.abs(exact).max() / LARGEST
+            assert not found[len(exact) :].any()  # bricks that are not there yet
+
+
+def test_the_structure_is_that_of_the_network(engine25):
+    network = engine25.network
+    data = structure_data(network)
+    assert len(data["bricks"]) == 25
+    assert len(data["edges"]) == len(network.edge_nodes)
+    for brick, drawn in zip(network.scene.placed, data["bricks"], strict=True):
+        corners = np.array(drawn["corners"])
+        assert corners.mean(axis=0) == pytest.approx(brick.position, abs=2e-6)
+        faces = np.array([corners[list(face)] for face in drawn["faces"]])
+        normal = np.cross(faces[:, 1] - faces[:, 0], faces[:, 2] - faces[:, 1])
+        outward = (normal * (faces.mean(axis=1) - corners.mean(axis=0))).sum(axis=1)
+        assert (outward > 0).all()
+        volume = (normal * faces.mean(axis=1)).sum() / 3
+        assert volume == pytest.approx(np.prod(brick.dimensions), rel=1e-3)
+
+
+def test_a_page_is_one_file_that_asks_for_nothing(engine25, builds):
+    text = report_page(engine25, list(builds.values()), "A & B <first>")
+    assert "A &amp; B &lt;first&gt;" in text
+    assert not re.search(r'(src|href)="(?!data:)', text)
+    assert len(data_of(text)["builds"]) == 2
+    assert len(text) < 2e6
+    with pytest.raises(ProblemError, match="a report of nothing"):
+        report_page(engine25, [], "")
+
+
+def test_names_of_others_do_not_end_the_script(engine25, builds):
+    wild = replace(builds["sequential"], name="</script><script>alert(1)</script>")
+    text = report_page(engine25, [wild], "")
+    assert "<script>alert" not in text
+    assert data_of(text)["builds"][0]["name"] == wild.name
+
+
+def test_fields_are_left_out_where_there_are_too_many_and_it_says_so(engine25, builds, monkeypatch):
+    monkeypatch.setattr(page, "MOST", 15_000)  # numbers: enough for one of the two
+    data = data_of(report_page(engine25, list(builds.values()), ""))
+    assert data["note"] == page.LEFT_OUT
+    assert [build["twist"] is None for build in data["builds"]] == [False, True]
+    monkeypatch.undo()
+    assert data_of(report_page(engine25, list(builds.values()), ""))["note"] == ""
+
+
+def test_commands_write_it_and_folders_are_read_again(capsys, tmp_path):
+    out = tmp_path / "best"
+    assert main(["optimize", "--formulation", "overlap_dp", "--out", str(out)]) == 0
+    first = data_of((out / "report.html").read_text("utf-8"))
+    assert first["builds"][0]["name"] == "overlap_dp"
+    plan = (out / "plan.csv").read_text("utf-8").splitlines()
+    assert [",".join(row) for row in first["builds"][0]["rows"]] == plan[1:]
+    assert main(["report", "arch25", str(out), "--out", str(tmp_path / "again.html")]) == 0
+    again = data_of((tmp_path / "again.html").read_text("utf-8"))
+    assert [build["name"] for build in again["builds"]] == ["plan"]
+    assert again["builds"][0]["steps"] == first["builds"][0]["steps"]
+    capsys.readouterr()
+    assert main(["report", str(tmp_path)]) == 2
+    assert "there is no plan in it" in capsys.readouterr().err
+
+
+def shown(path, state=""):
+    """Return the page as a headless browser has it once its script has run, and what it said."""
+    words = ["--headless", "--no-sandbox", "--disable-gpu-sandbox", "--use-angle=swiftshader"]
+    quiet = ["--enable-unsafe-swiftshader", "--no-first-run", "--disable-background-networking"]
+    calm = ["--disable-component-update", "--disable-sync", "--disable-quic"]
+    done = subprocess.run(
+        [
+            BROWSER,
+            *words,
+            *quiet,
+            *calm,
+            f"--user-data-dir={path.parent / 'profile'}",
+            "--enable-logging=stderr",
+            "--virtual-time-budget=20000",
+            "--dump-dom",
+            f"file://{path}#{state}",
+        ],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=True,
+        env=os.environ | {"HOME": str(path.parent)},
+    )
+    said = [line for line in done.stderr.splitlines() if "CONSOLE" in line and "error" in line]
+    return done.stdout, said
+
+
+@pytest.mark.slow
+@browser
+def test_a_browser_shows_the_numbers_of_the_step_that_is_asked_for(engine25, builds, tmp_path):
+    path = tmp_path / "report.html"
+    path.write_text(report_page(engine25, list(builds.values()), "Two ways."), "utf-8")
+    for state, name, number in (
+        ("step=12&build=sequential", "sequential", 12),
+        ("step=30&build=cantilever&forces&magnify=1000", "cantilever", 30),
+    ):
+        text, errors = shown(path, state)
+        assert errors == []
+        assert 'data-ready="true"' in text
+        assert f"{name}, step {number} of 49" in text
+        row = builds[name].table.iloc[number - 1]
+        for column in ("M_sup_Nm", "F_max_N", "D_max_1e-3mm"):
+            assert f">{row[column]:.6g}<" in text
+    broken = path.read_text("utf-8").replace('"steps":[', '"step":[')
+    path.write_text(broken, "utf-8")
+    assert 'data-ready="true"' not in shown(path)[0]  # the control
