@@ -59,7 +59,7 @@ def flat_face(corners: Floats, normal: Floats | None = None) -> FlatFace:
     Raises
     ------
     SceneError
-        If it has no area.
+        If it has no area, or crosses itself so much that it is none.
 
     Examples
     --------
@@ -81,6 +81,8 @@ def flat_face(corners: Floats, normal: Floats | None = None) -> FlatFace:
     flat = (corners - middle) @ sides.T
     area, shift, spread = _moments(flat)
     turned = _principal(spread)
+    if not np.linalg.det(spread) > 0:
+        raise SceneError(f"a face crosses itself; its corners are {short(corners.tolist())}")
     sides = turned @ sides
     return FlatFace(
         center=np.asarray(middle + (turned @ shift) @ sides),
