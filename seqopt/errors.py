@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import difflib
+from collections.abc import Iterable
+
 
 class SeqoptError(Exception):
     """Base of every error seqopt raises on purpose; its text is one line a user can act on.
@@ -75,3 +78,29 @@ class WorkerError(SeqoptError, RuntimeError):
 
 class SceneWarning(UserWarning):
     """Something in a scene can be, and probably is not meant."""
+
+
+def did_you_mean(given: str, known: Iterable[str]) -> str:
+    """Return a hint at the word that was probably meant.
+
+    Parameters
+    ----------
+    given : str
+        A word that is none.
+    known : iterable of str
+        Those that there are.
+
+    Returns
+    -------
+    str
+        To be put after the word; empty if none is near.
+
+    Examples
+    --------
+    >>> did_you_mean("overlap_pd", ["cascade", "overlap_dp"])
+    ' (did you mean overlap_dp?)'
+    >>> did_you_mean("x", ["cascade", "overlap_dp"])
+    ''
+    """
+    near = difflib.get_close_matches(given, known, 1)
+    return f" (did you mean {near[0]}?)" if near else ""

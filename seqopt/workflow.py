@@ -10,7 +10,7 @@ from typing import Any
 
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import make_engine
-from seqopt.errors import ProblemError
+from seqopt.errors import ProblemError, did_you_mean
 from seqopt.network.build import build_network
 from seqopt.placement.plan import Plan
 from seqopt.placement.problem import pose
@@ -111,6 +111,7 @@ def find_criterion(criterion: Criterion | str) -> Criterion:
         return criterion
     if criterion not in CRITERIA:
         raise ProblemError(
-            f"criterion {criterion!r}: there is no such; give one of {', '.join(CRITERIA)}"
+            f"criterion {criterion!r}: there is no such{did_you_mean(criterion, CRITERIA)}; give "
+            f"one of {', '.join(CRITERIA)}"
         )
     return CRITERIA[criterion]

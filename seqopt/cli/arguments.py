@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from importlib.metadata import version
 from pathlib import Path
 from typing import NoReturn, TypeAlias
 
@@ -19,6 +20,7 @@ from seqopt.cli.common_arguments import (
 from seqopt.cli.exchange import add_export, add_import
 from seqopt.cli.free import FREE
 from seqopt.cli.free_arguments import add_pareto, add_rules
+from seqopt.cli.hints import nearest
 from seqopt.cli.status import Status
 from seqopt.cli.terminal import complain, show
 from seqopt.contact.mortar import MORTARS
@@ -34,11 +36,14 @@ from seqopt.study.published import PUBLISHED
 class _Parser(argparse.ArgumentParser):
     """A parser whose errors are one line, and whose help is a result like others."""
 
+    words: tuple[str, ...] = ()  # options of all commands, for whoever mistypes one
+
     def print_help(self, file: object = None) -> None:
         show(self.format_help())
 
     def error(self, message: str) -> NoReturn:
-        complain(f"{self.prog}: error: {message} (see {self.prog} --help)")
+        hint = nearest(message, self.words or self._option_string_actions)
+        complain(f"{self.prog}: error: {message}{hint} (see {self.prog} --help)")
         self.exit(Status.BAD_INPUT)
 
 
@@ -58,6 +63,7 @@ def parser() -> argparse.ArgumentParser:
         prog="seqopt",
         description="Where should each robot hold a half-built structure, over the whole build?",
     )
+    whole.add_argument("--version", action="version", version=f"seqopt {version('seqopt')}")
     commands = whole.add_subparsers(required=True, metavar="COMMAND", dest="command")
     scene, engine = _scene_argument(), _engine_arguments()
     _add_compare(commands, [scene, engine])
@@ -69,6 +75,9 @@ def parser() -> argparse.ArgumentParser:
     _add_scene(commands, [scene])
     add_import(commands)
     add_export(commands)
+    whole.words = tuple(
+        word for command in commands.choices.values() for word in command._option_string_actions
+    )
     return whole
 
 

@@ -14,6 +14,7 @@ from seqopt.cli.asked import asked_engine, payloads_hold, say_idle, say_levels, 
 from seqopt.cli.criteria import asked_criterion
 from seqopt.cli.exchange import export_folder, import_file
 from seqopt.cli.free import pareto
+from seqopt.cli.hints import EXAMPLES
 from seqopt.cli.optimize import optimize
 from seqopt.cli.outputs import (
     comparison_files,
@@ -85,6 +86,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(arguments: Sequence[str] | None) -> int:
+    if not (sys.argv[1:] if arguments is None else arguments):
+        show(EXAMPLES)
+        return Status.DONE
     try:
         options = parser().parse_args(arguments)
     except SystemExit as stop:  # the parser has said why, or printed its help

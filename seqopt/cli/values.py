@@ -10,7 +10,7 @@ from dataclasses import replace
 from typing import Any
 
 from seqopt.contact.mortar import MORTARS, Mortar
-from seqopt.errors import ProblemError
+from seqopt.errors import ProblemError, did_you_mean
 from seqopt.placement.formulation import Formulation, as_formulation
 from seqopt.placement.requirements import Limit, payload_limits
 from seqopt.responses.choices import CHOICE_RESPONSES
@@ -223,7 +223,8 @@ def response_word(name: str, where: str) -> str:
     if name not in RESPONSES and not name.startswith("F_"):
         names = (*CRITERIA, *RESPONSES) if where == "--criteria" else ("payload", *CHOICE_RESPONSES)
         known = ", ".join((*names, "F_ROBOT"))
-        raise ProblemError(f"{where} {name}: there is no such; give {known}")
+        hint = did_you_mean(name, names)
+        raise ProblemError(f"{where} {name}: there is no such{hint}; give {known}")
     return name
 
 

@@ -11,7 +11,7 @@ from importlib.metadata import EntryPoint, entry_points
 import numpy as np
 
 from seqopt.arrays import FrozenValue
-from seqopt.errors import ProblemError
+from seqopt.errors import ProblemError, did_you_mean
 from seqopt.placement.interface import Aim
 from seqopt.placement.watch import Finding
 
@@ -214,7 +214,8 @@ def find_formulation(name: str) -> Formulation:
     found = [e for group in (GROUP, EXHIBITS) for e in entry_points(group=group) if e.name == name]
     if not found:
         known = ", ".join(formulation_names())
-        raise ProblemError(f"formulation {name!r}: there is no such; give one of {known}")
+        hint = did_you_mean(name, formulation_names())
+        raise ProblemError(f"formulation {name!r}: there is no such{hint}; give one of {known}")
     return _load(found[0])
 
 

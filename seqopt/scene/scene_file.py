@@ -11,7 +11,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from seqopt.errors import SceneError, SceneWarning
+from seqopt.errors import SceneError, SceneWarning, did_you_mean
 from seqopt.files import read_text, write_text
 from seqopt.scene.doubts import doubts
 from seqopt.scene.library.builtin import ABOUT, GENERATED
@@ -122,15 +122,19 @@ def load_scene(name: str | Path) -> Scene:
         return scene_by_words(name)
     path = Path(name)
     if not path.suffix and not os.path.lexists(path):
-        known = ", ".join(builtin_scenes())
-        raise SceneError(
-            f"scene {name}: no such built-in scene or file; built in: {known}; or in words, as "
-            "arch:span=2,rise=0.7"
-        )
+        raise SceneError(_no_such(name))
     scene = parse_scene(read_text(path), name)
     for doubt in doubts(scene):
         warnings.warn(f"scene {name}: {doubt}", SceneWarning, stacklevel=2)
     return scene
+
+
+def _no_such(name: str) -> str:
+    """Return what there is to say of a name that stands for no scene."""
+    return (
+        f"scene {name}: no such built-in scene or file{did_you_mean(name, builtin_scenes())}; "
+        f"built in: {', '.join(builtin_scenes())}; or in words, as arch:span=2,rise=0.7"
+    )
 
 
 def parse_scene(text: str, source: str = "text") -> Scene:

@@ -422,7 +422,7 @@ def test_help_teaches(capsys, command):
 @pytest.mark.parametrize(
     ("arguments", "named"),
     [
-        ((), "COMMAND"),
+        (("--engine",), "COMMAND"),
         (("optimise",), "'optimise'"),
         (("analyze",), "--method"),
         (("analyze", "--method", "seq"), "'seq' (choose from 'sequential', 'cantilever'"),

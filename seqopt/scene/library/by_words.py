@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import difflib
 import inspect
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from typing import Any, get_type_hints
 
 from seqopt.arrays import Vector
-from seqopt.errors import SceneError
+from seqopt.errors import SceneError, did_you_mean
 from seqopt.scene.library.arch_form import ArchForm, arch
 from seqopt.scene.library.barrel_vault import barrel_vault
 from seqopt.scene.library.chain import chain
@@ -109,10 +108,9 @@ def scene_by_words(words: str) -> Scene:
     for part in filter(None, rest.split(",")):
         key, _, text = part.partition("=")
         if key not in hints or key in given:
-            near = difflib.get_close_matches(key, hints, 1)
-            what = "is given twice" if key in given else "is none of its numbers"
-            hint = f"; {near[0]!r} is meant?" if near and key not in given else ""
-            raise SceneError(f"scene {words}: {key!r} {what}{hint or '; give ' + ', '.join(hints)}")
+            hint = did_you_mean(key, hints)
+            what = "is given twice" if key in given else f"is none of its numbers{hint}"
+            raise SceneError(f"scene {words}: {key!r} {what}; give {', '.join(hints)}")
         try:
             given[key] = READ[hints[key]](text)
         except ValueError:

@@ -151,7 +151,7 @@ def test_scenes_in_words_are_those_of_the_library(words, made):
     ("words", "said"),
     [
         ("tower:a=1", "'tower' is no kind; give one of arch, barrel, chain, dome, wall"),
-        ("arch:spn=2", "'spn' is none of its numbers; 'span' is meant?"),
+        ("arch:spn=2", "'spn' is none of its numbers (did you mean span?); give span, rise"),
         ("arch:span=2,span=2", "'span' is given twice; give span, rise"),
         ("arch:span=x", "span is 'x'; give it as 0.5"),
         ("arch:span=2,rise=1,dimensions=1x2", "dimensions is '1x2'; give it as 0.2x0.1x0.06"),

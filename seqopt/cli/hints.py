@@ -1,0 +1,49 @@
+"""What the program says to whoever starts, or mistypes a word."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+
+from seqopt.errors import did_you_mean
+
+EXAMPLES = """Three examples:
+
+  seqopt compare arch25
+      all methods and formulations on the arch of Bruun et al., side by side
+  seqopt optimize arch25 --schedule free --aim minmax --out best
+      the best build by three robots; best/report.html shows it step by step
+  seqopt optimize arch:span=2,rise=0.8 --formulation overlap_dp --out mine
+      where to hold an arch of your own
+
+seqopt --help names all commands.
+"""
+WRONG_CHOICE = re.compile(r"invalid choice: '(.*?)' \(choose from (.*)\)")
+UNKNOWN = re.compile(r"unrecognized arguments: (--[^ =]+)")
+
+
+def nearest(message: str, options: Iterable[str]) -> str:
+    """Return a hint at the word that was probably meant, or nothing.
+
+    Parameters
+    ----------
+    message : str
+        Of the parser.
+    options : iterable of str
+        That its commands have.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> nearest("unrecognized arguments: --formulaton=beam", ["--formulation", "--out"])
+    ' (did you mean --formulation?)'
+    >>> nearest("invalid choice: 'optimise' (choose from 'optimize', 'scene')", [])
+    ' (did you mean optimize?)'
+    """
+    if found := WRONG_CHOICE.search(message):
+        return did_you_mean(found[1], [word.strip(" '") for word in found[2].split(",")])
+    found = UNKNOWN.search(message)
+    return did_you_mean(found[1], options) if found else ""
