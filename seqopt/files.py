@@ -34,6 +34,23 @@ def read_text(path: Path) -> str:
         If the file cannot be read, is a pipe or device, larger than `LARGEST_INPUT`, or not UTF-8.
     """
     try:
+        return read_bytes(path).decode("utf-8-sig")  # spreadsheets start text with a mark
+    except UnicodeError as error:
+        raise FileError(f"cannot read {path}: {_reason(error)}; name a readable file") from error
+
+
+def read_bytes(path: Path) -> bytes:
+    """Return the content of a file; as `read_text`.
+
+    Parameters
+    ----------
+    path : pathlib.Path
+
+    Returns
+    -------
+    bytes
+    """
+    try:
         if not stat.S_ISREG(Path(path).stat().st_mode):  # a pipe would be waited for
             raise FileError(f"cannot read {path}: it is no regular file; name one")
         with Path(path).open("rb") as stream:
@@ -41,7 +58,7 @@ def read_text(path: Path) -> str:
         if len(content) > LARGEST_INPUT:
             most = LARGEST_INPUT / 1e6
             raise FileError(f"cannot read {path}: it has more than {most:g} MB; name a smaller one")
-        return content.decode("utf-8-sig")  # spreadsheets start text with a mark
+        return content
     except (OSError, ValueError) as error:
         if isinstance(error, FileError):
             raise
@@ -86,12 +103,7 @@ def write_csv(path: Path, table: pd.DataFrame) -> None:
     ----------
     path : pathlib.Path
     table : pandas.DataFrame
-        Written as `csv_text` does.
-
-    Raises
-    ------
-    FileError
-        If the file cannot be written.
+        Written as `csv_text` does, and as `write_text` does.
     """
     write_text(path, csv_text(table))
 

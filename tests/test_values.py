@@ -32,11 +32,14 @@ from seqopt.engines.rigid.spanning_tree import grow_tree
 from seqopt.network.build import build_network
 from seqopt.network.statics import build_statics
 from seqopt.scene.boxes import boxes
+from seqopt.scene.detection import Surface, touching_faces
+from seqopt.scene.face_joints import flat_face
 from seqopt.scene.library.meeting import meeting
 from seqopt.stability.assessment import assess, bonded
 from seqopt.stability.directions import first_directions
 from seqopt.stability.known import HoldingForces, Known
 from seqopt.stability.prover import Prover
+from tests.blocks import box
 
 COMPRESSED = (sparse.csr_array, sparse.csc_array)
 
@@ -56,9 +59,11 @@ def values(arch25):
     maps = scene_maps(network)
     shapes = boxes(arch25.bricks)
     joined = meeting(shapes, [(0, 1)])
+    (touching,) = touching_faces([box((1, 1, 1)), box((1, 1, 1), at=(0, 0, 1))], 1e-3)
     every = (
         *(maps, ResponseMaps(maps, 2)),
         *(shapes, joined, joined.shared, joined.faces[0]),
+        *(touching, flat_face(touching.corners), Surface(np.zeros((3, 3)), ((0, 1, 2),))),
         *(network, network.springs, build_statics(network)),
         *(assembly, face_quadrature(assembly), find_elastic_limits(network, EPOXY)),
         *(SPACE, plane, tree, OperatorBuilder(network, tree).operator(2), parts),

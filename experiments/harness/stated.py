@@ -29,7 +29,20 @@ def stated() -> dict[str, str]:
         | _engines(runs)
         | _heuristics(runs, gaps)
         | _shapes(pd.read_csv(RESULTS / "program_shapes.csv"))
+        | _outside(pd.read_csv(RESULTS / "outside_assemblies.csv"))
     )
+
+
+def _outside(table: pd.DataFrame) -> dict[str, str]:
+    """Return how many assemblies of others end in a plan, and how well faces are found."""
+    counts = table["outcome"].value_counts()
+    elsewhere = ~table["source"].str.startswith("compas_cra")
+    return {
+        "outside_elsewhere": str(int(elsewhere.sum())),
+        "outside_plans": str(counts["plan"]),
+        "outside_lacks": str(counts["lacks"]),
+        "outside_found": f"{table['found'].median():.4g}",
+    }
 
 
 def _shapes(table: pd.DataFrame) -> dict[str, str]:

@@ -17,6 +17,7 @@ from seqopt.cli.common_arguments import (
     robust_arguments,
     strict_argument,
 )
+from seqopt.cli.exchange import add_export, add_import
 from seqopt.cli.free_arguments import add_pareto, add_rules
 from seqopt.cli.hints import nearest
 from seqopt.cli.status import Status
@@ -73,6 +74,8 @@ def parser() -> argparse.ArgumentParser:
     _add_assess(commands, [scene])
     _add_report(commands, [scene, engine])
     _add_scene(commands, [scene])
+    add_import(commands)
+    add_export(commands)
     whole.words = tuple(
         word for command in commands.choices.values() for word in command._option_string_actions
     )

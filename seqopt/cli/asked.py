@@ -43,21 +43,19 @@ def asked_scene(options: argparse.Namespace) -> Scene:
     return in_order(load_scene(options.scene), options.order)
 
 
-def scene_file(options: argparse.Namespace, scene: Scene) -> dict[str, bytes | str]:
-    """Return the scene by its file's name where robots or order are not those of the one named.
+def scene_file(scene: Scene) -> dict[str, bytes | str]:
+    """Return the scene that a plan is for, by file name: plans name bricks by how many stand.
 
     Parameters
     ----------
-    options : argparse.Namespace
-        With ``scene``.
     scene : Scene
+        In the order in which it is built.
 
     Returns
     -------
     dict of str to (bytes or str)
-        None otherwise: what is written goes with the scene that was named.
     """
-    return {} if scene == load_scene(options.scene) else {"scene.json": dump_scene(scene)}
+    return {"scene.json": dump_scene(scene)}
 
 
 def asked_engine(options: argparse.Namespace, network: Network) -> Engine:

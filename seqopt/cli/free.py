@@ -73,7 +73,7 @@ def optimize_free(options: argparse.Namespace) -> Status:
     table = plan.responses()
     said = f"{', '.join(map(str, problem.goals))}; {plan.status}"
     files = free_files(plan, plan.summary(), "free schedule", said)
-    write_outputs(options, files | scene_file(options, scene))
+    write_outputs(options, files | scene_file(scene))
     values = ", ".join(f"{name} {value:.6g}" for name, value in plan.objective.items())
     say(
         f"{formulation.name} ({formulation.kind.value}): {values}, {plan.status}; "
@@ -119,7 +119,7 @@ def pareto(options: argparse.Namespace) -> Status:
         values = shown_table(front.table).iloc[chosen]
         row = ", ".join(f"{name} {value:.6g}" for name, value in values.items())
         said += f"; picked row {chosen + 1}: {row}"
-    write_outputs(options, files | scene_file(options, scene))
+    write_outputs(options, files | scene_file(scene))
     say(f"{said}; written to {options.out}")
     return Status.DONE
 

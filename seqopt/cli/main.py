@@ -1,4 +1,4 @@
-"""The command line: ``seqopt compare | optimize | pareto | analyze | assess | report | scene``."""
+"""The command line: ``seqopt import | scene | analyze | assess | optimize | report | …``."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ from seqopt.cli.asked import (
     step_answers,
 )
 from seqopt.cli.criteria import asked_criterion
+from seqopt.cli.exchange import export_folder, import_file
 from seqopt.cli.free import pareto
 from seqopt.cli.hints import EXAMPLES
 from seqopt.cli.optimize import optimize
@@ -230,4 +231,6 @@ COMMANDS: dict[str, Callable[[argparse.Namespace], int | None]] = {
     "assess": _assess,
     "report": _report,
     "scene": _scene,
+    "import": import_file,
+    "export": export_folder,
 }

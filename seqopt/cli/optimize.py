@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import time
 
-from seqopt.cli.asked import payloads_hold, say_idle, say_levels, scene_file
+from seqopt.cli.asked import payloads_hold, say_idle, say_levels
 from seqopt.cli.free import optimize_free, require_loop
 from seqopt.cli.outputs import plan_files, worth, write_outputs
 from seqopt.cli.pages import PAGE, plan_page
@@ -56,8 +56,7 @@ def optimize(options: argparse.Namespace) -> Status:
     table = plan.responses()
     scene = problem.schedule.scene
     page = plan_page(problem.engine, formulation.name, table, worth(plan))
-    files = plan_files(plan, report) | {PAGE: page} | scene_file(options, scene)
-    write_outputs(options, files)
+    write_outputs(options, plan_files(plan, scene, report) | {PAGE: page})
     say(
         f"{formulation.name} ({formulation.kind.value}): {worth(plan)}, "
         f"{plan.models} models; written to {options.out}"

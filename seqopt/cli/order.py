@@ -59,7 +59,7 @@ def optimize_order(options: argparse.Namespace, free: FreeProblem) -> Status:
     )
     plan = found.plan
     files = free_files(plan, found.summary(), "best order", _said(found))
-    write_outputs(options, files | scene_file(options, plan.problem.network.scene))
+    write_outputs(options, files | scene_file(plan.problem.network.scene))
     say(f"{formulation.name} {_said(found)}; written to {options.out}")
     say(f"order: {', '.join(map(str, found.order))}")
     return Status.INTERRUPTED if found.selection.stopped == "interrupt" else Status.DONE

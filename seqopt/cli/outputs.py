@@ -16,7 +16,8 @@ from seqopt.files import csv_text, require_apart, write_folder
 from seqopt.placement.plan import Plan
 from seqopt.placement.watch import trace_rows
 from seqopt.report.comparison import Comparison
-from seqopt.scene.scene_file import builtin_scenes
+from seqopt.scene.scene import Scene
+from seqopt.scene.scene_file import builtin_scenes, dump_scene
 
 
 def require_matplotlib(folder: Path) -> None:
@@ -62,12 +63,14 @@ def comparison_files(result: Comparison) -> dict[str, bytes | str]:
     return files
 
 
-def plan_files(plan: Plan, report: Mapping[str, object]) -> dict[str, bytes | str]:
-    """Return the tables of a plan and its summary, by file name.
+def plan_files(plan: Plan, scene: Scene, report: Mapping[str, object]) -> dict[str, bytes | str]:
+    """Return the tables of a plan, its summary and its scene, by file name.
 
     Parameters
     ----------
     plan : Plan
+    scene : Scene
+        That it is for.
     report : mapping of str to object
         The summary, ready for JSON.
 
@@ -81,6 +84,7 @@ def plan_files(plan: Plan, report: Mapping[str, object]) -> dict[str, bytes | st
         "selection.csv": csv_text(plan.table()),
         "responses.csv": csv_text(plan.alternatives()),
         "summary.json": json.dumps(report, indent=2) + "\n",
+        "scene.json": dump_scene(scene),
     }
     if rows := trace_rows(plan.selection.trace):
         files["trace.csv"] = csv_text(pd.DataFrame(rows))

@@ -23,6 +23,7 @@ from seqopt.placement.unseen import Trial, judge_unseen
 from seqopt.responses.table import analyze
 from seqopt.scene.scenarios import MOST, Scenarios, scenarios
 from seqopt.scene.scene import Scene
+from seqopt.scene.scene_file import dump_scene
 from seqopt.sequence.steps import idle_robots
 
 ALONE = ("scenarios", "unseen", "seed", "vary")  # options that mean something with --robust alone
@@ -87,8 +88,9 @@ def optimize_robust(options: argparse.Namespace) -> Status:
         "selection.csv": csv_text(plan.table()),
         "scenarios.csv": csv_text(trial.table),
         "summary.json": json.dumps(_plain(report), indent=2) + "\n",
+        "scene.json": dump_scene(problem.schedule.scene),
     }
-    write_outputs(options, files | scene_file(options, problem.schedule.scene))
+    write_outputs(options, files | scene_file(problem.schedule.scene))
     worth = trial.summary()["unseen"]
     say(
         f"{aim}: {plan.objective:.6g} over {count} scenarios, gap {100 * plan.gap:.3g} %; over "

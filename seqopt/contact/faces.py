@@ -19,8 +19,9 @@ SLIVER = 1e-6  # smallest overlap of two faces, as a share of the smaller one
 def step_assembly(network: Network, bricks: int, grips: Sequence[int | None]) -> Assembly:
     """Return a partial structure with the grips that hold it.
 
-    A joint is a contact over the overlap of the two faces that look at each other, seen along the
-    joint's normal; a ground end is a contact over the whole face of its brick.
+    A joint is a contact over the face that it says. If it says none, its bricks are boxes, and the
+    contact is the overlap of the two faces that look at each other, seen along the joint's normal;
+    a ground end is then a contact over the whole face of its brick.
 
     Parameters
     ----------
@@ -89,7 +90,10 @@ def _contact(network: Network, spring: int) -> tuple[str, Floats, Floats]:
     first, second = springs.bodies[spring]
     start = "ground" if first == GROUND else str(placed[first].name)
     name = f"{start}-{placed[second].name}"
+    if len(springs.face[spring]):
+        return name, springs.axes[spring, 0], springs.face[spring]
     between = [placed[b] for b in (first, second) if b != GROUND]
+    _require_boxes(name, between)
     point = springs.position[spring]
     axes = _oriented(springs.axes[spring], point, between)
     common = _overlap(axes, point, between, name)
@@ -103,6 +107,15 @@ def _contact(network: Network, spring: int) -> tuple[str, Floats, Floats]:
         thickness=float(springs.thickness[spring]),
     ).require_touching()
     return name, axes[0], np.asarray(point + common @ axes[1:])
+
+
+def _require_boxes(name: str, between: list[Brick]) -> None:
+    """Raise an error if faces cannot be told from the shapes of bricks."""
+    for brick in between:
+        if brick.shape is not None:
+            raise SceneError(
+                f"joint {name}: brick {brick.name} is no box and the joint has no face; give it one"
+            )
 
 
 def _oriented(axes: Floats, point: Floats, between: list[Brick]) -> Floats:

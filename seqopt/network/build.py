@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from seqopt.arrays import Ints
+from seqopt.arrays import Floats, Ints
 from seqopt.errors import SceneError
 from seqopt.network.network import GROUND, Network, PartKind, Springs
 from seqopt.scene.orders import in_order
@@ -163,8 +163,6 @@ def _arrays(
     edges: list[_Edge],
 ) -> Network:
     index = {node.name: i for i, node in enumerate(nodes)}
-    along = np.array([spring.along for spring, _ in springs])
-    across = np.array([spring.across for spring, _ in springs])
     return Network(
         scene=scene,
         springs=Springs(
@@ -173,11 +171,12 @@ def _arrays(
             node=np.array([index[name] for name in _joint_names(springs)]),
             position=np.array([spring.position for spring, _ in springs]),
             anchor=np.array([_anchor(spring) for spring, _ in springs]),
-            axes=np.stack([along, across, np.cross(along, across)], axis=1),
+            axes=_axes(springs, index_of),
             translational_stiffness=np.array([s.translational_stiffness for s, _ in springs]),
             rotational_stiffness=np.array([s.rotational_stiffness for s, _ in springs]),
             support=_support(scene, index_of, springs),
             thickness=np.array([s.thickness for s, _ in springs], dtype=float),  # None is NaN
+            face=tuple(np.array(s.corners or (), dtype=float).reshape(-1, 3) for s, _ in springs),
         ),
         node_position=np.array([node.position for node in nodes]),
         node_kind=np.array([node.kind.value for node in nodes]),
@@ -193,6 +192,17 @@ def _arrays(
         edge_spring=np.array([edge.spring for edge in edges]),
         weight=np.array([brick.mass for brick in scene.placed])[:, None] * np.array(scene.gravity),
     )
+
+
+def _axes(springs: list[tuple[Joint | Ground, int]], index_of: dict[int, int]) -> Floats:
+    """Return the axes (S, 3, 3) of springs; of one with a face the first is into its last body."""
+    along = np.array([spring.along for spring, _ in springs])
+    across = np.array([spring.across for spring, _ in springs])
+    for i, (spring, _) in enumerate(springs):
+        if isinstance(spring, Joint) and spring.face is not None:
+            first, second = (index_of[name] for name in spring.bricks)
+            along[i] *= 1.0 if first < second else -1.0
+    return np.stack([along, across, np.cross(along, across)], axis=1)
 
 
 def _support(

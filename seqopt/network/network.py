@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from seqopt.arrays import Floats, FrozenValue, Ints, frozen
+from seqopt.network.weight import shared_weight
 from seqopt.scene.scene import Scene
 
 if TYPE_CHECKING:
@@ -61,6 +62,9 @@ class Springs(FrozenValue):
         Indices of the springs that are ground ends, in the scene's order.
     thickness : (S,) float
         Of joints that say so, m; NaN for others.
+    face : tuple of (m, 3) float
+        Corners of the faces over which bodies touch, of springs that say so, m; no corners for
+        others. Their first axes then point from the first body into the second.
     """
 
     bodies: Ints
@@ -73,6 +77,7 @@ class Springs(FrozenValue):
     rotational_stiffness: Floats
     support: Ints
     thickness: Floats
+    face: tuple[Floats, ...]
 
     def acting(self, bricks: int) -> Ints:
         """Return the springs that act on a partial structure.
@@ -161,12 +166,24 @@ class Network(FrozenValue):
     @cached_property
     def centroid(self) -> Floats:
         """Centroids of the bricks in build order, (B, 3), m."""
-        return frozen(np.asarray(self.node_position[self.inner].mean(axis=1)))
+        middle = np.asarray(self.node_position[self.inner].mean(axis=1))
+        for i, brick in enumerate(self.scene.placed):
+            if brick.node_offsets is not None:
+                middle[i] = brick.position
+        return frozen(middle)
 
     @cached_property
     def inner_weight(self) -> Floats:
-        """Half of its brick's weight at every inner node, (2B, 3), N; order of ``inner``."""
-        return frozen(np.repeat(0.5 * self.weight, 2, axis=0))
+        """What of its brick's weight every inner node bears, (2B, 3), N; order of ``inner``.
+
+        Half, where nodes lie on either side of the centroid, as far. Elsewhere two forces that
+        share the weight and have its moment.
+        """
+        half = np.repeat(0.5 * self.weight, 2, axis=0)
+        for i, brick in enumerate(self.scene.placed):
+            if brick.node_offsets is not None:
+                half[2 * i : 2 * i + 2] = shared_weight(brick, self.weight[i])
+        return frozen(half)
 
     @cached_property
     def edge_axis(self) -> Floats:

@@ -14,9 +14,14 @@ from matplotlib.patheffects import withStroke
 from seqopt.arrays import Floats, Ints
 from seqopt.network.network import Network, PartKind
 from seqopt.report.occlusion import drawing_order
+from seqopt.scene.blocks import vertices_of
 from seqopt.scene.boxes import boxes
+from seqopt.scene.parts import Brick
+from seqopt.scene.shape import normal_of
 
-FACES = ((0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (1, 3, 7, 5))
+Faces = tuple[tuple[int, ...], ...]
+Color = tuple[float, float, float, float]
+FACES: Faces = ((0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (1, 3, 7, 5))
 CLAY = np.array([0.80, 0.52, 0.38])
 MARKED = np.array([0.46, 0.63, 0.76])
 INK, TENSION, COMPRESSION = "#2b2b2b", "#c8102e", "#1f5fa8"
@@ -63,7 +68,7 @@ def draw_bricks(  # noqa: PLR0913  # what is drawn, and how, each by its name
     alpha: float = 1.0,
     marked: Collection[int] = (),
 ) -> None:
-    """Draw the first bricks as shaded boxes, in place or moved.
+    """Draw the first bricks, boxes or not, shaded, in place or moved.
 
     Parameters
     ----------
@@ -84,22 +89,17 @@ def draw_bricks(  # noqa: PLR0913  # what is drawn, and how, each by its name
     marked : collection of int
         Names of bricks that are drawn in another color.
     """
-    corners = _moved(network, bricks, twist, magnify)
-    seen = corners @ view.axes().T
+    boxed = _moved(network, bricks, twist, magnify)
     polygons, colors = [], []
-    for b in drawing_order(corners, view.axes()):
-        own = MARKED if network.scene.placed[b].name in marked else CLAY
-        for face in sorted(FACES, key=lambda face: float(seen[b, list(face), 2].mean())):
-            polygons.append(seen[b, list(face), :2])
-            colors.append((*(_light(corners[b], face) * own), alpha))
-    axes.add_collection(
-        PolyCollection(
-            polygons,
-            facecolors=colors,
-            edgecolors=(0.25, 0.15, 0.1, alpha),
-            linewidths=0.4,
-        )
-    )
+    for b in drawing_order(boxed, view.axes()):
+        own = MARKED if (brick := network.scene.placed[b]).name in marked else CLAY
+        points, faces = _solid(brick, boxed[b], None if twist is None else magnify * twist[b])
+        seen = points @ view.axes().T
+        for face in _in_order(faces, seen, whole=brick.shape is None):
+            polygons.append(seen[list(face), :2])
+            red, green, blue = (_light(points, face) * own).tolist()
+            colors.append((red, green, blue, alpha))
+    _fill(axes, polygons, colors, alpha)
     _frame(axes)
 
 
@@ -249,9 +249,36 @@ def _moved(network: Network, bricks: int, twist: Floats | None, magnify: float) 
     return np.asarray(corners + magnify * (twist[:bricks, None, :3] + turned))
 
 
+def _fill(axes: Axes, polygons: list[Floats], colors: list[Color], alpha: float) -> None:
+    """Draw polygons (m, 2) with an edge around each."""
+    edge = (0.25, 0.15, 0.1, alpha)
+    axes.add_collection(
+        PolyCollection(polygons, facecolors=colors, edgecolors=edge, linewidths=0.4)
+    )
+
+
+def _solid(brick: Brick, corners: Floats, motion: Floats | None) -> tuple[Floats, Faces]:
+    """Return vertices (V, 3), m, and faces of a brick: the corners of its box, or of its shape.
+
+    Those of a shape are moved by a twist if given; those of a box are.
+    """
+    if brick.shape is None:
+        return corners, FACES
+    points, faces = vertices_of(brick)
+    if motion is not None:
+        points = points + motion[:3] + np.cross(motion[3:], points - brick.position)
+    return points, tuple(map(tuple, faces))
+
+
+def _in_order(faces: Faces, seen: Floats, *, whole: bool) -> list[tuple[int, ...]]:
+    """Return faces, as vertices (V, 3) are seen, the farthest first; turned away ones if whole."""
+    drawn = [face for face in faces if whole or normal_of(seen[list(face)])[2] > 0]
+    return sorted(drawn, key=lambda face: float(seen[list(face), 2].mean()))
+
+
 def _light(corners: Floats, face: tuple[int, ...]) -> float:
-    """Return how bright a face of corners (8, 3) is, from 0.55 to 1."""
-    normal = np.cross(corners[face[1]] - corners[face[0]], corners[face[2]] - corners[face[0]])
+    """Return how bright a face of corners (V, 3) is, from 0.55 to 1."""
+    normal = normal_of(corners[list(face)])
     return float(0.55 + 0.45 * abs(normal @ [0.3, -0.5, 0.8]) / np.linalg.norm(normal))
 
 

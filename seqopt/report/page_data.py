@@ -19,7 +19,10 @@ from seqopt.engines.interface import Engine, Want
 from seqopt.files import csv_text
 from seqopt.network.network import GROUND, Network, PartKind
 from seqopt.responses.table import force_column
+from seqopt.scene.blocks import vertices_of
 from seqopt.scene.boxes import boxes
+from seqopt.scene.scene import Scene
+from seqopt.scene.shape import normal_of
 from seqopt.sequence.steps import Step
 
 LARGEST = 32767
@@ -81,7 +84,7 @@ def structure_data(network: Network) -> dict[str, object]:
         that carry these, and the brick count from which they are there; ``grounds``; ``robots``.
     """
     scene = network.scene
-    corners = boxes(scene.placed).corners()
+    solids = _solids(scene)
     ends = [[int(i) for i in row] for row in network.edge_nodes]
     return {
         "name": scene.name,
@@ -89,8 +92,8 @@ def structure_data(network: Network) -> dict[str, object]:
             {
                 "name": brick.name,
                 "center": _rounded(network.centroid[i]),
-                "corners": _rounded(corners[i]),
-                "faces": FACES,
+                "corners": _rounded(solids[i][0]),
+                "faces": solids[i][1],
             }
             for i, brick in enumerate(scene.placed)
         ],
@@ -112,6 +115,29 @@ def structure_data(network: Network) -> dict[str, object]:
         ],
         "up": list(scene.up),
     }
+
+
+def _solids(scene: Scene) -> list[tuple[Floats, Sequence[Sequence[int]]]]:
+    """Return corners (k, 3) and faces of all bricks; the viewer draws a face as a fan."""
+    out: list[tuple[Floats, Sequence[Sequence[int]]]] = []
+    for brick, corners in zip(scene.placed, boxes(scene.placed).corners(), strict=True):
+        if brick.shape is None:
+            out.append((corners, FACES))
+            continue
+        points, faces = vertices_of(brick)
+        out.append((points, [_fan(points, tuple(face)) for face in faces]))
+    return out
+
+
+def _fan(points: Floats, face: tuple[int, ...]) -> tuple[int, ...]:
+    """Return a face from a vertex that sees all of it, if it has one."""
+    normal = normal_of(points[list(face)])
+    for k in range(len(face)):
+        turned = (*face[k:], *face[:k])
+        spokes = points[list(turned[1:])] - points[turned[0]]
+        if (np.cross(spokes[:-1], spokes[1:]) @ normal >= 0).all():
+            return turned
+    return face
 
 
 def _carried(network: Network) -> list[list[int]]:

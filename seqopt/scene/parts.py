@@ -9,17 +9,22 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from seqopt.arrays import Vector
 from seqopt.errors import SceneError
-from seqopt.scene.checks import axes, positive, printable, vector, whole, wholes
+from seqopt.scene.checks import axes, positive, printable, short, vector, whole, wholes
+from seqopt.scene.polygon import convex_polygon, rows
 from seqopt.scene.reach import Anywhere, Reach, as_reach
+from seqopt.scene.shape import Polyhedron
 
 THICKEST = 0.5  # of a joint that does not say, over the smallest dimension of its bricks
+SAME_PLACE = 1e-6  # distance that is none, over the size of a block
 
 
 @dataclass(frozen=True, kw_only=True)
 class Brick:
-    """A rigid box with two inner nodes, the centroids of its halves.
+    """A rigid box with two inner nodes, the centroids of its halves; or a block of another shape.
 
     Parameters
     ----------
@@ -30,13 +35,17 @@ class Brick:
     length_axis, width_axis : Vector
         Unit vectors along the length and the width, at right angles.
     dimensions : Vector
-        Length, width and thickness, m.
+        Length, width and thickness, m; how far a shape extends along its axes.
     density : float
         kg/m³.
     nodes : tuple of 2 int
         Numbers of the inner nodes a quarter of the length behind and before the centroid.
     placing_node : int
         The node held while the brick is placed by a robot that is on no side of the structure.
+    shape : Polyhedron, optional
+        Of a block that is no box; see `seqopt.scene.blocks.block_brick`.
+    node_offsets : tuple of 2 Vector, optional
+        Where the inner nodes are if they are elsewhere, from the centroid, m.
 
     Raises
     ------
@@ -52,6 +61,8 @@ class Brick:
     density: float
     nodes: tuple[int, int]
     placing_node: int
+    shape: Polyhedron | None = None
+    node_offsets: tuple[Vector, Vector] | None = None
 
     def __post_init__(self) -> None:
         _set(self, "name", whole("brick: its name", self.name))
@@ -75,11 +86,20 @@ class Brick:
                 f"{where}: placing_node is {self.placing_node}; "
                 f"give one of its nodes {list(self.nodes)}"
             )
+        if self.node_offsets is not None:
+            _set(self, "node_offsets", _offsets(where, self.node_offsets))
+        if self.shape is not None:
+            _check_shape(where, self)
+
+    @property
+    def volume(self) -> float:
+        """Volume, m³."""
+        return math.prod(self.dimensions) if self.shape is None else self.shape.volume
 
     @property
     def mass(self) -> float:
         """Mass, kg."""
-        return math.prod(self.dimensions) * self.density
+        return self.volume * self.density
 
     def node_position(self, node: int) -> Vector:
         """Return where one of the brick's inner nodes lies.
@@ -94,6 +114,10 @@ class Brick:
         Vector
             m.
         """
+        if self.node_offsets is not None:
+            away = self.node_offsets[self.nodes.index(node)]
+            x, y, z = (p + d for p, d in zip(self.position, away, strict=True))
+            return x, y, z
         sign = -0.25 if node == self.nodes[0] else 0.25
         step = sign * self.dimensions[0]
         x, y, z = (p + step * a for p, a in zip(self.position, self.length_axis, strict=True))
@@ -118,6 +142,10 @@ class Spring:
     thickness : float, optional
         Of what lies between the faces, m: to be given where it is more than `THICKEST` of the
         smallest dimension of the bricks; faces farther apart do not touch.
+    face : tuple of tuple of 2 float, optional
+        Corners of the convex face over which the bodies touch, once around: from ``position`` along
+        ``across`` and along the third axis, m. ``along`` then points from the first brick into the
+        second, or from the ground into its brick. By default faces follow from the boxes.
     """
 
     position: Vector
@@ -126,6 +154,7 @@ class Spring:
     translational_stiffness: Vector
     rotational_stiffness: Vector
     thickness: float | None = None
+    face: tuple[tuple[float, float], ...] | None = None
 
     def _check(self, where: str) -> None:
         _set(self, "position", vector(f"{where}: position", self.position))
@@ -136,6 +165,17 @@ class Spring:
             _set(self, name, vector(f"{where}: {name}", getattr(self, name), at_least=0.0))
         if self.thickness is not None:
             _set(self, "thickness", positive(f"{where}: thickness", self.thickness, "m"))
+        if self.face is not None:
+            _set(self, "face", convex_polygon(f"{where}: face", self.face))
+
+    @property
+    def corners(self) -> tuple[Vector, ...] | None:
+        """Corners of the face, m, if it is given."""
+        if self.face is None:
+            return None
+        sides = np.stack([self.across, np.cross(self.along, self.across)])
+        points = self.position + np.array(self.face) @ sides
+        return tuple((x, y, z) for x, y, z in points.tolist())
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -224,6 +264,34 @@ class Robot:
         printable("robot", self.name)
         _set(self, "reach", as_reach(f"robot {self.name}: reach", self.reach))
         _set(self, "payload", positive(f"robot {self.name}: payload", self.payload, "N"))
+
+
+def _offsets(where: str, given: tuple[Vector, Vector]) -> tuple[Vector, Vector]:
+    """Return where the nodes of a brick are if they are two places."""
+    found = [vector(f"{where}: node_offsets", row) for row in rows(f"{where}: node_offsets", given)]
+    if len(found) != 2 or found[0] == found[1]:
+        raise SceneError(f"{where}: node_offsets are {short(given)}; give two different points")
+    return found[0], found[1]
+
+
+def _check_shape(where: str, brick: Brick) -> None:
+    """Require a shape about the centroid that extends as far as the dimensions say."""
+    shape, size = brick.shape, max(brick.dimensions)
+    if not isinstance(shape, Polyhedron):
+        raise SceneError(f"{where}: shape is {short(shape)}; give a Polyhedron")
+    off = math.hypot(*shape.centroid.tolist())
+    if not off <= SAME_PLACE * size:
+        raise SceneError(
+            f"{where}: the centroid of its shape is {off:.3g} m from its position; give vertices "
+            "from the centroid"
+        )
+    length, width = np.array(brick.length_axis), np.array(brick.width_axis)
+    extents = shape.extents(np.stack([length, width, np.cross(length, width)]))
+    if not np.allclose(extents, brick.dimensions, rtol=0.0, atol=SAME_PLACE * size):
+        raise SceneError(
+            f"{where}: dimensions are {list(brick.dimensions)}, and its shape extends "
+            f"{[float(f'{e:.6g}') for e in extents]} along its axes; give these"
+        )
 
 
 def _set(value: object, name: str, content: object) -> None:

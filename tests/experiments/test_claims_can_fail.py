@@ -22,6 +22,7 @@ from experiments.engines import (
     frame_contrast,
     parallel,
 )
+from experiments.exchange import outside_assemblies
 from experiments.harness.catalog import claims
 from experiments.harness.plotting import RESULTS
 from experiments.peers import peers
@@ -148,6 +149,11 @@ def checks() -> dict[str, tuple[Check, Tables, Callable[..., Iterator[tuple[Any,
                 pd.read_csv(RESULTS / "mutation_survivors.csv", keep_default_na=False),
             ),
             spoil_mutation,
+        ),
+        "outside_assemblies": (
+            outside_assemblies.holds,
+            (rows("outside_assemblies"),),
+            spoil_outside,
         ),
         "paper_counterparts": (
             lambda table: not paper_counterparts.faults(numbered, table),
@@ -418,6 +424,15 @@ def spoil_witnesses(table):
     yield (spoiled(table, "rbe", "does not stand", case="bridge"),)
     yield (spoiled(table, "ours", "does not stand", case="25 at 1"),)
     yield (spoiled(table, "rbe_seconds", 1.0, case=witnesses.LARGEST),)
+
+
+def spoil_outside(table):
+    yield (spoiled(table, "outcome", "half", file="bridge.json"),)
+    yield (spoiled(table, "said", "feasible", file="bridge.json"),)
+    yield (spoiled(table, "said", "two\nlines", file="armadillo.json"),)
+    yield (spoiled(table, "falls", 1, file="bridge.json"),)
+    yield (spoiled(table, "open", 1, file="bridge.json"),)
+    yield (table[table["file"].isin(["bridge.json", "armadillo.json"])],)
 
 
 CHECKS = checks()

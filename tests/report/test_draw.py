@@ -7,9 +7,12 @@ import numpy as np
 import pytest
 
 from seqopt.engines.interface import Want
+from seqopt.network.build import build_network
 from seqopt.report.draw import View, draw_bricks, draw_grips, draw_network, draw_responses
 from seqopt.responses.table import analyze
 from seqopt.sequence.two_robots import METHODS
+from tests.blocks import with_shapes
+from tests.builders import six_bricks
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt
@@ -69,3 +72,10 @@ def test_methods_share_an_axis(engine25):
         assert line.get_xdata()[-1] == 25
     assert [line.get_label() for line in axes[0].lines] == list(METHODS)
     plt.close(figure)
+
+
+def test_blocks_of_any_shape_show_the_faces_that_look_at_the_viewer(axes):
+    network = build_network(with_shapes(six_bricks()))
+    draw_bricks(axes, network, 6, View(), twist=np.zeros((6, 6)), marked=(2,))
+    (drawn,) = axes.collections
+    assert len(drawn.get_paths()) == 6 * 3  # half of each box is turned away

@@ -18,11 +18,18 @@ from seqopt.cli.main import main
 from seqopt.engines.interface import Want
 from seqopt.errors import ProblemError
 from seqopt.files import csv_text
+from seqopt.network.build import build_network
 from seqopt.report import page
 from seqopt.report.page import report_page
 from seqopt.report.page_data import LARGEST, Build, build_data, structure_data
 from seqopt.responses.table import analyze
+from seqopt.scene.blocks import block_brick
+from seqopt.scene.face_joints import face_ground, flat_face
+from seqopt.scene.library.law import MASONRY
+from seqopt.scene.parts import Robot
+from seqopt.scene.scene import Scene
 from seqopt.sequence.two_robots import cantilever, sequential
+from tests.blocks import L_SHAPE, prism
 
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "google-chrome"))), None)
 browser = pytest.mark.skipif(BROWSER is None, reason="there is no Chromium")
@@ -176,3 +183,24 @@ def test_a_browser_shows_the_numbers_of_the_step_that_is_asked_for(engine25, bui
     broken = path.read_text("utf-8").replace('"steps":[', '"step":[')
     path.write_text(broken, "utf-8")
     assert 'data-ready="true"' not in shown(path)[0]  # the control
+
+
+def test_blocks_of_any_shape_are_drawn_as_they_are():
+    """An L is drawn as a fan from the one corner that sees all of it."""
+    brick = block_brick(1, prism(L_SHAPE), 2000.0)
+    floor = flat_face([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    scene = Scene(
+        name="L",
+        bricks=(brick,),
+        joints=(),
+        grounds=(face_ground(1, floor, MASONRY),),
+        build_order=(1,),
+        robots=(Robot(name="rob1", payload=1e6),),
+    )
+    (drawn,) = structure_data(build_network(scene))["bricks"]
+    corners = np.array(drawn["corners"])
+    area = 0.0
+    for face in drawn["faces"]:
+        spokes = corners[list(face[1:])] - corners[face[0]]
+        area += 0.5 * np.linalg.norm(np.cross(spokes[:-1], spokes[1:]), axis=1).sum()
+    assert area == pytest.approx(2 * 4.0 + 10.0)

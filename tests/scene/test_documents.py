@@ -6,9 +6,12 @@ import json
 
 import pytest
 
+from seqopt.contact.faces import bare_assembly
 from seqopt.errors import SceneError
+from seqopt.network.build import build_network
 from seqopt.scene.parts import Joint, Robot
 from seqopt.scene.scene_file import dump_scene, load_scene, parse_scene
+from tests.blocks import with_shapes
 from tests.builders import six_bricks
 
 TEXT = dump_scene(six_bricks())
@@ -78,3 +81,40 @@ def test_parts_want_whole_numbers(part, value):
 def test_a_number_of_thousands_of_digits_can_be_told():
     with pytest.raises(SceneError, match="a number of thousands of digits"):
         Robot(name="rob", payload=10**5000)
+
+
+SHAPED = dump_scene(with_shapes(six_bricks()))
+
+
+def reshaped(change):
+    document = json.loads(SHAPED)
+    change(document)
+    return json.dumps(document)
+
+
+@pytest.mark.parametrize(
+    ("change", "named"),
+    [
+        (lambda d: d["bricks"][0]["shape"].update(color="red"), r"bricks\[0\].shape.*color"),
+        (lambda d: d["bricks"][0]["shape"].pop("faces"), r"bricks\[0\].shape.*faces"),
+        (lambda d: d["bricks"][0]["shape"]["faces"].pop(), "brick 1: shape: edge"),
+        (lambda d: d["bricks"][0]["shape"]["faces"][0].reverse(), "brick 1: shape: "),
+        (lambda d: d["bricks"][0]["shape"]["faces"][0].append(10**30), "brick 1: shape: a face"),
+        (lambda d: d["bricks"][0]["shape"]["vertices"][0].pop(), "vertices"),
+        (lambda d: d["bricks"][0].update(node_offsets=[[0, 0, 0]]), "node_offsets"),
+        (lambda d: d["joints"][0].update(face=[[0, 0], [1, 0]]), r"joints\[0\].face"),
+        (lambda d: d["joints"][0].update(face=[[0, 0], [1, 0], [2, 0]]), "convex polygon"),
+        (lambda d: d["joints"][0]["face"].reverse(), "counterclockwise"),
+        (lambda d: d["joints"][0].pop("face"), ""),
+        (lambda d: d["bricks"][0].update(dimensions=[9, 9, 9]), "its shape extends"),
+    ],
+)
+def test_a_malformed_shape_gets_one_clear_line(change, named):
+    if not named:  # a joint without its face is a scene, but no contact follows from the shapes
+        scene = parse_scene(reshaped(change))
+        with pytest.raises(SceneError, match="is no box and the joint has no face"):
+            bare_assembly(build_network(scene), len(scene.bricks))
+        return
+    with pytest.raises(SceneError, match=named) as caught:
+        parse_scene(reshaped(change), "broken.json")
+    assert "\n" not in str(caught.value)

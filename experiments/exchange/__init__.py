@@ -1,0 +1,1 @@
+"""Experiments on assemblies that others made."""

@@ -1,0 +1,1 @@
+"""What claims about assemblies of others rest on."""

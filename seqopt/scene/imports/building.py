@@ -1,0 +1,239 @@
+"""Make a scene of what a file says and what the user adds; say what was assumed."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from seqopt.errors import SceneError
+from seqopt.scene.blocks import as_vectors, block_brick
+from seqopt.scene.checks import LARGEST_NUMBER, positive, short
+from seqopt.scene.face_joints import face_ground, face_joint
+from seqopt.scene.imports.content import MOST_CORNERS, UNITS, Content, FileJoint, Given
+from seqopt.scene.imports.ordering import upward_order
+from seqopt.scene.imports.tidying import Tidied, tidy_shape
+from seqopt.scene.imports.touching import GROUND, Touching, find_touching
+from seqopt.scene.library.law import MASONRY, JointLaw
+from seqopt.scene.library.laying import mobile_robots, whole_number
+from seqopt.scene.parts import Brick, Ground, Joint
+from seqopt.scene.scene import Scene
+from seqopt.scene.shape import Polyhedron
+
+STUB = 0.1  # of a ground end, over the smallest dimension of its block
+
+
+def build_scene(content: Content, given: Given, source: str) -> Scene:
+    """Return the scene of what a file and its user say.
+
+    Parameters
+    ----------
+    content : Content
+    given : Given
+    source : str
+        What the file is called, for messages and the provenance.
+
+    Returns
+    -------
+    Scene
+        What was read, mended and assumed stands in its provenance, a line each.
+
+    Raises
+    ------
+    SceneError
+        If the file lacks what the user did not give, or is no assembly that can be built.
+    FileError
+        If shapely is not installed.
+    """
+    try:
+        said = list(content.said)
+        _check_size(content)
+        content = content.scaled(_factor(content, given, said))
+        supports = _supports(content, given, said)
+        blocks = _tidied(content, supports, said)
+        bricks = _bricks(content, given, blocks, supports, said)
+        touching = find_touching(content, given, blocks, bricks)
+        said += touching.said
+        law = _law(content, given, touching, said)
+        springs = _springs(touching, bricks, law)
+        order = _order(touching, content, bricks, said)
+        robots = mobile_robots([*bricks.values()], whole_number("robots", given.robots, 1))
+    except SceneError as error:
+        raise SceneError(f"{source}: {error}") from error
+    said.append(f"{len(robots)} robots reach all and bear all; z is up")
+    return Scene(
+        name=given.name or source,
+        provenance="\n".join((f"imported from {source}", *said)),
+        bricks=tuple(bricks.values()),
+        joints=springs[0],
+        grounds=springs[1],
+        build_order=tuple(bricks[i].name for i in order),
+        robots=robots,
+    )
+
+
+def _check_size(content: Content) -> None:
+    corners = sum(len(face) for block in content.blocks for face in block.faces)
+    if not content.blocks:
+        raise SceneError("it has no blocks; give an assembly with some")
+    if corners > MOST_CORNERS:
+        raise SceneError(f"its blocks have {corners} corners; {MOST_CORNERS} is the most")
+
+
+def _factor(content: Content, given: Given, said: list[str]) -> float:
+    """Return the file's unit of length in m."""
+    if given.unit is not None and given.unit not in UNITS:
+        raise SceneError(f"unit is {short(given.unit)}; give one of {', '.join(UNITS)}")
+    if content.unit is None and given.unit is None:
+        raise SceneError(f"it does not say its unit of length; give one of {', '.join(UNITS)}")
+    if content.unit is not None and given.unit not in (None, content.unit):
+        raise SceneError(f"its lengths are known in {content.unit}; give no other unit")
+    if content.unit is None:
+        said.append(f"lengths are in {given.unit}, as given")
+    return UNITS[content.unit or given.unit or "m"]
+
+
+def _supports(content: Content, given: Given, said: list[str]) -> set[int]:
+    """Return the places of the blocks that are the ground."""
+    place = {block.key: i for i, block in enumerate(content.blocks)}
+    if given.supports is None:
+        keys = [block.key for block in content.blocks if block.support]
+        origin = "as the file says"
+    else:
+        keys, origin = [*given.supports], "as given"
+    unknown = [key for key in keys if key not in place]
+    if unknown:
+        known = short(", ".join(place), 200)
+        raise SceneError(f"there is no block {short(unknown[0])}; known are {known}")
+    if keys:
+        shown = ", ".join(keys[:8])
+        more = "" if len(keys) <= 8 else f" and {len(keys) - 8} more"
+        said.append(f"supports are blocks {shown}{more}, {origin}: the ground")
+    if len({place[key] for key in keys}) == len(place):
+        raise SceneError("all blocks are supports; leave one to be built")
+    return {place[key] for key in keys}
+
+
+def _tidied(content: Content, supports: set[int], said: list[str]) -> list[Tidied]:
+    """Return the blocks as polyhedra, and say what was mended."""
+    blocks = [tidy_shape(b, may_be_open=i in supports) for i, b in enumerate(content.blocks)]
+    total = sum((block.mended for block in blocks), Counter[str]())
+    said += [f"{text}: {count}" for text, count in total.items()]
+    return blocks
+
+
+def _bricks(
+    content: Content,
+    given: Given,
+    blocks: Sequence[Tidied],
+    supports: set[int],
+    said: list[str],
+) -> dict[int, Brick]:
+    """Return the bricks of the blocks that are built, by their places in the file."""
+    numbers = _numbers([block.key for block in content.blocks], said)
+    density = None if given.density is None else positive("density", given.density, "kg/m³")
+    silent = [
+        block.key
+        for i, block in enumerate(content.blocks)
+        if block.density is None and i not in supports
+    ]
+    if silent and density is None:
+        raise SceneError(f"block {silent[0]} has no density; give one in kg/m³")
+    if silent:
+        said.append(f"density of {len(silent)} blocks is {density:g} kg/m³, as given")
+    return {
+        i: block_brick(numbers[i], block.solid, content.blocks[i].density or density or 0.0)
+        for i, block in enumerate(blocks)
+        if i not in supports and isinstance(block.solid, Polyhedron)
+    }
+
+
+def _numbers(keys: Sequence[str], said: list[str]) -> list[int]:
+    """Return numbers for blocks: their keys where these are numbers, else from 1."""
+    if all(key.isascii() and key.isdigit() and len(key) < 10 for key in keys):
+        found = [int(key) for key in keys]
+        if len(set(found)) == len(keys) and max(found) < LARGEST_NUMBER // 4:
+            return found
+    said.append("blocks are numbered from 1 in the file's order")
+    return [*range(1, len(keys) + 1)]
+
+
+def _law(content: Content, given: Given, touching: Touching, said: list[str]) -> JointLaw:
+    law = given.law or content.law or MASONRY
+    if touching.faces or any(joint.translational is None for joint in touching.joints):
+        origin = "as given" if given.law else "of the file" if content.law else "by default"
+        along, across, _ = law.translational
+        said.append(f"joints are {along:g} and {across:g} N/m³ stiff along and across, {origin}")
+    return law
+
+
+def _springs(
+    touching: Touching, bricks: Mapping[int, Brick], law: JointLaw
+) -> tuple[tuple[Joint, ...], tuple[Ground, ...]]:
+    """Return the joints and ground ends where blocks touch."""
+    made: list[Joint | Ground] = []
+    for (a, b), face in touching.faces:
+        last = bricks[b]
+        if a == GROUND:
+            made.append(face_ground(last.name, face, law, STUB * min(last.dimensions)))
+        else:
+            made.append(face_joint((bricks[a].name, last.name), face, law))
+    made += [_faceless(joint, bricks, law) for joint in touching.joints]
+    grounds = tuple(spring for spring in made if isinstance(spring, Ground))
+    if not grounds:
+        raise SceneError(
+            "no block stands on the ground: none is marked as a support, and none has a level face "
+            "at the bottom; name supports"
+        )
+    return tuple(spring for spring in made if isinstance(spring, Joint)), grounds
+
+
+def _faceless(joint: FileJoint, bricks: Mapping[int, Brick], law: JointLaw) -> Joint | Ground:
+    """Return a joint, or a ground end, that has no face."""
+    a, b = joint.blocks
+    shift, turn = law.stiffness(joint.side**2, (joint.side**4 / 12,) * 2)
+    side = np.cross(joint.along, np.eye(3)[int(np.abs(joint.along).argmin())])
+    side /= np.linalg.norm(side)
+    position, along, across = as_vectors(np.stack([joint.position, joint.along, side]))
+    shift, turn = joint.translational or shift, joint.rotational or turn
+    if a != GROUND:
+        return Joint(
+            bricks=(bricks[a].name, bricks[b].name),
+            position=position,
+            along=along,
+            across=across,
+            translational_stiffness=shift,
+            rotational_stiffness=turn,
+        )
+    behind = joint.position - STUB * min(bricks[b].dimensions) * joint.along
+    return Ground(
+        brick=bricks[b].name,
+        position=position,
+        along=along,
+        across=across,
+        translational_stiffness=shift,
+        rotational_stiffness=turn,
+        anchor=as_vectors(behind[None])[0],
+    )
+
+
+def _order(
+    touching: Touching, content: Content, bricks: Mapping[int, Brick], said: list[str]
+) -> list[int]:
+    """Return the places of the bricks in the order of building."""
+    places = [*bricks]
+    row = {i: k for k, i in enumerate(places)}
+    courses = [content.blocks[i].course for i in places]
+    known = None not in courses
+    heights = [round(bricks[i].position[2], 6) for i in places]
+    said.append(
+        "the build goes by the file's courses" if known else "the build goes from the bottom up"
+    )
+    order = upward_order(
+        [(c or 0.0 if known else 0.0, h) for c, h in zip(courses, heights, strict=True)],
+        [(row[a], row[b]) for a, b in touching.pairs if a != GROUND],
+        [row[b] for a, b in touching.pairs if a == GROUND],
+        [content.blocks[i].key for i in places],
+    )
+    return [places[k] for k in order]

@@ -1,0 +1,202 @@
+"""Data of COMPAS as all of its packages write them: meshes, frames, boxes, transformations."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from seqopt.arrays import Floats
+from seqopt.errors import SceneError
+from seqopt.scene.blocks import BOX_CORNERS, BOX_FACES
+from seqopt.scene.checks import short
+from seqopt.scene.imports.documents import entry, listing, mapping, number, point
+
+Solid = tuple[Floats, list[list[int]]]
+
+
+def payload(value: Any) -> Any:
+    """Return what a serialized object holds, under whichever key its version uses.
+
+    Parameters
+    ----------
+    value : object
+
+    Returns
+    -------
+    object
+        Itself, if it wraps nothing.
+    """
+    for _ in range(4):
+        if not isinstance(value, dict):
+            break
+        inner = next((value[key] for key in ("data", "value") if key in value), None)
+        if not isinstance(inner, dict | list):
+            break
+        value = inner
+    return value
+
+
+def kind(value: Any) -> str:
+    """Return the last part of what a serialized object says that it is, in small letters.
+
+    Parameters
+    ----------
+    value : object
+
+    Returns
+    -------
+    str
+        Empty if it says nothing.
+    """
+    name = value.get("dtype") if isinstance(value, dict) else None
+    return name.rsplit("/", 1)[-1].lower() if isinstance(name, str) else ""
+
+
+def mesh(where: str, value: Any) -> Solid:
+    """Return the vertices and faces of a mesh.
+
+    Parameters
+    ----------
+    where : str
+        What it is, for messages.
+    value : object
+        With ``vertex`` and ``face``, as `compas.datastructures.Mesh` writes them, or with
+        ``vertices`` and ``faces``, as `compas.geometry.Polyhedron` does; or a box.
+
+    Returns
+    -------
+    vertices : (V, 3) float
+    faces : list of list of int
+        Places among the vertices.
+
+    Raises
+    ------
+    SceneError
+        If it is none.
+    """
+    held = payload(value)
+    if isinstance(held, dict) and {"xsize", "ysize", "zsize"} <= set(held):
+        return _box(where, held)
+    if isinstance(held, dict) and "vertices" in held:
+        rows = [point(f"{where}: a vertex", row) for row in listing(where, held["vertices"])]
+        sides = listing(where, entry(where, held, "faces"))
+        return np.array(rows).reshape(-1, 3), [_places(where, side, None) for side in sides]
+    return _halfedge(where, held)
+
+
+def _halfedge(where: str, held: Any) -> Solid:
+    """Return a mesh whose vertices and faces have keys."""
+    vertex = mapping(f"{where}: vertex", entry(where, held, "vertex"))
+    face = mapping(f"{where}: face", entry(where, held, "face"))
+    place = {key: i for i, key in enumerate(vertex)}
+    rows = [
+        [number(f"{where}: vertex {key}", mapping(where, v).get(axis, 0.0)) for axis in "xyz"]
+        for key, v in vertex.items()
+    ]
+    return np.array(rows).reshape(-1, 3), [
+        _places(f"{where}: face {key}", side, place) for key, side in face.items()
+    ]
+
+
+def _places(where: str, side: Any, place: dict[str, int] | None) -> list[int]:
+    """Return the places of a face's vertices; a vertex that closes the circle is left out."""
+    keys = listing(where, side)
+    out = []
+    for key in keys:
+        named = place.get(str(key)) if place is not None else key
+        if not isinstance(named, int) or isinstance(named, bool):
+            raise SceneError(f"{where}: there is no vertex {short(key)}")
+        out.append(named)
+    return out[:-1] if len(out) > 1 and out[0] == out[-1] else out
+
+
+def _box(where: str, held: dict[str, Any]) -> Solid:
+    """Return a box, whose frame is in its middle."""
+    size = [number(f"{where}: {key}", held[key]) for key in ("xsize", "ysize", "zsize")]
+    origin, axes = frame(where, held.get("frame"))
+    return origin + 0.5 * (BOX_CORNERS * size) @ axes, [list(face) for face in BOX_FACES]
+
+
+def frame(where: str, value: Any) -> tuple[Floats, Floats]:
+    """Return a frame.
+
+    Parameters
+    ----------
+    where : str
+        What it is, for messages.
+    value : object
+        With ``point``, ``xaxis`` and ``yaxis``; the world's if None.
+
+    Returns
+    -------
+    origin : (3,) float
+    axes : (3, 3) float
+        Rows are unit vectors.
+
+    Raises
+    ------
+    SceneError
+        If it is none.
+    """
+    if value is None:
+        return np.zeros(3), np.eye(3)
+    held = payload(value)
+    origin = point(f"{where}: point", entry(where, held, "point"))
+    first = point(f"{where}: xaxis", entry(where, held, "xaxis"))
+    second = point(f"{where}: yaxis", entry(where, held, "yaxis"))
+    third = np.cross(first, second)
+    sizes = [float(np.linalg.norm(axis)) for axis in (first, third)]
+    if not min(sizes) > 0:
+        raise SceneError(f"{where}: xaxis and yaxis span no plane")
+    first, third = first / sizes[0], third / sizes[1]
+    return origin, np.stack([first, np.cross(third, first), third])
+
+
+def transformation(where: str, value: Any) -> Floats:
+    """Return a transformation.
+
+    Parameters
+    ----------
+    where : str
+        What it is, for messages.
+    value : object
+        With a ``matrix``, or a matrix; none if None.
+
+    Returns
+    -------
+    (4, 4) float
+
+    Raises
+    ------
+    SceneError
+        If it is none.
+    """
+    if value is None:
+        return np.eye(4)
+    held = payload(value)
+    if isinstance(held, dict) and "matrix" not in held and "point" in held:
+        origin, axes = frame(where, held)
+        out = np.eye(4)
+        out[:3, :3], out[:3, 3] = axes.T, origin
+        return out
+    rows = listing(where, held["matrix"] if isinstance(held, dict) and "matrix" in held else held)
+    matrix = [[number(where, x) for x in listing(where, row)] for row in rows]
+    if [len(row) for row in matrix] != [4] * 4:
+        raise SceneError(f"{where} is {short(value)}; a matrix of four by four is expected")
+    return np.array(matrix)
+
+
+def moved(points: Floats, matrix: Floats) -> Floats:
+    """Return points after a transformation.
+
+    Parameters
+    ----------
+    points : (k, 3) float
+    matrix : (4, 4) float
+
+    Returns
+    -------
+    (k, 3) float
+    """
+    return np.asarray(points @ matrix[:3, :3].T + matrix[:3, 3])

@@ -1,0 +1,164 @@
+"""Where the blocks of a file touch each other and the ground: its own faces, or those found."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from importlib import import_module
+
+import numpy as np
+
+from seqopt.arrays import Floats
+from seqopt.scene.checks import positive
+from seqopt.scene.detection import (
+    OPPOSED,
+    Surface,
+    convex_pieces,
+    require_polygons,
+    touching_faces,
+)
+from seqopt.scene.face_joints import FlatFace, flat_face
+from seqopt.scene.imports.content import Content, FileJoint, Given
+from seqopt.scene.imports.tidying import Tidied
+from seqopt.scene.parts import Brick
+from seqopt.scene.shape import Polyhedron
+
+GAP = 0.05  # between faces that touch, over the thinnest block
+ASIDE = 1e-2  # how far beside a face a point is that tells on which side of it a block lies
+GROUND = -1
+DOWN = np.array([0.0, 0.0, -1.0])
+
+Shape = Polyhedron | Surface
+Held = tuple[tuple[int, int], FlatFace]
+
+
+@dataclass(frozen=True)
+class Touching:
+    """Where blocks touch each other and the ground.
+
+    Attributes
+    ----------
+    faces : tuple of ((int, int), FlatFace)
+        Places of the blocks in the file, the ground is -1 and comes first; normals point into the
+        second.
+    joints : tuple of FileJoint
+        Those without a face.
+    said : tuple of str
+        Where they come from.
+    """
+
+    faces: tuple[Held, ...]
+    joints: tuple[FileJoint, ...]
+    said: tuple[str, ...]
+
+    @property
+    def pairs(self) -> list[tuple[int, int]]:
+        """Which touch each other."""
+        return [*(pair for pair, _ in self.faces), *(joint.blocks for joint in self.joints)]
+
+
+def find_touching(
+    content: Content, given: Given, blocks: Sequence[Tidied], bricks: Mapping[int, Brick]
+) -> Touching:
+    """Return where blocks touch each other and the ground.
+
+    Parameters
+    ----------
+    content : Content
+        In m.
+    given : Given
+    blocks : sequence of Tidied
+        All of the file.
+    bricks : mapping of int to Brick
+        Those that are built, by their places in the file; others are the ground.
+
+    Returns
+    -------
+    Touching
+
+    Raises
+    ------
+    FileError
+        If shapely is not installed.
+    """
+    require_polygons("finding where blocks touch")
+    solids, facets = [block.solid for block in blocks], [block.facets for block in blocks]
+    thin = min(min(brick.dimensions) for brick in bricks.values())
+    gap = GAP * thin if given.gap is None else positive("gap", given.gap, "m")
+    if content.faces and not given.detect:
+        found = [*_file_faces(content, solids)]
+        said = [f"faces are those of the file: {len(content.faces)}"]
+    elif content.joints and all(joint.translational for joint in content.joints):
+        found, said = [], ["joints are those of a frame; none has a face"]
+    else:
+        found = [(f.blocks, flat_face(f.corners, f.normal)) for f in touching_faces(facets, gap)]
+        said = [f"faces are found where blocks are no more than {1e3 * gap:.3g} mm apart"]
+    faces = [held for pair, face in found for held in _on_ground(pair, face, bricks)]
+    known = {frozenset(pair) for pair, _ in faces}
+    joints = [joint for joint in content.joints if frozenset(joint.blocks) not in known]
+    if joints and found:
+        said.append(f"joints of the file between blocks without a face: {len(joints)}")
+    everywhere = len(bricks) == len(solids)
+    if everywhere and not any(GROUND in joint.blocks for joint in joints):
+        standing = [*_standing(bricks, facets, gap)]
+        faces += standing
+        said.append("no supports are named: blocks with a face at the lowest level stand there")
+    return Touching(tuple(faces), tuple(joints), tuple(said))
+
+
+def _on_ground(pair: tuple[int, int], face: FlatFace, bricks: Mapping[int, Brick]) -> list[Held]:
+    """Return a face between blocks, supports among them as the ground; none between supports."""
+    a, b = (i if i in bricks else GROUND for i in pair)
+    if a == b == GROUND:
+        return []
+    if b == GROUND:
+        turned = flat_face(face.center + face.corners @ face.axes[1:], -face.axes[0])
+        return [((GROUND, a), turned)]
+    return [((a, b), face)]
+
+
+def _file_faces(content: Content, solids: Sequence[Shape]) -> Iterator[Held]:
+    """Yield the faces of a file, in convex pieces, their normals into the second block."""
+    shapely = import_module("shapely")
+    for held in content.faces:
+        a, b = held.blocks
+        if a == b or len(held.corners) < 3:
+            continue
+        plane = flat_face(held.corners)
+        polygon = shapely.make_valid(shapely.Polygon(plane.corners))
+        parts = [p for p in getattr(polygon, "geoms", [polygon]) if p.geom_type == "Polygon"]
+        for piece in convex_pieces(parts):
+            corners = plane.center + piece @ plane.axes[1:]
+            yield (a, b), flat_face(corners, _into(corners, plane.axes[0], solids[a], solids[b]))
+
+
+def _into(corners: Floats, normal: Floats, first: Shape, second: Shape) -> Floats:
+    """Return the normal of a face that points from the first block into the second."""
+    middle = corners.mean(axis=0)
+    step = ASIDE * np.linalg.norm(np.ptp(corners, axis=0)) * normal
+    ahead = _holds(second, middle + step) + _holds(first, middle - step)
+    behind = _holds(second, middle - step) + _holds(first, middle + step)
+    if ahead == behind:  # a thin block, or one that is not where its face is
+        toward = second.points.mean(axis=0) - first.points.mean(axis=0)
+        return normal if toward @ normal >= 0 else -normal
+    return normal if ahead > behind else -normal
+
+
+def _holds(solid: Shape, point: Floats) -> bool:
+    return isinstance(solid, Polyhedron) and solid.contains(point)
+
+
+def _standing(bricks: Mapping[int, Brick], solids: Sequence[Shape], gap: float) -> Iterator[Held]:
+    """Yield the faces of blocks at the lowest level, their normals into the blocks."""
+    level = min(float(solids[i].points[:, 2].min()) for i in bricks)
+    shapely = import_module("shapely")
+    for i in bricks:
+        low = []
+        for face in solids[i].faces:
+            corners = solids[i].points[list(face)]
+            flat = flat_face(corners)
+            if flat.axes[0] @ DOWN > OPPOSED and corners[:, 2].max() <= level + gap:
+                low.append(shapely.Polygon(corners[:, :2]))
+        for piece in convex_pieces(low) if low else ():
+            height = np.full((len(piece), 1), level)
+            yield (GROUND, i), flat_face(np.hstack([piece, height]), -DOWN)

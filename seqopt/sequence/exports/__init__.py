@@ -1,0 +1,14 @@
+"""Plans in formats of others: tables, JSON, COMPAS, sequencer_benchmark.
+
+>>> import seqopt
+>>> from seqopt.sequence.exports import export_plan
+>>> scene = seqopt.load_scene("arch25")
+>>> steps = seqopt.sequential(seqopt.build_network(scene))
+>>> export_plan(scene, steps, "csv").splitlines()[0][:40]
+'step,type,bricks,placed,rob1_node,rob1_b'
+"""
+
+from seqopt.sequence.exports.formats import EXPORTS, export_plan, read_folder
+from seqopt.sequence.exports.states import BlockState, step_states
+
+__all__ = ["EXPORTS", "BlockState", "export_plan", "read_folder", "step_states"]

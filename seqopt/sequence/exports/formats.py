@@ -1,0 +1,101 @@
+"""Formats in which a plan goes out, and the plan of a folder that `seqopt optimize` wrote."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from seqopt.errors import FileError, StepError
+from seqopt.files import read_text
+from seqopt.scene.checks import short
+from seqopt.scene.imports.documents import parse_json
+from seqopt.scene.scene import Scene
+from seqopt.scene.scene_file import load_scene
+from seqopt.sequence.exports.compas_plans import compas_assembly, timber_plan
+from seqopt.sequence.exports.sequencer import sequencer_json
+from seqopt.sequence.exports.tables import plan_csv, plan_json
+from seqopt.sequence.plan_file import read_plan
+from seqopt.sequence.steps import Step
+
+PLAIN: dict[str, Callable[[Scene, Sequence[Step]], str]] = {
+    "csv": plan_csv,
+    "json": plan_json,
+    "sequencer": sequencer_json,
+}
+WITH_SOURCE: dict[str, Callable[[Scene, Sequence[Step], object], str]] = {
+    "compas_timber": timber_plan,
+    "compas_assembly": compas_assembly,
+}
+EXPORTS = (*PLAIN, *WITH_SOURCE)
+
+
+def export_plan(
+    scene: Scene, steps: Sequence[Step], form: str, source: str | Path | None = None
+) -> str:
+    """Return a plan in a format of others.
+
+    Parameters
+    ----------
+    scene : Scene
+    steps : sequence of Step
+        Of a plan for the scene.
+    form : str
+        One of `EXPORTS`.
+    source : str or pathlib.Path, optional
+        The file from which the scene was imported, for formats of COMPAS: the plan then names its
+        elements, or is written into it.
+
+    Returns
+    -------
+    str
+
+    Raises
+    ------
+    StepError
+        If there is no such format, or the source is not of this scene.
+    FileError
+        If the source cannot be read.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> scene = seqopt.load_scene("arch25")
+    >>> steps = seqopt.sequential(seqopt.build_network(scene))
+    >>> export_plan(scene, steps[:2], "sequencer")[:46]
+    '{"assembly_sequence": [{"installPartIDs": [1],'
+    """
+    if form not in EXPORTS:
+        raise StepError(f"format is {short(form)}; give one of {', '.join(EXPORTS)}")
+    if form in PLAIN and source is not None:
+        raise StepError(f"format {form} takes no source; leave it out")
+    if form in PLAIN:
+        return PLAIN[form](scene, steps)
+    document = None if source is None else parse_json(read_text(Path(source)), str(source))
+    return WITH_SOURCE[form](scene, steps, document)
+
+
+def read_folder(folder: Path) -> tuple[Scene, tuple[Step, ...]]:
+    """Return the scene and the steps of a plan's folder.
+
+    Parameters
+    ----------
+    folder : pathlib.Path
+        As ``seqopt optimize`` writes it, with ``scene.json`` and ``plan.csv``.
+
+    Returns
+    -------
+    scene : Scene
+    steps : tuple of Step
+
+    Raises
+    ------
+    FileError
+        If a file is missing.
+    SceneError, StepError
+        If one is wrong.
+    """
+    for name in ("scene.json", "plan.csv"):
+        if not (folder / name).is_file():
+            raise FileError(f"{folder}: it has no {name}; give a folder of seqopt optimize --out")
+    scene = load_scene(folder / "scene.json")
+    return scene, read_plan(scene, folder / "plan.csv")

@@ -1,0 +1,123 @@
+"""Files of others, read without COMPAS, against COMPAS and compas_cra themselves (extra witness).
+
+The samples ship with compas_cra 0.8 (ETH Zurich, Block Research Group, MIT license).
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from experiments.stability.parts.witness_cra import SAMPLES, force_only, sample_scene
+from seqopt.contact.faces import bare_assembly
+from seqopt.contact.mortar import Mortar
+from seqopt.network.build import build_network
+from seqopt.scene.face_joints import flat_face
+from seqopt.scene.imports.content import Given
+from seqopt.scene.imports.formats import import_scene
+from seqopt.sequence.exports.formats import export_plan
+from seqopt.sequence.two_robots import METHODS
+from seqopt.stability.assessment import Verdict, assess
+
+compas = pytest.importorskip("compas")
+compas_cra = pytest.importorskip("compas_cra")
+FOLDER = Path(compas_cra.SAMPLE)
+SMALL = sorted(set(SAMPLES) - {"armadillo_cra"})
+
+
+def imported(name, **more):
+    supports = [str(i) for i in SAMPLES[name].supports] or None
+    gap = SAMPLES[name].distance if name == "snake" else None
+    given = Given(unit="m", density=2000.0, supports=supports, gap=gap, **more)
+    return import_scene(FOLDER / f"{name}.json", given=given)
+
+
+def structure(scene):
+    return bare_assembly(build_network(scene), len(scene.bricks))
+
+
+@pytest.mark.parametrize("name", SMALL)
+def test_blocks_and_faces_are_those_of_compas_cra(name):
+    """Volumes, and areas of faces that we and compas_cra find or that the file has."""
+    scene, theirs = imported(name), sample_scene(name)
+    assert len(scene.bricks) == len(theirs.free)
+    volume = sum(brick.mass for brick in scene.bricks) / 2000.0
+    assert volume == pytest.approx(theirs.volume, rel=2e-3)  # faces that are not flat
+    area = sum(flat_face(touch.corner).area for touch in theirs.touches)
+    assert structure(scene).area.sum() == pytest.approx(area, rel=1e-6)
+
+
+@pytest.mark.parametrize("name", ["bridge", "shelf-stable", "A", "H", "type-a", "snake"])
+def test_verdicts_are_those_of_compas_cra(name):
+    friction = SAMPLES[name].friction
+    mine = assess(structure(imported(name)), Mortar(friction=friction))
+    assert mine.verdict is force_only(sample_scene(name), friction).verdict is Verdict.STANDS
+
+
+def test_too_little_friction_falls_for_both():
+    """The bridge needs a coefficient of 0.073."""
+    mine = assess(structure(imported("bridge")), Mortar(friction=0.05))
+    assert mine.verdict is force_only(sample_scene("bridge"), 0.05).verdict is Verdict.FALLS
+
+
+@pytest.mark.slow
+def test_armadillo_on_its_true_faces():
+    """366 blocks on 33 supports, 1,014 faces."""
+    scene, friction = imported("armadillo_cra"), SAMPLES["armadillo_cra"].friction
+    found = structure(scene)
+    assert (len(scene.bricks), len(found.area)) == (366, 1014)
+    sizes = sum(flat_face(touch.corner).area for touch in sample_scene("armadillo_cra").touches)
+    assert found.area.sum() == pytest.approx(sizes, rel=1e-5)
+    mine = assess(found, Mortar(friction=friction))
+    assert mine.verdict is force_only(sample_scene("armadillo_cra"), friction).verdict
+    assert mine.verdict is Verdict.STANDS
+
+
+@pytest.mark.slow
+def test_faces_of_the_armadillo_are_found_where_the_file_has_them():
+    """Its blocks are warped; two thirds of them touch within a millimeter, nearly all within 3."""
+    held, found = (structure(imported("armadillo_cra", detect=d)) for d in (False, True))
+    assert found.area.sum() == pytest.approx(held.area.sum(), rel=0.04)
+    assert len(found.area) == pytest.approx(len(held.area), rel=0.04)
+
+
+def test_a_plan_goes_back_into_the_assembly(tmp_path):
+    """COMPAS loads it; blocks stay, and every one that is built says when."""
+    scene = imported("bridge")
+    steps = METHODS["sequential"](build_network(scene), ())
+    path = tmp_path / "back.json"
+    path.write_text(export_plan(scene, steps, "compas_assembly", FOLDER / "bridge.json"), "utf-8")
+    back = compas.json_load(path)
+    graph = back.graph
+    assert graph.number_of_nodes() == 16
+    order = {int(node): graph.node_attribute(node, "order") for node in graph.nodes()}
+    built = {name: place for name, place in order.items() if place is not None}
+    assert sorted(built, key=built.get) == list(scene.build_order)
+    assert len(graph.attributes["plan"]) == len(steps)
+    again = import_scene(path, given=Given(unit="m", density=2000.0, supports=["0", "1"]))
+    assert [brick.mass for brick in again.bricks] == [brick.mass for brick in scene.bricks]
+
+
+def test_a_scene_goes_out_as_an_assembly_and_comes_back(tmp_path):
+    """Without a source: blocks, and the faces between them, are written anew."""
+    scene = imported("shelf-stable")
+    steps = METHODS["sequential"](build_network(scene), ())
+    path = tmp_path / "out.json"
+    path.write_text(export_plan(scene, steps, "compas_assembly"), encoding="utf-8")
+    theirs = compas.json_load(path)
+    assert theirs.graph.number_of_nodes() == len(scene.bricks) + 1  # and the ground
+    blocks = [theirs.graph.node_attribute(brick.name, "block") for brick in scene.bricks]
+    volume = sum(block.volume() for block in blocks)
+    assert volume == pytest.approx(sum(b.mass for b in scene.bricks) / 2000.0)
+    back = import_scene(path, given=Given(unit="m", density=2000.0))
+    assert back.build_order == scene.build_order
+    for one, other in zip(scene.bricks, back.bricks, strict=True):
+        assert other.mass == pytest.approx(one.mass)
+        assert other.position == pytest.approx(one.position)
+    for kind in ("joints", "grounds"):
+        one, other = (
+            sorted(spring.translational_stiffness[0] for spring in getattr(held, kind))
+            for held in (scene, back)
+        )
+        assert other == pytest.approx(one)

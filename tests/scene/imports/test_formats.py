@@ -1,0 +1,283 @@
+"""What files of others say becomes what they mean, whichever version wrote them."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+import trimesh
+
+from seqopt.errors import FileError, SceneError
+from seqopt.scene.arch import STANDARD_GRAVITY
+from seqopt.scene.imports.content import Given
+from seqopt.scene.imports.formats import import_scene
+from seqopt.scene.library.law import JointLaw
+from seqopt.scene.scene_file import dump_scene, parse_scene
+from tests.blocks import box
+from tests.documents import BOXES, DOCUMENTS, HIGH, LOW, TOP, model, obj
+
+METERS = Given(unit="m", density=2400.0)
+
+
+@pytest.fixture
+def read(tmp_path):
+    """Import a document, text or bytes under a name."""
+
+    def import_one(name, content, given=METERS, form=None):
+        path = tmp_path / name
+        if isinstance(content, bytes):
+            path.write_bytes(content)
+        else:
+            text = content if isinstance(content, str) else json.dumps(content)
+            path.write_text(text, encoding="utf-8")
+        return import_scene(path, form, given)
+
+    return import_one
+
+
+def measures(scene):
+    """Masses by name, and areas of joints and ground ends by their stiffness."""
+    masses = {brick.name: round(brick.mass, 6) for brick in scene.bricks}
+    areas = [round(spring.translational_stiffness[0] / 1.5e9, 9) for spring in scene.joints]
+    ends = [round(spring.translational_stiffness[0] / 1.5e9, 9) for spring in scene.grounds]
+    return masses, areas, ends
+
+
+@pytest.mark.parametrize(
+    ("name", "masses", "areas", "ends"),
+    [
+        ("assembly", {4: 1200.0, 7: 2400.0}, [1.0], [1.0]),
+        ("legacy", {0: 2400.0, 1: 1200.0, 2: 2400.0}, [1.0, 1.0], [2.0]),
+        ("model", {1: 1000.0, 2: 2000.0}, [1.0], [1.0]),
+        ("meshes", {0: 2400.0, 1: 1200.0, 2: 2400.0}, [1.0, 1.0], [2.0]),
+    ],
+)
+def test_blocks_faces_and_supports(read, name, masses, areas, ends):
+    scene = read(f"{name}.json", DOCUMENTS[name])
+    assert measures(scene) == (masses, areas, ends)
+    assert parse_scene(dump_scene(scene)) == scene
+    heights = [brick.position[2] for brick in scene.placed]
+    assert heights == sorted(heights)
+
+
+def test_normals_point_from_the_first_brick_into_the_second(read):
+    for name in ("assembly", "legacy", "model", "meshes"):
+        scene = read(f"{name}.json", DOCUMENTS[name])
+        place = {brick.name: np.array(brick.position) for brick in scene.bricks}
+        for joint in scene.joints:
+            a, b = joint.bricks
+            assert (place[b] - place[a]) @ joint.along > 0
+        for ground in scene.grounds:
+            assert (place[ground.brick] - ground.position) @ ground.along > 0
+
+
+def test_what_is_assumed_is_said(read):
+    said = read("tower.json", DOCUMENTS["assembly"]).provenance.splitlines()
+    assert said[0] == "imported from tower"
+    assert "lengths are in m, as given" in said
+    assert "density of 2 blocks is 2400 kg/m³, as given" in said
+    assert "supports are blocks 0, as the file says: the ground" in said
+    assert "faces are those of the file: 2" in said
+    said = read("meshes.json", DOCUMENTS["meshes"]).provenance
+    assert "faces are found where blocks are no more than 25 mm apart" in said
+    assert "blocks with a face at the lowest level stand there" in said
+
+
+def test_courses_are_the_order(read):
+    document = json.loads(json.dumps(DOCUMENTS["legacy"]))
+    assert read("a.json", document).build_order == (0, 1, 2)
+    document["assembly"]["node"]["2"]["course"] = 0
+    assert read("a.json", document).build_order == (0, 1, 2)  # it touches 1 alone
+    assert "courses" in read("a.json", document).provenance
+
+
+def test_a_transformation_of_a_block_is_applied(read):
+    shift = {"dtype": "compas.geometry/Transformation", "data": {"matrix": np.eye(4).tolist()}}
+    shift["data"]["matrix"][0][3] = 5.0
+    given = Given(unit="m", detect=True)
+    plain, moved = (read("m.json", model(shift=s), given) for s in (None, shift))
+    steps = [np.subtract(b.position, a.position) for a, b in zip(plain.bricks, moved.bricks)]  # noqa: B905
+    assert np.array(steps) == pytest.approx(np.tile([5.0, 0.0, 0.0], (2, 1)))
+
+
+def test_a_problem_brings_the_stiffness_of_its_joints(read):
+    scene = read("p.json", DOCUMENTS["problem"])
+    assert scene.joints[0].translational_stiffness == pytest.approx((1e11, 1e8, 1e8))
+    own = Given(unit="m", density=1.0, law=JointLaw(translational=(2e9, 1e9, 1e9)))
+    assert read("p.json", DOCUMENTS["problem"], own).joints[0].translational_stiffness[0] == 2e9
+
+
+def test_beams_start_at_their_frames(read):
+    """A post of 1.5 m on the center line of a sill: it stands 0.05 m over the ground."""
+    scene = read("t.json", DOCUMENTS["timber"], Given(unit="mm", density=450.0))
+    sill, post = scene.bricks
+    assert sill.position == pytest.approx((1.0, 0.0, 0.05))
+    assert post.position == pytest.approx((1.0, 0.0, 0.05 + 0.75))
+    assert post.mass == pytest.approx(450 * 1.5 * 0.1 * 0.1)
+    (joint,) = scene.joints  # the post runs into the sill: no face, but the model has a joint
+    assert joint.face is None
+    assert joint.position == pytest.approx((1.0, 0.0, 0.05))
+    assert joint.translational_stiffness[0] == pytest.approx(1.5e9 * 0.01)
+
+
+def test_bars_of_a_frame(read):
+    """Two bars of 1 cm² and sqrt(2) m: weight per volume, half of each bar's flexibility."""
+    scene = read("f.json", DOCUMENTS["frame"], Given())
+    length = np.sqrt(2)
+    weight = [brick.mass * STANDARD_GRAVITY for brick in scene.bricks]
+    assert weight == pytest.approx([78.5e3 * 1e-4 * length] * 2)
+    (joint,) = scene.joints
+    assert joint.translational_stiffness[0] == pytest.approx(2.1e11 * 1e-4 / length)
+    assert [ground.brick for ground in scene.grounds] == [0, 1]
+    end, half = scene.grounds[0], length / 2
+    assert end.translational_stiffness[0] == pytest.approx(2.1e11 * 1e-4 / half)
+    assert end.rotational_stiffness[1] == pytest.approx(2.1e11 * 0.08e-8 / half)
+
+
+def test_meshes_of_every_kind(read):
+    parts = [LOW, HIGH, TOP]
+    scene = read("wall.obj", obj(*parts))
+    assert measures(scene) == ({0: 2400.0, 1: 1200.0, 2: 2400.0}, [1.0, 1.0], [2.0])
+    assert len(scene.bricks[0].shape.faces) == 6  # polygons stay what they are
+    fans = [(f[0], f[1], f[2]) for f in LOW.faces] + [(f[0], f[2], f[3]) for f in LOW.faces]
+    mesh = trimesh.Trimesh(np.array(LOW.vertices), fans, process=False)
+    for form in ("ply", "stl", "stl_ascii"):
+        name = f"low.{form.removesuffix('_ascii')}"
+        single = read(name, mesh.export(file_type=form))
+        assert measures(single) == ({0: 2400.0}, [], [2.0])
+
+
+def test_a_table_of_boxes(read):
+    scene = read("boxes.csv", BOXES)
+    assert measures(scene) == ({2: 1200.0}, [], [1.0])
+    turned = BOXES.replace(",90,", ",45,")
+    assert read("boxes.csv", turned).bricks[0].mass == pytest.approx(1200.0)
+    names = BOXES.replace("yaw,support", "yaw,name").replace(",0,1\n", ",0,base\n")
+    assert "numbered from 1" in read("boxes.csv", names.replace(",90,", ",90,top")).provenance
+
+
+def test_units(read):
+    document = DOCUMENTS["meshes"]
+    small = read("a.json", document, Given(unit="cm", density=2400.0))
+    assert small.bricks[0].mass == pytest.approx(2400e-6)
+    with pytest.raises(SceneError, match="lengths are known in m; give no other unit"):
+        read("f.json", DOCUMENTS["frame"], Given(unit="mm"))
+
+
+def bent(index=4, by=0.01):
+    """The lowest block with a corner that is off: three faces are not flat."""
+    rows = [list(row) for row in LOW.vertices]
+    rows[index][0] += by
+    rows[index][2] += by
+    return rows
+
+
+def test_what_can_be_mended_is_mended_and_said(read):
+    faces = [list(face) for face in LOW.faces]
+    vertex = {str(i): dict(zip("xyz", row, strict=True)) for i, row in enumerate(bent())}
+    crooked = {"vertex": vertex, "face": {str(i): face for i, face in enumerate(faces)}}
+    assert "cut into triangles: 2" in read("a.json", [crooked]).provenance
+    flat = {"vertices": [list(row) for row in LOW.vertices], "faces": faces}
+    inside_out = {**flat, "faces": [face[::-1] for face in faces]}
+    assert "all agree which side is outside: 6" in read("a.json", [inside_out]).provenance
+    one_turned = {**flat, "faces": [faces[0][::-1], *faces[1:]]}
+    assert "all agree which side is outside: 1" in read("a.json", [one_turned]).provenance
+    doubled = {**flat, "faces": [*faces, *(face[::-1] for face in faces)]}
+    assert "twice are left out: 6" in read("a.json", [doubled]).provenance
+    soup = {
+        "vertices": [list(LOW.vertices[v]) for face in faces for v in face],
+        "faces": [[4 * i, 4 * i + 1, 4 * i + 2, 4 * i + 3] for i in range(6)],
+    }
+    scene = read("a.json", [soup])
+    assert "in one place are united: 16" in scene.provenance
+    assert scene.bricks[0].mass == pytest.approx(2400.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "given", "said"),
+    [
+        ("a.json", DOCUMENTS["assembly"], Given(density=1.0), "does not say its unit of length"),
+        ("a.json", DOCUMENTS["assembly"], Given(unit="m"), "block 4 has no density; give one"),
+        ("a.json", DOCUMENTS["assembly"], Given(unit="km", density=1.0), "unit is 'km'; give one"),
+        ("a.json", DOCUMENTS["assembly"], Given(unit="m", density=-1.0), "density is -1"),
+        ("a.json", DOCUMENTS["assembly"], Given(unit="m", density=1.0, robots=0), "robots is 0"),
+        (
+            "a.json",
+            DOCUMENTS["assembly"],
+            Given(unit="m", density=1.0, supports=["5"]),
+            "there is no block '5'; known are '0, 4, 7'",
+        ),
+        (
+            "a.json",
+            DOCUMENTS["assembly"],
+            Given(unit="m", density=1.0, supports=["0", "4", "7"]),
+            "all blocks are supports",
+        ),
+        (
+            "a.json",
+            DOCUMENTS["assembly"],
+            Given(unit="m", density=1.0, gap=0.0, detect=True),
+            "gap is 0",
+        ),
+        ("a.obj", obj(LOW, box((1, 1, 1), at=(0, 0, 5))), METERS, "1 blocks touch nothing"),
+        ("a.obj", "v 0 0 0\n", METERS, "it has no faces"),
+        ("a.obj", "v 0 0\n", METERS, "line 1: a vertex is '0 0'; give three numbers"),
+        ("a.obj", "v 0 0 0\nf 1 2 3\n", METERS, "line 2: there is no vertex '2'; 1 stand before"),
+        ("a.obj", "v 0 0 0\nf 1 1\n", METERS, "line 2: a face has three vertices or more"),
+        ("a.obj", obj(LOW).replace("f 4//1 3//1 2//1 1//1\n", ""), METERS, "one side only; close"),
+        ("a.stl", b"solid x\nfacet", METERS, "a.stl: "),
+        ("a.ply", b"ply\n", METERS, "no ply file that can be read"),
+        ("a.csv", "x,y,z\n1,2,3\n", METERS, "column length is missing"),
+        ("a.csv", BOXES.replace("yaw", "angle"), METERS, "column 'angle' is not known"),
+        ("a.csv", BOXES.replace(".75,", "nan,", 1), METERS, "row 2: x is 'nan'; give a number"),
+        ("a.csv", BOXES.replace("2,1,.5", "2,-1,.5"), METERS, "give positive ones"),
+        ("a.csv", BOXES.replace(",0,1", ",0,maybe"), METERS, "support is 'maybe'; give 1 or 0"),
+        ("a.csv", BOXES.splitlines()[0], METERS, "0 rows; give 1 to"),
+        ("a.dxf", "0\nSECTION\n", METERS, "its format is not known; give one of compas_assembly"),
+        ("a.json", "{", METERS, "not JSON, line 1"),
+        ("a.json", "[" * 100_000, METERS, "nested too deep"),
+        ("a.json", '{"node": NaN}', METERS, "NaN stands where a number should"),
+        ("a.json", '{"node": ' + "9" * 5000 + "}", METERS, "too many digits"),
+        ("a.json", {"format": "seqopt-scene"}, METERS, "a scene of seqopt already"),
+        ("a.json", {"stones": 3}, METERS, "no assembly that is known"),
+        ("a.json", {"dtype": "compas_dem.problem/Problem", "data": {}}, METERS, "give the model"),
+        ("a.json", {"node": {}, "edge": {}}, METERS, "it has no blocks"),
+        ("a.json", {"node": {"0": {"block": None}}}, METERS, "block 0 is None"),
+        (
+            "a.json",
+            [{"vertices": [[0, 0, 1e300]] * 4, "faces": []}],
+            METERS,
+            "a finite number up to 1e",
+        ),
+        ("a.json", [{"vertex": {}, "face": {"0": [1]}}], METERS, "there is no vertex 1"),
+    ],
+)
+def test_what_a_file_lacks_or_has_wrong_is_one_line(read, name, content, given, said):
+    with pytest.raises(SceneError, match=said.replace("(", r"\(")) as caught:
+        read(name, content, given)
+    assert "\n" not in str(caught.value)
+    assert len(str(caught.value)) < 600
+
+
+def test_what_is_no_file_or_too_large_is_refused(tmp_path, monkeypatch):
+    with pytest.raises(FileError, match="cannot read"):
+        import_scene(tmp_path / "none.json")
+    monkeypatch.setattr("seqopt.files.LARGEST_INPUT", 10)
+    path = tmp_path / "large.stl"
+    path.write_bytes(b"x" * 11)
+    with pytest.raises(FileError, match="more than"):
+        import_scene(path)
+
+
+def test_an_assembly_of_nobodys_size_is_refused(read, monkeypatch):
+    monkeypatch.setattr("seqopt.scene.imports.building.MOST_CORNERS", 60)
+    with pytest.raises(SceneError, match="its blocks have 72 corners; 60 is the most"):
+        read("a.json", DOCUMENTS["assembly"])
+
+
+def test_a_format_can_be_named(read):
+    scene = read("boxes.txt", BOXES, form="boxes")
+    assert len(scene.bricks) == 1
+    with pytest.raises(SceneError, match="format is 'dwg'; give one of"):
+        read("boxes.csv", BOXES, form="dwg")

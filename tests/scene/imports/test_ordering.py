@@ -1,0 +1,37 @@
+"""Orders in which everything touches the ground or what stands."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from seqopt.errors import SceneError
+from seqopt.scene.imports.ordering import upward_order
+
+
+@given(
+    count=st.integers(1, 12),
+    links=st.lists(st.tuples(st.integers(0, 11), st.integers(0, 11)), max_size=30),
+    rank=st.lists(st.integers(0, 5), min_size=12, max_size=12),
+)
+def test_each_touches_what_stands(count, links, rank):
+    pairs = [(a, b) for a, b in links if a < count and b < count and a != b]
+    keys = [str(i) for i in range(count)]
+    try:
+        order = upward_order([(float(r),) for r in rank[:count]], pairs, [0], keys)
+    except SceneError:
+        reached, before = {0}, set()
+        while reached != before:
+            before = set(reached)
+            reached |= {b for pair in pairs for a, b in (pair, pair[::-1]) if a in reached}
+        assert len(reached) < count
+        return
+    assert sorted(order) == list(range(count))
+    for k, i in enumerate(order):
+        assert i == 0 or any({i, j} in ({a, b} for a, b in pairs) for j in order[:k])
+
+
+def test_those_left_over_are_named():
+    with pytest.raises(SceneError, match=r"1 blocks touch nothing .* c"):
+        upward_order([(0.0,)] * 3, [(0, 1)], [0], ["a", "b", "c"])

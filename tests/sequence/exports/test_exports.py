@@ -1,0 +1,142 @@
+"""Plans in formats of others say who is absent, placed or held, and can be read again."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+
+import pytest
+
+from seqopt.errors import FileError, SceneError, StepError
+from seqopt.files import write_text
+from seqopt.network.build import build_network
+from seqopt.scene.imports.content import Given
+from seqopt.scene.imports.formats import import_scene
+from seqopt.scene.scene_file import save_scene
+from seqopt.sequence.exports.formats import EXPORTS, export_plan, read_folder
+from seqopt.sequence.exports.states import BlockState, step_states
+from seqopt.sequence.exports.tables import parse_plan_json
+from seqopt.sequence.plan_file import parse_plan
+from seqopt.sequence.two_robots import METHODS
+from tests.builders import six_bricks
+from tests.documents import DOCUMENTS
+
+SCENE = six_bricks()
+STEPS = METHODS["cantilever"](build_network(SCENE), ())
+
+
+def test_states_follow_from_what_stands_and_who_holds():
+    before = dict.fromkeys(SCENE.build_order, BlockState.ABSENT)
+    for row, step in zip(step_states(SCENE, STEPS), STEPS, strict=True):
+        held = {SCENE.brick_of_node[node].name for node in step.held}
+        standing = set(SCENE.build_order[: step.bricks])
+        assert {n for n, s in row.states.items() if s is BlockState.HELD} == held
+        assert {n for n, s in row.states.items() if s is not BlockState.ABSENT} == standing
+        assert set(row.new) == {n for n in standing if before[n] is BlockState.ABSENT}
+        before = row.states
+
+
+def test_json_comes_back_as_the_same_steps():
+    assert parse_plan_json(SCENE, export_plan(SCENE, STEPS, "json")) == STEPS
+
+
+def test_the_table_comes_back_as_the_same_steps():
+    text = export_plan(SCENE, STEPS, "csv")
+    assert parse_plan(SCENE, text, "table") == STEPS
+    rows = [*csv.DictReader(io.StringIO(text))]
+    assert [row["block_1"] for row in rows[:2]] == ["held", "held"]
+    assert rows[0]["block_6"] == "absent"
+    assert rows[0]["placed"] == "1"
+
+
+def test_a_sequence_installs_every_part_once_and_holds_what_is_held():
+    rows = json.loads(export_plan(SCENE, STEPS, "sequencer"))["assembly_sequence"]
+    assert [part for row in rows for part in row["installPartIDs"]] == list(SCENE.build_order)
+    for row, step in zip(rows, STEPS, strict=True):
+        assert row["holdPartIDs"] == sorted({SCENE.brick_of_node[n].name for n in step.held})
+
+
+@pytest.fixture
+def sources(tmp_path):
+    """Write documents; return the scenes that they become."""
+
+    def write(name):
+        path = tmp_path / f"{name}.json"
+        write_text(path, json.dumps(DOCUMENTS[name]))
+        return path, import_scene(path, given=Given(unit="m", density=2000.0))
+
+    return write
+
+
+def test_a_building_plan_names_the_elements_of_its_source(sources):
+    path, scene = sources("timber")
+    steps = METHODS["sequential"](build_network(scene), ())
+    rows = json.loads(export_plan(scene, steps, "compas_timber", path))["data"]["steps"]
+    placed = [row["data"]["element_ids"] for row in rows]
+    assert [names for names in placed if names] == [["s"], ["p"]]
+    assert {name for row in rows for name in row["data"]["elements_held"]} <= {"s", "p"}
+    own = json.loads(export_plan(scene, steps, "compas_timber"))["data"]["steps"]
+    assert own[0]["data"]["element_ids"] == ["0"]
+
+
+def test_an_assembly_keeps_all_and_gains_the_plan(sources):
+    path, scene = sources("assembly")
+    steps = METHODS["sequential"](build_network(scene), ())
+    whole = json.loads(export_plan(scene, steps, "compas_assembly", path))
+    graph = whole["data"]["graph"]["data"]
+    assert [graph["node"][key].get("order") for key in ("0", "4", "7")] == [None, 0, 1]
+    before = DOCUMENTS["assembly"]["data"]["graph"]["data"]["node"]["4"]
+    assert graph["node"]["4"]["block"] == before["block"]
+    assert graph["node"]["4"]["held"][0][0] == 1
+    assert [row["step"] for row in graph["attributes"]["plan"]] == list(range(1, len(steps) + 1))
+
+
+def test_a_folder_is_read_whole(tmp_path):
+    save_scene(SCENE, tmp_path / "scene.json")
+    with pytest.raises(FileError, match=r"it has no plan\.csv"):
+        read_folder(tmp_path)
+    write_text(tmp_path / "plan.csv", export_plan(SCENE, STEPS, "csv"))
+    assert read_folder(tmp_path) == (SCENE, STEPS)
+
+
+@pytest.mark.parametrize("form", EXPORTS)
+def test_every_format_is_text_of_a_line_or_more(form):
+    assert export_plan(SCENE, STEPS, form).endswith("\n")
+
+
+def test_what_does_not_fit_is_refused(sources, tmp_path):
+    path, _ = sources("assembly")
+    with pytest.raises(StepError, match="format is 'xml'; give one of csv"):
+        export_plan(SCENE, STEPS, "xml")
+    with pytest.raises(StepError, match="takes no source"):
+        export_plan(SCENE, STEPS, "csv", path)
+    with pytest.raises(StepError, match="the source has no block 1"):
+        export_plan(SCENE, STEPS, "compas_assembly", path)
+    with pytest.raises(SceneError, match="has no elements"):
+        export_plan(SCENE, STEPS, "compas_timber", path)
+    timber, _ = sources("timber")
+    with pytest.raises(SceneError, match="2 elements, and the scene a brick 6"):
+        export_plan(SCENE, STEPS, "compas_timber", timber)
+    meshes, _ = sources("meshes")
+    with pytest.raises(StepError, match="no assembly of compas_assembly"):
+        export_plan(SCENE, STEPS, "compas_assembly", meshes)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda d: d.update(format="x"), "format is 'x'"),
+        (lambda d: d["blocks"].reverse(), "its blocks are not those of scene"),
+        (lambda d: d["steps"][0]["holds"].update(arm={"node": 1}), "no robot 'arm'"),
+        (lambda d: d["steps"][0].pop("placed"), "no seqopt-plan document"),
+        (lambda d: d["steps"][0].update(type="throw"), "no seqopt-plan document"),
+        (lambda d: d.update(steps=3), "no seqopt-plan document"),
+        (lambda d: d["steps"].pop(0), "step 1"),
+    ],
+)
+def test_a_plan_that_is_none_is_refused(change, said):
+    document = json.loads(export_plan(SCENE, STEPS, "json"))
+    change(document)
+    with pytest.raises(StepError, match=said):
+        parse_plan_json(SCENE, json.dumps(document))
