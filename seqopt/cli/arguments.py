@@ -261,8 +261,8 @@ def _add_report(commands: Commands, parents: list[_Parser]) -> None:
         help="show plans step by step, as a page for the browser",
         description="Write a page with a step viewer of the plans in a folder: the structure in "
         "three dimensions, who holds what, axial forces, displacements and responses along the "
-        "build. It is one file and needs no network.",
-        epilog="example: seqopt report arch25 best",
+        "build. It is one file and needs no network. A scene.json in the folder is the scene.",
+        epilog="example: seqopt report best",
     )
     command.add_argument("folder", type=Path, metavar="DIR", help="folder that holds plans as CSV")
     command.add_argument(

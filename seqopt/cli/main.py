@@ -184,6 +184,9 @@ def _steps(scene: Scene, options: argparse.Namespace) -> tuple[Step, ...]:
 
 
 def _report(options: argparse.Namespace) -> None:
+    own = options.folder / "scene.json"
+    if own.is_file():  # plans go with the scene that stands beside them
+        options.scene = str(own)
     engine = asked_engine(options, build_network(asked_scene(options)))
     path = options.folder / PAGE if options.out is None else options.out
     keep_apart(options, path)
