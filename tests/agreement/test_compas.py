@@ -23,7 +23,8 @@ from seqopt.stability.assessment import Verdict, assess
 compas = pytest.importorskip("compas")
 compas_cra = pytest.importorskip("compas_cra")
 FOLDER = Path(compas_cra.SAMPLE)
-SMALL = sorted(set(SAMPLES) - {"armadillo_cra"})
+SNAKE = pytest.param("snake", marks=pytest.mark.slow)
+SMALL = [*sorted(set(SAMPLES) - {"armadillo_cra", "snake"}), SNAKE]
 
 
 def imported(name, **more):
@@ -48,7 +49,7 @@ def test_blocks_and_faces_are_those_of_compas_cra(name):
     assert structure(scene).area.sum() == pytest.approx(area, rel=1e-6)
 
 
-@pytest.mark.parametrize("name", ["bridge", "shelf-stable", "A", "H", "type-a", "snake"])
+@pytest.mark.parametrize("name", ["bridge", "shelf-stable", "A", "H", "type-a", SNAKE])
 def test_verdicts_are_those_of_compas_cra(name):
     friction = SAMPLES[name].friction
     mine = assess(structure(imported(name)), Mortar(friction=friction))

@@ -308,6 +308,7 @@ def test_optimize_with_words_of_ones_own(capsys, tmp_path):
     assert report["schedule"] == "modified-sequential"
 
 
+@pytest.mark.slow
 def test_optimize_without_proof(capsys, tmp_path):
     chosen = ("--formulation", "rank_search", "--engine", "auto")
     for folder, words in (("with", ("--option", "horizon=1")), ("without", ("--no-proof",))):

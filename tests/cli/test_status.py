@@ -73,7 +73,7 @@ def test_a_closed_stream_does_not_spoil_a_file(tmp_path):
 
 @posix
 @pytest.mark.parametrize("which", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-@pytest.mark.parametrize("after", [0.3, 1.5])
+@pytest.mark.parametrize("after", [0.3, pytest.param(1.5, marks=pytest.mark.slow)])
 def test_an_interrupt_is_one_line(tmp_path, which, after):
     words = ["optimize", "--formulation", "overlap_dp", "--engine", "frame"]  # takes minutes
     words += ["--out", str(tmp_path / "out")]

@@ -144,7 +144,7 @@ def test_what_is_only_compared_is_corrected_once_and_right_to_six_digits(monkeyp
     nodes = np.array([brick.nodes for brick in net.scene.placed])
     pairs = [(i, j) for i in (1, 2, 3) for j in (4, 6, 9)]
     sets = np.array([[nodes[-1, 1], nodes[-1 - i, 0], nodes[-1 - j, 1]] for i, j in pairs])
-    engine = ComplianceEngine(net)
+    engine = ComplianceEngine(net, accuracy=1e-13)
     exact = solve_mixed(net, bricks, grip_columns(net, bricks, sets))
     size = np.abs(exact.edge_force).max(axis=1)
     taken = {}

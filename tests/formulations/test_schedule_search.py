@@ -319,6 +319,7 @@ def test_time_and_interrupts_leave_a_plan_and_a_bound(arch, monkeypatch):
         seqopt.solve(arch, "schedule_search", speed=2)
 
 
+@pytest.mark.slow
 def test_where_memory_ends_there_is_a_bound(arch):
     best = seqopt.solve(arch, "schedule_search").selection.objective[0]
     short = seqopt.solve(replace(arch), "schedule_search", max_memory=1e6)

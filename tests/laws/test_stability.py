@@ -77,6 +77,7 @@ def test_where_the_scene_stands_changes_nothing(scene, grips):
     assert a == pytest.approx(b, rel=2e-3, abs=1e-5)
 
 
+@pytest.mark.slow
 @settings(max_examples=15)
 @given(st.lists(st.floats(-0.6, 0.6), min_size=1, max_size=4), st.floats(0.1, 1.0))
 def test_more_friction_bond_or_payload_never_hurts(offsets, friction):

@@ -88,6 +88,7 @@ def test_scales_are_those_of_the_scenes_own_methods(arch25):
         assert heavy.reference[name] == pytest.approx(2 * value)
 
 
+@pytest.mark.slow
 def test_a_method_that_falls_on_its_way_gives_no_scales():
     network = build_network(small_arch(9))
     for strength, falls in ((1.5e5, {"cantilever"}), (3e4, {*METHODS})):

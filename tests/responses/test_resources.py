@@ -164,6 +164,7 @@ def test_an_engine_is_made_once_for_a_worker(small_blocks, loop25, monkeypatch):
     assert len(made) == 1
 
 
+@pytest.mark.slow
 def test_an_engine_of_ones_own_is_sent_itself(loop25):
     expected = evaluation(ComplianceEngine(loop25.scene), loop25)
     found = evaluation(ComplianceEngine(loop25.scene), loop25, workers=2)
@@ -177,6 +178,7 @@ def test_an_engine_that_cannot_be_sent_is_refused_in_a_line(loop25):
         _ = evaluation(engine, loop25, workers=2).steps
 
 
+@pytest.mark.slow
 def test_a_network_that_is_not_its_scenes_is_not_made_anew(loop25):
     """A recipe would make another engine than this one."""
     network = build_network(loop25.scene)

@@ -160,6 +160,7 @@ def test_what_an_executor_of_others_loses_is_given_out_again():
         assert list(map_ordered(square, range(12), crew)) == WANTED
 
 
+@pytest.mark.slow
 def test_an_error_that_cannot_be_sent_is_an_error_in_a_line():
     with pytest.raises(WorkerError), hire(workers=2) as crew:
         list(map_ordered(own_error, range(3), crew))

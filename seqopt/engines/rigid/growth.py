@@ -145,8 +145,6 @@ class Growth:
         mine, rows = slice(k * brick, k * brick + k), slice(after, after + k)
         self.bricks += 1
         self._stressed(old)[:, k * self._count(brick) :] = 0.0
-        self._stressed(rows)[:] = 0.0
-        self.twist[rows, : k * brick], self.twist[old, mine] = 0.0, 0.0
         own, along = self._own_arm[brick], self._along[brick]
         flexibility = own @ self._compliance[spring] @ own.T
         if parent != GROUND:
@@ -160,6 +158,8 @@ class Growth:
             flexibility = flexibility + along @ self.twist[theirs, moved] @ along.T
             self.loss[brick] = self.loss[parent]
         else:
+            self.twist[rows, : k * brick], self.twist[old, mine] = 0.0, 0.0
+            self._stressed(rows)[:] = 0.0
             self.loss[brick] = 1.0
         self.twist[rows, mine] = flexibility
         self.wrench[rows, k * spring : k * spring + k] = -own
