@@ -16,7 +16,15 @@ import numpy as np
 from experiments.harness.plotting import HOME
 
 SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
-OPTIMIZE = ("plan.csv", "selection.csv", "responses.csv", "trace.csv", "summary.json")
+OPTIMIZE = (
+    "plan.csv",
+    "selection.csv",
+    "responses.csv",
+    "trace.csv",
+    "summary.json",
+    "scene.json",
+    "report.html",
+)
 BLOCKS = tuple(f"block{i}" for i in range(24))
 WRITER = """
 import signal

@@ -46,7 +46,6 @@ KEPT = 32e6  # bytes of operators that may stay when another is made
 CHUNK = 2048  # grip sets per pass: keeps the work arrays in the processor's cache
 ACCURACY = 1e-9  # largest error of fields over the largest of each
 SCREEN = 1e-6  # the same, of what is only to be compared
-ONCE = 10.0  # of it: after so small a correction the next is smaller than it, and is not made
 UNSEEN = 100 * np.finfo(float).eps  # largest error that was met over what is read off the equations
 EVEN = 5e-5  # softest over stiffest joint from which on pivots tell the whole error
 CANCEL = 10.0  # what the grips undo over what is left, where pivots do not
@@ -107,7 +106,7 @@ class ComplianceEngine:
             answer = keep_wanted(self._refined(bricks, columns, want), want)
             return require_finite(answer, bricks, grips)
         operator = self._operator(bricks, columns)
-        accuracy = self._accepted(want)
+        accuracy = max(SCREEN, self._accuracy) if want & Want.SCREEN else self._accuracy
         even = bricks <= self._even
         found, trusted = _answers(operator, columns, want, even=even, accuracy=accuracy)
         if self._basis is not SPACE:
@@ -143,13 +142,9 @@ class ComplianceEngine:
         """Made when the first operator is: a scene that is loose from the start has none."""
         return OperatorBuilder(self._network, self._tree, self._basis)
 
-    def _accepted(self, want: Want) -> float:
-        """Return the largest error that is accepted."""
-        return max(SCREEN, self._accuracy) if want & Want.SCREEN else self._accuracy
-
     def _refined(self, bricks: int, columns: Ints, want: Want) -> Fields:
         """Return the fields of grip sets that the operator alone does not answer well enough."""
-        largest = max(ONCE * self._accepted(want), LAST_CORRECTION)
+        largest = SCREEN if want & Want.SCREEN else LAST_CORRECTION
         operator = None
         if self._basis is SPACE and bricks <= len(self._tree.spring):
             operator = self._operator(bricks, columns)
