@@ -27,6 +27,7 @@ from seqopt.network.network import GROUND, Network
 
 TINY, ROUNDING = np.finfo(float).tiny, np.finfo(float).eps
 AT_ONCE = 2**17  # numbers changed at a time: they stay in the processor's cache
+SUMMED = 2**19  # the same, where much is done with each
 TAKEN = 1e3  # times less a brick moves in closed loops: rounding of what is gone would show
 WORSE = 10.0  # times the rounding that was left when they were summed anew
 SAMPLE = 600  # motions that are compared with each other, about
@@ -205,7 +206,7 @@ class Growth:
             )
             arm = center[brick] - center[parent] if parent != GROUND else np.zeros(3)
             ways.append((brick, parent, spring, -sign * given, self._carried(arm).T))
-        step = max(1, AT_ONCE // self._moves)
+        step = max(1, SUMMED // self._moves)
         for start in range(0, 1 + self._moves, step):
             part = slice(start, min(start + step, 1 + self._moves))
             twist = self.twist[part].reshape(part.stop - start, -1, k)
