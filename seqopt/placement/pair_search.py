@@ -132,7 +132,9 @@ def _best_known(costs: PartialCosts, formulation: Formulation, watch: Watch) -> 
 
 
 def _proven(costs: PartialCosts) -> bool:
-    return costs.best - costs.bound <= EQUAL * max(abs(costs.best), abs(costs.bound))
+    """Return whether no choice is below the best that is known; never where none is."""
+    size = max(abs(costs.best), abs(costs.bound))
+    return math.isfinite(costs.best) and costs.best - costs.bound <= EQUAL * size
 
 
 def _floor(problem: Problem, formulation: Formulation) -> float:
@@ -157,18 +159,28 @@ class _Pairs:
     def __init__(self, problem: Problem, aim: Aim, floor: float) -> None:
         self._problem, self._schedule, self._aim = problem, problem.schedule, aim
         self._each = isinstance(problem.criterion, WeightedSum | WorstRatio)  # pair by pair
-        first = search_windows(problem)
-        self._alone = first.alone
         sizes = [len(move.candidates) for move in self._schedule.moves]
-        free = [(k - 1, k) not in self._schedule.steps_of for k in range(len(sizes))]
-        rows: list[dict[int, Floats]] = [{}]
-        for k in range(1, len(sizes)):
-            whole = {before: np.zeros(sizes[k]) for before in range(sizes[k - 1])}
-            before = first.choice[k - 1]
-            met = {before: self._allowed(k, before, _own(first.shared[k], aim)[0])}
-            rows.append(whole if free[k] else met)
-        self.costs = PartialCosts(_own(first.alone, aim), tuple(rows), floor, aim)
-        self.models = sum(part.evaluation.models for part in (first.alone, *first.shared))
+        rows = [self._free(k, sizes) for k in range(len(sizes))]
+        try:
+            first = search_windows(problem)
+        except SolverError:  # move by move it is a dead end; other choices may lead on
+            steps = tuple(step for step in self._schedule.steps if len(step.moves) == 1)
+            self._alone = _of(problem, replace(self._schedule, steps=steps))
+            self.models = self._alone.evaluation.models
+        else:
+            self._alone = first.alone
+            self.models = sum(part.evaluation.models for part in (first.alone, *first.shared))
+            for k in range(1, len(sizes)):
+                before = first.choice[k - 1]
+                row = self._allowed(k, before, _own(first.shared[k], aim)[0])
+                rows[k].setdefault(before, row)
+        self.costs = PartialCosts(_own(self._alone, aim), tuple(rows), floor, aim)
+
+    def _free(self, move: int, sizes: Sequence[int]) -> dict[int, Floats]:
+        """Return the rows of a move that shares no step with the one before: nothing."""
+        if not move or (move - 1, move) in self._schedule.steps_of:
+            return {}
+        return {before: np.zeros(sizes[move]) for before in range(sizes[move - 1])}
 
     def look_until_proven(self, watch: Watch) -> None:
         """Look at more and more pairs until none could be better, or time is over."""

@@ -25,6 +25,7 @@ from seqopt.placement.problem import pose
 from seqopt.placement.ranks import Among, Ranked
 from seqopt.placement.requirements import Limit
 from seqopt.placement.solving import solve
+from seqopt.placement.window_search import search_windows
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.study.presets import EQUATIONS, WEIGHTED, WORST_RATIO
 from tests.builders import far_reaching
@@ -89,8 +90,23 @@ def test_under_a_limit(engine25):
     free = solve(posed(engine25, WEIGHTED), "overlap_dp")
     assert lazy.certificate.objective == pytest.approx(whole.certificate.objective, rel=1e-9)
     assert lazy.certificate.objective > free.certificate.objective * (1 + 1e-6)
-    with pytest.raises((InfeasibleError, SolverError)):
+    with pytest.raises(InfeasibleError):
         solve(posed(engine25, WEIGHTED, [Limit("F_largest", 1.0)]), "overlap_dp", lazy=True)
+
+
+@pytest.mark.parametrize("name", ["overlap_dp", "minimax"])
+def test_where_choices_move_by_move_end_others_are_found(engine25, name):
+    limits = [Limit("T_max", 65.0)]
+    with pytest.raises(SolverError, match="no allowed grip after the choices before it"):
+        search_windows(posed(engine25, WEIGHTED, limits))
+    lazy = solve(posed(engine25, WEIGHTED, limits), name, lazy=True)
+    whole = solve(posed(engine25, WEIGHTED, limits), name)
+    assert lazy.certificate.objective == pytest.approx(whole.certificate.objective, rel=1e-9)
+    assert lazy.certificate.gap <= 1e-9
+    with pytest.raises(SolverError, match="it ended before any choice was met"):
+        solve(posed(engine25, WEIGHTED, limits), name, lazy=True, time_limit=0)
+    with pytest.raises(InfeasibleError):
+        solve(posed(engine25, WEIGHTED, [Limit("T_max", 60.0)]), name, lazy=True)
 
 
 @pytest.mark.parametrize("name", ["overlap_dp", "minimax"])
