@@ -177,7 +177,7 @@ def test_a_killed_worker_is_replaced(tmp_path):
         while not list(tmp_path.glob("answers/*/*.npz")) and time.monotonic() < until:
             time.sleep(0.002)
         shown = subprocess.run(
-            ["ps", "-o", "pid,args", "--ppid", str(run.pid)],
+            ["ps", "-ww", "-o", "pid,args", "--ppid", str(run.pid)],
             capture_output=True,
             text=True,
             check=True,
