@@ -76,6 +76,10 @@ class WorkerError(SeqoptError, RuntimeError):
     """Processes or machines that work was given to end without an answer, again and again."""
 
 
+class ExtraError(SeqoptError, ImportError):
+    """A library that only some users need is not installed: the text says how to install it."""
+
+
 class SceneWarning(UserWarning):
     """Something in a scene can be, and probably is not meant."""
 

@@ -15,6 +15,7 @@ ROOT = Path(__file__).resolve().parent.parent
 ROOMS = (
     {"arrays", "errors", "interrupts"},
     {"files", "work"},
+    {"showing"},
     {"scene"},
     {"network"},
     {"sequence", "contact"},

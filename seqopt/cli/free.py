@@ -16,7 +16,6 @@ from seqopt.cli.free_files import free_files
 from seqopt.cli.means import parse_size
 from seqopt.cli.order import SEARCH, optimize_order
 from seqopt.cli.outputs import require_matplotlib, write_outputs
-from seqopt.cli.pages import PAGE, front_page
 from seqopt.cli.rules import parse_rules, parse_standing
 from seqopt.cli.status import Status
 from seqopt.cli.terminal import complain, progress, say
@@ -37,6 +36,7 @@ from seqopt.placement.schedule_formulation import find_schedule_formulation
 from seqopt.placement.solving import solve
 from seqopt.report.fronts import shown_table, worst_of
 from seqopt.report.methods import method_tables
+from seqopt.report.plan_pages import PAGE, front_page
 from seqopt.responses.table import analyze
 from seqopt.scene.scene import Scene
 from seqopt.sequence.free_rules import FREE, with_robots

@@ -57,6 +57,10 @@ class Certificate(FrozenValue):
     claimed_gap: float
     spent: Mapping[str, float]
 
+    def __repr__(self) -> str:
+        values = f"objective {self.objective:.6g}, no choice below {self.bound:.6g}"
+        return f"<Certificate: {values}, gap {100 * self.gap:.3g} %>"
+
 
 def certify(problem: PlacementProblem, selection: Selection, aim: Aim) -> Certificate:
     """Check a selection from the problem's data, without the solver.

@@ -74,7 +74,7 @@ class Selection(FrozenValue):
     trace: tuple[Finding, ...] = field(default=(), compare=False)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Formulation:
     """A way to solve the problem.
 
@@ -111,6 +111,11 @@ class Formulation:
     reads: Reads = Reads.ALL
     takes_budgets: bool = False
     windowed: tuple[tuple[str, int | str], ...] | None = None
+
+    def __repr__(self) -> str:
+        least = "sum" if self.aim is Aim.SUM else "largest"
+        what = f"{self.kind.value}, least {least} of the costs"
+        return f"<Formulation {self.name}: {self.summary} ({what})>"
 
     @property
     def window_options(self) -> dict[str, int | str] | None:

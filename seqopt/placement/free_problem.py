@@ -25,11 +25,12 @@ from seqopt.sequence.free_rules import FreeRules
 from seqopt.sequence.free_space import FreeSpace
 from seqopt.sequence.free_start import free_space
 from seqopt.sequence.steps import Grips
+from seqopt.showing import Shown
 from seqopt.stability.assessment import Stability
 
 
 @dataclass(frozen=True, repr=False)
-class FreeProblem:
+class FreeProblem(Shown):
     """The free schedule of a scene: nothing is computed before it is asked for.
 
     Attributes

@@ -26,10 +26,11 @@ from seqopt.responses.quantities import robot_response
 from seqopt.responses.resources import HERE, Resources
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import Step
+from seqopt.showing import Shown
 
 
 @dataclass(frozen=True, repr=False)
-class Problem:
+class Problem(Shown):
     """Support placement over a whole build.
 
     Nothing is computed before it is asked for: responses, sums and peaks each on first use.
@@ -192,25 +193,15 @@ class Problem:
             costs[limit.exceeded(responses[limit.response])] = np.inf
         return costs
 
-    def table(self, choices: StepChoices) -> pd.DataFrame:
-        """Return raw responses and cost of every choice in a step.
-
-        Parameters
-        ----------
-        choices : StepChoices
-            One of ``evaluation.steps``.
+    def table(self) -> pd.DataFrame:
+        """Return what is to be chosen.
 
         Returns
         -------
         pandas.DataFrame
-            A row per choice, labeled by its nodes; SI units.
+            A row per open grip; as of `seqopt.sequence.schedule.Schedule.table`.
         """
-        axes = next(iter(choices.responses.values())).ndim
-        moves = [self.schedule.moves[m] for m in choices.moves[-axes:]]
-        names = [f"{move.robot}_node" for move in moves]
-        index = pd.MultiIndex.from_product([move.candidates for move in moves], names=names)
-        columns: Mapping[str, Floats] = {**choices.responses, "cost": self.step_costs(choices)}
-        return pd.DataFrame({name: values.ravel() for name, values in columns.items()}, index=index)
+        return self.schedule.table()
 
     def nodes(self, choice: Sequence[int]) -> tuple[int, ...]:
         """Return the nodes that a choice stands for.

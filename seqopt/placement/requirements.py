@@ -10,7 +10,7 @@ from typing import Protocol
 
 import numpy as np
 
-from seqopt.arrays import Bools, Floats
+from seqopt.arrays import Bools, Floats, Terse
 from seqopt.errors import ProblemError
 from seqopt.placement.scales import SceneFacts
 from seqopt.responses.quantities import robot_response
@@ -146,8 +146,8 @@ def payload_limits(scene: Scene) -> tuple[Limit, ...]:
     return tuple(Limit(robot_response(robot.name), robot.payload) for robot in scene.robots)
 
 
-@dataclass(frozen=True)
-class ResponsesAsked:
+@dataclass(frozen=True, repr=False)
+class ResponsesAsked(Terse):
     """The responses that criterion, limits and further wishes ask for.
 
     Attributes

@@ -19,10 +19,11 @@ from seqopt.scene.checks import short
 from seqopt.scene.scenarios import Scenarios
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Step
+from seqopt.showing import Shown
 
 
 @dataclass(frozen=True, repr=False)
-class RobustProblem:
+class RobustProblem(Shown):
     """Support placement over a whole build, in many scenarios at once.
 
     Nothing is computed before it is asked for. Limits hold in every scenario.

@@ -11,6 +11,8 @@ import numpy as np
 from seqopt.arrays import Floats, FrozenValue, Vector
 from seqopt.contact.assembly import Assembly
 from seqopt.contact.mortar import Mortar
+from seqopt.showing import Shown
+from seqopt.stability.failure import first_to_fail
 from seqopt.stability.limit_analysis import (
     CAP,
     EXACT,
@@ -25,7 +27,6 @@ from seqopt.stability.prover import Proven, Prover
 DIRECTIONS = 8  # in which an assembly is pulled sideways, evenly spread
 ROUGHEST = 10.0  # largest coefficient of friction that is tried
 FRICTION_STEP = 1e-4  # to which the least one is found
-STILL = 1e-6  # motion slower than this, beside the fastest, is none
 
 
 class Verdict(Enum):
@@ -37,7 +38,7 @@ class Verdict(Enum):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Stability(FrozenValue):
+class Stability(Shown, FrozenValue):
     """Verdict and margins of one assembly; a margin of which nothing is proven is NaN.
 
     Attributes
@@ -88,6 +89,12 @@ class Stability(FrozenValue):
     first_contact: str
     claims: Mapping[Claim, int]
     unproven: int
+
+    def __repr__(self) -> str:
+        tilt = f", survives a tilt of {np.degrees(self.tilt):.3g} degrees"
+        margin = tilt if self.verdict is Verdict.STANDS else ""
+        first = f", block {self.first_block} fails first" if self.first_block else ""
+        return f"<Stability: {self.verdict.value}{margin}{first}>"
 
     @property
     def tilt(self) -> float:
@@ -269,28 +276,3 @@ def _grip(prove: Prover, fixed: Case) -> float:
     if not len(prove.assembly.payload):
         return 0.0
     return prove(replace(fixed, sense=Sense.SMALLEST, payload=(0.0, 1.0))).value
-
-
-def first_to_fail(assembly: Assembly, motion: Floats) -> tuple[str, str]:
-    """Return what goes first in a motion.
-
-    Parameters
-    ----------
-    assembly : Assembly
-    motion : (B, 6) float
-        As of `seqopt.stability.limit_analysis.Answer`.
-
-    Returns
-    -------
-    block, contact : str
-        The fastest block and the contact that parts fastest; empty where nothing moves.
-    """
-    speed = np.linalg.norm(motion, axis=1)
-    if not speed.max(initial=0.0) > 0:
-        return "", ""
-    block = str(assembly.block_name[int(speed.argmax())])
-    parting = (assembly.contact_map.T @ motion.ravel()).reshape(-1, 3)
-    apart = np.linalg.norm(parting, axis=1)
-    if not apart.max(initial=0.0) > STILL:
-        return block, ""
-    return block, assembly.contact_name[int(assembly.contact[int(apart.argmax())])]

@@ -1,0 +1,52 @@
+"""A figure that a notebook shows by itself, whichever backend matplotlib has."""
+
+from __future__ import annotations
+
+import io
+
+from matplotlib.figure import Figure
+
+DPI = 110
+
+
+class _Picture(Figure):
+    """A figure that pyplot does not manage: it is shown once, where it is returned."""
+
+    def _repr_png_(self) -> bytes:
+        """Return the figure as a PNG."""
+        return png(self)
+
+
+def new_picture(width: float, height: float, layout: str = "constrained") -> Figure:
+    """Return an empty figure that a notebook shows where it is returned.
+
+    Parameters
+    ----------
+    width, height : float
+        Inches.
+    layout : str, optional
+        How matplotlib arranges what is drawn.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    return _Picture(figsize=(width, height), layout=layout)
+
+
+def png(figure: Figure, dpi: float = DPI) -> bytes:
+    """Return a figure as a PNG.
+
+    Parameters
+    ----------
+    figure : matplotlib.figure.Figure
+    dpi : float, optional
+        Pixels per inch.
+
+    Returns
+    -------
+    bytes
+    """
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png", dpi=dpi)
+    return buffer.getvalue()
