@@ -28,7 +28,8 @@ from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.schedule_file import find_schedule
 from seqopt.study.presets import CRITERIA, EQUATIONS
 
-FREE_WORDS = ("aim", "rules", "robots", "stands")
+RULES = tuple(field.name for field in fields(FreeRules) if field.name != "robots")
+FREE_WORDS = ("aim", "rules", "robots", "stands", *RULES)
 """Options that the free schedule alone has.
 
 ``robots`` are names, or how many take part: further ones than the scene's are mobile.
@@ -94,8 +95,8 @@ def optimize(
     limits : sequence of Limit
         What no open step may exceed; of the free schedule no step.
     **options
-        Of `seqopt.solve`, the formulation, `seqopt.responses.Resources` (as ``workers=2``); an
-        ``order``; of the free schedule ``robots``, and what `seqopt.pose_free` takes.
+        Of `seqopt.solve`, the formulation, `seqopt.responses.Resources` (as ``workers=2``);
+        ``order``; if free, ``robots``, `seqopt.FreeRules`, and what `seqopt.pose_free` takes.
 
     Returns
     -------
@@ -159,15 +160,21 @@ def _pose_free(
     own = [field.name for field in fields(Resources) if field.name != "max_memory"]
     _refuse(options, own, "the free schedule has no such; leave it out")
     aim, stands = options.pop("aim", "minmax"), options.pop("stands", None)
-    rules, robots = options.pop("rules", FreeRules()), options.pop("robots", ())
-    if not isinstance(rules, FreeRules):
-        raise ProblemError(f"rules {short(rules)}: give a seqopt.FreeRules")
+    rules, robots = _rules(options), options.pop("robots", ())
     if isinstance(robots, int):
         scene = with_robots(scene, robots)
     elif robots:
         rules = replace(rules, robots=robots)
     engine = make_engine(asked[1], build_network(scene))
     return pose_free(engine, rules, find_criterion(asked[0]), aim, limits, stands)
+
+
+def _rules(options: dict[str, Any]) -> FreeRules:
+    """Take out of options what they say of the rules of a free schedule."""
+    rules = options.pop("rules", FreeRules())
+    if not isinstance(rules, FreeRules):
+        raise ProblemError(f"rules {short(rules)}: give a seqopt.FreeRules")
+    return replace(rules, **{name: options.pop(name) for name in RULES if name in options})
 
 
 def _refuse(options: dict[str, Any], names: Sequence[str], why: str) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -28,31 +27,27 @@ class ShownBuild(Shown):
     if TYPE_CHECKING:
 
         @property
+        def engine(self) -> Engine:
+            """What computes the responses."""
+
+        @property
         def steps(self) -> tuple[Step, ...]:
             """The steps of the build."""
+
+        @property
+        def title(self) -> str:
+            """What the plan is called beside others."""
+
+        @property
+        def worth(self) -> str:
+            """What the plan is worth, in words."""
 
         @property
         def seconds(self) -> Mapping[str, float]:
             """What finding it took, by stage, s."""
 
-    @property
-    @abstractmethod
-    def engine(self) -> Engine:
-        """What computes the responses."""
-
-    @property
-    @abstractmethod
-    def title(self) -> str:
-        """What the plan is called beside others."""
-
-    @property
-    @abstractmethod
-    def worth(self) -> str:
-        """What the plan is worth, in words."""
-
-    @abstractmethod
-    def responses(self) -> pd.DataFrame:
-        """Return the responses of every step, as `seqopt.analyze` makes them."""
+        def responses(self) -> pd.DataFrame:
+            """Return the responses of every step, as `seqopt.analyze` makes them."""
 
     def grips(self) -> pd.DataFrame:
         """Return every grip of the build, for as long as it lasts.

@@ -34,7 +34,7 @@ def build_page(plan: ShownBuild, *others: ShownBuild) -> Page:
         if other.engine.network.scene != scene:
             raise ProblemError(
                 f"plan {other.title} is for {other.engine.network.scene.name}, not for the same "
-                f"scene {scene.name}; show it by its own"
+                f"scene {scene.name}; show it on its own"
             )
         name = _apart(other.title, names)
         names.append(name)

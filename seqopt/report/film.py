@@ -86,7 +86,7 @@ class Film:
         scene = self.engine.network.scene
         low, high = seen_box(scene)
         width, height = high - low
-        figure = new_picture(SIZE, max(SIZE * height / width, 2.0) + 0.5, "none")
+        figure = new_picture(SIZE, max(SIZE * height / width, 2.0) + 0.5, constrained=False)
         axes = figure.add_axes((0.02, 0.02, 0.96, 0.88))
         rate: Any = 1.0 / self.seconds  # the writer takes fractions
         writer = PillowWriter(fps=rate)

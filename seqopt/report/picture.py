@@ -17,21 +17,21 @@ class _Picture(Figure):
         return png(self)
 
 
-def new_picture(width: float, height: float, layout: str = "constrained") -> Figure:
+def new_picture(width: float, height: float, *, constrained: bool = True) -> Figure:
     """Return an empty figure that a notebook shows where it is returned.
 
     Parameters
     ----------
     width, height : float
         Inches.
-    layout : str, optional
-        How matplotlib arranges what is drawn.
+    constrained : bool, optional
+        Whether matplotlib arranges what is drawn.
 
     Returns
     -------
     matplotlib.figure.Figure
     """
-    return _Picture(figsize=(width, height), layout=layout)
+    return _Picture(figsize=(width, height), layout="constrained" if constrained else None)
 
 
 def png(figure: Figure, dpi: float = DPI) -> bytes:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from numbers import Integral
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -190,7 +191,7 @@ def _bricks(scene: Scene, bricks: int | None) -> int:
     most = len(scene.bricks)
     if bricks is None:
         return most
-    if not isinstance(bricks, int) or not 1 <= bricks <= most:
+    if not isinstance(bricks, Integral) or not 1 <= bricks <= most:
         raise StepError(f"{short(bricks)} bricks: scene {scene.name} has 1 to {most}")
     return bricks
 
@@ -198,17 +199,20 @@ def _bricks(scene: Scene, bricks: int | None) -> int:
 def _picked(steps: Sequence[Step], chosen: int | Sequence[int] | None) -> list[Step]:
     """Return the steps of some numbers, from 1."""
     count = len(steps)
+    numbers: list[object]
     if chosen is None:
         spread = np.linspace(1, count, FRAMES + 1).round().astype(int)[1:]
-        numbers = sorted({int(number) for number in spread})
+        numbers = sorted({*spread.tolist()})
     else:
-        numbers = [chosen] if isinstance(chosen, int) else list(chosen)
+        numbers = [*chosen] if isinstance(chosen, tuple | list | range) else [chosen]
     if not 1 <= len(numbers) <= MOST:
         raise StepError(f"{len(numbers)} steps to draw: give 1 to {MOST}")
+    picked = []
     for number in numbers:
-        if not isinstance(number, int) or not 1 <= number <= count:
+        if not isinstance(number, Integral) or not 1 <= int(number) <= count:
             raise StepError(f"step {short(number)}: the build has steps 1 to {count}")
-    return [steps[number - 1] for number in numbers]
+        picked.append(steps[int(number) - 1])
+    return picked
 
 
 def _panels(scene: Scene, count: int, width: float = WIDTH) -> tuple[Figure, list[Axes]]:
