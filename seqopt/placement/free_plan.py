@@ -10,6 +10,7 @@ from typing import Any
 
 import pandas as pd
 
+from seqopt.contact.mortar import Mortar
 from seqopt.engines.interface import Engine
 from seqopt.errors import InfeasibleError
 from seqopt.placement.formulation import Formulation
@@ -123,15 +124,21 @@ class FreePlan(ShownBuild):
     def _responses(self) -> pd.DataFrame:
         return analyze(self.problem.engine, self.steps)
 
-    def stability(self) -> pd.DataFrame:
+    def stability(self, mortar: Mortar | str | None = None) -> pd.DataFrame:
         """Return whether every step stands and by which margins, by the cone program.
+
+        Parameters
+        ----------
+        mortar : Mortar or str, optional
+            Of all joints; by default that which was demanded, or dry.
 
         Returns
         -------
         pandas.DataFrame
-            As of `seqopt.stability.steps.stability_table`, with the mortar that was demanded, or
-            dry.
+            As of `seqopt.stability.steps.stability_table`.
         """
+        if mortar is not None:
+            return super().stability(mortar)
         return stability_table(self.steps, certified(self.problem, self.steps))
 
     def summary(self) -> dict[str, object]:

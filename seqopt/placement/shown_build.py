@@ -61,7 +61,7 @@ class ShownBuild(Shown):
         """
         return grips_table(self.engine.network.scene, self.steps, self.responses())
 
-    def stability_with(self, mortar: Mortar | str) -> pd.DataFrame:
+    def stability(self, mortar: Mortar | str) -> pd.DataFrame:
         """Return whether every step stands with a mortar, and by which margins.
 
         Parameters

@@ -25,7 +25,7 @@ def test_one_line_makes_a_plan_that_shows_itself(name):
     assert "<table" in plan._repr_html_()
     assert len(plan.table()) > 0
     assert plan.gantt().axes
-    used = {robot for robot in plan.grips()["robot"]}
+    used = set(plan.grips()["robot"])
     assert len(used) == given.get("robots", 3)
     if "order" in given:
         first = plan.engine.network.scene.build_order[:2]
@@ -59,7 +59,7 @@ def test_a_given_sequence_shows_itself_as_a_plan_does():
     assert build.responses().equals(seqopt.analyze(engine, steps))
     assert build.table().equals(build.grips())
     assert "given, not optimized" in build._repr_html_()
-    verdicts = build.stability_with("epoxy")["verdict"]
+    verdicts = build.stability("epoxy")["verdict"]
     assert len(verdicts) == len(steps)
     with pytest.raises(seqopt.SeqoptError, match="a Scene is no engine"):
         seqopt.GivenSequence(scene, steps)
