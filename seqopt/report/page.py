@@ -12,7 +12,7 @@ import pandas as pd
 
 from seqopt.engines.interface import Engine
 from seqopt.errors import ProblemError
-from seqopt.report.page_data import Build, build_data, size_of, structure_data
+from seqopt.report.page_data import Build, Scatter, build_data, size_of, structure_data
 
 RESPONSES = {
     "F_largest": "largest grip force, N",
@@ -29,6 +29,7 @@ def report_page(
     builds: Sequence[Build],
     sentence: str,
     tables: Sequence[tuple[str, pd.DataFrame]] = (),
+    scatter: Scatter | None = None,
 ) -> str:
     """Return a page that shows builds of one scene, as HTML that needs nothing else.
 
@@ -42,6 +43,8 @@ def report_page(
         What there is to see, in a sentence.
     tables : sequence of (str, pandas.DataFrame), optional
         Captions and tables; a row whose first cell names a build shows it.
+    scatter : Scatter, optional
+        A chart with a point for each of some builds.
 
     Returns
     -------
@@ -70,8 +73,9 @@ def report_page(
         sentence=escape(sentence),
         tables="".join(_table(caption, table) for caption, table in tables),
         style=_asset("viewer.css"),
-        data=_json(_data(engine, builds)),
+        data=_json(_data(engine, builds, scatter)),
         three=_asset("three.js"),
+        charts=_asset("charts.js"),
         viewer=_asset("viewer.js"),
     )
 
@@ -89,7 +93,7 @@ def _filled(**parts: str) -> str:
     return page
 
 
-def _data(engine: Engine, builds: Sequence[Build]) -> dict[str, object]:
+def _data(engine: Engine, builds: Sequence[Build], scatter: Scatter | None) -> dict[str, object]:
     """Return what the viewer reads, fields for as many builds as there is room for."""
     network = engine.network
     ends = np.cumsum([size_of(network, build) for build in builds])
@@ -100,6 +104,7 @@ def _data(engine: Engine, builds: Sequence[Build]) -> dict[str, object]:
             for build, end in zip(builds, ends, strict=True)
         ],
         "responses": RESPONSES,
+        "scatter": None if scatter is None else scatter.data(),
         "note": LEFT_OUT if ends[-1] > MOST else "",
     }
 
