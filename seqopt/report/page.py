@@ -20,6 +20,7 @@ RESPONSES = {
     "F_max_N": "largest tension in an edge, N",
     "D_max_1e-3mm": "largest displacement, 1e-3 mm",
 }
+PARTS = {"style": "viewer.css", "three": "three.js", "charts": "charts.js", "viewer": "viewer.js"}
 MOST = 6_000_000  # numbers of fields in a page: about 8 MB
 LEFT_OUT = "Displacements and axial forces of some builds are left out: there are too many steps."
 
@@ -66,17 +67,12 @@ def report_page(
     >>> len(report_page(engine, [build], "Two robots take turns.")) > 5e5
     True
     """
-    if not builds:
-        raise ProblemError("a report of nothing; give at least one build")
     return _filled(
         title=f"{escape(engine.network.scene.name)}, step by step",
         sentence=escape(sentence),
         tables="".join(_table(caption, table) for caption, table in tables),
-        style=_asset("viewer.css"),
         data=_json(_data(engine, builds, scatter)),
-        three=_asset("three.js"),
-        charts=_asset("charts.js"),
-        viewer=_asset("viewer.js"),
+        **{part: _asset(name) for part, name in PARTS.items()},
     )
 
 
@@ -95,6 +91,8 @@ def _filled(**parts: str) -> str:
 
 def _data(engine: Engine, builds: Sequence[Build], scatter: Scatter | None) -> dict[str, object]:
     """Return what the viewer reads, fields for as many builds as there is room for."""
+    if not builds:
+        raise ProblemError("a report of nothing; give at least one build")
     network = engine.network
     ends = np.cumsum([size_of(network, build) for build in builds])
     return {
