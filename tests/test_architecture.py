@@ -14,7 +14,7 @@ from seqopt.showing import DISPLAYS
 ROOT = Path(__file__).resolve().parent.parent
 
 ROOMS = (
-    {"arrays", "errors", "interrupts"},
+    {"arrays", "errors", "interrupts", "plugins"},
     {"files", "work"},
     {"showing"},
     {"scene"},
