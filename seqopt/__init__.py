@@ -42,10 +42,8 @@ if TYPE_CHECKING:
     from seqopt.placement.robust_plan import solve_robust
     from seqopt.placement.robust_problem import robust
     from seqopt.placement.solving import solve
-    from seqopt.report.comparison import compare
     from seqopt.responses.table import analyze
     from seqopt.scene.arch import ArchShape, arch_scene
-    from seqopt.scene.parts import Robot
     from seqopt.scene.scenarios import scenarios
     from seqopt.scene.scene import Scene
     from seqopt.scene.scene_file import load_scene, save_scene
@@ -79,10 +77,8 @@ _HOMES = {
     "placement.robust_plan": ("solve_robust",),
     "placement.robust_problem": ("robust",),
     "placement.solving": ("solve",),
-    "report.comparison": ("compare",),
     "responses.table": ("analyze",),
     "scene.arch": ("ArchShape", "arch_scene"),
-    "scene.parts": ("Robot",),
     "scene.scenarios": ("scenarios",),
     "scene.scene": ("Scene",),
     "scene.scene_file": ("load_scene", "save_scene"),
@@ -102,7 +98,6 @@ _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 
 __all__ = [  # noqa: RUF022  # in the order in which they are met
     "Scene",
-    "Robot",
     "load_scene",
     "save_scene",
     "ArchShape",
@@ -136,7 +131,6 @@ __all__ = [  # noqa: RUF022  # in the order in which they are met
     "Plan",
     "GivenSequence",
     "Certificate",
-    "compare",
     "DRY",
     "EPOXY",
     "assess_steps",

@@ -18,6 +18,7 @@ from seqopt.placement.loop_front import LoopFront
 from seqopt.placement.order_plan import solve_order
 from seqopt.placement.order_problem import OrderProblem
 from seqopt.placement.unseen import judge_unseen
+from seqopt.report.comparison import compare
 from seqopt.scene.library import ArchForm, DomeShape, VaultShape
 from seqopt.stability.steps import assess_steps
 
@@ -53,7 +54,7 @@ def met(problem25, arch25):
         *engines(network),
         *engines(posed.engine.network),
     ]
-    values += [seqopt.compare(posed.engine, posed.criterion), travel(problem25, 20.0)]
+    values += [compare(posed.engine, posed.criterion), travel(problem25, 20.0)]
     values += assess_steps(network, plan.steps[:1], seqopt.DRY)
     values += [seqopt.DRY, seqopt.CRITERIA, seqopt.formulations(), seqopt.Limit("F_largest", 300.0)]
     values += [ArchForm(span=2.0, rise=0.8), DomeShape(courses=4, around=12), VaultShape(bricks=9)]

@@ -55,19 +55,6 @@ class RobustPlan(ShownBuild):
         Of the scenarios, as they prove it; of peaks the scenario where the plan is worst.
     seconds : mapping of str to float
         By stage, s: respond, solve, verify.
-
-    Examples
-    --------
-    >>> import seqopt
-    >>> from seqopt.placement.robust_aim import WORST_PEAK
-    >>> from seqopt.placement.robust_problem import robust
-    >>> from seqopt.scene.scenarios import scenarios
-    >>> scene = seqopt.load_scene("arch25")
-    >>> network = seqopt.build_network(scene)
-    >>> engine, loop = seqopt.make_engine("auto", network), seqopt.three_robot_loop(network)
-    >>> nominal = seqopt.pose(engine, loop, seqopt.CRITERIA["worst-ratio-published"])
-    >>> solve_robust(robust(nominal, scenarios(scene, count=3, seed=1), WORST_PEAK)).gap
-    0.0
     """
 
     problem: RobustProblem
@@ -165,6 +152,15 @@ def solve_robust(
     ------
     InfeasibleError, SolverError
         If no choice is allowed in all scenarios; an answer is not what it is claimed to be.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> scene = seqopt.load_scene("arch25")
+    >>> problem = seqopt.optimize(scene, criterion="worst-ratio-published").problem
+    >>> robust = seqopt.robust(problem, seqopt.scenarios(scene, count=3, seed=1), "worst-peak")
+    >>> seqopt.solve_robust(robust)
+    RobustPlan(worst-peak, 3 scenarios: objective 1.29296, gap 0 %)
     """
     layers = problem.layered(problem.aim.aim)
     minimax = find_formulation(CHOOSES[Aim.PEAK])  # loaded before the time is taken
@@ -174,9 +170,13 @@ def solve_robust(
         found, weights = _least_peak(minimax, joined, layers)
     else:
         found, weights = _least_total(layers, problem.aim, watch, width)
-    taken = watch.seconds
-    start = time.perf_counter()
-    proven = _proven(joined, layers, problem.aim, weights)
+    return _judged(problem, found, weights, watch.seconds)
+
+
+def _judged(problem: RobustProblem, found: Searched, weights: Floats, taken: float) -> RobustPlan:
+    """Return the plan of a choice, checked; the time it took to find is given, s."""
+    start, layers = time.perf_counter(), problem.layered(problem.aim.aim)
+    proven = _proven(largest_of(layers), layers, problem.aim, weights)
     objective = _checked(problem, layers, found, proven)
     bound = min(max(found.bound, proven), objective)
     steps = problem.steps(found.choice)
