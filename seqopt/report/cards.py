@@ -13,7 +13,7 @@ from html import escape
 
 import numpy as np
 
-from seqopt.errors import ExtraError
+from seqopt.errors import ExtraError, ProblemError
 from seqopt.network.network import Network
 from seqopt.placement.free_problem import FreeProblem
 from seqopt.placement.order_problem import OrderProblem
@@ -193,16 +193,30 @@ def _limits(limits: tuple[Limit, ...]) -> str:
 
 @facts.register
 def _build(value: ShownBuild) -> tuple[str, Rows]:
-    scene = value.engine.network.scene
+    try:
+        scene = value.engine.network.scene
+    except ProblemError:  # costs alone were given
+        return "Plan", {"": repr(value)}
+    criterion = _criterion(value)
     rows: dict[str, object] = {
         "found by": value.title,
+        **({"criterion": criterion} if criterion else {}),
         "worth": value.worth,
         "steps": len(value.steps),
     }
     if len(scene.bricks) <= SMALL:
         rows |= _worst(value)
-    rows["time to find it, s"] = f"{sum(value.seconds.values()):.3g}"
+    if value.seconds:
+        rows["time to find it, s"] = f"{sum(value.seconds.values()):.3g}"
     return f"Plan for {scene.name}", rows
+
+
+def _criterion(value: ShownBuild) -> str:
+    """Return the name of the criterion that a plan was chosen by; empty where none was."""
+    problem = getattr(value, "problem", None)
+    for inner in ("nominal", "free"):  # of problems over scenarios and orders
+        problem = getattr(problem, inner, problem)
+    return "" if problem is None else str(problem.criterion.name)
 
 
 def _worst(value: ShownBuild) -> Rows:

@@ -13,8 +13,9 @@ from matplotlib.animation import PillowWriter
 
 from seqopt.engines.interface import Engine
 from seqopt.errors import FileError
+from seqopt.report.draw import draw_grips
 from seqopt.report.picture import new_picture
-from seqopt.report.pictures import caption, draw_step, seen_box
+from seqopt.report.pictures import VIEW, caption, draw_step, seen_box
 from seqopt.sequence.steps import Step
 
 DPI = 80
@@ -94,6 +95,7 @@ class Film:
             for step in self.steps:
                 axes.clear()
                 draw_step(axes, self.engine, step, forces=self.forces, magnify=self.magnify)
+                draw_grips(axes, self.engine.network, step.grips, VIEW)
                 axes.set_title(caption(scene, step, len(self.steps)))
                 axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
                 writer.grab_frame()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 
 from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 DPI = 110
 
@@ -31,7 +32,8 @@ def new_picture(width: float, height: float, *, constrained: bool = True) -> Fig
     -------
     matplotlib.figure.Figure
     """
-    return _Picture(figsize=(width, height), layout="constrained" if constrained else None)
+    layout = ConstrainedLayoutEngine(h_pad=0.08, w_pad=0.06) if constrained else None
+    return _Picture(figsize=(width, height), layout=layout)
 
 
 def png(figure: Figure, dpi: float = DPI) -> bytes:

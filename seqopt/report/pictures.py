@@ -4,26 +4,29 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from numbers import Integral
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from seqopt.arrays import Floats
 from seqopt.engines.interface import Engine, Fields, Want
 from seqopt.errors import StepError
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
-from seqopt.report.draw import View, draw_bricks, draw_grips, draw_network
+from seqopt.report.draw import ROBOT_COLORS, View, draw_bricks, draw_grips, draw_network
 from seqopt.report.picture import new_picture
 from seqopt.scene.boxes import boxes
 from seqopt.scene.checks import short
 from seqopt.scene.scene import Scene
-from seqopt.sequence.steps import Step, StepKind
+from seqopt.sequence.steps import Grips, Step, StepKind
 
 VIEW = View(azimuth=25, elevation=18)
 FRAMES = 6  # pictures of a build, where no steps are named
 MOST = 24
+MARKS = "XPDsv"  # of robots, beside their colors
 WIDTH = 8.0  # of a figure, inches
 NUMBERED = 30  # bricks up to which the nodes of a network are numbered
 TITLE = 9  # size of letters, points
@@ -117,16 +120,71 @@ def steps_picture(
     figure, panels = _panels(scene, len(picked))
     for axes, step in zip(panels, picked, strict=True):
         draw_step(axes, engine, step, forces=forces, magnify=magnify)
+        if len(picked) == 1:
+            draw_grips(axes, engine.network, step.grips, VIEW)
+        else:
+            mark_grips(axes, scene, step.grips)
         axes.set_title(caption(scene, step, len(steps)), fontsize=TITLE)
         low, high = seen_box(scene)
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+    if len(picked) > 1:
+        add_key(figure, scene, picked)
     return figure
+
+
+def mark_grips(axes: Axes, scene: Scene, grips: Grips) -> None:
+    """Mark the nodes that robots hold, a color and a shape for each robot.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+    scene : Scene
+    grips : tuple of (int or None)
+        Node that each of the scene's robots holds.
+    """
+    for i, node in enumerate(grips):
+        if node is not None:
+            x, y = VIEW.axes()[:2] @ np.array(scene.node_position(node))
+            axes.plot([x], [y], **_mark(i), gid=f"{scene.robots[i].name} at {node}")
+
+
+def add_key(figure: Figure, scene: Scene, steps: Sequence[Step]) -> None:
+    """Say below a figure which mark is which robot's.
+
+    Parameters
+    ----------
+    figure : matplotlib.figure.Figure
+    scene : Scene
+    steps : sequence of Step
+        What is drawn: robots that hold nothing in them are left out.
+    """
+    handles = [
+        Line2D([], [], **_mark(i), label=f"{robot.name} holds")
+        for i, robot in enumerate(scene.robots)
+        if any(step.grips[i] is not None for step in steps)
+    ]
+    if handles:
+        figure.legend(
+            handles=handles, loc="outside lower center", ncols=5, frameon=False, fontsize=TITLE
+        )
+
+
+def _mark(robot: int) -> dict[str, Any]:
+    """Return how the grip of a robot is drawn."""
+    return {
+        "marker": MARKS[robot % len(MARKS)],
+        "color": ROBOT_COLORS[robot % len(ROBOT_COLORS)],
+        "ms": 9,
+        "mec": "white",
+        "ls": "none",
+        "zorder": 5,
+    }
 
 
 def draw_step(
     axes: Axes, engine: Engine, step: Step, *, forces: bool = False, magnify: float = 0.0
 ) -> None:
-    """Draw one step: bricks or axial forces, and the grips.
+    """Draw one step: bricks or axial forces.
 
     Parameters
     ----------
@@ -155,7 +213,6 @@ def draw_step(
             draw_bricks(axes, network, bricks, VIEW, alpha=0.15)
         twist = None if fields is None else fields.brick_twist[0]
         draw_bricks(axes, network, bricks, VIEW, twist=twist, magnify=magnify or 1.0)
-    draw_grips(axes, network, step.grips, VIEW)
 
 
 def caption(scene: Scene, step: Step, count: int) -> str:
@@ -201,8 +258,7 @@ def _picked(steps: Sequence[Step], chosen: int | Sequence[int] | None) -> list[S
     count = len(steps)
     numbers: list[object]
     if chosen is None:
-        spread = np.linspace(1, count, FRAMES + 1).round().astype(int)[1:]
-        numbers = sorted({*spread.tolist()})
+        numbers = [*spread_steps(steps, FRAMES)]
     else:
         numbers = [*chosen] if isinstance(chosen, tuple | list | range) else [chosen]
     if not 1 <= len(numbers) <= MOST:
@@ -228,6 +284,26 @@ def _panels(scene: Scene, count: int, width: float = WIDTH) -> tuple[Figure, lis
     for axes in panels:
         axes.set_axis_off()
     return figure, panels
+
+
+def spread_steps(steps: Sequence[Step], most: int) -> tuple[int, ...]:
+    """Return numbers of steps that are spread over a build: those that place, and the last one.
+
+    Parameters
+    ----------
+    steps : sequence of Step
+    most : int
+        How many, from 2.
+
+    Returns
+    -------
+    tuple of int
+        Ascending, from 1.
+    """
+    placing = [i + 1 for i, step in enumerate(steps) if step.kind is StepKind.PLACE]
+    parts = range(1, most if placing else 1)
+    picked = {placing[round(k * (len(placing) - 1) / most)] for k in parts}
+    return tuple(sorted({*picked, len(steps)}))
 
 
 def seen_box(scene: Scene) -> tuple[Floats, Floats]:

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from PIL import Image
 
+from seqopt.errors import ProblemError
 from seqopt.network.network import Network
 from seqopt.placement.free_problem import FreeProblem
 from seqopt.placement.order_problem import OrderProblem
@@ -17,13 +18,13 @@ from seqopt.placement.robust_problem import RobustProblem
 from seqopt.placement.shown_build import ShownBuild
 from seqopt.report.gantt import gantt_picture
 from seqopt.report.picture import new_picture, png
-from seqopt.report.pictures import network_picture, scene_picture, steps_picture
+from seqopt.report.pictures import network_picture, scene_picture, spread_steps, steps_picture
 from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import Schedule
 from seqopt.stability.assessment import Stability, Verdict
 
 DPI = 90
-COLORS = 64  # of a picture: a third of the bytes, and no difference to be seen
+COLORS = 128  # of a picture: a quarter of the bytes; an octree keeps colors of small areas
 WIDTH = 4.5  # of a structure, inches
 STEPS = 34  # of a build whose grips are drawn
 BRICKS = 60  # up to which several steps are drawn
@@ -84,11 +85,13 @@ def _order_problem(value: OrderProblem) -> list[bytes]:
 
 @thumbnails.register
 def _build(value: ShownBuild) -> list[bytes]:
-    scene, count = value.engine.network.scene, len(value.steps)
+    try:
+        scene, count = value.engine.network.scene, len(value.steps)
+    except ProblemError:  # costs alone were given
+        return []
     if len(scene.bricks) > BRICKS:
         return [small(steps_picture(value.engine, value.steps, count // 2 + 1))]
-    spread = sorted({int(i) for i in np.linspace(1, count, 4).round()[1:]})
-    pictures = [steps_picture(value.engine, value.steps, spread)]
+    pictures = [steps_picture(value.engine, value.steps, spread_steps(value.steps, 3))]
     pictures.append(value.gantt(1, _last(count)))
     return [small(picture) for picture in pictures]
 
@@ -127,5 +130,5 @@ def small(figure: Figure) -> bytes:
     """
     picture = Image.open(io.BytesIO(png(figure, DPI))).convert("RGB")
     buffer = io.BytesIO()
-    picture.quantize(COLORS).save(buffer, format="png", optimize=True)
+    picture.quantize(COLORS, Image.Quantize.FASTOCTREE).save(buffer, format="png", optimize=True)
     return buffer.getvalue()

@@ -14,6 +14,7 @@ import seqopt
 from seqopt.placement.order_problem import OrderProblem
 from seqopt.report.cards import card, facts
 from seqopt.report.comparison import largest
+from seqopt.report.draw import ROBOT_COLORS
 from seqopt.stability.steps import assess_steps
 
 HEAVIEST = 60_000  # letters of HTML
@@ -50,6 +51,14 @@ def test_every_value_has_a_table_and_a_picture_and_is_light(values):
         assert images(html), name
         assert len(html) < HEAVIEST, name
         assert html.count("<table") == html.count("</table>") == 1
+
+
+def test_colors_of_robots_survive_in_small_pictures(values):
+    steps, _ = images(values["Plan"]._repr_html_())
+    colors = {color for _, color in steps.convert("RGB").getcolors(100_000)}
+    for robot in ROBOT_COLORS[:3]:
+        wanted = [int(robot[i : i + 2], 16) for i in (1, 3, 5)]
+        assert min(max(abs(a - b) for a, b in zip(c, wanted, strict=True)) for c in colors) < 20
 
 
 def test_a_step_that_falls_has_a_table_alone(engine25):

@@ -10,6 +10,7 @@ from PIL import Image
 from seqopt.errors import FileError, StepError
 from seqopt.placement.given_sequence import GivenSequence
 from seqopt.report.film import Film
+from seqopt.report.pictures import spread_steps
 from seqopt.sequence.two_robots import sequential
 
 
@@ -46,11 +47,15 @@ def test_every_step_that_is_asked_for_has_a_panel_with_its_grips(build):
         "step 30 of 49: brick 16 is placed",
     ]
     for axes, number in zip(figure.axes, (3, 30), strict=True):
-        named = [text.get_text() for text in axes.texts]
+        named = [line.get_gid() for line in axes.lines]
         scene, step = build.engine.network.scene, build.steps[number - 1]
         pairs = zip(scene.robots, step.grips, strict=True)
         assert named == [f"{robot.name} at {node}" for robot, node in pairs if node is not None]
     assert len(build.plot().axes) == 6
+    (key,) = figure.legends
+    assert [text.get_text() for text in key.get_texts()] == ["rob1 holds", "rob2 holds"]
+    (alone,) = build.plot(30).axes
+    assert [text.get_text() for text in alone.texts] == named  # words where there is room
 
 
 def test_forces_and_motion_are_drawn(build):
@@ -83,3 +88,11 @@ def test_a_film_has_a_picture_for_every_step(build, tmp_path):
         with pytest.raises(FileError, match=r"ends in \.gif|cannot write"):
             short.save(tmp_path / wrong)
     assert isinstance(build.animate(), Film)
+
+
+def test_pictures_of_a_build_are_spread_over_it(build):
+    numbers = [int(axes.get_title().split()[1]) for axes in build.plot().axes]
+    assert numbers[-1] == 49
+    kinds = [build.steps[number - 1].kind.value for number in numbers[:-1]]
+    assert kinds == ["place"] * 5
+    assert spread_steps(build.steps[-1:], 6) == (1,)
