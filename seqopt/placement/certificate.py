@@ -97,8 +97,8 @@ def certify(problem: PlacementProblem, selection: Selection, aim: Aim) -> Certif
     bound = least(costs, aim)
     if value < bound - TOLERANCE * scale:
         raise SolverError(
-            f"the least value found anew, {bound:.9g}, lies above that of the choice, {value:.9g}: "
-            "the costs changed while they were judged"
+            f"the least value computed again, {bound:.9g}, lies above that of the choice, "
+            f"{value:.9g}: the costs changed while they were judged"
         )
     highest = value if problem.budgets else bound
     if not selection.bound <= highest + TOLERANCE * scale:  # NaN is no bound
@@ -142,7 +142,7 @@ def certify_partial(costs: PartialCosts, selection: Selection, objective: float)
     gap = (objective - bound) / scale
     if selection.end is End.DONE and gap > TOLERANCE:
         raise SolverError(
-            f"the choice is worth {objective:.9g}, and no more than {bound:.9g} is proven"
+            f"the value of the choice is {objective:.9g}, and no more than {bound:.9g} is proven"
         )
     return Certificate(objective, bound, gap, gap, {})
 
@@ -260,6 +260,6 @@ def judge(
     if exact and certificate.gap > TOLERANCE:
         raise SolverError(
             f"{formulation.name} promises the optimum {certificate.bound:.9g}, "
-            f"but its choice is worth {certificate.objective:.9g}"
+            f"but the value of its choice is {certificate.objective:.9g}"
         )
     return certificate

@@ -215,7 +215,7 @@ def find_formulation(name: str) -> Formulation:
     if not found:
         known = ", ".join(formulation_names())
         hint = did_you_mean(name, formulation_names())
-        raise ProblemError(f"formulation {name!r}: there is no such{hint}; give one of {known}")
+        raise ProblemError(f"formulation {name!r} does not exist{hint}; give one of {known}")
     return _load(found[0])
 
 
@@ -240,7 +240,7 @@ def as_formulation(given: Formulation | str) -> Formulation:
     if isinstance(given, str):
         return find_formulation(given)
     known = ", ".join(formulation_names())
-    raise ProblemError(f"a {type(given).__name__} is no formulation; give one of {known}")
+    raise ProblemError(f"a {type(given).__name__} is not a formulation; give one of {known}")
 
 
 def said(error: Exception) -> str:

@@ -169,7 +169,9 @@ def find_front(
     for point, steps in zip(points, plans, strict=True):
         values = problem.values(steps, point)
         if not (np.abs(values - point) <= TOLERANCE * np.abs(point)).all():
-            raise SolverError(f"a plan is worth {values.tolist()}, not {point.tolist()} as claimed")
+            raise SolverError(
+                f"the values of a plan are {values.tolist()}, not {point.tolist()} as claimed"
+            )
     _require_apart(points)
     if not found.stopped:
         _require_complete(problem, points, progress)

@@ -294,5 +294,5 @@ def pose(
     asked = ResponsesAsked(criterion.for_scene(SceneFacts(engine)), tuple(limits), tuple(also))
     if unknown := {name for move in schedule.moves for name in asked(move.bricks)} - known:
         listed = ", ".join(sorted(known))
-        raise ProblemError(f"response {min(unknown)}: there is no such; give {listed}")
+        raise ProblemError(f"response {min(unknown)} does not exist; give {listed}")
     return Problem(asked.criterion, asked.limits, Evaluation(engine, schedule, asked, resources))

@@ -50,8 +50,8 @@ class Resources:
             raise ProblemError(f"workers is {self.workers!r}; give a whole number from 1")
         if not (self.executor is None or hasattr(self.executor, "submit")):
             raise ProblemError(
-                f"executor: a {type(self.executor).__name__} is none; give one of "
-                "concurrent.futures, or workers"
+                f"executor: a {type(self.executor).__name__} is not an executor; "
+                "give one of concurrent.futures, or workers"
             )
         most = self.max_memory
         known = most is None or (

@@ -62,7 +62,7 @@ def analyze(engine: Engine, steps: Sequence[Step]) -> pd.DataFrame:
     """
     if not isinstance(getattr(engine, "network", None), Network):
         kind = type(engine).__name__
-        raise SceneError(f"a {kind} is no engine; give make_engine('compliance', network)")
+        raise SceneError(f"a {kind} is not an engine; give make_engine('compliance', network)")
     return response_table(
         engine.network, ((step, step_fields(engine, step)) for step in require_steps(steps))
     )

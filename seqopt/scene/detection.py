@@ -141,7 +141,7 @@ def touching_faces(shapes: Sequence[Solid], gap: float) -> tuple[TouchingFace, .
     gap = positive("gap", gap, "m")
     for shape in shapes:
         if not hasattr(shape, "points") or not hasattr(shape, "faces"):
-            raise SceneError(f"shapes: {short(shape)} is none; give each as Polyhedron(...)")
+            raise SceneError(f"shapes: {short(shape)} is not a shape; give each as Polyhedron(...)")
     facets, found = [_facets(shape) for shape in shapes], list[TouchingFace]()
     for tries, (i, j) in enumerate(_near(shapes, gap)):
         if tries == MOST_PAIRS:

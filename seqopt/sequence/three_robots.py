@@ -182,5 +182,5 @@ def make_schedule(name: str, network: Network | Scene, robots: Sequence[str] = (
         If there is none of that name, or the scene cannot be built by it.
     """
     if name not in SCHEDULES:
-        raise StepError(f"schedule {name!r}: there is no such; give one of {', '.join(SCHEDULES)}")
+        raise StepError(f"schedule {name!r} does not exist; give one of {', '.join(SCHEDULES)}")
     return SCHEDULES[name](network, robots)

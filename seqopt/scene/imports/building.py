@@ -228,7 +228,9 @@ def _order(
     known = None not in courses
     heights = [round(bricks[i].position[2], 6) for i in places]
     said.append(
-        "the build goes by the file's courses" if known else "the build goes from the bottom up"
+        "blocks are placed by the file's courses"
+        if known
+        else "blocks are placed from the bottom up"
     )
     order = upward_order(
         [(c or 0.0 if known else 0.0, h) for c, h in zip(courses, heights, strict=True)],

@@ -102,7 +102,7 @@ def scene_by_words(words: str) -> Scene:
     name, _, rest = words.partition(":")
     kind = KINDS.get(name)
     if kind is None:
-        raise SceneError(f"scene {words}: {name!r} is no kind; give one of {', '.join(KINDS)}")
+        raise SceneError(f"scene {words}: {name!r} is not known; give one of {', '.join(KINDS)}")
     hints = kind.hints()
     given: dict[str, Any] = {}
     for part in filter(None, rest.split(",")):
