@@ -33,8 +33,8 @@ class Certificate(FrozenValue):
     objective : float
         The value of the selection, recomputed; in the unit of the criterion.
     bound : float
-        The least value of any choice, found anew from the data; with budgets a bound on the value
-        of any choice within them, by prices and partial choices of the certificate's own.
+        The least value of any choice, computed again from the data; with budgets a bound on the
+        value of any choice within them, by prices and partial choices of the certificate's own.
     gap : float
         Objective less bound, over the size of the costs that the choice meets, signs aside: their
         sum, or the largest for a peak. It has no unit.
@@ -68,7 +68,7 @@ def certify(problem: PlacementProblem, selection: Selection, aim: Aim) -> Certif
     selection : Selection
         What a formulation claims.
     aim : Aim
-        Whether the sum or the peak of the costs was to be least.
+        Whether the sum or the peak of the costs was minimized.
 
     Returns
     -------
@@ -119,7 +119,7 @@ def certify_partial(costs: PartialCosts, selection: Selection, objective: float)
     selection : Selection
         What is claimed.
     objective : float
-        What the steps that the selection meets cost, solved anew.
+        The costs of the steps that the selection meets, solved again.
 
     Returns
     -------
@@ -148,7 +148,7 @@ def certify_partial(costs: PartialCosts, selection: Selection, objective: float)
 
 
 def _value(costs: LayeredCosts, choice: tuple[int, ...], aim: Aim) -> float:
-    """Return what a choice is worth, or raise a `SolverError` if it is none."""
+    """Return the value of a choice, or raise a `SolverError` if it is not a valid choice."""
     sizes = costs.sizes
     if len(choice) != len(sizes):
         raise SolverError(f"the answer names {len(choice)} candidates for {len(sizes)} moves")

@@ -22,7 +22,7 @@ def stopped(
     ----------
     problem : PlacementProblem
     aim : Aim
-        What is to be least.
+        What to minimize.
     bound : float, optional
         A better one that is known.
     why : str, optional

@@ -184,7 +184,7 @@ def _load(entry: EntryPoint) -> Formulation:
     except Exception as error:  # whatever a package of others may raise
         raise ProblemError(
             f"formulation {entry.name!r}: {entry.value} cannot be loaded: {said(error)}; "
-            "install it anew or remove it"
+            "reinstall it or remove it"
         ) from error
     if not isinstance(found, Formulation):
         raise ProblemError(

@@ -189,7 +189,7 @@ def _require_apart(points: Floats) -> None:
 def _require_complete(
     problem: FrontProblem, points: Floats, progress: Callable[[str], None]
 ) -> None:
-    """Raise an error if a plan exists that no point dominates: bounds found anew, one by one."""
+    """Raise an error if a plan exists that no point dominates: bounds are searched again."""
     bounds = upper_bounds(points)
     for i, bound in enumerate(bounds):
         progress(f"proof: {i} of {len(bounds)} zones")

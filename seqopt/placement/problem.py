@@ -154,7 +154,7 @@ class Problem:
         -------
         tuple of StepChoices
             In order, with responses (C_k,); those of steps shared with the move before are of that
-            choice. Computed anew where the responses of all choices are not kept.
+            choice. Computed again if the responses of all choices are not kept.
         """
         if self.evaluation.streams:
             return window_anew(self.evaluation, move, before)

@@ -103,7 +103,7 @@ class RobustAim:
         return np.asarray(weights / weights.sum())
 
     def value(self, values: Floats) -> float:
-        """Return what values of scenarios are worth together.
+        """Return one value from the values of all scenarios.
 
         Parameters
         ----------
@@ -117,7 +117,7 @@ class RobustAim:
         return float(self.each(np.asarray(values, dtype=float)[None])[0])
 
     def each(self, values: Floats) -> Floats:
-        """Return what rows of values are worth.
+        """Return one value from every row of values.
 
         Parameters
         ----------

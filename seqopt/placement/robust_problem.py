@@ -34,7 +34,7 @@ class RobustProblem:
     scenes : tuple of Scene
         The scenarios.
     aim : RobustAim
-        What is to be least over them.
+        What to minimize over them.
     """
 
     nominal: Problem
@@ -95,7 +95,7 @@ class RobustProblem:
         return other
 
     def values(self, choice: Sequence[int], aim: Aim) -> Floats:
-        """Return what a choice is worth in every scenario.
+        """Return the value of a choice in every scenario.
 
         Parameters
         ----------

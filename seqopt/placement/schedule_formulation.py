@@ -61,7 +61,7 @@ class ScheduleFormulation:
         Parameters
         ----------
         given : iterable of str
-            Their names; ``progress`` goes without saying.
+            Their names; ``progress`` need not be listed.
 
         Raises
         ------

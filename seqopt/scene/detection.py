@@ -23,7 +23,7 @@ from seqopt.scene.shape import normal_of
 OPPOSED = np.cos(np.radians(15.0))  # cosine from which on normals are against each other
 LEVEL = 1 - 1e-6  # cosine from which on faces are in one plane
 MOST_PAIRS = 300_000  # of blocks that are near each other
-SLIVER = 1e-6  # overlap that is none, over the smaller of two faces
+SLIVER = 1e-6  # overlap treated as zero, over the smaller of two faces
 GRAIN = 1e-9  # length to which corners are rounded, over the size of what overlaps
 
 Plane = tuple[Floats, Floats, list[Any]]  # origin, axes, and polygons in it

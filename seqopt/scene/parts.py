@@ -19,7 +19,7 @@ from seqopt.scene.reach import Anywhere, Reach, as_reach
 from seqopt.scene.shape import Polyhedron
 
 THICKEST = 0.5  # of a joint that does not say, over the smallest dimension of its bricks
-SAME_PLACE = 1e-6  # distance that is none, over the size of a block
+SAME_PLACE = 1e-6  # distance treated as zero, over the size of a block
 
 
 @dataclass(frozen=True, kw_only=True)

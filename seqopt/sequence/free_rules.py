@@ -177,7 +177,7 @@ class FreeRules:
 
 
 def with_robots(scene: Scene, count: int) -> Scene:
-    """Return a scene with so many robots: its own first ones, and mobile ones beside them.
+    """Return a scene with a number of robots: its own first, then mobile ones that reach all.
 
     Parameters
     ----------
