@@ -112,7 +112,7 @@ def plan_values(
     problem : FreeProblem
     steps : sequence of Step
     claimed : sequence of float, optional
-        Of every goal: margins of stability are held against these, and taken from them.
+        The value of every goal; margins of stability are compared with these, and taken from them.
 
     Returns
     -------

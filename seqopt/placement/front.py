@@ -77,7 +77,7 @@ class FrontProblem(Protocol):
         ----------
         steps : sequence of Step
         claimed : (k,) float
-            What margins of stability are held against.
+            The values with which margins of stability are compared.
 
         Returns
         -------

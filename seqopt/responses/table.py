@@ -47,7 +47,7 @@ def analyze(engine: Engine, steps: Sequence[Step]) -> pd.DataFrame:
     MechanismError, SolverError
         As the engine does, the step named.
     SceneError, StepError
-        If these are no engine, or no steps.
+        If an argument is not an engine, or not a list of steps.
 
     Examples
     --------

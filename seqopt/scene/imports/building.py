@@ -42,7 +42,7 @@ def build_scene(content: Content, given: Given, source: str) -> Scene:
     Raises
     ------
     SceneError
-        If the file lacks what the user did not give, or is no assembly that can be built.
+        If the file lacks what the user did not give, or its assembly cannot be built.
     FileError
         If shapely is not installed.
     """
