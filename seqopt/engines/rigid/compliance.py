@@ -145,13 +145,11 @@ class ComplianceEngine:
     def _refined(self, bricks: int, columns: Ints, want: Want) -> Fields:
         """Return the fields of grip sets that the operator alone does not answer well enough."""
         largest = SCREEN if want & Want.SCREEN else LAST_CORRECTION
-        operator = None
-        if self._basis is SPACE and bricks <= len(self._tree.spring):
-            operator = self._operator(bricks, columns)
+        operator = self._operator(bricks, columns) if bricks <= len(self._tree.spring) else None
         with one_thread():
             if self._refinement is None or self._refinement.bricks != bricks:
                 self._refinement = Refinement(self._network, bricks, self._shared)
-            return self._refinement.solve(columns, operator, largest)
+            return self._refinement.solve(columns, operator, largest, self._basis)
 
 
 def solve_batch(
