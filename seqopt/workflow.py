@@ -82,20 +82,22 @@ def optimize(
     Parameters
     ----------
     scene : Scene, str or pathlib.Path
-        Or the name of a built-in scene, or a scene file.
+        The scene, the name of a built-in scene, a few words, or a scene file.
     schedule : Schedule, pathlib.Path or str
-        Or its file, or a key of `seqopt.sequence.three_robots.SCHEDULES`; ``"free"``.
+        The schedule, its file, a name in `seqopt.sequence.three_robots.SCHEDULES`, or ``"free"``.
     criterion : Criterion or str, optional
-        What a step costs; or a name of `seqopt.CRITERIA`, by default that of `DEFAULTS`.
+        What a step costs, or a name in `seqopt.CRITERIA`; by default that of `DEFAULTS`.
     formulation : str, optional
-        One of `seqopt.formulations`; the free schedule has its own; by default of `DEFAULTS`.
+        A name in `seqopt.formulations`; the free schedule has its own; by default that of
+        `DEFAULTS`.
     engine : str
-        A key of `seqopt.engines.registry.ENGINES`; ``"auto"`` models no more than is needed.
+        A name in `seqopt.engines.registry.ENGINES`; ``"auto"`` uses the simplest sufficient model.
     limits : sequence of Limit
-        What no open step may exceed; of the free schedule no step.
+        Bounds that no step with an open grip may exceed; in the free schedule, no step at all.
     **options
-        Of `seqopt.solve`, the formulation, `seqopt.responses.Resources` (as ``workers=2``); an
-        ``order``; of the free schedule ``robots``, and what `seqopt.pose_free` takes.
+        Options of `seqopt.solve`, of the formulation, and of `seqopt.responses.Resources` (such as
+        ``workers=2``); an ``order``; for the free schedule ``robots``, and options of
+        `seqopt.pose_free`.
 
     Returns
     -------
@@ -104,7 +106,7 @@ def optimize(
     Raises
     ------
     SeqoptError
-        One line that says who must act: see `seqopt.errors`.
+        With one line that says what to change; see `seqopt.errors`.
 
     Examples
     --------

@@ -86,7 +86,7 @@ class Formulation:
     kind : FormulationKind
         What it promises.
     aim : Aim
-        What it makes least: the sum of the costs, or the largest.
+        What it minimizes: the sum of the costs, or the largest cost.
     solve : callable
         Takes the problem and named options, returns a `Selection`.
     reads : Reads
@@ -94,7 +94,7 @@ class Formulation:
     takes_budgets : bool
         Whether it can keep totals over the build within budgets.
     windowed : tuple of (str, int or str), optional
-        Options with which it looks at one window after the other, if it does so with some only.
+        Options with which it looks at one window after the other, if it does so only with these.
 
     Examples
     --------

@@ -35,21 +35,21 @@ class Plan:
     Attributes
     ----------
     problem : PlacementProblem
-        What was solved.
+        The problem that was solved.
     formulation : Formulation
-        What solved it.
+        The formulation that solved it.
     selection : Selection
-        The choice, and what the formulation claims of it.
+        The choice, and what the formulation claims about it.
     certificate : Certificate or None
         The checked value of the choice; None without a proof.
     steps : tuple of Step
         The schedule with every move at its chosen node, checked.
     seconds : mapping of str to float
-        By stage, s: respond, rank, compile (writing a program down for a solver), solve, verify.
+        By stage, s: respond, rank, compile (preparing a program for a solver), solve, verify.
     search : WindowSearch or None
-        What was looked at along the choice where not all models were solved.
+        The models solved by a search without proof; None if all were solved.
     looked_at : int or None
-        How many models were solved where a lazy search did not need them all.
+        How many models a lazy search solved; None if all were solved.
 
     Examples
     --------

@@ -39,7 +39,7 @@ class Problem:
     criterion : Criterion
         What a step costs.
     limits : tuple of Limit
-        What no open step may exceed.
+        Bounds that no step with an open grip may exceed.
     evaluation : Evaluation
         Raw responses of every open step.
     budgets : tuple of Budget
@@ -259,17 +259,17 @@ def pose(
     Parameters
     ----------
     engine : Engine
-        What computes responses.
+        The engine that computes responses.
     schedule : Schedule
-        Whose open grips are to be chosen.
+        The schedule whose open grips are to be chosen.
     criterion : Criterion
         What a step costs.
     limits : sequence of Limit
         What no open step may exceed.
     also : sequence of str
-        Responses to evaluate beside those that these name.
+        Further responses to compute, besides those that criterion and limits use.
     resources : Resources, optional
-        Processes, memory, a folder for answers; by default this process alone.
+        Processes, memory and a folder for results; by default only this process.
 
     Returns
     -------

@@ -88,14 +88,14 @@ class Limit:
     Parameters
     ----------
     response : str
-        Named as in `seqopt.placement.criteria`.
+        A name as in `seqopt.placement.criteria`.
     bound : float
         SI units.
 
     Raises
     ------
     ProblemError
-        If these are no name and no number.
+        If the arguments are not a name and a number.
 
     Examples
     --------

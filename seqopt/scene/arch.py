@@ -46,7 +46,7 @@ class ArchShape:
     stub : float
         Length of the rigid stub behind the joint at each ground end.
     translational_stiffness, rotational_stiffness : Vector
-        Of every joint: along it and across it twice, N/m and N m/rad.
+        Stiffness of every joint: along it, and across it in two directions, N/m and N m/rad.
     dimensions : Vector
         Length, width and thickness of a brick.
     density : float
