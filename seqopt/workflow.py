@@ -88,8 +88,7 @@ def optimize(
     criterion : Criterion or str, optional
         What a step costs, or a name in `seqopt.CRITERIA`; by default that of `DEFAULTS`.
     formulation : str, optional
-        A name in `seqopt.formulations`; the free schedule has its own; by default that of
-        `DEFAULTS`.
+        A name in `seqopt.formulations`, or for the free schedule; by default that of `DEFAULTS`.
     engine : str
         A name in `seqopt.engines.registry.ENGINES`; ``"auto"`` uses the simplest sufficient model.
     limits : sequence of Limit

@@ -265,7 +265,7 @@ def pose(
     criterion : Criterion
         What a step costs.
     limits : sequence of Limit
-        What no open step may exceed.
+        Bounds that no step with an open grip may exceed.
     also : sequence of str
         Further responses to compute, besides those that criterion and limits use.
     resources : Resources, optional
@@ -274,7 +274,7 @@ def pose(
     Returns
     -------
     Problem
-        Nothing is computed yet.
+        The problem; nothing is computed yet.
 
     Raises
     ------

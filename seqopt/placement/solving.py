@@ -89,16 +89,13 @@ def solve(
         The problem, from `seqopt.pose` or `seqopt.placement.free_problem.pose_free`, or a
         `seqopt.placement.CostProblem`.
     formulation : Formulation, ScheduleFormulation or str
-        The formulation or its name, from `seqopt.formulations`; ``schedule_search`` for the free
-        schedule.
+        Or a name in `seqopt.formulations`; ``schedule_search`` for the free schedule.
     proof : bool, optional
-        If False, ``cascade`` or ``rank_search`` solve only the models that they need, and the gap
-        is not known.
+        False: ``cascade`` or ``rank_search`` solve only models that they need; no gap is known.
     lazy : bool, optional
         Solve only the models that the proof needs; for exact formulations without budgets.
     time_limit : float, optional
-        Seconds after which it stops choosing and returns its best choice and a bound; an interrupt
-        has the same effect.
+        Seconds after which it returns its best choice and a bound, as at an interrupt.
     progress : callable, optional
         Called with every better choice and bound as it is found.
     **options
@@ -111,8 +108,7 @@ def solve(
     Raises
     ------
     InfeasibleError, ProblemError, SolverError
-        If no choice is allowed; if the arguments do not fit together; if a solver fails or a claim
-        is wrong.
+        If no choice is allowed, the arguments do not fit together, or a solver or claim fails.
 
     Examples
     --------
