@@ -94,9 +94,8 @@ def optimize(
     limits : sequence of Limit
         Bounds that no step with an open grip may exceed; in the free schedule, no step at all.
     **options
-        Options of `seqopt.solve`, of the formulation, and of `seqopt.responses.Resources` (such as
-        ``workers=2``); an ``order``; for the free schedule ``robots``, and options of
-        `seqopt.pose_free`.
+        Options of `seqopt.solve`, the formulation and `seqopt.responses.Resources` (``workers=2``);
+        an ``order``; for the free schedule ``robots`` and options of `seqopt.pose_free`.
 
     Returns
     -------
