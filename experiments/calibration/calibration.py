@@ -1,4 +1,4 @@
-"""Claim: beds of springs fit eight vault tests better than printed only where that is minimized.
+"""Claim: a bed of springs fits the eight vault tests better than the paper only where it is fitted.
 
 A bed of springs over the area of a joint has a linear stiffness ``k_t b t`` and a rotational one
 ``k_r b t³ / 12``. Minimized over one pair of values, its mean absolute error over the measured

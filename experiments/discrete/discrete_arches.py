@@ -1,4 +1,4 @@
-"""Claim: no reading tried of the paper's discrete-element models gives the errors that it prints.
+"""Claim: no interpretation tried of the paper's discrete-element models gives its printed errors.
 
 Method: Bruun et al. compare their model with discrete elements on four partial arches (17, 18, 23
 and 24 bricks, one robot holding the last) and print the mean difference of the displacements of all

@@ -1,4 +1,4 @@
-"""Claim: in all cases tried the fast engine errs by 1e-9 at most, and no more than a direct solve.
+"""Claim: in all cases tried the fast engine errs by at most 1e-9, and no more than a direct solve.
 
 Method: chains of 2 to 2,000 bricks, walls, slender bricks, one joint from stiff to nearly absent,
 grips close together or in a line, a chain in two parts held by robots alone. Fast engine, stiff-bar

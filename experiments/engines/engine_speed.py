@@ -1,4 +1,4 @@
-"""Claim: in the median the fast engine answers grip sets a thousand times faster than the frame.
+"""Claim: in the median the fast engine solves grip sets a thousand times as fast as the frame.
 
 That is the frame that checks it. The lowest ratio of a round is stored beside the median and has to
 be 100 at least: a round in which the machine was busy elsewhere was seen at 541.

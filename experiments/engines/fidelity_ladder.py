@@ -1,4 +1,4 @@
-"""Claim: where its condition is met a level of fidelity answers what the next one would, for less.
+"""Claim: where its condition is met, a simpler model gives the answer of the next one in less time.
 
 That is, to 1e-8 between planar, rigid and discrete bricks and to 1e-5 from rigid bricks to the
 stiff-bar frame; and where its condition is not met a level is wrong by more than a tenth. For less:

@@ -1,4 +1,4 @@
-"""Claim: assemblies of others go from file to a proven plan, or one line says what they lack.
+"""Claim: files of other programs lead to a proven plan, or one line says what they lack.
 
 Method: every file of a list that the project did not make, 21 that ship with compas_cra and 30 of
 public repositories, is put through the command line: ``seqopt import`` with a unit, a density

@@ -1,4 +1,4 @@
-"""Claim: within their uncertainty joint stiffness decides on grips, weights and positions hardly.
+"""Claim: within its uncertainty joint stiffness changes grips; weights and positions hardly do.
 
 Method: the three-robot loop on `arch25`. A scenario perturbs the scene's joint stiffness, brick
 weights or positions; steps and candidates stay the nominal ones, so only responses differ. In every

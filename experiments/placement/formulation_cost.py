@@ -1,4 +1,4 @@
-"""Claim: where dynamic programming serves, a solver costs tens of times more, on `arch25` hundreds.
+"""Claim: where dynamic programming is enough, solvers take tens of times as long, or hundreds.
 
 The ratio grows with the brick count. On every size it has to be 20 at least, on `arch25` 100.
 

@@ -1,4 +1,4 @@
-"""Claim: made for many scenarios, plans keep peaks low in others; of totals they gain little.
+"""Claim: plans made for many scenarios keep peaks low in others, but gain little in totals.
 
 Method: the three-robot loop on `arch25`. Scenarios multiply the stiffness of every joint by
 log-uniform factors between 1/3 and 3 (translational and rotational apart), change every brick's

@@ -1,4 +1,4 @@
-"""Claim: nothing proves its plan much sooner than rigid bricks with dynamic programming do.
+"""Claim: no method proves its plan much sooner than rigid bricks with dynamic programming.
 
 With rigid bricks no other formulation does by more than a tenth, with another engine by more than a
 fifth (`auto`, which takes rigid bricks too), and nothing is closer to the optimum, on any scene and

@@ -1,4 +1,4 @@
-"""Claim: the dry `arch25`'s 19,601 grip sets are all decided, a twentieth solved; two robots fail.
+"""Claim: all 19,601 grip sets of a dry `arch25` are decided, a twentieth solved; two robots fail.
 
 Method: every set of two or three nodes that holds the newest of 2 to 25 bricks (the first one is
 held alone) is screened as rigid bricks laid dry (friction 25 degrees, the robots' payloads): does

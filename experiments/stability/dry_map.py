@@ -1,4 +1,4 @@
-"""Claim: a third robot builds dry what two cannot, and none needs more payload than one robot less.
+"""Claim: three robots build dry what two cannot, and one more robot never needs a larger payload.
 
 Method: arches of 7 to 16 bricks along a catenary, whose bricks stick out of the arch's line to
 either side as those of `arch25` do, of three thicknesses, with four coefficients of friction, are

@@ -1,4 +1,4 @@
-"""Claim: without bond the sequential and the cantilever method fail; larger arches need more of it.
+"""Claim: without bond the sequential and the cantilever method fail; larger arches need more bond.
 
 Method: every step of every method on `arch25` is certified as rigid blocks (friction 25 degrees)
 beside its elastic responses and the paper's limits (0.1 mm, 30 N m, payload 392.4 N). Then the

@@ -1,4 +1,4 @@
-"""Claim: our verdicts are those of two outside programs, and on a large assembly come sooner.
+"""Claim: our verdicts agree with those of two other programs, and on a large assembly come sooner.
 
 The verdicts wherever a program decides, but for three differences that are explained below: they
 are known from earlier runs, and the claim fails if one is missing or a fourth is found. The time is

@@ -1,4 +1,4 @@
-"""Claim: no criterion tried names all published nodes first; some name more than those printed.
+"""Claim: no criterion tried ranks all published nodes first; some rank more first than the paper's.
 
 Method: for every optimization of the published three-robot plan, the choices before it being as
 published, rank all candidates by each variant of the criteria (equation 1: ranks summed over the
