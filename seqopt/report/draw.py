@@ -2,30 +2,46 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
 
 from seqopt.arrays import Floats, Ints
 from seqopt.network.network import Network, PartKind
+from seqopt.report.along import draw_responses
+from seqopt.report.labels import aside
 from seqopt.report.occlusion import drawing_order
+from seqopt.report.style import BLUE, SMALL, VERMILION
 from seqopt.scene.blocks import vertices_of
 from seqopt.scene.boxes import boxes
 from seqopt.scene.parts import Brick
 from seqopt.scene.shape import normal_of
+
+__all__ = [
+    "View",
+    "draw_bricks",
+    "draw_grips",
+    "draw_network",
+    "draw_responses",
+    "force_key",
+]
 
 Faces = tuple[tuple[int, ...], ...]
 Color = tuple[float, float, float, float]
 FACES: Faces = ((0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (1, 3, 7, 5))
 CLAY = np.array([0.80, 0.52, 0.38])
 MARKED = np.array([0.46, 0.63, 0.76])
-INK, TENSION, COMPRESSION = "#2b2b2b", "#c8102e", "#1f5fa8"
-ROBOT_COLORS = ("#0b7a75", "#7b2d8b", "#d17a00", "#444444")
+INK, TENSION, COMPRESSION = "#2b2b2b", VERMILION, BLUE
+THIN, THICK = 0.8, 6.0  # points: edges without force, and with the largest
+ROBOT_COLORS = ("#0b7a75", "#7b2d8b", "#b35900", "#444444")
+ROBOT_MARKERS = "XPDs"
+HALO = (withStroke(linewidth=2.5, foreground="white"),)
+LINE = 11.0  # points from one line of text to the next
 
 
 @dataclass(frozen=True)
@@ -112,6 +128,7 @@ def draw_network(  # noqa: PLR0913  # what is drawn, and how, each by its name
     displacement: Floats | None = None,
     magnify: float = 1.0,
     edge_force: Floats | None = None,
+    largest_force: float | None = None,
     numbers: bool = False,
 ) -> None:
     """Draw nodes and edges of the first bricks, in place or moved.
@@ -131,7 +148,10 @@ def draw_network(  # noqa: PLR0913  # what is drawn, and how, each by its name
     magnify : float
         How many times larger the motion is drawn.
     edge_force : (E,) float, optional
-        Axial force, tension positive, N: colors the edges and sets their widths.
+        Axial force, tension positive, N: colors the edges and sets their widths; `force_key` says
+        how.
+    largest_force : float, optional
+        Force that is drawn widest, N; by default the largest of ``edge_force``.
     numbers : bool
         Whether to write the numbers of the nodes that robots may hold.
     """
@@ -140,24 +160,67 @@ def draw_network(  # noqa: PLR0913  # what is drawn, and how, each by its name
     if displacement is not None:
         points += magnify * displacement
     seen = points @ view.axes()[:2].T
-    axes.add_collection(_lines(list(seen[network.edge_nodes[:edges]]), edge_force))
+    segments = list(seen[network.edge_nodes[:edges]])
+    axes.add_collection(_lines(segments, edge_force, largest_force))
     _draw_nodes(axes, network.node_kind[:nodes], seen)
     if numbers:
-        for i in np.flatnonzero(network.node_kind[:nodes] == PartKind.INNER.value):
-            axes.annotate(
-                str(network.node_name[i]), seen[i], (3, 2), textcoords="offset points", fontsize=6
-            )
+        _write_numbers(axes, network, seen, segments)
     _frame(axes)
 
 
-def _lines(segments: list[Floats], edge_force: Floats | None) -> LineCollection:
+def _write_numbers(
+    axes: Axes, network: Network, seen: Floats, segments: Sequence[Floats]
+) -> None:
+    """Write the numbers of the nodes that robots may hold beside what is seen (N, 2)."""
+    inner = np.flatnonzero(network.node_kind[: len(seen)] == PartKind.INNER.value)
+    for i, shift in zip(inner, aside(seen[inner], segments), strict=True):
+        axes.annotate(
+            str(network.node_name[i]),
+            seen[i],
+            shift,
+            textcoords="offset points",
+            fontsize=SMALL,
+            ha="center",
+            va="center",
+            path_effects=HALO,
+            zorder=4,
+        )
+
+
+def _lines(
+    segments: list[Floats], edge_force: Floats | None, largest: float | None
+) -> LineCollection:
     """Return edges (E) of (2, 2), colored by their forces (E,) if given."""
     if edge_force is None:
         return LineCollection(segments, colors=INK, linewidths=1.2)
-    size = np.abs(edge_force).max() or 1.0
+    size = largest or np.abs(edge_force).max() or 1.0
     colors = [TENSION if force > 0 else COMPRESSION for force in edge_force]
-    widths = 0.6 + 3.4 * np.abs(edge_force) / size
+    widths = THIN + (THICK - THIN) * np.abs(edge_force) / size
     return LineCollection(segments, colors=colors, linewidths=widths.tolist())
+
+
+def force_key(largest_force: float) -> list[Line2D]:
+    """Return the entries of a legend for the color and the width of edges.
+
+    Parameters
+    ----------
+    largest_force : float
+        Force that is drawn widest, N.
+
+    Returns
+    -------
+    list of matplotlib.lines.Line2D
+    """
+    kinds = [
+        Line2D([], [], color=color, lw=THICK / 2, label=name)
+        for color, name in ((TENSION, "tension"), (COMPRESSION, "compression"))
+    ]
+    return kinds + [
+        Line2D(
+            [], [], color=INK, lw=THIN + (THICK - THIN) * share, label=f"{share * largest_force:.0f} N"
+        )
+        for share in (0.1, 0.5, 1.0)
+    ]
 
 
 def _draw_nodes(axes: Axes, kind: Ints, seen: Floats) -> None:
@@ -194,49 +257,27 @@ def draw_grips(axes: Axes, network: Network, grips: Sequence[int | None], view: 
     view : View
         From where.
     """
-    for i, (robot, node) in enumerate(zip(network.scene.robots, grips, strict=True)):
-        if node is None:
-            continue
-        x, y = view.axes()[:2] @ np.array(network.scene.node_position(node))
+    at = {
+        i: view.axes()[:2] @ np.array(network.scene.node_position(node))
+        for i, node in enumerate(grips)
+        if node is not None
+    }
+    below = sorted(at, key=lambda i: float(at[i][1]))  # labels keep a line of text apart
+    for i, (x, y) in at.items():
         color = ROBOT_COLORS[i % len(ROBOT_COLORS)]
-        axes.scatter([x], [y], s=120, marker="X", c=color, edgecolors="white", zorder=5)
+        marker = ROBOT_MARKERS[i % len(ROBOT_MARKERS)]
+        axes.scatter([x], [y], s=90, marker=marker, c=color, edgecolors="white", zorder=5)
         axes.annotate(
-            f"{robot.name} at {node}",
+            f"{network.scene.robots[i].name} at {grips[i]}",
             (x, y),
-            (9, -3),
+            (10, LINE * (below.index(i) - (len(at) - 1) / 2)),
             textcoords="offset points",
-            fontsize=8,
+            va="center",
+            fontsize=SMALL,
             color=color,
             zorder=6,
-            path_effects=[withStroke(linewidth=2.5, foreground="white")],
+            path_effects=HALO,
         )
-
-
-def draw_responses(
-    axes: Sequence[Axes], tables: Mapping[str, pd.DataFrame], columns: Mapping[str, str]
-) -> None:
-    """Draw responses along the build, one column of the tables on each axes.
-
-    A step stands at the share of the build that it ends, so that methods of different length align.
-
-    Parameters
-    ----------
-    axes : sequence of matplotlib.axes.Axes
-        One for every column.
-    tables : mapping of str to pandas.DataFrame
-        By method, as `seqopt.analyze` makes them.
-    columns : mapping of str to str
-        Label of every column, with its unit.
-    """
-    for axis, (column, label) in zip(axes, columns.items(), strict=True):
-        for name, table in tables.items():
-            count = table.groupby("bricks")["step"].transform("count")
-            rank = table.groupby("bricks").cumcount()
-            axis.plot(table["bricks"] - 1 + (rank + 1) / count, table[column], label=name, lw=1.3)
-        axis.set_ylabel(label)
-        axis.grid(visible=True, lw=0.3)
-    axes[-1].set_xlabel("bricks placed")
-    axes[0].legend(frameon=False, ncols=len(tables), fontsize=8)
 
 
 def _moved(network: Network, bricks: int, twist: Floats | None, magnify: float) -> Floats:
