@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import pandas as pd
@@ -23,3 +24,9 @@ def save_figure(figure: Figure, name: str) -> None:
 def stored(name: str) -> pd.DataFrame:
     """Return a table of results as it is stored, by its name without an ending."""
     return pd.read_csv(RESULTS / f"{name}.csv")
+
+
+def save_all(pictures: Mapping[str, Callable[[], Figure]]) -> None:
+    """Draw figures from stored results and write them, by file name."""
+    for name, draw in pictures.items():
+        save_figure(draw(), name)

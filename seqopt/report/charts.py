@@ -166,7 +166,10 @@ def trace_figure(plans: Sequence[Plan]) -> Figure:
         ):
             known = np.isfinite(values)
             axes.step(
-                seconds[known], np.array(values)[known], where="post", **(known_by[name].line() | more)
+                seconds[known],
+                np.array(values)[known],
+                where="post",
+                **(known_by[name].line() | more),
             )
     axes.plot([], [], "o-", color=GRAY, mfc="white", lw=0.8, label="lower bound")
     axes.set(xscale="log", xlabel="time [s]", ylabel="objective, and what bounds it below")

@@ -168,9 +168,7 @@ def draw_network(  # noqa: PLR0913  # what is drawn, and how, each by its name
     _frame(axes)
 
 
-def _write_numbers(
-    axes: Axes, network: Network, seen: Floats, segments: Sequence[Floats]
-) -> None:
+def _write_numbers(axes: Axes, network: Network, seen: Floats, segments: Sequence[Floats]) -> None:
     """Write the numbers of the nodes that robots may hold beside what is seen (N, 2)."""
     inner = np.flatnonzero(network.node_kind[: len(seen)] == PartKind.INNER.value)
     for i, shift in zip(inner, aside(seen[inner], segments), strict=True):
@@ -217,7 +215,11 @@ def force_key(largest_force: float) -> list[Line2D]:
     ]
     return kinds + [
         Line2D(
-            [], [], color=INK, lw=THIN + (THICK - THIN) * share, label=f"{share * largest_force:.0f} N"
+            [],
+            [],
+            color=INK,
+            lw=THIN + (THICK - THIN) * share,
+            label=f"{share * largest_force:.0f} N",
         )
         for share in (0.1, 0.5, 1.0)
     ]

@@ -30,7 +30,6 @@ IN_A_ROW = 2  # charts
 FAR = 2.5  # a method so much worse than the set makes an axis logarithmic
 
 
-
 @styled
 def drawn(
     table: pd.DataFrame,

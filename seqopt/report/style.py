@@ -166,8 +166,18 @@ def plain(*axes: Axis) -> None:
         low, high = axis.get_view_interval()
         few = np.floor(np.log10(high)) - np.ceil(np.log10(low)) < FEW - 1
         axis.set_major_locator(LogLocator(subs=(1, 2, 5) if few else (1,)))
-        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,g}"))
+        axis.set_major_formatter(FuncFormatter(lambda value, _: _in_full(value)))
         axis.set_minor_locator(NullLocator())
+
+
+def _in_full(value: float) -> str:
+    """Return a number as people write it, as a power of ten where it has many zeros."""
+    if 1e-4 <= value < 1e6:
+        return f"{value:,g}"
+    power = int(np.floor(np.log10(value) + 0.01))
+    digit = round(value / 10.0**power)
+    times = "" if digit == 1 else f"{digit}·"
+    return f"${times}10^{{{power}}}$"
 
 
 def name_panels(*panels: Axes) -> None:

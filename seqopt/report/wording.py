@@ -1,4 +1,4 @@
-"""Names of methods and formulations in the words of the field, for tables and charts."""
+"""Names of methods, formulations and criteria in the words of the field, for tables and charts."""
 
 from __future__ import annotations
 
@@ -17,6 +17,15 @@ WORDS = {
     "cascade": "cascade",
     "beam": "beam search",
     "rank_search": "rank search",
+    "equations-2-3": "equations 2 and 3",
+    "closest-to-plan": "rule closest to the published plan",
+    "weighted-published": "weighted sum of ratios",
+    "worst-ratio-published": "worst ratio",
+    "assignment_tight": "assignment, tight links",
+    "assignment_loose": "assignment, loose links",
+    "minimax_layer": "epigraph per step",
+    "minimax_arc": "epigraph per pair",
+    "minimax_big_m": "large constant (big-M)",
 }
 
 

@@ -41,7 +41,9 @@ EXACT = {
     "overlap_lp": "linear program",
     "overlap_mip": "integer program",
 }
-LOOKS = {name: look(number) for number, name in enumerate((*EXACT, "cascade", "rank_search", "beam"))}
+LOOKS = {
+    name: look(number) for number, name in enumerate((*EXACT, "cascade", "rank_search", "beam"))
+}
 ENGINES = {
     REFERENCE: "exactly rigid bricks",
     "auto": "automatic choice of engine",
