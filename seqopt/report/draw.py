@@ -37,7 +37,8 @@ FACES: Faces = ((0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6
 CLAY = np.array([0.80, 0.52, 0.38])
 MARKED = np.array([0.46, 0.63, 0.76])
 INK, TENSION, COMPRESSION = "#2b2b2b", VERMILION, BLUE
-THIN, THICK = 0.8, 6.0  # points: edges without force, and with the largest
+THIN, THICK = 1.2, 7.0  # points: edges without force, and with the largest
+SPARE = 0.3  # share of a node's area where the colors of edges count
 ROBOT_COLORS = ("#0b7a75", "#7b2d8b", "#b35900", "#444444")
 ROBOT_MARKERS = "XPDs"
 HALO = (withStroke(linewidth=2.5, foreground="white"),)
@@ -162,7 +163,7 @@ def draw_network(  # noqa: PLR0913  # what is drawn, and how, each by its name
     seen = points @ view.axes()[:2].T
     segments = list(seen[network.edge_nodes[:edges]])
     axes.add_collection(_lines(segments, edge_force, largest_force))
-    _draw_nodes(axes, network.node_kind[:nodes], seen)
+    _draw_nodes(axes, network.node_kind[:nodes], seen, 1.0 if edge_force is None else SPARE)
     if numbers:
         _write_numbers(axes, network, seen, segments)
     _frame(axes)
@@ -225,7 +226,7 @@ def force_key(largest_force: float) -> list[Line2D]:
     ]
 
 
-def _draw_nodes(axes: Axes, kind: Ints, seen: Floats) -> None:
+def _draw_nodes(axes: Axes, kind: Ints, seen: Floats, size_by: float) -> None:
     """Draw nodes of given kinds (N,) where they are seen (N, 2)."""
     for which, marker, size, face in (
         (PartKind.INNER, "o", 9, INK),
@@ -236,7 +237,7 @@ def _draw_nodes(axes: Axes, kind: Ints, seen: Floats) -> None:
         axes.scatter(
             at[:, 0],
             at[:, 1],
-            s=size,
+            s=size_by * size,
             marker=marker,
             c=face,
             edgecolors=INK,

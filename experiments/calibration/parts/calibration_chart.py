@@ -134,7 +134,7 @@ def _region(
     axes.set_xlabel("$k_t$ [10⁶ kN/m³]")
     axes.set_ylabel("$k_r$, per second moment\nof area [10⁶ kN/m³]")
     axes.set_title("95 % region (gray); numbers: test left out")
-    axes.legend(loc="upper right")
+    axes.legend(loc="upper right", frameon=True, framealpha=1, edgecolor="none")
 
 
 def _plain(axes: Axes) -> None:
