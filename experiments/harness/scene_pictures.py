@@ -63,7 +63,9 @@ def library(_: Engine) -> Figure:
     }
     for panel, (name, scene) in zip(figure.subplots(2, 2).ravel(), scenes.items(), strict=True):
         draw_bricks(panel, build_network(scene), len(scene.bricks), VIEW)
-        panel.set_title(name if "of" in name else f"{name}, {len(scene.bricks)} bricks", loc="center")
+        panel.set_title(
+            name if "of" in name else f"{name}, {len(scene.bricks)} bricks", loc="center"
+        )
     return figure
 
 
