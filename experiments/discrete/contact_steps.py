@@ -91,7 +91,7 @@ def rows(net: Network, method: str, steps: Sequence[Step]) -> list[dict[str, obj
 
 @styled
 def chart(table: pd.DataFrame) -> Figure:
-    figure = new_figure(4.6)
+    figure = new_figure(4.8)
     panels = figure.subplots(table["method"].nunique(), 1, sharex=True)
     for axes, (method, part) in zip(panels, table.groupby("method", sort=False), strict=True):
         axes.plot(part["step"], part["D_max_rigid_1e-3mm"], color=GRAY, lw=1.2)
@@ -112,7 +112,7 @@ def chart(table: pd.DataFrame) -> Figure:
     keys: list[Artist] = [Line2D([], [], label=words[end], **look) for end, look in SHOWN.items()]
     keys.append(Patch(color=FALLING, label="proven to fall"))
     keys.append(Line2D([], [], color=GRAY, label="the same, bricks bonded"))
-    figure.legend(handles=keys, loc="outside lower center", ncols=5)
+    figure.legend(handles=keys, loc="outside lower center", ncols=3)
     return figure
 
 

@@ -51,9 +51,8 @@ from matplotlib.figure import Figure
 
 from experiments.harness.claim import Claim, Extra, Finding, Option, Options, Times
 from experiments.harness.lmgc90 import python_with_lmgc90
-from experiments.harness.plotting import RESULTS, save_all, stored
+from experiments.harness.plotting import RESULTS, save_all
 from experiments.stability.parts.blocks import ring, stack
-from experiments.stability.parts.witness_chart import chart
 from experiments.stability.parts.witness_cra import (
     SAMPLES,
     coupled,
@@ -63,12 +62,12 @@ from experiments.stability.parts.witness_cra import (
 )
 from experiments.stability.parts.witness_lmgc90 import moved_by
 from experiments.stability.parts.witness_scenes import Scene, arch, incline, scene_of
+from experiments.stability.parts.witness_verdicts import LARGEST, differing, picture, words
 from seqopt.contact.mortar import Mortar
 from seqopt.stability.assessment import Verdict, bonded, verdict_of
 from seqopt.stability.limit_analysis import compile_equilibrium
 from seqopt.stability.prover import Prover
 
-LARGEST = "armadillo_cra"
 SOONER = 5.0
 OPEN = Verdict.UNDECIDED.value
 TURNED = "incline, turned"
@@ -201,20 +200,6 @@ def _timed(trial: Trial) -> float:
     return time.perf_counter() - start
 
 
-def words(table: pd.DataFrame, witness: str) -> pd.Series:
-    """Return a witness's verdicts; RBE's open ones as its constraints without tension have it."""
-    if witness != "rbe":
-        return table[witness].replace("", OPEN)
-    return table["rbe"].where(table["rbe"] != OPEN, table["no_tension"])
-
-
-def differing(table: pd.DataFrame, witness: str) -> set[tuple[str, str]]:
-    """Return where a witness decides otherwise than we."""
-    word = words(table, witness)
-    differs = (word != OPEN) & (word != table["ours"])
-    return {(case, witness) for case in table.loc[differs, "case"]}
-
-
 def faults(table: pd.DataFrame, witnesses: list[str], ratio: float | None) -> list[str]:
     """Return what speaks against the claim; without a ratio, nothing is said about times."""
     out = []
@@ -250,16 +235,6 @@ def report(table: pd.DataFrame, witnesses: list[str]) -> None:
             print(f"  {case}: {KNOWN.get((case, witness), 'unexplained')}")
     settled = table[table["rbe"] == OPEN]
     print(f"rbe undecided, by its constraints: {settled['no_tension'].value_counts().to_dict()}")
-
-
-def picture() -> Figure:
-    """Return the figure from stored rows; times are those of the run that they tell."""
-    table = stored("witnesses")
-    words_of = ["rbe", "no_tension", "cra", "lmgc90"]
-    table[words_of] = table[words_of].fillna("")
-    times = table[table["case"].isin([LARGEST, "bridge"])]
-    differ = set().union(*(differing(table, witness) for witness in ("rbe", "lmgc90")))
-    return chart(table, times, {case for case, _ in differ})
 
 
 def trials(*, quick: bool) -> list[Trial]:

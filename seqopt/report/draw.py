@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection, PolyCollection
-from matplotlib.lines import Line2D
-from matplotlib.patheffects import withStroke
+from matplotlib.collections import PolyCollection
 
-from seqopt.arrays import Floats, Ints
-from seqopt.network.network import Network, PartKind
+from seqopt.arrays import Floats
+from seqopt.network.network import Network
 from seqopt.report.along import draw_responses
-from seqopt.report.labels import aside
+from seqopt.report.network_picture import draw_network, force_key
 from seqopt.report.occlusion import drawing_order
-from seqopt.report.style import BLUE, SMALL, VERMILION
+from seqopt.report.style import SMALL
+from seqopt.report.view import HALO, View, frame
 from seqopt.scene.blocks import vertices_of
 from seqopt.scene.boxes import boxes
 from seqopt.scene.parts import Brick
@@ -36,42 +34,9 @@ Color = tuple[float, float, float, float]
 FACES: Faces = ((0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (1, 3, 7, 5))
 CLAY = np.array([0.80, 0.52, 0.38])
 MARKED = np.array([0.46, 0.63, 0.76])
-INK, TENSION, COMPRESSION = "#2b2b2b", VERMILION, BLUE
-THIN, THICK = 1.2, 7.0  # points: edges without force, and with the largest
-SPARE = 0.3  # share of a node's area where the colors of edges count
 ROBOT_COLORS = ("#0b7a75", "#7b2d8b", "#b35900", "#444444")
 ROBOT_MARKERS = "XPDs"
-HALO = (withStroke(linewidth=2.5, foreground="white"),)
 LINE = 11.0  # points from one line of text to the next
-
-
-@dataclass(frozen=True)
-class View:
-    """A parallel projection.
-
-    Parameters
-    ----------
-    azimuth : float
-        Direction from which the scene is seen, degrees from -y towards +x.
-    elevation : float
-        Degrees above the horizon.
-    """
-
-    azimuth: float = 25.0
-    elevation: float = 15.0
-
-    def axes(self) -> Floats:
-        """Return the unit vectors to the right, up and towards the viewer.
-
-        Returns
-        -------
-        (3, 3) float
-            A row for each.
-        """
-        a, e = np.radians([self.azimuth, self.elevation])
-        right = np.array([np.cos(a), np.sin(a), 0.0])
-        toward = np.array([np.sin(a) * np.cos(e), -np.cos(a) * np.cos(e), np.sin(e)])
-        return np.stack([right, np.cross(toward, right), toward])
 
 
 def draw_bricks(  # noqa: PLR0913  # what is drawn, and how, each by its name
@@ -117,133 +82,7 @@ def draw_bricks(  # noqa: PLR0913  # what is drawn, and how, each by its name
             red, green, blue = (_light(points, face) * own).tolist()
             colors.append((red, green, blue, alpha))
     _fill(axes, polygons, colors, alpha)
-    _frame(axes)
-
-
-def draw_network(  # noqa: PLR0913  # what is drawn, and how, each by its name
-    axes: Axes,
-    network: Network,
-    bricks: int,
-    view: View,
-    *,
-    displacement: Floats | None = None,
-    magnify: float = 1.0,
-    edge_force: Floats | None = None,
-    largest_force: float | None = None,
-    numbers: bool = False,
-) -> None:
-    """Draw nodes and edges of the first bricks, in place or moved.
-
-    Parameters
-    ----------
-    axes : matplotlib.axes.Axes
-        To draw on.
-    network : Network
-        Of the scene.
-    bricks : int
-        How many, in build order.
-    view : View
-        From where.
-    displacement : (N, 3) float, optional
-        Of every node, m.
-    magnify : float
-        How many times larger the motion is drawn.
-    edge_force : (E,) float, optional
-        Axial force, tension positive, N: colors the edges and sets their widths; `force_key` says
-        how.
-    largest_force : float, optional
-        Force that is drawn widest, N; by default the largest of ``edge_force``.
-    numbers : bool
-        Whether to write the numbers of the nodes that robots may hold.
-    """
-    nodes, edges = network.count_nodes(bricks), network.count_edges(bricks)
-    points = network.node_position[:nodes].copy()
-    if displacement is not None:
-        points += magnify * displacement
-    seen = points @ view.axes()[:2].T
-    segments = list(seen[network.edge_nodes[:edges]])
-    axes.add_collection(_lines(segments, edge_force, largest_force))
-    _draw_nodes(axes, network.node_kind[:nodes], seen, 1.0 if edge_force is None else SPARE)
-    if numbers:
-        _write_numbers(axes, network, seen, segments)
-    _frame(axes)
-
-
-def _write_numbers(axes: Axes, network: Network, seen: Floats, segments: Sequence[Floats]) -> None:
-    """Write the numbers of the nodes that robots may hold beside what is seen (N, 2)."""
-    inner = np.flatnonzero(network.node_kind[: len(seen)] == PartKind.INNER.value)
-    for i, shift in zip(inner, aside(seen[inner], segments), strict=True):
-        axes.annotate(
-            str(network.node_name[i]),
-            seen[i],
-            shift,
-            textcoords="offset points",
-            fontsize=SMALL,
-            ha="center",
-            va="center",
-            path_effects=HALO,
-            zorder=4,
-        )
-
-
-def _lines(
-    segments: list[Floats], edge_force: Floats | None, largest: float | None
-) -> LineCollection:
-    """Return edges (E) of (2, 2), colored by their forces (E,) if given."""
-    if edge_force is None:
-        return LineCollection(segments, colors=INK, linewidths=1.2)
-    size = largest or np.abs(edge_force).max() or 1.0
-    colors = [TENSION if force > 0 else COMPRESSION for force in edge_force]
-    widths = THIN + (THICK - THIN) * np.abs(edge_force) / size
-    return LineCollection(segments, colors=colors, linewidths=widths.tolist())
-
-
-def force_key(largest_force: float) -> list[Line2D]:
-    """Return the entries of a legend for the color and the width of edges.
-
-    Parameters
-    ----------
-    largest_force : float
-        Force that is drawn widest, N.
-
-    Returns
-    -------
-    list of matplotlib.lines.Line2D
-    """
-    kinds = [
-        Line2D([], [], color=color, lw=THICK / 2, label=name)
-        for color, name in ((TENSION, "tension"), (COMPRESSION, "compression"))
-    ]
-    return kinds + [
-        Line2D(
-            [],
-            [],
-            color=INK,
-            lw=THIN + (THICK - THIN) * share,
-            label=f"{share * largest_force:.0f} N",
-        )
-        for share in (0.1, 0.5, 1.0)
-    ]
-
-
-def _draw_nodes(axes: Axes, kind: Ints, seen: Floats, size_by: float) -> None:
-    """Draw nodes of given kinds (N,) where they are seen (N, 2)."""
-    for which, marker, size, face in (
-        (PartKind.INNER, "o", 9, INK),
-        (PartKind.JOINT, "o", 12, "white"),
-        (PartKind.BASE, "s", 36, INK),
-    ):
-        at = seen[kind == which]
-        axes.scatter(
-            at[:, 0],
-            at[:, 1],
-            s=size_by * size,
-            marker=marker,
-            c=face,
-            edgecolors=INK,
-            zorder=3,
-            linewidths=0.7,
-        )
+    frame(axes)
 
 
 def draw_grips(axes: Axes, network: Network, grips: Sequence[int | None], view: View) -> None:
@@ -324,9 +163,3 @@ def _light(corners: Floats, face: tuple[int, ...]) -> float:
     """Return how bright a face of corners (V, 3) is, from 0.55 to 1."""
     normal = normal_of(corners[list(face)])
     return float(0.55 + 0.45 * abs(normal @ [0.3, -0.5, 0.8]) / np.linalg.norm(normal))
-
-
-def _frame(axes: Axes) -> None:
-    axes.set_aspect("equal")
-    axes.autoscale_view()
-    axes.set_axis_off()

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogFormatter
 
-from seqopt.report.fronts import shown, worst_of
+from seqopt.report.front_numbers import shown, worst_of
 from seqopt.report.style import GRAY, VERMILION, dress, new_figure, styled
 from seqopt.report.wording import in_words
 
@@ -83,5 +84,5 @@ def _mark(axes: Axes, marks: Mapping[str, Mapping[str, float]], names: tuple[str
     for marker, (method, worst) in zip(MARKERS, marks.items(), strict=False):
         if all(name in worst for name in names):
             at = [shown(worst[name], name) for name in names]
-            look = {"color": VERMILION, "mec": "white", "ms": 8, "ls": "none"}
+            look: dict[str, Any] = {"color": VERMILION, "mec": "white", "ms": 8, "ls": "none"}
             axes.plot(*at, marker, label=in_words(method), zorder=3, **look)

@@ -10,6 +10,7 @@ from seqopt.arrays import Floats
 
 POINTS = 9.0  # from a mark to the middle of its number
 SHARE = 0.026  # of the picture's size that this is, about
+WIDE = 1.5  # of a number over its height
 ANGLES = np.radians(np.arange(0, 360, 15))
 
 
@@ -31,15 +32,16 @@ def aside(marks: Floats, segments: Sequence[Floats]) -> list[tuple[float, float]
         To the right and up.
     """
     reach = SHARE * float(np.ptp(marks, axis=0).max())
-    share = np.linspace(0, 1, 9)[:, None]
-    lines = np.concatenate([one[0] + share * (one[1] - one[0]) for one in segments])
     around = np.stack([np.cos(ANGLES), np.sin(ANGLES)], axis=1)
+    ends = np.asarray(segments, dtype=float).reshape(-1, 2, 2)
     placed: list[Floats] = []
     out = []
     for mark in marks:
-        taken = np.concatenate([lines, *(other[None] + _word(reach) for other in placed)])
         spots = mark + reach * around
-        room = np.linalg.norm(spots[:, None] - taken, axis=2).min(axis=1)
+        room = _from_lines(spots, ends)
+        for other in placed:
+            apart = np.linalg.norm((spots - other) / [WIDE, 1.0], axis=1)
+            room = np.minimum(room, apart)
         best = int(room.argmax())
         placed.append(spots[best])
         x, y = (POINTS * around[best]).tolist()
@@ -47,6 +49,10 @@ def aside(marks: Floats, segments: Sequence[Floats]) -> list[tuple[float, float]
     return out
 
 
-def _word(reach: float) -> Floats:
-    """Return points (3, 2) across a label of two digits, about its middle."""
-    return reach * np.array([[-0.6, 0.0], [0.0, 0.0], [0.6, 0.0]])
+def _from_lines(spots: Floats, ends: Floats) -> Floats:
+    """Return how far spots (n, 2) are from the nearest of lines between ends (E, 2, 2)."""
+    start, along = ends[:, 0], ends[:, 1] - ends[:, 0]
+    away = spots[:, None] - start
+    length = np.maximum((along**2).sum(axis=1), np.finfo(float).tiny)
+    share = np.clip((away * along).sum(axis=2) / length, 0.0, 1.0)
+    return np.asarray(np.linalg.norm(away - share[..., None] * along, axis=2).min(axis=1))

@@ -35,7 +35,7 @@ GRAY = "#767676"  # of what is beside the point; 4.5 to 1 against white
 COLORS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, INK)
 MARKERS = "os^DvP<>X*"
 DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1, 1.2)), (0, (5, 1.5, 1, 1.5)))
-PARAMETERS: dict[str, Any] = {
+PARAMETERS: Any = {
     "font.size": BODY,
     "axes.titlesize": BODY,
     "axes.labelsize": BODY,
@@ -55,7 +55,7 @@ PARAMETERS: dict[str, Any] = {
     "grid.color": "#dddddd",
     "lines.linewidth": 1.4,
     "lines.markersize": 4.5,
-    "axes.prop_cycle": mpl.cycler(color=COLORS),
+    "axes.prop_cycle": f"cycler(color={list(COLORS)})",
     "mathtext.default": "regular",
     "svg.hashsalt": "seqopt",
 }

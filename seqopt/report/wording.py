@@ -67,4 +67,5 @@ def typed(name: str) -> str:
     ('dynamic programming (overlap_dp)', 'cantilever')
     """
     words = in_words(name)
-    return words if name.replace("_", " ").replace("-", " ") in words else f"{words} ({name})"
+    same = words == name or name.replace("_", " ").replace("-", " ") in words
+    return words if same else f"{words} ({name})"

@@ -90,7 +90,7 @@ def _dress(axes: Axes, sweep: str, part: pd.DataFrame) -> None:
     dress(axes)
     if sweep in NAMED:
         names = part.drop_duplicates("value").sort_values("value")
-        axes.set_xticks(names["value"], names["label"], rotation=60, ha="right",
+        axes.set_xticks(names["value"], names["label"], rotation=90, ha="right",
                         rotation_mode="anchor")  # fmt: skip
         axes.set_xlim(-0.5, len(names) - 0.5)
         return
