@@ -45,6 +45,6 @@ def chart(table: pd.DataFrame) -> Figure:
                 axis.set_xlabel("bricks of the arch")
         row[0].set_ylabel(f"{1e3 * thickness:g} mm thick\ncoefficient of friction")
     figure.colorbar(image, ax=axes, label="least payload over the weight of the arch", shrink=0.6)
-    none = Patch(color="0.85", label="no such build was found")
+    none = Patch(color="0.85", label="no payload up to four times the weight is enough")
     figure.legend(handles=[none], loc="outside lower right")
     return figure
