@@ -5,7 +5,7 @@ from __future__ import annotations
 import pandas as pd
 from matplotlib.axes import Axes
 
-from seqopt.report.style import BLUE, VERMILION, dress
+from seqopt.report.style import BLUE, INK, VERMILION, dress
 
 OURS, STUDY, OFF = BLUE, "#222222", VERMILION
 
@@ -26,8 +26,8 @@ def tidy(axes: Axes) -> None:
 
 
 def pair(axes: Axes, x: object, rows: pd.DataFrame, color: str = OURS, name: str = "") -> None:
-    """Draw our values filled and printed ones around them; triangles for the second kind."""
-    ours, ring = ("^", "^") if color == OFF else (".", "o")
+    """Draw our values filled and printed ones around them; marks differ by color."""
+    ours, ring = {OFF: ("^", "^"), INK: ("s", "s")}.get(color, (".", "o"))
     axes.plot(x, rows["ours"], ours, ms=4, color=color, ls="none", label=f"{name}here")
     axes.plot(x, rows["printed"], ring, ms=8, mfc="none", mew=1, color=color, ls="none",
               label=f"{name}printed")  # fmt: skip

@@ -193,7 +193,7 @@ def along_steps(label: str) -> Draw:
             axes.plot(step, rows["ours"], "-", color=OURS, lw=1.2, label="here")
             axes.plot(step, rows["printed"], "o", ms=3, mfc="none", mew=0.6, color=STUDY,
                       label="printed")  # fmt: skip
-            axes.plot(step[off], rows["ours"][off], "o", ms=9, mfc="none", color=OFF,
+            axes.plot(step[off], rows["ours"][off], "D", ms=8, mfc="none", color=OFF,
                       label="off by more than 5 %")  # fmt: skip
             axes.set_title(CAPTIONS.get(name, name))
             tidy(axes)
@@ -228,6 +228,6 @@ def drawn(name: str, table: pd.DataFrame, own: Ours) -> Figure:
     draw, height = PICTURES[name]
     figure = new_figure(height)
     draw(figure, table, own)
-    text = textwrap.fill(caption(name, table), 112, break_on_hyphens=False)
+    text = textwrap.fill(caption(name, table), 118, break_on_hyphens=False)
     figure.supxlabel(text, fontsize=SMALL, x=0.01, ha="left", linespacing=1.4)
     return figure

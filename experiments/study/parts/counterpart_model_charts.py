@@ -63,9 +63,10 @@ def vault_tests(figure: Figure, table: pd.DataFrame, _own: Ours) -> None:
         x, y = made.points[:, 0] - made.points[:, 0].mean(), made.points[:, 1]
         tests = ", ".join(str(vault.test) for vault in alike)
         name = f"test{'s' * (len(alike) > 1)} {tests}"
-        outline.plot(x, y, color=style.color, ls=style.dashes, lw=1.2, label=name)
+        line = style.line() | {"markevery": max(1, len(x) // 6), "mfc": "white"}
+        outline.plot(x, y, lw=1.2, label=name, **line)
         at = float(made.loads[0] - made.points[:, 0].mean())
-        outline.plot(at, np.interp(at, x, y), "v", color=style.color, ms=8)
+        outline.plot(at, np.interp(at, x, y), "v", color=style.color, ms=9, zorder=3)
     outline.set_aspect("equal")
     outline.set(
         xlabel="m", ylabel="m", title="lines of the joints of the eight tests; triangle: load"
@@ -96,6 +97,7 @@ def vault_tests(figure: Figure, table: pd.DataFrame, _own: Ours) -> None:
     ticks = [50, 100, 200, 500]
     bars.set_yticks(ticks, [str(tick) for tick in ticks])
     bars.minorticks_off()
+    bars.set_xticks(at)
     for axes in (outline, secants, bars):
         tidy(axes)
     outline.legend(loc="center left", bbox_to_anchor=(1, 0.5))
