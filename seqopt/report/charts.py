@@ -100,6 +100,7 @@ def _responses(result: Comparison) -> Figure:
     axes[0].get_legend().remove()
     figure.legend(handles, labels, loc="outside lower left", ncols=1)
     axes[-1].set_yscale("log")
+    plain(axes[-1].yaxis)
     return figure
 
 
@@ -132,7 +133,7 @@ def _gaps(result: Comparison) -> Figure:
             )
         panel.set_title(title)
         panel.spines[["top", "right"]].set_visible(False)
-        panel.tick_params(axis="y", length=0)
+        panel.tick_params(axis="y", length=0, pad=8)
     panels[0].set_yticks(rows, [typed(str(name)) for name in solved.index])
     panels[0].set_ylim(len(solved) - 0.5, -0.5)
     return figure

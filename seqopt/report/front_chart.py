@@ -8,7 +8,7 @@ from typing import Any
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogFormatter
+from matplotlib.ticker import LogFormatter, MaxNLocator, ScalarFormatter
 
 from seqopt.report.front_numbers import shown, worst_of
 from seqopt.report.style import GRAY, VERMILION, dress, new_figure, styled
@@ -28,6 +28,7 @@ LABELS = {
 }
 MARKERS = "sD^vP*"
 IN_A_ROW = 2  # charts
+LEAST = 0.01  # share of its numbers that an axis spans at least
 FAR = 2.5  # a method so much worse than the set makes an axis logarithmic
 
 
@@ -69,10 +70,13 @@ def drawn(
             axes.set_yscale("log")
             axes.yaxis.set_major_formatter(LogFormatter())
             axes.yaxis.set_minor_formatter(LogFormatter(minor_thresholds=(2, 0.5)))
+        _open(axes)
         dress(axes)
     for axes in panels[len(others) :]:
         axes.set_axis_off()
-    figure.colorbar(dots, ax=list(panels), label="points of the set: steps of the plan", shrink=0.7)
+    words: dict[str, Any] = {"label": "points of the set: steps of the plan"}
+    words["ticks"] = MaxNLocator(integer=True)
+    figure.colorbar(dots, ax=list(panels), shrink=0.7, **words)
     handles, labels = panels[0].get_legend_handles_labels()
     if handles:
         figure.legend(handles, labels, loc="outside lower center", ncols=4)
@@ -84,5 +88,16 @@ def _mark(axes: Axes, marks: Mapping[str, Mapping[str, float]], names: tuple[str
     for marker, (method, worst) in zip(MARKERS, marks.items(), strict=False):
         if all(name in worst for name in names):
             at = [shown(worst[name], name) for name in names]
-            look: dict[str, Any] = {"color": VERMILION, "mec": "white", "ms": 8, "ls": "none"}
-            axes.plot(*at, marker, label=in_words(method), zorder=3, **look)
+            look: dict[str, Any] = {"color": VERMILION, "mfc": "none", "ms": 8, "ls": "none"}
+            axes.plot(*at, marker, label=in_words(method), zorder=3, mew=2, **look)
+
+
+def _open(axes: Axes) -> None:
+    """Keep rounding from looking like a trade-off: axes span a hundredth of what they show."""
+    for axis in (axes.xaxis, axes.yaxis):
+        low, high = axis.get_view_interval()
+        middle, least = (low + high) / 2, LEAST * max(abs(low), abs(high))
+        if axis.get_scale() == "linear" and high - low < least:
+            axis.set_view_interval(middle - least / 2, middle + least / 2, ignore=True)
+        if axis.get_scale() == "linear":
+            axis.set_major_formatter(ScalarFormatter(useOffset=False))

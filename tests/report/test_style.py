@@ -141,3 +141,13 @@ def test_the_chart_of_a_pareto_set_marks_methods_and_names_them():
         "loop, its set", "sequential", "cantilever",
     ]  # fmt: skip
     assert flaws(figure) == []
+
+
+def test_rounding_does_not_look_like_a_trade_off():
+    table = pd.DataFrame(
+        {"F_largest": [100.0, 200.0], "M_sup": [3.0, 3.0 + 1e-12], "steps": [9, 9]}
+    )
+    axes, *_ = drawn(table, {}, {}).axes
+    low, high = axes.get_ylim()
+    assert 0.01 < high - low < 0.1
+    assert axes.get_xlim()[1] - axes.get_xlim()[0] > 100
