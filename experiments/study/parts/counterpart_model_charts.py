@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from experiments.calibration.parts.barrel_vaults import Vault, chain, vaults
@@ -54,23 +55,7 @@ def geometry(figure: Figure, table: pd.DataFrame, own: Ours) -> None:
 def vault_tests(figure: Figure, table: pd.DataFrame, _own: Ours) -> None:
     panels = figure.subplot_mosaic([["outline", "outline"], ["secants", "bars"]])
     outline, secants, bars = panels["outline"], panels["secants"], panels["bars"]
-    shapes: dict[tuple[float, ...], list[Vault]] = {}
-    for vault in vaults():
-        shapes.setdefault((vault.span, vault.rise, vault.thickness), []).append(vault)
-    for number, alike in enumerate(shapes.values()):
-        style = look(number)
-        made = chain(alike[0])
-        x, y = made.points[:, 0] - made.points[:, 0].mean(), made.points[:, 1]
-        tests = ", ".join(str(vault.test) for vault in alike)
-        name = f"test{'s' * (len(alike) > 1)} {tests}"
-        line = style.line() | {"markevery": max(1, len(x) // 6), "mfc": "white"}
-        outline.plot(x, y, lw=1.2, label=name, **line)
-        at = float(made.loads[0] - made.points[:, 0].mean())
-        outline.plot(at, np.interp(at, x, y), "v", color=style.color, ms=9, zorder=3)
-    outline.set_aspect("equal")
-    outline.set(
-        xlabel="m", ylabel="m", title="lines of the joints of the eight tests; triangle: load"
-    )
+    _outlines(outline)
     study = printed("arch_stiffness")
     slopes = {"measured": study["k_e_kN_mm"][0], "Bruun et al.": study["k_m_kN_mm"][0]}
     slopes["here"] = of(table, "fig:secant_stiff")["ours"].iloc[0]
@@ -103,6 +88,27 @@ def vault_tests(figure: Figure, table: pd.DataFrame, _own: Ours) -> None:
     outline.legend(loc="center left", bbox_to_anchor=(1, 0.5))
     secants.legend()
     bars.legend(ncols=2)
+
+
+def _outlines(outline: Axes) -> None:
+    """Draw the joints of every vault that was tested, and where its load stands."""
+    shapes: dict[tuple[float, ...], list[Vault]] = {}
+    for vault in vaults():
+        shapes.setdefault((vault.span, vault.rise, vault.thickness), []).append(vault)
+    for number, alike in enumerate(shapes.values()):
+        style = look(number)
+        made = chain(alike[0])
+        x, y = made.points[:, 0] - made.points[:, 0].mean(), made.points[:, 1]
+        tests = ", ".join(str(vault.test) for vault in alike)
+        name = f"test{'s' * (len(alike) > 1)} {tests}"
+        line = style.line() | {"markevery": max(1, len(x) // 6), "mfc": "white"}
+        outline.plot(x, y, lw=1.2, label=name, **line)
+        at = float(made.loads[0] - made.points[:, 0].mean())
+        outline.plot(at, np.interp(at, x, y), "v", color=style.color, ms=9, zorder=3)
+    outline.set_aspect("equal")
+    outline.set(
+        xlabel="m", ylabel="m", title="lines of the joints of the eight tests; triangle: load"
+    )
 
 
 def discrete(figure: Figure, table: pd.DataFrame, own: Ours) -> None:
