@@ -99,7 +99,7 @@ class FrozenValue(Terse):
 
 
 def frozen(content: Content) -> Content:
-    """Return arrays, sparse arrays and what holds them in tuples or mappings, made read-only.
+    """Return read-only arrays and sparse arrays, also within tuples and mappings.
 
     Parameters
     ----------

@@ -24,7 +24,7 @@ DISPLAYS = {
     "thumbnails": "seqopt.report.thumbnails",
     "scene_picture": "seqopt.report.pictures",
     "network_picture": "seqopt.report.pictures",
-    "steps_picture": "seqopt.report.pictures",
+    "steps_picture": "seqopt.report.step_pictures",
     "gantt_picture": "seqopt.report.gantt",
     "Film": "seqopt.report.film",
     "build_page": "seqopt.report.build_page",

@@ -1,4 +1,4 @@
-"""The short cut: from a scene to a plan in one call."""
+"""The shortest way: from a scene to a plan in one call."""
 
 from __future__ import annotations
 
@@ -78,25 +78,25 @@ def optimize(
     limits: Sequence[Limit] = (),
     **options: Any,
 ) -> Plan | FreePlan:
-    """Choose where robots hold over a whole build, or with a free schedule every step of it.
+    """Choose where robots hold over a whole build, or every step of a free schedule.
 
     Parameters
     ----------
     scene : Scene, str or pathlib.Path
-        Or the name of a built-in scene, or a scene file.
+        The scene, the name of a built-in scene, a few words, or a scene file.
     schedule : Schedule, pathlib.Path or str
-        Or its file, or a key of `seqopt.sequence.three_robots.SCHEDULES`; ``"free"``.
+        The schedule, its file, a name in `seqopt.sequence.three_robots.SCHEDULES`, or ``"free"``.
     criterion : Criterion or str, optional
-        What a step costs; or a name of `seqopt.CRITERIA`, by default that of `DEFAULTS`.
+        What a step costs, or a name in `seqopt.CRITERIA`; by default that of `DEFAULTS`.
     formulation : str, optional
-        One of `seqopt.formulations`; the free schedule has its own; by default of `DEFAULTS`.
+        A name in `seqopt.formulations`, or for the free schedule; by default that of `DEFAULTS`.
     engine : str
-        A key of `seqopt.engines.registry.ENGINES`; ``"auto"`` models no more than is needed.
+        A name in `seqopt.engines.registry.ENGINES`; ``"auto"`` uses the simplest sufficient model.
     limits : sequence of Limit
-        What no open step may exceed; of the free schedule no step.
+        Bounds that no step with an open grip may exceed; in the free schedule, no step at all.
     **options
-        Of `seqopt.solve`, the formulation, `seqopt.responses.Resources` (as ``workers=2``);
-        ``order``; if free, ``robots``, `seqopt.FreeRules`, and what `seqopt.pose_free` takes.
+        Options of `seqopt.solve`, the formulation and `seqopt.responses.Resources` (``workers=2``);
+        an ``order``; if free, ``robots``, and options of `seqopt.FreeRules`, `seqopt.pose_free`.
 
     Returns
     -------
@@ -105,7 +105,7 @@ def optimize(
     Raises
     ------
     SeqoptError
-        One line that says who must act: see `seqopt.errors`.
+        With one line that says what to change; see `seqopt.errors`.
 
     Examples
     --------
@@ -158,7 +158,7 @@ def _pose_free(
 ) -> FreeProblem:
     """Return the problem of a free schedule; what options say of it is taken out of them."""
     own = [field.name for field in fields(Resources) if field.name != "max_memory"]
-    _refuse(options, own, "the free schedule has no such; leave it out")
+    _refuse(options, own, "the free schedule has no such option; leave it out")
     aim, stands = options.pop("aim", "minmax"), options.pop("stands", None)
     rules, robots = _rules(options), options.pop("robots", ())
     if isinstance(robots, int):
@@ -211,7 +211,7 @@ def find_criterion(criterion: Criterion | str) -> Criterion:
         return criterion
     if criterion not in CRITERIA:
         raise ProblemError(
-            f"criterion {criterion!r}: there is no such{did_you_mean(criterion, CRITERIA)}; give "
+            f"criterion {criterion!r} does not exist{did_you_mean(criterion, CRITERIA)}; give "
             f"one of {', '.join(CRITERIA)}"
         )
     return CRITERIA[criterion]

@@ -43,17 +43,18 @@ def build_network(scene: Scene, order: Sequence[int] | str | None = None) -> Net
     ----------
     scene : Scene
     order : sequence of int or str, optional
-        As `seqopt.scene.orders.in_order` takes it; by default the scene's own.
+        The order in which bricks are placed, in a form that `seqopt.scene.orders.in_order`
+        accepts; by default the scene's own.
 
     Returns
     -------
     Network
-        Its scene has this order.
+        The network; its scene has this order.
 
     Raises
     ------
     SceneError
-        If it is none, or the order does not name every brick once.
+        If the argument is not a scene, or the order does not name every brick once.
 
     Examples
     --------
@@ -112,13 +113,13 @@ def network_of(given: Network | Scene) -> Network:
     if isinstance(given, Network | Scene):
         return given if isinstance(given, Network) else build_network(given)
     kind = type(given).__name__
-    raise SceneError(f"a {kind} is no network; give build_network(scene), or the scene itself")
+    raise SceneError(f"a {kind} is not a network; give build_network(scene), or the scene itself")
 
 
 def _checked(scene: Scene) -> Scene:
     if not isinstance(scene, Scene):
         kind = type(scene).__name__
-        raise SceneError(f"a {kind} is no scene; give one, as load_scene('arch25') returns it")
+        raise SceneError(f"a {kind} is not a scene; give one, as load_scene('arch25') returns it")
     return scene
 
 

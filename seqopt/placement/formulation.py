@@ -1,4 +1,4 @@
-"""Formulations: what solves a placement problem, and what it returns."""
+"""Formulations: ways to solve a placement problem, and what they return."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class End(Enum):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Selection(FrozenValue):
-    """A candidate per move, and what its formulation claims of it.
+    """A candidate per move, and what the formulation claims about it.
 
     Attributes
     ----------
@@ -86,7 +86,7 @@ class Formulation:
     kind : FormulationKind
         What it promises.
     aim : Aim
-        What it makes least: the sum of the costs, or the largest.
+        What it minimizes: the sum of the costs, or the largest cost.
     solve : callable
         Takes the problem and named options, returns a `Selection`.
     reads : Reads
@@ -94,7 +94,7 @@ class Formulation:
     takes_budgets : bool
         Whether it can keep totals over the build within budgets.
     windowed : tuple of (str, int or str), optional
-        Options with which it looks at one window after the other, if it does so with some only.
+        Options with which it looks at one window after the other, if it does so only with these.
 
     Examples
     --------
@@ -188,7 +188,7 @@ def _load(entry: EntryPoint) -> Formulation:
     except Exception as error:  # whatever a package of others may raise
         raise ProblemError(
             f"formulation {entry.name!r}: {entry.value} cannot be loaded: {said(error)}; "
-            "install it anew or remove it"
+            "reinstall it or remove it"
         ) from error
     if not isinstance(found, Formulation):
         raise ProblemError(
@@ -219,7 +219,7 @@ def find_formulation(name: str) -> Formulation:
     if name not in found:
         known = ", ".join(formulation_names())
         hint = did_you_mean(name, formulation_names())
-        raise ProblemError(f"formulation {name!r}: there is no such{hint}; give one of {known}")
+        raise ProblemError(f"formulation {name!r} does not exist{hint}; give one of {known}")
     return _load(found[name])
 
 
@@ -244,11 +244,11 @@ def as_formulation(given: Formulation | str) -> Formulation:
     if isinstance(given, str):
         return find_formulation(given)
     known = ", ".join(formulation_names())
-    raise ProblemError(f"a {type(given).__name__} is no formulation; give one of {known}")
+    raise ProblemError(f"a {type(given).__name__} is not a formulation; give one of {known}")
 
 
 def said(error: Exception) -> str:
-    """Return what an error of others says, in a line.
+    """Return the message of an error in one line.
 
     Parameters
     ----------

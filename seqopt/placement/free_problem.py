@@ -1,4 +1,4 @@
-"""The problem of the free schedule: who does what next, and where, over a whole build."""
+"""The problem of the free schedule: which robot does what next, and where, over a whole build."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from seqopt.stability.assessment import Stability
 
 @dataclass(frozen=True, repr=False)
 class FreeProblem(Shown):
-    """The free schedule of a scene: nothing is computed before it is asked for.
+    """The problem of the free schedule of a scene; everything is computed when first needed.
 
     Attributes
     ----------
@@ -42,7 +42,7 @@ class FreeProblem(Shown):
     criterion : Criterion
         What a step costs, for the goals that name no response.
     goals : tuple of Goal
-        What is to be least, the most important first.
+        What to minimize, the most important first.
     limits : tuple of Limit
         What no step may exceed.
     standing : Standing or None
@@ -224,23 +224,23 @@ def pose_free(
     rules : FreeRules
         Which moves are possible.
     criterion : Criterion
-        What a step costs; ranks among choices do not go here.
+        What a step costs; ranks among choices cannot be used.
     goals : sequence of Goal or str
-        What is to be least; see `parse_goals`.
+        What to minimize; see `parse_goals`.
     limits : sequence of Limit
         What no step may exceed.
     stands : Standing, Mortar or str, optional
-        That every state must stand, with which mortar: ``"dry"``, ``"bond=3e3"`` (Pa).
+        Requires that every state stands, with this mortar: ``"dry"``, ``"bond=3e3"`` (Pa).
 
     Returns
     -------
     FreeProblem
-        Nothing is computed yet, but for the scales of a criterion that takes them from the scene.
+        Nothing is computed yet, except scales that a criterion takes from the scene.
 
     Raises
     ------
     ProblemError
-        If goals, criterion or limits name what a state does not have.
+        If goals, criterion or limits use a response that a state does not have.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""The plan of a free order: found, checked, and what there is to say about it."""
+"""The plan of the best build order: found, checked and summarized."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from seqopt.sequence.steps import Step
 
 @dataclass(frozen=True, repr=False)
 class OrderPlan(ShownBuild):
-    """An order, the best plan of it, and what is known of all others.
+    """A build order, its best plan, and a bound on all other orders.
 
     Attributes
     ----------
@@ -106,7 +106,7 @@ class OrderPlan(ShownBuild):
         return "optimal" if self.gap <= TOLERANCE else "heuristic"
 
     def summary(self) -> dict[str, object]:
-        """Return what there is to say about it, ready for JSON.
+        """Return a summary, ready for JSON.
 
         Returns
         -------
@@ -138,7 +138,7 @@ def solve_order(
 ) -> OrderPlan:
     """Return the best order, or a good one with a bound, and its best plan.
 
-    The plan is found anew for this one order and judged by its own certificate.
+    The plan is computed again for this one order and judged by its own certificate.
 
     Parameters
     ----------
@@ -190,6 +190,6 @@ def _require_worth(name: str, value: float, selection: OrderSelection) -> None:
     most = TOLERANCE * max(abs(value), abs(claimed))
     if not abs(value - claimed) <= most or bound > value + most:
         raise SolverError(
-            f"{name}: the order is worth {value:.9g}; claimed are {claimed:.9g} and a bound of "
-            f"{bound:.9g}"
+            f"{name}: the value of the order is {value:.9g}; claimed are {claimed:.9g} and "
+            f"a bound of {bound:.9g}"
         )

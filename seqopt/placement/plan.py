@@ -1,4 +1,4 @@
-"""The plan: a problem solved, with what its answer is worth and what finding it took."""
+"""The plan: a solved problem with its certificate and the time that it took."""
 
 from __future__ import annotations
 
@@ -34,26 +34,26 @@ from seqopt.sequence.steps import Step, idle_robots
 
 @dataclass(frozen=True, repr=False)
 class Plan(ShownBuild):
-    """A problem solved: where every robot holds over the whole build, and what that is worth.
+    """A solved problem: where every robot holds over the whole build, and how good that is.
 
     Attributes
     ----------
     problem : PlacementProblem
-        What was solved.
+        The problem that was solved.
     formulation : Formulation
-        What solved it.
+        The formulation that solved it.
     selection : Selection
-        The choice, and what the formulation claims of it.
+        The choice, and what the formulation claims about it.
     certificate : Certificate or None
-        What the choice is worth, checked; None where no proof was asked for.
+        The checked value of the choice; None without a proof.
     steps : tuple of Step
         The schedule with every move at its chosen node, checked.
     seconds : mapping of str to float
-        By stage, s: respond, rank, compile (writing a program down for a solver), solve, verify.
+        By stage, s: respond, rank, compile (preparing a program for a solver), solve, verify.
     search : WindowSearch or None
-        What was looked at along the choice where not all models were solved.
+        The models solved by a search without proof; None if all were solved.
     looked_at : int or None
-        How many models were solved where a lazy search did not need them all.
+        How many models a lazy search solved; None if all were solved.
 
     Examples
     --------
@@ -112,12 +112,12 @@ class Plan(ShownBuild):
 
     @property
     def explored(self) -> tuple[Problem, ...]:
-        """The problems of which responses were computed: the whole, or what a search met."""
+        """The problems whose responses were computed: the whole, or what a search needed."""
         return (self._posed,) if self.search is None else self.search.explored
 
     @property
     def models(self) -> int:
-        """How many different models it looked at."""
+        """How many different models were solved."""
         if self.looked_at is not None:
             return self.looked_at
         return self._posed.evaluation.models if self.search is None else self._window_models
@@ -201,7 +201,7 @@ class Plan(ShownBuild):
             }
 
     def alternatives(self) -> pd.DataFrame:
-        """Return raw responses and cost of every choice that was looked at.
+        """Return the responses and the cost of every choice that was evaluated.
 
         Returns
         -------
@@ -246,7 +246,7 @@ class Plan(ShownBuild):
         return {"objectives": values, "gap_parts": split | {"objective": parts.objective}}
 
     def summary(self) -> dict[str, object]:
-        """Return what there is to say about the plan, ready for JSON.
+        """Return the summary of the plan, ready for JSON.
 
         Returns
         -------

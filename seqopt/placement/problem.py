@@ -40,7 +40,7 @@ class Problem(Shown):
     criterion : Criterion
         What a step costs.
     limits : tuple of Limit
-        What no open step may exceed.
+        Bounds that no step with an open grip may exceed.
     evaluation : Evaluation
         Raw responses of every open step.
     budgets : tuple of Budget
@@ -71,12 +71,12 @@ class Problem(Shown):
 
     @property
     def sums(self) -> LayeredCosts:
-        """The costs whose sum over the build is to be least."""
+        """The costs whose sum over the build is minimized."""
         return self._sums[0]
 
     @property
     def peaks(self) -> LayeredCosts:
-        """The costs whose largest over the build is to be least."""
+        """The costs whose largest over the build is minimized."""
         return self._peaks[0]
 
     @cached_property
@@ -155,7 +155,7 @@ class Problem(Shown):
         -------
         tuple of StepChoices
             In order, with responses (C_k,); those of steps shared with the move before are of that
-            choice. Computed anew where the responses of all choices are not kept.
+            choice. Computed again if the responses of all choices are not kept.
         """
         if self.evaluation.streams:
             return window_anew(self.evaluation, move, before)
@@ -245,27 +245,27 @@ def pose(
     also: Sequence[str] = (),
     resources: Resources = HERE,
 ) -> Problem:
-    """Return the problem of filling a schedule's open grips.
+    """Return the problem of choosing the open grips of a schedule.
 
     Parameters
     ----------
     engine : Engine
-        What computes responses.
+        The engine that computes responses.
     schedule : Schedule
-        Whose open grips are to be chosen.
+        The schedule whose open grips are to be chosen.
     criterion : Criterion
         What a step costs.
     limits : sequence of Limit
-        What no open step may exceed.
+        Bounds that no step with an open grip may exceed.
     also : sequence of str
-        Responses to evaluate beside those that these name.
+        Further responses to compute, besides those that criterion and limits use.
     resources : Resources, optional
-        Processes, memory, a folder for answers; by default this process alone.
+        Processes, memory and a folder for results; by default only this process.
 
     Returns
     -------
     Problem
-        Nothing is computed yet.
+        The problem; nothing is computed yet.
 
     Raises
     ------
@@ -285,5 +285,5 @@ def pose(
     asked = ResponsesAsked(criterion.for_scene(SceneFacts(engine)), tuple(limits), tuple(also))
     if unknown := {name for move in schedule.moves for name in asked(move.bricks)} - known:
         listed = ", ".join(sorted(known))
-        raise ProblemError(f"response {min(unknown)}: there is no such; give {listed}")
+        raise ProblemError(f"response {min(unknown)} does not exist; give {listed}")
     return Problem(asked.criterion, asked.limits, Evaluation(engine, schedule, asked, resources))

@@ -13,9 +13,11 @@ from matplotlib.animation import PillowWriter
 
 from seqopt.engines.interface import Engine
 from seqopt.errors import FileError
+from seqopt.report.canvas import VIEW, seen_box
 from seqopt.report.draw import draw_grips
 from seqopt.report.picture import new_picture
-from seqopt.report.pictures import VIEW, caption, draw_step, seen_box
+from seqopt.report.step_pictures import Drawn, caption, draw_step
+from seqopt.report.style import styled
 from seqopt.sequence.steps import Step
 
 DPI = 80
@@ -82,6 +84,7 @@ class Film:
             raise FileError(f"cannot write {path}: {error.strerror}; name another") from error
         return path
 
+    @styled
     def _write(self, path: Path) -> None:
         """Draw every step and hand it to the writer."""
         scene = self.engine.network.scene
@@ -94,8 +97,8 @@ class Film:
         with writer.saving(figure, path, DPI):
             for step in self.steps:
                 axes.clear()
-                draw_step(axes, self.engine, step, forces=self.forces, magnify=self.magnify)
+                draw_step(axes, self.engine, step, Drawn(self.forces, self.magnify))
                 draw_grips(axes, self.engine.network, step.grips, VIEW)
-                axes.set_title(caption(scene, step, len(self.steps)))
+                axes.set_title(caption(scene, step, len(self.steps)), loc="center")
                 axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
                 writer.grab_frame()

@@ -17,6 +17,7 @@ from matplotlib.patches import Patch, Rectangle
 from seqopt.arrays import Floats
 from seqopt.errors import StepError
 from seqopt.report.picture import new_picture
+from seqopt.report.style import SMALL, styled
 from seqopt.responses.table import force_column
 from seqopt.scene.scene import Scene
 from seqopt.sequence.holds import Hold, holds
@@ -26,10 +27,11 @@ SHADES = "YlGnBu"
 PALE = "#f2efe9"  # of a grip whose force is not known
 INK = "#222222"
 LANE = 0.74  # height of a bar, of a lane's
-PER_STEP, LEAST, MOST = 0.115, 6.0, 30.0  # inches
-LETTER = 0.052  # width of one, inches
+PER_STEP, LEAST, MOST = 0.13, 6.0, 30.0  # inches
+LETTER = 0.06  # width of one, inches
 
 
+@styled
 def gantt_picture(
     scene: Scene,
     steps: Sequence[AnyStep],
@@ -131,7 +133,7 @@ def _words(scene: Scene, hold: Hold) -> str:
 def _label(axes: Axes, words: str, hold: Hold, inch: float) -> None:
     """Write words into a bar, upright where it is narrow; nothing where they do not fit."""
     room = inch * (hold.last - hold.first + 1)
-    if room < 0.11:
+    if room < 0.12:
         return
     flat = room >= LETTER * len(words) + 0.06
     axes.annotate(
@@ -140,7 +142,7 @@ def _label(axes: Axes, words: str, hold: Hold, inch: float) -> None:
         ha="center",
         va="center",
         rotation=0 if flat else 90,
-        fontsize=7 if flat else 6.5,
+        fontsize=SMALL,
         color=INK,
         bbox={"boxstyle": "square,pad=0.1", "fc": (1, 1, 1, 0.72), "lw": 0},
         clip_on=True,
@@ -176,7 +178,6 @@ def _key(figure: Figure, axes: Axes, shade: ScalarMappable | None, *, is_open: b
         bbox_to_anchor=(0, 1),
         ncols=3,
         frameon=False,
-        fontsize=8,
         borderaxespad=0.2,
     )
     if shade is not None:

@@ -18,7 +18,9 @@ from seqopt.placement.robust_problem import RobustProblem
 from seqopt.placement.shown_build import ShownBuild
 from seqopt.report.gantt import gantt_picture
 from seqopt.report.picture import new_picture, png
-from seqopt.report.pictures import network_picture, scene_picture, spread_steps, steps_picture
+from seqopt.report.pictures import network_picture, scene_picture
+from seqopt.report.step_pictures import spread_steps, steps_picture
+from seqopt.report.style import BLUE, styled
 from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import Schedule
 from seqopt.stability.assessment import Stability, Verdict
@@ -97,6 +99,7 @@ def _build(value: ShownBuild) -> list[bytes]:
 
 
 @thumbnails.register
+@styled
 def _stability(value: Stability) -> list[bytes]:
     """Return the tilt survived in every direction; nothing where it does not stand."""
     if value.verdict is not Verdict.STANDS:
@@ -105,10 +108,9 @@ def _stability(value: Stability) -> list[bytes]:
     axes = figure.add_subplot(projection="polar")
     angles = 2 * np.pi * np.arange(len(value.pull) + 1) / len(value.pull)
     tilts = np.degrees(np.arctan(value.pull))
-    axes.plot(angles, [*tilts, tilts[0]], "o-", color="#0b7a75", ms=4)
-    axes.fill(angles, [*tilts, tilts[0]], color="#0b7a75", alpha=0.15)
-    axes.set_title("tilt survived, degrees", fontsize=9)
-    axes.tick_params(labelsize=8)
+    axes.plot(angles, [*tilts, tilts[0]], "o-", color=BLUE, ms=4)
+    axes.fill(angles, [*tilts, tilts[0]], color=BLUE, alpha=0.15)
+    axes.set_title("tilt survived, degrees", loc="center")
     axes.set_yticks([float(f"{tilts.max() / 2:.2g}"), float(f"{tilts.max():.2g}")])
     return [small(figure)]
 

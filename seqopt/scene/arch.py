@@ -46,7 +46,7 @@ class ArchShape(Terse):
     stub : float
         Length of the rigid stub behind the joint at each ground end.
     translational_stiffness, rotational_stiffness : Vector
-        Of every joint: along it and across it twice, N/m and N m/rad.
+        Stiffness of every joint: along it, and across it in two directions, N/m and N m/rad.
     dimensions : Vector
         Length, width and thickness of a brick.
     density : float
@@ -205,7 +205,7 @@ def _pattern(shape: ArchShape) -> str:
 def _axes(shape: ArchShape) -> tuple[Floats, Floats, Floats]:
     """Return the bricks' directions along the arch, to the left, and the points between them."""
     if not isinstance(shape, ArchShape):
-        raise SceneError(f"a {type(shape).__name__} is no shape of an arch; give ArchShape(...)")
+        raise SceneError(f"a {type(shape).__name__} is not a shape of an arch; give ArchShape(...)")
     pitch = np.asarray(shape.pitch, dtype=float)
     zero = np.zeros_like(pitch)
     roll, yaw = (zero if a is None else np.asarray(a, float) for a in (shape.roll, shape.yaw))

@@ -41,29 +41,29 @@ class Ending(Enum):
 
 @dataclass(frozen=True, kw_only=True)
 class FreeRules:
-    """What a free schedule must keep to; reach and one robot per node go without saying.
+    """The rules of a free schedule, in addition to reach and one robot per node.
 
     Parameters
     ----------
     robots : tuple of str
         Names of the robots that take part, two to five; by default all of the scene.
     placers : tuple of str
-        Names of those that may place a brick; by default all that take part.
+        Names of the robots that may place a brick; by default all that take part.
     least_grips : int
-        How many nodes are held at least, from the second brick on.
+        Least number of nodes held, from the second brick on.
     newest : Newest or str
         Where the newest brick is held.
     payload : Payload or str
         Whether payloads are kept.
     regrips : int or None
-        How many grips may be taken between two bricks, beside those that place; any by default.
+        Most grips taken between two bricks, besides those that place; by default any number.
     ending : Ending or str
         How the build ends.
 
     Raises
     ------
     StepError
-        Naming the rule, its value and what would be accepted.
+        If a rule is malformed; the message gives its value and what would be accepted.
 
     Examples
     --------
@@ -109,7 +109,7 @@ class FreeRules:
         for name in (*self.robots, *self.placers):
             if name not in known:
                 listed = ", ".join(known)
-                raise StepError(f"robot {name!r}: there is no such; give some of {listed}")
+                raise StepError(f"robot {name!r} does not exist; give some of {listed}")
         team = tuple(i for i, name in enumerate(known) if name in self.robots or not self.robots)
         if not 2 <= len(team) <= MOST_ROBOTS:
             raise StepError(
@@ -177,7 +177,7 @@ class FreeRules:
 
 
 def with_robots(scene: Scene, count: int) -> Scene:
-    """Return a scene with so many robots: its own first ones, and mobile ones beside them.
+    """Return a scene with a number of robots: its own first, then mobile ones that reach all.
 
     Parameters
     ----------

@@ -103,7 +103,7 @@ class Schedule(Shown):
     moves : tuple of Move
         In the order in which they are made.
     left_out : str, optional
-        What was done to look at fewer candidates than there are; empty where all are open.
+        How candidates were left out, in words; empty if all are open.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Schedules of one's own: CSV tables of steps in which open grips are marked."""
+"""Schedule files: CSV tables of steps in which open grips are marked."""
 
 from __future__ import annotations
 
@@ -28,21 +28,21 @@ def read_schedule(where: Network | Scene, path: Path) -> Schedule:
     Parameters
     ----------
     where : Network or Scene
-        In which every step must be possible.
+        The network or scene in which every step must be possible.
     path : pathlib.Path
-        CSV; see `parse_schedule` for its columns.
+        The CSV file; see `parse_schedule` for its columns.
 
     Returns
     -------
     Schedule
-        Called as the file is, without its suffix.
+        The schedule, named after the file without its suffix.
 
     Raises
     ------
     FileError
         If the file cannot be read.
     StepError
-        If it is no such table or a step is impossible.
+        If the file is not such a table, or a step is impossible.
 
     Examples
     --------
@@ -173,7 +173,7 @@ def find_schedule(
     path = Path(schedule)
     if isinstance(schedule, str) and not path.suffix and not path.exists():
         raise StepError(
-            f"schedule {schedule!r}: there is no such; give one of {', '.join(SCHEDULES)}, "
+            f"schedule {schedule!r} does not exist; give one of {', '.join(SCHEDULES)}, "
             "or a CSV file"
         )
     return read_schedule(network, path)
@@ -194,9 +194,7 @@ def _step(scene: Scene, row: Row, before: Sequence[OpenStep], where: str) -> Ope
     """Return the step of a row, which must be possible after those before."""
     number, kind, bricks = read_cells(row, where)
     if number != len(before) + 1:
-        raise StepError(
-            f"{where}: step {number} stands where {len(before) + 1} should; number from 1"
-        )
+        raise StepError(f"{where}: step {number} should be {len(before) + 1}; number steps from 1")
     if None in row:
         raise StepError(f"{where}: it has more cells than there are columns; leave out the rest")
     step = OpenStep(number, kind, bricks, _grips(scene, row, before, where))

@@ -38,10 +38,11 @@ class ScheduleMethod(Protocol):
 def three_robot_loop(network: Network | Scene, robots: Sequence[str] = ()) -> Schedule:
     """Return the four-step loop of three robots whose roles rotate.
 
-    The first three robots place a brick each. Then, once per brick: the robot whose grip was chosen
-    before last releases and places the next brick, the one that placed the brick before releases,
-    and takes a new grip, which is to be chosen. At least two robots grip, and the newest brick is
-    held, at every step after the first. Source: section 5.2.2 and figure 12 of Bruun et al.
+    The first three robots place a brick each. Then four steps are repeated for every brick. The
+    robot whose grip was chosen in the round before releases, and places the next brick. The robot
+    that placed the brick before releases, and takes a new grip, which is to be chosen. From the
+    second step on, at least two robots grip and the newest brick is held. Source: section 5.2.2
+    and figure 12 of Bruun et al.
 
     Parameters
     ----------
@@ -77,7 +78,7 @@ def three_robot_loop(network: Network | Scene, robots: Sequence[str] = ()) -> Sc
 
 
 def modified_sequential(network: Network | Scene, robots: Sequence[str] = ()) -> Schedule:
-    """Return the sequential method with a third support, chosen anew after every placed brick.
+    """Return the sequential method with a third support, chosen again after every brick.
 
     Once two robots hold the arch, the third takes a grip for three steps: its own reposition, the
     release that follows and the next placing; then it releases. Source: section 5.2.1 and table 8
@@ -182,5 +183,5 @@ def make_schedule(name: str, network: Network | Scene, robots: Sequence[str] = (
         If there is none of that name, or the scene cannot be built by it.
     """
     if name not in SCHEDULES:
-        raise StepError(f"schedule {name!r}: there is no such; give one of {', '.join(SCHEDULES)}")
+        raise StepError(f"schedule {name!r} does not exist; give one of {', '.join(SCHEDULES)}")
     return SCHEDULES[name](network, robots)

@@ -1,4 +1,4 @@
-"""Does an assembly stand, with what margins, and what goes first where it does not."""
+"""Whether an assembly stands, with what margins, and what fails first if it does not."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ FRICTION_STEP = 1e-4  # to which the least one is found
 
 
 class Verdict(Enum):
-    """What is proven about an assembly; a solver that fails proves nothing."""
+    """What is proven about an assembly: it stands, it does not, or neither is proven."""
 
     STANDS = "stands"
     FALLS = "does not stand"
@@ -39,29 +39,29 @@ class Verdict(Enum):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Stability(Shown, FrozenValue):
-    """Verdict and margins of one assembly; a margin of which nothing is proven is NaN.
+    """Verdict and margins of one assembly; a margin that is not proven is NaN.
 
     Attributes
     ----------
     verdict : Verdict
-        With the mortar and the payloads given.
+        The verdict with the given mortar and payloads.
     bond : float
-        Least strength, in tension and at the same time in shear, of a bond in every contact with
-        which it stands at the mortar's friction, Pa; inf if none is enough.
+        Least strength of a bond, in tension and at the same time in shear, with which it stands at
+        the mortar's friction, Pa; inf if none is enough.
     friction : float
         Least coefficient of friction with which it stands at the mortar's bond; inf if none is.
     pull : (8,) float
-        Largest sideways acceleration that it survives in each direction, over that of gravity;
-        NaN where it does not stand.
+        Largest sideways acceleration that it survives in each direction, relative to gravity; NaN
+        if it does not stand.
     grip : float
         The largest grip force, made as small as equilibrium with the mortar allows, N; inf if no
         payload is enough, 0 if nothing grips.
     motion : (B, 6) float
-        How it fails: if it does not stand by itself, else when pulled to the limit in the worst
-        direction. Translation (m) and rotation (rad) of the blocks, the largest translation or
-        rotation times lever being 1 m; zero if unknown.
+        How it fails: by itself if it does not stand, and otherwise when pulled to the limit in the
+        worst direction. Translation (m) and rotation (rad) of the blocks; the largest translation,
+        or rotation times lever, is 1 m; zero if unknown.
     first_block, first_contact : str
-        The fastest block and the contact that parts fastest in that motion; empty if unknown.
+        The fastest block and the contact that opens fastest in that motion; empty if unknown.
     claims : mapping of Claim to int
         How the solver said it ended, over all cases that were solved.
     unproven : int

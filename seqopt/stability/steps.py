@@ -32,9 +32,9 @@ def assess_steps(
     network : Network or Scene
     steps : sequence of Step
     mortar : Mortar or str
-        Of all joints; or its name.
+        The mortar of all joints, or its name.
     progress : callable, optional
-        Told in words which step is next.
+        Called with the number of the next step, in words.
 
     Returns
     -------
@@ -64,7 +64,7 @@ def assess_steps(
 
 
 def stability_table(steps: Sequence[Step], results: Sequence[Stability]) -> pd.DataFrame:
-    """Return a row per step; an empty cell is a number that is not proven.
+    """Return one row per step; an empty cell is a number that is not proven.
 
     Parameters
     ----------

@@ -335,7 +335,7 @@ def test_what_is_no_problem_is_refused():
     assert robust(problem, drawn, "worst-peak") == robust(problem, drawn, WORST_PEAK)
     with pytest.raises(ProblemError, match="robust aim worst: there is no such"):
         robust(problem, drawn, "worst")
-    with pytest.raises(ProblemError, match="is no scene"):
+    with pytest.raises(ProblemError, match="is not a scene"):
         robust(problem, [scene, None], WORST_PEAK)
     with pytest.raises(ProblemError, match="scenario 1: it has other bricks"):
         robust(problem, [small_arch(4)], WORST_PEAK)
@@ -346,5 +346,5 @@ def test_what_is_no_problem_is_refused():
     capped = replace(problem, budgets=(travel(problem, math.inf),))
     with pytest.raises(ProblemError, match="take no budgets"):
         robust(capped, drawn, WORST_PEAK)
-    with pytest.raises(ProblemError, match="is no kind"):
+    with pytest.raises(ProblemError, match="is not a kind"):
         RobustAim("worst-peak")
