@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import io
 import json
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -197,14 +196,13 @@ def _front_files(
 ) -> dict[str, bytes | str]:
     """Return table, plans, chart and summary of a Pareto set by file name."""
     from seqopt.report.fronts import front_figure  # noqa: PLC0415  # matplotlib is an extra
+    from seqopt.report.style import picture_files  # noqa: PLC0415
 
     known: dict[tuple[Step, ...], pd.DataFrame] = {}
     plans = []
     for number, steps in enumerate(front.steps, start=1):
         table = known.setdefault(steps, analyze(engine, steps))
         plans.append(table.assign(point=number))
-    buffer = io.BytesIO()
-    front_figure(front, methods).savefig(buffer, dpi=130)
     summary = {
         "points": len(front.steps),
         "complete": front.complete,
@@ -216,7 +214,7 @@ def _front_files(
         PAGE: front_page(engine, shown_table(front.table), [known[steps] for steps in front.steps]),
         "pareto.csv": csv_text(numbered),
         "plans.csv": csv_text(pd.concat(plans, ignore_index=True)),
-        "pareto.png": buffer.getvalue(),
+        **picture_files("pareto", front_figure(front, methods)),
         "summary.json": json.dumps(summary, indent=2) + "\n",
     }
 
