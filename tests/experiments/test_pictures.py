@@ -75,6 +75,14 @@ def test_stored_figures_are_of_this_style():
         assert int.from_bytes(header[16:20]) == round(WIDTH * DPI), name
 
 
+def test_redraw_writes_figures_and_runs_nothing(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("experiments.harness.plotting.FIGURES", tmp_path)
+    claim = claims()["frame_contrast"]
+    claim.main(["--redraw"])
+    assert [path.name for path in tmp_path.iterdir()] == [*claim.pictures]
+    assert capsys.readouterr().out == "drawn: frame_contrast.png\n"  # and no verdict
+
+
 @styled
 def two_lines() -> Figure:
     """Return a chart without a flaw."""
