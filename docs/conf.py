@@ -4,7 +4,8 @@ import sys
 from importlib.metadata import version as installed_version
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+HERE = Path(__file__).resolve().parent
+sys.path[:0] = [str(HERE), str(HERE.parent)]
 
 from experiments.harness.stated import stated
 
@@ -18,9 +19,15 @@ extensions = [
     "sphinx.ext.autodoc",
     "sphinx.ext.viewcode",
     "numpydoc",
+    "sphinx_copybutton",
+    "extensions.equations",
+    "extensions.downloads",
 ]
 html_theme = "furo"
 html_title = "seqopt"
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
+html_math_renderer = "mathml"
 exclude_patterns = ["_build", "jupyter_execute"]  # what a build leaves behind
 myst_enable_extensions = ["amsmath", "dollarmath", "deflist", "substitution"]
 myst_substitutions = stated()  # figures of the stored runs, by name: {{ name }} in a page
