@@ -33,7 +33,7 @@ def notebook(text: str, stated: dict[str, str]) -> nbformat.NotebookNode:
     """
     page = read_myst_markdown_notebook(text)
     extras = page.metadata.get("extras", "plot")
-    words = f"This needs seqopt with its extras: in its folder, `pip install \".[{extras}]\"`."
+    words = f'This needs seqopt with its extras: in its folder, `pip install ".[{extras}]"`.'
     install = nbformat.v4.new_markdown_cell(words)
     cells = [_plain(cell, stated) for cell in page.cells if not _is_check(cell)]
     told = nbformat.v4.new_notebook(cells=[cells[0], install, *cells[1:]])

@@ -1,15 +1,17 @@
 """Pages whose commands and Python are run, block by block, and whose outputs are compared.
 
-``python -m tests.docs.transcripts`` writes the outputs of today into the pages; read what it changes
-before it is kept.
+``python -m tests.docs.transcripts`` writes the outputs of today into the pages; read what it
+changes before it is kept.
 """
 
 from __future__ import annotations
 
 import contextlib
+import importlib.util
 import io
 import os
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -64,6 +66,14 @@ def blocks(text: str) -> Iterator[Block]:
             yield block
 
 
+def furnish(folder: Path) -> None:
+    """Put the file that pages read into a folder: the bridge that ships with compas_cra."""
+    found = importlib.util.find_spec("compas_cra")
+    if found is None or found.origin is None:
+        raise LookupError("compas_cra is missing: install the extra witness")
+    shutil.copy(Path(found.origin).parent / "data" / "samples" / "bridge.json", folder)
+
+
 def run(block: Block, folder: Path) -> tuple[str, bool]:
     """Run a block in a folder; return what it prints, and whether all of it ended well."""
     if block.kind == "python":
@@ -100,6 +110,7 @@ def refresh(name: str) -> None:
     path = DOCS / f"{name}.md"
     text = path.read_text(encoding="utf-8")
     with tempfile.TemporaryDirectory() as folder:
+        furnish(Path(folder))
 
         def renewed(found: re.Match[str]) -> str:
             block = Block(*found.groups())
