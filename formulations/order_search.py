@@ -23,25 +23,29 @@ structure, with which every order ends.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
+from contextlib import closing
 from dataclasses import dataclass, field
+from itertools import islice
 
 import numpy as np
 
 from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.placement.formulation import FormulationKind
-from seqopt.placement.free_graph import explore
-from seqopt.placement.free_paths import TIED, least_to_end
+from seqopt.placement.free_paths import TIED
 from seqopt.placement.free_problem import FreeProblem
 from seqopt.placement.order_bound import whole_bound
 from seqopt.placement.order_graph import Key, OrderGraph, explore_orders
 from seqopt.placement.order_problem import OrderProblem, OrderSelection
+from seqopt.placement.order_work import Trial, trying, worth
 from seqopt.placement.schedule_formulation import Finds, ScheduleFormulation
+from seqopt.responses.resources import HERE, Resources
 from seqopt.scene.orders import ORDERS, Order
+from seqopt.work.crew import hire
+from seqopt.work.ordered import map_ordered
 
 FAR_BELOW = 4.0  # the best order known, over the first threshold
 GROWTH = 1.1  # of the threshold
-NARROW = 50  # states of a brick count with which an order is tried first
 BETTER = 1e-9  # share by which an order must be better
 
 
@@ -55,7 +59,7 @@ class _Search:
 
     problem: OrderProblem
     end: float
-    progress: Callable[[str], None]
+    resources: Resources
     order: Order = ()
     value: float = np.inf
     bound: float = -np.inf
@@ -64,7 +68,8 @@ class _Search:
 
     def tell(self, what: str) -> None:
         """Say how far it is; end the search in time."""
-        self.progress(what)
+        if self.resources.progress is not None:
+            self.resources.progress(what)
         if time.perf_counter() > self.end:
             raise _StopError
 
@@ -76,16 +81,20 @@ class _Search:
         """Return whether an order is better than the best so far, and keep it if it is."""
         if not self.problem.allows(order):
             return False
+        return self.take(order, worth(self.problem, self.trial(order)))
+
+    def trial(self, order: Order) -> Trial:
+        """Return an order to be tried against the best so far; end the search in time."""
         self.tell(f"{self.evaluated} orders, {self.value:.6g}")
+        return Trial(order, self.value * (1 - BETTER) if np.isfinite(self.value) else np.inf)
+
+    def take(self, order: Order, value: float) -> bool:
+        """Return whether an order that was tried is better than the best so far, and keep it."""
         self.evaluated += 1
-        problem = self.problem.judging(order)
-        ceiling = self.value * (1 - BETTER) if np.isfinite(self.value) else np.inf
-        for width in (NARROW, None):
-            graph = explore(problem, ceiling, width)
-            if graph.whole:
-                ceiling = float(least_to_end(graph, 0)[0].min())
-                self.order, self.value = order, ceiling
-        return self.order == order
+        better = value < self.value
+        if better:
+            self.order, self.value = order, value
+        return better
 
 
 def solve(
@@ -95,7 +104,7 @@ def solve(
     tries: int = 200,
     seed: int = 0,
     seconds: float = np.inf,
-    progress: Callable[[str], None] = lambda _: None,
+    resources: Resources = HERE,
 ) -> OrderSelection:
     """Return the best order, or a good one and a bound.
 
@@ -110,8 +119,9 @@ def solve(
         In which turn.
     seconds : float, optional
         After which the best order found is returned.
-    progress : callable, optional
-        Told in a few words how far it is.
+    resources : Resources, optional
+        Who is told how far it is, and who tries orders where not all are looked at; what is found
+        does not depend on it.
 
     Returns
     -------
@@ -124,7 +134,7 @@ def solve(
     """
     if most < 0 or tries < 0:
         raise ProblemError(f"options most={most}, tries={tries}: give whole numbers from 0 on")
-    search = _Search(problem, time.perf_counter() + seconds, progress)
+    search = _Search(problem, time.perf_counter() + seconds, resources)
     try:
         why = _run(search, most, tries, np.random.default_rng(seed))
     except (_StopError, KeyboardInterrupt) as stop:
@@ -198,16 +208,16 @@ def _neighbors(search: _Search, tries: int, rng: np.random.Generator) -> None:
     """Try orders beside the best, until none of them is better or all tries are made."""
     if not search.order:
         return
-    left = tries
-    while left > 0:
-        better = False
-        for order in _beside(search.order, search.problem, rng):
-            better = search.try_order(order)
-            left -= 1
-            if better or left <= 0:
-                break
-        if not better:
-            return
+    left, better = tries, True
+    with hire(search.resources.executor, search.resources.workers) as crew:
+        work = trying(search.problem, elsewhere=crew is not None)
+        while better and left > 0:
+            before = search.evaluated
+            orders = [*islice(_beside(search.order, search.problem, rng), left)]
+            trials = map(search.trial, orders)
+            with closing(map_ordered(work, trials, crew)) as found:  # ends at the first better one
+                better = any(map(search.take, orders, found))
+            left -= search.evaluated - before
 
 
 def _beside(order: Order, problem: OrderProblem, rng: np.random.Generator) -> Iterator[Order]:

@@ -150,7 +150,7 @@ def _require_free(options: argparse.Namespace) -> None:
     """Raise an error if options that the free schedule does not have are given with it."""
     unknown = ("budget", "candidates", "cache", "ranked", "among")
     given = [name for name in unknown if getattr(options, name)]
-    given += ["workers"] if options.workers != "1" else []
+    given += ["workers"] if options.workers != "1" and options.order != SEARCH else []
     if given:
         raise ProblemError(
             f"--{given[0].replace('_', '-')}: the free schedule has no such; leave it out"

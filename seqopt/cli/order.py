@@ -7,6 +7,7 @@ from math import isfinite
 
 from seqopt.cli.asked import scene_file
 from seqopt.cli.free_files import free_files
+from seqopt.cli.means import parse_resources
 from seqopt.cli.outputs import write_outputs
 from seqopt.cli.status import Status
 from seqopt.cli.terminal import progress, say
@@ -55,6 +56,7 @@ def optimize_order(options: argparse.Namespace, free: FreeProblem) -> Status:
         formulation,
         proof=not options.no_proof,
         progress=progress,
+        resources=parse_resources(options),
         **{"seconds": limit, **whole},
     )
     plan = found.plan

@@ -84,7 +84,8 @@ class ElasticLimits(FrozenValue):
 
     def _bound(self, wrench: Floats) -> float:
         """Return what no wrench (S, J, 6) exceeds its limits by, Pa, from the largest of each."""
-        largest = np.abs(wrench).max(axis=0, initial=0.0)[self.assembly.contact]
+        most, least = wrench.max(axis=0, initial=0.0), wrench.min(axis=0, initial=0.0)
+        largest = np.maximum(most, -least)[self.assembly.contact]
         stress = (np.abs(self.stress) @ largest[:, :, None])[:, :, 0]
         shear = np.linalg.norm(stress[:, 1:], axis=1) + self.mortar.friction * stress[:, 0]
         tension = stress[:, 0] - self.mortar.tensile_strength

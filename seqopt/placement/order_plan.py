@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 from seqopt.errors import SolverError
@@ -16,6 +16,7 @@ from seqopt.placement.schedule_formulation import (
     ScheduleFormulation,
     find_schedule_formulation,
 )
+from seqopt.responses.resources import HERE, Resources
 from seqopt.scene.orders import Order, in_order
 
 
@@ -87,12 +88,13 @@ def solve_order(
     formulation: ScheduleFormulation | str = "order_search",
     *,
     proof: bool = True,
+    progress: Callable[[str], None] | None = None,
+    resources: Resources = HERE,
     **options: Any,
 ) -> OrderPlan:
     """Return the best order, or a good one with a bound, and its best plan.
 
-    The plan is found anew, by the search of schedules for one order, and judged by its own
-    certificate; it must be worth what the order is claimed to be.
+    The plan is found anew for this one order and judged by its own certificate.
 
     Parameters
     ----------
@@ -100,8 +102,12 @@ def solve_order(
     formulation : ScheduleFormulation or str
     proof : bool, optional
         False leaves out the proof that the order has no better plan.
+    progress : callable, optional
+        Told in a few words how far it is.
+    resources : Resources, optional
+        Who tries orders; what is found does not depend on it.
     **options
-        Of the formulation; ``progress`` is told in a few words how far it is.
+        Of the formulation.
 
     Returns
     -------
@@ -114,19 +120,19 @@ def solve_order(
     ProblemError
         If there is no such formulation or option.
     SolverError
-        If the order is none of those that were asked for, or not worth what is claimed.
+        If the order is none that was asked for, or is not worth what is claimed.
     """
     found = find_schedule_formulation(formulation, Finds.ORDER)
     found.require_options(options)
-    start = time.perf_counter()
-    selection: OrderSelection = found.solve(problem, **options)
+    means, start = replace(resources, progress=progress or resources.progress), time.perf_counter()
+    selection: OrderSelection = found.solve(problem, resources=means, **options)
     seconds = {"order": time.perf_counter() - start}
     in_order(problem.scene, selection.order)  # names every brick once
     if not problem.allows(selection.order):
         raise SolverError(f"{found.name}: its order places a brick that nothing ties")
     plan = solve_free(problem.at(selection.order), "schedule_search", proof=proof)
     _require_worth(found.name, plan.selection.objective[0], selection)
-    return OrderPlan(problem, selection, plan, {**seconds, **plan.seconds})
+    return OrderPlan(problem, selection, plan, seconds | plan.seconds)
 
 
 def _require_worth(name: str, value: float, selection: OrderSelection) -> None:

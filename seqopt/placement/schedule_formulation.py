@@ -6,11 +6,11 @@ import inspect
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from enum import Enum
-from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
 from seqopt.errors import ProblemError
 from seqopt.placement.formulation import Formulation, FormulationKind
+from seqopt.plugins import plugins
 
 GROUP = "seqopt.schedule_formulations"
 
@@ -102,7 +102,7 @@ def find_schedule_formulation(
     """
     found = given if isinstance(given, ScheduleFormulation) else _loaded(given)
     if found.finds is not finds:
-        able = [name for name in _entries() if _loaded(name).finds is finds]
+        able = [name for name in plugins(GROUP) if _loaded(name).finds is finds]
         raise ProblemError(
             f"{found.name} finds {found.finds.value}, and {finds.value} is asked for; "
             f"use {' or '.join(able)}"
@@ -116,7 +116,7 @@ def _loaded(given: Formulation | str) -> ScheduleFormulation:
         raise ProblemError(
             f"{given.name}: a free schedule has no moves to choose; use schedule_search"
         )
-    entries = _entries()
+    entries = plugins(GROUP)
     if not isinstance(given, str) or given not in entries:
         known = ", ".join(sorted(entries))
         raise ProblemError(f"{given!r} is no formulation of the free schedule; give {known}")
@@ -127,7 +127,3 @@ def _loaded(given: Formulation | str) -> ScheduleFormulation:
             "entry point name a ScheduleFormulation"
         )
     return found
-
-
-def _entries() -> dict[str, EntryPoint]:
-    return {entry.name: entry for entry in entry_points(group=GROUP)}

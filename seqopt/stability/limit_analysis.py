@@ -18,12 +18,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
-from importlib.metadata import entry_points
 
 import numpy as np
 
 from seqopt.arrays import Floats, FrozenValue, Vector
 from seqopt.contact.assembly import Assembly
+from seqopt.plugins import plugins
 
 EXACT = 1e-6  # largest violation of an accepted proof, over the force scale and max(1, z)
 GAP = 1e-3  # largest difference between the two proofs, relative to max(1, z)
@@ -115,7 +115,7 @@ def compile_equilibrium(assembly: Assembly) -> Program:
     -------
     Program
     """
-    (entry,) = entry_points(group="seqopt.limit_analysis", name="socp")
+    entry = plugins("seqopt.limit_analysis")["socp"]
     compiled: Compile = entry.load()
     return compiled(assembly)
 

@@ -36,10 +36,10 @@ from seqopt.engines.rigid.mixed import LAST_CORRECTION
 from seqopt.engines.rigid.operator import ComplianceOperator, OperatorBuilder
 from seqopt.engines.rigid.refinement import Refinement
 from seqopt.engines.rigid.spanning_tree import grow_tree
+from seqopt.engines.rigid.ungripped import Shared, share
 from seqopt.engines.threads import one_thread
 from seqopt.network.build import network_of
 from seqopt.network.network import Network
-from seqopt.network.statics import Statics, build_statics
 from seqopt.scene.scene import Scene
 
 KEPT = 32e6  # bytes of operators that may stay when another is made
@@ -133,9 +133,9 @@ class ComplianceEngine:
         return known
 
     @cached_property
-    def _statics(self) -> Statics:
-        """What edges and supports carry, shared by the corrections of all brick counts."""
-        return build_statics(self._network)
+    def _shared(self) -> Shared:
+        """What the systems that correct answers are cut from, whatever the brick count."""
+        return share(self._network)
 
     @cached_property
     def _builder(self) -> OperatorBuilder:
@@ -150,7 +150,7 @@ class ComplianceEngine:
             operator = self._operator(bricks, columns)
         with one_thread():
             if self._refinement is None or self._refinement.bricks != bricks:
-                self._refinement = Refinement(self._network, bricks, self._statics)
+                self._refinement = Refinement(self._network, bricks, self._shared)
             return self._refinement.solve(columns, operator, largest)
 
 

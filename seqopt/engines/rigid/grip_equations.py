@@ -165,12 +165,14 @@ class _Pairs(NamedTuple):
 
 def _pairs(operator: ComplianceOperator, columns: Ints) -> _Pairs:
     """Return all pairs of grips of the sets (S, r) that share a brick."""
-    couples = np.array([*combinations(range(columns.shape[1]), 2)], dtype=np.int64).reshape(-1, 2)
     bricks = columns.T // 2
-    hits = np.flatnonzero(bricks[couples[:, 0]] == bricks[couples[:, 1]])
-    pair, sets = np.divmod(hits, max(len(columns), 1))
-    brick = bricks[couples[pair, 0], sets]
-    return _Pairs(sets, couples[pair, 0], couples[pair, 1], brick, operator.axis[brick])
+    couples = [*combinations(range(columns.shape[1]), 2)]
+    shared = [np.flatnonzero(bricks[i] == bricks[j]) for i, j in couples]
+    sets = np.concatenate([np.empty(0, dtype=np.int64), *shared])
+    counts = [len(found) for found in shared]
+    first, second = np.repeat(np.array(couples, np.int64).reshape(-1, 2), counts, axis=0).T
+    brick = bricks[first, sets]
+    return _Pairs(sets, first, second, brick, operator.axis[brick])
 
 
 def _brace(system: Floats, pairs: _Pairs) -> None:

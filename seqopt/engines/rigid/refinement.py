@@ -22,11 +22,11 @@ from seqopt.engines.rigid.loads import load_matrix
 from seqopt.engines.rigid.loose import HeldSystem, hold_loose
 from seqopt.engines.rigid.mechanism import require_resistance
 from seqopt.engines.rigid.mixed import LAST_CORRECTION, solve_mixed, unchanged
-from seqopt.engines.rigid.mixed_system import rescaled, ungripped_system, unscaled
+from seqopt.engines.rigid.mixed_system import rescaled, unscaled
 from seqopt.engines.rigid.operator import ComplianceOperator
 from seqopt.engines.rigid.recovery import Solution, respond
+from seqopt.engines.rigid.ungripped import Shared, ungripped_system
 from seqopt.network.network import Network
-from seqopt.network.statics import Statics
 
 TOGETHER = 256  # grip sets per pass: their unknowns stay in the processor's cache
 STEPS = 5  # corrections, after which a set is solved on its own
@@ -41,13 +41,13 @@ class Refinement:
     network : Network
     bricks : int
         How many bricks stand.
-    statics : Statics, optional
-        Of the network, if they are known.
+    shared : Shared, optional
+        What the systems of all brick counts are cut from, if it is known.
     """
 
-    def __init__(self, network: Network, bricks: int, statics: Statics | None = None) -> None:
+    def __init__(self, network: Network, bricks: int, shared: Shared | None = None) -> None:
         self.network, self.bricks = network, bricks
-        self.parts = ungripped_system(network, bricks, statics)
+        self.parts = ungripped_system(network, bricks, shared)
         self.held: HeldSystem = hold_loose(self.parts)
         self.inner = self.parts.inner
         weighed = sparse.csr_array(self.parts.load[None])
