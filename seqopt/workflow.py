@@ -1,4 +1,4 @@
-"""The short cut: from a scene to a plan in one call."""
+"""The shortest way: from a scene to a plan in one call."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def optimize(
     limits: Sequence[Limit] = (),
     **options: Any,
 ) -> Plan | FreePlan:
-    """Choose where robots hold over a whole build, or with a free schedule every step of it.
+    """Choose where robots hold over a whole build, or every step of a free schedule.
 
     Parameters
     ----------

@@ -38,7 +38,7 @@ class Finding(Enum):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Diagnosis(FrozenValue):
-    """What can be said about one grip set on one partial structure.
+    """The diagnosis of one grip set on one partial structure.
 
     Attributes
     ----------
@@ -69,7 +69,7 @@ class Diagnosis(FrozenValue):
 
 
 def diagnose(source: Engine | Network, bricks: int, grips: ArrayLike) -> Diagnosis:
-    """Return what can be said about one grip set.
+    """Return whether one grip set is solved well, ill-conditioned or a mechanism.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The smallest eigenvalue of a held structure's stiffness: whether it resists every motion."""
+"""The smallest eigenvalue of a held structure's stiffness: whether it can move freely."""
 
 from __future__ import annotations
 

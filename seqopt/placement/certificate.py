@@ -26,7 +26,7 @@ TOLERANCE = 1e-6  # of the costs that a choice meets: how far a claim may be fro
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Certificate(FrozenValue):
-    """What a selection is worth, checked from the problem's data alone.
+    """The value of a selection and a bound on all others, from the problem's data alone.
 
     Attributes
     ----------
@@ -162,7 +162,7 @@ def _value(costs: LayeredCosts, choice: tuple[int, ...], aim: Aim) -> float:
 
 
 def least(costs: LayeredCosts, aim: Aim) -> float:
-    """Return the least that any choice is worth, budgets aside.
+    """Return the least value of any choice, ignoring budgets.
 
     Parameters
     ----------
@@ -232,7 +232,7 @@ def _connected(costs: LayeredCosts, level: float) -> bool:
 def judge(
     problem: PlacementProblem, selection: Selection, formulation: Formulation | str
 ) -> Certificate:
-    """Certify a selection, and hold its formulation to what it promises.
+    """Certify a selection, and check what its formulation promises.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Budgets that cannot be kept together: the smallest set of them, and what to say."""
+"""The smallest set of budgets that no choice can keep together, and the message about it."""
 
 from __future__ import annotations
 

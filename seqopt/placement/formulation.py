@@ -1,4 +1,4 @@
-"""Formulations: what solves a placement problem, and what it returns."""
+"""Formulations: ways to solve a placement problem, and what they return."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class End(Enum):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Selection(FrozenValue):
-    """A candidate per move, and what its formulation claims of it.
+    """A candidate per move, and what the formulation claims about it.
 
     Attributes
     ----------
@@ -243,7 +243,7 @@ def as_formulation(given: Formulation | str) -> Formulation:
 
 
 def said(error: Exception) -> str:
-    """Return what an error of others says, in a line.
+    """Return the message of an error in one line.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Goals of a free schedule: what is to be least over a build, and their names."""
+"""Goals of a free schedule: the quantities to minimize over a build, and their names."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Measure(Enum):
 
 @dataclass(frozen=True)
 class Goal:
-    """What a free schedule makes least.
+    """A quantity that a free schedule minimizes.
 
     Parameters
     ----------

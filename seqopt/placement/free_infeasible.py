@@ -1,4 +1,4 @@
-"""Why a free schedule is impossible: the brick at which it stops, and what would open a way."""
+"""Why a free schedule is impossible: the brick at which it stops, and what would help."""
 
 from __future__ import annotations
 

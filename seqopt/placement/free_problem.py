@@ -1,4 +1,4 @@
-"""The problem of the free schedule: who does what next, and where, over a whole build."""
+"""The problem of the free schedule: which robot does what next, and where, over a whole build."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from seqopt.stability.assessment import Stability
 
 @dataclass(frozen=True, repr=False)
 class FreeProblem:
-    """The free schedule of a scene: nothing is computed before it is asked for.
+    """The problem of the free schedule of a scene; everything is computed when first needed.
 
     Attributes
     ----------

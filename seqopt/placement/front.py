@@ -1,4 +1,4 @@
-"""Pareto sets: all plans that no other beats in everything, how to pick one, and their proof."""
+"""Pareto sets: all plans that no other plan beats in everything, their proof, and picking one."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class FrontProblem(Protocol):
         """The numbers that are to be small."""
 
     def best_below(self, bounds: Floats) -> tuple[Floats, object] | None:
-        """Return a plan that none beats among those below bounds.
+        """Return a plan below bounds that no other such plan beats in everything.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""Several aims, the most important first: lexicographic, exact.
+"""Several aims in order of importance (lexicographic), solved exactly.
 
 The choices that are best for the first aim are a part of the same layered graph: those pairs that
 lie on a best path. Among these the second aim is made least, and so on.
@@ -20,7 +20,7 @@ from seqopt.placement.objectives import TIED, on_a_least_path
 
 @dataclass(frozen=True)
 class InOrder:
-    """The best choice for aims in their order.
+    """The best choice for several aims in order of importance.
 
     Attributes
     ----------
@@ -35,7 +35,7 @@ class InOrder:
 
 
 def solve_in_order(goals: Sequence[tuple[PlacementProblem, Aim]]) -> InOrder:
-    """Return the choice that is best for the first aim, among these for the second, and so on.
+    """Return the choice that is best for the first aim; among these best for the second; and so on.
 
     Exact, sums that differ by less than `seqopt.placement.objectives.TIED` counting as equal.
 

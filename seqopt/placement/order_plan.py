@@ -1,4 +1,4 @@
-"""The plan of a free order: found, checked, and what there is to say about it."""
+"""The plan of the best build order: found, checked and summarized."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from seqopt.scene.orders import Order, in_order
 
 @dataclass(frozen=True, repr=False)
 class OrderPlan:
-    """An order, the best plan of it, and what is known of all others.
+    """A build order, its best plan, and a bound on all other orders.
 
     Attributes
     ----------
@@ -62,7 +62,7 @@ class OrderPlan:
         return "optimal" if self.gap <= TOLERANCE else "heuristic"
 
     def summary(self) -> dict[str, object]:
-        """Return what there is to say about it, ready for JSON.
+        """Return a summary, ready for JSON.
 
         Returns
         -------

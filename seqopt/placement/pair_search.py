@@ -1,4 +1,4 @@
-"""The proof of an optimum from some of the pairs: those that could still be better.
+"""The proof of an optimum from only those pairs that could lead to a better choice.
 
 Where all pairs of candidates are too many to be looked at, most need not be. The search begins with
 the choices that are made move by move, which tell what can be had. A pair that was not looked at

@@ -1,4 +1,4 @@
-"""The plan: a problem solved, with what its answer is worth and what finding it took."""
+"""The plan: a solved problem with its certificate and the time that it took."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from seqopt.sequence.steps import Step, idle_robots
 
 @dataclass(frozen=True, repr=False)
 class Plan:
-    """A problem solved: where every robot holds over the whole build, and what that is worth.
+    """A solved problem: where every robot holds over the whole build, and how good that is.
 
     Attributes
     ----------
@@ -89,12 +89,12 @@ class Plan:
 
     @property
     def explored(self) -> tuple[Problem, ...]:
-        """The problems of which responses were computed: the whole, or what a search met."""
+        """The problems whose responses were computed: the whole, or what a search needed."""
         return (self._posed,) if self.search is None else self.search.explored
 
     @property
     def models(self) -> int:
-        """How many different models it looked at."""
+        """How many different models were solved."""
         if self.looked_at is not None:
             return self.looked_at
         return self._posed.evaluation.models if self.search is None else self._window_models
@@ -187,7 +187,7 @@ class Plan:
         }
 
     def alternatives(self) -> pd.DataFrame:
-        """Return raw responses and cost of every choice that was looked at.
+        """Return the responses and the cost of every choice that was evaluated.
 
         Returns
         -------
@@ -254,7 +254,7 @@ class Plan:
         return {"objectives": values, "gap_parts": split | {"objective": parts.objective}}
 
     def summary(self) -> dict[str, object]:
-        """Return what there is to say about the plan, ready for JSON.
+        """Return the summary of the plan, ready for JSON.
 
         Returns
         -------

@@ -70,12 +70,12 @@ class Problem:
 
     @property
     def sums(self) -> LayeredCosts:
-        """The costs whose sum over the build is to be least."""
+        """The costs whose sum over the build is minimized."""
         return self._sums[0]
 
     @property
     def peaks(self) -> LayeredCosts:
-        """The costs whose largest over the build is to be least."""
+        """The costs whose largest over the build is minimized."""
         return self._peaks[0]
 
     @cached_property
@@ -193,7 +193,7 @@ class Problem:
         return costs
 
     def table(self, choices: StepChoices) -> pd.DataFrame:
-        """Return raw responses and cost of every choice in a step.
+        """Return the responses and the cost of every choice in a step.
 
         Parameters
         ----------
@@ -254,7 +254,7 @@ def pose(
     also: Sequence[str] = (),
     resources: Resources = HERE,
 ) -> Problem:
-    """Return the problem of filling a schedule's open grips.
+    """Return the problem of choosing the open grips of a schedule.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What is promised of every step of a plan, also where nothing is chosen: payloads and limits."""
+"""Payloads and limits, checked in every step of a plan, also where nothing is chosen."""
 
 from __future__ import annotations
 

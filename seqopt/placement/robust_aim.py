@@ -1,4 +1,4 @@
-"""What a plan is to be worth over scenarios: worst peak, worst total, mean of a tail."""
+"""Aims over scenarios: worst peak, worst total, or the mean of a tail."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class RobustKind(Enum):
 
 @dataclass(frozen=True)
 class RobustAim:
-    """What is to be least over scenarios, all of which are equally likely.
+    """What to minimize over scenarios, all of which are equally likely.
 
     Parameters
     ----------

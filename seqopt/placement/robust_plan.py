@@ -30,7 +30,7 @@ CHOOSES = {Aim.PEAK: "minimax", Aim.SUM: "overlap_dp"}  # of one scenario, and o
 
 @dataclass(frozen=True, eq=False)
 class RobustPlan:
-    """A plan for many scenarios, and what it is worth over them.
+    """A plan for many scenarios, and its value over them.
 
     Attributes
     ----------

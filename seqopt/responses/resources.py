@@ -1,4 +1,4 @@
-"""What a computation may use: processes or other machines, a folder for answers, memory."""
+"""What a computation may use: processes or other machines, a folder for results, memory."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Staged construction analysis: what earlier steps lock into a structure, carried along.
+"""Staged construction analysis: forces and displacements that earlier steps lock in.
 
 From scratch, a step knows nothing of the steps before it: all weight acts at once, and every robot
 holds its node where the plan has it. Here the build goes through its steps. A brick comes without
@@ -67,7 +67,7 @@ class StagedState(FrozenValue):
 def analyze_staged(
     network: Network | Scene, steps: Sequence[Step], placing: Placing | str = Placing.FITTED
 ) -> pd.DataFrame:
-    """Return the responses of every step with all that earlier steps lock in.
+    """Return the responses of every step with everything that earlier steps lock in.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def analyze_staged(
 def staged_fields(
     network: Network, steps: Sequence[Step], placing: Placing | str = Placing.FITTED
 ) -> Iterator[Fields]:
-    """Yield the full fields of every step with all that earlier steps lock in.
+    """Yield the full fields of every step with everything that earlier steps lock in.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Bricks as boxes: how far they are apart, and whether two of them are in one place.
+"""Bricks as boxes: how far they are apart, and whether two of them overlap.
 
 Two boxes are apart if a plane passes between them, and if one does, then one that is parallel to a
 face of either or to an edge of each. The largest distance over these 15 directions is negative for

@@ -1,4 +1,4 @@
-"""What in a scene can be, and probably is not meant: units mixed up, parts in the wrong place."""
+"""Possible but probably wrong values in a scene: mixed-up units, parts in the wrong place."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ PULL = 100.0  # m/s²; ten times that of the earth
 
 
 def doubts(scene: Scene) -> tuple[str, ...]:
-    """Return what is odd about a scene, a line each.
+    """Return what looks wrong in a scene, one line each.
 
     Parameters
     ----------

@@ -24,7 +24,7 @@ SAME_PLACE = 1e-6  # distance that is none, over the size of a block
 
 @dataclass(frozen=True, kw_only=True)
 class Brick:
-    """A rigid box with two inner nodes, the centroids of its halves; or a block of another shape.
+    """A rigid box or block with two inner nodes; in a box, these are the centroids of its halves.
 
     Parameters
     ----------

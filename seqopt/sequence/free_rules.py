@@ -41,7 +41,7 @@ class Ending(Enum):
 
 @dataclass(frozen=True, kw_only=True)
 class FreeRules:
-    """What a free schedule must keep to; reach and one robot per node go without saying.
+    """The rules of a free schedule, in addition to reach and one robot per node.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Plans: a given sequence of steps, read from CSV with the first columns of Table A.1."""
+"""Plan files: sequences of steps as CSV, with the first columns of the paper's Table A.1."""
 
 from __future__ import annotations
 

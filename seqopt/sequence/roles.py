@@ -1,4 +1,4 @@
-"""Who places and who holds: roles of a method, filled from the reach of robots or by name."""
+"""Which robot places and which holds: the roles of a method, filled by reach or by name."""
 
 from __future__ import annotations
 

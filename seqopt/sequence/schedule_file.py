@@ -1,4 +1,4 @@
-"""Schedules of one's own: CSV tables of steps in which open grips are marked."""
+"""Schedule files: CSV tables of steps in which open grips are marked."""
 
 from __future__ import annotations
 

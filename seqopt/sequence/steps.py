@@ -26,7 +26,7 @@ class StepKind(Enum):
 
 @dataclass(frozen=True)
 class Step:
-    """One step of the build: what stands, and which node every robot holds.
+    """One step of the build: the bricks placed, and the node that every robot holds.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ class Step:
     kind : StepKind
         What the step does.
     bricks : int
-        How many bricks stand, in build order.
+        How many bricks are placed, in build order.
     grips : tuple of (int or None)
         Node that each of the scene's robots holds; None for a robot that holds nothing.
 
@@ -74,11 +74,11 @@ class AnyStep(Protocol):
 
     @property
     def bricks(self) -> int:
-        """How many bricks stand, in build order."""
+        """How many bricks are placed, in build order."""
 
     @property
     def grips(self) -> tuple[object, ...]:
-        """What each of the scene's robots holds."""
+        """The node that each of the scene's robots holds, or None."""
 
 
 def idle_robots(scene: Scene, steps: Iterable[AnyStep]) -> tuple[str, ...]:

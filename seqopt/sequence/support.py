@@ -1,4 +1,4 @@
-"""What stands by itself and what must be held: the islands of a partial structure.
+"""The parts of a partial structure that must be held because no joint ties them to the ground.
 
 A placed brick is supported if a path of joints that act leads from it to a ground end. Bricks that
 no such path reaches form islands; somebody must hold each of them at every step.

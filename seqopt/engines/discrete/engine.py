@@ -1,4 +1,4 @@
-r"""The discrete-element engine: rigid bricks on beds of springs that part, slip and break.
+r"""The discrete-element engine: rigid bricks on beds of springs that open, slip and break.
 
 A joint is its own elastic spring in series with a bed of points over the face between its bricks,
 so that within the elastic limits the answer is that of exactly rigid bricks; the bed takes over

@@ -52,7 +52,7 @@ CANCEL = 10.0  # what the grips undo over what is left, where pivots do not
 
 
 class ComplianceEngine:
-    """Answers any batch of grip sets on any partial structure of a scene.
+    """Computes any batch of grip sets on any partial structure of a scene.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Formats of others, which of them a file has, and the scene that it becomes."""
+"""File formats of other programs, how they are recognized, and reading them as scenes."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ FORMATS = (*DOCUMENTS, "boxes", "obj", "ply", "stl")
 
 
 def import_scene(path: str | Path, form: str | None = None, given: Given | None = None) -> Scene:
-    r"""Return the scene of a file of others.
+    r"""Return the scene of a file that another program wrote.
 
     Parameters
     ----------

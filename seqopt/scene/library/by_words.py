@@ -1,4 +1,4 @@
-"""Scenes in a few words: ``arch:span=2,rise=0.7``, ``wall:columns=6,courses=4``."""
+"""Scenes described in a few words: ``arch:span=2,rise=0.7``, ``wall:columns=6,courses=4``."""
 
 from __future__ import annotations
 
