@@ -7,6 +7,8 @@ line says what to install.
 
 from __future__ import annotations
 
+import ast
+import copy
 import re
 from pathlib import Path
 
@@ -16,6 +18,21 @@ from myst_nb.core.read import is_myst_markdown_notebook, read_myst_markdown_note
 from sphinx.application import Sphinx
 
 FOLDER = "_downloads"
+DISPLAY = """
+from itertools import count
+
+number = count(1)
+
+
+def display(value):
+    \"\"\"Print a value; write a figure to a file of its own.\"\"\"
+    if hasattr(value, "savefig"):
+        name = f"figure{next(number)}.png"
+        value.savefig(name, dpi=150)
+        print("written to", name)
+    elif value is not None:
+        print(value)
+"""
 _LINK = re.compile(r"\[([^\]]+)\]\((?!https?:)[^)]+\)")
 _PICTURE = re.compile(r"!\[([^\]]*)\]\([^)]+\)")
 _ROLE = re.compile(r"\{[a-z:-]+\}`([^`<]+?)(?:\s*<[^`>]*>)?`")
@@ -57,10 +74,31 @@ def _plain(cell: nbformat.NotebookNode, stated: dict[str, str]) -> nbformat.Note
 
 
 def script(told: nbformat.NotebookNode) -> str:
-    """Return a notebook as a Python script; its words are comments."""
+    """Return a notebook as a Python script that shows what the notebook shows.
+
+    Words are comments. The value at the end of a cell is printed; a figure is written to a file.
+    """
+    told = copy.deepcopy(told)
+    for cell in told.cells:
+        if cell.cell_type == "code":
+            cell.source = _displayed(cell.source)
+    if any("\ndisplay(" in f"\n{cell.source}" for cell in told.cells):
+        told.cells.insert(1, nbformat.v4.new_code_cell(DISPLAY.strip()))
     bare = {"jupytext": {"notebook_metadata_filter": "-all", "cell_metadata_filter": "-all"}}
     plain = nbformat.from_dict({**told, "metadata": {**told.metadata, **bare}})
     return jupytext.writes(plain, fmt="py:percent")
+
+
+def _displayed(code: str) -> str:
+    """Return code whose last line, if it is a value, is displayed."""
+    last = ast.parse(code).body[-1]
+    if not isinstance(last, ast.Expr) or ast.unparse(last).startswith(("print(", "plt.show(")):
+        return code
+    lines = code.splitlines()
+    value = "\n".join(lines[last.lineno - 1 : last.end_lineno])
+    if isinstance(last.value, ast.Tuple):
+        value = f"({value})"
+    return "\n".join([*lines[: last.lineno - 1], f"display({value})"])
 
 
 def _source(app: Sphinx, name: str) -> str | None:

@@ -100,7 +100,7 @@ def test_downloads_run_and_show_their_figures(text, tmp_path):
     assert done.returncode == 0, done.stderr
     last = done.stdout.splitlines()[-1]
     assert last.endswith("left: 0"), last
-    assert ("plt." in script.read_text(encoding="utf-8")) == ("shown: []" not in last)
+    assert ("plt.subplots" in script.read_text(encoding="utf-8")) == ("shown: []" not in last)
 
 
 def test_equations_become_mathml():
