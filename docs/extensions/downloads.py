@@ -18,6 +18,7 @@ from myst_nb.core.read import is_myst_markdown_notebook, read_myst_markdown_note
 from sphinx.application import Sphinx
 
 FOLDER = "_downloads"
+EXTRAS = "plot"  # where a page does not say
 DISPLAY = """
 from itertools import count
 
@@ -49,11 +50,12 @@ def notebook(text: str, stated: dict[str, str]) -> nbformat.NotebookNode:
         What stands for ``{{ name }}`` in it.
     """
     page = read_myst_markdown_notebook(text)
-    extras = page.metadata.get("extras", "plot")
-    words = f'This needs seqopt with its extras: in its folder, `pip install ".[{extras}]"`.'
-    install = nbformat.v4.new_markdown_cell(words)
+    extras = page.metadata.get("extras", EXTRAS)
     cells = [_plain(cell, stated) for cell in page.cells if not _is_check(cell)]
-    told = nbformat.v4.new_notebook(cells=[cells[0], install, *cells[1:]])
+    needs = f'It needs seqopt with extras: in the folder of seqopt, `pip install ".[{extras}]"`.'
+    opening, mark, rest = cells[0].source.partition("\n## ")
+    cells[0].source = f"{opening.strip()}\n\n{needs}\n{mark}{rest}"
+    told = nbformat.v4.new_notebook(cells=cells)
     told.metadata["kernelspec"] = {"name": "python3", "display_name": "Python 3"}
     return told
 
@@ -116,10 +118,19 @@ def _write(app: Sphinx, error: Exception | None) -> None:
         if not _offered(app, name) or (text := _source(app, name)) is None:
             continue
         told = notebook(text, app.config.myst_substitutions)
-        target = Path(app.outdir, FOLDER, *name.split("/"))
+        target = Path(app.outdir, _address(name))
         target.parent.mkdir(parents=True, exist_ok=True)
         nbformat.write(told, target.with_suffix(".ipynb"))
         target.with_suffix(".py").write_text(script(told), encoding="utf-8")
+
+
+def _address(name: str) -> str:
+    """Return where the download of a page lies, but for its suffix.
+
+    A script in the name of the package that it imports would hide that package.
+    """
+    folder, _, page = name.rpartition("/")
+    return f"{FOLDER}/{folder}/seqopt_{page}"
 
 
 def _offered(app: Sphinx, name: str) -> bool:
@@ -130,10 +141,12 @@ def _link(app: Sphinx, pagename: str, _: str, context: dict, __: object) -> None
     """Put links to notebook and script under the title of an executed page."""
     if "body" not in context or not _offered(app, pagename) or _source(app, pagename) is None:
         return
-    root = "../" * pagename.count("/") + f"{FOLDER}/{pagename}"
+    root = "../" * pagename.count("/") + _address(pagename)
+    extras = app.env.metadata[pagename].get("extras", EXTRAS)
     links = (
         f'<p class="downloads">Download this page as a <a href="{root}.ipynb" download>notebook</a>'
-        f' or a <a href="{root}.py" download>script</a>.</p>'
+        f' or a <a href="{root}.py" download>script</a>. Either needs seqopt with extras: '
+        f'<code>pip install ".[{extras}]"</code> in the folder of seqopt.</p>'
     )
     context["body"] = context["body"].replace("</h1>", f"</h1>{links}", 1)
 

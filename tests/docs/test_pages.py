@@ -88,7 +88,7 @@ def test_downloads_are_plain_python_without_checks(text):
 @pytest.mark.slow
 @pytest.mark.parametrize("text", [*told()])
 def test_downloads_run_and_show_their_figures(text, tmp_path):
-    script = tmp_path / "page.py"
+    script = tmp_path / "seqopt_page.py"
     script.write_text(downloads.script(downloads.notebook(text, stated())), encoding="utf-8")
     done = subprocess.run(
         [sys.executable, "-c", SHOW, script],
