@@ -38,6 +38,9 @@ nb_execution_raise_on_error = True
 nb_execution_timeout = 120
 nb_merge_streams = True
 
+nitpicky = True
+nitpick_ignore_regex = [("py:class", r"(numpy|collections)\..*")]  # they have pages elsewhere
+
 autodoc_member_order = "bysource"
 autodoc_typehints = "none"  # the numpydoc sections carry shapes and units
 numpydoc_show_class_members = False
