@@ -127,12 +127,17 @@ def solve_order(
     means, start = replace(resources, progress=progress or resources.progress), time.perf_counter()
     selection: OrderSelection = found.solve(problem, resources=means, **options)
     seconds = {"order": time.perf_counter() - start}
-    in_order(problem.scene, selection.order)  # names every brick once
-    if not problem.allows(selection.order):
-        raise SolverError(f"{found.name}: its order places a brick that nothing ties")
+    _require_allowed(found.name, problem, selection.order)
     plan = solve_free(problem.at(selection.order), "schedule_search", proof=proof)
     _require_worth(found.name, plan.selection.objective[0], selection)
-    return OrderPlan(problem, selection, plan, seconds | plan.seconds)
+    return OrderPlan(problem, selection, plan, {**seconds, **plan.seconds})
+
+
+def _require_allowed(name: str, problem: OrderProblem, order: Order) -> None:
+    """Raise an error if an order does not name every brick once, or is none of those asked for."""
+    in_order(problem.scene, order)
+    if not problem.allows(order):
+        raise SolverError(f"{name}: its order places a brick that nothing ties")
 
 
 def _require_worth(name: str, value: float, selection: OrderSelection) -> None:
