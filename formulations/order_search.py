@@ -1,6 +1,6 @@
 r"""The order in which bricks are placed, by all sets of bricks, or where these are many by trying.
 
-What an order :math:`\pi` is worth is the least worst step of any schedule of it. Orders share what
+The value of an order :math:`\pi` is the least worst step of any schedule of it. Orders share what
 they have in common: with the set :math:`S` of bricks standing and the newest :math:`b \in S` known,
 neither the responses nor the moves depend on how the rest was placed. The best order is therefore a
 bottleneck path

@@ -86,9 +86,9 @@ def did_you_mean(given: str, known: Iterable[str]) -> str:
     Parameters
     ----------
     given : str
-        A word that is none.
+        A word that does not exist.
     known : iterable of str
-        Those that there are.
+        The words that exist.
 
     Returns
     -------

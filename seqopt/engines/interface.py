@@ -266,7 +266,7 @@ def grip_columns(network: Network, bricks: int, grips: ArrayLike) -> Ints:
     Raises
     ------
     GripError
-        If there are not so many bricks, the shape is another, or a set names an unknown, blocked,
+        If there are fewer bricks, the shape is another, or a set names an unknown, blocked,
         unplaced or repeated node.
     """
     total = len(network.inner)

@@ -183,7 +183,7 @@ def _load(entry: EntryPoint) -> Formulation:
     except Exception as error:  # whatever a package of others may raise
         raise ProblemError(
             f"formulation {entry.name!r}: {entry.value} cannot be loaded: {said(error)}; "
-            "install it anew or remove it"
+            "reinstall it or remove it"
         ) from error
     if not isinstance(found, Formulation):
         raise ProblemError(
@@ -214,7 +214,7 @@ def find_formulation(name: str) -> Formulation:
     if name not in found:
         known = ", ".join(formulation_names())
         hint = did_you_mean(name, formulation_names())
-        raise ProblemError(f"formulation {name!r}: there is no such{hint}; give one of {known}")
+        raise ProblemError(f"formulation {name!r} does not exist{hint}; give one of {known}")
     return _load(found[name])
 
 
@@ -239,7 +239,7 @@ def as_formulation(given: Formulation | str) -> Formulation:
     if isinstance(given, str):
         return find_formulation(given)
     known = ", ".join(formulation_names())
-    raise ProblemError(f"a {type(given).__name__} is no formulation; give one of {known}")
+    raise ProblemError(f"a {type(given).__name__} is not a formulation; give one of {known}")
 
 
 def said(error: Exception) -> str:

@@ -103,7 +103,7 @@ def parse_goals(text: str) -> tuple[Goal, ...]:
     words = [word.strip() for word in text.split(",")] if isinstance(text, str) else [text]
     for word in words:
         if word not in known:
-            raise ProblemError(f"aim {short(word)}: there is no such; give {', '.join(known)}")
+            raise ProblemError(f"aim {short(word)} does not exist; give {', '.join(known)}")
         if words.count(word) > 1:
-            raise ProblemError(f"aim {word}: it stands there twice; name it once")
+            raise ProblemError(f"aim {word}: it is listed twice; name it once")
     return tuple(known[word] for word in words)

@@ -39,7 +39,7 @@ class FreePlan:
     selection : ScheduleSelection
         The states, and what the formulation claims of them.
     certificate : ScheduleCertificate or None
-        What they are worth, checked; None where no proof was asked for.
+        Their checked values; None without a proof.
     steps : tuple of Step
         Checked.
     seconds : mapping of str to float

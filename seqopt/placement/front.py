@@ -77,7 +77,7 @@ class FrontProblem(Protocol):
         ----------
         steps : sequence of Step
         claimed : (k,) float
-            What margins of stability are held against.
+            The values with which margins of stability are compared.
 
         Returns
         -------
@@ -169,7 +169,9 @@ def find_front(
     for point, steps in zip(points, plans, strict=True):
         values = problem.values(steps, point)
         if not (np.abs(values - point) <= TOLERANCE * np.abs(point)).all():
-            raise SolverError(f"a plan is worth {values.tolist()}, not {point.tolist()} as claimed")
+            raise SolverError(
+                f"the values of a plan are {values.tolist()}, not {point.tolist()} as claimed"
+            )
     _require_apart(points)
     if not found.stopped:
         _require_complete(problem, points, progress)
@@ -187,7 +189,7 @@ def _require_apart(points: Floats) -> None:
 def _require_complete(
     problem: FrontProblem, points: Floats, progress: Callable[[str], None]
 ) -> None:
-    """Raise an error if a plan exists that no point dominates: bounds found anew, one by one."""
+    """Raise an error if a plan exists that no point dominates: bounds are searched again."""
     bounds = upper_bounds(points)
     for i, bound in enumerate(bounds):
         progress(f"proof: {i} of {len(bounds)} zones")

@@ -24,7 +24,7 @@ class Aim(Enum):
 
     @property
     def worth(self) -> Callable[[LayeredCosts, Sequence[int]], float]:
-        """What a choice is worth: its total, or its largest cost."""
+        """The value of a choice: its total, or its largest cost."""
         return LayeredCosts.cost if self is Aim.SUM else LayeredCosts.worst
 
     def costs(self, problem: PlacementProblem) -> LayeredCosts:

@@ -94,7 +94,7 @@ def solve_order(
 ) -> OrderPlan:
     """Return the best order, or a good one with a bound, and its best plan.
 
-    The plan is found anew for this one order and judged by its own certificate.
+    The plan is computed again for this one order and judged by its own certificate.
 
     Parameters
     ----------
@@ -146,6 +146,6 @@ def _require_worth(name: str, value: float, selection: OrderSelection) -> None:
     most = TOLERANCE * max(abs(value), abs(claimed))
     if not abs(value - claimed) <= most or bound > value + most:
         raise SolverError(
-            f"{name}: the order is worth {value:.9g}; claimed are {claimed:.9g} and a bound of "
-            f"{bound:.9g}"
+            f"{name}: the value of the order is {value:.9g}; claimed are {claimed:.9g} and "
+            f"a bound of {bound:.9g}"
         )

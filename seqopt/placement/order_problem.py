@@ -29,7 +29,7 @@ class Orders(Enum):
 class OrderProblem:
     """The free schedule of a scene whose build order is free too.
 
-    What an order is worth is the first goal of its best plan; the criterion keeps the numbers that
+    The value of an order is the first goal of its best plan; the criterion keeps the numbers that
     it has in the scene's own order.
 
     Parameters

@@ -107,7 +107,7 @@ def search_pairs(problem: Problem, formulation: Formulation, watch: Watch) -> Pa
     costs = walk.costs
     if math.isinf(costs.best):
         if watch.over:
-            raise SolverError("it ended before any choice was met; give it more time")
+            raise SolverError("it ended before any choice was found; give it more time")
         raise InfeasibleError("no choice is allowed; relax a limit or widen a reach")
     selection = _best_known(costs, formulation, watch)
     return PairSearch(costs, selection, walk.along(selection.choice), walk.models)

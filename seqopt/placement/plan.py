@@ -41,7 +41,7 @@ class Plan:
     selection : Selection
         The choice, and what the formulation claims of it.
     certificate : Certificate or None
-        What the choice is worth, checked; None where no proof was asked for.
+        The checked value of the choice; None without a proof.
     steps : tuple of Step
         The schedule with every move at its chosen node, checked.
     seconds : mapping of str to float
@@ -174,7 +174,7 @@ class Plan:
         return pd.DataFrame(rows)
 
     def _worth(self, move: int, before: int, now: int) -> dict[str, float]:
-        """Return the cells of the table that say what a choice is worth."""
+        """Return the cells of the table with the value of a choice."""
         if self.search is not None:
             costs = self.search.costs(move)
             margin = np.delete(costs, now).min(initial=np.inf) - costs[now]

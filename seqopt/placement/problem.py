@@ -154,7 +154,7 @@ class Problem:
         -------
         tuple of StepChoices
             In order, with responses (C_k,); those of steps shared with the move before are of that
-            choice. Computed anew where the responses of all choices are not kept.
+            choice. Computed again if the responses of all choices are not kept.
         """
         if self.evaluation.streams:
             return window_anew(self.evaluation, move, before)
@@ -294,5 +294,5 @@ def pose(
     asked = ResponsesAsked(criterion.for_scene(SceneFacts(engine)), tuple(limits), tuple(also))
     if unknown := {name for move in schedule.moves for name in asked(move.bricks)} - known:
         listed = ", ".join(sorted(known))
-        raise ProblemError(f"response {min(unknown)}: there is no such; give {listed}")
+        raise ProblemError(f"response {min(unknown)} does not exist; give {listed}")
     return Problem(asked.criterion, asked.limits, Evaluation(engine, schedule, asked, resources))

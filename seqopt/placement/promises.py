@@ -149,7 +149,7 @@ def require_possible(problem: Problem) -> None:
     table = analyze(problem.engine, fixed)
     for excess in excesses(problem.schedule.scene, table, problem.limits):
         raise InfeasibleError(
-            f"{excess}, where nothing is left to choose; relax the limit or change the schedule"
+            f"{excess}, where no grip is left to choose; relax the limit or change the schedule"
         )
 
 

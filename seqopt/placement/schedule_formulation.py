@@ -61,7 +61,7 @@ class ScheduleFormulation:
         Parameters
         ----------
         given : iterable of str
-            Their names; ``progress`` goes without saying.
+            Their names; ``progress`` need not be listed.
 
         Raises
         ------
@@ -119,7 +119,7 @@ def _loaded(given: Formulation | str) -> ScheduleFormulation:
     entries = plugins(GROUP)
     if not isinstance(given, str) or given not in entries:
         known = ", ".join(sorted(entries))
-        raise ProblemError(f"{given!r} is no formulation of the free schedule; give {known}")
+        raise ProblemError(f"{given!r} is not a formulation of the free schedule; give {known}")
     found: object = entries[given].load()
     if not isinstance(found, ScheduleFormulation):
         raise ProblemError(

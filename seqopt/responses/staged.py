@@ -213,7 +213,7 @@ def _way(placing: Placing | str) -> Placing:
         return Placing(placing)
     except ValueError:
         known = ", ".join(way.value for way in Placing)
-        raise StepError(f"placing {short(placing)}: there is no such; give {known}") from None
+        raise StepError(f"placing {short(placing)} does not exist; give {known}") from None
 
 
 def _loaded(parts: Ungripped, state: StagedState, load: Floats) -> StagedState:

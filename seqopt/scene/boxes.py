@@ -17,7 +17,7 @@ from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.errors import SceneError
 from seqopt.scene.parts import Brick
 
-PARALLEL = 1e-9  # sine of an angle between edges that is none
+PARALLEL = 1e-9  # sine of an angle between edges treated as zero
 DEEPEST = 1e-6  # depth that is rounding, over the smallest dimension
 
 

@@ -23,7 +23,7 @@ from seqopt.scene.shape import normal_of
 OPPOSED = np.cos(np.radians(15.0))  # cosine from which on normals are against each other
 LEVEL = 1 - 1e-6  # cosine from which on faces are in one plane
 MOST_PAIRS = 300_000  # of blocks that are near each other
-SLIVER = 1e-6  # overlap that is none, over the smaller of two faces
+SLIVER = 1e-6  # overlap treated as zero, over the smaller of two faces
 GRAIN = 1e-9  # length to which corners are rounded, over the size of what overlaps
 
 Plane = tuple[Floats, Floats, list[Any]]  # origin, axes, and polygons in it
@@ -141,7 +141,7 @@ def touching_faces(shapes: Sequence[Solid], gap: float) -> tuple[TouchingFace, .
     gap = positive("gap", gap, "m")
     for shape in shapes:
         if not hasattr(shape, "points") or not hasattr(shape, "faces"):
-            raise SceneError(f"shapes: {short(shape)} is none; give each as Polyhedron(...)")
+            raise SceneError(f"shapes: {short(shape)} is not a shape; give each as Polyhedron(...)")
     facets, found = [_facets(shape) for shape in shapes], list[TouchingFace]()
     for tries, (i, j) in enumerate(_near(shapes, gap)):
         if tries == MOST_PAIRS:

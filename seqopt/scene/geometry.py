@@ -14,7 +14,7 @@ from seqopt.arrays import Vector
 from seqopt.errors import SceneError
 from seqopt.scene.parts import Brick, Ground, Joint
 
-AT_NODE = 1e-6  # distance that is none, over the length of the brick
+AT_NODE = 1e-6  # distance treated as zero, over the length of the brick
 FAR = 1e9  # of a position from the origin, over the smallest dimension: digits are lost beyond
 SIZES = (1e-9, 1e9)  # m; dimensions that a brick may have
 HEAVY = 1e100  # N, N/m, N m/rad; squares of what is beyond overflow, of its inverse vanish

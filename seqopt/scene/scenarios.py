@@ -138,8 +138,8 @@ def _sample(
         return shifted(out, position, moved) if position else out
     except SceneError as error:
         raise SceneError(
-            f"scenario {stream[1] + 1} of {scene.name} is no valid scene ({error}); let positions, "
-            "densities and stiffnesses vary less"
+            f"scenario {stream[1] + 1} of {scene.name} is not a valid scene ({error}); let "
+            "positions, densities and stiffnesses vary less"
         ) from error
 
 

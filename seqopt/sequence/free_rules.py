@@ -109,7 +109,7 @@ class FreeRules:
         for name in (*self.robots, *self.placers):
             if name not in known:
                 listed = ", ".join(known)
-                raise StepError(f"robot {name!r}: there is no such; give some of {listed}")
+                raise StepError(f"robot {name!r} does not exist; give some of {listed}")
         team = tuple(i for i, name in enumerate(known) if name in self.robots or not self.robots)
         if not 2 <= len(team) <= MOST_ROBOTS:
             raise StepError(
@@ -177,7 +177,7 @@ class FreeRules:
 
 
 def with_robots(scene: Scene, count: int) -> Scene:
-    """Return a scene with so many robots: its own first ones, and mobile ones beside them.
+    """Return a scene with a number of robots: its own first, then mobile ones that reach all.
 
     Parameters
     ----------

@@ -50,7 +50,7 @@ def find_robots(scene: Scene, names: Sequence[str], method: str, roles: int) -> 
         return list(range(len(known)))
     for name in names:
         if name not in known:
-            raise StepError(f"robot {name!r}: there is no such; give some of {', '.join(known)}")
+            raise StepError(f"robot {name!r} does not exist; give some of {', '.join(known)}")
     if len({*names}) < len(names):
         raise StepError(f"robots {', '.join(names)}: one occurs twice; name different ones")
     if len(names) != roles:

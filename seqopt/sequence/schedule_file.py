@@ -173,7 +173,7 @@ def find_schedule(
     path = Path(schedule)
     if isinstance(schedule, str) and not path.suffix and not path.exists():
         raise StepError(
-            f"schedule {schedule!r}: there is no such; give one of {', '.join(SCHEDULES)}, "
+            f"schedule {schedule!r} does not exist; give one of {', '.join(SCHEDULES)}, "
             "or a CSV file"
         )
     return read_schedule(network, path)
@@ -194,9 +194,7 @@ def _step(scene: Scene, row: Row, before: Sequence[OpenStep], where: str) -> Ope
     """Return the step of a row, which must be possible after those before."""
     number, kind, bricks = read_cells(row, where)
     if number != len(before) + 1:
-        raise StepError(
-            f"{where}: step {number} stands where {len(before) + 1} should; number from 1"
-        )
+        raise StepError(f"{where}: step {number} should be {len(before) + 1}; number steps from 1")
     if None in row:
         raise StepError(f"{where}: it has more cells than there are columns; leave out the rest")
     step = OpenStep(number, kind, bricks, _grips(scene, row, before, where))

@@ -67,7 +67,7 @@ def test_a_plan_over_scenarios_is_written(capsys, tmp_path, scene, aim):
     ("words", "said"),
     [
         (["--robust", "cvar=2"], "--robust: cvar=2.0: give a level"),
-        (["--robust", "best"], "--robust: robust aim best: there is no such"),
+        (["--robust", "best"], "--robust: robust aim best does not exist"),
         (["--robust", "worst-peak", "--formulation", "minimax"], "--formulation: it does not go"),
         (["--robust", "worst-peak", "--budget", "travel=0.8"], "--budget: it does not go with"),
         (["--robust", "worst-peak", "--no-proof"], "--no-proof: it does not go with"),

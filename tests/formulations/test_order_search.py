@@ -150,7 +150,7 @@ def test_an_order_that_the_check_refuses_is_seen():
     problem = posed(small_arch(4))
     found = solve_order(problem, FORMULATION)
     for change, said in (
-        ({"objective": 0.9 * found.selection.objective}, "the order is worth"),
+        ({"objective": 0.9 * found.selection.objective}, "the value of the order is"),
         ({"bound": 1.1 * found.selection.objective}, "and a bound of"),
         ({"order": (2, 1, 3, 4)}, "places a brick that nothing ties"),
         ({"order": (1, 2, 3)}, "1 bricks are missing"),
