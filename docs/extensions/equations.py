@@ -22,7 +22,7 @@ def mathml(latex: str, *, block: bool) -> str:
     try:
         return _CONVERTER.convert_with_local_state(text, displaystyle=block)
     except LatexError as error:
-        message = f"an equation is no LaTeX that becomes MathML: {latex!r} ({error})"
+        message = f"the equation {latex!r} cannot become MathML: {error}"
         raise ExtensionError(message) from error
 
 

@@ -107,7 +107,7 @@ def test_equations_become_mathml():
     found = equations.mathml(r"\min_x \; & x \\ \text{s.t.} \; & x \ge 1", block=True)
     assert found.startswith("<math")
     assert found.count("<mtr>") == 2
-    with pytest.raises(Exception, match="is no LaTeX"):
+    with pytest.raises(Exception, match="cannot become MathML"):
         equations.mathml(r"\frac{1}{", block=False)
 
 
