@@ -41,6 +41,8 @@ nb_merge_streams = True
 nitpicky = True
 nitpick_ignore_regex = [("py:class", r"(numpy|collections)\..*")]  # they have pages elsewhere
 
+viewcode_follow_imported_members = False  # its links back would name the importing module
+
 autodoc_member_order = "bysource"
 autodoc_typehints = "none"  # the numpydoc sections carry shapes and units
 numpydoc_show_class_members = False
