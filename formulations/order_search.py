@@ -23,7 +23,7 @@ structure, with which every order ends.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -38,6 +38,7 @@ from seqopt.placement.order_graph import Key, OrderGraph, explore_orders
 from seqopt.placement.order_problem import OrderProblem, OrderSelection
 from seqopt.placement.schedule_formulation import Finds, ScheduleFormulation
 from seqopt.scene.orders import ORDERS, Order
+from seqopt.work.progress import Stage, Tell
 
 FAR_BELOW = 4.0  # the best order known, over the first threshold
 GROWTH = 1.1  # of the threshold
@@ -55,14 +56,15 @@ class _Search:
 
     problem: OrderProblem
     end: float
-    progress: Callable[[str], None]
+    progress: Tell
     order: Order = ()
     value: float = np.inf
     bound: float = -np.inf
     evaluated: int = 0
     problems: dict[Key, FreeProblem] = field(default_factory=dict)
+    tried: Stage | None = None  # of orders beside the best, how many
 
-    def tell(self, what: str) -> None:
+    def tell(self, what: object) -> None:
         """Say how far it is; end the search in time."""
         self.progress(what)
         if time.perf_counter() > self.end:
@@ -70,13 +72,14 @@ class _Search:
 
     def tell_bricks(self, bricks: int) -> None:
         """Say how far all orders are looked at."""
-        self.tell(f"all orders: {bricks} bricks, {len(self.problems)} sets")
+        self.tell(Stage("all orders", bricks / len(self.problem.scene.bricks)))
 
     def try_order(self, order: Order) -> bool:
         """Return whether an order is better than the best so far, and keep it if it is."""
         if not self.problem.allows(order):
             return False
-        self.tell(f"{self.evaluated} orders, {self.value:.6g}")
+        best = f", the best {self.value:.6g}" if self.order else ""
+        self.tell(self.tried or f"{self.evaluated} orders{best}")
         self.evaluated += 1
         problem = self.problem.judging(order)
         ceiling = self.value * (1 - BETTER) if np.isfinite(self.value) else np.inf
@@ -95,7 +98,7 @@ def solve(
     tries: int = 200,
     seed: int = 0,
     seconds: float = np.inf,
-    progress: Callable[[str], None] = lambda _: None,
+    progress: Tell = lambda _: None,
 ) -> OrderSelection:
     """Return the best order, or a good one and a bound.
 
@@ -202,6 +205,7 @@ def _neighbors(search: _Search, tries: int, rng: np.random.Generator) -> None:
     while left > 0:
         better = False
         for order in _beside(search.order, search.problem, rng):
+            search.tried = Stage("orders beside the best", 1 - left / tries)
             better = search.try_order(order)
             left -= 1
             if better or left <= 0:

@@ -5,11 +5,13 @@ from __future__ import annotations
 import argparse
 from math import isfinite
 
+from seqopt.cli.answer import Answer
 from seqopt.cli.asked import scene_file
+from seqopt.cli.facts import scene_facts
 from seqopt.cli.free_files import free_files
+from seqopt.cli.layout import wrapped
 from seqopt.cli.outputs import write_outputs
 from seqopt.cli.status import Status
-from seqopt.cli.terminal import progress, say
 from seqopt.cli.values import parse_numbers, parse_time_limit
 from seqopt.errors import ProblemError
 from seqopt.files import require_folder
@@ -17,11 +19,12 @@ from seqopt.placement.free_problem import FreeProblem
 from seqopt.placement.order_plan import OrderPlan, solve_order
 from seqopt.placement.order_problem import OrderProblem
 from seqopt.placement.schedule_formulation import Finds, find_schedule_formulation
+from seqopt.work.progress import within
 
 SEARCH = "search"  # the order that is sought
 
 
-def optimize_order(options: argparse.Namespace, free: FreeProblem) -> Status:
+def optimize_order(options: argparse.Namespace, free: FreeProblem) -> Answer:
     """Find the order whose best free schedule is best, and write its plan.
 
     Parameters
@@ -33,7 +36,7 @@ def optimize_order(options: argparse.Namespace, free: FreeProblem) -> Status:
 
     Returns
     -------
-    Status
+    Answer
 
     Raises
     ------
@@ -54,15 +57,28 @@ def optimize_order(options: argparse.Namespace, free: FreeProblem) -> Status:
         problem,
         formulation,
         proof=not options.no_proof,
-        progress=progress,
+        progress=within(options.tell, limit),
         **{"seconds": limit, **whole},
     )
+    options.tell("writing the plan")
     plan = found.plan
+    scene = plan.problem.network.scene
     files = free_files(plan, found.summary(), "best order", _said(found))
-    write_outputs(options, files | scene_file(plan.problem.network.scene))
-    say(f"{formulation.name} {_said(found)}; written to {options.out}")
-    say(f"order: {', '.join(map(str, found.order))}")
-    return Status.INTERRUPTED if found.selection.stopped == "interrupt" else Status.DONE
+    write_outputs(options, files | scene_file(scene))
+    said = f"{formulation.name} {_said(found)}; written to {options.out}"
+    order = ", ".join(map(str, found.order))
+    stopped = found.selection.stopped == "interrupt"
+    return Answer(
+        facts={
+            "scene": scene_facts(scene),
+            "order": found.order,
+            "summary": found.summary(),
+            "plan": plan.responses(),
+        },
+        text="\n".join([said, wrapped(order, first="order: ")]),
+        written=(options.out,),
+        status=Status.INTERRUPTED if stopped else Status.DONE,
+    )
 
 
 def _said(found: OrderPlan) -> str:

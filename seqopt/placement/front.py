@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -18,6 +18,7 @@ from seqopt.placement.schedule_formulation import (
     find_schedule_formulation,
 )
 from seqopt.sequence.steps import Step, StepKind
+from seqopt.work.progress import Tell, told
 
 TOLERANCE = 1e-6  # of a value: how far a point may be from what the engine says of its plan
 
@@ -133,7 +134,7 @@ def find_front(
     formulation: ScheduleFormulation | str = "pareto_zones",
     *,
     seconds: float = np.inf,
-    progress: Callable[[str], None] = lambda _: None,
+    progress: Tell = lambda _: None,
 ) -> Front:
     """Return the Pareto set of a problem, its points recomputed and its completeness judged.
 
@@ -144,7 +145,7 @@ def find_front(
     seconds : float, optional
         After which the points found are returned.
     progress : callable, optional
-        Told in a few words how far it is.
+        Told how far it is, in a few words or as a `seqopt.work.Stage`.
 
     Returns
     -------
@@ -184,13 +185,10 @@ def _require_apart(points: Floats) -> None:
             raise SolverError(f"the point {point.tolist()} is dominated by another one")
 
 
-def _require_complete(
-    problem: FrontProblem, points: Floats, progress: Callable[[str], None]
-) -> None:
+def _require_complete(problem: FrontProblem, points: Floats, progress: Tell) -> None:
     """Raise an error if a plan exists that no point dominates: bounds found anew, one by one."""
     bounds = upper_bounds(points)
-    for i, bound in enumerate(bounds):
-        progress(f"proof: {i} of {len(bounds)} zones")
+    for bound in told("proving that no plan is missing", bounds, progress):
         if not problem.is_empty_below(bound):
             raise SolverError(f"the set lacks a point below {bound.tolist()}")
 

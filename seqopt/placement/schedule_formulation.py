@@ -9,7 +9,7 @@ from enum import Enum
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
-from seqopt.errors import ProblemError
+from seqopt.errors import ProblemError, did_you_mean
 from seqopt.placement.formulation import Formulation, FormulationKind
 
 GROUP = "seqopt.schedule_formulations"
@@ -74,6 +74,17 @@ class ScheduleFormulation:
                 raise ProblemError(f"option {name}: {self.name} has {known}")
 
 
+def schedule_formulation_names() -> tuple[str, ...]:
+    """Return the names of all formulations of the free schedule, without loading any.
+
+    Returns
+    -------
+    tuple of str
+        In alphabetical order.
+    """
+    return tuple(sorted(_entries()))
+
+
 def find_schedule_formulation(
     given: ScheduleFormulation | Formulation | str, finds: Finds = Finds.PLAN
 ) -> ScheduleFormulation:
@@ -119,7 +130,8 @@ def _loaded(given: Formulation | str) -> ScheduleFormulation:
     entries = _entries()
     if not isinstance(given, str) or given not in entries:
         known = ", ".join(sorted(entries))
-        raise ProblemError(f"{given!r} is no formulation of the free schedule; give {known}")
+        hint = did_you_mean(given, entries) if isinstance(given, str) else ""
+        raise ProblemError(f"{given!r} is no formulation of the free schedule{hint}; give {known}")
     found: object = entries[given].load()
     if not isinstance(found, ScheduleFormulation):
         raise ProblemError(

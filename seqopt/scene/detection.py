@@ -19,6 +19,7 @@ from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.errors import FileError, SceneError
 from seqopt.scene.checks import positive, short
 from seqopt.scene.shape import normal_of
+from seqopt.work.progress import Progress, Tell
 
 OPPOSED = np.cos(np.radians(15.0))  # cosine from which on normals are against each other
 LEVEL = 1 - 1e-6  # cosine from which on faces are in one plane
@@ -102,7 +103,9 @@ def require_polygons(what: str) -> None:
         raise FileError(f"{what} needs shapely; pip install 'seqopt[blocks]'")
 
 
-def touching_faces(shapes: Sequence[Solid], gap: float) -> tuple[TouchingFace, ...]:
+def touching_faces(
+    shapes: Sequence[Solid], gap: float, progress: Tell | None = None
+) -> tuple[TouchingFace, ...]:
     """Return the faces over which blocks touch.
 
     Parameters
@@ -111,6 +114,8 @@ def touching_faces(shapes: Sequence[Solid], gap: float) -> tuple[TouchingFace, .
         Where they are in the scene.
     gap : float
         Most that may lie between two faces, or by which they may interpenetrate, m.
+    progress : callable, optional
+        Told how far it is, once it takes longer than a second.
 
     Returns
     -------
@@ -143,7 +148,10 @@ def touching_faces(shapes: Sequence[Solid], gap: float) -> tuple[TouchingFace, .
         if not hasattr(shape, "points") or not hasattr(shape, "faces"):
             raise SceneError(f"shapes: {short(shape)} is none; give each as Polyhedron(...)")
     facets, found = [_facets(shape) for shape in shapes], list[TouchingFace]()
+    course, done = Progress("finding where blocks touch", len(shapes), progress), 0
     for tries, (i, j) in enumerate(_near(shapes, gap)):
+        course.add(i - done)
+        done = i
         if tries == MOST_PAIRS:
             raise SceneError(f"more than {MOST_PAIRS} pairs of blocks are in one place; part them")
         for polygons, (origin, axes) in _overlaps(facets[i], facets[j], gap):
