@@ -62,12 +62,9 @@ COMMANDS = {
 class Parser(argparse.ArgumentParser):
     """A parser whose errors are one line, and whose help is a result like others."""
 
-    def __init__(self, **more: Any) -> None:
-        super().__init__(**more)
-        self.formatter_class = _layout
-        self.color = False  # of Python 3.14; what is printed is cleaned of such signs
-        self.given: Sequence[str] = ()  # what it was asked to parse
-        self.spoken: tuple[str, ...] = ()  # options of the command that is asked for
+    color: bool  # of Python 3.14
+    given: Sequence[str] = ()  # what it was asked to parse
+    spoken: tuple[str, ...] = ()  # options of the command that is asked for
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
         """Parse as argparse does, and remember what; a missing argument may be a mistyped one.
@@ -124,16 +121,19 @@ def parser(asked: str | None = None) -> Parser:
     """
     whole = Parser(
         prog="seqopt",
+        formatter_class=_layout,
         description="Where should each robot hold a half-built structure, over the whole build?",
         epilog="seqopt COMMAND --help has the options of a command, and examples.",
     )
     whole.add_argument("--version", action="version", version=f"seqopt {version('seqopt')}")
+    whole.color = False  # signs of color would be printed as codes
     whole.set_defaults(quiet=False, json=False)
     commands = whole.add_subparsers(
         required=True, title="commands", metavar="COMMAND", dest="command"
     )
     for name, command in COMMANDS.items():
-        added = commands.add_parser(name, help=command.about)
+        added = commands.add_parser(name, help=command.about, formatter_class=_layout)
+        added.color = False
         if asked in (None, name):
             _fill(added, command.load())
         if asked == name:

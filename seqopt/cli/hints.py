@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 
 from seqopt.errors import did_you_mean
 
-STARTS = """Three examples:
+EXAMPLES = """Three examples:
 
   seqopt compare arch25
       all methods and formulations on the arch of Bruun et al., side by side
@@ -72,7 +72,7 @@ def first_wrong(message: str, given: Sequence[str], options: Sequence[str]) -> s
     >>> first_wrong("the following arguments are required: --out", given, ["--out"])
     'unrecognized arguments: --ot'
     """
-    if not message.startswith(MISSING):
+    if not message.startswith(MISSING) or message.endswith("COMMAND"):
         return message
     for word in given:
         name = word.partition("=")[0]

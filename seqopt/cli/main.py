@@ -9,7 +9,7 @@ from importlib import import_module
 
 from seqopt.cli.answer import Answer, print_answer
 from seqopt.cli.arguments import COMMANDS, asked_command, parser
-from seqopt.cli.hints import STARTS
+from seqopt.cli.hints import EXAMPLES
 from seqopt.cli.status import Status, status_of
 from seqopt.cli.terminal import flush, quiet_numbers, show, silence
 from seqopt.errors import SeqoptError
@@ -57,7 +57,7 @@ def load(words: Sequence[str]) -> None:
 
 def _run(words: Sequence[str]) -> int:
     if not words:
-        show(STARTS)
+        show(EXAMPLES)
         return Status.DONE
     try:
         options = parser(asked_command(words)).parse_args(words)

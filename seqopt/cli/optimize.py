@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import time
+from collections.abc import Mapping
 
 from seqopt.cli import optimize_arguments
 from seqopt.cli.answer import Answer
@@ -17,6 +18,8 @@ from seqopt.cli.robust import optimize_robust, require_no_scenarios
 from seqopt.cli.status import Status
 from seqopt.cli.values import parse_options, parse_time_limit
 from seqopt.placement.formulation import End, find_formulation
+from seqopt.placement.plan import Plan
+from seqopt.placement.problem import Problem
 from seqopt.placement.solving import solve
 from seqopt.sequence.free_rules import FREE
 from seqopt.sequence.schedule import Schedule
@@ -63,26 +66,27 @@ def run(options: argparse.Namespace) -> Answer:
     start = time.perf_counter()
     problem = asked_problem(options)
     assemble = time.perf_counter() - start
-    plan = solve(
-        problem,
-        formulation,
-        **how,
-        time_limit=limit,
-        progress=within(options.tell, limit),
-        **chosen,
-    )
+    tell = within(options.tell, limit)
+    plan = solve(problem, formulation, **how, time_limit=limit, progress=tell, **chosen)
     options.tell("writing the plan")
     report = plan.summary() | {
         "models_paper_count": _paper_count(problem.schedule),
         "seconds": {"assemble": assemble, **plan.seconds},
     }
-    table = plan.responses()
-    scene = problem.schedule.scene
-    page = plan_page(problem.engine, formulation.name, table, worth(plan))
-    write_outputs(options, plan_files(plan, scene, report) | {PAGE: page})
+    page = plan_page(problem.engine, formulation.name, plan.responses(), worth(plan))
+    files = plan_files(plan, problem.schedule.scene, report)
+    write_outputs(options, files | {PAGE: page})
+    return _answer(options, problem, plan, report)
+
+
+def _answer(
+    options: argparse.Namespace, problem: Problem, plan: Plan, report: Mapping[str, object]
+) -> Answer:
+    """Return what a plan is worth, once it is written."""
+    table, scene = plan.responses(), problem.schedule.scene
     over = exceeded(scene, table)
     said = (
-        f"{formulation.name} ({formulation.kind.value}): {worth(plan)}, "
+        f"{plan.formulation.name} ({plan.formulation.kind.value}): {worth(plan)}, "
         f"{plan.models} models; written to {options.out}"
     )
     stopped = plan.selection.end is End.INTERRUPTED

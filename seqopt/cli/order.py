@@ -61,19 +61,22 @@ def optimize_order(options: argparse.Namespace, free: FreeProblem) -> Answer:
         **{"seconds": limit, **whole},
     )
     options.tell("writing the plan")
-    plan = found.plan
-    scene = plan.problem.network.scene
-    files = free_files(plan, found.summary(), "best order", _said(found))
-    write_outputs(options, files | scene_file(scene))
-    said = f"{formulation.name} {_said(found)}; written to {options.out}"
+    files = free_files(found.plan, found.summary(), "best order", _said(found))
+    write_outputs(options, files | scene_file(found.plan.problem.network.scene))
+    return _answer(options, found, formulation.name)
+
+
+def _answer(options: argparse.Namespace, found: OrderPlan, name: str) -> Answer:
+    """Return the order and what its plan is worth, once it is written."""
+    said = f"{name} {_said(found)}; written to {options.out}"
     order = ", ".join(map(str, found.order))
     stopped = found.selection.stopped == "interrupt"
     return Answer(
         facts={
-            "scene": scene_facts(scene),
+            "scene": scene_facts(found.plan.problem.network.scene),
             "order": found.order,
             "summary": found.summary(),
-            "plan": plan.responses(),
+            "plan": found.plan.responses(),
         },
         text="\n".join([said, wrapped(order, first="order: ")]),
         written=(options.out,),

@@ -180,7 +180,7 @@ def test_the_best_order_is_written_with_its_scene(capsys, tmp_path, arch):
     [
         (
             ["--schedule", "loop", "--formulation", "minimax"],
-            "--order search: the free schedule of",
+            "--order search: only the free schedule has it",
         ),
         (["--schedule", "free", "--max-memory", "2GB"], "--max-memory: the search of orders has"),
         (["--schedule", "free", "--aim", "steps"], "an order is chosen by a worst step"),

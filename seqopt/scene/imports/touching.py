@@ -10,10 +10,10 @@ import numpy as np
 
 from seqopt.arrays import Floats
 from seqopt.scene.checks import positive
+from seqopt.scene.convex import convex_pieces
 from seqopt.scene.detection import (
     OPPOSED,
     Surface,
-    convex_pieces,
     require_polygons,
     touching_faces,
 )
