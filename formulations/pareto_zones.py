@@ -56,7 +56,7 @@ def solve(
     stopped = ""
     try:
         while len(zones) and not stopped:
-            progress(f"{len(points)} plans found, {len(zones)} zones left to search")
+            progress(f"{len(points)} plans found, {len(zones)} regions left")
             zone, rest = zones[-1], zones[:-1]
             found = problem.best_below(zone)
             zones = rest

@@ -29,7 +29,8 @@ class Command:
     about : str
         What it does, in a few words.
     module : str
-        Of `seqopt.cli`: it has ``add_arguments``, ``run``, ``DESCRIPTION`` and ``EXAMPLES``.
+        Of `seqopt.cli`: it has ``add_arguments``, ``run``, ``DESCRIPTION``, ``EXAMPLES``, and
+        ``USAGE`` where it has more options than a reader takes in at once.
     """
 
     about: str
@@ -143,6 +144,8 @@ def parser(asked: str | None = None) -> Parser:
 
 def _fill(command: Parser, module: ModuleType) -> None:
     """Give a command what its module says."""
+    if usage := getattr(module, "USAGE", ""):
+        command.usage = f"{command.prog} {usage}"
     add: Callable[[argparse.ArgumentParser], None] = module.add_arguments
     lines = "\n".join(f"  {example}" for example in module.EXAMPLES)
     command.description = wrapped(module.DESCRIPTION)

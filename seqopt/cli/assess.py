@@ -25,6 +25,7 @@ DESCRIPTION = (
     "joints may open and slide; say how much bond, friction and robot force it needs, which tilt "
     "it survives, and which brick and joint fail first."
 )
+USAGE = "[SCENE] --method NAME | --plan FILE [--out FILE] [other options]"
 EXAMPLES = (
     "seqopt assess arch25 --method cantilever --out stands.csv",
     "seqopt assess arch25 --method sequential --mortar dry",

@@ -67,10 +67,10 @@ def engine_arguments(takes: Takes) -> None:
         "--engine",
         choices=tuple(ENGINES),
         default="compliance",
-        help="compliance: exactly rigid bricks, fast (default); planar: the same with three "
-        "unknowns per brick, where all lies in a plane; frame: stiff bars, a slow independent "
-        "check; discrete: joints that open and slip; auto: the cheapest of planar, compliance and "
-        "discrete that is enough",
+        help="what computes responses: compliance: exactly rigid bricks, fast (default); planar: "
+        "the same with three unknowns per brick, where all lies in a plane; frame: stiff bars, a "
+        "slow independent check; discrete: joints that open and slip; auto: the cheapest of "
+        "planar, compliance and discrete that is enough",
     )
     takes.add_argument(
         "--mortar",
@@ -123,14 +123,14 @@ def robots_argument(takes: Takes, whose: str) -> None:
     ----------
     takes : argparse._ActionsContainer
     whose : str
-        Which methods take them, for the help.
+        What they take part in, for the help.
     """
     takes.add_argument(
         "--robots",
         default="",
         metavar="NAME,NAME[,NAME]",
-        help=f"{whose} robots that take part, in the order in which they place their first bricks "
-        "(default: the first of the scene whose reach allows the build)",
+        help=f"robots that take part in {whose}, in the order in which they place their first "
+        "bricks (default: the first of the scene whose reach allows the build)",
     )
 
 

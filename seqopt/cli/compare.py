@@ -36,6 +36,7 @@ DESCRIPTION = (
     "and displacements side by side; for the arch of Bruun et al. beside the figures that they "
     "print, with a list of the inconsistencies in print."
 )
+USAGE = "[SCENE] [--out DIR] [--json | --quiet] [other options]"
 EXAMPLES = (
     "seqopt compare",
     "seqopt compare wall:columns=6,courses=4 --out wall",
@@ -52,7 +53,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     """
     basic = group(command, "what is compared")
     scene_argument(basic)
-    robots_argument(basic, "of all methods, which take as many as they need, the")
+    robots_argument(basic, "all methods, each of which takes as many as it needs")
     basic.add_argument(
         "--out", type=Path, metavar="DIR", help="write tables, figures and a page with all builds"
     )

@@ -14,10 +14,10 @@ from hashlib import sha256
 import shtab
 
 from seqopt.cli.answer import Answer
-from seqopt.cli.arguments import Parser, parser
+from seqopt.cli.arguments import COMMANDS, Parser, parser
 from seqopt.cli.rules import RULES
 from seqopt.placement.formulation import formulation_names
-from seqopt.placement.schedule_formulation import schedule_formulation_names
+from seqopt.placement.schedule_formulation import Finds, schedule_formulation_names
 from seqopt.responses.choices import CHOICE_RESPONSES
 from seqopt.scene.library.by_words import KINDS
 from seqopt.scene.orders import ORDERS
@@ -86,6 +86,8 @@ def completed(whole: Parser) -> Parser:
         "scene": words([*builtin_scenes(), *(f"{kind}:" for kind in KINDS)], files=True),
         "schedule": words([*SCHEDULES, FREE], files=True),
     }
+    for command in _commands(whole):
+        command.description = COMMANDS[command.prog.split()[-1]].about
     for action in _actions(whole):
         if action.dest in known:
             action.complete = known[action.dest]  # type: ignore[attr-defined]
@@ -98,21 +100,24 @@ def completed(whole: Parser) -> Parser:
     return whole
 
 
-def _actions(whole: argparse.ArgumentParser) -> Iterator[argparse.Action]:
-    """Yield all arguments of a parser and of its commands."""
+def _commands(whole: argparse.ArgumentParser) -> Iterator[argparse.ArgumentParser]:
+    """Yield the parsers of all commands."""
     for action in whole._actions:
         if isinstance(action, argparse._SubParsersAction):
-            for command in action.choices.values():
-                yield from _actions(command)
-        else:
-            yield action
+            yield from action.choices.values()
+
+
+def _actions(whole: argparse.ArgumentParser) -> Iterator[argparse.Action]:
+    """Yield the arguments of all commands."""
+    for command in _commands(whole):
+        yield from command._actions
 
 
 def _names() -> dict[str, list[str]]:
     """Return the names that an argument takes, by its place among the options."""
     responses = [*CHOICE_RESPONSES]
     return {
-        "formulation": [*formulation_names(), *schedule_formulation_names()],
+        "formulation": [*formulation_names(), *schedule_formulation_names(Finds.PLAN, Finds.ORDER)],
         "criteria": [*CRITERIA, *responses],
         "aim": [*AIMS, *responses],
         "pick": [*responses, "steps", "regrips"],

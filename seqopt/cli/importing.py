@@ -8,7 +8,6 @@ from pathlib import Path
 from seqopt.cli.answer import Answer
 from seqopt.cli.common_arguments import form_arguments, group
 from seqopt.cli.facts import scene_facts
-from seqopt.cli.layout import fitted
 from seqopt.cli.values import number_word
 from seqopt.errors import ProblemError
 from seqopt.files import require_apart, write_text
@@ -100,7 +99,7 @@ def run(options: argparse.Namespace) -> Answer:
     )
     return Answer(
         facts={"scene": scene_facts(scene), "assumed": assumed},
-        text="\n".join([*(fitted(line) for line in assumed), said]),
+        text="\n".join([*assumed, said]),
         written=(options.out,),
     )
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import shutil
-import sys
 import textwrap
 from typing import TextIO
 
@@ -54,22 +53,6 @@ def wrapped(text: str, width: int | None = None, first: str = "", rest: str | No
         break_long_words=False,
         break_on_hyphens=False,
     )
-
-
-def fitted(text: str, rest: str = "  ") -> str:
-    """Return a line as it is, for scripts, or wrapped where a person looks at standard output.
-
-    Parameters
-    ----------
-    text : str
-    rest : str, optional
-        What all lines but the first begin with.
-
-    Returns
-    -------
-    str
-    """
-    return wrapped(text, rest=rest) if is_terminal(sys.stdout) else text
 
 
 def is_terminal(stream: TextIO | None) -> bool:

@@ -31,10 +31,12 @@ DESCRIPTION = (
     "--schedule free, choose every step. The answer is checked from the problem's own data, and "
     "plan, selection, responses, summary and a page for the browser are written."
 )
+USAGE = "[SCENE] --formulation NAME | --schedule free --out DIR [other options]"
 EXAMPLES = (
     "seqopt optimize arch25 --formulation overlap_dp --out best",
     "seqopt optimize arch25 --schedule free --out free",
-    "seqopt optimize wall:columns=6,courses=4 --formulation overlap_dp --limit payload --out wall",
+    "seqopt optimize wall:columns=6,courses=4 --schedule free --out wall",
+    "seqopt optimize my.json --formulation overlap_dp --limit payload --out mine",
     "seqopt optimize arch25 --robust worst-peak --out robust",
 )
 INTERRUPTED = "seqopt: interrupted; the plan is the best that was met"

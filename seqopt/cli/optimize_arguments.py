@@ -60,7 +60,7 @@ def _basic(takes: Takes) -> None:
         "file of steps in which open grips are marked ?, or "
         f"{FREE}: any robot may release, hold or place next (default: %(default)s)",
     )
-    robots_argument(takes, "of a schedule by name, the")
+    robots_argument(takes, "a schedule that is named")
     takes.add_argument("--out", type=Path, metavar="DIR", required=True, help="folder to write")
 
 

@@ -10,7 +10,6 @@ from seqopt.cli.answer import Answer
 from seqopt.cli.asked import asked_scene
 from seqopt.cli.common_arguments import form_arguments, group, scene_argument
 from seqopt.cli.facts import network_facts, scene_facts
-from seqopt.cli.layout import fitted
 from seqopt.cli.outputs import keep_apart
 from seqopt.files import write_text
 from seqopt.network.build import build_network
@@ -84,8 +83,8 @@ def _list(options: argparse.Namespace) -> Answer:
         name: load_scene(name)
         for name in told("reading built-in scenes", builtin_scenes(), options.tell)
     }
-    lines = [fitted(f"{name}: {_size(scene)}; {about(name)}") for name, scene in found.items()]
-    lines += [fitted(kind.about) for kind in KINDS.values()]
+    lines = [f"{name}: {_size(scene)}; {about(name)}" for name, scene in found.items()]
+    lines += [kind.about for kind in KINDS.values()]
     facts = {
         "scenes": [{**scene_facts(scene), "about": about(name)} for name, scene in found.items()],
         "kinds": {name: kind.about for name, kind in KINDS.items()},
@@ -106,4 +105,4 @@ def _described(scene: Scene, facts: dict[str, object]) -> Iterator[str]:
         yield f"{robot.name}: payload {robot.payload:g} N, reach {reach}"
     yield f"weight: {facts['weight_N']:.1f} N"
     for i, line in enumerate(scene.provenance.splitlines()):
-        yield fitted(line if i else f"provenance: {line}")
+        yield line if i else f"provenance: {line}"

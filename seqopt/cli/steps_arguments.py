@@ -36,7 +36,7 @@ def steps_arguments(takes: Takes) -> None:
         metavar="FILE",
         help="CSV file of the steps: step, type, bricks, and NAME_node for each robot",
     )
-    robots_argument(takes, "of --method, the")
+    robots_argument(takes, "--method")
 
 
 def asked_steps(scene: Scene, options: argparse.Namespace) -> tuple[Step, ...]:

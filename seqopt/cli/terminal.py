@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any, TextIO
 
-from seqopt.cli.layout import colored, is_terminal, painted, wrapped
+from seqopt.cli.layout import colored, columns, is_terminal, painted, wrapped
 from seqopt.errors import FileError, SceneWarning
 
 CLEAR = "\r\033[K"  # of a terminal: the line it is on
@@ -71,7 +71,7 @@ def show_text(text: str, headings: Sequence[str] = ()) -> None:
     Parameters
     ----------
     text : str
-        A line or several, without the end of the last.
+        A line or several, without the end of the last; a terminal has long ones wrapped.
     headings : sequence of str, optional
         Lines of it that stand out on a terminal.
 
@@ -80,6 +80,10 @@ def show_text(text: str, headings: Sequence[str] = ()) -> None:
     FileError
         If standard output is closed.
     """
+    if is_terminal(sys.stdout):
+        fits = columns()
+        lines = (wrapped(x, rest="  ") if len(x) > fits else x for x in text.split("\n"))
+        text = "\n".join(lines)
     for line in text.split("\n"):
         if line and line in headings and colored(sys.stdout):
             sys.stdout.write(painted(harmless(line), "heading", sys.stdout) + "\n")

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 PATIENCE = 1.0  # s for which a command says nothing
 TICK = 0.5  # s between two looks at the clock
-KNOWN = "{desc}: {percentage:3.0f} % |{bar:20}| {postfix}"
+KNOWN = "{desc}: {percentage:3.0f} % |{bar:20}|"
 TAIL = ": 100 % |12345678901234567890| about 100 min left "  # beside which words have to find room
 
 
@@ -40,7 +40,7 @@ class Watcher:
 
     def __init__(self, *, shows: bool = True) -> None:
         self._shows = shows and is_terminal(sys.stderr)
-        self._start = time.perf_counter()
+        self._start = self._told = time.perf_counter()
         self._began: dict[str, tuple[float, float]] = {}  # of each stage, and its last share
         self._stage = Stage("working", -1.0)  # no share is below zero
         self._bar: tqdm[None] | None = None
@@ -83,9 +83,7 @@ class Watcher:
                 began = time.perf_counter()
             if new.share >= 0:
                 self._began[new.what] = began, new.share
-            if (new.share > 0) != (self._stage.share > 0):
-                self._close()
-            self._stage = new
+            self._stage, self._told = new, time.perf_counter()
             self._show()
 
     def _tick(self) -> None:
@@ -102,17 +100,23 @@ class Watcher:
         if self._bar is None:
             self._bar = _bar()
         stage, bar = self._stage, self._bar
-        what = harmless(stage.what)[: columns() - len(TAIL)]
-        if stage.share > 0:
-            left = stage.left
-            if left is None:
-                took = now - self._began[stage.what][0]
-                left = took * (1 - stage.share) / stage.share
-            bar.n, bar.bar_format = min(stage.share, 1.0), KNOWN
-            bar.desc, bar.postfix = what, f"about {duration(left)} left"
+        what, left = harmless(stage.what), self._left(now)
+        if stage.share > 0 and left > 0:
+            said = f"about {duration(max(left, 1.0))} left"
+            bar.n, bar.bar_format = min(stage.share, 1.0), f"{KNOWN} {said}"
+            bar.desc = what[: columns() - len(TAIL)]
         else:
-            bar.desc = f"{what} … {duration(now - self._start)} so far"
+            bar.bar_format = "{desc}"
+            bar.desc = f"{what[: columns() - 24]} … {duration(now - self._start)} so far"
         bar.refresh()
+
+    def _left(self, now: float) -> float:
+        """Return how long the stage will still take, s; nothing where that is not known."""
+        stage = self._stage
+        if stage.left is not None:
+            return stage.left - (now - self._told)
+        took = now - self._began[stage.what][0] if stage.share > 0 else 0.0
+        return took * (1 - stage.share) / max(stage.share, 1e-9)
 
     def _close(self) -> None:
         if self._bar is not None:

@@ -74,15 +74,25 @@ class ScheduleFormulation:
                 raise ProblemError(f"option {name}: {self.name} has {known}")
 
 
-def schedule_formulation_names() -> tuple[str, ...]:
-    """Return the names of all formulations of the free schedule, without loading any.
+def schedule_formulation_names(*finds: Finds) -> tuple[str, ...]:
+    """Return the names of the formulations of the free schedule that answer something.
+
+    Parameters
+    ----------
+    *finds : Finds
+        What.
 
     Returns
     -------
     tuple of str
         In alphabetical order.
+
+    Examples
+    --------
+    >>> schedule_formulation_names(Finds.PLAN)
+    ('schedule_search',)
     """
-    return tuple(sorted(_entries()))
+    return tuple(name for name in sorted(_entries()) if _loaded(name).finds in finds)
 
 
 def find_schedule_formulation(

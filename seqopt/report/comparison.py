@@ -157,8 +157,7 @@ def compare(
     tables |= {name: plan.responses() for name, plan in plans.items()}
     rows |= {name: _row(plan) for name, plan in plans.items()}
     loop = None if problem is None else _facts(problem, rows, robots)
-    progress("comparing with the free schedule")
-    notes += _add_free(engine, robots, rows, tables)
+    notes += _add_free(engine, robots, progress, (rows, tables))
     if problem is not None:
         notes += idle_note(scene, f"{problem.schedule.method} loop", problem.schedule.steps)
     notes += _add_largest(scene, rows, tables)
@@ -183,11 +182,11 @@ def _add_largest(
 def _add_free(
     engine: Engine,
     robots: Sequence[str],
-    rows: dict[str, dict[str, object]],
-    tables: dict[str, pd.DataFrame],
+    progress: Tell,
+    known: tuple[dict[str, dict[str, object]], dict[str, pd.DataFrame]],
 ) -> list[str]:
     """Add the free schedule to rows and tables, or say why there is none."""
-    free, why_not = free_plan(engine, robots)
+    (rows, tables), (free, why_not) = known, free_plan(engine, robots, progress)
     if free is None:
         return [why_not]
     tables[FREE], rows[FREE] = free.responses(), free_row(free)
@@ -215,7 +214,7 @@ def _plans(
         known = formulations()
         problem = pose(engine, loop, criterion, resources=Resources(progress=progress))
         for done, (name, formulation) in enumerate(known.items()):
-            progress(Stage("comparing", (done + 1) / (len(known) + 2)))
+            progress(Stage("comparing", (done + 1) / (len(known) + 1)))
             plans[name] = on_the_way(solve(problem, formulation))
     except (StepError, ProblemError) as error:
         return {}, None, str(error)
