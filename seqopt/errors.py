@@ -80,13 +80,13 @@ class SceneWarning(UserWarning):
     """Something in a scene can be, and probably is not meant."""
 
 
-def did_you_mean(given: str, known: Iterable[str]) -> str:
+def did_you_mean(given: object, known: Iterable[str]) -> str:
     """Return a hint at the word that was probably meant.
 
     Parameters
     ----------
     given : str
-        A word that is none.
+        A word that is none; there is no hint at anything else.
     known : iterable of str
         Those that there are.
 
@@ -99,8 +99,9 @@ def did_you_mean(given: str, known: Iterable[str]) -> str:
     --------
     >>> did_you_mean("overlap_pd", ["cascade", "overlap_dp"])
     ' (did you mean overlap_dp?)'
-    >>> did_you_mean("x", ["cascade", "overlap_dp"])
-    ''
+    >>> did_you_mean("t_max", ["T_max"]), did_you_mean("x", ["cascade", "overlap_dp"])
+    (' (did you mean T_max?)', '')
     """
-    near = difflib.get_close_matches(given, known, 1)
-    return f" (did you mean {near[0]}?)" if near else ""
+    meant = {name.lower(): name for name in known}
+    near = difflib.get_close_matches(given.lower(), meant, 1) if isinstance(given, str) else []
+    return f" (did you mean {meant[near[0]]}?)" if near else ""

@@ -65,7 +65,8 @@ class Parser(argparse.ArgumentParser):
 
     color: bool  # of Python 3.14
     given: Sequence[str] = ()  # what it was asked to parse
-    spoken: tuple[str, ...] = ()  # options of the command that is asked for
+    asked = ""  # the command that is asked for, and its options
+    spoken: tuple[str, ...] = ()
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
         """Parse as argparse does, and remember what; a missing argument may be a mistyped one.
@@ -102,7 +103,8 @@ class Parser(argparse.ArgumentParser):
         own = tuple(self._option_string_actions)
         message = first_wrong(message, self.given, own)
         hint = nearest(message, self.spoken or own)
-        complain(f"{self.prog}: error: {message}{hint} (see {self.prog} --help)")
+        where = f"{self.prog} {self.asked}".rstrip()
+        complain(f"{self.prog}: error: {message}{hint} (see {where} --help)")
         self.exit(Status.BAD_INPUT)
 
 
@@ -138,7 +140,7 @@ def parser(asked: str | None = None) -> Parser:
         if asked in (None, name):
             _fill(added, command.load())
         if asked == name:
-            whole.spoken = tuple(added._option_string_actions)
+            whole.asked, whole.spoken = name, tuple(added._option_string_actions)
     return whole
 
 

@@ -23,7 +23,7 @@ from seqopt.cli.outputs import write_outputs
 from seqopt.cli.rules import parse_rules, parse_standing
 from seqopt.cli.status import Status
 from seqopt.cli.values import parse_limits, parse_numbers, parse_robots, parse_time_limit
-from seqopt.errors import ProblemError, StepError
+from seqopt.errors import ProblemError, StepError, did_you_mean
 from seqopt.files import require_folder
 from seqopt.network.build import build_network
 from seqopt.placement.criteria import WORST_OVER_METHODS
@@ -35,6 +35,7 @@ from seqopt.placement.schedule_formulation import find_schedule_formulation
 from seqopt.placement.solving import solve
 from seqopt.scene.scene import Scene
 from seqopt.sequence.free_rules import FREE, with_robots
+from seqopt.sequence.three_robots import SCHEDULES
 
 
 def optimize_free(options: argparse.Namespace) -> Answer:
@@ -109,6 +110,9 @@ def require_loop(options: argparse.Namespace) -> None:
             raise ProblemError(f"{name}: only the free schedule has it; give --schedule {FREE}")
     if options.formulation is None:
         known = ", ".join(formulation_names())
+        meant = (*SCHEDULES, FREE)
+        if options.schedule not in meant and (hint := did_you_mean(options.schedule, meant)):
+            raise ProblemError(f"--schedule {options.schedule}: there is no such{hint}")
         raise ProblemError(f"--formulation: it is missing; give one of {known}")
 
 

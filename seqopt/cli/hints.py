@@ -47,7 +47,13 @@ def nearest(message: str, options: Iterable[str]) -> str:
     if found := WRONG_CHOICE.search(message):
         return did_you_mean(found[1], [word.strip(" '") for word in found[2].split(",")])
     found = UNKNOWN.search(message)
-    return did_you_mean(found[1], options) if found else ""
+    if found is None:
+        return ""
+    known = {option.lstrip("-"): option for option in options}
+    if found[1] in known.values():
+        return " (options stand after the command)"
+    hint = did_you_mean(found[1].lstrip("-"), known)
+    return hint.replace("mean ", "mean --") if hint else ""
 
 
 def first_wrong(message: str, given: Sequence[str], options: Sequence[str]) -> str:

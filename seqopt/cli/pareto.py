@@ -27,7 +27,7 @@ from seqopt.cli.outputs import require_matplotlib, write_outputs
 from seqopt.cli.pages import PAGE, front_page
 from seqopt.cli.values import parse_numbers, parse_robots
 from seqopt.engines.interface import Engine
-from seqopt.errors import ProblemError, StepError
+from seqopt.errors import ProblemError, StepError, did_you_mean
 from seqopt.files import csv_text, require_folder
 from seqopt.placement.free_front import FreeFront
 from seqopt.placement.free_problem import FreeProblem
@@ -218,6 +218,10 @@ def _under(texts: Sequence[str], methods: Mapping[str, pd.DataFrame]) -> dict[st
     """Return bounds from words: RESPONSE=VALUE, or the name of a method to beat."""
     out: dict[str, float] = {}
     for text in texts:
+        if "=" not in text and text not in methods:
+            known = ", ".join(methods)
+            why = f"there is no such method{did_you_mean(text, methods)}"
+            raise ProblemError(f"--under {text}: {why}; give {known}, or a bound as F_largest=250")
         bounds = worst_of(methods[text]) if text in methods else parse_numbers("--under", [text])
         for name, value in bounds.items():
             out[name] = min(value, out.get(name, value))

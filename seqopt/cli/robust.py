@@ -16,7 +16,7 @@ from seqopt.cli.facts import scene_facts
 from seqopt.cli.outputs import write_outputs
 from seqopt.cli.posing import asked_problem
 from seqopt.cli.values import number_word, parse_time_limit, split_word
-from seqopt.errors import ProblemError
+from seqopt.errors import ProblemError, did_you_mean
 from seqopt.files import csv_text
 from seqopt.placement.robust_aim import RobustAim, parse_robust
 from seqopt.placement.robust_plan import solve_robust
@@ -143,7 +143,8 @@ def _drawn(scene: Scene, options: argparse.Namespace, count: int, seed: int) -> 
         name, value = split_word(text)
         if name not in SPREADS:
             raise ProblemError(
-                f"--vary {text}: there is no such; give one of {', '.join(SPREADS)}, as stiffness=3"
+                f"--vary {text}: there is no such{did_you_mean(name, SPREADS)}; give one of "
+                f"{', '.join(SPREADS)}, as stiffness=3"
             )
         asked[name] = number_word(value, f"--vary {text}", zero="allowed")
     factor = asked.pop("stiffness", 3.0)

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from seqopt.arrays import Floats, FrozenValue
-from seqopt.errors import InfeasibleError, ProblemError, SolverError
+from seqopt.errors import InfeasibleError, ProblemError, SolverError, did_you_mean
 from seqopt.placement.schedule_formulation import (
     Finds,
     ScheduleFormulation,
@@ -263,8 +263,9 @@ def pick(table: pd.DataFrame, least: str, under: Mapping[str, float] | None = No
     under = dict(under or {})
     for name in (least, *under):
         if name not in table:
-            known = ", ".join(map(str, table.columns))
-            raise ProblemError(f"pick {name}: the set has no such column; give one of {known}")
+            known = [*map(str, table.columns)]
+            why = f"the set has no such column{did_you_mean(name, known)}"
+            raise ProblemError(f"pick {name}: {why}; give one of {', '.join(known)}")
     rows = np.ones(len(table), dtype=bool)
     for name, bound in under.items():
         rows &= table[name].to_numpy(float) < bound

@@ -10,7 +10,7 @@ from numbers import Real
 import numpy as np
 
 from seqopt.arrays import Floats
-from seqopt.errors import ProblemError
+from seqopt.errors import ProblemError, did_you_mean
 from seqopt.placement.interface import Aim
 from seqopt.scene.checks import short
 
@@ -180,7 +180,9 @@ def parse_robust(text: str) -> RobustAim:
     except ValueError:
         level = math.nan
     if math.isnan(level):
+        hint = did_you_mean(name, (*known, RobustKind.CVAR.value))
         raise ProblemError(
-            f"robust aim {text}: there is no such; give worst-peak, worst-total or as cvar=0.9"
+            f"robust aim {text}: there is no such{hint}; give worst-peak, worst-total or as "
+            "cvar=0.9"
         )
     return cvar(level)
