@@ -103,5 +103,7 @@ def did_you_mean(given: object, known: Iterable[str]) -> str:
     (' (did you mean T_max?)', '')
     """
     meant = {name.lower(): name for name in known}
-    near = difflib.get_close_matches(given.lower(), meant, 1) if isinstance(given, str) else []
+    if not isinstance(given, str) or given in meant.values():
+        return ""
+    near = difflib.get_close_matches(given.lower(), meant, 1)
     return f" (did you mean {meant[near[0]]}?)" if near else ""

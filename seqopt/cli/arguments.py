@@ -60,46 +60,22 @@ COMMANDS = {
 }
 
 
-class Parser(argparse.ArgumentParser):
+class _Parser(argparse.ArgumentParser):
     """A parser whose errors are one line, and whose help is a result like others."""
 
     color: bool  # of Python 3.14
-    given: Sequence[str] = ()  # what it was asked to parse
+    given: Sequence[str] = ()  # what it was asked to parse: a missing word may be a mistyped one
     asked = ""  # the command that is asked for, and its options
     spoken: tuple[str, ...] = ()
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
-        """Parse as argparse does, and remember what; a missing argument may be a mistyped one.
-
-        Parameters
-        ----------
-        args : sequence of str, optional
-        namespace : argparse.Namespace, optional
-
-        Returns
-        -------
-        (argparse.Namespace, list of str)
-        """
         self.given = args or ()
         return super().parse_known_args(args, namespace)
 
     def print_help(self, file: object = None) -> None:
-        """Show the help on standard output.
-
-        Parameters
-        ----------
-        file : object, optional
-            As argparse has it; not used.
-        """
         show(self.format_help())
 
     def error(self, message: str) -> NoReturn:
-        """End with one line that says what is wrong, and the word that was probably meant.
-
-        Parameters
-        ----------
-        message : str
-        """
         own = tuple(self._option_string_actions)
         message = first_wrong(message, self.given, own)
         hint = nearest(message, self.spoken or own)
@@ -108,7 +84,7 @@ class Parser(argparse.ArgumentParser):
         self.exit(Status.BAD_INPUT)
 
 
-def parser(asked: str | None = None) -> Parser:
+def parser(asked: str | None = None) -> argparse.ArgumentParser:
     """Return the parser of the command line.
 
     Parameters
@@ -118,11 +94,11 @@ def parser(asked: str | None = None) -> Parser:
 
     Returns
     -------
-    Parser
+    argparse.ArgumentParser
         ``command`` names what is to be run. A wrong word ends the program with status
         `seqopt.cli.status.Status.BAD_INPUT`.
     """
-    whole = Parser(
+    whole = _Parser(
         prog="seqopt",
         formatter_class=_layout,
         description="Where should each robot hold a half-built structure, over the whole build?",
@@ -144,10 +120,10 @@ def parser(asked: str | None = None) -> Parser:
     return whole
 
 
-def _fill(command: Parser, module: ModuleType) -> None:
+def _fill(command: argparse.ArgumentParser, module: ModuleType) -> None:
     """Give a command what its module says."""
-    if usage := getattr(module, "USAGE", ""):
-        command.usage = f"{command.prog} {usage}"
+    if usages := getattr(module, "USAGE", ()):
+        command.usage = "\n       ".join(f"{command.prog} {usage}" for usage in usages)
     add: Callable[[argparse.ArgumentParser], None] = module.add_arguments
     lines = "\n".join(f"  {example}" for example in module.EXAMPLES)
     command.description = wrapped(module.DESCRIPTION)

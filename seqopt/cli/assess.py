@@ -25,7 +25,10 @@ DESCRIPTION = (
     "joints may open and slide; say how much bond, friction and robot force it needs, which tilt "
     "it survives, and which brick and joint fail first."
 )
-USAGE = "[SCENE] --method NAME | --plan FILE [--out FILE] [other options]"
+USAGE = (
+    "[SCENE] --method NAME [--out FILE] [other options]",
+    "[SCENE] --plan FILE [--out FILE] [other options]",
+)
 EXAMPLES = (
     "seqopt assess arch25 --method cantilever --out stands.csv",
     "seqopt assess arch25 --method sequential --mortar dry",

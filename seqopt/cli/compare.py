@@ -28,7 +28,7 @@ from seqopt.cli.values import parse_robots
 from seqopt.files import require_folder
 from seqopt.network.build import build_network
 from seqopt.report.comparison import Comparison, compare
-from seqopt.report.text import format_comparison
+from seqopt.report.text import format_details
 
 DESCRIPTION = (
     "Build a scene in every way that seqopt knows, on paper: the fixed sequences, a loop of robots "
@@ -36,7 +36,7 @@ DESCRIPTION = (
     "and displacements side by side; for the arch of Bruun et al. beside the figures that they "
     "print, with a list of the inconsistencies in print."
 )
-USAGE = "[SCENE] [--out DIR] [--json | --quiet] [other options]"
+USAGE = ("[SCENE] [--out DIR] [--details] [other options]",)
 EXAMPLES = (
     "seqopt compare",
     "seqopt compare wall:columns=6,courses=4 --out wall",
@@ -92,7 +92,7 @@ def run(options: argparse.Namespace) -> Answer:
     told = tell_comparison(result, scene, criterion)
     blocks = [told.text]
     if options.details:
-        blocks.append(format_comparison(result, scene, criterion))
+        blocks.append(format_details(result, scene))
     written: tuple[Path, ...] = ()
     if options.out is not None and result.loop is not None:
         options.tell("drawing figures")

@@ -14,7 +14,7 @@ from hashlib import sha256
 import shtab
 
 from seqopt.cli.answer import Answer
-from seqopt.cli.arguments import COMMANDS, Parser, parser
+from seqopt.cli.arguments import COMMANDS, parser
 from seqopt.cli.rules import RULES
 from seqopt.placement.formulation import formulation_names
 from seqopt.placement.schedule_formulation import Finds, schedule_formulation_names
@@ -69,17 +69,17 @@ def run(options: argparse.Namespace) -> Answer:
     return Answer(facts={"shell": options.shell, "script": script}, data=script + "\n")
 
 
-def completed(whole: Parser) -> Parser:
+def completed(whole: argparse.ArgumentParser) -> argparse.ArgumentParser:
     """Return a parser whose arguments know what may follow them.
 
     Parameters
     ----------
-    whole : Parser
+    whole : argparse.ArgumentParser
         Of all commands; it is changed.
 
     Returns
     -------
-    Parser
+    argparse.ArgumentParser
     """
     known = {name: words(names) for name, names in _names().items()}
     known |= {

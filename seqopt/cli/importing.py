@@ -22,6 +22,7 @@ DESCRIPTION = (
     "Read an assembly of COMPAS, a mesh, a table of boxes or a frame, say what was assumed, and "
     "write it as a scene."
 )
+USAGE = ("FILE --out SCENE.json [--unit UNIT] [other options]",)
 EXAMPLES = (
     "seqopt import wall.obj --unit m --density 2400 --out wall.json",
     "seqopt import boxes.csv --unit mm --supports 0,1 --out house.json",

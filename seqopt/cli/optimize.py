@@ -31,7 +31,11 @@ DESCRIPTION = (
     "--schedule free, choose every step. The answer is checked from the problem's own data, and "
     "plan, selection, responses, summary and a page for the browser are written."
 )
-USAGE = "[SCENE] --formulation NAME | --schedule free --out DIR [other options]"
+USAGE = (
+    "[SCENE] --formulation NAME --out DIR [other options]",
+    "[SCENE] --schedule free --out DIR [other options]",
+    "[SCENE] --robust AIM --out DIR [other options]",
+)
 EXAMPLES = (
     "seqopt optimize arch25 --formulation overlap_dp --out best",
     "seqopt optimize arch25 --schedule free --out free",

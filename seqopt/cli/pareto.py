@@ -48,7 +48,7 @@ DESCRIPTION = (
     "beats in all aims at once (the Pareto set); check each, and write a table, the plans, a chart "
     "and a page for the browser."
 )
-USAGE = "[SCENE] --out DIR [--aim NAME,NAME] [other options]"
+USAGE = ("[SCENE] --out DIR [--aim NAME,NAME] [other options]",)
 EXAMPLES = (
     "seqopt pareto arch25 --out front",
     "seqopt pareto arch25 --pick D_max --under F_largest=250 --out front",

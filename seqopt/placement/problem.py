@@ -293,7 +293,6 @@ def pose(
     limits = (limits,) if isinstance(limits, Limit) else limits
     asked = ResponsesAsked(criterion.for_scene(SceneFacts(engine)), tuple(limits), tuple(also))
     if unknown := {name for move in schedule.moves for name in asked(move.bricks)} - known:
-        listed = ", ".join(sorted(known))
-        hint = did_you_mean(min(unknown), known)
-        raise ProblemError(f"response {min(unknown)}: there is no such{hint}; give {listed}")
+        why = f"there is no such{did_you_mean(min(unknown), known)}"
+        raise ProblemError(f"response {min(unknown)}: {why}; give {', '.join(sorted(known))}")
     return Problem(asked.criterion, asked.limits, Evaluation(engine, schedule, asked, resources))

@@ -147,19 +147,20 @@ def touching_faces(
     for shape in shapes:
         if not hasattr(shape, "points") or not hasattr(shape, "faces"):
             raise SceneError(f"shapes: {short(shape)} is none; give each as Polyhedron(...)")
-    facets, found = [_facets(shape) for shape in shapes], list[TouchingFace]()
-    course, done = Progress("finding where blocks touch", len(shapes), progress), 0
+    return tuple(_found(shapes, gap, Progress("finding faces", len(shapes), progress)))
+
+
+def _found(shapes: Sequence[Solid], gap: float, course: Progress) -> Iterator[TouchingFace]:
+    """Yield the faces over which blocks touch, pair by pair."""
+    facets, done = [_facets(shape) for shape in shapes], 0
     for tries, (i, j) in enumerate(_near(shapes, gap)):
         course.add(i - done)
         done = i
         if tries == MOST_PAIRS:
             raise SceneError(f"more than {MOST_PAIRS} pairs of blocks are in one place; part them")
         for polygons, (origin, axes) in _overlaps(facets[i], facets[j], gap):
-            found += [
-                TouchingFace((i, j), origin + piece @ axes[1:], axes[0])
-                for piece in convex_pieces(polygons)
-            ]
-    return tuple(found)
+            for piece in convex_pieces(polygons):
+                yield TouchingFace((i, j), origin + piece @ axes[1:], axes[0])
 
 
 def _facets(shape: Solid) -> _Facets:
