@@ -1,4 +1,4 @@
-r"""The simplified cascading scheme of Bruun et al.: move by move, a shared step charged to one.
+r"""The simplified cascading scheme of Bruun et al., move by move.
 
 With ``charge="later"`` move :math:`k` knows the choice before it and takes
 

@@ -7,7 +7,7 @@ r"""The smallest achievable worst cost over the build: exact.
 where :math:`c_k(i)` is the worst of the steps in which move :math:`k` alone is open, and
 :math:`d_k` that of the steps it shares with the move before. It is a bottleneck path in a layered
 graph; dynamic programming solves it with the maximum instead of the sum. Among the choices with the
-same worst cost the least sum of costs wins. The certificate proves the value anew: no choice stays
+same worst cost the least sum of costs wins. The certificate proves the value again: no choice stays
 strictly below it.
 """
 

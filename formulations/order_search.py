@@ -1,6 +1,6 @@
 r"""The order in which bricks are placed, by all sets of bricks, or where these are many by trying.
 
-What an order :math:`\pi` is worth is the least worst step of any schedule of it. Orders share what
+The value of an order :math:`\pi` is the least worst step of any schedule of it. Orders share what
 they have in common: with the set :math:`S` of bricks standing and the newest :math:`b \in S` known,
 neither the responses nor the moves depend on how the rest was placed. The best order is therefore a
 bottleneck path
@@ -24,25 +24,29 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from contextlib import closing
+from dataclasses import dataclass, field, replace
+from itertools import islice
 
 import numpy as np
 
 from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.placement.formulation import FormulationKind
-from seqopt.placement.free_graph import explore
-from seqopt.placement.free_paths import TIED, least_to_end
+from seqopt.placement.free_paths import TIED
 from seqopt.placement.free_problem import FreeProblem
 from seqopt.placement.order_bound import whole_bound
 from seqopt.placement.order_graph import Key, OrderGraph, explore_orders
 from seqopt.placement.order_problem import OrderProblem, OrderSelection
+from seqopt.placement.order_work import Trial, trying, worth
 from seqopt.placement.schedule_formulation import Finds, ScheduleFormulation
+from seqopt.responses.resources import HERE, Resources
 from seqopt.scene.orders import ORDERS, Order
-from seqopt.work.progress import Stage, Tell
+from seqopt.work.crew import hire
+from seqopt.work.ordered import map_ordered
+from seqopt.work.progress import Stage
 
 FAR_BELOW = 4.0  # the best order known, over the first threshold
 GROWTH = 1.1  # of the threshold
-NARROW = 50  # states of a brick count with which an order is tried first
 BETTER = 1e-9  # share by which an order must be better
 
 
@@ -56,17 +60,19 @@ class _Search:
 
     problem: OrderProblem
     end: float
-    progress: Tell
+    resources: Resources
     order: Order = ()
     value: float = np.inf
     bound: float = -np.inf
     evaluated: int = 0
     problems: dict[Key, FreeProblem] = field(default_factory=dict)
     tried: Stage | None = None  # of orders beside the best, how many
+    each: float = 0.0  # share of one of them
 
     def tell(self, what: object) -> None:
         """Say how far it is; end the search in time."""
-        self.progress(what)
+        if self.resources.progress is not None:
+            self.resources.progress(what)
         if time.perf_counter() > self.end:
             raise _StopError
 
@@ -78,17 +84,23 @@ class _Search:
         """Return whether an order is better than the best so far, and keep it if it is."""
         if not self.problem.allows(order):
             return False
+        return self.take(order, worth(self.problem, self.trial(order)))
+
+    def trial(self, order: Order) -> Trial:
+        """Return an order to be tried against the best so far; end the search in time."""
         best = f", the best {self.value:.6g}" if self.order else ""
         self.tell(self.tried or f"{self.evaluated} orders{best}")
+        return Trial(order, self.value * (1 - BETTER) if np.isfinite(self.value) else np.inf)
+
+    def take(self, order: Order, value: float) -> bool:
+        """Return whether an order that was tried is better than the best so far, and keep it."""
+        if self.tried is not None:
+            self.tried = replace(self.tried, share=min(1.0, self.tried.share + self.each))
         self.evaluated += 1
-        problem = self.problem.judging(order)
-        ceiling = self.value * (1 - BETTER) if np.isfinite(self.value) else np.inf
-        for width in (NARROW, None):
-            graph = explore(problem, ceiling, width)
-            if graph.whole:
-                ceiling = float(least_to_end(graph, 0)[0].min())
-                self.order, self.value = order, ceiling
-        return self.order == order
+        better = value < self.value
+        if better:
+            self.order, self.value = order, value
+        return better
 
 
 def solve(
@@ -98,7 +110,7 @@ def solve(
     tries: int = 200,
     seed: int = 0,
     seconds: float = np.inf,
-    progress: Tell = lambda _: None,
+    resources: Resources = HERE,
 ) -> OrderSelection:
     """Return the best order, or a good one and a bound.
 
@@ -113,8 +125,9 @@ def solve(
         In which turn.
     seconds : float, optional
         After which the best order found is returned.
-    progress : callable, optional
-        Told in a few words how far it is.
+    resources : Resources, optional
+        Who is told how far it is, and who tries orders where not all are looked at; what is found
+        does not depend on it.
 
     Returns
     -------
@@ -127,7 +140,7 @@ def solve(
     """
     if most < 0 or tries < 0:
         raise ProblemError(f"options most={most}, tries={tries}: give whole numbers from 0 on")
-    search = _Search(problem, time.perf_counter() + seconds, progress)
+    search = _Search(problem, time.perf_counter() + seconds, resources)
     try:
         why = _run(search, most, tries, np.random.default_rng(seed))
     except (_StopError, KeyboardInterrupt) as stop:
@@ -201,17 +214,17 @@ def _neighbors(search: _Search, tries: int, rng: np.random.Generator) -> None:
     """Try orders beside the best, until none of them is better or all tries are made."""
     if not search.order:
         return
-    left = tries
-    while left > 0:
-        better = False
-        for order in _beside(search.order, search.problem, rng):
-            search.tried = Stage("orders beside the best", 1 - left / tries)
-            better = search.try_order(order)
-            left -= 1
-            if better or left <= 0:
-                break
-        if not better:
-            return
+    left, better = tries, True
+    with hire(search.resources.executor, search.resources.workers) as crew:
+        work = trying(search.problem, elsewhere=crew is not None)
+        while better and left > 0:
+            before = search.evaluated
+            search.tried, search.each = Stage("orders beside the best", 1 - left / tries), 1 / tries
+            orders = [*islice(_beside(search.order, search.problem, rng), left)]
+            trials = map(search.trial, orders)
+            with closing(map_ordered(work, trials, crew)) as found:  # ends at the first better one
+                better = any(map(search.take, orders, found))
+            left -= search.evaluated - before
 
 
 def _beside(order: Order, problem: OrderProblem, rng: np.random.Generator) -> Iterator[Order]:

@@ -10,7 +10,7 @@ points found so far lies in one of finitely many *search zones*,
 
 A zone is empty if no path of states that are all below :math:`u` leads to an end. Else the least of
 the first number in it, of the second among these, and so on, is a new point :math:`z`; every zone
-that holds it is split, once for each number, with :math:`z_k` in the place of :math:`u_k`, and
+that holds it is split, once for each number, with :math:`z_k` instead of :math:`u_k`, and
 zones inside others are dropped. When no zone is left the set is complete. Source: Klamroth, Lacour
 and Vanderpooten, On the representation of the search region in multi-objective optimization (2015).
 """

@@ -1,7 +1,7 @@
 r"""The free schedule by threshold and reachability, one goal after the other: exact.
 
 A state is how many bricks stand and which node each robot holds; a plan is a path from the empty
-site to an end of the build, each of its moves a step. Goals :math:`g_1, g_2, \dots` are made least
+site to an end of the build, each of its moves a step. Goals :math:`g_1, g_2, \dots` are minimized
 in their order,
 
 .. math::
@@ -13,14 +13,14 @@ in their order,
    \quad\text{or}\quad
    g(s_1, \dots, s_N) = \sum_i c(s_{i-1}, s_i),
 
-with :math:`v` what a state is worth and :math:`c` what a step costs. A narrow search without
+with :math:`v` the value of a state and :math:`c` the cost of a step. A narrow search without
 regrips, which keeps the best states of every brick count, gives a first plan. Then a threshold
 rises until states below it connect the empty site to an end; responses are computed only for states
 next to those that are reached below it. Among these every goal is a shortest path, with the maximum
-in the place of the sum for a peak; what is not on a best path of one goal is left out before the
+instead of the sum for a peak; what is not on a best path of one goal is left out before the
 next. A margin of stability comes first: the best one with which states still connect both ends is
 found by halving an interval, and all further states must have it. The certificate proves every
-value anew: below it no path connects the empty site to an end.
+value again: below it no path connects the empty site to an end.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """Find where each robot should hold a half-built structure, over the whole build.
 
-A scene says what is built, in which order and by which robots. From it follow the network of bars
-and springs, an engine that computes how every partial structure responds to its grips, and a
-schedule: the steps of the build, some of whose grips are open. Choosing them is the problem; a
-formulation solves it; the plan is its answer, checked.
+A scene says what is built, in which order and by which robots. It becomes a network of bars and
+springs. An engine computes how every partial structure responds to the robots' grips. A schedule
+lists the steps of the build; some of its grips are still open. The problem is to choose them. A
+formulation solves the problem, and the plan is the checked answer.
 
 >>> import seqopt
 >>> scene = seqopt.load_scene("arch25")

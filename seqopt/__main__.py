@@ -44,7 +44,7 @@ def run() -> int:
         with contextlib.suppress(OSError, AttributeError):
             said = " ".join(f"{type(error).__name__} {error}".split())
             sys.stderr.write(
-                f"seqopt: cannot start: {said}; give it more memory, or install anew\n"
+                f"seqopt: cannot start: {said}; give it more memory, or reinstall it\n"
             )
         return FAILED
     if status == INTERRUPTED:  # else Python may end by the signal, where it met an exec of text

@@ -80,7 +80,7 @@ class FrozenValue:
 
 
 def frozen(content: Content) -> Content:
-    """Return arrays, sparse arrays and what holds them in tuples or mappings, made read-only.
+    """Return read-only arrays and sparse arrays, also within tuples and mappings.
 
     Parameters
     ----------

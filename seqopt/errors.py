@@ -1,4 +1,4 @@
-"""The exceptions of seqopt: one small tree that says who must act."""
+"""The exceptions of seqopt. Their classes say who can fix the problem."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Iterable
 
 
 class SeqoptError(Exception):
-    """Base of every error seqopt raises on purpose; its text is one line a user can act on.
+    """Base of all errors that seqopt raises; the text is one line that says what to change.
 
     Examples
     --------
@@ -21,23 +21,23 @@ class SeqoptError(Exception):
 
 
 class FileError(SeqoptError, OSError):
-    """A file cannot be read or written: the caller must name another."""
+    """A file cannot be read or written; name another one."""
 
 
 class SceneError(SeqoptError, ValueError):
-    """A scene, or a file that describes one, is wrong: its author must act."""
+    """A scene, or a file that describes one, is wrong and must be corrected."""
 
 
 class StepError(SeqoptError, ValueError):
-    """A step of a sequence or plan is impossible in its scene: the plan's author must act."""
+    """A step of a sequence or plan is impossible in its scene; the plan must be changed."""
 
 
 class GripError(SeqoptError, ValueError):
-    """A grip set handed to an engine is malformed: the caller must act."""
+    """A grip set given to an engine is malformed."""
 
 
 class ProblemError(SeqoptError, ValueError):
-    """A placement problem is malformed, or not of the kind a formulation solves."""
+    """A placement problem is malformed, or a formulation cannot solve problems of its kind."""
 
 
 class InfeasibleError(ProblemError):
@@ -69,15 +69,15 @@ class SolverError(SeqoptError, ArithmeticError):
 
 
 class MemoryShortError(SeqoptError, MemoryError):
-    """There is not the memory for what is asked; the text says how much it takes."""
+    """There is not enough memory; the text says how much is needed."""
 
 
 class WorkerError(SeqoptError, RuntimeError):
-    """Processes or machines that work was given to end without an answer, again and again."""
+    """Worker processes or machines ended without a result several times in a row."""
 
 
 class SceneWarning(UserWarning):
-    """Something in a scene can be, and probably is not meant."""
+    """Something in a scene is possible but probably a mistake."""
 
 
 def did_you_mean(given: object, known: Iterable[str]) -> str:
@@ -86,9 +86,9 @@ def did_you_mean(given: object, known: Iterable[str]) -> str:
     Parameters
     ----------
     given : str
-        A word that is none; there is no hint at anything else.
+        A word that does not exist; there is no hint at anything else.
     known : iterable of str
-        Those that there are.
+        The words that exist.
 
     Returns
     -------

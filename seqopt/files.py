@@ -52,7 +52,7 @@ def read_bytes(path: Path) -> bytes:
     """
     try:
         if not stat.S_ISREG(Path(path).stat().st_mode):  # a pipe would be waited for
-            raise FileError(f"cannot read {path}: it is no regular file; name one")
+            raise FileError(f"cannot read {path}: it is not a regular file; name one")
         with Path(path).open("rb") as stream:
             content = stream.read(LARGEST_INPUT + 1)
         if len(content) > LARGEST_INPUT:
@@ -201,7 +201,7 @@ def require_folder(path: Path) -> None:
     while not os.path.lexists(there) and there != there.parent:
         there = there.parent
     if not there.is_dir() or not os.access(there, os.W_OK | os.X_OK):
-        what = "cannot be written" if there.is_dir() else "is no folder"
+        what = "cannot be written" if there.is_dir() else "is not a folder"
         raise FileError(f"cannot make folder {path}: {there} {what}; name another")
 
 

@@ -1,4 +1,4 @@
-"""Interrupts that wait until what must not be left half done is done, or are answered by a call."""
+"""Interrupts that wait until a critical piece of work is done, or that call a function."""
 
 from __future__ import annotations
 

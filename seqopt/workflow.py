@@ -1,4 +1,4 @@
-"""The short cut: from a scene to a plan in one call."""
+"""The shortest way: from a scene to a plan in one call."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def optimize(
     limits: Sequence[Limit] = (),
     **options: Any,
 ) -> Plan | FreePlan:
-    """Choose where robots hold over a whole build, or with a free schedule every step of it.
+    """Choose where robots hold over a whole build, or every step of a free schedule.
 
     Parameters
     ----------
@@ -157,7 +157,7 @@ def _pose_free(
 ) -> FreeProblem:
     """Return the problem of a free schedule; what options say of it is taken out of them."""
     own = [field.name for field in fields(Resources) if field.name != "max_memory"]
-    _refuse(options, own, "the free schedule has no such; leave it out")
+    _refuse(options, own, "the free schedule has no such option; leave it out")
     aim, stands = options.pop("aim", "minmax"), options.pop("stands", None)
     rules, robots = options.pop("rules", FreeRules()), options.pop("robots", ())
     if not isinstance(rules, FreeRules):
@@ -204,7 +204,7 @@ def find_criterion(criterion: Criterion | str) -> Criterion:
         return criterion
     if criterion not in CRITERIA:
         raise ProblemError(
-            f"criterion {criterion!r}: there is no such{did_you_mean(criterion, CRITERIA)}; give "
+            f"criterion {criterion!r} does not exist{did_you_mean(criterion, CRITERIA)}; give "
             f"one of {', '.join(CRITERIA)}"
         )
     return CRITERIA[criterion]

@@ -13,7 +13,7 @@ from experiments.harness.catalog import claims
 ROOT = Path(__file__).resolve().parent.parent
 
 ROOMS = (
-    {"arrays", "errors", "interrupts"},
+    {"arrays", "errors", "interrupts", "plugins"},
     {"files", "work"},
     {"scene"},
     {"network"},

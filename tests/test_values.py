@@ -24,11 +24,12 @@ from seqopt.engines.interface import Fields, Want
 from seqopt.engines.plane import Plane
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.engines.rigid.mechanism import rigid_structure
-from seqopt.engines.rigid.mixed import mixed_system, ungripped_system
+from seqopt.engines.rigid.mixed import mixed_system
 from seqopt.engines.rigid.operator import OperatorBuilder
 from seqopt.engines.rigid.recovery import Solution
 from seqopt.engines.rigid.response_maps import ResponseMaps, scene_maps
 from seqopt.engines.rigid.spanning_tree import grow_tree
+from seqopt.engines.rigid.ungripped import share, ungripped_system
 from seqopt.network.build import build_network
 from seqopt.network.statics import build_statics
 from seqopt.scene.boxes import boxes
@@ -66,7 +67,7 @@ def values(arch25):
         *(touching, flat_face(touching.corners), Surface(np.zeros((3, 3)), ((0, 1, 2),))),
         *(network, network.springs, build_statics(network)),
         *(assembly, face_quadrature(assembly), find_elastic_limits(network, EPOXY)),
-        *(SPACE, plane, tree, OperatorBuilder(network, tree).operator(2), parts),
+        *(SPACE, plane, tree, OperatorBuilder(network, tree).operator(2), parts, share(network)),
         *(mixed_system(parts, grips), rigid_structure(network, 2)),
         *(Solution(np.zeros(6), np.zeros((1, 6)), np.zeros((0, 3))), system, system.points, held),
         *(settle(held), ComplianceEngine(network).solve(2, [[2]], Want.ALL)),

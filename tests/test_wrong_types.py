@@ -70,12 +70,12 @@ def test_what_is_meant_is_taken(tmp_path):
 
 
 WRONG = {
-    "a float is no network": lambda: ComplianceEngine(3.0),
-    "a str is no network": lambda: seqopt.sequential("arch25"),
-    "a NoneType is no network": lambda: seqopt.make_engine("auto", None),
-    "a Network is no scene": lambda: seqopt.build_network(NETWORK),
-    "a str is no scene": lambda: seqopt.build_network("arch25"),
-    "a int is no name of a scene": lambda: seqopt.load_scene(25),
+    "a float is not a network": lambda: ComplianceEngine(3.0),
+    "a str is not a network": lambda: seqopt.sequential("arch25"),
+    "a NoneType is not a network": lambda: seqopt.make_engine("auto", None),
+    "a Network is not a scene": lambda: seqopt.build_network(NETWORK),
+    "a str is not a scene": lambda: seqopt.build_network("arch25"),
+    "a int is not a name of a scene": lambda: seqopt.load_scene(25),
     "mortar 'glue': give a Mortar, or one of": lambda: seqopt.make_engine("auto", SCENE, "glue"),
     "robot r: reach is 'far'; give Anywhere": lambda: Robot(name="r", payload=1.0, reach="far"),
     "robot r: reach is 3; give": lambda: Robot(name="r", payload=1.0, reach=3),
@@ -83,21 +83,21 @@ WRONG = {
     "is no engine; take one of": lambda: seqopt.pose(NETWORK, LOOP, EQUATIONS),
     "is no schedule; take one of": lambda: seqopt.pose(ENGINE, seqopt.sequential, EQUATIONS),
     "'weighted' is no criterion": lambda: seqopt.pose(ENGINE, LOOP, "weighted"),
-    "a Schedule is no problem": lambda: seqopt.solve(LOOP, "overlap_dp"),
-    "a int is no formulation": lambda: seqopt.solve(PROBLEM, 3),
+    "a Schedule is not a problem": lambda: seqopt.solve(LOOP, "overlap_dp"),
+    "a int is not a formulation": lambda: seqopt.solve(PROBLEM, 3),
     "formulation 'simplex'": lambda: seqopt.solve(PROBLEM, "simplex"),
-    "a Network is no engine": lambda: seqopt.analyze(NETWORK, seqopt.sequential(NETWORK)),
-    "a Schedule is no sequence of steps": lambda: seqopt.analyze(ENGINE, LOOP),
-    "a list is no sequence of steps": lambda: seqopt.assess_steps(NETWORK, [1], seqopt.DRY),
+    "a Network is not an engine": lambda: seqopt.analyze(NETWORK, seqopt.sequential(NETWORK)),
+    "a Schedule is not a sequence of steps": lambda: seqopt.analyze(ENGINE, LOOP),
+    "a list is not a sequence of steps": lambda: seqopt.assess_steps(NETWORK, [1], seqopt.DRY),
     "limit 3 of 'much'": lambda: seqopt.Limit(3, "much"),
     "its bound is NaN": lambda: seqopt.Limit("T_max", np.nan),
     "arch: pitch is 3": lambda: seqopt.ArchShape(pitch=3),
     "arch: roll is 'left'": lambda: seqopt.ArchShape(pitch=[1.0], roll="left"),
-    "a list is no shape of an arch": lambda: seqopt.arch_scene([1.0, 0.5]),
-    "scene: bricks: 3 is none; give each as Brick": lambda: seqopt.Scene(
+    "a list is not a shape of an arch": lambda: seqopt.arch_scene([1.0, 0.5]),
+    "scene: bricks: give each as Brick(...), not 3": lambda: seqopt.Scene(
         **{k: v for k, v in vars(SCENE).items() if k in SCENE.__dataclass_fields__} | {"bricks": 3}
     ),
-    "scene: robots: 'rob1' is none; give each as Robot": lambda: seqopt.Scene(
+    "scene: robots: give each as Robot(...), not 'rob1'": lambda: seqopt.Scene(
         **{k: v for k, v in vars(SCENE).items() if k in SCENE.__dataclass_fields__}
         | {"robots": ["rob1"]}
     ),

@@ -112,7 +112,7 @@ def require_loop(options: argparse.Namespace) -> None:
         known = ", ".join(formulation_names())
         meant = (*SCHEDULES, FREE)
         if options.schedule not in meant and (hint := did_you_mean(options.schedule, meant)):
-            raise ProblemError(f"--schedule {options.schedule}: there is no such{hint}")
+            raise ProblemError(f"--schedule {options.schedule} does not exist{hint}")
         raise ProblemError(f"--formulation: it is missing; give one of {known}")
 
 
@@ -120,7 +120,7 @@ def _require_free(options: argparse.Namespace) -> None:
     """Raise an error if options that the free schedule does not have are given with it."""
     unknown = ("budget", "candidates", "cache", "ranked", "among")
     given = [name for name in unknown if getattr(options, name)]
-    given += ["workers"] if options.workers != "1" else []
+    given += ["workers"] if options.workers != "1" and options.order != SEARCH else []
     if given:
         raise ProblemError(
             f"--{given[0].replace('_', '-')}: the free schedule has no such; leave it out"

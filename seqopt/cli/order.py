@@ -10,6 +10,7 @@ from seqopt.cli.asked import scene_file
 from seqopt.cli.facts import scene_facts
 from seqopt.cli.free_files import free_files
 from seqopt.cli.layout import wrapped
+from seqopt.cli.means import parse_resources
 from seqopt.cli.outputs import write_outputs
 from seqopt.cli.status import Status
 from seqopt.cli.values import parse_numbers, parse_time_limit
@@ -58,6 +59,7 @@ def optimize_order(options: argparse.Namespace, free: FreeProblem) -> Answer:
         formulation,
         proof=not options.no_proof,
         progress=within(options.tell, limit),
+        resources=parse_resources(options),
         **{"seconds": limit, **whole},
     )
     options.tell("writing the plan")

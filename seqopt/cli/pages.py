@@ -13,7 +13,7 @@ from seqopt.files import csv_text
 from seqopt.report.comparison import LARGEST, Comparison, largest
 from seqopt.report.methods import method_tables
 from seqopt.report.page import report_page
-from seqopt.report.page_data import Build
+from seqopt.report.page_data import Build, Scatter
 from seqopt.responses.table import analyze
 from seqopt.scene.scene import Scene
 from seqopt.sequence.plan_file import parse_plan, read_plan
@@ -25,6 +25,7 @@ WORDS = {
     "T_max": "tension, N",
     "D_max": "displacement, 1e-3 mm",
 }  # as of seqopt.report.comparison.LARGEST
+FORCES = {"F_largest": "F_rob"}  # another name for the same
 PLANS = ("plan.csv", "pick.csv", "steps_*.csv")  # of optimize, pareto and compare
 SMALL = 60  # bricks up to which a plan is shown beside the fixed methods
 
@@ -63,9 +64,10 @@ def plan_page(
     worst = ", ".join(
         f"{word.split(',')[0]} {values[key]:.4g} {LARGEST[key]}" for key, word in WORDS.items()
     )
-    robots = sum(table[f"{robot.name}_node"].notna().any() for robot in scene.robots)
+    robots = int(sum(table[f"{robot.name}_node"].notna().any() for robot in scene.robots))
+    who = "1 robot builds" if robots == 1 else f"{robots} robots build"
     sentence = (
-        f"{robots} robots build {scene.name} in {len(table)} steps ({name}: {said}). "
+        f"{who} {scene.name} in {len(table)} steps ({name}: {said}). "
         f"The largest of any step: {worst}."
     )
     return report_page(engine, builds, sentence, [("Largest responses", _worst(scene, tables))])
@@ -94,7 +96,7 @@ def comparison_page(engine: Engine, result: Comparison) -> str:
         printed = result.printed.add_suffix(", printed").rename_axis("largest").reset_index()
         tables.append(("What the paper prints", printed))
     sentence = f"{len(builds)} ways to build {scene.name}, step by step and side by side."
-    return report_page(engine, builds, sentence, tables)
+    return report_page(engine, builds, sentence, tables, _speed_and_accuracy(result))
 
 
 def folder_page(engine: Engine, folder: Path) -> str:
@@ -146,12 +148,32 @@ def front_page(engine: Engine, table: pd.DataFrame, plans: Sequence[pd.DataFrame
     scene = engine.network.scene
     names = [f"point {number}" for number in range(1, len(plans) + 1)]
     builds = [_build(scene, name, plan) for name, plan in zip(names, plans, strict=True)]
-    shown = table.copy()
-    shown.insert(0, "plan", names)
+    points = _in_words(table).set_axis(names)
+    shown = points.rename_axis("plan").reset_index()
     sentence = (
         f"{len(plans)} plans for {scene.name}, none of which is better than another in everything."
     )
-    return report_page(engine, builds, sentence, [("The Pareto set; a click shows a plan", shown)])
+    scatter = Scatter("The Pareto set: every point is a plan; a click shows it", points)
+    shows = [("The Pareto set; a click shows a plan", shown)]
+    return report_page(engine, builds, sentence, shows, scatter)
+
+
+def _speed_and_accuracy(result: Comparison) -> Scatter | None:
+    """Return how long each formulation took and how far from the best its choice is."""
+    found = result.table.loc[result.table["gap"].notna(), ["seconds", "gap"]]
+    if found.empty:
+        return None
+    axes = ("seconds to choose, responses being known", "above the best, %")
+    points = found.assign(gap=100 * found["gap"]).set_axis(axes, axis=1)
+    return Scatter("Speed against accuracy: a click shows the plan", points, axes[:1])
+
+
+def _in_words(table: pd.DataFrame) -> pd.DataFrame:
+    """Return the points of a Pareto set with columns in words, displacements in 1e-3 mm."""
+    words = {name: WORDS.get(FORCES.get(name, name), name) for name in map(str, table)}
+    lengths = [name for name in words.values() if name.endswith("1e-3 mm")]
+    shown = table.rename(columns=words)
+    return shown.assign(**{name: 1e6 * shown[name] for name in lengths})
 
 
 def _build(scene: Scene, name: str, table: pd.DataFrame, stands: Sequence[str] = ()) -> Build:

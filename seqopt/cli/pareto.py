@@ -220,7 +220,7 @@ def _under(texts: Sequence[str], methods: Mapping[str, pd.DataFrame]) -> dict[st
     for text in texts:
         if "=" not in text and text not in methods:
             known = ", ".join(methods)
-            why = f"there is no such method{did_you_mean(text, methods)}"
+            why = f"no such method{did_you_mean(text, methods)}"
             raise ProblemError(f"--under {text}: {why}; give {known}, or a bound as F_largest=250")
         bounds = worst_of(methods[text]) if text in methods else parse_numbers("--under", [text])
         for name, value in bounds.items():

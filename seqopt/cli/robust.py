@@ -143,7 +143,7 @@ def _drawn(scene: Scene, options: argparse.Namespace, count: int, seed: int) -> 
         name, value = split_word(text)
         if name not in SPREADS:
             raise ProblemError(
-                f"--vary {text}: there is no such{did_you_mean(name, SPREADS)}; give one of "
+                f"--vary {text} does not exist{did_you_mean(name, SPREADS)}; give one of "
                 f"{', '.join(SPREADS)}, as stiffness=3"
             )
         asked[name] = number_word(value, f"--vary {text}", zero="allowed")

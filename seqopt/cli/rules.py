@@ -70,8 +70,8 @@ def parse_rules(texts: Sequence[str], robots: tuple[str, ...]) -> FreeRules:
     for text in texts:
         name, _, value = text.partition("=")
         if name not in RULES:
-            why = f"there is no such{did_you_mean(name, RULES)}; give one of {', '.join(RULES)}"
-            raise StepError(f"--rule {text}: {why}")
+            why = f"does not exist{did_you_mean(name, RULES)}; give one of {', '.join(RULES)}"
+            raise StepError(f"--rule {text} {why}")
         if name in COUNTS:
             given[name] = int(value) if value.isdecimal() else value
             if name == "regrips" and value == "any":

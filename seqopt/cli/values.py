@@ -115,8 +115,8 @@ def parse_numbers(
     for text in texts:
         name, value = split_word(text)
         if known is not None and name not in known:
-            why = f"there is no such{did_you_mean(name, known)}; give one of {', '.join(known)}"
-            raise ProblemError(f"{where} {text}: {why}")
+            why = f"does not exist{did_you_mean(name, known)}; give one of {', '.join(known)}"
+            raise ProblemError(f"{where} {text} {why}")
         out[name] = number_word(value, f"{where} {text}")
     return out
 
@@ -226,7 +226,7 @@ def response_word(name: str, where: str) -> str:
         names = (*CRITERIA, *RESPONSES) if where == "--criteria" else ("payload", *CHOICE_RESPONSES)
         known = ", ".join((*names, "F_ROBOT"))
         hint = did_you_mean(name, names)
-        raise ProblemError(f"{where} {name}: there is no such{hint}; give {known}")
+        raise ProblemError(f"{where} {name} does not exist{hint}; give {known}")
     return name
 
 

@@ -1,4 +1,4 @@
-"""Rigid blocks that touch: what equilibrium with contact needs to know, and no more."""
+"""Rigid blocks that touch: the data needed for equilibrium with contact."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ class Assembly(FrozenValue):
 
     @cached_property
     def corner_area(self) -> Floats:
-        """Share of its face that each corner stands for, (K,) m².
+        """Area of the face that each corner represents, (K,) m².
 
         Half of the two triangles between the face's centroid and the edges that meet in the
         corner: one more corner on an edge or on a corner changes no sum.

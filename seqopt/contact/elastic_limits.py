@@ -1,8 +1,8 @@
-"""Elastic limits: whether what joints carry stays below what their mortar holds.
+"""Elastic limits: whether the stress in joints stays below the strength of their mortar.
 
-Stress over a face is what the wrench of its joint spreads linearly: force over area, moment over
-second moment. It is largest at the corners, so the corners are asked, tension against the tensile
-strength and shear against cohesion and friction.
+The wrench (force and moment) of a joint is distributed linearly over its face: force over area,
+moment over second moment. The stress is largest at the corners, so it is checked there: tension
+against the tensile strength, and shear against cohesion and friction.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ STRESS_MARGIN = 1e-6  # stress above a limit that counts as none, over the stres
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ElasticLimits(FrozenValue):
-    """The faces of a whole structure and what their mortar holds; joints in the network's order.
+    """The faces of a structure and the strength of their mortar; joints in the network's order.
 
     Attributes
     ----------
@@ -84,7 +84,8 @@ class ElasticLimits(FrozenValue):
 
     def _bound(self, wrench: Floats) -> float:
         """Return what no wrench (S, J, 6) exceeds its limits by, Pa, from the largest of each."""
-        largest = np.abs(wrench).max(axis=0, initial=0.0)[self.assembly.contact]
+        most, least = wrench.max(axis=0, initial=0.0), wrench.min(axis=0, initial=0.0)
+        largest = np.maximum(most, -least)[self.assembly.contact]
         stress = (np.abs(self.stress) @ largest[:, :, None])[:, :, 0]
         shear = np.linalg.norm(stress[:, 1:], axis=1) + self.mortar.friction * stress[:, 0]
         tension = stress[:, 0] - self.mortar.tensile_strength

@@ -114,7 +114,8 @@ def _require_boxes(name: str, between: list[Brick]) -> None:
     for brick in between:
         if brick.shape is not None:
             raise SceneError(
-                f"joint {name}: brick {brick.name} is no box and the joint has no face; give it one"
+                f"joint {name}: brick {brick.name} is not a box and the joint has no "
+                "face; give it one"
             )
 
 

@@ -1,4 +1,4 @@
-"""The space between two bricks that a joint takes up: whether its bricks can touch there at all.
+"""The space between two bricks that a joint fills, and whether the bricks can touch there.
 
 Faces are projected onto the plane of their joint before their overlap is taken, so that bricks
 meters apart, or one inside the other, would have a contact like any others. What lies between the

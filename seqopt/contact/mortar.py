@@ -1,4 +1,4 @@
-"""What holds a joint beside compression: mortars by name."""
+"""Mortars by name: what a joint carries besides compression."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from seqopt.errors import SceneError, did_you_mean
 
 @dataclass(frozen=True, kw_only=True)
 class Mortar:
-    """What a contact can carry beside compression: Mohr-Coulomb with a tension cut-off.
+    """What a contact can carry besides compression: Mohr-Coulomb with a tension cut-off.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ MORTARS = {"epoxy": EPOXY, "dry": DRY}
 
 
 def bond_mortar(strength: float, friction: float = FRICTION) -> Mortar:
-    """Return the mortar of a bond that carries so much tension and, at once, so much shear.
+    """Return the mortar of a bond with the same strength in tension and in shear.
 
     Parameters
     ----------

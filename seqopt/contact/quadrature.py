@@ -1,4 +1,4 @@
-"""Faces as beds of points, and what a joint's wrench presses on them."""
+"""Faces as beds of points, and how the wrench of a joint acts on them."""
 
 from __future__ import annotations
 

@@ -1,8 +1,9 @@
-"""The engine that models no more than a scene needs, and says why it needs that much.
+"""The engine that chooses the simplest sufficient model for each grip set, and says why.
 
-Of three levels the cheapest whose condition a grip set meets: planar, where everything lies in one
-plane; exactly rigid bricks, where joints stay within their elastic limits; discrete elements
-beyond. The first two answer what the next would answer, to rounding; that is why they may.
+There are three levels, and the cheapest whose condition a grip set meets is used: planar, if
+everything lies in one plane; exactly rigid bricks, if joints stay within their elastic limits; and
+discrete elements otherwise. Where their condition holds, the first two give the same answer as the
+next level, to rounding.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ from seqopt.scene.scene import Scene
 
 
 class Level(Enum):
-    """How much of a structure is modeled, cheapest first; values are the engines' names."""
+    """Levels of detail of a model, cheapest first; values are the engines' names."""
 
     PLANAR = "planar"
     RIGID = "compliance"
@@ -63,7 +64,7 @@ BEYOND = LevelChoice(Level.DISCRETE, "a joint would leave its elastic limits")
 
 
 class AutoEngine:
-    """Answers every grip set at the cheapest level whose condition it meets.
+    """Computes every grip set at the cheapest level whose condition it meets.
 
     Parameters
     ----------

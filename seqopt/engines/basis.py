@@ -1,4 +1,4 @@
-"""The directions in which a structure is loaded and moves: all of space, or those of a plane."""
+"""The directions in which a structure is loaded and moves: in space, or in a plane."""
 
 from __future__ import annotations
 

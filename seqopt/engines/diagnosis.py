@@ -38,7 +38,7 @@ class Finding(Enum):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Diagnosis(FrozenValue):
-    """What can be said about one grip set on one partial structure.
+    """The diagnosis of one grip set on one partial structure.
 
     Attributes
     ----------
@@ -69,7 +69,7 @@ class Diagnosis(FrozenValue):
 
 
 def diagnose(source: Engine | Network, bricks: int, grips: ArrayLike) -> Diagnosis:
-    """Return what can be said about one grip set.
+    """Return whether one grip set is solved well, ill-conditioned or a mechanism.
 
     Parameters
     ----------
@@ -116,7 +116,10 @@ def _judge(
     refusal: MechanismError | SolverError | None,
 ) -> tuple[Finding, str]:
     if not lowest:
-        return Finding.MECHANISM, "joints, ground and grips leave the mode free: nothing resists it"
+        return (
+            Finding.MECHANISM,
+            "neither joints nor ground nor grips resist the motion",
+        )
     if residuals is None:
         return Finding.ILL_CONDITIONED, f"condition {condition:.1e}; the engine refused: {refusal}"
     error = residuals.backward_error
@@ -124,4 +127,4 @@ def _judge(
         text = f"backward error {error:.1e}, at most {WELL:g}, at a condition of {condition:.1e}"
         return Finding.SOLVED_WELL, text
     text = f"backward error {error:.1e}, above {WELL:g}, at a condition of {condition:.1e}"
-    return Finding.ILL_CONDITIONED, f"{text}: these fields solve another problem than was asked"
+    return Finding.ILL_CONDITIONED, f"{text}: the fields do not solve the equations"

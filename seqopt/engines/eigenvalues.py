@@ -1,4 +1,4 @@
-"""The smallest eigenvalue of a held structure's stiffness: whether it resists every motion."""
+"""The smallest eigenvalue of a held structure's stiffness: whether it can move freely."""
 
 from __future__ import annotations
 
@@ -7,12 +7,8 @@ from scipy import sparse
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from seqopt.arrays import Floats, Ints
-from seqopt.engines.rigid.mixed_system import (
-    MixedSystem,
-    factorize,
-    mixed_system,
-    ungripped_system,
-)
+from seqopt.engines.rigid.mixed_system import MixedSystem, factorize, mixed_system
+from seqopt.engines.rigid.ungripped import ungripped_system
 from seqopt.network.network import Network
 
 UNRESISTED = 1e-17  # a scaled eigenvalue below this is found by a shift

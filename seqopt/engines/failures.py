@@ -1,4 +1,4 @@
-"""What a numerical library raises where numbers run beyond all bounds, as an error of seqopt."""
+"""Errors of numerical libraries, such as overflow, turned into errors of seqopt."""
 
 from __future__ import annotations
 

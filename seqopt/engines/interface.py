@@ -1,4 +1,4 @@
-"""What an engine is asked and what it answers."""
+"""The interface of engines: what they are asked and what they return."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from seqopt.network.network import Network
 
 
 class Want(Flag):
-    """Which fields are evaluated; grip forces always are."""
+    """Which fields are computed; grip forces always are."""
 
     EDGES = auto()
     DISPLACEMENTS = auto()
@@ -62,7 +62,7 @@ class Fields(FrozenValue):
 
 
 class Engine(Protocol):
-    """Solves partial structures of one scene: linear, from scratch, all weight at once.
+    """Solves partial structures of one scene: linear, each from scratch, with all weight at once.
 
     Examples
     --------
@@ -266,7 +266,7 @@ def grip_columns(network: Network, bricks: int, grips: ArrayLike) -> Ints:
     Raises
     ------
     GripError
-        If there are not so many bricks, the shape is another, or a set names an unknown, blocked,
+        If there are fewer bricks, the shape is another, or a set names an unknown, blocked,
         unplaced or repeated node.
     """
     total = len(network.inner)

@@ -1,8 +1,8 @@
 """The planar engine: three unknowns per brick, for structures held and loaded in their own plane.
 
-Where bricks, springs and gravity lie in one plane and every grip holds a node in it, nothing turns
-or moves out of it, and forces across it are zero: half of the unknowns go. That is exact, not an
-approximation; what is lost is that motions out of the plane are not asked about.
+If bricks, springs and gravity lie in one plane and every grip holds a node in it, nothing moves or
+turns out of the plane, and forces across it are zero. Half of the unknowns are then not needed.
+This is exact, not an approximation. Motions out of the plane are not considered.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ ELSE = "use the compliance engine"
 
 
 class PlanarEngine:
-    """Answers any batch of grip sets on any partial structure of a planar scene.
+    """Computes any batch of grip sets on any partial structure of a planar scene.
 
     Parameters
     ----------

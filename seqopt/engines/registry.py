@@ -60,14 +60,14 @@ def make_engine(name: str, network: Network | Scene, mortar: Mortar | str | None
     (1, 1, 3)
     """
     if name not in ENGINES:
-        raise SceneError(f"engine {name}: there is none; known are {', '.join(ENGINES)}")
+        raise SceneError(f"engine {name} does not exist; known are {', '.join(ENGINES)}")
     network = network_of(network)
     if mortar is None:
         return _known_by(ENGINES[name](network), Recipe(name, network.scene))
     if name not in LIMITED:
         raise SceneError(
-            f"engine {name}: its joints hold anything, so that a mortar changes nothing; "
-            f"take the engine {' or '.join(LIMITED)}"
+            f"engine {name}: its joints never fail, so a mortar changes nothing; "
+            f"use the engine {' or '.join(LIMITED)}"
         )
     mortar = find_mortar(mortar)
     return _known_by(

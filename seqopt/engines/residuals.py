@@ -1,4 +1,4 @@
-"""What is left of the equations of equilibrium when an engine's fields are put in.
+"""Residuals of the equations of equilibrium for the fields of an engine.
 
 Deformations, wrenches and balances are written out here once more, on purpose: a check that used
 the maps of `seqopt.network.kinematics` would share their errors.

@@ -1,4 +1,4 @@
-"""One thread for linear algebra on small matrices: more only wait for each other."""
+"""One thread for linear algebra on small matrices, because more threads wait for each other."""
 
 from __future__ import annotations
 

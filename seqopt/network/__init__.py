@@ -6,12 +6,12 @@
 >>> network
 <Network arch25: 25 bricks, 26 springs, 78 nodes, 77 edges>
 
-What a partial structure has comes first in every array, so a brick count says it all:
+The parts of a partial structure come first in every array, so its brick count is enough:
 
 >>> network.count_nodes(3), network.count_edges(3), network.springs.acting(3)
 (11, 10, array([0, 1, 2]))
 
-Maps say how its nodes follow the bricks, and what its edges carry of the springs' forces:
+Linear maps give the motion of nodes from that of bricks, and edge forces from spring forces:
 
 >>> from seqopt.network import build_statics, node_motion
 >>> node_motion(network, 3).shape, build_statics(network).edge_of_spring.shape

@@ -112,13 +112,13 @@ def network_of(given: Network | Scene) -> Network:
     if isinstance(given, Network | Scene):
         return given if isinstance(given, Network) else build_network(given)
     kind = type(given).__name__
-    raise SceneError(f"a {kind} is no network; give build_network(scene), or the scene itself")
+    raise SceneError(f"a {kind} is not a network; give build_network(scene), or the scene itself")
 
 
 def _checked(scene: Scene) -> Scene:
     if not isinstance(scene, Scene):
         kind = type(scene).__name__
-        raise SceneError(f"a {kind} is no scene; give one, as load_scene('arch25') returns it")
+        raise SceneError(f"a {kind} is not a scene; give one, as load_scene('arch25') returns it")
     return scene
 
 

@@ -1,4 +1,4 @@
-"""The double-cross network: nodes and edges, and the brick count that brings each.
+"""The double-cross network: nodes and edges, and with which brick each appears.
 
 Every brick has an inner edge between its two inner nodes. Every joint splits the connection of
 two bricks into two half-edges that meet in a joint node; a half-edge whose other brick is not

@@ -1,4 +1,4 @@
-"""Equilibrium of the network: what edges and supports carry, given spring and node forces."""
+"""Equilibrium of the network: forces of edges and supports, from spring and node forces."""
 
 from __future__ import annotations
 

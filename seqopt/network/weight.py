@@ -8,7 +8,7 @@ from seqopt.arrays import Floats
 from seqopt.errors import SceneError
 from seqopt.scene.parts import Brick
 
-OFF_PLANE = 1e-9  # lever of a weight about the line of its nodes that is none, over the brick
+OFF_PLANE = 1e-9  # lever of a weight about the line of its nodes treated as zero, over the brick
 
 
 def shared_weight(brick: Brick, weight: Floats) -> Floats:

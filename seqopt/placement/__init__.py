@@ -2,7 +2,7 @@
 
 A problem says what a step costs (a criterion), which values are allowed (limits) and which choices
 there are (a schedule). A formulation solves it. The plan that comes back carries a certificate: its
-value and a lower bound, both computed anew from the problem's data.
+value and a lower bound, both computed again from the problem's data.
 
 >>> from seqopt.engines.registry import make_engine
 >>> from seqopt.network.build import build_network

@@ -1,4 +1,4 @@
-"""Budgets: totals over the build that couple all moves and break the structure of a path."""
+"""Budgets: bounds on totals over the build. They couple all moves."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from seqopt.sequence.schedule import OpenGrip
 
 
 def steps_over(problem: Problem, response: str, level: float, bound: float) -> Budget:
-    """Return a cap on the number of open steps in which a response exceeds a level.
+    """Return a bound on the number of open steps in which a response exceeds a level.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ def steps_over(problem: Problem, response: str, level: float, bound: float) -> B
 
 
 def robot_use(problem: Problem, robot: str, force: float, bound: float) -> Budget:
-    """Return a cap on how often a robot is used: open steps in which it carries more than a force.
+    """Return a bound on the number of open steps in which a robot carries more than a force.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ def robot_use(problem: Problem, robot: str, force: float, bound: float) -> Budge
 
 
 def travel(problem: Problem, bound: float) -> Budget:
-    """Return a cap on the way that robots go to chosen grips and on to their next ones.
+    """Return a bound on the distance that robots travel to chosen grips and on to their next ones.
 
     Parameters
     ----------

@@ -26,15 +26,15 @@ TOLERANCE = 1e-6  # of the costs that a choice meets: how far a claim may be fro
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Certificate(FrozenValue):
-    """What a selection is worth, checked from the problem's data alone.
+    """The value of a selection and a bound on all others, from the problem's data alone.
 
     Attributes
     ----------
     objective : float
         The value of the selection, recomputed; in the unit of the criterion.
     bound : float
-        The least value of any choice, found anew from the data; with budgets a bound on the value
-        of any choice within them, by prices and partial choices of the certificate's own.
+        The least value of any choice, computed again from the data; with budgets a bound on the
+        value of any choice within them, by prices and partial choices of the certificate's own.
     gap : float
         Objective less bound, over the size of the costs that the choice meets, signs aside: their
         sum, or the largest for a peak. It has no unit.
@@ -68,7 +68,7 @@ def certify(problem: PlacementProblem, selection: Selection, aim: Aim) -> Certif
     selection : Selection
         What a formulation claims.
     aim : Aim
-        Whether the sum or the peak of the costs was to be least.
+        Whether the sum or the peak of the costs was minimized.
 
     Returns
     -------
@@ -97,8 +97,8 @@ def certify(problem: PlacementProblem, selection: Selection, aim: Aim) -> Certif
     bound = least(costs, aim)
     if value < bound - TOLERANCE * scale:
         raise SolverError(
-            f"the least value found anew, {bound:.9g}, lies above that of the choice, {value:.9g}: "
-            "the costs changed while they were judged"
+            f"the least value computed again, {bound:.9g}, lies above that of the choice, "
+            f"{value:.9g}: the costs changed while they were judged"
         )
     highest = value if problem.budgets else bound
     if not selection.bound <= highest + TOLERANCE * scale:  # NaN is no bound
@@ -119,7 +119,7 @@ def certify_partial(costs: PartialCosts, selection: Selection, objective: float)
     selection : Selection
         What is claimed.
     objective : float
-        What the steps that the selection meets cost, solved anew.
+        The costs of the steps that the selection meets, solved again.
 
     Returns
     -------
@@ -142,13 +142,13 @@ def certify_partial(costs: PartialCosts, selection: Selection, objective: float)
     gap = (objective - bound) / scale
     if selection.end is End.DONE and gap > TOLERANCE:
         raise SolverError(
-            f"the choice is worth {objective:.9g}, and no more than {bound:.9g} is proven"
+            f"the value of the choice is {objective:.9g}, and no more than {bound:.9g} is proven"
         )
     return Certificate(objective, bound, gap, gap, {})
 
 
 def _value(costs: LayeredCosts, choice: tuple[int, ...], aim: Aim) -> float:
-    """Return what a choice is worth, or raise a `SolverError` if it is none."""
+    """Return the value of a choice, or raise a `SolverError` if it is not a valid choice."""
     sizes = costs.sizes
     if len(choice) != len(sizes):
         raise SolverError(f"the answer names {len(choice)} candidates for {len(sizes)} moves")
@@ -162,7 +162,7 @@ def _value(costs: LayeredCosts, choice: tuple[int, ...], aim: Aim) -> float:
 
 
 def least(costs: LayeredCosts, aim: Aim) -> float:
-    """Return the least that any choice is worth, budgets aside.
+    """Return the least value of any choice, ignoring budgets.
 
     Parameters
     ----------
@@ -232,7 +232,7 @@ def _connected(costs: LayeredCosts, level: float) -> bool:
 def judge(
     problem: PlacementProblem, selection: Selection, formulation: Formulation | str
 ) -> Certificate:
-    """Certify a selection, and hold its formulation to what it promises.
+    """Certify a selection, and check what its formulation promises.
 
     Parameters
     ----------
@@ -260,6 +260,6 @@ def judge(
     if exact and certificate.gap > TOLERANCE:
         raise SolverError(
             f"{formulation.name} promises the optimum {certificate.bound:.9g}, "
-            f"but its choice is worth {certificate.objective:.9g}"
+            f"but the value of its choice is {certificate.objective:.9g}"
         )
     return certificate

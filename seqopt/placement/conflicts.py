@@ -1,4 +1,4 @@
-"""Budgets that cannot be kept together: the smallest set of them, and what to say."""
+"""The smallest set of budgets that no choice can keep together, and the message about it."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def refusal(problem: PlacementProblem) -> InfeasibleError:
     if len(found) == 1:
         least = least_spent(problem.sums, found[0])
         return InfeasibleError(
-            f"no choice is within all budgets: any takes at least {least:.6g} of "
+            f"no choice is within all budgets: every choice uses at least {least:.6g} of "
             f"{found[0].name!r}, more than {found[0].bound:.6g}; raise that bound"
         )
     return InfeasibleError(

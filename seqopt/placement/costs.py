@@ -1,4 +1,4 @@
-"""Costs and budgets of choices, as arrays, whatever the choices stand for."""
+"""Costs and budgets of choices, as arrays, independent of what the choices mean."""
 
 from __future__ import annotations
 
@@ -171,7 +171,7 @@ def _values(costs: Floats) -> Floats:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Budget(FrozenValue):
-    """A cap on a total over the build.
+    """A bound on a total over the build.
 
     Parameters
     ----------

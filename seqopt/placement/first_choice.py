@@ -22,7 +22,7 @@ def stopped(
     ----------
     problem : PlacementProblem
     aim : Aim
-        What is to be least.
+        What to minimize.
     bound : float, optional
         A better one that is known.
     why : str, optional
@@ -48,7 +48,7 @@ def stopped(
             return Selection(choice, value, max(bound, at_least(costs, aim)), end=End.STOPPED)
     known = f" (no choice is below {bound:.6g})" if np.isfinite(bound) else ""
     raise SolverError(
-        f"{why or f'it ended{known}'} before any choice within all budgets was met; "
+        f"{why or f'it ended{known}'} before any choice within all budgets was found; "
         "give it more time"
     )
 

@@ -1,4 +1,4 @@
-"""Whether a problem, a formulation and its options go together."""
+"""Whether a problem, a formulation and its options fit together."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from seqopt.scene.checks import short
 def require_fit(
     problem: PlacementProblem, formulation: Formulation | str, options: Mapping[str, object]
 ) -> None:
-    """Raise an error unless a formulation is for such a problem and has such options.
+    """Raise an error unless a formulation can solve a problem and has the given options.
 
     Parameters
     ----------

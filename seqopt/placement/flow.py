@@ -200,7 +200,7 @@ def within_each(problem: PlacementProblem) -> bool:
         sizes = sum(float(np.abs(a).max()) for a in (*budget.single, *budget.shared))
         if least > budget.bound + TOLERANCE * sizes:
             raise InfeasibleError(
-                f"no choice is within all budgets: any takes at least {least:.6g} of "
+                f"no choice is within all budgets: every choice uses at least {least:.6g} of "
                 f"{budget.name!r}, more than {budget.bound:.6g}; raise that bound"
             )
         known = known and len(problem.budgets) == 1 and least <= budget.bound

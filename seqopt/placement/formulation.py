@@ -1,4 +1,4 @@
-"""Formulations: what solves a placement problem, and what it returns."""
+"""Formulations: ways to solve a placement problem, and what they return."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoint
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from seqopt.arrays import FrozenValue
 from seqopt.errors import ProblemError, did_you_mean
 from seqopt.placement.interface import Aim
 from seqopt.placement.watch import Finding
+from seqopt.plugins import plugins
 
 GROUP = "seqopt.formulations"
 EXHIBITS = "seqopt.exhibits"
@@ -45,7 +46,7 @@ class End(Enum):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Selection(FrozenValue):
-    """A candidate per move, and what its formulation claims of it.
+    """A candidate per move, and what the formulation claims about it.
 
     Attributes
     ----------
@@ -142,7 +143,7 @@ def formulation_names() -> tuple[str, ...]:
     tuple of str
         In alphabetical order.
     """
-    return tuple(sorted(entry.name for entry in entry_points(group=GROUP)))
+    return tuple(sorted(plugins(GROUP)))
 
 
 def formulations() -> dict[str, Formulation]:
@@ -159,8 +160,7 @@ def formulations() -> dict[str, Formulation]:
     >>> [name for name, f in seqopt.formulations().items() if f.takes_budgets]
     ['labels', 'lagrangian', 'overlap_lp', 'overlap_mip']
     """
-    found = {entry.name: _load(entry) for entry in entry_points(group=GROUP)}
-    return dict(sorted(found.items()))
+    return {name: _load(entry) for name, entry in sorted(plugins(GROUP).items())}
 
 
 def exhibits() -> dict[str, Formulation]:
@@ -174,8 +174,7 @@ def exhibits() -> dict[str, Formulation]:
     dict of str to Formulation
         By name, in alphabetical order.
     """
-    found = {entry.name: _load(entry) for entry in entry_points(group=EXHIBITS)}
-    return dict(sorted(found.items()))
+    return {name: _load(entry) for name, entry in sorted(plugins(EXHIBITS).items())}
 
 
 def _load(entry: EntryPoint) -> Formulation:
@@ -184,7 +183,7 @@ def _load(entry: EntryPoint) -> Formulation:
     except Exception as error:  # whatever a package of others may raise
         raise ProblemError(
             f"formulation {entry.name!r}: {entry.value} cannot be loaded: {said(error)}; "
-            "install it anew or remove it"
+            "reinstall it or remove it"
         ) from error
     if not isinstance(found, Formulation):
         raise ProblemError(
@@ -211,12 +210,12 @@ def find_formulation(name: str) -> Formulation:
     ProblemError
         If there is none of that name; the message lists those there are.
     """
-    found = [e for group in (GROUP, EXHIBITS) for e in entry_points(group=group) if e.name == name]
-    if not found:
+    found = plugins(EXHIBITS) | plugins(GROUP)
+    if name not in found:
         known = ", ".join(formulation_names())
         hint = did_you_mean(name, formulation_names())
-        raise ProblemError(f"formulation {name!r}: there is no such{hint}; give one of {known}")
-    return _load(found[0])
+        raise ProblemError(f"formulation {name!r} does not exist{hint}; give one of {known}")
+    return _load(found[name])
 
 
 def as_formulation(given: Formulation | str) -> Formulation:
@@ -240,11 +239,11 @@ def as_formulation(given: Formulation | str) -> Formulation:
     if isinstance(given, str):
         return find_formulation(given)
     known = ", ".join(formulation_names())
-    raise ProblemError(f"a {type(given).__name__} is no formulation; give one of {known}")
+    raise ProblemError(f"a {type(given).__name__} is not a formulation; give one of {known}")
 
 
 def said(error: Exception) -> str:
-    """Return what an error of others says, in a line.
+    """Return the message of an error in one line.
 
     Parameters
     ----------

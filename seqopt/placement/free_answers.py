@@ -37,7 +37,7 @@ class Answers(NamedTuple):
 
 
 def ask(problem: FreeProblem, bricks: int, grips: Ints) -> Answers:
-    """Return what is known of grip sets, asked of the engine anew.
+    """Return what is known about grip sets, computed again by the engine.
 
     Parameters
     ----------

@@ -203,7 +203,7 @@ class FreeFront:
         ----------
         steps : sequence of Step
         claimed : (k,) float
-            What margins of stability are held against.
+            The values with which margins of stability are compared.
 
         Returns
         -------

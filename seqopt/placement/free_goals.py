@@ -1,4 +1,4 @@
-"""Goals of a free schedule: what is to be least over a build, and their names."""
+"""Goals of a free schedule: the quantities to minimize over a build, and their names."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Measure(Enum):
 
 @dataclass(frozen=True)
 class Goal:
-    """What a free schedule makes least.
+    """A quantity that a free schedule minimizes.
 
     Parameters
     ----------
@@ -103,8 +103,8 @@ def parse_goals(text: str) -> tuple[Goal, ...]:
     words = [word.strip() for word in text.split(",")] if isinstance(text, str) else [text]
     for word in words:
         if word not in known:
-            why = f"there is no such{did_you_mean(word, known)}; give {', '.join(known)}"
-            raise ProblemError(f"aim {short(word)}: {why}")
+            why = f"does not exist{did_you_mean(word, known)}; give {', '.join(known)}"
+            raise ProblemError(f"aim {short(word)} {why}")
         if words.count(word) > 1:
-            raise ProblemError(f"aim {word}: it stands there twice; name it once")
+            raise ProblemError(f"aim {word}: it is listed twice; name it once")
     return tuple(known[word] for word in words)

@@ -1,4 +1,4 @@
-"""Why a free schedule is impossible: the brick at which it stops, and what would open a way."""
+"""Why a free schedule is impossible: the brick at which it stops, and what would help."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from seqopt.placement.free_problem import FreeProblem
 from seqopt.sequence.free_rules import FreeRules, Payload
 
 STEPS = (Goal(Measure.STEPS),)
-STANDING = "no demand to stand"
+STANDING = "no requirement to stand"
 
 
 def why_impossible(problem: FreeProblem) -> str:
@@ -46,7 +46,7 @@ def why_impossible(problem: FreeProblem) -> str:
             "add a robot"
         )
     ways = [_enough(problem, way) for way in ways]
-    return f"free schedule: {where}; a way opens with {' or '.join(ways)}"
+    return f"free schedule: {where}; it becomes possible with {' or '.join(ways)}"
 
 
 def _opening(problem: FreeProblem) -> Iterator[str]:
@@ -92,7 +92,7 @@ def _enough(problem: FreeProblem, way: str) -> str:
         return f"no limit on {way}" if found else way
     rest = tuple(limit for limit in problem.limits if limit.response != way)
     least = worst_least(replace(problem, limits=rest), way)
-    return f"{way}={least:.6g} in the place of {found[0].bound:g}"
+    return f"{way}={least:.6g} instead of {found[0].bound:g}"
 
 
 def worst_least(problem: FreeProblem, response: str) -> float:

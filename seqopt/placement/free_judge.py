@@ -2,7 +2,7 @@
 
 The plan's own values come from the responses of its steps, one after the other. For every goal all
 plans are then sought that keep the goals before it at their values and take less of this one: state
-by state, by the rules in plain words, with responses asked of the engine anew. None must reach an
+by state, by a second version of the rules, with responses computed again. None must reach an
 end. This shares nothing with the search that is judged.
 """
 
@@ -32,7 +32,7 @@ TOLERANCE = 1e-6  # over the size of a value: how far a claim may be from what t
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ScheduleCertificate(FrozenValue):
-    """What a free schedule is worth, checked from the problem's data alone.
+    """The values of a free schedule with bounds, checked from the problem's data alone.
 
     Attributes
     ----------
@@ -112,7 +112,7 @@ def plan_values(
     problem : FreeProblem
     steps : sequence of Step
     claimed : sequence of float, optional
-        Of every goal: margins of stability are held against these, and taken from them.
+        The value of every goal; margins of stability are compared with these, and taken from them.
 
     Returns
     -------

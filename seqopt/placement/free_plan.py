@@ -1,4 +1,4 @@
-"""The plan of a free schedule: solved, judged, and what there is to say about it."""
+"""The plan of a free schedule: solved, judged and summarized."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from seqopt.stability.steps import stability_table
 
 @dataclass(frozen=True, repr=False)
 class FreePlan:
-    """A free schedule: every step of the build, and what the whole is worth.
+    """A free schedule: every step of the build, and the values of its goals.
 
     Attributes
     ----------
@@ -39,7 +39,7 @@ class FreePlan:
     selection : ScheduleSelection
         The states, and what the formulation claims of them.
     certificate : ScheduleCertificate or None
-        What they are worth, checked; None where no proof was asked for.
+        Their checked values; None without a proof.
     steps : tuple of Step
         Checked.
     seconds : mapping of str to float
@@ -108,7 +108,7 @@ class FreePlan:
         return stability_table(self.steps, certified(self.problem, self.steps))
 
     def summary(self) -> dict[str, object]:
-        """Return what there is to say about the plan, ready for JSON.
+        """Return the summary of the plan, ready for JSON.
 
         Returns
         -------

@@ -1,4 +1,4 @@
-"""The problem of the free schedule: who does what next, and where, over a whole build."""
+"""The problem of the free schedule: which robot does what next, and where, over a whole build."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from seqopt.stability.assessment import Stability
 
 @dataclass(frozen=True, repr=False)
 class FreeProblem:
-    """The free schedule of a scene: nothing is computed before it is asked for.
+    """The problem of the free schedule of a scene; everything is computed when first needed.
 
     Attributes
     ----------
@@ -41,7 +41,7 @@ class FreeProblem:
     criterion : Criterion
         What a step costs, for the goals that name no response.
     goals : tuple of Goal
-        What is to be least, the most important first.
+        What to minimize, the most important first.
     limits : tuple of Limit
         What no step may exceed.
     standing : Standing or None
@@ -225,7 +225,7 @@ def pose_free(
     criterion : Criterion
         What a step costs; ranks among choices do not go here.
     goals : sequence of Goal or str
-        What is to be least; see `parse_goals`.
+        What to minimize; see `parse_goals`.
     limits : sequence of Limit
         What no step may exceed.
     stands : Standing, Mortar or str, optional
@@ -234,7 +234,7 @@ def pose_free(
     Returns
     -------
     FreeProblem
-        Nothing is computed yet, but for the scales of a criterion that takes them from the scene.
+        Nothing is computed yet, except scales that a criterion takes from the scene.
 
     Raises
     ------

@@ -34,7 +34,7 @@ Move = tuple[State, Label, StepKind, State]
 
 
 class Proof:
-    """Looks for plans that are better than claimed, by plain rules and answers asked anew.
+    """Looks for plans that are better than claimed, by independent rules and new responses.
 
     Parameters
     ----------

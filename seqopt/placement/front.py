@@ -1,4 +1,4 @@
-"""Pareto sets: all plans that no other beats in everything, how to pick one, and their proof."""
+"""Pareto sets: all plans that no other plan beats in everything, their proof, and picking one."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class FrontProblem(Protocol):
         """The numbers that are to be small."""
 
     def best_below(self, bounds: Floats) -> tuple[Floats, object] | None:
-        """Return a plan that none beats among those below bounds.
+        """Return a plan below bounds that no other such plan beats in everything.
 
         Parameters
         ----------
@@ -78,7 +78,7 @@ class FrontProblem(Protocol):
         ----------
         steps : sequence of Step
         claimed : (k,) float
-            What margins of stability are held against.
+            The values with which margins of stability are compared.
 
         Returns
         -------
@@ -170,7 +170,9 @@ def find_front(
     for point, steps in zip(points, plans, strict=True):
         values = problem.values(steps, point)
         if not (np.abs(values - point) <= TOLERANCE * np.abs(point)).all():
-            raise SolverError(f"a plan is worth {values.tolist()}, not {point.tolist()} as claimed")
+            raise SolverError(
+                f"the values of a plan are {values.tolist()}, not {point.tolist()} as claimed"
+            )
     _require_apart(points)
     if not found.stopped:
         _require_complete(problem, points, progress)
@@ -186,7 +188,7 @@ def _require_apart(points: Floats) -> None:
 
 
 def _require_complete(problem: FrontProblem, points: Floats, progress: Tell) -> None:
-    """Raise an error if a plan exists that no point dominates: bounds found anew, one by one."""
+    """Raise an error if a plan exists that no point dominates: bounds are searched again."""
     bounds = upper_bounds(points)
     for bound in told("proving that no plan is missing", bounds, progress):
         if not problem.is_empty_below(bound):

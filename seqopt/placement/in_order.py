@@ -1,7 +1,7 @@
-"""Several aims, the most important first: lexicographic, exact.
+"""Several aims in order of importance (lexicographic), solved exactly.
 
 The choices that are best for the first aim are a part of the same layered graph: those pairs that
-lie on a best path. Among these the second aim is made least, and so on.
+lie on a best path. Among these the second aim is minimized, and so on.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from seqopt.placement.objectives import TIED, on_a_least_path
 
 @dataclass(frozen=True)
 class InOrder:
-    """The best choice for aims in their order.
+    """The best choice for several aims in order of importance.
 
     Attributes
     ----------
     choice : tuple of int
         A candidate for every move.
     values : tuple of float
-        What it is worth for every aim.
+        Its value for every aim.
     """
 
     choice: tuple[int, ...]
@@ -35,7 +35,7 @@ class InOrder:
 
 
 def solve_in_order(goals: Sequence[tuple[PlacementProblem, Aim]]) -> InOrder:
-    """Return the choice that is best for the first aim, among these for the second, and so on.
+    """Return the choice that is best for the first aim; among these best for the second; and so on.
 
     Exact, sums that differ by less than `seqopt.placement.objectives.TIED` counting as equal.
 
@@ -43,7 +43,7 @@ def solve_in_order(goals: Sequence[tuple[PlacementProblem, Aim]]) -> InOrder:
     ----------
     goals : sequence of (PlacementProblem, Aim)
         Problems of the same moves, each under its own criterion, and whether its sum or its peak is
-        to be least; the most important first.
+        to minimize; the most important first.
 
     Returns
     -------

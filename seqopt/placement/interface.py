@@ -1,4 +1,4 @@
-"""What a formulation is given: a problem as costs, and which of them are to be least."""
+"""The problem that a formulation gets: costs, and which of them to minimize."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from seqopt.sequence.steps import Step
 
 
 class Aim(Enum):
-    """What is to be least over the build."""
+    """What to minimize over the build: the sum of costs or the largest cost."""
 
     SUM = "sum"
     PEAK = "peak"
 
     @property
     def worth(self) -> Callable[[LayeredCosts, Sequence[int]], float]:
-        """What a choice is worth: its total, or its largest cost."""
+        """The value of a choice: its total, or its largest cost."""
         return LayeredCosts.cost if self is Aim.SUM else LayeredCosts.worst
 
     def costs(self, problem: PlacementProblem) -> LayeredCosts:
@@ -43,18 +43,18 @@ class Aim(Enum):
 
 
 class PlacementProblem(Protocol):
-    """What a formulation is given: costs, and what the choices stand for.
+    """The problem that a formulation gets: costs, and the meaning of its choices.
 
     A choice is one candidate per move, each an index from 0.
     """
 
     @property
     def sums(self) -> LayeredCosts:
-        """The costs whose sum over the build is to be least."""
+        """The costs whose sum over the build is minimized."""
 
     @property
     def peaks(self) -> LayeredCosts:
-        """The costs whose largest over the build is to be least."""
+        """The costs whose largest over the build is minimized."""
 
     @property
     def budgets(self) -> tuple[Budget, ...]:
@@ -212,12 +212,12 @@ class Handed:
 
     @cached_property
     def sums(self) -> LayeredCosts:
-        """The costs whose sum over the build is to be least."""
+        """The costs whose sum over the build is minimized."""
         return _copied(self.__problem.sums)
 
     @cached_property
     def peaks(self) -> LayeredCosts:
-        """The costs whose largest over the build is to be least."""
+        """The costs whose largest over the build is minimized."""
         return _copied(self.__problem.peaks)
 
     def conditional(self, move: int, before: int) -> Floats:

@@ -25,7 +25,7 @@ TIED = 1e-9  # sums of ranks this close, relative to the least, are equal
 
 @dataclass(frozen=True)
 class GapParts:
-    """What a choice gives up against the exact optimum, in two parts that add up to it.
+    """The gap of a choice to the exact optimum, split in two parts.
 
     Attributes
     ----------
@@ -70,7 +70,7 @@ def under(problem: Problem, ranked: Ranked) -> Problem | None:
 
 
 def under_both(problem: Problem, choice: Sequence[int]) -> dict[str, float | None]:
-    """Return what a choice is worth under both objectives.
+    """Return the value of a choice under both objectives.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ def under_both(problem: Problem, choice: Sequence[int]) -> dict[str, float | Non
 
 
 def split_gap(problem: Problem, choice: Sequence[int]) -> GapParts | None:
-    """Return what a choice gives up, in two parts.
+    """Return the gap of a choice, in two parts.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""All orders of a free schedule at once: which bricks stand in the place of how many.
+"""All orders of a free schedule at once: by which bricks stand, not by how many.
 
 The states with a set of bricks, the newest of them known, are those of the free schedule in any
 order that begins with the set and has this brick at its end. Sets of one size follow from those

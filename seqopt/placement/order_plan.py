@@ -1,10 +1,10 @@
-"""The plan of a free order: found, checked, and what there is to say about it."""
+"""The plan of the best build order: found, checked and summarized."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from seqopt.errors import SolverError
@@ -16,12 +16,14 @@ from seqopt.placement.schedule_formulation import (
     ScheduleFormulation,
     find_schedule_formulation,
 )
+from seqopt.responses.resources import HERE, Resources
 from seqopt.scene.orders import Order, in_order
+from seqopt.work.progress import Tell
 
 
 @dataclass(frozen=True, repr=False)
 class OrderPlan:
-    """An order, the best plan of it, and what is known of all others.
+    """A build order, its best plan, and a bound on all other orders.
 
     Attributes
     ----------
@@ -61,7 +63,7 @@ class OrderPlan:
         return "optimal" if self.gap <= TOLERANCE else "heuristic"
 
     def summary(self) -> dict[str, object]:
-        """Return what there is to say about it, ready for JSON.
+        """Return a summary, ready for JSON.
 
         Returns
         -------
@@ -87,12 +89,13 @@ def solve_order(
     formulation: ScheduleFormulation | str = "order_search",
     *,
     proof: bool = True,
+    progress: Tell | None = None,
+    resources: Resources = HERE,
     **options: Any,
 ) -> OrderPlan:
     """Return the best order, or a good one with a bound, and its best plan.
 
-    The plan is found anew, by the search of schedules for one order, and judged by its own
-    certificate; it must be worth what the order is claimed to be.
+    The plan is computed again for this one order and judged by its own certificate.
 
     Parameters
     ----------
@@ -100,8 +103,12 @@ def solve_order(
     formulation : ScheduleFormulation or str
     proof : bool, optional
         False leaves out the proof that the order has no better plan.
+    progress : callable, optional
+        Told in a few words how far it is.
+    resources : Resources, optional
+        Who tries orders; what is found does not depend on it.
     **options
-        Of the formulation; ``progress`` is told in a few words how far it is.
+        Of the formulation.
 
     Returns
     -------
@@ -114,19 +121,24 @@ def solve_order(
     ProblemError
         If there is no such formulation or option.
     SolverError
-        If the order is none of those that were asked for, or not worth what is claimed.
+        If the order is none that was asked for, or is not worth what is claimed.
     """
     found = find_schedule_formulation(formulation, Finds.ORDER)
     found.require_options(options)
-    start = time.perf_counter()
-    selection: OrderSelection = found.solve(problem, **options)
+    means, start = replace(resources, progress=progress or resources.progress), time.perf_counter()
+    selection: OrderSelection = found.solve(problem, resources=means, **options)
     seconds = {"order": time.perf_counter() - start}
-    in_order(problem.scene, selection.order)  # names every brick once
-    if not problem.allows(selection.order):
-        raise SolverError(f"{found.name}: its order places a brick that nothing ties")
+    _require_allowed(found.name, problem, selection.order)
     plan = solve_free(problem.at(selection.order), "schedule_search", proof=proof)
     _require_worth(found.name, plan.selection.objective[0], selection)
     return OrderPlan(problem, selection, plan, {**seconds, **plan.seconds})
+
+
+def _require_allowed(name: str, problem: OrderProblem, order: Order) -> None:
+    """Raise an error if an order does not name every brick once, or is none of those asked for."""
+    in_order(problem.scene, order)
+    if not problem.allows(order):
+        raise SolverError(f"{name}: its order places a brick that nothing ties")
 
 
 def _require_worth(name: str, value: float, selection: OrderSelection) -> None:
@@ -135,6 +147,6 @@ def _require_worth(name: str, value: float, selection: OrderSelection) -> None:
     most = TOLERANCE * max(abs(value), abs(claimed))
     if not abs(value - claimed) <= most or bound > value + most:
         raise SolverError(
-            f"{name}: the order is worth {value:.9g}; claimed are {claimed:.9g} and a bound of "
-            f"{bound:.9g}"
+            f"{name}: the value of the order is {value:.9g}; claimed are {claimed:.9g} and "
+            f"a bound of {bound:.9g}"
         )

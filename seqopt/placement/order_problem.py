@@ -1,4 +1,4 @@
-"""The problem of an order: in which the bricks are placed, so that the best plan is best."""
+"""The problem of finding the build order whose best plan is best."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ class Orders(Enum):
 
 @dataclass(frozen=True, repr=False)
 class OrderProblem:
-    """The free schedule of a scene whose order is free too.
+    """The free schedule of a scene whose build order is free too.
 
-    What an order is worth is the first goal of its best plan; the criterion keeps the numbers that
+    The value of an order is the first goal of its best plan; the criterion keeps the numbers that
     it has in the scene's own order.
 
     Parameters

@@ -1,4 +1,4 @@
-"""A criterion of one's own: any function of the responses as the cost of a step."""
+"""A criterion of your own: any function of the responses as the cost of a step."""
 
 from __future__ import annotations
 

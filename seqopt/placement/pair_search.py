@@ -1,4 +1,4 @@
-"""The proof of an optimum from some of the pairs: those that could still be better.
+"""The proof of an optimum from only those pairs that could lead to a better choice.
 
 Where all pairs of candidates are too many to be looked at, most need not be. The search begins with
 the choices that are made move by move, which tell what can be had. A pair that was not looked at
@@ -107,7 +107,7 @@ def search_pairs(problem: Problem, formulation: Formulation, watch: Watch) -> Pa
     costs = walk.costs
     if math.isinf(costs.best):
         if watch.over:
-            raise SolverError("it ended before any choice was met; give it more time")
+            raise SolverError("it ended before any choice was found; give it more time")
         raise InfeasibleError("no choice is allowed; relax a limit or widen a reach")
     selection = _best_known(costs, formulation, watch)
     return PairSearch(costs, selection, walk.along(selection.choice), walk.models)

@@ -148,7 +148,7 @@ class PartialCosts(FrozenValue):
 
 
 def least_possible(costs: PartialCosts) -> float:
-    """Return what any choice costs at least: found anew, over all pairs of one move at a time.
+    """Return a lower bound on the cost of any choice, over all pairs of one move at a time.
 
     Parameters
     ----------

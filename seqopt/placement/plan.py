@@ -1,4 +1,4 @@
-"""The plan: a problem solved, with what its answer is worth and what finding it took."""
+"""The plan: a solved problem with its certificate and the time that it took."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from seqopt.sequence.steps import Step, idle_robots
 
 @dataclass(frozen=True, repr=False)
 class Plan:
-    """A problem solved: where every robot holds over the whole build, and what that is worth.
+    """A solved problem: where every robot holds over the whole build, and how good that is.
 
     Attributes
     ----------
@@ -41,7 +41,7 @@ class Plan:
     selection : Selection
         The choice, and what the formulation claims of it.
     certificate : Certificate or None
-        What the choice is worth, checked; None where no proof was asked for.
+        The checked value of the choice; None without a proof.
     steps : tuple of Step
         The schedule with every move at its chosen node, checked.
     seconds : mapping of str to float
@@ -89,12 +89,12 @@ class Plan:
 
     @property
     def explored(self) -> tuple[Problem, ...]:
-        """The problems of which responses were computed: the whole, or what a search met."""
+        """The problems whose responses were computed: the whole, or what a search needed."""
         return (self._posed,) if self.search is None else self.search.explored
 
     @property
     def models(self) -> int:
-        """How many different models it looked at."""
+        """How many different models were solved."""
         if self.looked_at is not None:
             return self.looked_at
         return self._posed.evaluation.models if self.search is None else self._window_models
@@ -174,7 +174,7 @@ class Plan:
         return pd.DataFrame(rows)
 
     def _worth(self, move: int, before: int, now: int) -> dict[str, float]:
-        """Return the cells of the table that say what a choice is worth."""
+        """Return the cells of the table with the value of a choice."""
         if self.search is not None:
             costs = self.search.costs(move)
             margin = np.delete(costs, now).min(initial=np.inf) - costs[now]
@@ -187,7 +187,7 @@ class Plan:
         }
 
     def alternatives(self) -> pd.DataFrame:
-        """Return raw responses and cost of every choice that was looked at.
+        """Return the responses and the cost of every choice that was evaluated.
 
         Returns
         -------
@@ -254,7 +254,7 @@ class Plan:
         return {"objectives": values, "gap_parts": split | {"objective": parts.objective}}
 
     def summary(self) -> dict[str, object]:
-        """Return what there is to say about the plan, ready for JSON.
+        """Return the summary of the plan, ready for JSON.
 
         Returns
         -------

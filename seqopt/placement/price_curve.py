@@ -1,4 +1,4 @@
-"""What a budget costs: the objective against how much there is of it, with its price as slope."""
+"""The objective as a function of a budget; its slope is the price of the budget."""
 
 from __future__ import annotations
 

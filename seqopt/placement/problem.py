@@ -70,12 +70,12 @@ class Problem:
 
     @property
     def sums(self) -> LayeredCosts:
-        """The costs whose sum over the build is to be least."""
+        """The costs whose sum over the build is minimized."""
         return self._sums[0]
 
     @property
     def peaks(self) -> LayeredCosts:
-        """The costs whose largest over the build is to be least."""
+        """The costs whose largest over the build is minimized."""
         return self._peaks[0]
 
     @cached_property
@@ -154,7 +154,7 @@ class Problem:
         -------
         tuple of StepChoices
             In order, with responses (C_k,); those of steps shared with the move before are of that
-            choice. Computed anew where the responses of all choices are not kept.
+            choice. Computed again if the responses of all choices are not kept.
         """
         if self.evaluation.streams:
             return window_anew(self.evaluation, move, before)
@@ -193,7 +193,7 @@ class Problem:
         return costs
 
     def table(self, choices: StepChoices) -> pd.DataFrame:
-        """Return raw responses and cost of every choice in a step.
+        """Return the responses and the cost of every choice in a step.
 
         Parameters
         ----------
@@ -254,7 +254,7 @@ def pose(
     also: Sequence[str] = (),
     resources: Resources = HERE,
 ) -> Problem:
-    """Return the problem of filling a schedule's open grips.
+    """Return the problem of choosing the open grips of a schedule.
 
     Parameters
     ----------
@@ -293,6 +293,6 @@ def pose(
     limits = (limits,) if isinstance(limits, Limit) else limits
     asked = ResponsesAsked(criterion.for_scene(SceneFacts(engine)), tuple(limits), tuple(also))
     if unknown := {name for move in schedule.moves for name in asked(move.bricks)} - known:
-        why = f"there is no such{did_you_mean(min(unknown), known)}"
-        raise ProblemError(f"response {min(unknown)}: {why}; give {', '.join(sorted(known))}")
+        why = f"does not exist{did_you_mean(min(unknown), known)}"
+        raise ProblemError(f"response {min(unknown)} {why}; give {', '.join(sorted(known))}")
     return Problem(asked.criterion, asked.limits, Evaluation(engine, schedule, asked, resources))

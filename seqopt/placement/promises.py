@@ -1,4 +1,4 @@
-"""What is promised of every step of a plan, also where nothing is chosen: payloads and limits."""
+"""Payloads and limits, checked in every step of a plan, also where nothing is chosen."""
 
 from __future__ import annotations
 
@@ -149,7 +149,7 @@ def require_possible(problem: Problem) -> None:
     table = analyze(problem.engine, fixed)
     for excess in excesses(problem.schedule.scene, table, problem.limits):
         raise InfeasibleError(
-            f"{excess}, where nothing is left to choose; relax the limit or change the schedule"
+            f"{excess}, where no grip is left to choose; relax the limit or change the schedule"
         )
 
 

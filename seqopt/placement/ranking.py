@@ -1,4 +1,4 @@
-"""How firm the ranking of each move is: ties, margins, reversals."""
+"""How reliable the ranking of each move is: ties, margins, reversals."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def _tie(costs: Floats) -> float:
 
 
 def rank_moves(problem: Problem, choice: Sequence[int]) -> pd.DataFrame:
-    """Return where the chosen candidates rank, and how firm the first rank of each move is.
+    """Return where the chosen candidates rank, and how reliable the first rank of each move is.
 
     Parameters
     ----------

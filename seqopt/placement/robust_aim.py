@@ -1,4 +1,4 @@
-"""What a plan is to be worth over scenarios: worst peak, worst total, mean of a tail."""
+"""Aims over scenarios: worst peak, worst total, or the mean of a tail."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class RobustKind(Enum):
 
 @dataclass(frozen=True)
 class RobustAim:
-    """What is to be least over scenarios, all of which are equally likely.
+    """What to minimize over scenarios, all of which are equally likely.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ class RobustAim:
 
     def __post_init__(self) -> None:
         if not isinstance(self.kind, RobustKind):
-            raise ProblemError(f"{short(self.kind)} is no kind of robust aim; give a RobustKind")
+            raise ProblemError(f"{short(self.kind)} is not a kind of robust aim; give a RobustKind")
         number = isinstance(self.level, Real) and not isinstance(self.level, bool)
         if not number or not 0 <= self.level < 1:
             raise ProblemError(f"cvar={short(self.level)}: give a level from 0 to below 1")
@@ -103,7 +103,7 @@ class RobustAim:
         return np.asarray(weights / weights.sum())
 
     def value(self, values: Floats) -> float:
-        """Return what values of scenarios are worth together.
+        """Return one value from the values of all scenarios.
 
         Parameters
         ----------
@@ -117,7 +117,7 @@ class RobustAim:
         return float(self.each(np.asarray(values, dtype=float)[None])[0])
 
     def each(self, values: Floats) -> Floats:
-        """Return what rows of values are worth.
+        """Return one value from every row of values.
 
         Parameters
         ----------
@@ -182,7 +182,6 @@ def parse_robust(text: str) -> RobustAim:
     if math.isnan(level):
         hint = did_you_mean(name, (*known, RobustKind.CVAR.value))
         raise ProblemError(
-            f"robust aim {text}: there is no such{hint}; give worst-peak, worst-total or as "
-            "cvar=0.9"
+            f"robust aim {text} does not exist{hint}; give worst-peak, worst-total or cvar=0.9, say"
         )
     return cvar(level)

@@ -30,7 +30,7 @@ CHOOSES = {Aim.PEAK: "minimax", Aim.SUM: "overlap_dp"}  # of one scenario, and o
 
 @dataclass(frozen=True, eq=False)
 class RobustPlan:
-    """A plan for many scenarios, and what it is worth over them.
+    """A plan for many scenarios, and its value over them.
 
     Attributes
     ----------
@@ -41,12 +41,12 @@ class RobustPlan:
     steps : tuple of Step
         The schedule with every move at its chosen node, checked.
     objective : float
-        What the aim makes of the scenarios, computed anew from their costs.
+        The value of the aim over the scenarios, computed again from their costs.
     bound : float
         On the objective of any choice.
     proven : float
-        The part of the bound that weights of scenarios prove by one dynamic program, computed anew;
-        of peaks it is the whole bound. The rest was closed by search.
+        The part of the bound that weights of scenarios prove by one dynamic program, computed
+        again; of peaks it is the whole bound. The rest was closed by search.
     weights : (S,) float
         Of the scenarios, as they prove it; of peaks the scenario where the plan is worst.
     seconds : mapping of str to float
@@ -193,7 +193,7 @@ def _worst_scenario(joined: LayeredCosts, layers: tuple[LayeredCosts, ...], choi
 def _least_total(
     layers: tuple[LayeredCosts, ...], aim: RobustAim, watch: Watch, width: int
 ) -> tuple[Searched, Floats]:
-    """Return the choice whose totals are worth least, as far as it is found."""
+    """Return the best choice found."""
     arcs = scenario_arcs(layers, aim)
     weighed = best_weights(arcs, watch)
     return close_gap(arcs, weighed, watch, width), weighed.weights
@@ -238,7 +238,7 @@ def _proven(
 def _checked(
     problem: RobustProblem, layers: tuple[LayeredCosts, ...], found: Searched, proven: float
 ) -> float:
-    """Return what a choice is worth by the scenarios' costs, if that is what is claimed."""
+    """Return the value of a choice from the scenarios' costs, if it is as claimed."""
     worth = problem.aim.aim.worth
     value = problem.aim.value(np.array([worth(each, found.choice) for each in layers]))
     size = max(abs(value), abs(found.value), TINY)

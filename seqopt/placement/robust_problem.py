@@ -34,7 +34,7 @@ class RobustProblem:
     scenes : tuple of Scene
         The scenarios.
     aim : RobustAim
-        What is to be least over them.
+        What to minimize over them.
     """
 
     nominal: Problem
@@ -95,7 +95,7 @@ class RobustProblem:
         return other
 
     def values(self, choice: Sequence[int], aim: Aim) -> Floats:
-        """Return what a choice is worth in every scenario.
+        """Return the value of a choice in every scenario.
 
         Parameters
         ----------
@@ -195,7 +195,7 @@ def robust(problem: Problem, scenes: Scenarios | Sequence[Scene], aim: RobustAim
 def _require_alike(nominal: Scene, scene: Scene, number: int) -> None:
     """Raise an error if the choices of a schedule do not mean the same in a scenario."""
     if not isinstance(scene, Scene):
-        raise ProblemError(f"scenario {number}: {short(scene)} is no scene")
+        raise ProblemError(f"scenario {number}: {short(scene)} is not a scene")
 
     def meant(it: Scene) -> tuple[object, ...]:
         joints = tuple(joint.bricks for joint in it.joints)

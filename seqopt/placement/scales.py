@@ -1,4 +1,4 @@
-"""What criteria take from a scene where the user gives no number: its crown, units and scales."""
+"""What criteria take from a scene if the user gives no number: its crown, units and scales."""
 
 from __future__ import annotations
 

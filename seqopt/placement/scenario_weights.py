@@ -8,7 +8,7 @@ r"""The weights of scenarios that prove most, by cutting planes.
 with the totals :math:`c_s` of a choice in every scenario. The largest of :math:`\sum_s w_s c_s`
 over :math:`W` is what the aim makes of totals: the worst for :math:`\bar w = 1`, the mean of the
 worst for less. At fixed weights the cheapest choice is a shortest path, which dynamic programming
-finds; its value is a bound on what any choice is worth. Every choice is a plane over the weights,
+finds; its value is a bound on the value of any choice. Every choice is a plane over the weights,
 and the highest point below all planes met so far is asked for next.
 """
 
@@ -25,7 +25,7 @@ from seqopt.placement.scenario_arcs import Choice, ScenarioArcs
 from seqopt.placement.watch import Watch
 
 STEPS = 400  # weights that are tried at most
-CLOSE = 1e-9  # distance of bound and roof that is none, over their size
+CLOSE = 1e-9  # distance of bound and roof treated as zero, over their size
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,11 +6,11 @@ import inspect
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from enum import Enum
-from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
 from seqopt.errors import ProblemError, did_you_mean
 from seqopt.placement.formulation import Formulation, FormulationKind
+from seqopt.plugins import plugins
 
 GROUP = "seqopt.schedule_formulations"
 
@@ -61,7 +61,7 @@ class ScheduleFormulation:
         Parameters
         ----------
         given : iterable of str
-            Their names; ``progress`` goes without saying.
+            Their names; ``progress`` need not be listed.
 
         Raises
         ------
@@ -92,7 +92,7 @@ def schedule_formulation_names(*finds: Finds) -> tuple[str, ...]:
     >>> schedule_formulation_names(Finds.PLAN)
     ('schedule_search',)
     """
-    return tuple(name for name in sorted(_entries()) if _loaded(name).finds in finds)
+    return tuple(name for name in sorted(plugins(GROUP)) if _loaded(name).finds in finds)
 
 
 def find_schedule_formulation(
@@ -123,7 +123,7 @@ def find_schedule_formulation(
     """
     found = given if isinstance(given, ScheduleFormulation) else _loaded(given)
     if found.finds is not finds:
-        able = [name for name in _entries() if _loaded(name).finds is finds]
+        able = [name for name in plugins(GROUP) if _loaded(name).finds is finds]
         raise ProblemError(
             f"{found.name} finds {found.finds.value}, and {finds.value} is asked for; "
             f"use {' or '.join(able)}"
@@ -137,11 +137,13 @@ def _loaded(given: Formulation | str) -> ScheduleFormulation:
         raise ProblemError(
             f"{given.name}: a free schedule has no moves to choose; use schedule_search"
         )
-    entries = _entries()
+    entries = plugins(GROUP)
     if not isinstance(given, str) or given not in entries:
         known = ", ".join(sorted(entries))
-        hint = did_you_mean(given, entries) if isinstance(given, str) else ""
-        raise ProblemError(f"{given!r} is no formulation of the free schedule{hint}; give {known}")
+        hint = did_you_mean(given, entries)
+        raise ProblemError(
+            f"{given!r} is not a formulation of the free schedule{hint}; give {known}"
+        )
     found: object = entries[given].load()
     if not isinstance(found, ScheduleFormulation):
         raise ProblemError(
@@ -149,7 +151,3 @@ def _loaded(given: Formulation | str) -> ScheduleFormulation:
             "entry point name a ScheduleFormulation"
         )
     return found
-
-
-def _entries() -> dict[str, EntryPoint]:
-    return {entry.name: entry for entry in entry_points(group=GROUP)}

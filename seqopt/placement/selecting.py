@@ -88,7 +88,7 @@ def _with_numbers(formulation: Formulation, found: Selection, watch: Watch) -> S
         )
     except (TypeError, ValueError, AttributeError, OverflowError) as error:
         raise SolverError(
-            f"formulation {formulation.name} returned a Selection that is none: {said(error)}"
+            f"formulation {formulation.name} returned an invalid Selection: {said(error)}"
         ) from error
 
 

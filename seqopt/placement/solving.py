@@ -181,7 +181,7 @@ def _fitting(
     found = as_formulation(formulation)
     if not isinstance(getattr(problem, "budgets", None), tuple):
         raise ProblemError(
-            f"a {type(problem).__name__} is no problem; give one that seqopt.pose made"
+            f"a {type(problem).__name__} is not a problem; give one that seqopt.pose made"
         )
     require_fit(problem, found, options)
     require_time(found, time_limit)

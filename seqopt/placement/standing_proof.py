@@ -1,4 +1,4 @@
-"""That states stand, found anew for whoever judges a free schedule."""
+"""An independent proof that states stand, for the judge of free schedules."""
 
 from __future__ import annotations
 

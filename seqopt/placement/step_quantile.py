@@ -1,4 +1,4 @@
-"""The least level that all open steps but a few keep: a quantile over steps as an aim, exact.
+"""The least level that all open steps except a few keep: a quantile over steps, solved exactly.
 
 A peak is the cost of one step, and one step that cannot be helped may hide all others. Here some
 steps may cost more than the level. How many do is a sum over steps, so for a given level dynamic
@@ -31,7 +31,7 @@ StepCosts = Sequence[tuple[tuple[int, ...], Floats]]
 
 @dataclass(frozen=True)
 class StepQuantile:
-    """A choice whose steps, but for a few, keep the least level.
+    """A choice whose open steps, except a few, keep the least level.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""The best margin of stability with which a free schedule exists, by halving intervals."""
+"""The best margin of stability with which a free schedule exists, found by bisection."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""What a robust plan is worth in scenarios that it was not made for.
+"""The value of a robust plan in scenarios that it was not made for.
 
-A plan that is good over some scenarios may have learned these by heart. It is judged on others,
-beside the nominal plan, which knows none, and beside the plan that knows each scenario before it
-chooses (wait and see), which nobody can have and nobody can beat.
+A plan that is good over some scenarios may be fitted to these only. It is therefore judged on
+others and compared with two plans: the nominal plan, which uses no scenario, and the best plan for
+each single scenario (wait and see), which no plan can beat.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ class Trial:
 
 
 def judge_unseen(plan: RobustPlan, scenes: RobustProblem | Scenarios | Sequence[Scene]) -> Trial:
-    """Return what a plan is worth in other scenarios, beside two that it is measured by.
+    """Return the value of a plan in other scenarios, beside two plans for comparison.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The search of Bruun et al., move by move, solving only the models that it meets.
+"""The search of Bruun et al., move by move, solving only the models that it needs.
 
 A formulation is given the costs of all choices, so that its answer can be certified. Where a model
 is expensive these costs are the price of the proof. This search asks less: every move's candidates

@@ -1,4 +1,4 @@
-"""Windows of a schedule: the steps that one move decides once the move before is made."""
+"""Windows of a schedule: the steps that one move decides, given the move before."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ import pandas as pd
 
 from seqopt.engines.interface import Engine
 from seqopt.errors import ProblemError
-from seqopt.report.page_data import Build, build_data, size_of, structure_data
+from seqopt.report.page_data import Build, Scatter, build_data, size_of, structure_data
 
 RESPONSES = {
     "F_largest": "largest grip force, N",
@@ -20,6 +20,7 @@ RESPONSES = {
     "F_max_N": "largest tension in an edge, N",
     "D_max_1e-3mm": "largest displacement, 1e-3 mm",
 }
+PARTS = {"style": "viewer.css", "three": "three.js", "charts": "charts.js", "viewer": "viewer.js"}
 MOST = 6_000_000  # numbers of fields in a page: about 8 MB
 LEFT_OUT = "Displacements and axial forces of some builds are left out: there are too many steps."
 
@@ -29,6 +30,7 @@ def report_page(
     builds: Sequence[Build],
     sentence: str,
     tables: Sequence[tuple[str, pd.DataFrame]] = (),
+    scatter: Scatter | None = None,
 ) -> str:
     """Return a page that shows builds of one scene, as HTML that needs nothing else.
 
@@ -42,6 +44,8 @@ def report_page(
         What there is to see, in a sentence.
     tables : sequence of (str, pandas.DataFrame), optional
         Captions and tables; a row whose first cell names a build shows it.
+    scatter : Scatter, optional
+        A chart with a point for each of some builds.
 
     Returns
     -------
@@ -63,16 +67,12 @@ def report_page(
     >>> len(report_page(engine, [build], "Two robots take turns.")) > 5e5
     True
     """
-    if not builds:
-        raise ProblemError("a report of nothing; give at least one build")
     return _filled(
         title=f"{escape(engine.network.scene.name)}, step by step",
         sentence=escape(sentence),
         tables="".join(_table(caption, table) for caption, table in tables),
-        style=_asset("viewer.css"),
-        data=_json(_data(engine, builds)),
-        three=_asset("three.js"),
-        viewer=_asset("viewer.js"),
+        data=_json(_data(engine, builds, scatter)),
+        **{part: _asset(name) for part, name in PARTS.items()},
     )
 
 
@@ -89,8 +89,10 @@ def _filled(**parts: str) -> str:
     return page
 
 
-def _data(engine: Engine, builds: Sequence[Build]) -> dict[str, object]:
+def _data(engine: Engine, builds: Sequence[Build], scatter: Scatter | None) -> dict[str, object]:
     """Return what the viewer reads, fields for as many builds as there is room for."""
+    if not builds:
+        raise ProblemError("a report of nothing; give at least one build")
     network = engine.network
     ends = np.cumsum([size_of(network, build) for build in builds])
     return {
@@ -100,6 +102,7 @@ def _data(engine: Engine, builds: Sequence[Build]) -> dict[str, object]:
             for build, end in zip(builds, ends, strict=True)
         ],
         "responses": RESPONSES,
+        "scatter": None if scatter is None else scatter.data(),
         "note": LEFT_OUT if ends[-1] > MOST else "",
     }
 

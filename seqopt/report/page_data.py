@@ -26,6 +26,7 @@ from seqopt.scene.shape import normal_of
 from seqopt.sequence.steps import Step
 
 LARGEST = 32767
+FIELDS = ("twist", "edge", "push", "turn")  # packed, a row for every step
 ROBOT_COLORS = ("#0b7a75", "#7b2d8b", "#b85c00", "#444444", "#1f5fa8")
 FACES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
 
@@ -52,6 +53,43 @@ class Build:
     table: pd.DataFrame
     stands: Sequence[str] = ()
     bounds: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Scatter:
+    """A chart with a point for each of some builds.
+
+    Attributes
+    ----------
+    title : str
+    points : pandas.DataFrame
+        A row per build, its name as index; a column for every quantity that an axis may show, in
+        words and with its unit. The first two are shown first.
+    logarithmic : sequence of str, optional
+        The columns that are drawn on a logarithmic axis; their values are positive.
+    """
+
+    title: str
+    points: pd.DataFrame
+    logarithmic: Sequence[str] = ()
+
+    def data(self) -> dict[str, object]:
+        """Return it as lists, ready for JSON; what is not known is None.
+
+        Returns
+        -------
+        dict
+            ``title``, ``builds``, ``axes`` and ``logarithmic``, and ``values`` by axis.
+        """
+        known = self.points.astype(float).map(lambda value: value if np.isfinite(value) else None)
+        known = known.astype(object).where(self.points.notna(), None)
+        return {
+            "title": self.title,
+            "builds": [str(name) for name in self.points.index],
+            "axes": [*self.points],
+            "logarithmic": [*self.logarithmic],
+            "values": {name: known[name].tolist() for name in known},
+        }
 
 
 def size_of(network: Network, build: Build) -> int:
@@ -171,11 +209,12 @@ def build_data(engine: Engine, build: Build, *, fields: bool = True) -> dict[str
     dict
         ``name`` and ``bounds``; ``steps`` with number, kind, bricks and the node that each robot
         holds; ``columns`` and ``rows`` of the table of responses, as text, ``forces`` the columns
-        of the robots, and whether each step ``stands``; packed fields ``twist`` and ``edge`` with
-        the ``scale`` of each step, or None.
+        of the robots, and whether each step ``stands``; packed fields ``twist``, ``edge``,
+        ``push`` and ``turn`` (force and moment of every ground end) with the ``scale`` of each
+        step, or None.
     """
     lines = [line.split(",") for line in csv_text(build.table).splitlines()]
-    twist, edge = _fields(engine, build) if fields else (None, None)
+    found = _fields(engine, build) if fields else dict.fromkeys(FIELDS)
     return {
         "name": build.name,
         "bounds": dict(build.bounds),
@@ -192,22 +231,24 @@ def build_data(engine: Engine, build: Build, *, fields: bool = True) -> dict[str
         "columns": lines[0],
         "rows": lines[1:],
         "forces": [force_column(robot) for robot in engine.network.scene.robots],
-        "twist": None if twist is None else _packed(twist),
-        "edge": None if edge is None else _packed(edge),
+        **{name: None if part is None else _packed(part) for name, part in found.items()},
     }
 
 
-def _fields(engine: Engine, build: Build) -> tuple[Floats, Floats]:
-    """Return the twists (steps, B, 6) of all bricks, and the forces (steps, E) of all edges."""
+def _fields(engine: Engine, build: Build) -> dict[str, Floats]:
+    """Return twists (steps, B, 6), edge forces (steps, E), and what ground ends exert."""
     network = engine.network
-    twist = np.zeros((len(build.steps), len(network.inner), 6))
-    edge = np.zeros((len(build.steps), len(network.edge_nodes)))
+    count = len(build.steps)
+    twist = np.zeros((count, len(network.inner), 6))
+    edge = np.zeros((count, len(network.edge_nodes)))
+    support = np.zeros((count, len(network.springs.support), 6))
     for i, step in enumerate(build.steps):
         held = np.array([step.held], dtype=np.int64).reshape(1, -1)
-        found = engine.solve(step.bricks, held, Want.EDGES | Want.BRICKS)
+        found = engine.solve(step.bricks, held, Want.EDGES | Want.BRICKS | Want.SUPPORT)
         twist[i, : step.bricks] = found.brick_twist[0]
         edge[i, : found.edge_force.shape[1]] = found.edge_force[0]
-    return twist, edge
+        support[i] = found.support[0]
+    return dict(zip(FIELDS, (twist, edge, support[..., :3], support[..., 3:]), strict=True))
 
 
 def _packed(values: Floats) -> dict[str, object]:

@@ -1,8 +1,9 @@
-"""Responses: the few numbers that say how a partial structure bears its weight and its grips.
+"""Responses: the few numbers that describe how a partial structure carries its weight.
 
 An engine gives forces and displacements everywhere; a response is one number of these, such as the
-largest tension. Responses come as a table of given steps, each from scratch or with what the steps
-before it lock in (`analyze_staged`), or over all choices of steps with open grips.
+largest tension. `analyze` returns them as a table for given steps, each computed from scratch, and
+`analyze_staged` with the forces that earlier steps lock in. `Evaluation` computes them for all
+choices in steps with open grips.
 
 >>> from seqopt.engines.registry import make_engine
 >>> from seqopt.network.build import build_network
@@ -20,7 +21,8 @@ before it lock in (`analyze_staged`), or over all choices of steps with open gri
 >>> evaluation.steps[0].responses["T_max"].round(1)  # N, by candidate of the first move
 array([17.6, 17.6])
 
-More processes, other machines, or a folder of answers change no result, to the last bit:
+Worker processes, other machines, or stored results do not change a result, not even in the last
+bit:
 
 >>> from seqopt.responses import Resources
 >>> shared = Evaluation(engine, schedule, lambda bricks: {"T_max"}, Resources(max_memory=1e9))

@@ -1,4 +1,4 @@
-"""Responses of grip sets, solved when they are first asked for, and kept.
+"""Responses of grip sets, computed when they are first needed, and kept.
 
 For whoever searches among more sets than need to be solved: all sets that are asked for at once are
 solved in batches, each of them once.

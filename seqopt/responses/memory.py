@@ -1,4 +1,4 @@
-"""Whether there is the memory for the responses of all choices, before they are computed."""
+"""Checks, before computing, whether there is enough memory for the responses of all choices."""
 
 from __future__ import annotations
 

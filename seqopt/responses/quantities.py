@@ -1,4 +1,4 @@
-"""Each response, defined once: from the fields of grip sets to scalars.
+"""Each response, defined once, as a function of the fields of grip sets.
 
 A response has the name that criteria and limits use, the column it has in tables, and the fields it
 needs. Sizes of grip forces are functions of their own, since there is one per robot.

@@ -1,4 +1,4 @@
-"""What a computation may use: processes or other machines, a folder for answers, memory."""
+"""What a computation may use: processes or other machines, a folder for results, memory."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Resources:
     workers : int, optional
         Processes to share the work among; with an executor, how many tasks it works on at once.
     executor : concurrent.futures.Executor, optional
-        Any executor in the place of processes of our own. It stays the caller's, who ends it.
+        Any executor, instead of processes of our own. The caller ends it.
     cache : str or pathlib.Path, optional
         A folder that keeps the answers to states by content; it is made if it is not there.
     max_memory : float, optional
@@ -50,8 +50,8 @@ class Resources:
             raise ProblemError(f"workers is {self.workers!r}; give a whole number from 1")
         if not (self.executor is None or hasattr(self.executor, "submit")):
             raise ProblemError(
-                f"executor: a {type(self.executor).__name__} is none; give one of "
-                "concurrent.futures, or workers"
+                f"executor: a {type(self.executor).__name__} is not an executor; "
+                "give one of concurrent.futures, or workers"
             )
         most = self.max_memory
         known = most is None or (

@@ -117,7 +117,21 @@ def _answer_here(engine: Engine, blocks: Blocks) -> list[Answers]:
 
 
 def _answer_sent(shipment: Shipment, blocks: Blocks) -> list[Answers]:
-    return _answer_here(_shelf.engine(shipment), blocks)
+    return _answer_here(engine_of(shipment), blocks)
+
+
+def engine_of(shipment: Shipment) -> Engine:
+    """Return an engine that was sent; a worker keeps the last few that it made.
+
+    Parameters
+    ----------
+    shipment : Shipment
+
+    Returns
+    -------
+    Engine
+    """
+    return _shelf.engine(shipment)
 
 
 class _Shelf(threading.local):

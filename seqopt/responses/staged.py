@@ -1,4 +1,4 @@
-"""Staged construction analysis: what earlier steps lock into a structure, carried along.
+"""Staged construction analysis: forces and displacements that earlier steps lock in.
 
 From scratch, a step knows nothing of the steps before it: all weight acts at once, and every robot
 holds its node where the plan has it. Here the build goes through its steps. A brick comes without
@@ -21,8 +21,8 @@ from scipy import linalg
 from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.engines.interface import Fields, grip_columns
 from seqopt.engines.rigid.mixed import solve_load
-from seqopt.engines.rigid.mixed_system import Ungripped, ungripped_system
 from seqopt.engines.rigid.recovery import edge_forces, reactions, split_pairs
+from seqopt.engines.rigid.ungripped import Ungripped, ungripped_system
 from seqopt.errors import MechanismError, SolverError, StepError
 from seqopt.network.build import network_of
 from seqopt.network.kinematics import spring_maps
@@ -67,7 +67,7 @@ class StagedState(FrozenValue):
 def analyze_staged(
     network: Network | Scene, steps: Sequence[Step], placing: Placing | str = Placing.FITTED
 ) -> pd.DataFrame:
-    """Return the responses of every step with all that earlier steps lock in.
+    """Return the responses of every step with everything that earlier steps lock in.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def analyze_staged(
 def staged_fields(
     network: Network, steps: Sequence[Step], placing: Placing | str = Placing.FITTED
 ) -> Iterator[Fields]:
-    """Yield the full fields of every step with all that earlier steps lock in.
+    """Yield the full fields of every step with everything that earlier steps lock in.
 
     Parameters
     ----------
@@ -213,7 +213,7 @@ def _way(placing: Placing | str) -> Placing:
         return Placing(placing)
     except ValueError:
         known = ", ".join(way.value for way in Placing)
-        raise StepError(f"placing {short(placing)}: there is no such; give {known}") from None
+        raise StepError(f"placing {short(placing)} does not exist; give {known}") from None
 
 
 def _loaded(parts: Ungripped, state: StagedState, load: Floats) -> StagedState:

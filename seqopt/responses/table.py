@@ -47,7 +47,7 @@ def analyze(engine: Engine, steps: Sequence[Step]) -> pd.DataFrame:
     MechanismError, SolverError
         As the engine does, the step named.
     SceneError, StepError
-        If these are no engine, or no steps.
+        If an argument is not an engine, or not a list of steps.
 
     Examples
     --------
@@ -62,7 +62,7 @@ def analyze(engine: Engine, steps: Sequence[Step]) -> pd.DataFrame:
     """
     if not isinstance(getattr(engine, "network", None), Network):
         kind = type(engine).__name__
-        raise SceneError(f"a {kind} is no engine; give make_engine('compliance', network)")
+        raise SceneError(f"a {kind} is not an engine; give make_engine('compliance', network)")
     return response_table(
         engine.network, ((step, step_fields(engine, step)) for step in require_steps(steps))
     )

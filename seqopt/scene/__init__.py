@@ -6,14 +6,14 @@ A built-in scene by its name, or a file by its path:
 >>> load_scene("arch25")
 <Scene arch25: 25 bricks, 24 joints, 2 ground ends, 3 robots>
 
-An arch of one's own from the angles of its bricks, with robots beside it that reach its line:
+An arch of your own from the angles of its bricks, with robots beside it that reach its line:
 
 >>> shape = ArchShape(pitch=(1.2, 0.6, 0.0, -0.6, -1.2), pattern="V")
 >>> scene = arch_scene(shape, "small")
 >>> [robot.reach.covers(scene.node_position(9)) for robot in scene.robots]
 [True, True, True]
 
-Whatever else is made of `Brick`, `Joint`, `Ground` and `Robot`; `save_scene` writes any to a file.
+Make any other scene from `Brick`, `Joint`, `Ground` and `Robot`; `save_scene` writes it to a file.
 """
 
 from seqopt.scene.arch import ArchShape, arch_scene

@@ -205,7 +205,7 @@ def _pattern(shape: ArchShape) -> str:
 def _axes(shape: ArchShape) -> tuple[Floats, Floats, Floats]:
     """Return the bricks' directions along the arch, to the left, and the points between them."""
     if not isinstance(shape, ArchShape):
-        raise SceneError(f"a {type(shape).__name__} is no shape of an arch; give ArchShape(...)")
+        raise SceneError(f"a {type(shape).__name__} is not a shape of an arch; give ArchShape(...)")
     pitch = np.asarray(shape.pitch, dtype=float)
     zero = np.zeros_like(pitch)
     roll, yaw = (zero if a is None else np.asarray(a, float) for a in (shape.roll, shape.yaw))

@@ -1,4 +1,4 @@
-"""Bricks as boxes: how far they are apart, and whether two of them are in one place.
+"""Bricks as boxes: how far they are apart, and whether two of them overlap.
 
 Two boxes are apart if a plane passes between them, and if one does, then one that is parallel to a
 face of either or to an edge of each. The largest distance over these 15 directions is negative for
@@ -17,7 +17,7 @@ from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.errors import SceneError
 from seqopt.scene.parts import Brick
 
-PARALLEL = 1e-9  # sine of an angle between edges that is none
+PARALLEL = 1e-9  # sine of an angle between edges treated as zero
 DEEPEST = 1e-6  # depth that is rounding, over the smallest dimension
 
 

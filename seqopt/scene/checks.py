@@ -130,7 +130,7 @@ def parts(where: str, values: Iterable[Part], kind: type[Part]) -> tuple[Part, .
     found = tuple(values) if isinstance(values, Iterable) else (values,)
     for value in found:
         if not isinstance(value, kind):
-            raise SceneError(f"{where}: {short(value)} is none; give each as {kind.__name__}(...)")
+            raise SceneError(f"{where}: give each as {kind.__name__}(...), not {short(value)}")
     return found
 
 

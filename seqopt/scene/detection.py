@@ -25,7 +25,7 @@ from seqopt.work.progress import Progress, Tell
 OPPOSED = np.cos(np.radians(15.0))  # cosine from which on normals are against each other
 LEVEL = 1 - 1e-6  # cosine from which on faces are in one plane
 MOST_PAIRS = 300_000  # of blocks that are near each other
-SLIVER = 1e-6  # overlap that is none, over the smaller of two faces
+SLIVER = 1e-6  # overlap treated as zero, over the smaller of two faces
 
 Plane = tuple[Floats, Floats, list[Any]]  # origin, axes, and polygons in it
 
@@ -146,7 +146,7 @@ def touching_faces(
     gap = positive("gap", gap, "m")
     for shape in shapes:
         if not hasattr(shape, "points") or not hasattr(shape, "faces"):
-            raise SceneError(f"shapes: {short(shape)} is none; give each as Polyhedron(...)")
+            raise SceneError(f"shapes: {short(shape)} is not a shape; give each as Polyhedron(...)")
     return tuple(_found(shapes, gap, Progress("finding faces", len(shapes), progress)))
 
 

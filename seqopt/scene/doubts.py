@@ -1,4 +1,4 @@
-"""What in a scene can be, and probably is not meant: units mixed up, parts in the wrong place."""
+"""Possible but probably wrong values in a scene: mixed-up units, parts in the wrong place."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from seqopt.arrays import Vector
 from seqopt.scene.parts import Brick, Ground, Joint
 from seqopt.scene.scene import Scene
 
-ONE_PLACE = 0.25  # distance of centroids that is none, over the smallest dimension
+ONE_PLACE = 0.25  # distance of centroids treated as zero, over the smallest dimension
 FAR_AWAY = 1.0  # of a joint from a brick, over the brick's largest dimension
 THICK_BRICK = 5.0  # m; the smallest dimension of a brick whose lengths may be meant in mm
 DENSITIES = (10.0, 30_000.0)  # kg/m³; from aerogel to the heaviest metals
@@ -19,7 +19,7 @@ PULL = 100.0  # m/s²; ten times that of the earth
 
 
 def doubts(scene: Scene) -> tuple[str, ...]:
-    """Return what is odd about a scene, a line each.
+    """Return what looks wrong in a scene, one line each.
 
     Parameters
     ----------

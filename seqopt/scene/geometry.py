@@ -1,8 +1,8 @@
-"""Whether the parts of a scene lie so that anything can be computed with them.
+"""Checks that the geometry of a scene can be computed with.
 
-A joint at an inner node makes an edge of no length, a brick far from the origin has no size beside
-its position, a weight beyond all bounds overflows: what follows from these is not a number. They
-are refused where they are said; what is merely odd is a doubt (`seqopt.scene.doubts`).
+A joint at an inner node would make an edge without length, a brick very far from the origin would
+lose its size to rounding, and an enormous weight would overflow. Such values are refused. Values
+that are merely unusual get a warning (`seqopt.scene.doubts`).
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from seqopt.arrays import Vector
 from seqopt.errors import SceneError
 from seqopt.scene.parts import Brick, Ground, Joint
 
-AT_NODE = 1e-6  # distance that is none, over the length of the brick
+AT_NODE = 1e-6  # distance treated as zero, over the length of the brick
 FAR = 1e9  # of a position from the origin, over the smallest dimension: digits are lost beyond
 SIZES = (1e-9, 1e9)  # m; dimensions that a brick may have
 HEAVY = 1e100  # N, N/m, N m/rad; squares of what is beyond overflow, of its inverse vanish

@@ -1,4 +1,4 @@
-"""The order in which the bricks of a scene are placed: another one than its own, from any end."""
+"""Build orders other than the scene's own, from any end."""
 
 from __future__ import annotations
 

@@ -19,12 +19,12 @@ from seqopt.scene.reach import Anywhere, Reach, as_reach
 from seqopt.scene.shape import Polyhedron
 
 THICKEST = 0.5  # of a joint that does not say, over the smallest dimension of its bricks
-SAME_PLACE = 1e-6  # distance that is none, over the size of a block
+SAME_PLACE = 1e-6  # distance treated as zero, over the size of a block
 
 
 @dataclass(frozen=True, kw_only=True)
 class Brick:
-    """A rigid box with two inner nodes, the centroids of its halves; or a block of another shape.
+    """A rigid box or block with two inner nodes; in a box, these are the centroids of its halves.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ class Brick:
     placing_node : int
         The node held while the brick is placed by a robot that is on no side of the structure.
     shape : Polyhedron, optional
-        Of a block that is no box; see `seqopt.scene.blocks.block_brick`.
+        The shape of a block that is not a box; see `seqopt.scene.blocks.block_brick`.
     node_offsets : tuple of 2 Vector, optional
         Where the inner nodes are if they are elsewhere, from the centroid, m.
 

@@ -1,8 +1,8 @@
-"""Scenarios: seeded samples of what a scene may turn out to be.
+"""Scenarios: random variations of a scene, reproducible by a seed.
 
-Nobody knows the stiffness of a joint before it is made, the exact weight of a brick, or where it
-comes to lie. A scenario draws all of these at random. Topology, names, nodes, build order and
-robots stay those of the scene, so that the choices of a schedule mean the same in all scenarios.
+The stiffness of a joint is not known before it is made, nor are the exact weight and position of a
+brick. A scenario draws all of these at random. Topology, names, nodes, build order and robots stay
+those of the scene. The choices of a schedule therefore mean the same in all scenarios.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ def scenarios(
     count: int = 30,
     seed: int = 0,
 ) -> Scenarios:
-    """Return seeded samples of a scene.
+    """Return random variations of a scene, reproducible by a seed.
 
     Every joint, ground end, brick and coordinate is drawn on its own. Scenario i depends on the
     seed and i alone: more scenarios leave the first ones as they are, and a spread that is set to
@@ -138,8 +138,8 @@ def _sample(
         return shifted(out, position, moved) if position else out
     except SceneError as error:
         raise SceneError(
-            f"scenario {stream[1] + 1} of {scene.name} is no valid scene ({error}); let positions, "
-            "densities and stiffnesses vary less"
+            f"scenario {stream[1] + 1} of {scene.name} is not a valid scene ({error}); let "
+            "positions, densities and stiffnesses vary less"
         ) from error
 
 

@@ -1,4 +1,4 @@
-"""The scene: what is built, in which order, and who holds it."""
+"""The scene: what is built, in which order, and by which robots."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ KINDS = {"bricks": Brick, "joints": Joint, "grounds": Ground, "robots": Robot}
 
 @dataclass(frozen=True, kw_only=True)
 class Scene:
-    """Everything a build needs: what is built, in which order, and who holds it.
+    """Everything a build needs: what is built, in which order, and by which robots.
 
     Parameters
     ----------

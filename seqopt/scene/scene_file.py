@@ -112,7 +112,7 @@ def load_scene(name: str | Path) -> Scene:
     <Scene arch25: 25 bricks, 24 joints, 2 ground ends, 3 robots>
     """
     if not isinstance(name, str | Path):
-        raise SceneError(f"a {type(name).__name__} is no name of a scene; give text or a path")
+        raise SceneError(f"a {type(name).__name__} is not a name of a scene; give text or a path")
     name = str(name)
     if name in GENERATED:
         return GENERATED[name](_load_stored)

@@ -1,4 +1,4 @@
-"""Scenes that are a little other than a given one: stiffer, heavier, moved.
+"""Variations of a scene: stiffer, heavier, or moved.
 
 Names, nodes, build order, robots and what joins what stay the same, so that steps and the choices
 of a schedule mean the same in all of them.

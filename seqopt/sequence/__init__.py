@@ -1,7 +1,7 @@
 """Steps of a build: what a sequence is, and the methods that make one from a network.
 
-A step places a brick, releases grips or takes a new one. A sequence lists them in order and is
-checked in its scene. A schedule is a sequence some of whose grips are still to be chosen.
+A step places a brick, releases grips or takes a new grip. A sequence is a list of steps, checked in
+its scene. A schedule is a sequence in which some grips are still to be chosen.
 
 >>> from seqopt.network.build import build_network
 >>> from seqopt.scene.scene_file import load_scene

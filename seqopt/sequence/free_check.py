@@ -179,7 +179,7 @@ def check_free(network: Network, rules: FreeRules, steps: Sequence[Step]) -> Non
     Raises
     ------
     StepError
-        Naming the step that is none of those that were possible.
+        If a step is not among those that were possible; the message says which.
     """
     book = RuleBook(network, rules)
     state: tuple[int, Grips, int] = (0, (None,) * len(network.scene.robots), 0)

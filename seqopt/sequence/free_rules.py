@@ -41,7 +41,7 @@ class Ending(Enum):
 
 @dataclass(frozen=True, kw_only=True)
 class FreeRules:
-    """What a free schedule must keep to; reach and one robot per node go without saying.
+    """The rules of a free schedule, in addition to reach and one robot per node.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ class FreeRules:
             if name not in known:
                 listed = ", ".join(known)
                 hint = did_you_mean(name, known)
-                raise StepError(f"robot {name!r}: there is no such{hint}; give some of {listed}")
+                raise StepError(f"robot {name!r} does not exist{hint}; give some of {listed}")
         team = tuple(i for i, name in enumerate(known) if name in self.robots or not self.robots)
         if not 2 <= len(team) <= MOST_ROBOTS:
             raise StepError(
@@ -178,7 +178,7 @@ class FreeRules:
 
 
 def with_robots(scene: Scene, count: int) -> Scene:
-    """Return a scene with so many robots: its own first ones, and mobile ones beside them.
+    """Return a scene with a number of robots: its own first, then mobile ones that reach all.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Plans: a given sequence of steps, read from CSV with the first columns of Table A.1."""
+"""Plan files: sequences of steps as CSV, with the first columns of the paper's Table A.1."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ def parse_plan(scene: Scene, text: str, source: str) -> tuple[Step, ...]:
     for expected, step in enumerate(steps, start=1):
         if step.number != expected:
             raise StepError(
-                f"plan {source}: step {step.number} stands where {expected} should; number from 1"
+                f"plan {source}: step {step.number} should be {expected}; number steps from 1"
             )
     return check_sequence(scene, steps)
 
@@ -113,7 +113,7 @@ def read_rows(scene: Scene, text: str, what: str) -> list[tuple[int, Row]]:
     try:
         return _rows(scene, csv.DictReader(io.StringIO(text), restval=""), what)
     except csv.Error as error:
-        raise StepError(f"{what}: no CSV that can be read: {error}") from error
+        raise StepError(f"{what}: not a readable CSV file: {error}") from error
 
 
 def _rows(scene: Scene, reader: csv.DictReader[str], what: str) -> list[tuple[int, Row]]:
@@ -123,7 +123,7 @@ def _rows(scene: Scene, reader: csv.DictReader[str], what: str) -> list[tuple[in
         raise StepError(f"{what}: column {missing[0]} is missing; give {', '.join(wanted)}")
     twice = [column for column in wanted if (reader.fieldnames or ()).count(column) > 1]
     if twice:
-        raise StepError(f"{what}: column {twice[0]} stands there twice; keep one")
+        raise StepError(f"{what}: column {twice[0]} occurs twice; keep one")
     return [(reader.line_num, row) for row in reader]
 
 

@@ -1,4 +1,4 @@
-"""Who places and who holds: roles of a method, filled from the reach of robots or by name."""
+"""Which robot places and which holds: the roles of a method, filled by reach or by name."""
 
 from __future__ import annotations
 
@@ -50,8 +50,8 @@ def find_robots(scene: Scene, names: Sequence[str], method: str, roles: int) -> 
         return list(range(len(known)))
     for name in names:
         if name not in known:
-            why = f"there is no such{did_you_mean(name, known)}; give some of {', '.join(known)}"
-            raise StepError(f"robot {name!r}: {why}")
+            why = f"does not exist{did_you_mean(name, known)}; give some of {', '.join(known)}"
+            raise StepError(f"robot {name!r} {why}")
     if len({*names}) < len(names):
         raise StepError(f"robots {', '.join(names)}: one occurs twice; name different ones")
     if len(names) != roles:

@@ -51,7 +51,7 @@ class OpenStep:
     bricks: int
     grips: ScheduledGrips
 
-    @property
+    @cached_property
     def moves(self) -> tuple[int, ...]:
         """The moves that are open in this step, in order."""
         return tuple(sorted({grip.move for grip in self.grips if isinstance(grip, OpenGrip)}))

@@ -1,4 +1,4 @@
-"""Schedules of one's own: CSV tables of steps in which open grips are marked."""
+"""Schedule files: CSV tables of steps in which open grips are marked."""
 
 from __future__ import annotations
 
@@ -174,7 +174,7 @@ def find_schedule(
     if isinstance(schedule, str) and not path.suffix and not path.exists():
         hint = did_you_mean(schedule, SCHEDULES)
         raise StepError(
-            f"schedule {schedule!r}: there is no such{hint}; give one of {', '.join(SCHEDULES)}, "
+            f"schedule {schedule!r} does not exist{hint}; give one of {', '.join(SCHEDULES)}, "
             "or a CSV file"
         )
     return read_schedule(network, path)
@@ -195,9 +195,7 @@ def _step(scene: Scene, row: Row, before: Sequence[OpenStep], where: str) -> Ope
     """Return the step of a row, which must be possible after those before."""
     number, kind, bricks = read_cells(row, where)
     if number != len(before) + 1:
-        raise StepError(
-            f"{where}: step {number} stands where {len(before) + 1} should; number from 1"
-        )
+        raise StepError(f"{where}: step {number} should be {len(before) + 1}; number steps from 1")
     if None in row:
         raise StepError(f"{where}: it has more cells than there are columns; leave out the rest")
     step = OpenStep(number, kind, bricks, _grips(scene, row, before, where))

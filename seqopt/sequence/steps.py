@@ -26,7 +26,7 @@ class StepKind(Enum):
 
 @dataclass(frozen=True)
 class Step:
-    """One step of the build: what stands, and which node every robot holds.
+    """One step of the build: the bricks placed, and the node that every robot holds.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ class Step:
     kind : StepKind
         What the step does.
     bricks : int
-        How many bricks stand, in build order.
+        How many bricks are placed, in build order.
     grips : tuple of (int or None)
         Node that each of the scene's robots holds; None for a robot that holds nothing.
 
@@ -74,11 +74,11 @@ class AnyStep(Protocol):
 
     @property
     def bricks(self) -> int:
-        """How many bricks stand, in build order."""
+        """How many bricks are placed, in build order."""
 
     @property
     def grips(self) -> tuple[object, ...]:
-        """What each of the scene's robots holds."""
+        """The node that each of the scene's robots holds, or None."""
 
 
 def idle_robots(scene: Scene, steps: Iterable[AnyStep]) -> tuple[str, ...]:
@@ -125,8 +125,8 @@ def require_steps(steps: Sequence[Step]) -> Sequence[Step]:
     """
     if not isinstance(steps, Sequence) or not all(isinstance(step, Step) for step in steps):
         raise StepError(
-            f"a {type(steps).__name__} is no sequence of steps; give those of a method, of a plan, "
-            "or of a schedule that is filled"
+            f"a {type(steps).__name__} is not a sequence of steps; "
+            "give the steps of a method, a plan, or a filled schedule"
         )
     return steps
 
@@ -251,7 +251,7 @@ def _check_change(scene: Scene, before: AnyStep, step: AnyStep) -> None:
     for robot, old, new in zip(scene.robots, before.grips, step.grips, strict=True):
         if None not in (old, new) and old != new:
             raise StepError(
-                f"{where}: {robot.name} goes from node {old} to {new}; let it release first"
+                f"{where}: {robot.name} moves from node {old} to {new}; let it release first"
             )
     taken = [
         n for o, n in zip(before.grips, step.grips, strict=True) if o is None and n is not None

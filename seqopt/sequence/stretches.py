@@ -57,7 +57,7 @@ def begins_elsewhere(network: Network) -> frozenset[int]:
 
 
 def degeneration(network: Network, method: str) -> str:
-    """Return why a method is not what its name says on a structure.
+    """Return why a method becomes another one on a structure, or nothing.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What stands by itself and what must be held: the islands of a partial structure.
+"""The parts of a partial structure that must be held because no joint ties them to the ground.
 
 A placed brick is supported if a path of joints that act leads from it to a ground end. Bricks that
 no such path reaches form islands; somebody must hold each of them at every step.
@@ -109,9 +109,9 @@ def check_support(
         for island in known[step.bricks]:
             if not any(names and names <= island for names in holds):
                 raise StepError(
-                    f"step {step.number} ({step.kind.value}): {_hang(island)} free: no joint leads "
-                    "to a ground end and no robot is sure to hold on; place it later, or write a "
-                    "schedule in which one more robot holds it"
+                    f"step {step.number} ({step.kind.value}): {_hang(island)} free: no joint "
+                    "connects to the ground and no robot is sure to hold on; place it later, or "
+                    "write a schedule in which one more robot holds it"
                 )
 
 

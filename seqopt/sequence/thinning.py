@@ -1,4 +1,4 @@
-"""Fewer candidates: those near the working end, where a build is too large to look at all.
+"""Fewer candidates: only those near the working end, for builds too large to examine all.
 
 The working end is where the two bricks are that were placed last. What is left out is not looked
 at, so that whatever is found among the rest is a heuristic for the whole, however it is found.

@@ -77,7 +77,7 @@ def three_robot_loop(network: Network | Scene, robots: Sequence[str] = ()) -> Sc
 
 
 def modified_sequential(network: Network | Scene, robots: Sequence[str] = ()) -> Schedule:
-    """Return the sequential method with a third support, chosen anew after every placed brick.
+    """Return the sequential method with a third support, chosen again after every brick.
 
     Once two robots hold the arch, the third takes a grip for three steps: its own reposition, the
     release that follows and the next placing; then it releases. Source: section 5.2.1 and table 8
@@ -182,6 +182,6 @@ def make_schedule(name: str, network: Network | Scene, robots: Sequence[str] = (
         If there is none of that name, or the scene cannot be built by it.
     """
     if name not in SCHEDULES:
-        why = f"there is no such{did_you_mean(name, SCHEDULES)}; give one of {', '.join(SCHEDULES)}"
-        raise StepError(f"schedule {name!r}: {why}")
+        why = f"does not exist{did_you_mean(name, SCHEDULES)}; give one of {', '.join(SCHEDULES)}"
+        raise StepError(f"schedule {name!r} {why}")
     return SCHEDULES[name](network, robots)

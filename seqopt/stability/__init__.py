@@ -1,6 +1,6 @@
-"""Whether half-built structures stand: verdicts with proofs, margins, and what fails first.
+"""Whether partial structures stand: verdicts with proofs, margins, and what fails first.
 
-An assembly of blocks is assessed with the mortar in its joints; a solver's word is never enough:
+An assembly of blocks is assessed with the mortar in its joints. Every verdict is proven:
 
 >>> from seqopt.contact import DRY, EPOXY, step_assembly
 >>> from seqopt.network import build_network

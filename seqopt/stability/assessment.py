@@ -1,4 +1,4 @@
-"""Does an assembly stand, with what margins, and what goes first where it does not."""
+"""Whether an assembly stands, with what margins, and what fails first if it does not."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ STILL = 1e-6  # motion slower than this, beside the fastest, is none
 
 
 class Verdict(Enum):
-    """What is proven about an assembly; a solver that fails proves nothing."""
+    """What is proven about an assembly: it stands, it does not, or neither is proven."""
 
     STANDS = "stands"
     FALLS = "does not stand"
@@ -38,7 +38,7 @@ class Verdict(Enum):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Stability(FrozenValue):
-    """Verdict and margins of one assembly; a margin of which nothing is proven is NaN.
+    """Verdict and margins of one assembly; a margin that is not proven is NaN.
 
     Attributes
     ----------
@@ -272,7 +272,7 @@ def _grip(prove: Prover, fixed: Case) -> float:
 
 
 def first_to_fail(assembly: Assembly, motion: Floats) -> tuple[str, str]:
-    """Return what goes first in a motion.
+    """Return what fails first in a motion.
 
     Parameters
     ----------

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from importlib.metadata import entry_points
 
 from seqopt.arrays import Floats
 from seqopt.contact.assembly import Assembly
+from seqopt.plugins import plugins
 from seqopt.stability.limit_analysis import Answer, Case
 
 Enough = Callable[[Answer], bool]
@@ -35,6 +35,6 @@ def compile_held(assembly: Assembly, case: Case) -> HeldProgram:
     -------
     HeldProgram
     """
-    (entry,) = entry_points(group="seqopt.limit_analysis", name="lp")
+    entry = plugins("seqopt.limit_analysis")["lp"]
     compiled: CompileHeld = entry.load()
     return compiled(assembly, case)

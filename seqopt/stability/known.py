@@ -26,7 +26,7 @@ from seqopt.stability.limit_analysis import (
 )
 
 TIGHT = 1e-8  # largest violation of forces that prove, over the force scale and max(1, z)
-IDLE = 1e-10  # a grip's force that is none, over the force scale
+IDLE = 1e-10  # a grip's force treated as zero, over the force scale
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -18,16 +18,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
-from importlib.metadata import entry_points
 
 import numpy as np
 
 from seqopt.arrays import Floats, FrozenValue, Vector
 from seqopt.contact.assembly import Assembly
+from seqopt.plugins import plugins
 
 EXACT = 1e-6  # largest violation of an accepted proof, over the force scale and max(1, z)
 GAP = 1e-3  # largest difference between the two proofs, relative to max(1, z)
-ROUNDING = 1e-12  # work in a motion that is none, over the largest entry of the motion
+ROUNDING = 1e-12  # work in a motion treated as zero, over the largest entry of the motion
 LARGEST_FORCE = 10.0  # of a corner, over total weight and payloads: prices motions that violate
 CAP = 1e5  # z is sought between 0 and this
 
@@ -115,7 +115,7 @@ def compile_equilibrium(assembly: Assembly) -> Program:
     -------
     Program
     """
-    (entry,) = entry_points(group="seqopt.limit_analysis", name="socp")
+    entry = plugins("seqopt.limit_analysis")["socp"]
     compiled: Compile = entry.load()
     return compiled(assembly)
 

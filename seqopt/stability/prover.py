@@ -1,4 +1,4 @@
-"""Cases of one assembly, solved and proven: a solver's word counts for nothing here."""
+"""Cases of one assembly, solved and proven without trusting the solver."""
 
 from __future__ import annotations
 

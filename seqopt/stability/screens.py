@@ -1,4 +1,4 @@
-"""Which grip sets of a half-built structure stand: many at a time, most of them unsolved.
+"""Which grip sets of a partial structure stand: many at a time, most without a solver.
 
 A set stands if forces are found that hold it, and falls if a motion is found in which it falls:
 either is checked by the structure's own data (`seqopt.stability.known`), with the friction cone and

@@ -62,7 +62,7 @@ def assess_steps(
 
 
 def stability_table(steps: Sequence[Step], results: Sequence[Stability]) -> pd.DataFrame:
-    """Return a row per step; an empty cell is a number that is not proven.
+    """Return one row per step; an empty cell is a number that is not proven.
 
     Parameters
     ----------

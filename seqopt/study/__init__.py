@@ -1,6 +1,6 @@
-"""What Bruun et al. printed: their robots, criteria, tables and three-robot plan.
+"""What Bruun et al. published: their robots, criteria, tables and three-robot plan.
 
-The paper is arXiv 2104.04856. No other room knows a number of theirs.
+The paper is arXiv 2104.04856. No other part of seqopt uses numbers from it.
 
 >>> from seqopt.engines.registry import make_engine
 >>> from seqopt.network.build import build_network

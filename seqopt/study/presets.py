@@ -1,4 +1,4 @@
-"""What Bruun et al. give numbers for: their robots, beds, criteria and scales."""
+"""Presets with the numbers of Bruun et al.: robots, joint stiffness, criteria and scales."""
 
 from __future__ import annotations
 

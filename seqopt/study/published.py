@@ -31,7 +31,7 @@ IRREGULARITIES = (
     "The average T_max of the sequential method is printed as 38.0 N; all 49 rows give 36.7 N. "
     "Those of the cantilever method leave out steps 1 to 4.",
 )
-"""What does not add up in the paper's own numbers, a sentence each."""
+"""Inconsistencies in the paper's own numbers, one sentence each."""
 
 PUBLISHED = "published"  # the name of the printed three-robot plan, where methods are listed
 PRINTED_COLUMN = {

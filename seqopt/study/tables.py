@@ -58,7 +58,7 @@ def printed_steps(method: str) -> pd.DataFrame:
         If the method is none of these.
     """
     if method not in STEP_TABLES:
-        raise KeyError(f"printed table of {method!r}: there is none; give {', '.join(STEP_TABLES)}")
+        raise KeyError(f"printed table of {method!r} does not exist; give {', '.join(STEP_TABLES)}")
     table = printed(STEP_TABLES[method])
     if method == "cantilever":
         table.loc[table["step"] == 9, "bricks"] = 5

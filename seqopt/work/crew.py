@@ -1,4 +1,4 @@
-"""Who works: processes of our own, or the executor of a caller."""
+"""Workers: processes of our own, or an executor of the caller."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ UNKNOWN = 16  # workers of an executor that does not say how many it has
 
 
 class Crew(Protocol):
-    """Who works on tasks."""
+    """Workers that work on tasks."""
 
     @property
     def workers(self) -> int:
@@ -103,7 +103,7 @@ class Given:
 
 @contextmanager
 def hire(executor: Executor | None = None, workers: int = 1) -> Iterator[Crew | None]:
-    """Have workers for a while.
+    """Hire workers for the duration of a with block.
 
     Parameters
     ----------

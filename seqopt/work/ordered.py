@@ -1,7 +1,7 @@
 """One function over many tasks; results in their order.
 
-Only so many tasks are under way at once that neither they nor their results pile up. What a task
-raises is raised for the first task that does, as in a loop.
+The number of tasks under way is limited, so that neither they nor their results pile up. What a
+task raises is raised for the first task that does, as in a loop.
 """
 
 from __future__ import annotations

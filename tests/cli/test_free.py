@@ -86,14 +86,14 @@ def test_the_sturdiest_plan_is_in_degrees(capsys, tmp_path, arch):
     ("words", "status", "said"),
     [
         (["--rule", "newest=never"], 2, "rule newest: 'never'; give one of either"),
-        (["--rule", "speed=2"], 2, "--rule speed=2: there is no such; give one of newest"),
+        (["--rule", "speed=2"], 2, "--rule speed=2 does not exist; give one of newest"),
         (["--rule", "regrips=few"], 2, "rule regrips: 'few'"),
-        (["--aim", "speed"], 2, "aim 'speed': there is no such"),
+        (["--aim", "speed"], 2, "aim 'speed' does not exist"),
         (["--robots", "7"], 2, "7 robots: the free schedule takes two to 5"),
-        (["--robots", "rob9,rob1"], 2, "robot 'rob9': there is no such"),
+        (["--robots", "rob9,rob1"], 2, "robot 'rob9' does not exist"),
         (["--option", "width=0"], 2, "--option width=0: '0' is not a positive number"),
-        (["--option", "speed=1"], 2, "--option speed=1: there is no such; give one of width"),
-        (["--formulation", "minimax"], 2, "no formulation of the free schedule"),
+        (["--option", "speed=1"], 2, "--option speed=1 does not exist; give one of width"),
+        (["--formulation", "minimax"], 2, "not a formulation of the free schedule"),
         (["--criteria", "equations-2-3"], 2, "it ranks the choices of a move"),
         (["--tilt", "3"], 2, "--tilt: it goes with --stands"),
         (["--stands", "jelly"], 2, "mortar 'jelly': give a Mortar, or one of epoxy, dry"),
@@ -101,7 +101,7 @@ def test_the_sturdiest_plan_is_in_degrees(capsys, tmp_path, arch):
         (["--stands", "dry", "--rule", "payload=ignored"], 2, "holds up anything"),
         (["--aim", "minmax,tilt"], 2, "name bond, friction and tilt before all others"),
         (["--stands", "bond=1e-9", "--friction", "0.01"], 3, "a bond of "),
-        (["--limit", "F_largest=1"], 3, "a way opens with F_largest="),
+        (["--limit", "F_largest=1"], 3, "it becomes possible with F_largest="),
     ],
 )
 def test_what_is_wrong_gets_one_line(capsys, tmp_path, arch, words, status, said):

@@ -61,7 +61,7 @@ def test_a_pipe_is_no_input(capsys, tmp_path):
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
     for words in (("scene", pipe), ("analyze", "--plan", pipe), ("scene", "/dev/zero")):
-        assert "it is no regular file" in refused(capsys, *words)
+        assert "it is not a regular file" in refused(capsys, *words)
 
 
 def test_a_failure_makes_no_folder(capsys, tmp_path):

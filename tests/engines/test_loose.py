@@ -24,10 +24,10 @@ from seqopt.engines.rigid.ldlt import solve_positive
 from seqopt.engines.rigid.loose import hold_loose
 from seqopt.engines.rigid.mechanism import require_resistance
 from seqopt.engines.rigid.mixed import solve_mixed
-from seqopt.engines.rigid.mixed_system import ungripped_system
 from seqopt.engines.rigid.operator import OperatorBuilder
 from seqopt.engines.rigid.refinement import Corrector, Refinement
 from seqopt.engines.rigid.spanning_tree import grow_tree
+from seqopt.engines.rigid.ungripped import ungripped_system
 from seqopt.errors import MechanismError, SolverError
 from seqopt.network.build import build_network
 from seqopt.placement.problem import pose

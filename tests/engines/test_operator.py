@@ -17,9 +17,9 @@ from seqopt.engines.rigid.grip_equations import grip_forces, share_pairs, still_
 from seqopt.engines.rigid.held_operator import held_operator
 from seqopt.engines.rigid.loads import load_matrix
 from seqopt.engines.rigid.loose import hold_loose
-from seqopt.engines.rigid.mixed_system import ungripped_system
 from seqopt.engines.rigid.operator import OperatorBuilder
 from seqopt.engines.rigid.spanning_tree import grow_tree
+from seqopt.engines.rigid.ungripped import ungripped_system
 from seqopt.network.build import build_network
 from seqopt.scene.arch import ArchShape, arch_scene
 from tests.builders import (

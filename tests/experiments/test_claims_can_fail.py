@@ -21,6 +21,7 @@ from experiments.engines import (
     fidelity_ladder,
     frame_contrast,
     parallel,
+    partial_structures,
 )
 from experiments.exchange import outside_assemblies
 from experiments.harness.catalog import claims
@@ -161,6 +162,11 @@ def checks() -> dict[str, tuple[Check, Tables, Callable[..., Iterator[tuple[Any,
             spoil_counterparts,
         ),
         "parallel": (parallel.holds, (rows("parallel"),), spoil_parallel),
+        "partial_structures": (
+            partial_structures.holds,
+            (rows("partial_structures"),),
+            spoil_partial,
+        ),
         "peers": (peers.judge, tuple(parts), spoil_peers),
         "program_shapes": (program_shapes.holds, (rows("program_shapes"),), spoil_shapes),
         "robust_placement": (
@@ -342,6 +348,12 @@ def spoil_contrast(table):
     ),)  # fmt: skip
     flat = table.assign(**dict.fromkeys(frame_contrast.FIELDS, 1e-07), refused=0)
     yield (flat,)  # no contrast is better than another
+
+
+def spoil_partial(table):
+    yield (spoiled(table, "difference", 2e-9, scene="vault338", method="sequential"),)
+    yield (spoiled(table, "states", 12, scene="dome163", method="sequential"),)  # some left out
+    yield (table[table["scene"] != "armadillo_cra"],)
 
 
 def spoil_shapes(table):

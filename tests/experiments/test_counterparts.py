@@ -46,7 +46,7 @@ def wrong_numbers(text, table):
         pairs = re.findall(r"; ([^;]+): printed (\S+), here (\S+?)[.;]?(?= |$)", said)
         right &= bool(pairs) or rows["error_pct"].max() == 0
         for name, *numbers in pairs:
-            named = rows["quantity"] + ", " + rows["at"] == name.removeprefix("worst ")
+            named = rows["quantity"] + ", " + rows["at"] == name.removeprefix("largest error in ")
             wanted = rows.loc[named, ["printed", "ours"]].to_numpy()[0]
             right &= [float(n) for n in numbers] == [float(f"{value:.4g}") for value in wanted]
         if not right:

@@ -73,7 +73,7 @@ def test_what_does_not_end_is_not_read(tmp_path, kind):
     found = []
 
     def read():
-        with pytest.raises(FileError, match="no regular file"):
+        with pytest.raises(FileError, match="not a regular file"):
             read_text(path)
         found.append(kind)
 
@@ -187,6 +187,6 @@ def test_nobody_sees_a_part_of_a_new_folder(tmp_path):
 def test_a_folder_that_cannot_be_is_refused_early(tmp_path):
     (tmp_path / "file").touch()
     require_folder(tmp_path / "new" / "out")
-    with pytest.raises(FileError, match="file is no folder"):
+    with pytest.raises(FileError, match="file is not a folder"):
         require_folder(tmp_path / "file" / "out")
     assert names(tmp_path) == ["file"]

@@ -330,7 +330,7 @@ def test_options_are_checked(problem25):
     ):
         with pytest.raises(ProblemError, match=named):
             ALL[name].solve(problem25, **options)
-    with pytest.raises(ProblemError, match="there is no such; give one of beam, cascade"):
+    with pytest.raises(ProblemError, match="does not exist; give one of beam, cascade"):
         find_formulation("simplex")
 
 

@@ -237,7 +237,7 @@ def test_a_solver_that_fails_never_calls_the_problem_infeasible(monkeypatch, nam
 @pytest.mark.parametrize("amount", [1e-9, 1.0, 1e9])
 def test_a_budget_that_cannot_be_met_is_named(name, amount):
     problem = capped(SMALL, np.random.default_rng(0), amount, -1.0)
-    with pytest.raises(InfeasibleError, match="any takes at least 0 of 'use', more than -"):
+    with pytest.raises(InfeasibleError, match="every choice uses at least 0 of 'use', more than -"):
         ALL[name].solve(problem)
 
 

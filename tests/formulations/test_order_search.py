@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from itertools import permutations
 
@@ -17,8 +18,11 @@ from seqopt.placement.free_problem import pose_free
 from seqopt.placement.order_bound import whole_bound
 from seqopt.placement.order_plan import solve_order
 from seqopt.placement.order_problem import OrderProblem
+from seqopt.placement.order_work import trying
+from seqopt.placement.own_criterion import StepCost
 from seqopt.placement.schedule_formulation import find_schedule_formulation
 from seqopt.placement.solving import solve
+from seqopt.responses.resources import Resources
 from seqopt.scene.library.wall import WallShape, wall
 from seqopt.sequence.free_rules import FreeRules
 from tests.builders import small_arch
@@ -98,6 +102,28 @@ def test_a_heuristic_order_is_on_the_right_side(seed):
     assert tried.summary()["order_status"] == tried.status
 
 
+@pytest.mark.parametrize("hired", [pytest.param(None, marks=pytest.mark.slow), "threads"])
+def test_who_tries_orders_changes_nothing(hired):
+    """Two processes of our own, or two threads of an executor."""
+    problem = posed(small_arch(6), aim="F_largest")
+    alone = solve_order(problem, FORMULATION, most=6, tries=25)
+    with ThreadPoolExecutor(2) as executor:
+        means = Resources(workers=2, executor=executor if hired else None)
+        shared = solve_order(problem, FORMULATION, most=6, tries=25, resources=means)
+    assert alone.order != problem.scene.build_order  # something was found
+    assert shared.selection == alone.selection
+
+
+def test_a_criterion_that_cannot_be_sent_is_named():
+    free = posed(small_arch(5)).free
+    own = replace(
+        free, criterion=StepCost("mine", ("F_largest",), lambda found, _: found["F_largest"])
+    )
+    with pytest.raises(ProblemError, match="criterion mine: it cannot be sent"):
+        trying(OrderProblem(own), elsewhere=True)
+    assert callable(trying(OrderProblem(own), elsewhere=False))
+
+
 def test_the_aims_after_the_first_are_those_of_the_plan():
     found = solve_order(posed(small_arch(5), aim="T_max,steps"), FORMULATION)
     assert found.plan.certificate.gap == 0
@@ -124,13 +150,13 @@ def test_an_order_that_the_check_refuses_is_seen():
     problem = posed(small_arch(4))
     found = solve_order(problem, FORMULATION)
     for change, said in (
-        ({"objective": 0.9 * found.selection.objective}, "the order is worth"),
+        ({"objective": 0.9 * found.selection.objective}, "the value of the order is"),
         ({"bound": 1.1 * found.selection.objective}, "and a bound of"),
         ({"order": (2, 1, 3, 4)}, "places a brick that nothing ties"),
         ({"order": (1, 2, 3)}, "1 bricks are missing"),
     ):
         claimed = replace(found.selection, **change)
-        liar = replace(FORMULATION, solve=lambda _, claimed=claimed: claimed)
+        liar = replace(FORMULATION, solve=lambda *_, claimed=claimed, **more: claimed)
         with pytest.raises((SolverError, seqopt.SeqoptError), match=said):
             solve_order(problem, liar)
 

@@ -353,11 +353,13 @@ def test_travel_is_that_of_the_steps():
 @pytest.mark.slow
 def test_refusals_name_the_brick_and_what_opens_a_way(arch, engine25):
     two = FreeRules(robots=("rob1", "rob2"))
-    said = r"brick 3 \(3 of 25\) is never placed; a way opens with least_grips=1 together with"
+    said = (
+        r"brick 3 \(3 of 25\) is never placed; it becomes possible with least_grips=1 together with"
+    )
     with pytest.raises(InfeasibleError, match=said):
         seqopt.solve(replace(arch, rules=two), "schedule_search")
     tight = pose_free(engine25, FreeRules(), ONES, "steps", [Limit("F_largest", 200.0)])
-    with pytest.raises(InfeasibleError, match=r"F_largest=216\.005 in the place of 200"):
+    with pytest.raises(InfeasibleError, match=r"F_largest=216\.005 instead of 200"):
         seqopt.solve(tight, "schedule_search")
     enough = [Limit("F_largest", 216.006)]
     assert seqopt.solve(replace(tight, limits=tuple(enough)), "schedule_search").steps
@@ -419,12 +421,12 @@ def test_the_short_cut_does_what_the_long_way_does():
     ("words", "said"),
     [
         ({"criterion": "equations-2-3"}, "equations-2-3: it ranks the choices of a move"),
-        ({"formulation": "overlap_dp"}, "'overlap_dp' is no formulation of the free schedule"),
+        ({"formulation": "overlap_dp"}, "'overlap_dp' is not a formulation of the free schedule"),
         ({"formulation": "pareto_zones"}, "one plan is asked for; use schedule_search"),
         ({"workers": 2}, "option workers: the free schedule has no such"),
         ({"rules": {"regrips": 0}}, "rules {'regrips': 0}: give a seqopt.FreeRules"),
         ({"robots": 9}, "9 robots: the free schedule takes two to 5"),
-        ({"robots": "rob9"}, "robot 'rob9': there is no such; give some of rob1"),
+        ({"robots": "rob9"}, "robot 'rob9' does not exist; give some of rob1"),
         ({"width": 3, "depth": 1}, "option depth: schedule_search has width"),
         ({"schedule": "loop", "aim": "steps"}, "option aim: only the free schedule has it"),
     ],
@@ -438,6 +440,6 @@ def test_the_short_cut_says_in_a_line_what_does_not_fit(words, said):
 def test_formulations_are_found_by_name():
     assert find_schedule_formulation("pareto_zones", Finds.FRONT).kind.value == "exact"
     with pytest.raises(
-        ProblemError, match=r"no formulation of the free schedule; give .*pareto_zones"
+        ProblemError, match=r"not a formulation of the free schedule; give .*pareto_zones"
     ):
         find_schedule_formulation("overlap_dp")

@@ -184,7 +184,7 @@ def test_a_bond_that_opens_a_way_is_named():
     rules = FreeRules(robots=("rob1", "rob2"), least_grips=0)
     problem = pose_free(engine, rules, ONES, "minmax", stands=Standing("dry", 0.0))
     problem = replace(problem, standing=Standing(replace(DRY, friction=0.05)))
-    with pytest.raises(InfeasibleError, match=r"a way opens with .*a bond of [\d.e+]+ Pa"):
+    with pytest.raises(InfeasibleError, match=r"it becomes possible with .*a bond of [\d.e+]+ Pa"):
         seqopt.solve(problem, "schedule_search")
 
 

@@ -92,7 +92,7 @@ def test_few_labels_stop_with_a_bound(problem25):
     assert few.selection.end is End.STOPPED or few.selection.bound == few.selection.objective
     assert few.certificate.claimed_gap < 0.02
     tight = replace(capped, budgets=(*capped.budgets, travel(problem25, 10.9)))
-    with pytest.raises(SolverError, match="before any choice within all budgets was met"):
+    with pytest.raises(SolverError, match="before any choice within all budgets was found"):
         solve(tight, "labels", most=1, time_limit=0)
 
 

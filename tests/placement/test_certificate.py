@@ -252,5 +252,7 @@ def test_who_promises_the_optimum_reaches_it(kind, bounds, excess, kept):
         gap = judge(CostProblem(costs, budgets), given_up, formulation).gap
         assert gap == pytest.approx(excess, rel=1e-6)
     else:
-        with pytest.raises(SolverError, match="own promises the optimum 1, but its choice"):
+        with pytest.raises(
+            SolverError, match="own promises the optimum 1, but the value of its choice"
+        ):
             judge(CostProblem(costs, budgets), given_up, formulation)

@@ -94,7 +94,7 @@ def test_states_of_no_free_schedule_are_refused(plan):
 
 
 def test_problems_go_to_their_own_formulations(plan):
-    with pytest.raises(ProblemError, match="no formulation of the free schedule"):
+    with pytest.raises(ProblemError, match="not a formulation of the free schedule"):
         solve(plan.problem, "minimax")
     with pytest.raises(ProblemError, match="a free schedule has no moves to choose"):
         solve(plan.problem, seqopt.formulations()["minimax"])
@@ -111,8 +111,8 @@ def test_problems_go_to_their_own_formulations(plan):
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        ({"goals": "fast"}, "aim 'fast': there is no such"),
-        ({"goals": "steps,steps"}, "aim steps: it stands there twice"),
+        ({"goals": "fast"}, "aim 'fast' does not exist"),
+        ({"goals": "steps,steps"}, "aim steps: it is listed twice"),
         ({"goals": ()}, "give goals, or their names"),
         ({"limits": [Limit("F_move", 3.0)]}, "a state of a free schedule has no F_move"),
         ({"criterion": seqopt.CRITERIA["equations-2-3"]}, "it ranks the choices of a move"),

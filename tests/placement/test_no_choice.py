@@ -134,7 +134,7 @@ class Entry:
     [(ImportError("no package"), "cannot be loaded: ImportError: no package"), (3, "is a int")],
 )
 def test_a_registered_formulation_that_is_none_is_named(monkeypatch, thing, said):
-    monkeypatch.setattr(registry, "entry_points", lambda **_: [Entry(thing)])
+    monkeypatch.setattr(registry, "plugins", lambda _: {"odd": Entry(thing)})
     with pytest.raises(ProblemError, match=f"'odd': package:THING {said}"):
         find_formulation("odd")
 

@@ -103,7 +103,7 @@ def test_what_is_no_function_is_refused():
         StepCost("wrong", NAMES, 3.0)
     with pytest.raises(ProblemError, match="give names of responses"):
         StepCost("wrong", "T_max", weighed)
-    with pytest.raises(ProblemError, match="response X_max: there is no such"):
+    with pytest.raises(ProblemError, match="response X_max does not exist"):
         posed(StepCost("wrong", ("X_max",), weighed))
 
 

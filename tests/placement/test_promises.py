@@ -25,7 +25,7 @@ def test_a_limit_that_a_fixed_step_exceeds_is_infeasible(arch25):
     """The first two steps of the loop have no open grip: nothing can be chosen there."""
     with pytest.raises(InfeasibleError, match=r"F_largest is up to .* of 20 \(steps? 1"):
         seqopt.optimize(arch25, limits=[seqopt.Limit("F_largest", 20.0)])
-    with pytest.raises(InfeasibleError, match="nothing is left to choose"):
+    with pytest.raises(InfeasibleError, match="no grip is left to choose"):
         seqopt.optimize(
             arch25, "modified-sequential", formulation="cascade", proof=False,
             limits=payload_limits(weak(arch25, 150.0)),

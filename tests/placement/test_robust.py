@@ -332,7 +332,7 @@ def test_what_is_no_problem_is_refused():
         robust(problem, [], WORST_PEAK)
     with pytest.raises(ProblemError, match="give a problem of"):
         robust(problem, drawn, "worst-peak")
-    with pytest.raises(ProblemError, match="is no scene"):
+    with pytest.raises(ProblemError, match="is not a scene"):
         robust(problem, [scene, None], WORST_PEAK)
     with pytest.raises(ProblemError, match="scenario 1: it has other bricks"):
         robust(problem, [small_arch(4)], WORST_PEAK)
@@ -343,5 +343,5 @@ def test_what_is_no_problem_is_refused():
     capped = replace(problem, budgets=(travel(problem, math.inf),))
     with pytest.raises(ProblemError, match="take no budgets"):
         robust(capped, drawn, WORST_PEAK)
-    with pytest.raises(ProblemError, match="is no kind"):
+    with pytest.raises(ProblemError, match="is not a kind"):
         RobustAim("worst-peak")

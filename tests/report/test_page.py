@@ -12,6 +12,7 @@ import subprocess
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from seqopt.cli.main import main
@@ -21,7 +22,7 @@ from seqopt.files import csv_text
 from seqopt.network.build import build_network
 from seqopt.report import page
 from seqopt.report.page import report_page
-from seqopt.report.page_data import LARGEST, Build, build_data, structure_data
+from seqopt.report.page_data import LARGEST, Build, Scatter, build_data, structure_data
 from seqopt.responses.table import analyze
 from seqopt.scene.blocks import block_brick
 from seqopt.scene.face_joints import face_ground, flat_face
@@ -77,6 +78,24 @@ def test_what_is_drawn_is_what_the_engine_answers(engine25, builds):
         ):
             assert np.abs(found[: len(exact)] - exact).max() <= np.abs(exact).max() / LARGEST
             assert not found[len(exact) :].any()  # bricks that are not there yet
+
+
+def test_reactions_are_those_of_the_table(engine25, builds):
+    build = builds["cantilever"]
+    data = build_data(engine25, build)
+    for name, column in (("push", "F_sup_N"), ("turn", "M_sup_Nm")):
+        found = unpacked(data[name], len(build.steps)).reshape(len(build.steps), -1, 3)
+        sizes = np.linalg.norm(found, axis=2).max(axis=1)
+        np.testing.assert_allclose(sizes, build.table[column].abs(), rtol=3 / LARGEST)
+
+
+def test_a_point_for_each_build(engine25, builds):
+    points = pd.DataFrame({"time, s": [1.0, np.nan], "gap, %": [2, 3]}, index=[*builds])
+    page = report_page(engine25, [*builds.values()], "", (), Scatter("both", points, ["time, s"]))
+    found = data_of(page)["scatter"]
+    assert found["builds"] == [*builds]
+    assert found["values"] == {"time, s": [1.0, None], "gap, %": [2.0, 3.0]}
+    assert data_of(report_page(engine25, [*builds.values()], ""))["scatter"] is None
 
 
 def test_the_structure_is_that_of_the_network(engine25):
@@ -194,6 +213,58 @@ def test_a_browser_shows_the_numbers_of_the_step_that_is_asked_for(
     broken = path.read_text("utf-8").replace('"steps":[', '"step":[')
     path.write_text(broken, "utf-8")
     assert 'data-ready="true"' not in shown(path)[0]  # the control
+
+
+LOOK = """<script>
+const light = (color) => {
+  const [r, g, b] = color.match(/[\\d.]+/g).slice(0, 3).map((v) => v / 255)
+    .map((v) => (v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4));
+  return 0.2126 * r + 0.7152 * g + 0.0722 * b;
+};
+const behind = (e) => {
+  for (; e; e = e.parentElement) {
+    const color = getComputedStyle(e).backgroundColor;
+    if (!/rgba\\(.*, 0\\)|transparent/.test(color)) return color;
+  }
+  return "rgb(255, 255, 255)";
+};
+const timer = setInterval(() => {
+  if (document.body.dataset.ready !== "true") return;
+  clearInterval(timer);
+  const point = document.querySelectorAll("circle.point")[1];
+  point.focus();
+  point.dispatchEvent(new KeyboardEvent("keydown", { key: "Enter", bubbles: true }));
+  const told = [...document.querySelectorAll("body *")].filter((e) =>
+    e.checkVisibility() && [...e.childNodes].some((n) => n.nodeType === 3 && n.data.trim()));
+  const ratios = told.map((e) => {
+    const style = getComputedStyle(e), own = e instanceof SVGElement ? style.fill : style.color;
+    const [dark, pale] = [light(own), light(behind(e))].sort((a, b) => a - b);
+    return (pale + 0.05) / (dark + 0.05);
+  });
+  document.body.dataset.contrast = Math.min(...ratios).toFixed(2);
+  document.body.dataset.texts = ratios.length;
+}, 50);
+</script>"""
+
+
+@pytest.mark.slow
+@browser
+def test_a_point_shows_its_build_and_words_stand_out(engine25, builds, shown, tmp_path):
+    points = pd.DataFrame({"time, s": [1.0, 2.0], "gap, %": [2, 3]}, index=[*builds])
+    scatter = Scatter("both", points)
+    text = report_page(engine25, list(builds.values()), "Two ways.", (), scatter)
+    path, pale = tmp_path / "report.html", tmp_path / "pale.html"
+    path.write_text(text.replace("</body>", f"{LOOK}</body>"), "utf-8")
+    found, errors = shown(path, "step=12&build=sequential")
+    assert errors == []
+    assert "cantilever, step 12 of 49" in found  # the second point was chosen by its key
+    contrast, told = (re.search(f'data-{n}="([0-9.]+)"', found)[1] for n in ("contrast", "texts"))
+    assert float(contrast) >= 4.5
+    assert int(told) > 60
+    faint = text.replace("--soft: #595959", "--soft: #999999")
+    pale.write_text(faint.replace("</body>", f"{LOOK}</body>"), "utf-8")
+    low = re.search('data-contrast="([0-9.]+)"', shown(pale)[0])[1]
+    assert float(low) < 4.5  # the control
 
 
 def test_blocks_of_any_shape_are_drawn_as_they_are():

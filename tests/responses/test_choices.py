@@ -51,7 +51,7 @@ def test_states_hold_the_responses_of_their_steps(engine25, method):
 
 
 def test_unknown_responses_are_refused(engine25, loop25):
-    with pytest.raises(ProblemError, match="response F_rob9: there is no such; give C_max, D_max"):
+    with pytest.raises(ProblemError, match="response F_rob9 does not exist; give C_max, D_max"):
         pose(engine25, loop25, RankSum("x", equal("F_rob9"), equal("F_rob9")))
 
 

@@ -77,7 +77,7 @@ def test_triangles_make_the_face_that_they_are_parts_of():
 def test_what_cannot_touch_is_one_line():
     with pytest.raises(SceneError, match="gap is 'x'; give a positive number"):
         touching_faces([box((1, 1, 1))], "x")
-    with pytest.raises(SceneError, match="shapes: 3 is none; give each as Polyhedron"):
+    with pytest.raises(SceneError, match="shapes: 3 is not a shape; give each as Polyhedron"):
         touching_faces([3], GAP)
     with pytest.raises(SceneError, match="a face has no area"):
         flat_face([[0, 0, 0], [1, 0, 0], [2, 0, 0]])

@@ -112,7 +112,7 @@ def reshaped(change):
 def test_a_malformed_shape_gets_one_clear_line(change, named):
     if not named:  # a joint without its face is a scene, but no contact follows from the shapes
         scene = parse_scene(reshaped(change))
-        with pytest.raises(SceneError, match="is no box and the joint has no face"):
+        with pytest.raises(SceneError, match="is not a box and the joint has no face"):
             bare_assembly(build_network(scene), len(scene.bricks))
         return
     with pytest.raises(SceneError, match=named) as caught:

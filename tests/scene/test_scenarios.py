@@ -134,7 +134,7 @@ def test_scenarios_are_frozen_and_say_how_they_were_drawn():
         ({"density": -0.1}, "density is"),
         ({"position": math.nan}, "position is nan; give a number from 0"),
         ({"position": "2 mm"}, "position is"),
-        ({"position": 1e20}, "scenario 1 of .* is no valid scene"),
+        ({"position": 1e20}, "scenario 1 of .* is not a valid scene"),
         ({"count": 0}, "count is 0; give a whole number from 1"),
         ({"count": 2.5}, "count is"),
         ({"seed": -1}, "seed is"),

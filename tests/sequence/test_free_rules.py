@@ -39,7 +39,7 @@ def test_wrong_rules_get_one_line(rules, said):
 @pytest.mark.parametrize(
     ("rules", "said"),
     [
-        ({"robots": ("rob9", "rob1")}, "robot 'rob9': there is no such"),
+        ({"robots": ("rob9", "rob1")}, "robot 'rob9' does not exist"),
         ({"robots": ("rob1",)}, "1 robots take part; name two to 5"),
         ({"least_grips": 4}, "rule least_grips: 4 grips of 3 robots; give at most 3"),
         ({"robots": ("rob1", "rob2"), "placers": ("rob3",)}, "rule placers: rob3 takes no part"),

@@ -67,7 +67,7 @@ def edited(plan, number, **changes):
         (4, {"grips": (None, 2, 2)}, "step 4: rob3 at node 2: rob2 holds it"),
         (9, {"grips": (7, 8, None)}, "step 9: rob2 at node 8: the node is out of its reach"),
         (4, {"grips": (1, 2, 4)}, r"step 4 \(release\): it takes grips \[\] and drops \[\]"),
-        (4, {"grips": (None, 1, 4)}, "step 4 .*: rob2 goes from node 2 to 1"),
+        (4, {"grips": (None, 1, 4)}, "step 4 .*: rob2 moves from node 2 to 1"),
         (4, {"kind": StepKind.PLACE}, r"step 4 \(place\): 3 bricks after 3; give 4"),
         (5, {"kind": StepKind.RELEASE}, r"step 5 \(release\): 4 bricks after 3; give 3"),
         (5, {"grips": (1, 2, 4)}, r"step 5 \(place\): its new grip is on node 1; hold brick 4"),

@@ -21,7 +21,7 @@ HEADER = "step,type,bricks,rob1_brick,rob1_node,rob2_brick,rob2_node,rob3_brick,
         (HEADER + "1,place,one,1,1,,,,\n", "line 2: bricks is 'one'"),
         (HEADER + "1,place,1,1,a,,,,\n", "line 2: rob1_node is 'a'"),
         (HEADER + "1,place,1,2,1,,,,\n", "rob1 holds node 1 of brick 2; it is on brick 1"),
-        (HEADER + "2,place,1,1,1,,,,\n", "step 2 stands where 1 should"),
+        (HEADER + "2,place,1,1,1,,,,\n", "step 2 should be 1"),
         (HEADER + "1,place\n", "line 2: bricks is ''"),
     ],
 )
@@ -45,12 +45,12 @@ HEAD = "step,type,bricks,rob1_node,rob2_node,rob3_node\n"
 @pytest.mark.parametrize(
     ("text", "named"),
     [
-        (HEAD + "1,place,1," + "1" * 131_073 + ",,\n", "no CSV that can be read: field larger"),
-        ("x" * 200_000, "no CSV that can be read: field larger"),
-        (HEAD.replace("\n", "\r") + "1,place,1,1,,\r", "no CSV that can be read: new-line"),
+        (HEAD + "1,place,1," + "1" * 131_073 + ",,\n", "not a readable CSV file: field larger"),
+        ("x" * 200_000, "not a readable CSV file: field larger"),
+        (HEAD.replace("\n", "\r") + "1,place,1,1,,\r", "not a readable CSV file: new-line"),
         (HEAD + "1,place,1," + "1" * 5000 + ",,\n", "rob1_node is '1111"),
         (HEAD + f"1,place,1,{10**400},,\n", "rob1_node is '1000"),
-        (HEAD.strip() + ",rob1_node\n1,place,1,1,,,4\n", "column rob1_node stands there twice"),
+        (HEAD.strip() + ",rob1_node\n1,place,1,1,,,4\n", "column rob1_node occurs twice"),
     ],
 )
 def test_what_is_no_table_of_steps_gets_one_line(arch25, text, named):

@@ -66,12 +66,12 @@ def test_spaces_and_other_columns_do_not_matter(arch25):
         (HEADER.replace("rob3", "rob1") + "1,place,1,1,,\n", "column rob3_node is missing"),
         (
             HEADER.replace("rob3_node", "rob3_node,rob1_node") + "1,place,1,1,,,\n",
-            "column rob1_node stands there twice",
+            "column rob1_node occurs twice",
         ),
         (HEADER + "1,put,1,1,,\n", "line 2: type is 'put'; give one of place"),
         (HEADER + "1,place,one,1,,\n", "line 2: bricks is 'one'; give a whole number"),
         (HEADER + "1,place,1,1,,,5\n", "line 2: it has more cells than there are columns"),
-        (HEADER + "2,place,1,1,,\n", "line 2: step 2 stands where 1 should"),
+        (HEADER + "2,place,1,1,,\n", "line 2: step 2 should be 1"),
         (START + "3,place,26,1,2,?\n", "line 4: step 3: 26 bricks; the scene has 1 to 25"),
         (START + "3,place,3,1,2,!\n", "line 4: rob3_node is '!'; give a node, \\? for an open"),
         (START + "3,place,3,1,2,?x\n", "line 4: rob3_node is '\\?x'; give a node"),
@@ -86,10 +86,10 @@ def test_spaces_and_other_columns_do_not_matter(arch25):
             START + "3,place,3,1,2,?1\n4,release,3,,2,?2\n",
             "line 5: rob3_node is '\\?2', but this is open grip \\?1: .* let rob3 release first",
         ),
-        (START + "3,place,3,1,?,4\n", "line 4: step 3 .*: rob2 goes from node 2 to \\?1; let it"),
+        (START + "3,place,3,1,?,4\n", "line 4: step 3 .*: rob2 moves from node 2 to \\?1; let it"),
         (
             START + "3,place,3,1,2,?\n4,release,3,,2,4\n",
-            "line 5: step 4 .*: rob3 goes from node \\?1 to 4; let it release first",
+            "line 5: step 4 .*: rob3 moves from node \\?1 to 4; let it release first",
         ),
         (
             START + "3,release,2,,2,\n4,reposition,2,?,2,?\n",
@@ -143,7 +143,9 @@ def test_schedules_are_found_by_name_file_and_value(engine25, loop25, tmp_path):
 
 def test_what_cannot_be_found_gets_one_line(engine25, loop25, tmp_path):
     network = engine25.network
-    with pytest.raises(StepError, match=r"schedule 'ring': .* three-robot, .*loop, or a CSV file"):
+    with pytest.raises(
+        StepError, match=r"schedule 'ring' does not exist; .* three-robot, .*loop, or a CSV file"
+    ):
         find_schedule(network, "ring")
     with pytest.raises(FileError, match=r"cannot read .*none.csv"):
         find_schedule(network, tmp_path / "none.csv")

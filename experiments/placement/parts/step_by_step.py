@@ -8,7 +8,7 @@ from typing import TypeVar
 import numpy as np
 
 from seqopt.engines.interface import Engine, Fields
-from seqopt.engines.rigid.mixed_system import Ungripped, ungripped_system
+from seqopt.engines.rigid.ungripped import Ungripped, ungripped_system
 from seqopt.network.network import Network
 from seqopt.responses.quantities import CHOSEN_BY, lengths
 from seqopt.responses.staged import Placing, StagedState, next_state, state_fields

@@ -28,21 +28,21 @@ TITLES = {
 INTRODUCTION = """\
 # Counterparts of the paper's figures and tables
 
-Every figure and table of the [paper](paper.md) that has numbers, and what seqopt gives in its
-place. `python -m experiments.study.paper_counterparts` computes all of it anew in a few seconds,
-draws the pictures and writes this page; `experiments/results/paper_counterparts.csv` holds every
-value. Photographs, sketches and definitions have no numbers. Where another experiment goes deeper,
-it is named too.
+This page lists every figure and table of the [paper](paper.md), and compares those that have
+numbers with what seqopt computes. Photographs, sketches and definitions have no numbers. `python
+-m experiments.study.paper_counterparts` computes everything again in a few seconds, draws the
+pictures and writes this page. All values are in `experiments/results/paper_counterparts.csv`.
+Where another experiment goes into more detail, the table names it too.
 
-The error is what exceeds the rounding of print, relative to the printed size or 1. An item *agrees*
-if every value is within 5 % of print, *agrees in part* if at least half are, and *disagrees*
-otherwise.
+The error is the difference from the printed value beyond its rounding, relative to the printed
+value or to 1. An item *agrees* if every value is within 5 % of print, *agrees in part* if at
+least half of the values are, and *disagrees* otherwise.
 
 """
 CONVENTIONS = """\
-In the CSV a grip is its node, no grip is -1, and an optimized grip O3 is 1003. Forces of robots and
-of the support, the first ground end, are compared by size, `T_pct` to within two edges. Figures and
-tables are numbered in the order of the paper's source.
+In the CSV file a grip is given by its node; -1 means no grip, and 1003 means the optimized grip O3.
+Forces of robots and of the support (the first ground end) are compared by magnitude, and `T_pct` to
+within two edges. Figures and tables are numbered in the order of the paper's source.
 
 """
 
@@ -70,7 +70,7 @@ def statement(item: Item, rows: pd.DataFrame) -> str:
     if error.max() == 0:
         return f"{count} within rounding."
     median = f", median error {float(f'{error.median():.2g}'):.10g} %" if len(rows) > 2 else ""
-    text = f"{count} within 5 %{median}; worst {beside(rows.loc[error.idxmax()])}"
+    text = f"{count} within 5 %{median}; largest error in {beside(rows.loc[error.idxmax()])}"
     if item.counted == STEPS:
         text += f"; of the responses alone {yardstick(rows)}"
     if item.key:

@@ -35,7 +35,7 @@ class Item:
     why : str
         Why the counterpart disagrees, or why there are no numbers.
     key : str
-        A quantity that its caption names beside the worst one.
+        A quantity that its caption gives in addition to the one with the largest error.
     counted : str
         What its values are.
     """
@@ -61,73 +61,75 @@ ITEMS = (
     Item("fig:full_vault", "Figure 1", "3.1", "the finished vault", why="photograph"),
     Item("fig:arch_vault", "Figure 2", "3.1", "vault and central arch with dimensions", "geometry",
          "calibration.identify_arch25",
-         why="Ours is what the bricks as identified from the responses take up."),
+         why="Our values are the dimensions of the bricks as identified from the responses."),
     Item("fig:2robot_traditional", "Figure 3", "3.1", "scaffolding on two sides", why="sketch"),
     Item("fig:doublecross", "Figure 4", "3.2.1", "the double-cross model",
          why="definition; drawn in `network.png`"),
     Item("table:exp_data", "Table 1", "3.2.2", "eight vault tests: dimensions", "vaults",
          "calibration.calibration",
-         why="These are inputs: ours are measured back from the modeled joints, r being the rise."),
+         why="These are inputs. Our values are measured from the modeled joints; r is the rise."),
     Item("fig:arch_test", "Figure 5", "3.2.2", "a vault test in general", why="sketch"),
     Item("fig:secant_stiff", "Figure 6", "3.2.2", "load and displacement of test 1, with secants",
          "vaults", "calibration.calibration",
-         why="Ours is the bed of springs fitted to all eight tests, which meets the measured "
-         "secant; the measured curve itself is in no table."),
+         why="Our model is the bed of springs fitted to all eight tests, which meets the measured "
+         "secant. The measured curve itself is not in any table."),
     Item("table:model_results", "Table 2", "3.2.2", "measured and calibrated stiffness", "vaults",
          "calibration.calibration",
-         why="Ours is another law, whose mean error over these tests was minimized; on tests left "
-         "out it is not shown to be closer. The paper's law with its printed values does not give "
-         "its column.", key="mean size of e_rel [%]"),
+         why="Our model uses another law, fitted to minimize the mean error over these tests. On "
+         "tests left out of the fit it is not shown to be closer. The paper's law with its "
+         "printed values does not reproduce the paper's column.", key="mean size of e_rel [%]"),
     Item("fig:3dec_image", "Figure 7", "3.2.3", "the discrete-element model", why="sketch"),
     Item("fig:3dec_image2", "Figure 8", "3.2.3", "displacements of blocks and of nodes", "discrete",
          "discrete.discrete_arches",
-         why="The displacements that it draws are not printed, only how many nodes are compared.",
+         why="The figure draws displacements but prints only how many nodes are compared.",
          counted="node counts (all that is printed)"),
     Item("table:validation_results", "Table 3", "3.2.3", "errors against discrete elements",
          "discrete", "discrete.discrete_arches",
-         why="No reading of the printed contacts comes near; ours is the printed stiffness with a "
-         "robot that holds a node."),
+         why="No interpretation of the printed contacts comes close. Our values use the printed "
+         "stiffness with a robot that holds a node."),
     Item("fig:2rob_methods", "Figure 9", "4", "both two-robot sequences at bricks 17 to 19",
          "sequences", parts=("fig:two_robot_methods",)),
     Item("table:sequential_twist", "Table 4", "4.1", "the eight twisting steps", "twisting",
          "stability.failing_steps"),
     Item("fig:sequential_twist", "Figure 10", "4.1", "lever arm; displaced shape at step 35",
          "twisting", "figures", ("fig:sequential_twist_offcenter", "fig:sequential_twist_35"),
-         why="The lever arm is support moment over robot force after the crown; the paper's own "
-         "columns leave its 135 ± 15 mm too."),
+         why="The lever arm is the support moment divided by the robot force after the crown. The "
+         "paper's own columns also leave its range of 135 ± 15 mm."),
     Item("table:cantilever_compare", "Table 5", "4.2", "both methods at the twisting steps",
          "twisting"),
     Item("fig:2robot_sequence1", "Figure 11", "4.2", "the cantilever method", why="photographs"),
     Item("table:2robot_tension", "Table 6", "4.2", "tension of the two-robot methods", "maxima",
-         why="Read as steps 1 to 25 before the crown; the cantilever method without steps 1 to 4."),
+         why="We take steps 1 to 25 as before the crown, and leave out steps 1 to 4 of the "
+         "cantilever method."),
     Item("table:2robot_forces", "Table 7", "4.3", "largest robot forces of the two-robot methods",
          "maxima"),
     Item("table:optimization1", "Table 8", "5.2.1", "the modified sequential method", "sequences",
-         why="The paper's count of bricks is one short in every row, against its Table A.1; "
-         "all grips agree."),
+         why="The paper's count of bricks is one less than in its Table A.1 in every row; all "
+         "grips agree."),
     Item("table:optimization2", "Table 9", "5.2.2", "the cascade of the three-robot method",
          "sequences"),
     Item("fig:fab_loop", "Figure 12", "5.2.2", "the four-step loop", why="sketch"),
     Item("fig:3rob_sequence", "Figure 13", "5.2.2", "one loop, steps 59 to 62", "loop",
          "study.criteria_variants", ("fig:3rob_58", "fig:3rob_59", "fig:3rob_60", "fig:3rob_61"),
-         why="The grips are the printed ones; as an optimum, O15 should take the first place."),
+         why="The grips are the printed ones. If it were the optimum, O15 would be in first "
+         "place."),
     Item("table:optimization_results", "Table 10", "5.3", "largest responses of three methods",
          "maxima", "figures",
-         why="Printed is the second largest displacement of the plan, that of step 88; Table B.1 "
-         "has 27.9 at step 86."),
+         why="The printed value is the second largest displacement of the plan, at step 88; "
+         "Table B.1 has 27.9 at step 86."),
     Item("table:experimental_data1", "Table A.1", "A", "the sequential method, step by step",
          "sequential", "figures",
-         why="What is off is explained [there](paper.md#where-it-disagrees).",
+         why="[Where it disagrees](paper.md#where-it-disagrees) explains the differences.",
          counted=STEPS),
     Item("table:experimental_data2", "Table A.2", "A", "the cantilever method, step by step",
          "cantilever", "figures",
-         why="What is off is explained [there](paper.md#where-it-disagrees).",
+         why="[Where it disagrees](paper.md#where-it-disagrees) explains the differences.",
          counted=STEPS),
     Item("table:experimental_data3", "Table B.1", "B", "the three-robot plan, step by step",
          "plan", "study.criteria_variants",
          why="Its responses took no part in the identification of the arch. The schedule is the "
-         "loop's; its chosen nodes do not follow from the printed equations. What is off is "
-         "explained [there](paper.md#where-it-disagrees).",
+         "loop's; its chosen nodes do not follow from the printed equations. "
+         "[Where it disagrees](paper.md#where-it-disagrees) explains the differences.",
          counted=STEPS),
 )  # fmt: skip
 

@@ -85,11 +85,37 @@
         foot.quaternion.setFromUnitVectors(new THREE.Vector3(0, 1, 0), new THREE.Vector3(...structure.up));
         this.scene.add(foot);
       }
+      this.arrows = structure.grounds.map((ground) => {
+        const arrow = new THREE.Group(), paint = new THREE.MeshBasicMaterial({ color: 0x222222, depthTest: false, transparent: true });
+        const shaft = new THREE.Mesh(new THREE.CylinderGeometry(1, 1, 1, 8), paint), head = new THREE.Mesh(new THREE.ConeGeometry(1, 1, 12), paint);
+        arrow.add(shaft, head);
+        arrow.position.set(...ground.at);
+        arrow.renderOrder = shaft.renderOrder = head.renderOrder = 4;
+        arrow.visible = false;
+        this.scene.add(arrow);
+        return arrow;
+      });
+    }
+    // an arrow ends where its ground end pushes
+    showReactions(build, s, shown) {
+      const forces = this.arrows.map((_, g) => new THREE.Vector3(...[0, 1, 2].map((k) => value(build.push, s, 3 * g + k))));
+      const most = Math.max(1e-30, ...forces.map((force) => force.length()));
+      this.arrows.forEach((arrow, g) => {
+        const force = forces[g], long = radius * 0.28 * (force.length() / most), thin = radius * 0.007, tip = radius * 0.06;
+        arrow.visible = shown && force.length() > 1e-6 * most;
+        if (!arrow.visible) return;
+        const [shaft, head] = arrow.children, size = Math.min(tip, long);
+        shaft.scale.set(thin, Math.max(long - size, 1e-9), thin);
+        shaft.position.set(0, -size - (long - size) / 2, 0);
+        head.scale.set(0.45 * size, size, 0.45 * size);
+        head.position.set(0, -size / 2, 0);
+        arrow.quaternion.setFromUnitVectors(new THREE.Vector3(0, 1, 0), force.clone().normalize());
+      });
     }
     look() {
       const up = new THREE.Vector3(...structure.up);
       const side = Math.abs(up.z) > 0.9 ? new THREE.Vector3(0.35, -1, 0.3) : new THREE.Vector3(1, 0.4, 0.5);
-      this.camera.position.copy(middle).addScaledVector(side.normalize(), (radius * 2.75) / Math.min(1, this.camera.aspect));
+      this.camera.position.copy(middle).addScaledVector(side.normalize(), (radius * 2.9) / Math.min(1, this.camera.aspect));
       this.controls.target.copy(middle);
       this.controls.update();
     }
@@ -132,6 +158,7 @@
       });
       this.edges.visible = options.forces && build.edge !== null;
       if (this.edges.visible) this.showForces(build, s, step, options);
+      this.showReactions(build, s, options.forces);
       this.grips.forEach((ball, r) => {
         const node = step.grips[r];
         ball.visible = node !== null && node !== undefined;
@@ -225,104 +252,22 @@
       row.append(text("td", build.rows[s][i], bound !== undefined && Number(build.rows[s][i]) > bound ? "over" : ""));
       rows.append(row);
     });
-    out.append(grips, rows);
+    out.append(grips, rows, ...supports(build, s));
     return out;
   }
-
-  // charts along the build
-  const SVG = "http://www.w3.org/2000/svg";
-  function draw(tag, attributes, parent, content) {
-    const e = document.createElementNS(SVG, tag);
-    for (const [key, v] of Object.entries(attributes)) e.setAttribute(key, v);
-    if (content !== undefined) e.textContent = content;
-    parent.append(e);
-    return e;
-  }
-  const cursors = [];
-  function frame(title, width, height, left, steps) {
-    const box = document.createElement("div");
-    box.className = "chart";
-    const svg = draw("svg", { viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": title }, box);
-    draw("text", { x: left, y: 13, style: "font-weight:600" }, svg, title);
-    const x = (s) => left + ((s + 0.5) * (width - left - 10)) / steps;
-    const cursor = draw("line", { class: "cursor", y1: 18, y2: height - 18 }, svg);
-    cursors.push((s) => { const at = x(Math.min(s, steps - 1)); cursor.setAttribute("x1", at); cursor.setAttribute("x2", at); });
-    svg.classList.add("hit");
-    svg.addEventListener("click", (event) => {
-      const at = (event.clientX - svg.getBoundingClientRect().left) * (width / svg.getBoundingClientRect().width);
-      go(Math.floor(((at - left) * steps) / (width - left - 10)));
-    });
-    draw("text", { x: width - 10, y: height - 4, "text-anchor": "end" }, svg, `step ${steps}`);
-    draw("text", { x: left, y: height - 4 }, svg, "step 1");
-    return { box, svg, x, cursor };
-  }
-  function gantt(build) {
-    const steps = build.steps.length, rows = structure.robots.length, width = 1180, height = 40 + 26 * rows, left = 70;
-    const { box, svg, x, cursor } = frame(`${build.name}: which brick each robot holds; darker where it carries more`, width, height, left, steps);
-    const most = Math.max(1e-30, ...build.steps.flatMap((_, s) => build.forces.map((name) => Math.abs(number(build, s, name) || 0))));
-    structure.robots.forEach((robot, r) => {
-      const y = 22 + 26 * r;
-      draw("text", { x: left - 6, y: y + 14, "text-anchor": "end" }, svg, robot.name);
-      let s = 0;
-      while (s < steps) {
-        const node = build.steps[s].grips[r];
-        let end = s;
-        while (end + 1 < steps && build.steps[end + 1].grips[r] === node) end += 1;
-        if (node !== null) {
-          for (let k = s; k <= end; k += 1) {
-            const share = Math.abs(number(build, k, build.forces[r]) || 0) / most;
-            draw("rect", { x: x(k - 0.5), y, width: x(1) - x(0) + 0.3, height: 20, fill: robot.color, "fill-opacity": 0.15 + 0.85 * share }, svg);
-          }
-          const name = structure.bricks[structure.nodes[node].brick].name, span = x(end + 0.5) - x(s - 0.5);
-          const mine = draw("rect", { x: x(s - 0.5), y, width: span, height: 20, fill: "none", stroke: "#222", "stroke-width": 0.7 }, svg);
-          draw("title", {}, mine, `${robot.name} holds brick ${name} at node ${node}, steps ${build.steps[s].number} to ${build.steps[end].number}`);
-          if (span > 9 * String(name).length) {
-            draw("rect", { x: (x(s - 0.5) + x(end + 0.5)) / 2 - 4 * String(name).length - 1, y: y + 4, width: 8 * String(name).length + 2, height: 13, fill: "#fff", "fill-opacity": 0.85, rx: 2 }, svg);
-            draw("text", { x: (x(s - 0.5) + x(end + 0.5)) / 2, y: y + 14.5, "text-anchor": "middle" }, svg, name);
-          }
-        }
-        s = end + 1;
-      }
-    });
-    svg.append(cursor);
-    box.classList.add("wide");
-    return box;
-  }
-  const STYLES = [["#1f5fa8", ""], ["#c8102e", "6 3"], ["#0b7a75", "2 2"], ["#7b2d8b", "8 3 2 3"], ["#8a5a00", "4 4"], ["#444", "1 3"]];
-  // lines of at most so many builds: those shown, then the first others
-  const MOST = 6;
-  const drawn = () => [...new Set([...shown(), ...(builds.length > MOST ? [] : builds)])];
-  function lines(name, title) {
-    const builds = drawn(), steps = Math.max(...builds.map((b) => b.steps.length)), width = 430, height = 190, left = 44;
-    const { box, svg, x, cursor } = frame(title, width, height, left, steps);
-    const values = builds.map((build) => build.steps.map((_, s) => responseAt(build, s, name)));
-    const bound = builds.map((build) => build.bounds[name]).find((b) => b !== undefined);
-    const top = 1.06 * Math.max(1e-12, bound || 0, ...values.flat().filter((v) => v !== null));
-    const y = (v) => height - 18 - (v / top) * (height - 40);
-    for (const share of [0, 0.5, 1]) {
-      draw("line", { class: "axis", x1: left, x2: width - 10, y1: y((share * top) / 1.06), y2: y((share * top) / 1.06), "stroke-opacity": share ? 0.25 : 1 }, svg);
-      draw("text", { x: left - 5, y: y((share * top) / 1.06) + 4, "text-anchor": "end" }, svg, Number(((share * top) / 1.06).toPrecision(3)));
+  // force and moment that each ground end exerts
+  function supports(build, s) {
+    const size = (field, g) => Math.hypot(...[0, 1, 2].map((k) => value(field, s, 3 * g + k)));
+    const acting = structure.grounds.map((_, g) => g).filter((g) => size(build.push, g) > 0);
+    if (!build.push || !acting.length || acting.length > 8) return [];
+    const out = document.createElement("table");
+    out.innerHTML = "<tr><th>support at brick</th><th>force, N</th><th>moment, N m</th></tr>";
+    for (const g of acting) {
+      const row = document.createElement("tr");
+      row.append(text("td", structure.grounds[g].brick), text("td", Number(size(build.push, g).toPrecision(3))), text("td", Number(size(build.turn, g).toPrecision(3))));
+      out.append(row);
     }
-    if (bound) draw("line", { x1: left, x2: width - 10, y1: y(bound), y2: y(bound), stroke: "#a40018", "stroke-dasharray": "3 3" }, svg);
-    builds.forEach((build, b) => {
-      const [color, dash] = STYLES[b % STYLES.length];
-      const points = values[b].map((v, s) => (v === null ? null : `${x(s)},${y(v)}`)).filter(Boolean).join(" ");
-      draw("polyline", { points, fill: "none", stroke: color, "stroke-width": 1.5, "stroke-dasharray": dash }, svg);
-    });
-    svg.append(cursor);
-    return box;
-  }
-  function legend() {
-    const out = document.createElement("p"), builds = drawn();
-    builds.forEach((build, b) => {
-      const [color, dash] = STYLES[b % STYLES.length], svg = document.createElementNS(SVG, "svg"), span = document.createElement("span");
-      svg.setAttribute("width", 34); svg.setAttribute("height", 10);
-      draw("line", { x1: 2, x2: 30, y1: 5, y2: 5, stroke: color, "stroke-width": 2, "stroke-dasharray": dash }, svg);
-      span.className = "key";
-      span.append(svg, " " + build.name);
-      out.append(span);
-    });
-    return out;
+    return [out];
   }
 
   // controls
@@ -338,7 +283,8 @@
     pair.forEach((build, i) => panes[i].show(build, at, options()));
     byId("where").textContent = `step ${at + 1} of ${Number(slider.max) + 1}`;
     byId("now").replaceChildren(...pair.map((build) => table(build, at)));
-    cursors.forEach((move) => move(at));
+    charts.cursors.forEach((move) => move(at));
+    if (points) points.mark();
   }
   function go(s) { slider.value = Math.max(0, Math.min(Number(slider.max), s)); refresh(); }
   function pause() { clearInterval(timer); timer = null; byId("play").textContent = "play"; }
@@ -348,12 +294,15 @@
     byId("play").textContent = "pause";
     timer = setInterval(() => { if (Number(slider.value) >= Number(slider.max)) pause(); else go(Number(slider.value) + 1); }, 450);
   }
+  const charts = makeCharts({ structure, builds, shown, number, responseAt, text, go, choose });
+  const points = data.scatter && charts.scatter(data.scatter);
   function drawCharts() {
-    cursors.length = 0;
+    charts.cursors.length = 0;
     const grid = document.createElement("div");
     grid.className = "grid";
-    for (const [name, title] of Object.entries(responses)) grid.append(lines(name, title));
-    byId("charts").replaceChildren(...shown().map(gantt), ...(builds.length > 1 ? [legend()] : []), grid);
+    for (const [name, title] of Object.entries(responses)) grid.append(charts.lines(name, title));
+    const parts = [...shown().map(charts.gantt), ...(builds.length > 1 ? [charts.legend()] : []), grid];
+    byId("charts").replaceChildren(...(points ? [points] : []), ...parts);
   }
 
   // rows that name a build show it
@@ -382,13 +331,19 @@
   });
   byId("second").prepend(new Option("nothing", "", true, true));
   byId("second").value = "";
-  await Promise.all(builds.flatMap((build) => [unpack(build.twist), unpack(build.edge)]));
+  await Promise.all(builds.flatMap((build) => ["twist", "edge", "push", "turn"].map((name) => unpack(build[name]))));
   for (const id of ["first", "second"]) byId(id).addEventListener("change", () => { drawCharts(); refresh(); });
   for (const id of ["magnify", "forces"]) byId(id).addEventListener("input", refresh);
   slider.addEventListener("input", refresh);
   byId("back").addEventListener("click", () => go(Number(slider.value) - 1));
   byId("on").addEventListener("click", () => go(Number(slider.value) + 1));
   byId("play").addEventListener("click", play);
+  byId("save").addEventListener("click", () => {
+    const link = document.createElement("a");
+    link.download = `${structure.name} step ${Number(slider.value) + 1}.png`;
+    link.href = panes[0].canvas.toDataURL("image/png");
+    link.click();
+  });
   document.addEventListener("keydown", (event) => {
     if (["SELECT", "INPUT", "BUTTON"].includes(event.target.tagName) && event.target !== slider) return;
     const keys = { ArrowLeft: () => go(Number(slider.value) - 1), ArrowRight: () => go(Number(slider.value) + 1), Home: () => go(0), End: () => go(Number(slider.max)), " ": play };

@@ -1,4 +1,4 @@
-"""Discrete elements: rigid bricks on beds of points that part, slip and break.
+"""Discrete elements: rigid bricks on beds of springs that open, slip and break.
 
 `DiscreteEngine` lays a bed over every joint's face (`BedStiffness` and `Mortar` say what it
 carries), holds nodes or pinches bricks between pads (`Pinch`), and follows the structure to rest.

@@ -1,4 +1,4 @@
-r"""The discrete-element engine: rigid bricks on beds of springs that part, slip and break.
+r"""The discrete-element engine: rigid bricks on beds of springs that open, slip and break.
 
 A joint is its own elastic spring in series with a bed of points over the face between its bricks,
 so that within the elastic limits the answer is that of exactly rigid bricks; the bed takes over
@@ -40,7 +40,7 @@ from seqopt.network.network import Network
 from seqopt.network.statics import build_statics
 from seqopt.scene.scene import Scene
 
-GONE = "joints part or slip and brick {brick} goes; add a grip, a bond or friction"
+GONE = "joints open or slip and brick {brick} becomes unstable; add a grip, a bond or friction"
 
 
 class DiscreteEngine:
@@ -133,8 +133,8 @@ def _not_at_rest(network: Network, held: Held, found: Settled, nodes: Ints) -> S
         return mechanism_error(network, moved[: 6 * system.bricks], GONE)
     names = ", ".join(str(network.node_name[n]) for n in nodes) or "nothing"
     return SolverError(
-        f"{system.bricks} bricks held at {names}: discrete elements came to no rest and went "
-        "nowhere; assess the step's stability to learn whether there is an equilibrium"
+        f"{system.bricks} bricks held at {names}: the discrete elements neither came to rest nor "
+        "became unstable; assess the step's stability to learn whether there is an equilibrium"
     )
 
 

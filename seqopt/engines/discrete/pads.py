@@ -1,4 +1,4 @@
-"""How robots hold bricks beyond a node: between two pads that give way."""
+"""How robots hold bricks with two elastic pads instead of at a node."""
 
 from __future__ import annotations
 

@@ -29,17 +29,17 @@ from seqopt.engines.interface import (
     keep_wanted,
     require_finite,
 )
-from seqopt.engines.rigid.grip_equations import grip_forces, share_pairs
+from seqopt.engines.rigid.grip_equations import grip_forces, pairs_of, share_pairs
 from seqopt.engines.rigid.kept import Kept
 from seqopt.engines.rigid.loads import load_matrix
 from seqopt.engines.rigid.mixed import LAST_CORRECTION
 from seqopt.engines.rigid.operator import ComplianceOperator, OperatorBuilder
 from seqopt.engines.rigid.refinement import Refinement
 from seqopt.engines.rigid.spanning_tree import grow_tree
+from seqopt.engines.rigid.ungripped import Shared, share
 from seqopt.engines.threads import one_thread
 from seqopt.network.build import network_of
 from seqopt.network.network import Network
-from seqopt.network.statics import Statics, build_statics
 from seqopt.scene.scene import Scene
 
 KEPT = 32e6  # bytes of operators that may stay when another is made
@@ -52,7 +52,7 @@ CANCEL = 10.0  # what the grips undo over what is left, where pivots do not
 
 
 class ComplianceEngine:
-    """Answers any batch of grip sets on any partial structure of a scene.
+    """Computes any batch of grip sets on any partial structure of a scene.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ class ComplianceEngine:
 
     def _operator(self, bricks: int, columns: Ints) -> ComplianceOperator:
         """Return an operator that answers grip sets: one that is kept, or else a new one."""
-        held = np.unique(columns // 2)
+        held = np.flatnonzero(np.bincount(columns.ravel() // 2))
         known = self._kept.take(bricks)
         if known is None or not known.covers(held):
             if known is not None:
@@ -133,9 +133,9 @@ class ComplianceEngine:
         return known
 
     @cached_property
-    def _statics(self) -> Statics:
-        """What edges and supports carry, shared by the corrections of all brick counts."""
-        return build_statics(self._network)
+    def _shared(self) -> Shared:
+        """What the systems that correct answers are cut from, whatever the brick count."""
+        return share(self._network)
 
     @cached_property
     def _builder(self) -> OperatorBuilder:
@@ -145,13 +145,11 @@ class ComplianceEngine:
     def _refined(self, bricks: int, columns: Ints, want: Want) -> Fields:
         """Return the fields of grip sets that the operator alone does not answer well enough."""
         largest = SCREEN if want & Want.SCREEN else LAST_CORRECTION
-        operator = None
-        if self._basis is SPACE and bricks <= len(self._tree.spring):
-            operator = self._operator(bricks, columns)
+        operator = self._operator(bricks, columns) if bricks <= len(self._tree.spring) else None
         with one_thread():
             if self._refinement is None or self._refinement.bricks != bricks:
-                self._refinement = Refinement(self._network, bricks, self._statics)
-            return self._refinement.solve(columns, operator, largest)
+                self._refinement = Refinement(self._network, bricks, self._shared)
+            return self._refinement.solve(columns, operator, largest, self._basis)
 
 
 def solve_batch(
@@ -193,21 +191,26 @@ def _answers(
     index = operator.load_index(columns)
     force = np.empty(index.shape)
     trusted = np.empty(sets, dtype=bool)
+    pairs = pairs_of(operator, columns)
     for start in range(0, sets, CHUNK):
         part = slice(start, start + CHUNK)
-        force[part], _, doubt = grip_forces(operator, columns[part], index[part])
+        mine = pairs if sets <= CHUNK else pairs.within(start, start + CHUNK)
+        force[part], _, doubt = grip_forces(operator, columns[part], index[part], mine)
         trusted[part] = UNSEEN * doubt <= accuracy
     force[~trusted] = 0.0
     if not even:
         trusted &= ~cancels(operator, index, force)
-    return _fields(operator, columns, index, force, want), trusted
+    found = _fields(operator, index, force, want)
+    share_pairs(operator, columns, index, force, found["edge_force"], pairs)
+    nodes = force[:, : columns.shape[1] * operator.directions]
+    return {**found, "grip_force": nodes.reshape(*columns.shape, operator.directions)}, trusted
 
 
 def _fields(
-    operator: ComplianceOperator, columns: Ints, index: Ints, force: Floats, want: Want
+    operator: ComplianceOperator, index: Ints, force: Floats, want: Want
 ) -> dict[str, Floats]:
-    """Return the fields of grip sets whose grips exert forces (S, k), by name."""
-    sets, held = columns.shape
+    """Return the fields of grip sets whose loads are forces (S, k), those of the grips aside."""
+    sets = len(index)
     load = load_matrix(index, force, len(operator.flexibility))
 
     def answer(name: str, *shape: int) -> Floats:
@@ -216,16 +219,13 @@ def _fields(
         wanted = operator.answer(name, index, force, load)
         return wanted.reshape(sets, wanted.shape[1] // math.prod(shape), *shape)
 
-    found = {
+    return {
         "edge_force": answer("edge_force"),
         "displacement": answer("displacement", 3),
         "support": answer("support", 6),
         "joint_wrench": answer("joint_wrench", 6),
         "brick_twist": answer("brick_twist", 6),
     }
-    share_pairs(operator, columns, index, force, found["edge_force"])
-    width = operator.directions
-    return {**found, "grip_force": force[:, : held * width].reshape(sets, held, width)}
 
 
 def _count_even(network: Network) -> int:

@@ -33,7 +33,65 @@ class GripForces(NamedTuple):
     doubt: Floats
 
 
-def grip_forces(operator: ComplianceOperator, columns: Ints, index: Ints) -> GripForces:
+class Pairs(NamedTuple):
+    """Two grips on one brick.
+
+    Attributes
+    ----------
+    sets, first, second, brick : (p,) int
+        The grip set, which two of its grips, and the brick.
+    axis : (p, d) float
+        Unit vectors from the brick's first node to its second.
+    """
+
+    sets: Ints
+    first: Ints
+    second: Ints
+    brick: Ints
+    axis: Floats
+
+    def within(self, start: int, end: int) -> Pairs:
+        """Return those of some sets, counted from the first of these.
+
+        Parameters
+        ----------
+        start, end : int
+
+        Returns
+        -------
+        Pairs
+        """
+        here = (self.sets >= start) & (self.sets < end)
+        first, second, brick = self.first[here], self.second[here], self.brick[here]
+        return Pairs(self.sets[here] - start, first, second, brick, self.axis[here])
+
+
+def pairs_of(operator: ComplianceOperator, columns: Ints) -> Pairs:
+    """Return all pairs of grips of the sets that share a brick.
+
+    Parameters
+    ----------
+    operator : ComplianceOperator
+    columns : (S, r) int
+        Grips as indices into ``network.inner.ravel()``.
+
+    Returns
+    -------
+    Pairs
+    """
+    bricks = columns.T // 2
+    couples = [*combinations(range(columns.shape[1]), 2)]
+    shared = [np.flatnonzero(bricks[i] == bricks[j]) for i, j in couples]
+    sets = np.concatenate([np.empty(0, dtype=np.int64), *shared])
+    counts = [len(found) for found in shared]
+    first, second = np.repeat(np.array(couples, np.int64).reshape(-1, 2), counts, axis=0).T
+    brick = bricks[first, sets]
+    return Pairs(sets, first, second, brick, operator.axis[brick])
+
+
+def grip_forces(
+    operator: ComplianceOperator, columns: Ints, index: Ints, pairs: Pairs | None = None
+) -> GripForces:
     """Return the forces with which grips hold their nodes still.
 
     Two grips on one rigid brick leave the force between them along the brick undetermined:
@@ -46,13 +104,16 @@ def grip_forces(operator: ComplianceOperator, columns: Ints, index: Ints) -> Gri
         Grips as indices into ``network.inner.ravel()``.
     index : (S, k) int
         The loads at the grips, from `ComplianceOperator.load_index`.
+    pairs : Pairs, optional
+        Of the sets, if they are known.
 
     Returns
     -------
     GripForces
     """
+    pairs = pairs_of(operator, columns) if pairs is None else pairs
     dead = operator.dead_displacement.take(np.ascontiguousarray(index.T))
-    force, pivots = _solved(operator, columns, index, dead)
+    force, pivots = _solved(operator, pairs, index, dead)
     pivot = pivots.min(axis=0, initial=1.0)
     doubt = _doubt(operator, index, force, pivots)
     return GripForces(force, pivot, np.where(pivot > 0, doubt, np.inf))
@@ -90,11 +151,16 @@ def still_forces(operator: ComplianceOperator, columns: Ints, index: Ints, moved
     (S, k) float
         N; between two grips on one brick, none.
     """
-    return _solved(operator, columns, index, np.ascontiguousarray(moved.T))[0]
+    return _solved(operator, pairs_of(operator, columns), index, np.ascontiguousarray(moved.T))[0]
 
 
 def share_pairs(
-    operator: ComplianceOperator, columns: Ints, index: Ints, force: Floats, carried: Floats
+    operator: ComplianceOperator,
+    columns: Ints,
+    index: Ints,
+    force: Floats,
+    carried: Floats,
+    pairs: Pairs | None = None,
 ) -> None:
     """Let each of two grips on one brick take what reaches its own node.
 
@@ -110,8 +176,10 @@ def share_pairs(
         Changed in place, N.
     carried : (S, E) or (S, 0) float
         By the edges, N; changed in place. Computed where they are needed if there are none.
+    pairs : Pairs, optional
+        Of the sets, if they are known.
     """
-    pairs = _pairs(operator, columns)
+    pairs = pairs_of(operator, columns) if pairs is None else pairs
     if not len(pairs.sets):
         return
     sets, edges = pairs.sets, operator.inner_edge[pairs.brick]
@@ -131,7 +199,7 @@ def share_pairs(
 
 
 def _solved(
-    operator: ComplianceOperator, columns: Ints, index: Ints, dead: Floats
+    operator: ComplianceOperator, pairs: Pairs, index: Ints, dead: Floats
 ) -> tuple[Floats, Floats]:
     """Return forces (S, k) that undo displacements (k, S), and scaled pivots (k, S)."""
     sets, count = index.shape
@@ -144,7 +212,6 @@ def _solved(
         mode="clip",  # other modes copy once more
     )
     np.negative(dead, out=system[-1])
-    pairs = _pairs(operator, columns)
     if len(pairs.sets):
         nodes = count - operator.loose
         _brace(system[:nodes, :nodes], pairs)
@@ -153,27 +220,7 @@ def _solved(
     return np.ascontiguousarray(answer.T), pivot
 
 
-class _Pairs(NamedTuple):
-    """Two grips on one brick: the set, which of its grips, the brick, its axis (len, d)."""
-
-    sets: Ints
-    first: Ints
-    second: Ints
-    brick: Ints
-    axis: Floats
-
-
-def _pairs(operator: ComplianceOperator, columns: Ints) -> _Pairs:
-    """Return all pairs of grips of the sets (S, r) that share a brick."""
-    couples = np.array([*combinations(range(columns.shape[1]), 2)], dtype=np.int64).reshape(-1, 2)
-    bricks = columns.T // 2
-    hits = np.flatnonzero(bricks[couples[:, 0]] == bricks[couples[:, 1]])
-    pair, sets = np.divmod(hits, max(len(columns), 1))
-    brick = bricks[couples[pair, 0], sets]
-    return _Pairs(sets, couples[pair, 0], couples[pair, 1], brick, operator.axis[brick])
-
-
-def _brace(system: Floats, pairs: _Pairs) -> None:
+def _brace(system: Floats, pairs: Pairs) -> None:
     """Give the force between two grips on one brick a flexibility, so that there is one answer."""
     count, sets = system.shape[1:]
     width = pairs.axis.shape[1]

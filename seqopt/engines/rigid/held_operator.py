@@ -14,9 +14,10 @@ import numpy as np
 from seqopt.arrays import Floats
 from seqopt.engines.rigid.loads import inner_edges
 from seqopt.engines.rigid.loose import HeldSystem
-from seqopt.engines.rigid.mixed_system import Ungripped, unscaled
+from seqopt.engines.rigid.mixed_system import unscaled
 from seqopt.engines.rigid.operator import ComplianceOperator
 from seqopt.engines.rigid.response_maps import ResponseMaps, scene_maps
+from seqopt.engines.rigid.ungripped import Ungripped
 
 TIED = 0.1  # most that what resists loose motions may be of the springs that they stand on
 

@@ -17,7 +17,7 @@ from scipy.sparse import csgraph
 from scipy.sparse.linalg import SuperLU, splu
 
 from seqopt.arrays import Bools, Floats, Ints
-from seqopt.engines.rigid.mixed_system import Ungripped
+from seqopt.engines.rigid.ungripped import Ungripped
 from seqopt.errors import SolverError
 from seqopt.network.kinematics import point_motion
 from seqopt.network.network import GROUND

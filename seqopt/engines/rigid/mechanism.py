@@ -8,7 +8,7 @@ import numpy as np
 from scipy import linalg
 
 from seqopt.arrays import Floats, FrozenValue, Ints
-from seqopt.engines.rigid.mixed_system import ungripped_system
+from seqopt.engines.rigid.ungripped import ungripped_system
 from seqopt.engines.threads import one_thread
 from seqopt.errors import MechanismError
 from seqopt.network.kinematics import node_motion, spring_maps

@@ -11,14 +11,9 @@ import numpy as np
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.engines.interface import Fields, join_sets, no_sets
 from seqopt.engines.rigid.mechanism import require_resistance
-from seqopt.engines.rigid.mixed_system import (
-    Ungripped,
-    factorize,
-    mixed_system,
-    ungripped_system,
-    unscaled,
-)
+from seqopt.engines.rigid.mixed_system import factorize, mixed_system, unscaled
 from seqopt.engines.rigid.recovery import Solution, respond
+from seqopt.engines.rigid.ungripped import Ungripped, ungripped_system
 from seqopt.errors import SolverError
 from seqopt.network.network import Network
 

@@ -1,6 +1,6 @@
-r"""Assemblies of others as scenes: COMPAS, meshes, tables of boxes, frames.
+r"""Scenes from files of other programs: COMPAS, meshes, tables of boxes, frames.
 
-Files are read as they are, without the packages that wrote them:
+The packages that wrote the files are not needed:
 
 >>> import tempfile
 >>> from pathlib import Path

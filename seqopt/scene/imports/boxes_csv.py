@@ -51,7 +51,7 @@ def read_boxes(text: str, source: str) -> Content:
         reader = csv.DictReader(io.StringIO(text), restval="")
         rows = [row for row, _ in zip(reader, range(MOST_BLOCKS + 1), strict=False)]
     except csv.Error as error:
-        raise SceneError(f"{source}: no CSV that can be read: {error}") from error
+        raise SceneError(f"{source}: not a readable CSV file: {error}") from error
     names = [name or "" for name in reader.fieldnames or ()]
     _check_columns(source, names)
     if not rows or len(rows) > MOST_BLOCKS:
@@ -68,7 +68,7 @@ def _check_columns(source: str, names: list[str]) -> None:
         raise SceneError(f"{source}: column {missing[0]} is missing; give {', '.join(NEEDED)}")
     for name in names:
         if name not in COLUMNS or names.count(name) > 1:
-            why = "stands there twice" if name in COLUMNS else "is not known"
+            why = "occurs twice" if name in COLUMNS else "is not known"
             raise SceneError(f"{source}: column {short(name)} {why}; give {', '.join(COLUMNS)}")
 
 

@@ -42,7 +42,7 @@ def build_scene(content: Content, given: Given, source: str) -> Scene:
     Raises
     ------
     SceneError
-        If the file lacks what the user did not give, or is no assembly that can be built.
+        If the file lacks what the user did not give, or its assembly cannot be built.
     FileError
         If shapely is not installed.
     """
@@ -228,7 +228,9 @@ def _order(
     known = None not in courses
     heights = [round(bricks[i].position[2], 6) for i in places]
     said.append(
-        "the build goes by the file's courses" if known else "the build goes from the bottom up"
+        "blocks are placed by the file's courses"
+        if known
+        else "blocks are placed from the bottom up"
     )
     order = upward_order(
         [(c or 0.0 if known else 0.0, h) for c, h in zip(courses, heights, strict=True)],

@@ -50,7 +50,7 @@ def read_timber(document: Any, source: str) -> Content:
     joints = tuple(_joint(blocks, pair) for pair in _pairs(source, held, place))
     said = ["beams are their blanks: cuts and fasteners are left out"]
     if len(beams) < len(rows):
-        said.append(f"{len(rows) - len(beams)} elements that are no beams are left out")
+        said.append(f"{len(rows) - len(beams)} elements that are not beams are left out")
     return Content(blocks, joints=joints, said=tuple(said))
 
 

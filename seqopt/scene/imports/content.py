@@ -1,4 +1,4 @@
-"""What files of others say about an assembly, and what they leave to the user."""
+"""What a file says about an assembly, and what the user has to add."""
 
 from __future__ import annotations
 
@@ -133,7 +133,7 @@ class Content:
 
 @dataclass(frozen=True, kw_only=True)
 class Given:
-    """What the user says where a file does not.
+    """What the user adds if a file does not say it.
 
     Parameters
     ----------

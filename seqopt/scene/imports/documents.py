@@ -1,4 +1,4 @@
-"""JSON of others, read strictly: what is not as it should be is named in one line."""
+"""JSON of other programs, read strictly: anything unexpected is an error of one line."""
 
 from __future__ import annotations
 

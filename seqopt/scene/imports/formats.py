@@ -1,4 +1,4 @@
-"""Formats of others, which of them a file has, and the scene that it becomes."""
+"""File formats of other programs, how they are recognized, and reading them as scenes."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ FORMATS = (*DOCUMENTS, "boxes", "obj", "ply", "stl")
 
 
 def import_scene(path: str | Path, form: str | None = None, given: Given | None = None) -> Scene:
-    r"""Return the scene of a file of others.
+    r"""Return the scene of a file that another program wrote.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ def import_scene(path: str | Path, form: str | None = None, given: Given | None 
     <Scene two: 2 bricks, 1 joints, 1 ground ends, 3 robots>
     """
     if not isinstance(path, str | Path):
-        raise SceneError(f"a {type(path).__name__} is no file; give a path")
+        raise SceneError(f"a {type(path).__name__} is not a file; give a path")
     if not isinstance(given, Given | None):
         raise SceneError(f"given is {short(given)}; give Given(unit=..., density=...)")
     where = Path(path)

@@ -38,7 +38,7 @@ MEASURES = {
     "kN/cm3": 1e9,
 }  # in m, N
 GROUND = -1
-LEAST = 1e-30  # area, second moment, modulus or density that is none
+LEAST = 1e-30  # area, second moment, modulus or density treated as zero
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Meshes of others as closed polyhedra: what can be mended is, and what was mended is said."""
+"""Meshes as closed polyhedra: repaired where possible, with a note of every repair."""
 
 from __future__ import annotations
 

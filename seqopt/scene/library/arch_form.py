@@ -147,7 +147,7 @@ def arch(form: ArchForm, name: str = "", *, robots: Sequence[Robot] | None = Non
 
 
 def _arch(form: ArchForm, count: int, name: str, robots: Sequence[Robot] | None) -> Scene:
-    """Return the scene of so many bricks."""
+    """Return the scene of an arch with a number of bricks."""
     gap, points = _laid(form, form.line, count)
     step = np.diff(points, axis=0)
     length, width, thickness = form.dimensions

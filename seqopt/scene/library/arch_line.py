@@ -132,7 +132,7 @@ def arch_line(arch: Scene) -> ArchLine:
         first and last lie along.
     """
     if not isinstance(arch, Scene):
-        raise SceneError(f"vault: a {type(arch).__name__} is no arch; give a Scene")
+        raise SceneError(f"vault: a {type(arch).__name__} is not an arch; give a Scene")
     bricks = arch.placed
     names = [brick.name for brick in bricks]
     linked = [joint.bricks for joint in arch.joints] == [*pairwise(names)]
@@ -140,7 +140,7 @@ def arch_line(arch: Scene) -> ArchLine:
     alike = len({(brick.dimensions, brick.density) for brick in bricks}) == 1
     if len(bricks) < 4 or len(bricks) % 3 != 1 or not (linked and stands and alike):
         raise SceneError(
-            f"vault: scene {arch.name} is no arch to start from; give a closed chain of equal "
+            f"vault: scene {arch.name} is not an arch to start from; give a closed chain of equal "
             "bricks in the pattern VLR, 3n + 1 of them, in the order in which they are built"
         )
     covered, row = [], 0

@@ -1,4 +1,4 @@
-"""The scenes that ship with the package: what each is, and how those are made that are no files."""
+"""The built-in scenes: what each is, and how those that are not files are made."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Scenes in a few words: ``arch:span=2,rise=0.7``, ``wall:columns=6,courses=4``."""
+"""Scenes described in a few words: ``arch:span=2,rise=0.7``, ``wall:columns=6,courses=4``."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class Kind:
 KINDS = {
     "arch": Kind("an arch by span and rise: arch:span=2,rise=0.7,curve=catenary", arch, ArchForm),
     "barrel": Kind("one of the eight tested barrel vaults: barrel:test=3", barrel_vault),
-    "chain": Kind("an arch of so many bricks that turn evenly: chain:bricks=40", chain),
+    "chain": Kind("an arch of any number of bricks that turn evenly: chain:bricks=40", chain),
     "dome": Kind("a dome: dome:courses=6,around=20,bond=herringbone", dome, DomeShape),
     "wall": Kind("a wall in running bond: wall:columns=6,courses=4,corbel=0.02", wall, WallShape),
 }
@@ -102,7 +102,7 @@ def scene_by_words(words: str) -> Scene:
     name, _, rest = words.partition(":")
     kind = KINDS.get(name)
     if kind is None:
-        raise SceneError(f"scene {words}: {name!r} is no kind; give one of {', '.join(KINDS)}")
+        raise SceneError(f"scene {words}: {name!r} is not known; give one of {', '.join(KINDS)}")
     hints = kind.hints()
     given: dict[str, Any] = {}
     for part in filter(None, rest.split(",")):

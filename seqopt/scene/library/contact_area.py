@@ -12,8 +12,8 @@ import numpy as np
 
 from seqopt.arrays import Floats, FrozenValue
 
-ON_EDGE = 1e-12  # distance that is none, over the size of the faces
-PARALLEL = 1e-12  # sine of an angle between edges that is none
+ON_EDGE = 1e-12  # distance treated as zero, over the size of the faces
+PARALLEL = 1e-12  # sine of an angle between edges treated as zero
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -26,7 +26,7 @@ TURN = 2 * math.pi
 
 @dataclass(frozen=True)
 class _Place:
-    """Where a brick goes: from one row to another, and how far around either side of a direction.
+    """The place of a brick: from one row to another, and how far around on either side.
 
     Attributes
     ----------

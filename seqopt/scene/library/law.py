@@ -1,4 +1,4 @@
-"""How stiff a joint is, by the face over which its bricks meet."""
+"""The stiffness of a joint as a function of the face over which its bricks meet."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from seqopt.scene.checks import vector
 
 @dataclass(frozen=True, kw_only=True)
 class JointLaw:
-    """How stiff a joint is, by the area where its faces meet.
+    """The stiffness of a joint per area of the face over which its bricks meet.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Plans in formats of others: tables, JSON, COMPAS, sequencer_benchmark.
+"""Plans in formats of other programs: tables, JSON, COMPAS, sequencer_benchmark.
 
 >>> import seqopt
 >>> from seqopt.sequence.exports import export_plan

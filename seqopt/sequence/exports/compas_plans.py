@@ -142,7 +142,7 @@ def _graph(whole: object) -> Document:
     if isinstance(held, dict) and isinstance(held.get("assembly"), dict):
         held = held["assembly"]
     if not isinstance(held, dict) or not isinstance(held.get("node", held.get("vertex")), dict):
-        raise StepError("the source is no assembly of compas_assembly; give what was imported")
+        raise StepError("the source is not an assembly of compas_assembly; give what was imported")
     return held
 
 

@@ -1,4 +1,4 @@
-"""Formats in which a plan goes out, and the plan of a folder that `seqopt optimize` wrote."""
+"""Formats in which a plan can be written, and reading the folder of a plan."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ EXPORTS = (*PLAIN, *WITH_SOURCE)
 def export_plan(
     scene: Scene, steps: Sequence[Step], form: str, source: str | Path | None = None
 ) -> str:
-    """Return a plan in a format of others.
+    """Return a plan in the format of another program.
 
     Parameters
     ----------

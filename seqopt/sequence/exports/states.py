@@ -1,4 +1,4 @@
-"""What becomes of every block in every step: absent, placed or held."""
+"""The state of every block in every step: absent, placed or held."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from seqopt.sequence.steps import Step
 
 
 class BlockState(Enum):
-    """What a block is in a step."""
+    """The state of a block in a step."""
 
     ABSENT = "absent"
     PLACED = "placed"

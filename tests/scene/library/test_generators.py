@@ -241,17 +241,17 @@ def test_compliance_agrees_with_independent_routes(scene, share):
         ),
         (
             lambda: herringbone_vault(small_arch(12), VaultShape(bricks=40)),
-            "vault: scene arch is no arch to start from; give a closed chain of equal bricks",
+            "vault: scene arch is not an arch to start from; give a closed chain of equal bricks",
         ),
         (
             lambda: herringbone_vault(wall(WallShape(columns=7, courses=1)), VaultShape(bricks=40)),
-            "vault: scene wall 7 x 1 is no arch to start from",
+            "vault: scene wall 7 x 1 is not an arch to start from",
         ),
         (
             lambda: herringbone_vault(chain(13, pattern="V"), VaultShape(bricks=40)),
             "vault: brick 2 of chain 13 does not lie as L in the pattern VLR",
         ),
-        (lambda: herringbone_vault("arch25", VaultShape(bricks=40)), "vault: a str is no arch"),
+        (lambda: herringbone_vault("arch25", VaultShape(bricks=40)), "vault: a str is not an arch"),
         (
             lambda: JointLaw(translational=(1.0, -1.0, 1.0)),
             "joint law: translational is .*at least",

@@ -119,7 +119,7 @@ def test_what_does_not_fit_is_refused(sources, tmp_path):
     with pytest.raises(SceneError, match="2 elements, and the scene a brick 6"):
         export_plan(SCENE, STEPS, "compas_timber", timber)
     meshes, _ = sources("meshes")
-    with pytest.raises(StepError, match="no assembly of compas_assembly"):
+    with pytest.raises(StepError, match="not an assembly of compas_assembly"):
         export_plan(SCENE, STEPS, "compas_assembly", meshes)
 
 

@@ -1,0 +1,184 @@
+"""What the systems of all grip sets of a partial structure have in common, cut from the whole."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+
+from seqopt.arrays import Floats, FrozenValue, Ints
+from seqopt.network.kinematics import deformation, node_motion, point_motion
+from seqopt.network.network import Network
+from seqopt.network.statics import Statics, build_statics
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Shared(FrozenValue):
+    """What the systems of all brick counts are cut from.
+
+    Attributes
+    ----------
+    statics : Statics
+        Of the network.
+    gap : (6S, 6B) sparse
+        Deformation of every spring, in its own axes, for unit twists.
+    inner : (6B, 6B) sparse
+        Displacements of the inner nodes for unit twists, in the order of ``network.inner``.
+    """
+
+    statics: Statics
+    gap: sparse.csr_array
+    inner: sparse.csr_array
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Ungripped(FrozenValue):
+    """What the systems of all grip sets of a partial structure have in common, scaled to order one.
+
+    Attributes
+    ----------
+    network : Network
+    bricks : int
+    motion : (3n, 6b) sparse
+        Displacements of the nodes for unit twists.
+    inner : (6b, 6b) sparse
+        Those of the inner nodes for scaled twists, in the order of ``network.inner``, m.
+    statics : Statics
+        Of the network.
+    deformation : (6s, 6b) sparse
+        Scaled deformation of the acting springs, in their own axes, for scaled twists.
+    stiffness : (6s,) float
+        Over ``unit``.
+    matrix : (6s + 6b,) square sparse
+        The system without grips.
+    load : (6b,) float
+        The weight, scaled.
+    acting : (s,) int
+    twist_unit, wrench_unit : (6b,), (6s,) float
+        What turns scaled twists into m and rad, scaled wrenches into N and N m.
+    unit : float
+        N/m.
+    """
+
+    network: Network
+    bricks: int
+    motion: sparse.csr_array
+    inner: sparse.csr_array
+    statics: Statics
+    deformation: sparse.csr_array
+    stiffness: Floats
+    matrix: sparse.csr_array
+    load: Floats
+    acting: Ints
+    twist_unit: Floats
+    wrench_unit: Floats
+    unit: float
+
+
+def share(network: Network) -> Shared:
+    """Return what the systems of all brick counts are cut from.
+
+    Parameters
+    ----------
+    network : Network
+
+    Returns
+    -------
+    Shared
+    """
+    springs, size = network.springs, network.inner.size
+    brick = np.repeat(np.arange(len(network.inner)), 2)
+    arm = network.node_position[network.inner.ravel()] - network.centroid[brick]
+    column = np.repeat(6 * brick[:, None] + np.arange(6), 3, axis=0).ravel()
+    inner = (point_motion(arm).ravel(), column, np.arange(0, 18 * size + 1, 6))
+    return Shared(
+        statics=build_statics(network),
+        gap=deformation(springs.bodies, springs.position, network.centroid, springs.axes),
+        inner=sparse.csr_array(inner, shape=(3 * size, 3 * size)),
+    )
+
+
+def ungripped_system(network: Network, bricks: int, shared: Shared | None = None) -> Ungripped:
+    """Return what all systems of a partial structure have in common.
+
+    Parameters
+    ----------
+    network : Network
+    bricks : int
+        How many bricks stand.
+    shared : Shared, optional
+        From `share`; made anew by default.
+
+    Returns
+    -------
+    Ungripped
+    """
+    shared = share(network) if shared is None else shared
+    springs = network.springs
+    acting = springs.acting(bricks)
+    steps = np.diff(network.node_position[network.inner[:bricks]], axis=1)
+    length = float(np.linalg.norm(steps, axis=2).max())
+    lever = np.array([1.0, 1.0, 1.0, length, length, length])
+    raw = (springs.stiffness[acting] / lever**2).ravel()
+    unit = float(np.median(raw[raw > 0])) if raw.any() else 1.0
+    stiffness = raw / unit
+    twist_unit = np.tile(1 / lever, bricks)
+    gap = _scaled_gap(shared, acting, twist_unit, lever)
+    inner = _leading(shared.inner, twist_unit)
+    weight = network.inner_weight[: 2 * bricks].ravel()
+    return Ungripped(
+        network=network,
+        bricks=bricks,
+        motion=node_motion(network, bricks),
+        inner=inner,
+        statics=shared.statics,
+        deformation=gap,
+        stiffness=stiffness,
+        matrix=_side_by_side(gap, stiffness),
+        load=inner.T @ weight / unit,
+        acting=acting,
+        twist_unit=twist_unit,
+        wrench_unit=unit * np.tile(lever, len(acting)),
+        unit=unit,
+    )
+
+
+def _scaled_gap(
+    shared: Shared, acting: Ints, twist_unit: Floats, lever: Floats
+) -> sparse.csr_array:
+    """Return the deformation (6s, 6b) of the acting springs, all components made lengths."""
+    gap = shared.gap[(6 * acting[:, None] + np.arange(6)).ravel()]
+    gap.data *= np.repeat(np.tile(lever, len(acting)), np.diff(gap.indptr))
+    gap.data *= twist_unit[gap.indices]
+    return sparse.csr_array(
+        (gap.data, gap.indices, gap.indptr), shape=(gap.shape[0], len(twist_unit))
+    )
+
+
+def _leading(inner: sparse.csr_array, twist_unit: Floats) -> sparse.csr_array:
+    """Return the displacements (6b, 6b) of the first inner nodes for scaled twists, m."""
+    size = len(twist_unit)
+    column = inner.indices[: 6 * size]
+    data = inner.data[: 6 * size] * twist_unit[column]
+    return sparse.csr_array((data, column, inner.indptr[: size + 1]), shape=(size, size))
+
+
+def _side_by_side(gap: sparse.csr_array, stiffness: Floats) -> sparse.csr_array:
+    """Return the system without grips, row by row, from the scaled deformation (6s, 6b)."""
+    row = 1 / np.maximum(1.0, stiffness)  # keeps a stiff joint's equation of order one
+    joints, moves = gap.shape
+    pulled = np.repeat(row * stiffness, np.diff(gap.indptr)) * gap.data
+    carried = gap.tocsc()
+    return sparse.csr_array(
+        (
+            np.concatenate([np.insert(pulled, gap.indptr[:-1], row), -carried.data]),
+            np.concatenate(
+                [np.insert(gap.indices + joints, gap.indptr[:-1], range(joints)), carried.indices]
+            ),
+            np.concatenate(
+                [gap.indptr + np.arange(joints + 1), carried.indptr[1:] + gap.nnz + joints]
+            ),
+        ),
+        shape=(joints + moves, joints + moves),
+    )

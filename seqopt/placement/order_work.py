@@ -1,0 +1,95 @@
+"""What one order is worth, tried here or by other processes."""
+
+from __future__ import annotations
+
+import pickle
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from functools import partial
+
+import numpy as np
+
+from seqopt.errors import ProblemError
+from seqopt.placement.free_graph import explore
+from seqopt.placement.free_paths import least_to_end
+from seqopt.placement.free_problem import FreeProblem
+from seqopt.placement.order_problem import OrderProblem
+from seqopt.responses.shipping import Shipment, engine_of, pack
+from seqopt.scene.orders import Order
+
+NARROW = 50  # states of a brick count with which an order is tried first
+
+
+@dataclass(frozen=True)
+class Trial:
+    """An order to be tried.
+
+    Attributes
+    ----------
+    order : tuple of int
+        Names of all bricks.
+    ceiling : float
+        What it must stay below.
+    """
+
+    order: Order
+    ceiling: float
+
+
+def worth(problem: OrderProblem, trial: Trial) -> float:
+    """Return the first goal of the best plan of an order.
+
+    Parameters
+    ----------
+    problem : OrderProblem
+    trial : Trial
+
+    Returns
+    -------
+    float
+        Infinite where no plan of it stays below the ceiling.
+    """
+    judged, ceiling, found = problem.judging(trial.order), trial.ceiling, np.inf
+    for width in (NARROW, None):
+        graph = explore(judged, ceiling, width)
+        if graph.whole:
+            found = ceiling = float(least_to_end(graph, 0)[0].min())
+    return found
+
+
+def trying(problem: OrderProblem, *, elsewhere: bool) -> Callable[[Trial], float]:
+    """Return the function that tries orders.
+
+    Parameters
+    ----------
+    problem : OrderProblem
+    elsewhere : bool
+        Whether it is to be sent to other processes: then with the scene, not with an engine.
+
+    Returns
+    -------
+    callable
+        Takes a trial, returns its `worth`.
+
+    Raises
+    ------
+    ProblemError, SceneError
+        If a criterion or an engine of one's own cannot be sent.
+    """
+    if not elsewhere:
+        return partial(worth, problem)
+    free = problem.free
+    rest = {f.name: getattr(free, f.name) for f in fields(free) if f.name != "engine"}
+    try:
+        content = pickle.dumps((rest, problem.among))
+    except Exception as error:  # whatever objects of others may raise
+        raise ProblemError(
+            f"criterion {free.criterion.name}: it cannot be sent to other processes ({error}); "
+            "define it in a module, or let this process work alone"
+        ) from error
+    return partial(_sent, pack(free.engine), content)
+
+
+def _sent(shipment: Shipment, content: bytes, trial: Trial) -> float:
+    rest, among = pickle.loads(content)  # our own, from `trying`
+    return worth(OrderProblem(FreeProblem(engine=engine_of(shipment), **rest), among), trial)
