@@ -93,7 +93,7 @@ def did_you_mean(given: object, known: Iterable[str]) -> str:
     Returns
     -------
     str
-        To be put after the word; empty if none is near.
+        To be put after the word; empty if none is near, or two are equally near.
 
     Examples
     --------
@@ -105,5 +105,11 @@ def did_you_mean(given: object, known: Iterable[str]) -> str:
     meant = {name.lower(): name for name in known}
     if not isinstance(given, str) or given in meant.values():
         return ""
-    near = difflib.get_close_matches(given.lower(), meant, 1)
-    return f" (did you mean {meant[near[0]]}?)" if near else ""
+    near = difflib.get_close_matches(given.lower(), meant, 2)
+    tied = len({_likeness(name, given) for name in near}) < len(near)
+    return f" (did you mean {meant[near[0]]}?)" if near and not tied else ""
+
+
+def _likeness(one: str, other: str) -> float:
+    """Return how much one word is like another, from 0 to 1."""
+    return difflib.SequenceMatcher(None, one.lower(), other.lower()).ratio()
