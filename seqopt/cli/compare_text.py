@@ -178,7 +178,7 @@ def _about_choices(comparison: Comparison, criterion: Criterion) -> str:
         "largest step, of the free schedule the worst response over what the fixed sequences "
         "reach. Only rows under one heading, and of one aim, compete. Gap: how far the objective "
         "is above the proven optimum of that aim. Models: how many partial structures with "
-        "different grips it looks at. Seconds: to choose and to check"
+        f"different grips it looks at{_counted(comparison)}. Seconds: to choose and to check"
     )
     if comparison.loop is not None:
         seconds = comparison.loop.seconds
@@ -187,6 +187,14 @@ def _about_choices(comparison: Comparison, criterion: Criterion) -> str:
             f"{seconds['respond']:.2f} s more and their ranks {seconds['rank']:.2f} s"
         )
     return wrapped(said + ".")
+
+
+def _counted(comparison: Comparison) -> str:
+    """Return how many models the paper counts, in words; nothing where it counts none."""
+    if comparison.loop is None or comparison.loop.paper_models is None:
+        return ""
+    cascading, overlap = comparison.loop.paper_models
+    return f" (the paper counts {cascading:,} for its cascade and {overlap:,} with full overlap)"
 
 
 def _notes(comparison: Comparison) -> Iterator[list[str]]:

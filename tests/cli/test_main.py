@@ -504,7 +504,7 @@ def test_the_command_line_says_why(capsys):
     assert "engine: compliance for 49 grip sets: brick 11: its centroid lies 65.2 mm" in said
     dry = ["analyze", "--method", "sequential", "--engine", "auto", "--mortar", "dry"]
     assert main(dry) == 3
-    assert "step 9: 5 bricks: joints part or slip and brick" in capsys.readouterr().err
+    assert "step 9: 5 bricks: joints open or slip and brick" in capsys.readouterr().err
     assert main(["analyze", "--method", "sequential", "--engine", "planar"]) == 2
     assert "use the compliance engine" in capsys.readouterr().err
     assert main(["analyze", "--method", "sequential", "--mortar", "dry"]) == 2
