@@ -4,6 +4,7 @@ import sys
 from importlib.metadata import version as installed_version
 from pathlib import Path
 
+sys.path.insert(0, str(Path(__file__).resolve().parent))
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from experiments.harness.stated import stated
@@ -18,9 +19,15 @@ extensions = [
     "sphinx.ext.autodoc",
     "sphinx.ext.viewcode",
     "numpydoc",
+    "sphinx_copybutton",
+    "extensions.equations",
+    "extensions.downloads",
 ]
 html_theme = "furo"
 html_title = "seqopt"
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
+html_math_renderer = "mathml"
 exclude_patterns = ["_build", "jupyter_execute"]  # what a build leaves behind
 myst_enable_extensions = ["amsmath", "dollarmath", "deflist", "substitution"]
 myst_substitutions = stated()  # figures of the stored runs, by name: {{ name }} in a page
@@ -30,6 +37,11 @@ nb_execution_mode = "force"
 nb_execution_raise_on_error = True
 nb_execution_timeout = 120
 nb_merge_streams = True
+
+nitpicky = True
+nitpick_ignore_regex = [("py:class", r"(numpy|collections)\..*")]  # they have pages elsewhere
+
+viewcode_follow_imported_members = False  # its links back would name the importing module
 
 autodoc_member_order = "bysource"
 autodoc_typehints = "none"  # the numpydoc sections carry shapes and units

@@ -23,11 +23,11 @@ from seqopt.cli.criteria import asked_criterion
 from seqopt.cli.facts import scene_facts
 from seqopt.cli.layout import wrapped
 from seqopt.cli.outputs import comparison_files, require_matplotlib, write_outputs
-from seqopt.cli.pages import PAGE, comparison_page
 from seqopt.cli.values import parse_robots
 from seqopt.files import require_folder
 from seqopt.network.build import build_network
 from seqopt.report.comparison import Comparison, compare
+from seqopt.report.plan_pages import PAGE, comparison_page
 from seqopt.report.text import format_details
 
 DESCRIPTION = (
@@ -120,7 +120,7 @@ def _where(folder: Path) -> str:
         f"tables and figures written to {folder}\n"
         f"  {PAGE}: every build step by step; open it in a browser\n"
         "  comparison.csv: a row per way to build; steps_NAME.csv: a row per step of each\n"
-        "  *.png: the figures"
+        "  *.png, *.svg: the figures"
     )
 
 

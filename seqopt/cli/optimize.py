@@ -12,7 +12,6 @@ from seqopt.cli.asked import exceeded, idle_notes, level_notes, strictly
 from seqopt.cli.facts import scene_facts
 from seqopt.cli.free import optimize_free, require_loop
 from seqopt.cli.outputs import plan_files, worth, write_outputs
-from seqopt.cli.pages import PAGE, plan_page
 from seqopt.cli.posing import asked_problem
 from seqopt.cli.robust import optimize_robust, require_no_scenarios
 from seqopt.cli.status import Status
@@ -21,6 +20,7 @@ from seqopt.placement.formulation import End, find_formulation
 from seqopt.placement.plan import Plan
 from seqopt.placement.problem import Problem
 from seqopt.placement.solving import solve
+from seqopt.report.plan_pages import PAGE, plan_page
 from seqopt.sequence.free_rules import FREE
 from seqopt.sequence.schedule import Schedule
 from seqopt.study.published import paper_models

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import io
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -24,7 +23,6 @@ from seqopt.cli.facts import scene_facts
 from seqopt.cli.free import posed_free
 from seqopt.cli.free_arguments import add_rules
 from seqopt.cli.outputs import require_matplotlib, write_outputs
-from seqopt.cli.pages import PAGE, front_page
 from seqopt.cli.values import parse_numbers, parse_robots
 from seqopt.engines.interface import Engine
 from seqopt.errors import ProblemError, StepError, did_you_mean
@@ -35,6 +33,7 @@ from seqopt.placement.front import Front, FrontProblem, find_front, pick
 from seqopt.placement.loop_front import LoopFront
 from seqopt.report.fronts import shown_table, worst_of
 from seqopt.report.methods import method_tables
+from seqopt.report.plan_pages import PAGE, front_page
 from seqopt.responses.table import analyze
 from seqopt.sequence.free_rules import FREE
 from seqopt.sequence.schedule_file import find_schedule
@@ -189,6 +188,7 @@ def _front_files(
 ) -> dict[str, bytes | str]:
     """Return table, plans, chart and summary of a Pareto set by file name."""
     from seqopt.report.fronts import front_figure  # noqa: PLC0415  # matplotlib is an extra
+    from seqopt.report.style import picture_files  # noqa: PLC0415
 
     known: dict[tuple[Step, ...], pd.DataFrame] = {}
     plans = []
@@ -196,8 +196,6 @@ def _front_files(
         table = known.setdefault(steps, analyze(engine, steps))
         plans.append(table.assign(point=number))
     tell("drawing and writing the page")
-    buffer = io.BytesIO()
-    front_figure(front, methods).savefig(buffer, dpi=130)
     summary = {
         "points": len(front.steps),
         "complete": front.complete,
@@ -209,7 +207,7 @@ def _front_files(
         PAGE: front_page(engine, shown_table(front.table), [known[steps] for steps in front.steps]),
         "pareto.csv": csv_text(numbered),
         "plans.csv": csv_text(pd.concat(plans, ignore_index=True)),
-        "pareto.png": buffer.getvalue(),
+        **picture_files("pareto", front_figure(front, methods)),
         "summary.json": json.dumps(summary, indent=2) + "\n",
     }
 

@@ -10,9 +10,9 @@ from seqopt.cli.asked import asked_engine, asked_scene
 from seqopt.cli.common_arguments import engine_arguments, form_arguments, group, scene_argument
 from seqopt.cli.facts import scene_facts
 from seqopt.cli.outputs import keep_apart
-from seqopt.cli.pages import PAGE, folder_page
 from seqopt.files import write_text
 from seqopt.network.build import build_network
+from seqopt.report.plan_pages import PAGE, folder_page
 
 DESCRIPTION = (
     "Write a page with a step viewer of the plans in a folder: the structure in three dimensions, "

@@ -31,9 +31,9 @@ def assess_steps(
     network : Network or Scene
     steps : sequence of Step
     mortar : Mortar or str
-        Of all joints; or its name.
+        The mortar of all joints, or its name.
     progress : callable, optional
-        Told how far it is, step by step.
+        Told as a `seqopt.work.Stage` how far it is, step by step.
 
     Returns
     -------

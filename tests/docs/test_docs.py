@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 import subprocess
 import sys
 
@@ -14,7 +15,10 @@ from experiments.harness.stated import stated
 from experiments.harness.wording import markdown, two
 from seqopt.cli.main import main
 from seqopt.placement.formulation import exhibits, formulations
+from tests.browser import browsed
 from tests.builders import ROOT
+from tests.docs.site_links import broken
+from tests.docs.transcripts import PAGES
 
 STATED = stated()
 
@@ -34,6 +38,10 @@ def test_the_site_builds_strictly(tmp_path):
     page = (tmp_path / "html" / "formulations" / "index.html").read_text(encoding="utf-8")
     assert f"takes {STATED['lp_times_25']} times as long at 25 bricks" in " ".join(page.split())
     assert page.count("<table") >= 4
+    assert broken(tmp_path / "html") == []
+    search = (tmp_path / "html" / "search.html").as_uri()
+    if "<p>here</p>" in browsed(tmp_path, "data:text/html,<p>here</p>"):
+        assert "guides/infeasible.html" in browsed(tmp_path, f"{search}?q=infeasible")
 
 
 @pytest.mark.slow
@@ -41,7 +49,9 @@ def test_the_site_builds_strictly(tmp_path):
 def test_a_flaw_fails_the_build(tmp_path, flaw):
     source = tmp_path / "docs"
     source.mkdir()
-    (source / "conf.py").write_bytes((ROOT / "docs" / "conf.py").read_bytes())
+    shutil.copy(ROOT / "docs" / "conf.py", source)
+    for part in ("extensions", "_static"):
+        shutil.copytree(ROOT / "docs" / part, source / part)
     front = "---\nfile_format: mystnb\nkernelspec:\n  name: python3\n---\n"
     (source / "index.md").write_text(f"{front}# Page\n\n{flaw}\n", encoding="utf-8")
     done = build(source, tmp_path / "html")
@@ -142,7 +152,8 @@ def test_readme_python_runs(capsys):
 def examples():
     """Python blocks of the documentation that are followed by the output they print."""
     pattern = re.compile(r"```python\n(.*?)```\n\n```text\n(.*?)```", flags=re.DOTALL)
-    for page in sorted((ROOT / "docs").rglob("*.md")):
+    pages = {*(ROOT / "docs").rglob("*.md")} - {ROOT / "docs" / f"{name}.md" for name in PAGES}
+    for page in sorted(pages):
         for number, match in enumerate(pattern.finditer(page.read_text(encoding="utf-8"))):
             yield pytest.param(*match.groups(), id=f"{page.stem}-{number}")
 

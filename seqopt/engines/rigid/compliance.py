@@ -29,6 +29,7 @@ from seqopt.engines.interface import (
     keep_wanted,
     require_finite,
 )
+from seqopt.engines.named import NamedEngine
 from seqopt.engines.rigid.grip_equations import grip_forces, pairs_of, share_pairs
 from seqopt.engines.rigid.kept import Kept
 from seqopt.engines.rigid.loads import load_matrix
@@ -51,7 +52,7 @@ EVEN = 5e-5  # softest over stiffest joint from which on pivots tell the whole e
 CANCEL = 10.0  # what the grips undo over what is left, where pivots do not
 
 
-class ComplianceEngine:
+class ComplianceEngine(NamedEngine):
     """Computes any batch of grip sets on any partial structure of a scene.
 
     Parameters

@@ -1,0 +1,1 @@
+"""What the site does that no published extension of Sphinx does."""

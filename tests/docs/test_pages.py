@@ -1,0 +1,117 @@
+"""Pages are true and whole: what they run, show, offer and refer to."""
+
+from __future__ import annotations
+
+import ast
+import importlib.util
+import re
+import subprocess
+import sys
+
+import pytest
+
+from experiments.harness.stated import stated
+from tests.builders import ROOT
+from tests.docs.site_links import broken
+from tests.docs.transcripts import DOCS, PAGES, blocks, furnish, run
+
+PICTURE = re.compile(r"!\[([^\]]*)\]\(([^)]+)\)")
+SHOW = """
+import runpy, sys
+import matplotlib.pyplot as plt
+counts = []
+def show():
+    counts.append(len(plt.get_fignums()))
+    plt.close("all")
+plt.show = show
+runpy.run_path(sys.argv[1], run_name="__main__")
+print("figures shown:", counts, "left:", len(plt.get_fignums()))
+"""
+
+
+def extension(name):
+    """Load an extension of the site, which is not a package that is installed."""
+    spec = importlib.util.spec_from_file_location(name, DOCS / "extensions" / f"{name}.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+downloads, equations = extension("downloads"), extension("equations")
+
+
+def told():
+    """Pages that can be downloaded, by name."""
+    for path in sorted([*(DOCS / "tutorials").glob("*.md"), *(DOCS / "guides").glob("*.md")]):
+        text = path.read_text(encoding="utf-8")
+        if text.startswith("---\nfile_format: mystnb"):
+            yield pytest.param(text, id=path.stem)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", PAGES)
+def test_pages_show_what_is_printed(name, tmp_path):
+    furnish(tmp_path)
+    for block in blocks((DOCS / f"{name}.md").read_text(encoding="utf-8")):
+        printed, well = run(block, tmp_path)
+        if block.printed is None:
+            assert well, f"{block.code}\n{printed}"
+        else:
+            assert printed.strip() == block.printed.strip(), block.code
+
+
+@pytest.mark.slow
+def test_a_wrong_output_is_seen(tmp_path):
+    (block,) = blocks("```sh\nseqopt scene wall:columns=2,courses=1\n```\n\n```text\nwrong\n```\n")
+    printed, well = run(block, tmp_path)
+    assert well
+    assert "2 bricks" in printed
+    assert printed.strip() != block.printed.strip()
+
+
+def test_images_have_words():
+    for page in [ROOT / "README.md", *DOCS.rglob("*.md")]:
+        for words, target in PICTURE.findall(page.read_text(encoding="utf-8")):
+            assert len(words.split()) >= 3, f"{page.name}: {target} has the text {words!r}"
+
+
+@pytest.mark.parametrize("text", [*told()])
+def test_downloads_are_plain_python_without_checks(text):
+    told = downloads.notebook(text, stated())
+    script = downloads.script(told)
+    ast.parse(script)
+    assert "{{" not in script.replace("f'{{", "")
+    assert not re.search(r"\]\((?!http)[^)]*\.md", script)
+    assert 'pip install ".[' in script
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("text", [*told()])
+def test_downloads_run_and_show_their_figures(text, tmp_path):
+    script = tmp_path / "seqopt_page.py"
+    script.write_text(downloads.script(downloads.notebook(text, stated())), encoding="utf-8")
+    done = subprocess.run(
+        [sys.executable, "-c", SHOW, script],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    last = done.stdout.splitlines()[-1]
+    assert last.endswith("left: 0"), last
+    assert ("plt.subplots" in script.read_text(encoding="utf-8")) == ("shown: []" not in last)
+
+
+def test_equations_become_mathml():
+    found = equations.mathml(r"\min_x \; & x \\ \text{s.t.} \; & x \ge 1", block=True)
+    assert found.startswith("<math")
+    assert found.count("<mtr>") == 2
+    with pytest.raises(Exception, match="cannot become MathML"):
+        equations.mathml(r"\frac{1}{", block=False)
+
+
+def test_links_that_lead_nowhere_are_seen(tmp_path):
+    (tmp_path / "a.html").write_text('<h1 id="x"></h1><a href="b.html#y"></a><a href="#x"></a>')
+    (tmp_path / "b.html").write_text('<script src="https://cdn.example/x.js"></script>')
+    assert broken(tmp_path) == ["a.html: b.html#y", "b.html: https://cdn.example/x.js"]

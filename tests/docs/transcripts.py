@@ -1,0 +1,128 @@
+"""Pages whose commands and Python are run, block by block, and whose outputs are compared.
+
+``python -m tests.docs.transcripts`` writes the outputs of today into the pages; read what it
+changes before it is kept.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import importlib.util
+import io
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from tests.builders import ROOT
+
+DOCS = ROOT / "docs"
+PAGES = (
+    "quickstart",
+    "faq",
+    "coming_from",
+    *(
+        f"guides/{name}"
+        for name in ("own_robots", "both_sides", "limits", "certificate", "infeasible")
+    ),
+)
+BLOCK = re.compile(r"```(sh|python)\n(.*?)```(?:\n\n```text\n(.*?)```)?", flags=re.DOTALL)
+
+
+@dataclass(frozen=True)
+class Block:
+    """A block of code on a page.
+
+    Attributes
+    ----------
+    kind : str
+        ``sh`` or ``python``.
+    code : str
+    printed : str or None
+        The output that the page shows; None where it shows none.
+    """
+
+    kind: str
+    code: str
+    printed: str | None
+
+    @property
+    def commands(self) -> list[str]:
+        """The lines that call seqopt."""
+        lines = self.code.splitlines()
+        return [line.split(" #")[0].strip() for line in lines if line.startswith("seqopt")]
+
+
+def blocks(text: str) -> Iterator[Block]:
+    """Yield the blocks of a page that can be run, in their order."""
+    for found in BLOCK.finditer(text):
+        block = Block(*found.groups())
+        if block.kind == "python" or block.commands:
+            yield block
+
+
+def furnish(folder: Path) -> None:
+    """Put the file that pages read into a folder: the bridge that ships with compas_cra."""
+    found = importlib.util.find_spec("compas_cra")
+    if found is None or found.origin is None:
+        raise LookupError("compas_cra is missing: install the extra witness")
+    shutil.copy(Path(found.origin).parent / "data" / "samples" / "bridge.json", folder)
+
+
+def run(block: Block, folder: Path) -> tuple[str, bool]:
+    """Run a block in a folder; return what it prints, and whether all of it ended well."""
+    if block.kind == "python":
+        return _python(block.code, folder), True
+    done = [_command(line, folder) for line in block.commands]
+    return "".join(text for text, _ in done), all(code == 0 for _, code in done)
+
+
+def _python(code: str, folder: Path) -> str:
+    printed = io.StringIO()
+    with contextlib.chdir(folder), contextlib.redirect_stdout(printed):
+        exec(compile(code, "page", "exec"), {"__name__": "__main__"})
+    return printed.getvalue()
+
+
+def _command(line: str, folder: Path) -> tuple[str, int]:
+    words = [sys.executable, "-m", *line.split()]
+    paths = [str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])]
+    surroundings = os.environ | {"COLUMNS": "80", "PYTHONPATH": os.pathsep.join(paths)}
+    done = subprocess.run(
+        words,
+        cwd=folder,
+        env=surroundings,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        check=False,
+    )
+    return done.stdout, done.returncode
+
+
+def refresh(name: str) -> None:
+    """Write today's outputs into a page."""
+    path = DOCS / f"{name}.md"
+    text = path.read_text(encoding="utf-8")
+    with tempfile.TemporaryDirectory() as folder:
+        furnish(Path(folder))
+
+        def renewed(found: re.Match[str]) -> str:
+            block = Block(*found.groups())
+            if block.kind == "sh" and not block.commands:
+                return found[0]
+            printed, _ = run(block, Path(folder))
+            shown = f"```{block.kind}\n{block.code}```"
+            return shown if block.printed is None else f"{shown}\n\n```text\n{printed.strip()}\n```"
+
+        path.write_text(BLOCK.sub(renewed, text), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    for page in sys.argv[1:] or PAGES:
+        refresh(page)
