@@ -247,6 +247,8 @@ def solve_free(
     except InfeasibleError:
         raise InfeasibleError(why_impossible(problem)) from None
     solved = time.perf_counter()
+    if proof and "progress" in options:
+        options["progress"]("proving that no plan is better")
     steps = steps_of(problem.space, selection.states)
     certificate = judge_schedule(problem, selection, steps) if proof else None
     seconds = {"solve": solved - start, "verify": time.perf_counter() - solved}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -23,6 +23,7 @@ from seqopt.placement.shown_build import ShownBuild
 from seqopt.responses.resources import HERE, Resources
 from seqopt.scene.orders import Order, in_order
 from seqopt.sequence.steps import Step
+from seqopt.work.progress import Tell
 
 
 @dataclass(frozen=True, repr=False)
@@ -132,7 +133,7 @@ def solve_order(
     formulation: ScheduleFormulation | str = "order_search",
     *,
     proof: bool = True,
-    progress: Callable[[str], None] | None = None,
+    progress: Tell | None = None,
     resources: Resources = HERE,
     **options: Any,
 ) -> OrderPlan:
