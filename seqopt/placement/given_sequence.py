@@ -1,4 +1,4 @@
-"""A sequence that is given, of a fixed method or a file, with everything that a plan can show."""
+"""The steps of a fixed method or a file, with all displays that plans have."""
 
 from __future__ import annotations
 
@@ -17,26 +17,26 @@ from seqopt.sequence.steps import Step, check_sequence, require_steps
 
 @dataclass(frozen=True, repr=False)
 class GivenSequence(ShownBuild):
-    """Steps that nobody optimized: those of a fixed method, or of a file.
+    """The steps of a fixed method or a file, with the same tables and pictures as a plan.
 
     Parameters
     ----------
     engine : Engine
-        What computes the responses; it has the scene.
+        Computes the responses, for the scene that is built.
     steps : tuple of Step
         Of `seqopt.sequential`, `seqopt.cantilever` or `seqopt.read_plan`.
     title : str, optional
-        What it is called beside others.
+        Its name where it is shown next to others.
 
     Attributes
     ----------
     seconds : mapping of str to float
-        Empty: nothing was searched.
+        Empty, since nothing was searched.
 
     Raises
     ------
     SceneError, StepError
-        If it is no engine, these are no steps, or they are not possible in the scene.
+        If it is not an engine, these are no steps, or they are not possible in the scene.
 
     Examples
     --------
@@ -57,7 +57,7 @@ class GivenSequence(ShownBuild):
     def __post_init__(self) -> None:
         if not isinstance(getattr(self.engine, "network", None), Network):
             kind = type(self.engine).__name__
-            raise SceneError(f"a {kind} is no engine; give seqopt.make_engine('auto', scene)")
+            raise SceneError(f"a {kind} is not an engine; give seqopt.make_engine('auto', scene)")
         check_sequence(self.engine.network.scene, require_steps(self.steps))
 
     def __repr__(self) -> str:
@@ -66,7 +66,7 @@ class GivenSequence(ShownBuild):
 
     @property
     def worth(self) -> str:
-        """What it is worth, in words."""
+        """A note that the sequence was not optimized."""
         return "given, not optimized"
 
     def table(self) -> pd.DataFrame:

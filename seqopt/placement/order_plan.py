@@ -62,12 +62,12 @@ class OrderPlan(ShownBuild):
 
     @property
     def title(self) -> str:
-        """What it is called beside other plans."""
+        """The name of the plan where it is shown next to others."""
         return "best order"
 
     @property
     def worth(self) -> str:
-        """What the plan is worth, in words."""
+        """The value of the plan, and what is proven about it, in words."""
         return f"{self.problem.free.goals[0]} {self.selection.objective:.6g}, {self.status}"
 
     def responses(self) -> pd.DataFrame:
