@@ -21,10 +21,11 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 from matplotlib.image import imread
-from matplotlib.patches import Rectangle
+from matplotlib.lines import Line2D
 
 from experiments.harness.claim import Claim, Finding, Options
-from experiments.harness.plotting import DPI, FIGURES, new_figure, save_figure
+from experiments.harness.plotting import FIGURES, save_figure
+from experiments.harness.scene_pictures import VIEW, library, scenes_in_words, vault
 from experiments.harness.yardstick import VALUES
 from seqopt.arrays import Floats
 from seqopt.engines.interface import Engine, Want
@@ -35,10 +36,17 @@ from seqopt.placement.free_problem import pose_free
 from seqopt.placement.front import find_front
 from seqopt.placement.loop_front import LoopFront
 from seqopt.report.comparison import method_tables
-from seqopt.report.draw import View, draw_bricks, draw_grips, draw_network, draw_responses
+from seqopt.report.draw import (
+    View,
+    draw_bricks,
+    draw_grips,
+    draw_network,
+    draw_responses,
+    force_key,
+)
 from seqopt.report.fronts import front_figure
-from seqopt.scene.boxes import boxes
-from seqopt.scene.library import DomeShape, WallShape, chain, dome, wall
+from seqopt.report.style import BLUE, DPI, GRAY, GREEN, VERMILION, new_figure, plain, styled
+from seqopt.report.wording import in_words
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.free_rules import FreeRules
 from seqopt.sequence.three_robots import three_robot_loop
@@ -46,64 +54,93 @@ from seqopt.study.presets import WORST_RATIO
 from seqopt.study.published import as_printed
 from seqopt.study.tables import printed_steps
 
-VIEW = View(azimuth=35, elevation=22)
+FROM_ASIDE = View(azimuth=20, elevation=14)  # nodes stand apart
 MAGNIFY = 2000.0
 SQUARE, ALIKE = 16, 0.2  # pixels; share of what the stored picture shows
 ROUNDED = {"F_largest": 5.0, "M_sup": 0.5, "T_max": 5.0, "D_max": 5e-7}
 COLUMNS = {
-    "F_rob1_N": "F_rob1 [N]",
-    "M_sup_Nm": "M_sup [N m]",
-    "F_max_N": "T_max [N]",
+    "F_rob1_N": "force of robot 1\nF_rob1 [N]",
+    "M_sup_Nm": "support moment\nM_sup [N m]",
+    "F_max_N": "largest tension\nT_max [N]",
+    "D_max_1e-3mm": "largest displacement\nD_max [1e-3 mm]",
+}
+PRINTED = {
+    "F_rob1_N": "force of robot 1 [N]",
+    "F_rob2_N": "force of robot 2 [N]",
+    "F_rob3_N": "force of robot 3 [N]",
+    "F_sup_N": "force of support [N]",
+    "M_sup_Nm": "support moment [N m]",
+    "F_min_N": "compression C_max [N]",
+    "F_max_N": "tension T_max [N]",
+    "F_avg_N": "mean axial force [N]",
     "D_max_1e-3mm": "D_max [1e-3 mm]",
+    "D_avg_1e-3mm": "mean displacement [1e-3 mm]",
+    "D_std_1e-3mm": "its deviation [1e-3 mm]",
 }
 TABLES = {
-    "sequential": ("o", "A.1, sequential"),
-    "cantilever": ("x", "A.2, cantilever"),
-    "published": ("+", "B.1, three-robot plan\n(took no part)"),
+    "sequential": ("o", BLUE, "Table A.1: sequential method"),
+    "cantilever": ("x", VERMILION, "Table A.2: cantilever method"),
+    "published": ("+", GREEN, "Table B.1: three-robot plan\n(not used to identify the arch)"),
 }
 
 
+@styled
 def twisting_step(engine: Engine) -> Figure:
     """Draw the arch, 18 bricks held off their line, and the same held on a brick along it."""
     net = engine.network
-    figure = new_figure(10, 4.2)
+    figure = new_figure(3.0)
     whole, twist, calm = figure.subplots(1, 3)
     draw_bricks(whole, net, 25, VIEW)
-    whole.set_title("25 bricks", fontsize=9)
+    whole.set_title("the arch of 25 bricks", loc="center")
     for axes, node, name in (
-        (twist, 35, "sequential, step 35"),
-        (calm, 31, "cantilever, step 35"),
+        (twist, 35, "18 bricks held off their line:\nthey twist (motion × 2,000)"),
+        (calm, 31, "held on their line:\nthey do not (motion × 2,000)"),
     ):
         fields = engine.solve(18, [[node]], Want.ALL)
         draw_bricks(axes, net, 18, VIEW, alpha=0.1)
         draw_bricks(axes, net, 18, VIEW, twist=fields.brick_twist[0], magnify=MAGNIFY)
         draw_grips(axes, net, (None, node, None), VIEW)
-        axes.set_title(f"{name}, motion x {MAGNIFY:g}", fontsize=9)
+        axes.set_title(name, loc="center")
     return figure
 
 
+@styled
 def network_picture(engine: Engine) -> Figure:
     net = engine.network
-    figure = new_figure(8, 6)
+    figure = new_figure(7.2)
     axes = figure.subplots()
-    draw_bricks(axes, net, 25, VIEW, alpha=0.15)
-    draw_network(axes, net, 25, VIEW, numbers=True)
+    draw_bricks(axes, net, 25, FROM_ASIDE, alpha=0.12)
+    draw_network(axes, net, 25, FROM_ASIDE, numbers=True)
+    keys = [
+        Line2D([], [], marker="o", color="k", ms=4, ls="none", label="node that a robot may hold"),
+        Line2D([], [], marker="o", color="k", mfc="w", ms=5, ls="none", label="joint of bricks"),
+        Line2D([], [], marker="s", color="k", ms=6, ls="none", label="end on the ground"),
+        Line2D([], [], color="k", lw=1.2, label="edge"),
+    ]
+    axes.legend(handles=keys, loc="center")
     return figure
 
 
+@styled
 def axial_forces(engine: Engine) -> Figure:
-    """Draw the edges of two states, red in tension, blue in compression."""
+    """Draw the edges of two states, tension and compression in two colors."""
     net = engine.network
-    figure = new_figure(9, 4.2)
+    figure = new_figure(5.4)
     axes = figure.subplots(1, 2)
-    for panel, (bricks, grips) in zip(
-        axes, ((12, (None, 19, None)), (17, (33, 31, None))), strict=True
-    ):
-        held = [[g for g in grips if g is not None]]
-        draw_bricks(panel, net, bricks, VIEW, alpha=0.1)
-        draw_network(panel, net, bricks, VIEW, edge_force=engine.solve(bricks, held).edge_force[0])
+    states = ((12, (None, 19, None)), (17, (33, 31, None)))
+    forces = [
+        engine.solve(bricks, [[g for g in grips if g is not None]]).edge_force[0]
+        for bricks, grips in states
+    ]
+    largest = max(float(np.abs(force).max()) for force in forces)
+    for panel, (bricks, grips), force in zip(axes, states, forces, strict=True):
+        draw_bricks(panel, net, bricks, VIEW, alpha=0.08)
+        look = {"edge_force": force, "largest_force": largest}
+        draw_network(panel, net, bricks, VIEW, **look)
         draw_grips(panel, net, grips, VIEW)
-        panel.set_title(f"{bricks} bricks", fontsize=9)
+        held = sum(grip is not None for grip in grips)
+        panel.set_title(f"{bricks} bricks, {held} grip{'s' * (held > 1)}", loc="center")
+    figure.legend(handles=force_key(largest), loc="outside lower center", ncols=5)
     return figure
 
 
@@ -113,90 +150,40 @@ def tables_as_printed(engine: Engine) -> dict[str, pd.DataFrame]:
     return {name: as_printed(scene, table) for name, table in method_tables(engine)[0].items()}
 
 
+@styled
 def responses_along_the_build(engine: Engine) -> Figure:
-    figure = new_figure(8, 8)
+    figure = new_figure(7.8)
     axes = figure.subplots(len(COLUMNS), 1, sharex=True)
-    draw_responses(axes, tables_as_printed(engine), COLUMNS)
+    tables = {in_words(name): table for name, table in tables_as_printed(engine).items()}
+    draw_responses(axes, tables, COLUMNS)
+    axes[0].get_legend().remove()
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=3)
     axes[-1].set(yscale="log", ylim=(0.1, 500))
+    plain(axes[-1].yaxis)
     return figure
 
 
+@styled
 def printed_against_computed(engine: Engine) -> Figure:
     tables = tables_as_printed(engine)
-    figure = new_figure(9, 6.5)
-    panels = figure.subplots(3, 4).ravel()
+    figure = new_figure(8.6)
+    panels = figure.subplots(4, 3).ravel()
     for panel, column in zip(panels, VALUES, strict=False):
-        for name, (marker, label) in TABLES.items():
+        for name, (marker, color, label) in TABLES.items():
             want = printed_steps(name)[column].abs()
-            panel.plot(want, tables[name][column].abs(), marker, ms=3, mfc="none", label=label)
+            look = {"ms": 4, "mfc": "none", "color": color, "ls": "none", "label": label}
+            panel.plot(want, tables[name][column].abs(), marker, **look)
         low, high = panel.get_xlim()
-        panel.plot([low, high], [low, high], "k:", lw=0.6)
+        panel.plot([low, high], [low, high], color=GRAY, lw=0.8, zorder=0)
         if column.startswith("D_"):  # the twisting steps move a thousand times as far as others
             panel.set(xscale="log", yscale="log", xlim=(0.05, 2 * high), ylim=(0.05, 2 * high))
-        panel.set_title(column, fontsize=8)
-        panel.tick_params(labelsize=6)
-    handles, labels = panels[0].get_legend_handles_labels()
+            plain(panel.xaxis, panel.yaxis)
+        panel.set_title(PRINTED[column])
+        panel.spines[["top", "right"]].set_visible(False)
     panels[-1].set_axis_off()
-    panels[-1].legend(handles, labels, frameon=False, fontsize=8, loc="center")
-    figure.supxlabel("printed", fontsize=9)
-    figure.supylabel("computed", fontsize=9)
-    return figure
-
-
-def vault(_: Engine) -> Figure:
-    """Draw the vault in three phases, and its plan with the sides of the rectangle around it."""
-    net = build_network(load_scene("vault338"))
-    arch = range(1, 26)
-    figure = new_figure(10, 7.4)
-    panels = figure.subplots(2, 2).ravel()
-    for panel, bricks in zip(panels, (25, 120, 338), strict=False):
-        draw_bricks(panel, net, bricks, VIEW, marked=arch)
-        panel.set_title(f"{bricks} bricks", fontsize=9)
-    draw_bricks(panels[-1], net, 338, View(azimuth=0, elevation=90), marked=arch)
-    panels[-1].set_title("plan, mm", fontsize=9)
-    corner = boxes(net.scene.bricks).corners().reshape(-1, 3)
-    (left, front, _), (right, back, _) = corner.min(axis=0), corner.max(axis=0)
-    panels[-1].add_patch(Rectangle((left, front), right - left, back - front, fill=False, ls=":"))
-    text = {"fontsize": 8, "ha": "center", "va": "center"}
-    panels[-1].text((left + right) / 2, front - 0.15, f"{1e3 * (right - left):.0f}", **text)
-    panels[-1].text(
-        left - 0.15, (front + back) / 2, f"{1e3 * (back - front):.0f}", **text, rotation=90
-    )
-    return figure
-
-
-def library(_: Engine) -> Figure:
-    """Draw a chain, a wall, and a dome in either bond."""
-    figure = new_figure(10, 7.4)
-    scenes = (
-        chain(50),
-        wall(WallShape(columns=6, courses=8, gap=0.01)),
-        load_scene("dome163"),
-        dome(DomeShape(courses=10, around=24, bond="herringbone", thickness=0.06)),
-    )
-    for panel, scene in zip(figure.subplots(2, 2).ravel(), scenes, strict=True):
-        draw_bricks(panel, build_network(scene), len(scene.bricks), VIEW)
-        panel.set_title(scene.name, fontsize=9)
-    return figure
-
-
-WORDS = (
-    "arch:span=2,rise=0.8",
-    "arch:span=2,rise=1.2,curve=catenary,pattern=VLR",
-    "arch:span=2,rise=1.3,curve=pointed,dimensions=0.12x0.1x0.06",
-    "barrel:test=2",
-    "wall:columns=6,courses=8,corbel=-0.03,gap=0.005",
-    "dome:courses=6,around=16,rise=0.8,thickness=0.06",
-)
-
-
-def scenes_in_words(_: Engine) -> Figure:
-    """Draw scenes that a few words describe."""
-    figure = new_figure(10, 6.4)
-    for panel, words in zip(figure.subplots(2, 3).ravel(), WORDS, strict=True):
-        scene = load_scene(words)
-        draw_bricks(panel, build_network(scene), len(scene.bricks), VIEW)
-        panel.set_title(words.replace(",curve", ",\ncurve"), fontsize=8)
+    panels[-1].legend(*panels[0].get_legend_handles_labels(), loc="center")
+    figure.supxlabel("printed by Bruun et al.")
+    figure.supylabel("computed here")
     return figure
 
 

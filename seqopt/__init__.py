@@ -34,12 +34,17 @@ if TYPE_CHECKING:
     from seqopt.placement.certificate import Certificate
     from seqopt.placement.formulation import Formulation, formulations
     from seqopt.placement.free_problem import pose_free
+    from seqopt.placement.given_sequence import GivenSequence
+    from seqopt.placement.own_criterion import StepCost
     from seqopt.placement.plan import Plan
     from seqopt.placement.problem import pose
     from seqopt.placement.requirements import Limit
+    from seqopt.placement.robust_plan import solve_robust
+    from seqopt.placement.robust_problem import robust
     from seqopt.placement.solving import solve
     from seqopt.responses.table import analyze
     from seqopt.scene.arch import ArchShape, arch_scene
+    from seqopt.scene.scenarios import scenarios
     from seqopt.scene.scene import Scene
     from seqopt.scene.scene_file import load_scene, save_scene
     from seqopt.sequence.free_rules import FreeRules
@@ -64,12 +69,17 @@ _HOMES = {
     "placement.certificate": ("Certificate",),
     "placement.formulation": ("Formulation", "formulations"),
     "placement.free_problem": ("pose_free",),
+    "placement.given_sequence": ("GivenSequence",),
+    "placement.own_criterion": ("StepCost",),
     "placement.plan": ("Plan",),
     "placement.problem": ("pose",),
     "placement.requirements": ("Limit",),
+    "placement.robust_plan": ("solve_robust",),
+    "placement.robust_problem": ("robust",),
     "placement.solving": ("solve",),
     "responses.table": ("analyze",),
     "scene.arch": ("ArchShape", "arch_scene"),
+    "scene.scenarios": ("scenarios",),
     "scene.scene": ("Scene",),
     "scene.scene_file": ("load_scene", "save_scene"),
     "sequence.free_rules": ("FreeRules",),
@@ -106,6 +116,7 @@ __all__ = [  # noqa: RUF022  # in the order in which they are met
     "make_engine",
     "analyze",
     "CRITERIA",
+    "StepCost",
     "Limit",
     "pose",
     "Formulation",
@@ -114,7 +125,11 @@ __all__ = [  # noqa: RUF022  # in the order in which they are met
     "pose_free",
     "solve",
     "optimize",
+    "scenarios",
+    "robust",
+    "solve_robust",
     "Plan",
+    "GivenSequence",
     "Certificate",
     "DRY",
     "EPOXY",

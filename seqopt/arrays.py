@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import fields
+from dataclasses import MISSING, fields
+from enum import Enum
+from itertools import accumulate
 from typing import Any, TypeVar
 
 import numpy as np
@@ -15,6 +17,7 @@ Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 Vector = tuple[float, float, float]
 Content = TypeVar("Content")
+LONGEST = 240  # letters of what is shown of a value, its name aside
 
 _COMPRESSED = (sparse.csr_array, sparse.csc_array)
 
@@ -41,7 +44,28 @@ def skew(vectors: Floats) -> Floats:
     return out
 
 
-class FrozenValue:
+class Terse:
+    """Base of dataclasses that stay short at the prompt, whatever they hold.
+
+    Arrays are shown by shape and type, long tuples by length, numbers with six digits; fields at
+    their defaults are left out, and what would go beyond `LONGEST` letters is counted. Subclasses
+    are decorated with ``@dataclass(repr=False)``.
+    """
+
+    def __repr__(self) -> str:
+        own = vars(type(self)).get("__annotations__", {})  # before those of a base
+        shown = [
+            f"{field.name}={_short(getattr(self, field.name))}"
+            for field in sorted(fields(self), key=lambda field: field.name not in own)  # type: ignore[arg-type]
+            if field.repr and not _is_default(getattr(self, field.name), field.default)
+        ]
+        ends = accumulate(len(text) + 2 for text in shown)
+        kept = max(1, sum(end <= LONGEST for end in ends))
+        more = [f"and {len(shown) - kept} more"] if kept < len(shown) else []
+        return f"{type(self).__name__}({', '.join(shown[:kept] + more)})"
+
+
+class FrozenValue(Terse):
     """Base of frozen dataclasses that hold arrays.
 
     A value takes over the arrays it is made of: they become read-only at once, and again after
@@ -72,11 +96,6 @@ class FrozenValue:
 
     def __hash__(self) -> int:
         return hash((type(self), *map(_hashable, _parts(self))))
-
-    def __repr__(self) -> str:
-        shown = [field.name for field in fields(self) if field.repr]  # type: ignore[arg-type]
-        text = ", ".join(f"{name}={_short(getattr(self, name))}" for name in shown)
-        return f"{type(self).__name__}({text})"
 
 
 def frozen(content: Content) -> Content:
@@ -149,14 +168,30 @@ def _hashable(content: object) -> object:
     return "NaN" if _is_nan(content) else content
 
 
+def _is_default(content: object, default: object) -> bool:
+    """Return whether a field is what it is where nothing is given."""
+    plain = (str, int, float, tuple, type(None), Enum)
+    return default is not MISSING and isinstance(content, plain) and bool(content == default)
+
+
 def _short(content: object) -> str:
     """Return a representation of a few words: an array is its shape and type."""
-    if isinstance(content, (np.ndarray, *_COMPRESSED)):
-        return f"<{' x '.join(map(str, content.shape)) or 'one'} {content.dtype}>"
+    if isinstance(content, Enum):
+        return repr(content.value)
+    if isinstance(content, float):
+        return f"{content:.6g}"
+    if isinstance(shape := getattr(content, "shape", None), tuple):
+        size, kind = " x ".join(map(str, shape)) or "one", getattr(content, "dtype", "table")
+        return f"<{size} {kind}>"
     if isinstance(content, Mapping):
         return "{" + ", ".join(f"{key!r}: {_short(content[key])}" for key in content) + "}"
-    if isinstance(content, list | tuple) and len(content) > 3:
-        return f"<{len(content)} {type(content[0]).__name__}>"
     if isinstance(content, list | tuple):
-        return "(" + ", ".join(map(_short, content)) + ")"
+        return _short_list(content)
     return repr(content)
+
+
+def _short_list(content: list[object] | tuple[object, ...]) -> str:
+    """Return the entries of a list of up to three, else how many and what they are."""
+    if len(content) > 3:
+        return f"<{len(content)} {type(content[0]).__name__}>"
+    return "(" + ", ".join(map(_short, content)) + ")"

@@ -76,6 +76,10 @@ class WorkerError(SeqoptError, RuntimeError):
     """Worker processes or machines ended without a result several times in a row."""
 
 
+class ExtraError(SeqoptError, ImportError):
+    """A library that only some users need is not installed: the text says how to install it."""
+
+
 class SceneWarning(UserWarning):
     """Something in a scene is possible but probably a mistake."""
 

@@ -28,7 +28,8 @@ from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.schedule_file import find_schedule
 from seqopt.study.presets import CRITERIA, EQUATIONS
 
-FREE_WORDS = ("aim", "rules", "robots", "stands")
+RULES = tuple(field.name for field in fields(FreeRules) if field.name != "robots")
+FREE_WORDS = ("aim", "rules", "robots", "stands", *RULES)
 """Options that the free schedule alone has.
 
 ``robots`` are names, or how many take part: further ones than the scene's are mobile.
@@ -82,20 +83,20 @@ def optimize(
     Parameters
     ----------
     scene : Scene, str or pathlib.Path
-        Or the name of a built-in scene, or a scene file.
+        The scene, the name of a built-in scene, a few words, or a scene file.
     schedule : Schedule, pathlib.Path or str
-        Or its file, or a key of `seqopt.sequence.three_robots.SCHEDULES`; ``"free"``.
+        The schedule, its file, a name in `seqopt.sequence.three_robots.SCHEDULES`, or ``"free"``.
     criterion : Criterion or str, optional
-        What a step costs; or a name of `seqopt.CRITERIA`, by default that of `DEFAULTS`.
+        What a step costs, or a name in `seqopt.CRITERIA`; by default that of `DEFAULTS`.
     formulation : str, optional
-        One of `seqopt.formulations`; the free schedule has its own; by default of `DEFAULTS`.
+        A name in `seqopt.formulations`, or for the free schedule; by default that of `DEFAULTS`.
     engine : str
-        A key of `seqopt.engines.registry.ENGINES`; ``"auto"`` models no more than is needed.
+        A name in `seqopt.engines.registry.ENGINES`; ``"auto"`` uses the simplest sufficient model.
     limits : sequence of Limit
-        What no open step may exceed; of the free schedule no step.
+        Bounds that no step with an open grip may exceed; in the free schedule, no step at all.
     **options
-        Of `seqopt.solve`, the formulation, `seqopt.responses.Resources` (as ``workers=2``); an
-        ``order``; of the free schedule ``robots``, and what `seqopt.pose_free` takes.
+        Options of `seqopt.solve`, the formulation and `seqopt.responses.Resources` (``workers=2``);
+        an ``order``; if free, ``robots``, and options of `seqopt.FreeRules`, `seqopt.pose_free`.
 
     Returns
     -------
@@ -104,7 +105,7 @@ def optimize(
     Raises
     ------
     SeqoptError
-        One line that says who must act: see `seqopt.errors`.
+        With one line that says what to change; see `seqopt.errors`.
 
     Examples
     --------
@@ -159,15 +160,21 @@ def _pose_free(
     own = [field.name for field in fields(Resources) if field.name != "max_memory"]
     _refuse(options, own, "the free schedule has no such option; leave it out")
     aim, stands = options.pop("aim", "minmax"), options.pop("stands", None)
-    rules, robots = options.pop("rules", FreeRules()), options.pop("robots", ())
-    if not isinstance(rules, FreeRules):
-        raise ProblemError(f"rules {short(rules)}: give a seqopt.FreeRules")
+    rules, robots = _rules(options), options.pop("robots", ())
     if isinstance(robots, int):
         scene = with_robots(scene, robots)
     elif robots:
         rules = replace(rules, robots=robots)
     engine = make_engine(asked[1], build_network(scene))
     return pose_free(engine, rules, find_criterion(asked[0]), aim, limits, stands)
+
+
+def _rules(options: dict[str, Any]) -> FreeRules:
+    """Take out of options what they say of the rules of a free schedule."""
+    rules = options.pop("rules", FreeRules())
+    if not isinstance(rules, FreeRules):
+        raise ProblemError(f"rules {short(rules)}: give a seqopt.FreeRules")
+    return replace(rules, **{name: options.pop(name) for name in RULES if name in options})
 
 
 def _refuse(options: dict[str, Any], names: Sequence[str], why: str) -> None:

@@ -9,12 +9,14 @@ import networkx as nx
 import pytest
 
 from experiments.harness.catalog import claims
+from seqopt.showing import DISPLAYS
 
 ROOT = Path(__file__).resolve().parent.parent
 
 ROOMS = (
     {"arrays", "errors", "interrupts", "plugins"},
     {"files", "work"},
+    {"showing"},
     {"scene"},
     {"network"},
     {"sequence", "contact"},
@@ -93,6 +95,42 @@ def circles(modules: nx.DiGraph) -> list[list[str]]:
 
 def test_imports_between_rooms_go_upward_only():
     assert wrong_arrows(graph("seqopt")) == []
+
+
+def looked_up(path: Path) -> list[str]:
+    """Return what a file imports by name as it runs; ``?`` where the name is made as it runs."""
+    found = []
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        called = node.func if isinstance(node, ast.Call) else None
+        if "import_module" in (getattr(called, "id", ""), getattr(called, "attr", "")):
+            name = node.args[0]
+            found.append(str(name.value) if isinstance(name, ast.Constant) else "?")
+    return found
+
+
+def hidden_arrows(files: list[Path]) -> list[str]:
+    """Return the files that may import a room without an import that the checks above see."""
+    out = []
+    for path in files:
+        names = looked_up(path)
+        if any(name == "?" or name.startswith("seqopt") for name in names):
+            out.append(dotted(path))
+    return out
+
+
+def test_rooms_are_looked_up_in_two_places_only():
+    """The door opens every room; values find what draws them, which is in the report alone."""
+    assert hidden_arrows(sources("seqopt")) == ["seqopt", "seqopt.showing"]
+    assert {room(module) for module in DISPLAYS.values()} == {"report"}
+
+
+@pytest.mark.parametrize("name", ["'seqopt.report.draw'", "f'seqopt.{x}'", "name"])
+def test_a_hidden_arrow_is_seen(tmp_path, monkeypatch, name):
+    path = tmp_path / "seqopt" / "scene" / "any.py"
+    path.parent.mkdir(parents=True)
+    path.write_text(f"import importlib\n\nimportlib.import_module({name})\n", "utf-8")
+    monkeypatch.setattr("tests.test_architecture.ROOT", tmp_path)
+    assert hidden_arrows([path]) == ["seqopt.scene.any"]
 
 
 def test_an_arrow_against_the_order_is_seen():

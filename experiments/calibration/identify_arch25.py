@@ -1,4 +1,4 @@
-"""Claim: an arch of numbers with a meaning, fitted to Tables A.1 and A.2, also meets Table B.1.
+"""Claim: an arch of meaningful numbers, fitted to Tables A.1 and A.2, also agrees with Table B.1.
 
 Bruun et al. print span, height, brick and pattern of their arch but no coordinates, and joint
 stiffnesses per area. This experiment recovers the rest from Tables A.1 and A.2 alone. Table B.1,

@@ -14,13 +14,18 @@ Writes ``experiments/results/contact_steps.csv`` and ``docs/figures/contact_step
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 import pandas as pd
+from matplotlib.artist import Artist
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 
 from experiments.harness.claim import Claim, Finding, Options
-from experiments.harness.plotting import RESULTS, new_figure, save_figure
+from experiments.harness.plotting import RESULTS, save_all, stored
 from seqopt.contact.mortar import DRY
 from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.interface import Engine, Want
@@ -28,6 +33,7 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import MechanismError, SolverError
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
+from seqopt.report.style import BLUE, GRAY, VERMILION, new_figure, plain, styled
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.steps import Step
 from seqopt.sequence.two_robots import METHODS
@@ -35,7 +41,13 @@ from seqopt.stability.assessment import Verdict
 from seqopt.stability.steps import assess_steps
 
 RESTS, GOES, NEITHER = "rests", "goes", "neither"
-SHOWN = {RESTS: "#2166ac", GOES: "#b2182b", NEITHER: "#bbbbbb"}
+SHOWN: dict[str, dict[str, Any]] = {
+    RESTS: {"color": BLUE, "marker": "o", "ls": "none"},
+    GOES: {"color": VERMILION, "marker": "x", "ls": "none", "ms": 6, "mew": 1.5},
+    NEITHER: {"color": GRAY, "marker": "|", "ls": "none", "ms": 7, "mew": 1.5},
+}
+FALLING = "#fbe3d3"
+TOP = 3e3  # 1e-3 mm, where steps that do not rest are marked
 TO_1E_3MM = 1e6
 
 
@@ -77,34 +89,31 @@ def rows(net: Network, method: str, steps: Sequence[Step]) -> list[dict[str, obj
     return out
 
 
-def chart(table: pd.DataFrame) -> None:
-    figure = new_figure(7.5, 4.5)
+@styled
+def chart(table: pd.DataFrame) -> Figure:
+    figure = new_figure(4.8)
     panels = figure.subplots(table["method"].nunique(), 1, sharex=True)
     for axes, (method, part) in zip(panels, table.groupby("method", sort=False), strict=True):
-        axes.plot(part["step"], part["D_max_rigid_1e-3mm"], color="#888888", lw=1)
+        axes.plot(part["step"], part["D_max_rigid_1e-3mm"], color=GRAY, lw=1.2)
         rests = part[part["discrete"] == RESTS]
-        axes.plot(rests["step"], rests["D_max_1e-3mm"], "o", ms=4, color=SHOWN[RESTS])
+        axes.plot(rests["step"], rests["D_max_1e-3mm"], **SHOWN[RESTS])
         for ends in (GOES, NEITHER):
             those = part[part["discrete"] == ends]
-            at = np.full(len(those), 3e3)
-            axes.plot(those["step"], at, "x", ms=5, color=SHOWN[ends], clip_on=False)
-        falls = part[part["certificate"] == Verdict.FALLS.value]["step"]
-        for step in falls:
-            axes.axvspan(step - 0.5, step + 0.5, color="#fddbc7", lw=0)
-        axes.set(yscale="log", ylim=(1e-3, 3e3), ylabel="D_max [1e-3 mm]")
-        axes.set_title(f"{method} method, bricks laid dry", fontsize=9, loc="left")
+            axes.plot(those["step"], np.full(len(those), TOP), clip_on=False, **SHOWN[ends])
+        for step in part[part["certificate"] == Verdict.FALLS.value]["step"]:
+            axes.axvspan(step - 0.5, step + 0.5, color=FALLING, lw=0)
+        axes.set(yscale="log", ylim=(1e-3, TOP), xlim=(0, table["step"].max() + 1))
+        axes.set_ylabel("largest displacement\nD_max [1e-3 mm]")
+        axes.set_title(f"{method} method, bricks laid dry", pad=9)
+        plain(axes.yaxis)
         axes.spines[["top", "right"]].set_visible(False)
     panels[-1].set_xlabel("step")
-    for marker, color, text in (
-        ("o", SHOWN[RESTS], "comes to rest"),
-        ("x", SHOWN[GOES], "goes"),
-        ("x", SHOWN[NEITHER], "neither found"),
-        ("s", "#fddbc7", "proven to fall"),
-        ("_", "#888888", "rigid bricks, bonded"),
-    ):
-        panels[0].plot([], [], marker, color=color, label=text)
-    figure.legend(loc="outside lower center", ncols=5, fontsize=8, frameon=False)
-    save_figure(figure, "contact_steps.png")
+    words = {RESTS: "comes to rest", GOES: "becomes unstable", NEITHER: "neither was found"}
+    keys: list[Artist] = [Line2D([], [], label=words[end], **look) for end, look in SHOWN.items()]
+    keys.append(Patch(color=FALLING, label="proven to fall"))
+    keys.append(Line2D([], [], color=GRAY, label="the same, bricks bonded"))
+    figure.legend(handles=keys, loc="outside lower center", ncols=3)
+    return figure
 
 
 def holds(table: pd.DataFrame) -> bool:
@@ -138,11 +147,14 @@ def experiment(options: Options) -> Finding:
     if not quick:
         RESULTS.mkdir(exist_ok=True)
         table.to_csv(RESULTS / "contact_steps.csv", index=False, float_format="%.4g")
-        chart(table)
+        save_all(PICTURES)
     return Finding(holds(table))
 
 
-CLAIM = Claim(experiment, quick="ten steps, nothing written")
+PICTURES: dict[str, Callable[[], Figure]] = {
+    "contact_steps.png": lambda: chart(stored("contact_steps")),
+}
+CLAIM = Claim(experiment, quick="ten steps, nothing written", pictures=PICTURES)
 
 if __name__ == "__main__":
     CLAIM.main()

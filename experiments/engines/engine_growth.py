@@ -30,15 +30,17 @@ import os
 import resource
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from matplotlib.figure import Figure
 
 from experiments.engines.parts import growth_runs
 from experiments.harness.claim import Claim, Finding, Option, Options, Times, on_this_run
-from experiments.harness.plotting import HOME, RESULTS, new_figure, save_figure
+from experiments.harness.plotting import HOME, RESULTS, save_all, stored
+from seqopt.report.style import GRAY, dress, looks, new_figure, plain, styled
 
 SMALL = ["chain25", "chain50", "chain100"]
 LARGE = [*SMALL, "chain200", "chain338", "vault338"]
@@ -57,12 +59,12 @@ MOST_MEMORY = 2.1  # exponents that are claimed
 MOST_TIME = {"analyze": 2.5, "no proof": 3.0, "lazy proof": 3.0}
 MOST_ERROR, MOST_SCREEN_ERROR = 1e-9, 1e-6  # of the largest edge force of a set
 STYLES = {
-    "analyze": "o-",
-    "no proof": "s-",
-    "no proof, two processes": "D--",
-    "proof": "^-",
-    "lazy proof": "v-",
-}
+    "analyze": "analysis of a sequence",
+    "no proof": "search without proof",
+    "no proof, two processes": "search without proof, two processes",
+    "proof": "proof over all pairs",
+    "lazy proof": "lazy proof",
+}  # in words
 
 
 def run_apart(task: str, name: str, home: Path, patience: float | None = None) -> growth_runs.Row:
@@ -117,29 +119,32 @@ def taken(rows: pd.DataFrame) -> pd.Series:
     return rows["seconds"].where(~rows["task"].str.contains("two"), rows["clock_s"])
 
 
-def chart(table: pd.DataFrame) -> None:
-    figure = new_figure(7.5, 4.2)
+@styled
+def chart(table: pd.DataFrame) -> Figure:
+    """Draw time and memory over the size; stars are the vault, hollow marks an older version."""
+    figure = new_figure(4.2)
     panels = figure.subplots(1, 2)
-    columns = {"time on a core [s]": taken(table), "peak memory [MB]": table["memory_MB"]}
+    columns = {"time of a processor [s]": taken(table), "peak memory [MB]": table["memory_MB"]}
     for axes, (label, values) in zip(panels, columns.items(), strict=True):
-        for n, (task, style) in enumerate(STYLES.items()):
-            for version, alpha in (("this", 1.0), ("older", 0.45)):
+        for task, style in looks(STYLES).items():
+            for version in ("this", "older"):
                 mine = (table["task"] == task) & (table["version"] == version)
                 own = mine & table["scene"].str.startswith("chain") & values.notna()
                 if own.any():
-                    name = task if version == "this" else f"{task}, older version"
-                    line = style if version == "this" else style[:-1].rstrip("-") + ":"
-                    bricks = table["bricks"][own]
-                    axes.loglog(
-                        bricks, values[own], line, color=f"C{n}", ms=4, alpha=alpha, label=name
-                    )
+                    line = style.line()
+                    if version == "older":
+                        line |= {"mfc": "white", "lw": 0.8}
+                    name = STYLES[task] + (", an older version" if version == "older" else "")
+                    axes.plot(table["bricks"][own], values[own], label=name, **line)
                 vault = mine & table["scene"].str.startswith("vault")
-                axes.loglog(table["bricks"][vault], values[vault], "*", color=f"C{n}", ms=9)
-        axes.set(xlabel="bricks in the chain (star: vault338)", ylabel=label)
-        axes.grid(visible=True, which="both", lw=0.2)
+                axes.plot(table["bricks"][vault], values[vault], "*", color=style.color, ms=9)
+        axes.set(xscale="log", yscale="log", xlabel="bricks in the chain", ylabel=label)
+        plain(axes.xaxis, axes.yaxis)
+        dress(axes)
+    panels[0].plot([], [], "*", color=GRAY, ms=9, label="the vault of 338 bricks, by color")
     handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, labels, frameon=False, fontsize=8, ncols=3, loc="outside lower center")
-    save_figure(figure, "growth.png")
+    figure.legend(handles, labels, ncols=2, loc="outside lower center")
+    return figure
 
 
 def experiment(options: Options) -> Finding:
@@ -151,7 +156,7 @@ def experiment(options: Options) -> Finding:
     if not quick:
         RESULTS.mkdir(exist_ok=True)
         table.to_csv(RESULTS / "engine_growth_runs.csv", index=False, float_format="%.4g")
-        chart(table)
+        save_all(PICTURES)
     return on_this_run(holds=holds(table))
 
 
@@ -166,11 +171,15 @@ def holds(table: pd.DataFrame) -> bool:
     return bool(mine["seconds"].notna().all() and small and fast and exact)
 
 
+PICTURES: dict[str, Callable[[], Figure]] = {
+    "growth.png": lambda: chart(stored("engine_growth_runs")),
+}
 CLAIM = Claim(
     experiment,
     quick="small chains, nothing written",
     times=Times.SHOWN,
     options=(Option("--older", "the folder of an older version to run in turns", default=""),),
+    pictures=PICTURES,
 )
 
 if __name__ == "__main__":

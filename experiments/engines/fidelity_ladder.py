@@ -1,4 +1,4 @@
-"""Claim: where its condition is met a level of fidelity answers what the next one would, for less.
+"""Claim: where its condition is met, a simpler model gives the answer of the next one in less time.
 
 That is, to 1e-8 between planar, rigid and discrete bricks and to 1e-5 from rigid bricks to the
 stiff-bar frame; and where its condition is not met a level is wrong by more than a tenth. For less:
@@ -22,18 +22,21 @@ and ``docs/figures/fidelity_ladder.png``.
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from statistics import median
 from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from experiments.engines.parts.fidelity_scenes import flat_arch, flattened
 from experiments.engines.parts.grip_sets import grip_sets
 from experiments.harness.claim import Claim, Finding, Options, Times
-from experiments.harness.plotting import RESULTS, new_figure, save_figure
+from experiments.harness.plotting import RESULTS, save_all, stored
 from experiments.harness.timing import best
+from experiments.harness.wording import two
 from seqopt.arrays import Floats, Ints
 from seqopt.contact.mortar import DRY
 from seqopt.engines.auto import AutoEngine
@@ -43,6 +46,17 @@ from seqopt.engines.interface import Engine, Want
 from seqopt.engines.planar import PlanarEngine
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network
+from seqopt.report.style import (
+    BLUE,
+    GRAY,
+    GREEN,
+    SMALL,
+    VERMILION,
+    dress,
+    new_figure,
+    plain,
+    styled,
+)
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.two_robots import sequential
@@ -53,7 +67,7 @@ SIZES = (10, 25, 50, 100, 200)
 SETS = 200
 MET, NOT_MET = "met", "not met"
 RESTING = (3, 7, 13, 24, 40)  # steps of the sequential method that rest unbonded
-COLORS = {"planar": "#2166ac", "rigid": "#b2182b", "auto": "#e08214"}
+LOOKS = {"planar": (GREEN, "s"), "rigid": (BLUE, "o"), "auto": (VERMILION, "D")}
 
 
 class Question(NamedTuple):
@@ -161,39 +175,47 @@ def cheaper(table: pd.DataFrame) -> bool:
     return bool((met["ratio"] > least).all())
 
 
-def chart(table: pd.DataFrame) -> None:
-    figure = new_figure(8, 4.4)
-    left, right = figure.subplots(1, 2, sharey=True, width_ratios=(1, 1.2))
+@styled
+def chart(table: pd.DataFrame) -> Figure:
+    figure = new_figure(4.0)
+    left, right = figure.subplots(1, 2, sharey=True, width_ratios=(1, 1.3))
     at = -np.arange(len(table))
     for y, (_, row) in zip(at, table.iterrows(), strict=True):
-        color = COLORS[str(row["level"])]
-        fill = color if row["condition"] == MET else "white"
-        error = max(float(row["error"]), 1e-16)
-        left.plot(error, y, "o", ms=7, color=color, mfc=fill)
+        color, marker = LOOKS[str(row["level"])]
+        look = {"color": color, "ms": 7, "mfc": color if row["condition"] == MET else "white"}
+        left.plot(max(float(row["error"]), 1e-16), y, marker, **look)
         right.plot([row["set_us"], row["against_us"]], [y, y], color="#cccccc", lw=1, zorder=1)
-        right.plot(row["set_us"], y, "o", ms=7, color=color, mfc=fill)
-        right.plot(row["against_us"], y, "s", ms=5, color="#888888")
+        right.plot(row["against_us"], y, "X", ms=6, color=GRAY)
+        right.plot(row["set_us"], y, marker, **look)
         right.annotate(
-            f"{float(f'{row.ratio:.2g}'):,g} ×",
+            f"{two(float(row['ratio']))} times",
             (max(row["set_us"], row["against_us"]), y),
-            xytext=(6, -3),
+            xytext=(7, 0),
             textcoords="offset points",
-            fontsize=7,
+            va="center",
+            fontsize=SMALL,
         )
-    left.set_yticks(at, table["level"] + " for " + table["against"] + ", " + table["case"])
-    left.tick_params(axis="y", labelsize=8)
-    left.set(xscale="log", xlabel="error against the other")
-    right.set(xscale="log", xlabel="time per grip set [µs]")
-    right.margins(x=0.18)
+    left.set_yticks(at, table["level"] + " for " + table["against"] + ": " + table["case"])
+    left.set(xscale="log", xlabel="error against the other model", xlim=(1e-17, 30))
+    left.set_xticks([1e-16, 1e-12, 1e-8, 1e-4, 1], ["none", "1e-12", "1e-8", "1e-4", "1"])
+    right.set(xscale="log", xlabel="time per set of grips [µs]", xlim=(0.7, 2e7))
+    plain(right.xaxis)
     for axes in (left, right):
-        axes.grid(visible=True, axis="x", lw=0.2)
-        axes.spines[["top", "right"]].set_visible(False)
-    figure.supxlabel(
-        "Filled: the condition of the level is met. Open: it is not, and auto does not take it. "
-        "Squares: the other.\nAt the left edge: no difference, auto takes the same engine.",
-        fontsize=8,
-    )
-    save_figure(figure, "fidelity_ladder.png")
+        dress(axes)
+        axes.minorticks_off()
+        axes.grid(visible=False, axis="y")
+    keys = [
+        Line2D([], [], marker=marker, color=color, ls="none", ms=7, label=f"{name} bricks")
+        for name, (color, marker) in LOOKS.items()
+    ]
+    keys[-1].set_label("automatic choice")
+    look = {"color": GRAY, "ls": "none"}
+    keys += [
+        Line2D([], [], marker="o", ms=7, mfc="white", label="its condition is not met", **look),
+        Line2D([], [], marker="X", ms=6, label="the model that it stands for", **look),
+    ]
+    figure.legend(handles=keys, loc="outside lower center", ncols=5, columnspacing=1.2)
+    return figure
 
 
 def experiment(options: Options) -> Finding:
@@ -204,11 +226,14 @@ def experiment(options: Options) -> Finding:
     if not quick:
         RESULTS.mkdir(exist_ok=True)
         table.to_csv(RESULTS / "fidelity_ladder.csv", index=False, float_format="%.3g")
-        chart(table)
+        save_all(PICTURES)
     return Finding(judge(table) and (quick or cheaper(table)))
 
 
-CLAIM = Claim(experiment, quick="few cases, nothing written", times=Times.SHOWN)
+PICTURES: dict[str, Callable[[], Figure]] = {
+    "fidelity_ladder.png": lambda: chart(stored("fidelity_ladder")),
+}
+CLAIM = Claim(experiment, quick="few cases, nothing written", times=Times.SHOWN, pictures=PICTURES)
 
 if __name__ == "__main__":
     CLAIM.main()

@@ -14,17 +14,21 @@ Writes ``experiments/results/frame_contrast.csv`` and ``docs/figures/frame_contr
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pandas as pd
+from matplotlib.figure import Figure
 
 from experiments.harness.claim import Claim, Finding, Options
-from experiments.harness.plotting import RESULTS, new_figure, save_figure
+from experiments.harness.plotting import RESULTS, save_all, stored
 from seqopt.engines.frame import CONTRAST, FrameEngine
 from seqopt.engines.interface import Engine, Fields, grip_columns
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.engines.rigid.dense import solve_dense
 from seqopt.errors import SolverError
 from seqopt.network.build import build_network
+from seqopt.report.style import GRAY, SMALL, dress, looks, new_figure, styled
 from seqopt.responses.table import step_fields
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.steps import Step
@@ -32,6 +36,7 @@ from seqopt.sequence.two_robots import METHODS
 from seqopt.study.published import published_plan
 
 FIELDS = ("edge_force", "displacement", "grip_force", "support")
+LABELS = {"displacement": "displacement of nodes", "support": "reaction of the support"}
 
 
 def published_steps(engine: Engine) -> list[Step]:
@@ -79,16 +84,22 @@ def direct_gap(steps: list[Step], fast: Engine) -> float:
     return worst
 
 
-def chart(table: pd.DataFrame) -> None:
-    figure = new_figure(6, 3.6)
+@styled
+def chart(table: pd.DataFrame) -> Figure:
+    figure = new_figure(3.2)
     axes = figure.subplots()
-    for name in FIELDS:
-        axes.loglog(table["contrast"], table[name], "o-", ms=3, label=name.replace("_", " "))
-    axes.axvline(CONTRAST, color="k", lw=0.8, ls=":")
-    axes.set(xlabel="bar over joint stiffness", ylabel="largest relative difference")
-    axes.grid(visible=True, which="both", lw=0.2)
-    axes.legend(frameon=False, fontsize=8)
-    save_figure(figure, "frame_contrast.png")
+    for name, style in looks(FIELDS).items():
+        label = LABELS.get(name, name.replace("_", " "))
+        axes.plot(table["contrast"], table[name], label=label, **style.line())
+    axes.axvline(CONTRAST, color=GRAY, lw=0.8)
+    axes.set(xscale="log", yscale="log", ylabel="largest relative difference\nfrom rigid bricks")
+    axes.set_xlabel("stiffness of the bars over that of the joints")
+    axes.annotate("the default", (CONTRAST, 0.05), (4, 0), textcoords="offset points",
+                  fontsize=SMALL)  # fmt: skip
+    axes.locator_params(axis="y", numticks=6)
+    dress(axes)
+    axes.legend()
+    return figure
 
 
 def experiment(options: Options) -> Finding:
@@ -103,7 +114,7 @@ def experiment(options: Options) -> Finding:
     if not quick:
         RESULTS.mkdir(exist_ok=True)
         table.to_csv(RESULTS / "frame_contrast.csv", index=False, float_format="%.3g")
-        chart(table)
+        save_all(PICTURES)
     return Finding(holds(table, gap))
 
 
@@ -116,7 +127,10 @@ def holds(table: pd.DataFrame, gap: float) -> bool:
     return bool(best <= min(5e-6, worst.min()) and bad.all() and gap <= 1e-9)
 
 
-CLAIM = Claim(experiment, quick="few states, nothing written")
+PICTURES: dict[str, Callable[[], Figure]] = {
+    "frame_contrast.png": lambda: chart(stored("frame_contrast")),
+}
+CLAIM = Claim(experiment, quick="few states, nothing written", pictures=PICTURES)
 
 if __name__ == "__main__":
     CLAIM.main()

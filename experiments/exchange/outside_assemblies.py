@@ -1,4 +1,4 @@
-"""Claim: assemblies of others go from file to a proven plan, or one line says what they lack.
+"""Claim: files of other programs lead to a proven plan, or one line says what they lack.
 
 Method: every file of a list that the project did not make, 21 that ship with compas_cra and 30 of
 public repositories, is put through the command line: ``seqopt import`` with a unit, a density
@@ -28,16 +28,17 @@ import json
 import tempfile
 import warnings
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from matplotlib.figure import Figure
 
 from experiments.exchange.parts.outside_chart import chart
 from experiments.exchange.parts.outside_files import ELSEWHERE, SAMPLES, Outside, find
 from experiments.harness.claim import Claim, Extra, Finding, Option, Options
-from experiments.harness.plotting import RESULTS, save_figure
+from experiments.harness.plotting import RESULTS, save_all
 from formulations.limit_analysis import compile_equilibrium
 from seqopt.cli.main import main
 from seqopt.contact.faces import step_assembly
@@ -194,17 +195,21 @@ def experiment(options: Options) -> Finding:
         if not options.quick:
             store(pd.DataFrame(rows))  # file by file: a run that ends early keeps what it found
     if not options.quick:
-        save_figure(chart(), "outside_assemblies.png")
+        save_all(PICTURES)
     table = pd.DataFrame(rows) if options.quick else pd.read_csv(STORE)
     plans = int((table["outcome"] == PLAN).sum())
     return Finding(holds(table, 1 if options.quick else LEAST), f": {plans} of {len(table)} plans")
 
 
+PICTURES: dict[str, Callable[[], Figure]] = {
+    "outside_assemblies.png": chart,
+}
 CLAIM = Claim(
     experiment,
     quick="three samples, nothing written",
     options=(Option("--files", "folder of clones of the repositories named", ""),),
     needs=(Extra("compas_cra", "pip install 'seqopt[witness]'"),),
+    pictures=PICTURES,
 )
 
 if __name__ == "__main__":

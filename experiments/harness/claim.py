@@ -16,10 +16,14 @@ from __future__ import annotations
 import argparse
 import inspect
 import sys
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from enum import Enum
 from importlib.util import find_spec
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 Options = argparse.Namespace
 START = "Claim: "  # of the text of a module that makes one
@@ -96,6 +100,9 @@ class Claim:
         Beyond ``--quick``.
     needs : tuple of Extra
         Without one of these it ends with exit status 2.
+    pictures : mapping of str to callable
+        What draws each figure of the documentation from stored results alone, by file name:
+        ``--redraw`` does, and runs nothing.
     """
 
     experiment: Callable[[Options], Finding | None]
@@ -103,6 +110,7 @@ class Claim:
     times: Times = Times.NONE
     options: tuple[Option, ...] = ()
     needs: tuple[Extra, ...] = ()
+    pictures: Mapping[str, Callable[[], Figure]] = field(default_factory=dict)
 
     @property
     def module(self) -> str:
@@ -126,6 +134,9 @@ class Claim:
         """Return the options of a command line, that of the process by default."""
         parser = argparse.ArgumentParser(description=START + self.text)
         parser.add_argument("--quick", action="store_true", help=self.quick)
+        if self.pictures:
+            text = "draw the figures anew from stored results, run nothing"
+            parser.add_argument("--redraw", action="store_true", help=text)
         for option in self.options:
             if option.default is None:
                 parser.add_argument(option.flag, action="store_true", help=option.help)
@@ -136,6 +147,9 @@ class Claim:
     def main(self, arguments: Sequence[str] | None = None) -> None:
         """Run the experiment and print its verdict; exit with status 2 if an extra is missing."""
         options = self.parse(arguments)
+        if self.pictures and options.redraw:
+            self.redraw()
+            return
         for extra in self.needs:
             if find_spec(extra.module) is None:
                 print(f"{extra.module} is not installed: {extra.install}")
@@ -143,3 +157,11 @@ class Claim:
         verdict = self.experiment(options)
         if verdict is not None:
             print(f"{PREFIX}{verdict}")
+
+    def redraw(self) -> None:
+        """Draw the figures of the documentation from stored results."""
+        from experiments.harness.plotting import save_figure  # noqa: PLC0415  # an extra
+
+        for name, draw in self.pictures.items():
+            save_figure(draw(), name)
+            print(f"drawn: {name}")

@@ -8,19 +8,19 @@ from experiments.harness.wording import markdown, two
 from seqopt.placement.formulation import formulations
 
 FREE = {
-    "overlap_dp": "the least sum: the default",
+    "overlap_dp": "the least sum (the default)",
     "minimax": "the least worst step",
-    "cascade": "what the paper's scheme would choose; without the proof, few models",
-    "rank_search": "what a look at the next moves is worth",
-    "beam": "how much looking ahead is worth",
-    "lagrangian": "no use without budgets",
-    "labels": "no use without budgets",
-    "overlap_lp": "no use without budgets",
-    "overlap_mip": "no use without budgets",
+    "cascade": "the paper's scheme; without the proof it needs few models",
+    "rank_search": "comparison: looking at the next moves",
+    "beam": "comparison: keeping several choices",
+    "lagrangian": "not needed without budgets",
+    "labels": "not needed without budgets",
+    "overlap_lp": "not needed without budgets",
+    "overlap_mip": "not needed without budgets",
 }
 CAPPED = {
-    "labels": "the best choice, proven: the default with budgets",
-    "lagrangian": "bound, prices and a good choice where labels are too many",
+    "labels": "the best choice, proven (the default with budgets)",
+    "lagrangian": "bound, prices and a good choice if there are too many labels",
     "overlap_lp": "to check the prices; its choice need not keep the budgets",
     "overlap_mip": "to check `labels` by a program that shares nothing with it",
 }
@@ -54,7 +54,7 @@ def shapes_table(table: pd.DataFrame) -> str:
 def _table(table: pd.DataFrame, when: dict[str, str]) -> str:
     kinds = {name: formulation.kind.value for name, formulation in formulations().items()}
     counts = sorted(table["bricks"].unique())
-    head = ["take", "for", "promise", "gap at most", *(f"{n} bricks" for n in counts), "memory"]
+    head = ["formulation", "use it for", "kind", "largest gap", *(f"{n} bricks" for n in counts), "memory"]
     rows = []
     for name, use in when.items():
         own = table[table["formulation"] == name]

@@ -21,14 +21,16 @@ Inputs: the shipped scene; seed 0; PyNiteFEA, openseespy and pyconmech if instal
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
+from matplotlib.figure import Figure
 
 from experiments.harness.claim import Claim, Finding, Options, Times
-from experiments.harness.plotting import RESULTS
+from experiments.harness.plotting import RESULTS, save_all, stored
 from experiments.harness.timing import best
 from experiments.peers.parts.bounds import products
 from experiments.peers.parts.chain import Answer, Peer, chain_of
@@ -228,12 +230,23 @@ def experiment(options: Options) -> Finding:
         RESULTS.mkdir(exist_ok=True)
         both = pd.concat({"models": table, "placement": ways}, names=["part"]).reset_index(level=0)
         both.to_csv(RESULTS / "peers.csv", index=False, float_format="%.4g")
-        chart(table)
+        save_all(PICTURES)
     without = f", without {', '.join(lacking)}; nothing stored" if lacking and not quick else ""
     return Finding(judge(table, ways), without)
 
 
-CLAIM = Claim(experiment, quick="loops and paths, nothing written", times=Times.JUDGED)
+def picture() -> Figure:
+    """Return the figure from stored rows."""
+    both = stored("peers")
+    return chart(both[both["part"] == "models"])
+
+
+PICTURES: dict[str, Callable[[], Figure]] = {
+    "peers.png": picture,
+}
+CLAIM = Claim(
+    experiment, quick="loops and paths, nothing written", times=Times.JUDGED, pictures=PICTURES
+)
 
 if __name__ == "__main__":
     CLAIM.main()

@@ -1,4 +1,4 @@
-"""Claim: within their uncertainty joint stiffness decides on grips, weights and positions hardly.
+"""Claim: within its uncertainty joint stiffness changes grips; weights and positions hardly do.
 
 Method: the three-robot loop on `arch25`. A scenario perturbs the scene's joint stiffness, brick
 weights or positions; steps and candidates stay the nominal ones, so only responses differ. In every
@@ -27,14 +27,15 @@ Inputs: the shipped scene. Command: ``python -m experiments.placement.decision_s
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
+from matplotlib.figure import Figure
 
 from experiments.harness.claim import Claim, Finding, Options
-from experiments.harness.plotting import RESULTS
+from experiments.harness.plotting import RESULTS, save_all, stored
 from experiments.placement.parts.scenarios import (
     GRIDS,
     POSITION,
@@ -151,11 +152,14 @@ def experiment(options: Options) -> Finding:
     if not quick:
         RESULTS.mkdir(exist_ok=True)
         table.to_csv(RESULTS / "decision_sensitivity.csv", index=False, float_format="%.6g")
-        chart(table)
+        save_all(PICTURES)
     return Finding(holds(table))
 
 
-CLAIM = Claim(experiment, quick="few scenarios, nothing written")
+PICTURES: dict[str, Callable[[], Figure]] = {
+    "decision_sensitivity.png": lambda: chart(stored("decision_sensitivity")),
+}
+CLAIM = Claim(experiment, quick="few scenarios, nothing written", pictures=PICTURES)
 
 if __name__ == "__main__":
     CLAIM.main()

@@ -1,4 +1,4 @@
-"""Claim: of the degenerate problems tried none is answered wrongly, and a refusal gives its reason.
+"""Claim: no degenerate problem tried is answered wrongly, and every refusal gives its reason.
 
 Method: every registered formulation solves small problems whose exact answer enumeration finds:
 ties, limits and budgets that bind or cannot be met, badly scaled or malformed costs. What comes

@@ -21,12 +21,15 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import Callable
 
 import numpy as np
 import pandas as pd
+from matplotlib.figure import Figure
 
 from experiments.harness.claim import Claim, Finding, Options, Times, on_this_run
-from experiments.harness.plotting import RESULTS, new_figure, save_figure
+from experiments.harness.plotting import RESULTS, save_all, stored
+from seqopt.report.style import GRAY, SMALL, dress, look, new_figure, plain, styled
 
 SIZES = {3: (7, 13, 25, 49, 73, 97, 145), 4: (7, 13, 25, 37, 49, 73), 5: (7, 13, 19, 25)}
 QUICK = {3: (7, 13), 4: (7,)}
@@ -34,7 +37,6 @@ SOLVED = {3: 145, 4: 73, 5: 19}  # bricks up to which a plan is proven, by robot
 STEEPEST = {3: 3.0, 4: 4.0}  # exponents of time that are claimed
 FROM = 25  # bricks from which on exponents are fitted
 MOST = 2048.0  # MB
-STYLE = {3: ("o-", "#2166ac"), 4: ("s-", "#e08214"), 5: ("^-", "#b2182b")}
 
 
 def run_apart(bricks: int, robots: int) -> dict[str, object]:
@@ -74,28 +76,30 @@ def holds(table: pd.DataFrame) -> bool:
     return solved and bounded and not slow and bool((table["memory_MB"] <= MOST).all())
 
 
-def chart(table: pd.DataFrame) -> None:
-    figure = new_figure(10, 3.6)
+@styled
+def chart(table: pd.DataFrame) -> Figure:
+    figure = new_figure(3.0)
     parts = figure.subplots(1, 3)
     columns = ("states", "seconds", "memory_MB")
-    labels = ("states in the proof", "time on one core [s]", "peak memory [MB]")
+    labels = ("states in the proof", "time of one core [s]", "peak memory [MB]")
     table = table.assign(states=table["states"].where(table["status"] == "optimal"))
     for axes, column, label in zip(parts, columns, labels, strict=True):
-        for robots, rows in table.groupby("robots"):
-            line, color = STYLE[int(robots)]  # type: ignore[call-overload]
-            axes.loglog(rows["bricks"], rows[column], line, color=color, ms=5, label=f"{robots}")
+        for number, (robots, rows) in enumerate(table.groupby("robots")):
+            style = look(number)
+            axes.plot(rows["bricks"], rows[column], label=f"{robots} robots", **style.line())
             ended = rows[rows["status"] != "optimal"]
-            axes.loglog(ended["bricks"], ended[column], line[0], color="white", mec=color, ms=5)
-        axes.set(xlabel="bricks", ylabel=label)
-        axes.set_xticks([7, 13, 25, 49, 97], ["7", "13", "25", "49", "97"])
+            axes.plot(ended["bricks"], ended[column], zorder=3, **style.mark(filled=False))
+        axes.set(xscale="log", yscale="log", xlabel="bricks", ylabel=label)
+        plain(axes.yaxis)
+        axes.set_xticks([7, 13, 25, 49, 145], ["7", "13", "25", "49", "145"])
         axes.minorticks_off()
-        axes.grid(visible=True, lw=0.2)
-        axes.spines[["top", "right"]].set_visible(False)
-    parts[2].axhline(MOST, color="k", lw=0.8, ls=":")
-    parts[0].legend(
-        frameon=False, fontsize=8, title="robots (open: memory ended)", title_fontsize=8
-    )
-    save_figure(figure, "free_growth.png")
+        dress(axes)
+    parts[2].axhline(MOST, color=GRAY, lw=0.8)
+    parts[2].annotate("2 GB", (7, MOST), (0, -9), textcoords="offset points", fontsize=SMALL)
+    parts[0].plot([], [], "^", color=GRAY, mfc="white", label="memory ended before the proof")
+    handles, names = parts[0].get_legend_handles_labels()
+    figure.legend(handles, names, loc="outside lower center", ncols=4)
+    return figure
 
 
 def experiment(options: Options) -> Finding:
@@ -107,11 +111,16 @@ def experiment(options: Options) -> Finding:
         print("exponents of", column, exponents(table, column))
     if not options.quick:
         table.to_csv(RESULTS / "free_growth.csv", index=False, float_format="%.4g")
-        chart(table)
+        save_all(PICTURES)
     return on_this_run(holds=holds(table))
 
 
-CLAIM = Claim(experiment, quick="small arches, nothing written", times=Times.SHOWN)
+PICTURES: dict[str, Callable[[], Figure]] = {
+    "free_growth.png": lambda: chart(stored("free_growth")),
+}
+CLAIM = Claim(
+    experiment, quick="small arches, nothing written", times=Times.SHOWN, pictures=PICTURES
+)
 
 if __name__ == "__main__":
     CLAIM.main()

@@ -1,4 +1,4 @@
-"""Claim: tests notice at least 95 % of the changes made to what computes, costs and certifies.
+"""Claim: tests notice at least 95 % of the changes to code that computes, costs and certifies.
 
 Method: Cosmic Ray changes one operator, number, loop or decorator of a module at a time
 (`experiments.robustness.parts.mutants`), and the tests that are for the module run against it. A

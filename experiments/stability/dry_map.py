@@ -1,4 +1,4 @@
-"""Claim: a third robot builds dry what two cannot, and none needs more payload than one robot less.
+"""Claim: three robots build dry what two cannot, and one more robot never needs a larger payload.
 
 Method: arches of 7 to 16 bricks along a catenary, whose bricks stick out of the arch's line to
 either side as those of `arch25` do, of three thicknesses, with four coefficients of friction, are
@@ -19,13 +19,15 @@ Inputs: generated arches. Command: ``python -m experiments.stability.dry_map [--
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import product
 
 import numpy as np
 import pandas as pd
+from matplotlib.figure import Figure
 
 from experiments.harness.claim import Claim, Finding, Options
-from experiments.harness.plotting import RESULTS
+from experiments.harness.plotting import RESULTS, save_all, stored
 from experiments.stability.parts.dry_arches import CLOSE, Cell, least_payload
 from experiments.stability.parts.dry_map_chart import chart
 
@@ -72,14 +74,19 @@ def experiment(options: Options) -> Finding:
     print(table.to_string(index=False, float_format="%.3g"))
     if not options.quick:
         table.to_csv(RESULTS / "dry_map.csv", index=False, float_format="%.4g")
-        chart(table)
+        save_all(PICTURES)
     found = np.isfinite(table["least_payload"]).groupby(table["robots"]).sum()
     built = ", ".join(f"{count} by {robots}" for robots, count in found.items())
     each = len(table) // table["robots"].nunique()
     return Finding(holds(table), f": of {each} arches robots build {built}")
 
 
-CLAIM = Claim(experiment, quick="two arches, two or three robots, nothing written")
+PICTURES: dict[str, Callable[[], Figure]] = {
+    "dry_map.png": lambda: chart(stored("dry_map")),
+}
+CLAIM = Claim(
+    experiment, quick="two arches, two or three robots, nothing written", pictures=PICTURES
+)
 
 if __name__ == "__main__":
     CLAIM.main()

@@ -1,4 +1,4 @@
-"""Claim: our verdicts are those of two outside programs, and on a large assembly come sooner.
+"""Claim: our verdicts agree with those of two other programs, and on a large assembly come sooner.
 
 The verdicts wherever a program decides, but for three differences that are explained below: they
 are known from earlier runs, and the claim fails if one is missing or a fourth is found. The time is
@@ -42,16 +42,17 @@ from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
+from matplotlib.figure import Figure
 
 from experiments.harness.claim import Claim, Extra, Finding, Option, Options, Times
 from experiments.harness.lmgc90 import python_with_lmgc90
-from experiments.harness.plotting import RESULTS
+from experiments.harness.plotting import RESULTS, save_all
 from experiments.stability.parts.blocks import ring, stack
-from experiments.stability.parts.witness_chart import chart
 from experiments.stability.parts.witness_cra import (
     SAMPLES,
     coupled,
@@ -61,12 +62,12 @@ from experiments.stability.parts.witness_cra import (
 )
 from experiments.stability.parts.witness_lmgc90 import moved_by
 from experiments.stability.parts.witness_scenes import Scene, arch, incline, scene_of
+from experiments.stability.parts.witness_verdicts import LARGEST, differing, picture, words
 from seqopt.contact.mortar import Mortar
 from seqopt.stability.assessment import Verdict, bonded, verdict_of
 from seqopt.stability.limit_analysis import compile_equilibrium
 from seqopt.stability.prover import Prover
 
-LARGEST = "armadillo_cra"
 SOONER = 5.0
 OPEN = Verdict.UNDECIDED.value
 TURNED = "incline, turned"
@@ -199,20 +200,6 @@ def _timed(trial: Trial) -> float:
     return time.perf_counter() - start
 
 
-def words(table: pd.DataFrame, witness: str) -> pd.Series:
-    """Return a witness's verdicts; RBE's open ones as its constraints without tension have it."""
-    if witness != "rbe":
-        return table[witness].replace("", OPEN)
-    return table["rbe"].where(table["rbe"] != OPEN, table["no_tension"])
-
-
-def differing(table: pd.DataFrame, witness: str) -> set[tuple[str, str]]:
-    """Return where a witness decides otherwise than we."""
-    word = words(table, witness)
-    differs = (word != OPEN) & (word != table["ours"])
-    return {(case, witness) for case in table.loc[differs, "case"]}
-
-
 def faults(table: pd.DataFrame, witnesses: list[str], ratio: float | None) -> list[str]:
     """Return what speaks against the claim; without a ratio, nothing is said about times."""
     out = []
@@ -275,8 +262,7 @@ def experiment(options: Options) -> Finding:
     if python:  # rows of a witness are not given up because it is not there
         RESULTS.mkdir(exist_ok=True)
         table.to_csv(RESULTS / "witnesses.csv", index=False, float_format="%.3g")
-        differ = set().union(*(differing(table, witness) for witness in witnesses))
-        chart(table, times, {case for case, _ in differ})
+        save_all(PICTURES)
     for fault in found:
         print(f"against it: {fault}")
     alone = (
@@ -287,12 +273,16 @@ def experiment(options: Options) -> Finding:
     return Finding(not found, alone)
 
 
+PICTURES: dict[str, Callable[[], Figure]] = {
+    "witnesses.png": picture,
+}
 CLAIM = Claim(
     experiment,
     quick="few cases, nothing written",
     times=Times.SHOWN,
     options=(Option("--lmgc90", "a Python with compas_lmgc90", sys.executable),),
     needs=(Extra("compas_cra", 'pip install "seqopt[witness]"'),),
+    pictures=PICTURES,
 )
 
 if __name__ == "__main__":

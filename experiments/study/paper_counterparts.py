@@ -19,13 +19,17 @@ experiments.study.paper_counterparts [--quick]``. Writes
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import cache, partial
+
 import pandas as pd
+from matplotlib.figure import Figure
 
 from experiments.harness.claim import Claim, Finding, Options
-from experiments.harness.plotting import FIGURES, RESULTS
-from experiments.study.parts.counterpart_charts import draw_all
-from experiments.study.parts.counterpart_models import ours
-from experiments.study.parts.counterpart_page import DISAGREES, page, statement, verdict
+from experiments.harness.plotting import FIGURES, RESULTS, save_all, stored
+from experiments.study.parts.counterpart_charts import drawn
+from experiments.study.parts.counterpart_models import Ours, ours
+from experiments.study.parts.counterpart_page import DISAGREES, TITLES, page, statement, verdict
 from experiments.study.parts.counterpart_rows import tabulate
 from experiments.study.parts.paper_items import ITEMS, Item
 
@@ -57,7 +61,7 @@ def experiment(options: Options) -> Finding:
         path = RESULTS / "paper_counterparts.csv"
         table.to_csv(path, index=False, float_format="%.6g", lineterminator="\n")
         table = pd.read_csv(path)  # captions tell what is stored
-        draw_all(table, own)
+        save_all(PICTURES)
         (FIGURES.parent / "counterparts.md").write_text(page(table), encoding="utf-8")
     found = faults(items, table)
     for fault in found:
@@ -65,7 +69,21 @@ def experiment(options: Options) -> Finding:
     return Finding(not found)
 
 
-CLAIM = Claim(experiment, quick="a few items, nothing written")
+@cache
+def model() -> Ours:
+    """Return what all pictures are drawn from beside stored rows."""
+    return ours()
+
+
+def picture(name: str) -> Figure:
+    """Return one of `TITLES` from stored rows."""
+    return drawn(name, stored("paper_counterparts"), model())
+
+
+PICTURES: dict[str, Callable[[], Figure]] = {
+    f"counterpart_{name}.png": partial(picture, name) for name in TITLES
+}
+CLAIM = Claim(experiment, quick="a few items, nothing written", pictures=PICTURES)
 
 if __name__ == "__main__":
     CLAIM.main()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import io
 import json
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -16,7 +15,6 @@ from seqopt.cli.free_files import free_files
 from seqopt.cli.means import parse_size
 from seqopt.cli.order import SEARCH, optimize_order
 from seqopt.cli.outputs import require_matplotlib, write_outputs
-from seqopt.cli.pages import PAGE, front_page
 from seqopt.cli.rules import parse_rules, parse_standing
 from seqopt.cli.status import Status
 from seqopt.cli.terminal import complain, progress, say
@@ -37,6 +35,7 @@ from seqopt.placement.schedule_formulation import find_schedule_formulation
 from seqopt.placement.solving import solve
 from seqopt.report.fronts import shown_table, worst_of
 from seqopt.report.methods import method_tables
+from seqopt.report.plan_pages import PAGE, front_page
 from seqopt.responses.table import analyze
 from seqopt.scene.scene import Scene
 from seqopt.sequence.free_rules import FREE, with_robots
@@ -197,14 +196,13 @@ def _front_files(
 ) -> dict[str, bytes | str]:
     """Return table, plans, chart and summary of a Pareto set by file name."""
     from seqopt.report.fronts import front_figure  # noqa: PLC0415  # matplotlib is an extra
+    from seqopt.report.style import picture_files  # noqa: PLC0415
 
     known: dict[tuple[Step, ...], pd.DataFrame] = {}
     plans = []
     for number, steps in enumerate(front.steps, start=1):
         table = known.setdefault(steps, analyze(engine, steps))
         plans.append(table.assign(point=number))
-    buffer = io.BytesIO()
-    front_figure(front, methods).savefig(buffer, dpi=130)
     summary = {
         "points": len(front.steps),
         "complete": front.complete,
@@ -216,7 +214,7 @@ def _front_files(
         PAGE: front_page(engine, shown_table(front.table), [known[steps] for steps in front.steps]),
         "pareto.csv": csv_text(numbered),
         "plans.csv": csv_text(pd.concat(plans, ignore_index=True)),
-        "pareto.png": buffer.getvalue(),
+        **picture_files("pareto", front_figure(front, methods)),
         "summary.json": json.dumps(summary, indent=2) + "\n",
     }
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 
-from seqopt.cli.pages import PAGE, plan_page
 from seqopt.files import csv_text
 from seqopt.placement.free_plan import FreePlan
+from seqopt.report.plan_pages import PAGE, plan_page
 
 
 def free_files(

@@ -29,7 +29,6 @@ from seqopt.cli.outputs import (
     require_matplotlib,
     write_outputs,
 )
-from seqopt.cli.pages import PAGE, comparison_page, folder_page
 from seqopt.cli.status import Status, status_of
 from seqopt.cli.terminal import (
     flush,
@@ -53,6 +52,7 @@ from seqopt.files import (
 )
 from seqopt.network.build import build_network
 from seqopt.report.comparison import compare
+from seqopt.report.plan_pages import PAGE, comparison_page, folder_page
 from seqopt.report.text import format_comparison
 from seqopt.responses.table import archive, response_table
 from seqopt.scene.library.by_words import KINDS

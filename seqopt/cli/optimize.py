@@ -8,7 +8,6 @@ import time
 from seqopt.cli.asked import payloads_hold, say_idle, say_levels
 from seqopt.cli.free import optimize_free, require_loop
 from seqopt.cli.outputs import plan_files, worth, write_outputs
-from seqopt.cli.pages import PAGE, plan_page
 from seqopt.cli.posing import asked_problem
 from seqopt.cli.robust import optimize_robust, require_no_scenarios
 from seqopt.cli.status import Status
@@ -16,6 +15,7 @@ from seqopt.cli.terminal import complain, progress, say, tell
 from seqopt.cli.values import parse_options, parse_time_limit
 from seqopt.placement.formulation import End, find_formulation
 from seqopt.placement.solving import solve
+from seqopt.report.plan_pages import PAGE, plan_page
 from seqopt.sequence.free_rules import FREE
 from seqopt.sequence.schedule import Schedule
 from seqopt.study.published import paper_models

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import io
 import json
 from collections.abc import Mapping
 from importlib.util import find_spec
@@ -49,6 +48,7 @@ def comparison_files(result: Comparison) -> dict[str, bytes | str]:
     dict of str to (bytes or str)
     """
     from seqopt.report.charts import comparison_figures  # noqa: PLC0415  # matplotlib is an extra
+    from seqopt.report.style import picture_files  # noqa: PLC0415
 
     files: dict[str, bytes | str] = {
         "comparison.csv": result.table.to_csv(float_format="%.6g"),
@@ -57,9 +57,7 @@ def comparison_files(result: Comparison) -> dict[str, bytes | str]:
     if result.loop is not None and result.loop.ranks is not None:
         files["published_ranks.csv"] = result.loop.ranks.to_csv(index=False)
     for name, figure in comparison_figures(result).items():
-        buffer = io.BytesIO()
-        figure.savefig(buffer, dpi=130)
-        files[name] = buffer.getvalue()
+        files |= picture_files(name, figure)
     return files
 
 

@@ -26,6 +26,7 @@ from seqopt.engines.interface import (
     merge_sets,
     select_sets,
 )
+from seqopt.engines.named import NamedEngine
 from seqopt.engines.planar import PlanarEngine
 from seqopt.engines.plane import NoPlane, find_plane, off_plane
 from seqopt.engines.rigid.compliance import ComplianceEngine
@@ -63,7 +64,7 @@ OFF_PLANE = LevelChoice(Level.RIGID, "a grip lies outside the plane of the brick
 BEYOND = LevelChoice(Level.DISCRETE, "a joint would leave its elastic limits")
 
 
-class AutoEngine:
+class AutoEngine(NamedEngine):
     """Computes every grip set at the cheapest level whose condition it meets.
 
     Parameters

@@ -28,6 +28,7 @@ from seqopt.engines.interface import (
     no_sets,
     require_finite,
 )
+from seqopt.engines.named import NamedEngine
 from seqopt.engines.rigid.mechanism import require_resistance
 from seqopt.errors import SolverError
 from seqopt.network.build import network_of
@@ -41,7 +42,7 @@ SUSPICIOUS = 1e-9  # a smallest scaled eigenvalue below this, over the contrast,
 LOOSE = 1e-12  # stiffness of a spring that has none, over the stiffest: holds its joint node
 
 
-class FrameEngine:
+class FrameEngine(NamedEngine):
     """Solves each grip set as a frame of its own.
 
     Parameters

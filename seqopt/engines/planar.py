@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from seqopt.engines.interface import Fields, Want, grip_columns
+from seqopt.engines.named import NamedEngine
 from seqopt.engines.plane import NoPlane, Plane, find_plane, off_plane
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import GripError, SceneError
@@ -21,7 +22,7 @@ from seqopt.scene.scene import Scene
 ELSE = "use the compliance engine"
 
 
-class PlanarEngine:
+class PlanarEngine(NamedEngine):
     """Computes any batch of grip sets on any partial structure of a planar scene.
 
     Parameters

@@ -39,7 +39,7 @@ def make_engine(name: str, network: Network | Scene, mortar: Mortar | str | None
         One of `ENGINES`.
     network : Network or Scene
     mortar : Mortar or str, optional
-        What the joints hold; by default the engine's own choice.
+        The strength of the joints, for the engines that need it; by default the epoxy.
 
     Returns
     -------

@@ -43,17 +43,18 @@ def build_network(scene: Scene, order: Sequence[int] | str | None = None) -> Net
     ----------
     scene : Scene
     order : sequence of int or str, optional
-        As `seqopt.scene.orders.in_order` takes it; by default the scene's own.
+        The order in which bricks are placed, in a form that `seqopt.scene.orders.in_order`
+        accepts; by default the scene's own.
 
     Returns
     -------
     Network
-        Its scene has this order.
+        The network; its scene has this order.
 
     Raises
     ------
     SceneError
-        If it is none, or the order does not name every brick once.
+        If the argument is not a scene, or the order does not name every brick once.
 
     Examples
     --------

@@ -21,9 +21,11 @@ import numpy as np
 from seqopt.arrays import Floats, FrozenValue, Ints, frozen
 from seqopt.network.weight import shared_weight
 from seqopt.scene.scene import Scene
+from seqopt.showing import Shown, display
 
 if TYPE_CHECKING:
     import networkx as nx
+    from matplotlib.figure import Figure
 
 GROUND = -1  # stands for the ground where a brick's index in build order is expected
 
@@ -101,7 +103,7 @@ class Springs(FrozenValue):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Network(FrozenValue):
+class Network(Shown, FrozenValue):
     """The double-cross network of a scene as arrays; see the module's text for the order.
 
     Attributes
@@ -238,6 +240,27 @@ class Network(FrozenValue):
         int
         """
         return int(np.searchsorted(self.edge_since, bricks, side="right"))
+
+    def plot(self, bricks: int | None = None) -> Figure:
+        """Draw the network, or its part of the first bricks.
+
+        Parameters
+        ----------
+        bricks : int, optional
+            How many, in build order; all by default.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            A notebook shows it; ``savefig`` writes it to a file.
+
+        Raises
+        ------
+        ExtraError
+            If matplotlib is not installed (extra ``plot``).
+        """
+        figure: Figure = display("network_picture")(self, bricks)
+        return figure
 
     def graph(self, bricks: int) -> nx.Graph[object]:
         """Return a partial structure as a graph.

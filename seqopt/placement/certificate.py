@@ -36,12 +36,12 @@ class Certificate(FrozenValue):
         The least value of any choice, computed again from the data; with budgets a bound on the
         value of any choice within them, by prices and partial choices of the certificate's own.
     gap : float
-        Objective less bound, over the size of the costs that the choice meets, signs aside: their
+        The objective minus the bound, relative to the magnitude of the costs of the choice: their
         sum, or the largest for a peak. It has no unit.
     claimed_gap : float
-        The same with the formulation's own bound where that is higher; it is not proven.
+        The same with the formulation's own bound if that is higher; it is not proven.
     spent : mapping of str to float
-        What the selection takes of each budget.
+        The amount that the selection uses of each budget.
 
     Examples
     --------
@@ -56,6 +56,10 @@ class Certificate(FrozenValue):
     gap: float
     claimed_gap: float
     spent: Mapping[str, float]
+
+    def __repr__(self) -> str:
+        values = f"objective {self.objective:.6g}, no choice below {self.bound:.6g}"
+        return f"<Certificate: {values}, gap {100 * self.gap:.3g} %>"
 
 
 def certify(problem: PlacementProblem, selection: Selection, aim: Aim) -> Certificate:

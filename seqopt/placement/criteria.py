@@ -14,15 +14,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from seqopt.arrays import Floats
+from seqopt.arrays import Floats, Terse
 from seqopt.placement.ranks import Among, Ranked, ranks_of
 from seqopt.placement.requirements import ChoiceResponses
 from seqopt.placement.scales import NEVER, ROUNDED, SceneFacts
 from seqopt.placement.terms import known, present, scale_of, spell_out
 
 
-@dataclass(frozen=True)
-class RankSum:
+@dataclass(frozen=True, repr=False)
+class RankSum(Terse):
     """The criteria of Bruun et al.: ranks of responses, averaged, least is best (a Borda count).
 
     Ranks start at 1; ties share the mean of their ranks. Responses are rounded to a resolution
@@ -139,8 +139,8 @@ class RankSum:
         return self.before if bricks < known(self.crown, self.name) else self.after
 
 
-@dataclass(frozen=True)
-class WeightedSum:
+@dataclass(frozen=True, repr=False)
+class WeightedSum(Terse):
     """A weighted sum of responses, each divided by a scale of its own.
 
     Parameters
@@ -215,8 +215,8 @@ class WeightedSum:
         return np.asarray(sum(parts))
 
 
-@dataclass(frozen=True)
-class WorstRatio:
+@dataclass(frozen=True, repr=False)
+class WorstRatio(Terse):
     """The largest ratio of a response to its limit: a step is as bad as its worst response.
 
     Parameters

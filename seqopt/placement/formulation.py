@@ -75,7 +75,7 @@ class Selection(FrozenValue):
     trace: tuple[Finding, ...] = field(default=(), compare=False)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Formulation:
     """A way to solve the problem.
 
@@ -86,7 +86,7 @@ class Formulation:
     kind : FormulationKind
         What it promises.
     aim : Aim
-        What it makes least: the sum of the costs, or the largest.
+        What it minimizes: the sum of the costs, or the largest cost.
     solve : callable
         Takes the problem and named options, returns a `Selection`.
     reads : Reads
@@ -94,7 +94,7 @@ class Formulation:
     takes_budgets : bool
         Whether it can keep totals over the build within budgets.
     windowed : tuple of (str, int or str), optional
-        Options with which it looks at one window after the other, if it does so with some only.
+        Options with which it looks at one window after the other, if it does so only with these.
 
     Examples
     --------
@@ -112,6 +112,11 @@ class Formulation:
     reads: Reads = Reads.ALL
     takes_budgets: bool = False
     windowed: tuple[tuple[str, int | str], ...] | None = None
+
+    def __repr__(self) -> str:
+        least = "sum" if self.aim is Aim.SUM else "largest"
+        what = f"{self.kind.value}, least {least} of the costs"
+        return f"<Formulation {self.name}: {self.summary} ({what})>"
 
     @property
     def window_options(self) -> dict[str, int | str] | None:

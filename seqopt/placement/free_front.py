@@ -51,6 +51,9 @@ class FreeFront:
                 )
         self._round = rounding_steps(self.names, rounding)
 
+    def __repr__(self) -> str:
+        return f"<FreeFront of {self._problem}>"
+
     @property
     def names(self) -> tuple[str, ...]:
         """The goals."""

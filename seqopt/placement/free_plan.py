@@ -10,6 +10,8 @@ from typing import Any
 
 import pandas as pd
 
+from seqopt.contact.mortar import Mortar
+from seqopt.engines.interface import Engine
 from seqopt.errors import InfeasibleError
 from seqopt.placement.formulation import Formulation
 from seqopt.placement.free_infeasible import why_impossible
@@ -19,6 +21,7 @@ from seqopt.placement.free_steps import steps_of
 from seqopt.placement.promises import Excess, overloads
 from seqopt.placement.schedule_formulation import ScheduleFormulation, find_schedule_formulation
 from seqopt.placement.schedule_selection import ScheduleSelection
+from seqopt.placement.shown_build import ShownBuild
 from seqopt.placement.standing_proof import certified
 from seqopt.responses.table import analyze
 from seqopt.sequence.free_rules import Ending
@@ -27,7 +30,7 @@ from seqopt.stability.steps import stability_table
 
 
 @dataclass(frozen=True, repr=False)
-class FreePlan:
+class FreePlan(ShownBuild):
     """A free schedule: every step of the build, and the values of its goals.
 
     Attributes
@@ -54,9 +57,24 @@ class FreePlan:
     seconds: Mapping[str, float] = field(compare=False, hash=False)
 
     def __repr__(self) -> str:
-        values = ", ".join(f"{name} {value:.6g}" for name, value in self.objective.items())
         name = self.problem.network.scene.name
-        return f"FreePlan({name!r}, {len(self.steps)} steps, {values}, {self.status})"
+        return f"FreePlan({name!r}, {len(self.steps)} steps, {self.worth})"
+
+    @property
+    def engine(self) -> Engine:
+        """What computes the responses."""
+        return self.problem.engine
+
+    @property
+    def title(self) -> str:
+        """What it is called beside other plans."""
+        return "free schedule"
+
+    @property
+    def worth(self) -> str:
+        """What the plan is worth, in words."""
+        values = ", ".join(f"{name} {value:.6g}" for name, value in self.objective.items())
+        return f"{values}, {self.status}"
 
     @property
     def status(self) -> str:
@@ -82,6 +100,16 @@ class FreePlan:
         """The payloads that steps exceed, where rules ignore them."""
         return overloads(self.problem.network.scene, self._responses)
 
+    def table(self) -> pd.DataFrame:
+        """Return what was chosen: every grip.
+
+        Returns
+        -------
+        pandas.DataFrame
+            As of `grips`.
+        """
+        return self.grips()
+
     def responses(self) -> pd.DataFrame:
         """Return the responses of every step.
 
@@ -96,15 +124,21 @@ class FreePlan:
     def _responses(self) -> pd.DataFrame:
         return analyze(self.problem.engine, self.steps)
 
-    def stability(self) -> pd.DataFrame:
+    def stability(self, mortar: Mortar | str | None = None) -> pd.DataFrame:
         """Return whether every step stands and by which margins, by the cone program.
+
+        Parameters
+        ----------
+        mortar : Mortar or str, optional
+            Of all joints; by default that which was demanded, or dry.
 
         Returns
         -------
         pandas.DataFrame
-            As of `seqopt.stability.steps.stability_table`, with the mortar that was demanded, or
-            dry.
+            As of `seqopt.stability.steps.stability_table`.
         """
+        if mortar is not None:
+            return super().stability(mortar)
         return stability_table(self.steps, certified(self.problem, self.steps))
 
     def summary(self) -> dict[str, object]:

@@ -25,11 +25,12 @@ from seqopt.sequence.free_rules import FreeRules
 from seqopt.sequence.free_space import FreeSpace
 from seqopt.sequence.free_start import free_space
 from seqopt.sequence.steps import Grips
+from seqopt.showing import Shown
 from seqopt.stability.assessment import Stability
 
 
 @dataclass(frozen=True, repr=False)
-class FreeProblem:
+class FreeProblem(Shown):
     """The problem of the free schedule of a scene; everything is computed when first needed.
 
     Attributes
@@ -223,13 +224,13 @@ def pose_free(
     rules : FreeRules
         Which moves are possible.
     criterion : Criterion
-        What a step costs; ranks among choices do not go here.
+        What a step costs; ranks among choices cannot be used.
     goals : sequence of Goal or str
         What to minimize; see `parse_goals`.
     limits : sequence of Limit
         What no step may exceed.
     stands : Standing, Mortar or str, optional
-        That every state must stand, with which mortar: ``"dry"``, ``"bond=3e3"`` (Pa).
+        Requires that every state stands, with this mortar: ``"dry"``, ``"bond=3e3"`` (Pa).
 
     Returns
     -------
@@ -239,7 +240,7 @@ def pose_free(
     Raises
     ------
     ProblemError
-        If goals, criterion or limits name what a state does not have.
+        If goals, criterion or limits use a response that a state does not have.
 
     Examples
     --------

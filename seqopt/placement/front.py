@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 import pandas as pd
 
-from seqopt.arrays import Floats, FrozenValue
+from seqopt.arrays import Floats, FrozenValue, Terse
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.placement.schedule_formulation import (
     Finds,
@@ -105,8 +105,8 @@ class FrontSelection(FrozenValue):
     stopped: str = ""
 
 
-@dataclass(frozen=True, eq=False)
-class Front:
+@dataclass(frozen=True, eq=False, repr=False)
+class Front(Terse):
     """A Pareto set whose points are checked.
 
     Attributes
@@ -126,6 +126,10 @@ class Front:
     steps: tuple[tuple[Step, ...], ...]
     complete: bool
     seconds: Mapping[str, float]
+
+    def __repr__(self) -> str:
+        whole = "complete" if self.complete else "not complete"
+        return f"<Front: {len(self.table)} plans, {whole}; {', '.join(self.table.columns)}>"
 
 
 def find_front(

@@ -54,6 +54,9 @@ class LoopFront:
         ones = WorstRatio("front", tuple((name, 1.0) for name in names))
         self._problem: Problem = pose(engine, schedule, ones, limits)
 
+    def __repr__(self) -> str:
+        return f"<LoopFront of {self._problem.schedule}: {', '.join(self._names)}>"
+
     @property
     def names(self) -> tuple[str, ...]:
         """The responses."""

@@ -7,6 +7,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
+import pandas as pd
+
+from seqopt.engines.interface import Engine
 from seqopt.errors import SolverError
 from seqopt.placement.free_judge import TOLERANCE
 from seqopt.placement.free_plan import FreePlan, solve_free
@@ -16,12 +19,14 @@ from seqopt.placement.schedule_formulation import (
     ScheduleFormulation,
     find_schedule_formulation,
 )
+from seqopt.placement.shown_build import ShownBuild
 from seqopt.responses.resources import HERE, Resources
 from seqopt.scene.orders import Order, in_order
+from seqopt.sequence.steps import Step
 
 
 @dataclass(frozen=True, repr=False)
-class OrderPlan:
+class OrderPlan(ShownBuild):
     """A build order, its best plan, and a bound on all other orders.
 
     Attributes
@@ -42,8 +47,47 @@ class OrderPlan:
     seconds: Mapping[str, float]
 
     def __repr__(self) -> str:
-        worth = f"{self.problem.free.goals[0]} {self.selection.objective:.6g}, {self.status}"
-        return f"OrderPlan({self.problem.scene.name!r}, {worth})"
+        return f"OrderPlan({self.problem.scene.name!r}, {self.worth})"
+
+    @property
+    def engine(self) -> Engine:
+        """What computes the responses, of the scene in this order."""
+        return self.plan.engine
+
+    @property
+    def steps(self) -> tuple[Step, ...]:
+        """The steps of the plan."""
+        return self.plan.steps
+
+    @property
+    def title(self) -> str:
+        """What it is called beside other plans."""
+        return "best order"
+
+    @property
+    def worth(self) -> str:
+        """What the plan is worth, in words."""
+        return f"{self.problem.free.goals[0]} {self.selection.objective:.6g}, {self.status}"
+
+    def responses(self) -> pd.DataFrame:
+        """Return the responses of every step.
+
+        Returns
+        -------
+        pandas.DataFrame
+            As of `seqopt.analyze`.
+        """
+        return self.plan.responses()
+
+    def table(self) -> pd.DataFrame:
+        """Return what was chosen: every grip.
+
+        Returns
+        -------
+        pandas.DataFrame
+            As of `grips`.
+        """
+        return self.grips()
 
     @property
     def order(self) -> Order:

@@ -16,6 +16,7 @@ from seqopt.placement.free_goals import Measure
 from seqopt.placement.free_problem import FreeProblem
 from seqopt.scene.orders import Order
 from seqopt.scene.scene import Scene
+from seqopt.showing import Shown
 
 
 class Orders(Enum):
@@ -26,7 +27,7 @@ class Orders(Enum):
 
 
 @dataclass(frozen=True, repr=False)
-class OrderProblem:
+class OrderProblem(Shown):
     """The free schedule of a scene whose build order is free too.
 
     The value of an order is the first goal of its best plan; the criterion keeps the numbers that

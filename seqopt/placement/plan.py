@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 import pandas as pd
 
+from seqopt.engines.interface import Engine
 from seqopt.errors import ProblemError
 from seqopt.placement.certificate import TOLERANCE, Certificate
 from seqopt.placement.formulation import (
@@ -19,37 +21,39 @@ from seqopt.placement.formulation import (
 )
 from seqopt.placement.interface import PlacementProblem
 from seqopt.placement.objectives import split_gap, under_both
+from seqopt.placement.plan_tables import alternatives, moves_table
 from seqopt.placement.problem import Problem
 from seqopt.placement.promises import Excess, overloads
 from seqopt.placement.ranking import move_costs, rank_of
+from seqopt.placement.shown_build import ShownBuild
 from seqopt.placement.window_search import WindowSearch
-from seqopt.responses.choices import StepChoices, window_models
+from seqopt.responses.choices import window_models
 from seqopt.responses.table import analyze
 from seqopt.sequence.steps import Step, idle_robots
 
 
 @dataclass(frozen=True, repr=False)
-class Plan:
+class Plan(ShownBuild):
     """A solved problem: where every robot holds over the whole build, and how good that is.
 
     Attributes
     ----------
     problem : PlacementProblem
-        What was solved.
+        The problem that was solved.
     formulation : Formulation
-        What solved it.
+        The formulation that solved it.
     selection : Selection
-        The choice, and what the formulation claims of it.
+        The choice, and what the formulation claims about it.
     certificate : Certificate or None
         The checked value of the choice; None without a proof.
     steps : tuple of Step
         The schedule with every move at its chosen node, checked.
     seconds : mapping of str to float
-        By stage, s: respond, rank, compile (writing a program down for a solver), solve, verify.
+        By stage, s: respond, rank, compile (preparing a program for a solver), solve, verify.
     search : WindowSearch or None
-        What was looked at along the choice where not all models were solved.
+        The models solved by a search without proof; None if all were solved.
     looked_at : int or None
-        How many models were solved where a lazy search did not need them all.
+        How many models a lazy search solved; None if all were solved.
 
     Examples
     --------
@@ -81,6 +85,25 @@ class Plan:
             schedule = self.problem.schedule
             what = f"{schedule.scene.name!r}, {schedule.method!r}, "
         return f"Plan({what}by {self.formulation.name}: {counts}, {proof})"
+
+    @property
+    def engine(self) -> Engine:
+        """What computes the responses."""
+        return self._posed.engine
+
+    @property
+    def title(self) -> str:
+        """The name of its formulation."""
+        return self.formulation.name
+
+    @property
+    def worth(self) -> str:
+        """What the plan is worth, in words."""
+        if self.certificate is None:
+            return "not compared with the optimum"
+        value, left_out = self.certificate.objective, self._posed.schedule.left_out
+        gap = f"heuristic: {left_out}" if left_out else f"gap {100 * self.certificate.gap:.3g} %"
+        return f"objective {value:.6g}, {gap}"
 
     @property
     def nodes(self) -> tuple[int, ...]:
@@ -152,39 +175,30 @@ class Plan:
         Returns
         -------
         pandas.DataFrame
-            A row per move. Columns: ``move``, ``step``, ``bricks``, ``robot``, ``brick``, ``node``,
-            ``candidates`` (how many there were); then ``single_cost``, ``shared_cost`` and
-            ``rank_in_window``, or without proof ``cost`` and the ``margin`` to the next candidate.
+            A row per move. Columns: ``move``, ``step``, ``to_step`` (the last in which the node is
+            held), ``bricks``, ``robot``, ``brick``, ``node``, ``largest_force_N``, ``candidates``
+            (how many there were); then ``single_cost``, ``shared_cost`` and ``rank_in_window``, or
+            without proof ``cost`` and the ``margin`` to the next candidate.
         """
-        rows, before = [], 0
-        for k, now in enumerate(self.selection.choice):
-            move = self._posed.schedule.moves[k]
-            node = move.candidates[now]
-            chosen = {
-                "move": k + 1,
-                "step": move.step,
-                "bricks": move.bricks,
-                "robot": move.robot,
-                "brick": self._posed.schedule.scene.brick_of_node[node].name,
-                "node": node,
-                "candidates": len(move.candidates),
-            }
-            rows.append(chosen | self._worth(k, before, now))
-            before = now
-        return pd.DataFrame(rows)
+        chosen = moves_table(self._posed, self.selection.choice, self.grips())
+        worth = pd.DataFrame([*self._worths()])
+        return pd.concat([chosen, worth], axis=1)
 
-    def _worth(self, move: int, before: int, now: int) -> dict[str, float]:
-        """Return the cells of the table with the value of a choice."""
-        if self.search is not None:
-            costs = self.search.costs(move)
-            margin = np.delete(costs, now).min(initial=np.inf) - costs[now]
-            return {"cost": costs[now], "margin": margin}
-        layered = self.formulation.aim.costs(self.problem)
-        return {
-            "single_cost": layered.single[move][now],
-            "shared_cost": layered.shared[move][before, now],
-            "rank_in_window": rank_of(move_costs(self._posed, move, before), now),
-        }
+    def _worths(self) -> Iterator[dict[str, float]]:
+        """Yield the cells of the table that say what the choice of every move is worth."""
+        choice = self.selection.choice
+        for k, (before, now) in enumerate(pairwise((0, *choice))):
+            if self.search is not None:
+                costs = self.search.costs(k)
+                margin = np.delete(costs, now).min(initial=np.inf) - costs[now]
+                yield {"cost": costs[now], "margin": margin}
+                continue
+            layered = self.formulation.aim.costs(self.problem)
+            yield {
+                "single_cost": layered.single[k][now],
+                "shared_cost": layered.shared[k][before, now],
+                "rank_in_window": rank_of(move_costs(self._posed, k, before), now),
+            }
 
     def alternatives(self) -> pd.DataFrame:
         """Return the responses and the cost of every choice that was evaluated.
@@ -195,29 +209,7 @@ class Plan:
             A row per choice, by step; ``second_node`` where two moves are open. SI units. Where
             the responses of all choices are not kept, those that go with the plan's choices before.
         """
-        parts = []
-        for problem, choices, before in self._looked_at():
-            table = problem.table(choices)
-            columns = ["node", "second_node"][: table.index.nlevels]
-            nodes = pd.DataFrame(table.index.to_frame(index=False).to_numpy(), columns=columns)
-            if before is not None:
-                nodes = nodes.rename(columns={"node": "second_node"})
-                nodes.insert(0, "node", before)
-            nodes.insert(0, "step", choices.step.number)
-            parts.append(pd.concat([nodes, table.reset_index(drop=True)], axis=1))
-        return pd.concat(parts).sort_values("step", kind="stable", ignore_index=True)
-
-    def _looked_at(self) -> Iterator[tuple[Problem, StepChoices, int | None]]:
-        """Yield steps and, where only one choice before is kept, the node of that choice."""
-        if self.search is not None or not self._posed.evaluation.streams:
-            for problem in self.explored:
-                for choices in problem.evaluation.steps:
-                    yield problem, choices, None
-            return
-        before = (0, *self.selection.choice)
-        for k in range(len(self._posed.schedule.moves)):
-            for choices in self._posed.window_choices(k, before[k]):
-                yield self._posed, choices, self.nodes[k - 1] if len(choices.moves) == 2 else None
+        return alternatives(self._posed, self.selection.choice, self.search)
 
     def _budgets(self) -> dict[str, dict[str, float | None]]:
         """Return what there is of every budget, what is spent, and its price."""

@@ -26,10 +26,11 @@ from seqopt.responses.quantities import robot_response
 from seqopt.responses.resources import HERE, Resources
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import Step
+from seqopt.showing import Shown
 
 
 @dataclass(frozen=True, repr=False)
-class Problem:
+class Problem(Shown):
     """Support placement over a whole build.
 
     Nothing is computed before it is asked for: responses, sums and peaks each on first use.
@@ -39,7 +40,7 @@ class Problem:
     criterion : Criterion
         What a step costs.
     limits : tuple of Limit
-        What no open step may exceed.
+        Bounds that no step with an open grip may exceed.
     evaluation : Evaluation
         Raw responses of every open step.
     budgets : tuple of Budget
@@ -192,25 +193,15 @@ class Problem:
             costs[limit.exceeded(responses[limit.response])] = np.inf
         return costs
 
-    def table(self, choices: StepChoices) -> pd.DataFrame:
-        """Return the responses and the cost of every choice in a step.
-
-        Parameters
-        ----------
-        choices : StepChoices
-            One of ``evaluation.steps``.
+    def table(self) -> pd.DataFrame:
+        """Return what is to be chosen.
 
         Returns
         -------
         pandas.DataFrame
-            A row per choice, labeled by its nodes; SI units.
+            A row per open grip; as of `seqopt.sequence.schedule.Schedule.table`.
         """
-        axes = next(iter(choices.responses.values())).ndim
-        moves = [self.schedule.moves[m] for m in choices.moves[-axes:]]
-        names = [f"{move.robot}_node" for move in moves]
-        index = pd.MultiIndex.from_product([move.candidates for move in moves], names=names)
-        columns: Mapping[str, Floats] = {**choices.responses, "cost": self.step_costs(choices)}
-        return pd.DataFrame({name: values.ravel() for name, values in columns.items()}, index=index)
+        return self.schedule.table()
 
     def nodes(self, choice: Sequence[int]) -> tuple[int, ...]:
         """Return the nodes that a choice stands for.
@@ -259,22 +250,22 @@ def pose(
     Parameters
     ----------
     engine : Engine
-        What computes responses.
+        The engine that computes responses.
     schedule : Schedule
-        Whose open grips are to be chosen.
+        The schedule whose open grips are to be chosen.
     criterion : Criterion
         What a step costs.
     limits : sequence of Limit
-        What no open step may exceed.
+        Bounds that no step with an open grip may exceed.
     also : sequence of str
-        Responses to evaluate beside those that these name.
+        Further responses to compute, besides those that criterion and limits use.
     resources : Resources, optional
-        Processes, memory, a folder for answers; by default this process alone.
+        Processes, memory and a folder for results; by default only this process.
 
     Returns
     -------
     Problem
-        Nothing is computed yet.
+        The problem; nothing is computed yet.
 
     Raises
     ------

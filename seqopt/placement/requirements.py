@@ -10,7 +10,7 @@ from typing import Protocol
 
 import numpy as np
 
-from seqopt.arrays import Bools, Floats
+from seqopt.arrays import Bools, Floats, Terse
 from seqopt.errors import ProblemError
 from seqopt.placement.scales import SceneFacts
 from seqopt.responses.quantities import robot_response
@@ -88,14 +88,14 @@ class Limit:
     Parameters
     ----------
     response : str
-        Named as in `seqopt.placement.criteria`.
+        A name as in `seqopt.placement.criteria`.
     bound : float
         SI units.
 
     Raises
     ------
     ProblemError
-        If these are no name and no number.
+        If the arguments are not a name and a number.
 
     Examples
     --------
@@ -146,8 +146,8 @@ def payload_limits(scene: Scene) -> tuple[Limit, ...]:
     return tuple(Limit(robot_response(robot.name), robot.payload) for robot in scene.robots)
 
 
-@dataclass(frozen=True)
-class ResponsesAsked:
+@dataclass(frozen=True, repr=False)
+class ResponsesAsked(Terse):
     """The responses that criterion, limits and further wishes ask for.
 
     Attributes

@@ -11,25 +11,29 @@ import numpy as np
 import pandas as pd
 
 from seqopt.arrays import Floats
+from seqopt.engines.interface import Engine
 from seqopt.errors import SolverError
 from seqopt.placement.certificate import TOLERANCE, least_peak, least_sum
 from seqopt.placement.costs import TINY, LayeredCosts
 from seqopt.placement.formulation import Formulation, Selection, find_formulation
 from seqopt.placement.interface import Aim, CostProblem
+from seqopt.placement.plan_tables import moves_table
 from seqopt.placement.robust_aim import RobustAim
 from seqopt.placement.robust_problem import RobustProblem, largest_of
 from seqopt.placement.scenario_arcs import Choice, scenario_arcs
 from seqopt.placement.scenario_search import WIDTH, Searched, close_gap
 from seqopt.placement.scenario_weights import best_weights
 from seqopt.placement.selecting import select
+from seqopt.placement.shown_build import ShownBuild
 from seqopt.placement.watch import Finding, Watch
+from seqopt.responses.table import analyze
 from seqopt.sequence.steps import Step
 
 CHOOSES = {Aim.PEAK: "minimax", Aim.SUM: "overlap_dp"}  # of one scenario, and of worst peaks
 
 
-@dataclass(frozen=True, eq=False)
-class RobustPlan:
+@dataclass(frozen=True, eq=False, repr=False)
+class RobustPlan(ShownBuild):
     """A plan for many scenarios, and its value over them.
 
     Attributes
@@ -51,19 +55,6 @@ class RobustPlan:
         Of the scenarios, as they prove it; of peaks the scenario where the plan is worst.
     seconds : mapping of str to float
         By stage, s: respond, solve, verify.
-
-    Examples
-    --------
-    >>> import seqopt
-    >>> from seqopt.placement.robust_aim import WORST_PEAK
-    >>> from seqopt.placement.robust_problem import robust
-    >>> from seqopt.scene.scenarios import scenarios
-    >>> scene = seqopt.load_scene("arch25")
-    >>> network = seqopt.build_network(scene)
-    >>> engine, loop = seqopt.make_engine("auto", network), seqopt.three_robot_loop(network)
-    >>> nominal = seqopt.pose(engine, loop, seqopt.CRITERIA["worst-ratio-published"])
-    >>> solve_robust(robust(nominal, scenarios(scene, count=3, seed=1), WORST_PEAK)).gap
-    0.0
     """
 
     problem: RobustProblem
@@ -76,8 +67,32 @@ class RobustPlan:
     seconds: Mapping[str, float] = field(default_factory=dict)
 
     def __repr__(self) -> str:
-        worth = f"objective {self.objective:.6g}, gap {100 * self.gap:.3g} %"
-        return f"RobustPlan({self.problem.aim}, {len(self.weights)} scenarios: {worth})"
+        return f"RobustPlan({self.problem.aim}, {len(self.weights)} scenarios: {self.worth})"
+
+    @property
+    def engine(self) -> Engine:
+        """What computes the responses of the nominal scene."""
+        return self.problem.nominal.engine
+
+    @property
+    def title(self) -> str:
+        """The aim over scenarios."""
+        return str(self.problem.aim)
+
+    @property
+    def worth(self) -> str:
+        """What the plan is worth, in words."""
+        return f"objective {self.objective:.6g}, gap {100 * self.gap:.3g} %"
+
+    def responses(self) -> pd.DataFrame:
+        """Return the responses of every step in the nominal scene.
+
+        Returns
+        -------
+        pandas.DataFrame
+            As of `seqopt.analyze`.
+        """
+        return analyze(self.engine, self.steps)
 
     @property
     def nodes(self) -> tuple[int, ...]:
@@ -101,22 +116,9 @@ class RobustPlan:
         Returns
         -------
         pandas.DataFrame
-            A row per move. Columns: ``move``, ``step``, ``bricks``, ``robot``, ``node``,
-            ``candidates`` (how many there were).
+            As of `seqopt.placement.plan_tables.moves_table`; forces are those of the nominal scene.
         """
-        moves = self.problem.nominal.schedule.moves
-        rows = [
-            {
-                "move": k,
-                "step": move.step,
-                "bricks": move.bricks,
-                "robot": move.robot,
-                "node": move.candidates[now],
-                "candidates": len(move.candidates),
-            }
-            for k, (move, now) in enumerate(zip(moves, self.choice, strict=True), start=1)
-        ]
-        return pd.DataFrame(rows)
+        return moves_table(self.problem.nominal, self.choice, self.grips())
 
 
 def solve_robust(
@@ -150,6 +152,15 @@ def solve_robust(
     ------
     InfeasibleError, SolverError
         If no choice is allowed in all scenarios; an answer is not what it is claimed to be.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> scene = seqopt.load_scene("arch25")
+    >>> problem = seqopt.optimize(scene, criterion="worst-ratio-published").problem
+    >>> robust = seqopt.robust(problem, seqopt.scenarios(scene, count=3, seed=1), "worst-peak")
+    >>> seqopt.solve_robust(robust)
+    RobustPlan(worst-peak, 3 scenarios: objective 1.29296, gap 0 %)
     """
     layers = problem.layered(problem.aim.aim)
     minimax = find_formulation(CHOOSES[Aim.PEAK])  # loaded before the time is taken
@@ -159,9 +170,13 @@ def solve_robust(
         found, weights = _least_peak(minimax, joined, layers)
     else:
         found, weights = _least_total(layers, problem.aim, watch, width)
-    taken = watch.seconds
-    start = time.perf_counter()
-    proven = _proven(joined, layers, problem.aim, weights)
+    return _judged(problem, found, weights, watch.seconds)
+
+
+def _judged(problem: RobustProblem, found: Searched, weights: Floats, taken: float) -> RobustPlan:
+    """Return the plan of a choice, checked; the time it took to find is given, s."""
+    start, layers = time.perf_counter(), problem.layered(problem.aim.aim)
+    proven = _proven(largest_of(layers), layers, problem.aim, weights)
     objective = _checked(problem, layers, found, proven)
     bound = min(max(found.bound, proven), objective)
     steps = problem.steps(found.choice)

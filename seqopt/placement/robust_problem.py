@@ -13,16 +13,17 @@ from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.placement.costs import LayeredCosts
 from seqopt.placement.interface import Aim
 from seqopt.placement.problem import Problem
-from seqopt.placement.robust_aim import RobustAim
+from seqopt.placement.robust_aim import RobustAim, parse_robust
 from seqopt.placement.scenario_costs import ScenarioCosts, scenario_costs, tasks_of
 from seqopt.scene.checks import short
 from seqopt.scene.scenarios import Scenarios
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Step
+from seqopt.showing import Shown
 
 
 @dataclass(frozen=True, repr=False)
-class RobustProblem:
+class RobustProblem(Shown):
     """Support placement over a whole build, in many scenarios at once.
 
     Nothing is computed before it is asked for. Limits hold in every scenario.
@@ -140,7 +141,9 @@ class RobustProblem:
         return self.nominal.steps(choice)
 
 
-def robust(problem: Problem, scenes: Scenarios | Sequence[Scene], aim: RobustAim) -> RobustProblem:
+def robust(
+    problem: Problem, scenes: Scenarios | Sequence[Scene], aim: RobustAim | str
+) -> RobustProblem:
     """Return the problem of a plan that is good in many scenarios at once.
 
     Parameters
@@ -148,9 +151,9 @@ def robust(problem: Problem, scenes: Scenarios | Sequence[Scene], aim: RobustAim
     problem : Problem
         The nominal one, of `seqopt.pose`; with an engine of `seqopt.make_engine`.
     scenes : Scenarios or sequence of Scene
-        Of `seqopt.scene.scenarios.scenarios`, or scenes of one's own with the same bricks and
-        nodes.
-    aim : RobustAim
+        Of `seqopt.scenarios`, or scenes of one's own with the same bricks and nodes.
+    aim : RobustAim or str
+        Or in words: ``worst-peak``, ``worst-total`` or ``cvar=0.9``.
 
     Returns
     -------
@@ -165,15 +168,12 @@ def robust(problem: Problem, scenes: Scenarios | Sequence[Scene], aim: RobustAim
     Examples
     --------
     >>> import seqopt
-    >>> from seqopt.placement.robust_aim import WORST_PEAK
-    >>> from seqopt.scene.scenarios import scenarios
     >>> scene = seqopt.load_scene("arch25")
-    >>> network = seqopt.build_network(scene)
-    >>> engine, loop = seqopt.make_engine("auto", network), seqopt.three_robot_loop(network)
-    >>> problem = seqopt.pose(engine, loop, seqopt.CRITERIA["worst-ratio-published"])
-    >>> robust(problem, scenarios(scene, count=5), WORST_PEAK)  # doctest: +ELLIPSIS
+    >>> problem = seqopt.optimize(scene, criterion="worst-ratio-published").problem
+    >>> robust(problem, seqopt.scenarios(scene, count=5), "worst-peak")  # doctest: +ELLIPSIS
     RobustProblem('arch25', 'three-robot', 5 scenarios, ... worst-peak)
     """
+    aim = parse_robust(aim) if isinstance(aim, str) else aim
     if not isinstance(problem, Problem) or not isinstance(aim, RobustAim):
         raise ProblemError(
             f"{short(aim if isinstance(problem, Problem) else problem)}: give a problem of "

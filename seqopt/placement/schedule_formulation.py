@@ -23,7 +23,7 @@ class Finds(Enum):
     ORDER = "an order"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class ScheduleFormulation:
     """A way to solve the free schedule.
 
@@ -45,6 +45,10 @@ class ScheduleFormulation:
     kind: FormulationKind
     solve: Callable[..., Any]
     finds: Finds = Finds.PLAN
+
+    def __repr__(self) -> str:
+        what = f"{self.kind.value}, finds {self.finds.value}"
+        return f"<ScheduleFormulation {self.name}: {self.summary} ({what})>"
 
     @property
     def options(self) -> dict[str, int | float]:

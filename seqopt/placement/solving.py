@@ -86,20 +86,20 @@ def solve(
     Parameters
     ----------
     problem : PlacementProblem or FreeProblem
-        A `seqopt.placement.CostProblem`, or one of `seqopt.pose` or of
-        `seqopt.placement.free_problem.pose_free`.
+        The problem, from `seqopt.pose` or `seqopt.placement.free_problem.pose_free`, or a
+        `seqopt.placement.CostProblem`.
     formulation : Formulation, ScheduleFormulation or str
-        Or its name, of `seqopt.formulations`; ``schedule_search`` for the free schedule.
+        Or a name in `seqopt.formulations`; ``schedule_search`` for the free schedule.
     proof : bool, optional
-        False: ``cascade`` or ``rank_search`` solve only what they meet, and no gap is known.
+        False: ``cascade`` or ``rank_search`` solve only models that they need; no gap is known.
     lazy : bool, optional
         Solve only the models that the proof needs; for exact formulations without budgets.
     time_limit : float, optional
-        After which, or at an interrupt, it stops choosing, with its best choice and a bound, s.
+        Seconds after which it returns its best choice and a bound, as at an interrupt.
     progress : callable, optional
-        Told every better choice and bound as it is found.
+        Called with every better choice and bound as it is found.
     **options
-        Of the formulation.
+        Options of the formulation.
 
     Returns
     -------
@@ -108,7 +108,7 @@ def solve(
     Raises
     ------
     InfeasibleError, ProblemError, SolverError
-        If no choice is allowed; what is given does not go together; a solver or claim fails.
+        If no choice is allowed, the arguments do not fit together, or a solver or claim fails.
 
     Examples
     --------

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
+from seqopt.arrays import Terse
 from seqopt.errors import InfeasibleError
 from seqopt.placement.interface import Aim
 from seqopt.placement.robust_plan import RobustPlan, best_choice
@@ -25,8 +26,8 @@ from seqopt.scene.scene import Scene
 PLANS = ("robust", "nominal", "knows_it")
 
 
-@dataclass(frozen=True)
-class Trial:
+@dataclass(frozen=True, repr=False)
+class Trial(Terse):
     """Plans, scenario by scenario.
 
     Attributes
@@ -45,6 +46,11 @@ class Trial:
     plan: RobustPlan
     nominal: Choice
     table: pd.DataFrame
+
+    def __repr__(self) -> str:
+        counts = self.table.groupby("set", sort=False).size()
+        sets = ", ".join(f"{count} {name}" for name, count in counts.items())
+        return f"<Trial of {self.plan} in scenarios: {sets}>"
 
     def summary(self) -> dict[str, dict[str, float]]:
         """Return what the aim makes of every set of scenarios, ready for JSON.

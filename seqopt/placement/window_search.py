@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from seqopt.arrays import Floats
+from seqopt.arrays import Floats, Terse
 from seqopt.errors import MemoryShortError, SolverError
 from seqopt.placement.joining import Joined
 from seqopt.placement.problem import Problem
@@ -26,8 +26,8 @@ from seqopt.responses.resources import Resources
 from seqopt.sequence.schedule import Schedule
 
 
-@dataclass(frozen=True)
-class WindowSearch:
+@dataclass(frozen=True, repr=False)
+class WindowSearch(Terse):
     """What a search move by move looked at, and what it chose.
 
     Attributes

@@ -6,16 +6,44 @@ from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.ticker import NullFormatter
+from matplotlib.patches import Patch
 
 from seqopt.placement.plan import Plan
+from seqopt.report.along import draw_responses, merged, worst_steps
 from seqopt.report.comparison import LARGEST, Comparison
-from seqopt.report.draw import draw_responses
+from seqopt.report.style import (
+    BLUE,
+    GRAY,
+    SMALL,
+    VERMILION,
+    dress,
+    looks,
+    new_figure,
+    plain,
+    styled,
+)
+from seqopt.report.wording import typed
 from seqopt.study.published import PUBLISHED
 
-MARKERS = "osv^D<>P*X"
-FLOOR = 1e-6  # where a gap of zero is drawn on a logarithmic axis
-COLUMNS = {"M_sup_Nm": "M_sup [N m]", "F_max_N": "T_max [N]", "D_max_1e-3mm": "D_max [1e-3 mm]"}
+EXACT = 1e-7  # %: gaps below are rounding
+COSTS = {
+    "gap to the optimum [%]": "{:.2g}",
+    "time to choose [s]": "{:.2g}",
+    "structures analyzed": "{:,.0f}",
+}  # how the numbers are written
+TITLES = {
+    "F_rob": "robot force",
+    "M_sup": "support moment",
+    "T_max": "edge tension",
+    "D_max": "node displacement",
+}
+COLUMNS = {
+    "M_sup_Nm": "support moment\nM_sup [N m]",
+    "F_max_N": "largest tension\nT_max [N]",
+    "D_max_1e-3mm": "largest displacement\nD_max [1e-3 mm]",
+}
+ROW = 0.21  # inches of a bar
+PRINTED = "plan published by Bruun et al., its responses computed here"
 
 
 def comparison_figures(result: Comparison) -> dict[str, Figure]:
@@ -29,59 +57,89 @@ def comparison_figures(result: Comparison) -> dict[str, Figure]:
     Returns
     -------
     dict of str to matplotlib.figure.Figure
-        By file name.
+        By file name, without an ending.
     """
     return {
-        "maxima.png": _maxima(result),
-        "responses.png": _responses(result),
-        "gap_against_cost.png": _gaps(result),
+        "maxima": _maxima(result),
+        "responses": _responses(result),
+        "gap_against_cost": _gaps(result),
     }
 
 
+@styled
 def _maxima(result: Comparison) -> Figure:
-    figure = Figure(figsize=(9, 6), layout="constrained")
     names = list(result.table.index)
+    figure = new_figure(1.4 + 2 * ROW * len(names))
+    figure.suptitle("Largest response of any step", x=0.01, ha="left")
     panels = figure.subplots(2, 2, sharey=True).ravel()
     for panel, (column, unit) in zip(panels, LARGEST.items(), strict=True):
-        colors = ["#b8643c" if name == PUBLISHED else "#5b7a8c" for name in names]
-        panel.barh(names, result.table[column], color=colors)
-        panel.set_title(f"largest {column} [{unit}]", fontsize=9)
-        panel.tick_params(labelsize=7)
+        colors = [VERMILION if name == PUBLISHED else BLUE for name in names]
+        values = result.table[column].astype(float)
+        bars = panel.barh([typed(name) for name in names], values, color=colors, height=0.7)
+        panel.bar_label(bars, [f" {value:.3g}" for value in values], fontsize=SMALL)
+        panel.set_title(f"{TITLES[column]}, {column} [{unit}]")
+        panel.margins(x=0.14)
+        panel.spines[["top", "right"]].set_visible(False)
+        panel.tick_params(axis="y", length=0)
     panels[0].invert_yaxis()
+    if PUBLISHED in names:
+        key = [Patch(color=BLUE, label="plan made here"), Patch(color=VERMILION, label=PRINTED)]
+        figure.legend(handles=key, loc="outside lower center", ncols=2)
     return figure
 
 
+@styled
 def _responses(result: Comparison) -> Figure:
-    figure = Figure(figsize=(9, 8), layout="constrained")
+    plans = merged(result.tables)
+    tables = {_together(names): worst_steps(result.tables[one]) for one, names in plans.items()}
+    figure = new_figure(6.6 + 0.2 * len(tables))
+    figure.suptitle("Worst step at every number of bricks", x=0.01, ha="left")
     axes = figure.subplots(len(COLUMNS), 1, sharex=True)
-    draw_responses(axes, result.tables, COLUMNS)
-    axes[0].legend(frameon=False, ncols=4, fontsize=7)
+    draw_responses(axes, tables, COLUMNS)
+    handles, labels = axes[0].get_legend_handles_labels()
+    axes[0].get_legend().remove()
+    figure.legend(handles, labels, loc="outside lower left", ncols=1)
     axes[-1].set_yscale("log")
+    plain(axes[-1].yaxis)
     return figure
 
 
+def _together(names: Sequence[str]) -> str:
+    """Return what a line is called that several plans share."""
+    return typed(names[0]) if len(names) == 1 else f"the same plan: {', '.join(names)}"
+
+
+@styled
 def _gaps(result: Comparison) -> Figure:
-    figure = Figure(figsize=(9, 4), layout="constrained")
-    left, right = figure.subplots(1, 2, sharey=True)
     solved = result.table.dropna(subset=["seconds", "gap"])
-    gap = np.maximum(solved["gap"].to_numpy(float), FLOOR)
-    for panel, column, label in (
-        (left, "solve_seconds", "time to solve [s]"),
-        (right, "models", "models looked at"),
-    ):
-        values = solved[column].to_numpy(float)
-        for i, name in enumerate(solved.index):
-            marker = MARKERS[i % len(MARKERS)]
-            panel.loglog(values[i], gap[i], marker, ms=9, mfc="none", mew=1.5, label=str(name))
-        panel.set_xlabel(label)
-        panel.xaxis.set_minor_formatter(NullFormatter())
-        panel.grid(visible=True, which="both", lw=0.2)
-    left.set_ylabel(f"gap to the exact optimum (0 drawn at {FLOOR:g})")
-    handles, labels = left.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside right center", frameon=False, fontsize=8)
+    figure = new_figure(0.9 + ROW * len(solved))
+    panels = figure.subplots(1, 3, sharey=True)
+    rows = np.arange(len(solved))
+    columns = (100 * solved["gap"], solved["solve_seconds"], solved["models"])
+    for panel, column, (title, text) in zip(panels, columns, COSTS.items(), strict=True):
+        values = column.to_numpy(float)
+        if title.startswith("time"):
+            panel.set_xscale("log")
+            panel.set_xlim(values.min() / 2, 30 * values.max())
+            plain(panel.xaxis)
+        else:
+            panel.set_xlim(0, 1.45 * max(values.max(), 0.01))
+        panel.hlines(rows, panel.get_xlim()[0], values, color=BLUE, lw=1)
+        panel.plot(values, rows, "o", color=BLUE, ms=5, clip_on=False)
+        for row, value in enumerate(values):
+            words = "none" if value < EXACT and panel is panels[0] else text.format(value)
+            panel.annotate(
+                words, (value, row), (6, 0), textcoords="offset points", va="center", fontsize=SMALL
+            )
+        panel.set_title(title)
+        panel.spines[["top", "right"]].set_visible(False)
+        panel.tick_params(axis="y", length=0, pad=8)
+    panels[0].set_yticks(rows, [typed(str(name)) for name in solved.index])
+    panels[0].set_ylim(len(solved) - 0.5, -0.5)
     return figure
 
 
+@styled
 def trace_figure(plans: Sequence[Plan]) -> Figure:
     """Return a figure of choices and bounds against time.
 
@@ -93,32 +151,29 @@ def trace_figure(plans: Sequence[Plan]) -> Figure:
     Returns
     -------
     matplotlib.figure.Figure
-        Values of choices drawn through, bounds dashed, as steps over the time since a formulation
-        began.
+        Values of choices filled, bounds hollow and gray, as steps over the time since a
+        formulation began.
     """
-    figure = Figure(figsize=(7, 4), layout="constrained")
+    figure = new_figure(3.6)
     axes = figure.subplots()
-    for number, plan in enumerate(plans):
+    known_by = looks(plan.formulation.name for plan in plans)
+    for plan in plans:
+        name = plan.formulation.name
         trace = plan.selection.trace
         seconds = np.array([found.seconds for found in trace])
-        for values, style in (
-            ([found.objective for found in trace], "-"),
-            ([found.bound for found in trace], "--"),
+        for values, more in (
+            ([found.objective for found in trace], {"label": typed(name)}),
+            ([found.bound for found in trace], {"mfc": "white", "lw": 0.8}),
         ):
             known = np.isfinite(values)
-            label = plan.formulation.name if style == "-" else None
-            marker = MARKERS[number % len(MARKERS)]
             axes.step(
                 seconds[known],
                 np.array(values)[known],
-                style + marker,
                 where="post",
-                color=f"C{number}",
-                ms=4,
-                mfc="none",
-                label=label,
+                **(known_by[name].line() | more),
             )
-    axes.set(xscale="log", xlabel="time [s]", ylabel="objective; bound dashed")
-    axes.grid(visible=True, which="both", lw=0.2)
-    axes.legend(frameon=False, fontsize=8)
+    axes.plot([], [], "o-", color=GRAY, mfc="white", lw=0.8, label="lower bound")
+    axes.set(xscale="log", xlabel="time [s]", ylabel="objective, and what bounds it below")
+    dress(axes)
+    axes.legend()
     return figure

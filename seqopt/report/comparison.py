@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
+from seqopt.arrays import Terse
 from seqopt.engines.interface import Engine
 from seqopt.errors import ProblemError, StepError
 from seqopt.placement.certificate import least_sum
@@ -54,8 +55,8 @@ MOST = 3  # robots that take part where none are named: as many as in the paper'
 CLOSED = "no choice"  # the problem of a sequence without open grips
 
 
-@dataclass(frozen=True, eq=False)
-class LoopFacts:
+@dataclass(frozen=True, eq=False, repr=False)
+class LoopFacts(Terse):
     """What the formulations of one loop have in common.
 
     Attributes
@@ -76,8 +77,8 @@ class LoopFacts:
     ranks: pd.DataFrame | None
 
 
-@dataclass(frozen=True, eq=False)
-class Comparison:
+@dataclass(frozen=True, eq=False, repr=False)
+class Comparison(Terse):
     """Methods and formulations side by side.
 
     Attributes

@@ -2,59 +2,41 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Sequence
 
 import numpy as np
-import pandas as pd
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection, PolyCollection
-from matplotlib.patheffects import withStroke
+from matplotlib.collections import PolyCollection
 
-from seqopt.arrays import Floats, Ints
-from seqopt.network.network import Network, PartKind
+from seqopt.arrays import Floats
+from seqopt.network.network import Network
+from seqopt.report.along import draw_responses
+from seqopt.report.network_picture import draw_network, force_key
 from seqopt.report.occlusion import drawing_order
+from seqopt.report.style import SMALL
+from seqopt.report.view import HALO, View, frame
 from seqopt.scene.blocks import vertices_of
 from seqopt.scene.boxes import boxes
 from seqopt.scene.parts import Brick
 from seqopt.scene.shape import normal_of
+
+__all__ = [
+    "View",
+    "draw_bricks",
+    "draw_grips",
+    "draw_network",
+    "draw_responses",
+    "force_key",
+]
 
 Faces = tuple[tuple[int, ...], ...]
 Color = tuple[float, float, float, float]
 FACES: Faces = ((0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (1, 3, 7, 5))
 CLAY = np.array([0.80, 0.52, 0.38])
 MARKED = np.array([0.46, 0.63, 0.76])
-INK, TENSION, COMPRESSION = "#2b2b2b", "#c8102e", "#1f5fa8"
-ROBOT_COLORS = ("#0b7a75", "#7b2d8b", "#d17a00", "#444444")
-
-
-@dataclass(frozen=True)
-class View:
-    """A parallel projection.
-
-    Parameters
-    ----------
-    azimuth : float
-        Direction from which the scene is seen, degrees from -y towards +x.
-    elevation : float
-        Degrees above the horizon.
-    """
-
-    azimuth: float = 25.0
-    elevation: float = 15.0
-
-    def axes(self) -> Floats:
-        """Return the unit vectors to the right, up and towards the viewer.
-
-        Returns
-        -------
-        (3, 3) float
-            A row for each.
-        """
-        a, e = np.radians([self.azimuth, self.elevation])
-        right = np.array([np.cos(a), np.sin(a), 0.0])
-        toward = np.array([np.sin(a) * np.cos(e), -np.cos(a) * np.cos(e), np.sin(e)])
-        return np.stack([right, np.cross(toward, right), toward])
+ROBOT_COLORS = ("#0b7a75", "#7b2d8b", "#b35900", "#444444")
+ROBOT_MARKERS = "XPDs"
+LINE = 11.0  # points from one line of text to the next
 
 
 def draw_bricks(  # noqa: PLR0913  # what is drawn, and how, each by its name
@@ -100,84 +82,7 @@ def draw_bricks(  # noqa: PLR0913  # what is drawn, and how, each by its name
             red, green, blue = (_light(points, face) * own).tolist()
             colors.append((red, green, blue, alpha))
     _fill(axes, polygons, colors, alpha)
-    _frame(axes)
-
-
-def draw_network(  # noqa: PLR0913  # what is drawn, and how, each by its name
-    axes: Axes,
-    network: Network,
-    bricks: int,
-    view: View,
-    *,
-    displacement: Floats | None = None,
-    magnify: float = 1.0,
-    edge_force: Floats | None = None,
-    numbers: bool = False,
-) -> None:
-    """Draw nodes and edges of the first bricks, in place or moved.
-
-    Parameters
-    ----------
-    axes : matplotlib.axes.Axes
-        To draw on.
-    network : Network
-        Of the scene.
-    bricks : int
-        How many, in build order.
-    view : View
-        From where.
-    displacement : (N, 3) float, optional
-        Of every node, m.
-    magnify : float
-        How many times larger the motion is drawn.
-    edge_force : (E,) float, optional
-        Axial force, tension positive, N: colors the edges and sets their widths.
-    numbers : bool
-        Whether to write the numbers of the nodes that robots may hold.
-    """
-    nodes, edges = network.count_nodes(bricks), network.count_edges(bricks)
-    points = network.node_position[:nodes].copy()
-    if displacement is not None:
-        points += magnify * displacement
-    seen = points @ view.axes()[:2].T
-    axes.add_collection(_lines(list(seen[network.edge_nodes[:edges]]), edge_force))
-    _draw_nodes(axes, network.node_kind[:nodes], seen)
-    if numbers:
-        for i in np.flatnonzero(network.node_kind[:nodes] == PartKind.INNER.value):
-            axes.annotate(
-                str(network.node_name[i]), seen[i], (3, 2), textcoords="offset points", fontsize=6
-            )
-    _frame(axes)
-
-
-def _lines(segments: list[Floats], edge_force: Floats | None) -> LineCollection:
-    """Return edges (E) of (2, 2), colored by their forces (E,) if given."""
-    if edge_force is None:
-        return LineCollection(segments, colors=INK, linewidths=1.2)
-    size = np.abs(edge_force).max() or 1.0
-    colors = [TENSION if force > 0 else COMPRESSION for force in edge_force]
-    widths = 0.6 + 3.4 * np.abs(edge_force) / size
-    return LineCollection(segments, colors=colors, linewidths=widths.tolist())
-
-
-def _draw_nodes(axes: Axes, kind: Ints, seen: Floats) -> None:
-    """Draw nodes of given kinds (N,) where they are seen (N, 2)."""
-    for which, marker, size, face in (
-        (PartKind.INNER, "o", 9, INK),
-        (PartKind.JOINT, "o", 12, "white"),
-        (PartKind.BASE, "s", 36, INK),
-    ):
-        at = seen[kind == which]
-        axes.scatter(
-            at[:, 0],
-            at[:, 1],
-            s=size,
-            marker=marker,
-            c=face,
-            edgecolors=INK,
-            zorder=3,
-            linewidths=0.7,
-        )
+    frame(axes)
 
 
 def draw_grips(axes: Axes, network: Network, grips: Sequence[int | None], view: View) -> None:
@@ -194,49 +99,27 @@ def draw_grips(axes: Axes, network: Network, grips: Sequence[int | None], view: 
     view : View
         From where.
     """
-    for i, (robot, node) in enumerate(zip(network.scene.robots, grips, strict=True)):
-        if node is None:
-            continue
-        x, y = view.axes()[:2] @ np.array(network.scene.node_position(node))
+    at = {
+        i: view.axes()[:2] @ np.array(network.scene.node_position(node))
+        for i, node in enumerate(grips)
+        if node is not None
+    }
+    below = sorted(at, key=lambda i: float(at[i][1]))  # labels keep a line of text apart
+    for i, (x, y) in at.items():
         color = ROBOT_COLORS[i % len(ROBOT_COLORS)]
-        axes.scatter([x], [y], s=120, marker="X", c=color, edgecolors="white", zorder=5)
+        marker = ROBOT_MARKERS[i % len(ROBOT_MARKERS)]
+        axes.scatter([x], [y], s=90, marker=marker, c=color, edgecolors="white", zorder=5)
         axes.annotate(
-            f"{robot.name} at {node}",
+            f"{network.scene.robots[i].name} at {grips[i]}",
             (x, y),
-            (9, -3),
+            (10, LINE * (below.index(i) - (len(at) - 1) / 2)),
             textcoords="offset points",
-            fontsize=8,
+            va="center",
+            fontsize=SMALL,
             color=color,
             zorder=6,
-            path_effects=[withStroke(linewidth=2.5, foreground="white")],
+            path_effects=HALO,
         )
-
-
-def draw_responses(
-    axes: Sequence[Axes], tables: Mapping[str, pd.DataFrame], columns: Mapping[str, str]
-) -> None:
-    """Draw responses along the build, one column of the tables on each axes.
-
-    A step stands at the share of the build that it ends, so that methods of different length align.
-
-    Parameters
-    ----------
-    axes : sequence of matplotlib.axes.Axes
-        One for every column.
-    tables : mapping of str to pandas.DataFrame
-        By method, as `seqopt.analyze` makes them.
-    columns : mapping of str to str
-        Label of every column, with its unit.
-    """
-    for axis, (column, label) in zip(axes, columns.items(), strict=True):
-        for name, table in tables.items():
-            count = table.groupby("bricks")["step"].transform("count")
-            rank = table.groupby("bricks").cumcount()
-            axis.plot(table["bricks"] - 1 + (rank + 1) / count, table[column], label=name, lw=1.3)
-        axis.set_ylabel(label)
-        axis.grid(visible=True, lw=0.3)
-    axes[-1].set_xlabel("bricks placed")
-    axes[0].legend(frameon=False, ncols=len(tables), fontsize=8)
 
 
 def _moved(network: Network, bricks: int, twist: Floats | None, magnify: float) -> Floats:
@@ -280,9 +163,3 @@ def _light(corners: Floats, face: tuple[int, ...]) -> float:
     """Return how bright a face of corners (V, 3) is, from 0.55 to 1."""
     normal = normal_of(corners[list(face)])
     return float(0.55 + 0.45 * abs(normal @ [0.3, -0.5, 0.8]) / np.linalg.norm(normal))
-
-
-def _frame(axes: Axes) -> None:
-    axes.set_aspect("equal")
-    axes.autoscale_view()
-    axes.set_axis_off()

@@ -2,7 +2,9 @@
 
 Sorting faces by depth fails where a long one lies beside a short one. Of two convex bodies that a
 plane parts, the one on the viewer's side of it is drawn last; among the bodies that hide each other
-in the picture this gives an order, unless they do so in a circle.
+in the picture this gives an order, unless they do so in a circle. Where several planes part two
+bodies and disagree, neither hides the other: bricks that are corbelled touch along an edge, where
+any of the planes alone could name the wrong one.
 """
 
 from __future__ import annotations
@@ -16,6 +18,7 @@ from seqopt.arrays import Floats, Ints
 
 EDGES = ((0, 4), (0, 2), (0, 1))  # corners of a box along its length, width and thickness
 EVEN = 1e-9  # share of a direction toward the viewer that is none
+TOUCH = 1e-6  # share of a box's size up to which boxes that touch are parted
 
 
 def drawing_order(corners: Floats, toward: Floats) -> list[int]:
@@ -95,8 +98,12 @@ def _in_front(seen: Floats, pairs: Ints) -> Ints:
     first, second = (axes @ seen[which].transpose(0, 2, 1) for which in (a, b))
     ahead = second.min(axis=2) - first.max(axis=2)  # how far the second lies along each axis
     behind = first.min(axis=2) - second.max(axis=2)
-    best = np.maximum(ahead, behind).argmax(axis=1)
-    row = np.arange(len(pairs))
-    sign = np.where(ahead[row, best] >= behind[row, best], 1, -1)
-    facing = axes[row, best, 2]
-    return np.asarray(np.where(np.abs(facing) > EVEN, sign * np.sign(facing), 0).astype(np.int64))
+    known = np.linalg.norm(axes, axis=2) > 0.5  # not the product of edges that are parallel
+    apart = np.where(known, np.maximum(ahead, behind), -np.inf)
+    touch = TOUCH * np.linalg.norm(edges[a], axis=2).max(axis=1, keepdims=True)
+    parts = apart >= np.minimum(apart.max(axis=1, keepdims=True), -touch)
+    sign = np.where(ahead >= behind, 1, -1)
+    facing = np.where(np.abs(axes[..., 2]) > EVEN, sign * np.sign(axes[..., 2]), 0)
+    nearest = np.where(parts, facing, 2).min(axis=1)
+    farthest = np.where(parts, facing, -2).max(axis=1)
+    return np.asarray(np.where(nearest == farthest, nearest, 0).astype(np.int64))

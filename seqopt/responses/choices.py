@@ -19,6 +19,7 @@ from functools import cached_property
 
 import numpy as np
 
+from seqopt.arrays import Terse
 from seqopt.engines.interface import Engine
 from seqopt.errors import MemoryShortError
 from seqopt.responses.alike import (
@@ -43,8 +44,8 @@ CHOICE_RESPONSES = ("T_max", "M_sup", "D_max", "C_max", "F_move", "F_largest")  
 __all__ = ["CHOICE_RESPONSES", "Evaluation", "StepChoices", "Wanted", "evaluate_choices"]
 
 
-@dataclass(frozen=True)
-class Evaluation:
+@dataclass(frozen=True, repr=False)
+class Evaluation(Terse):
     """The responses of all choices of a schedule, computed when they are first asked for.
 
     Parameters
@@ -141,8 +142,8 @@ class Evaluation:
         return self._found.seconds
 
 
-@dataclass(frozen=True)
-class _Found:
+@dataclass(frozen=True, repr=False)
+class _Found(Terse):
     """What is kept of an evaluation; no steps where there is not the memory."""
 
     steps: tuple[StepChoices, ...]

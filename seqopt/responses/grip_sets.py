@@ -50,6 +50,9 @@ class GripSets:
         scene = engine.network.scene
         self._number = np.array([0, *(node for brick in scene.placed for node in brick.nodes)])
 
+    def __repr__(self) -> str:
+        return f"<GripSets of {self._engine}: {self.solved} solved>"
+
     @property
     def solved(self) -> int:
         """How many different grip sets were solved."""

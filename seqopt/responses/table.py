@@ -30,22 +30,23 @@ def analyze(engine: Engine, steps: Sequence[Step]) -> pd.DataFrame:
     Parameters
     ----------
     engine : Engine
-        What computes them.
+        The engine that computes them.
     steps : sequence of Step
-        With every grip given.
+        Steps with every grip given.
 
     Returns
     -------
     pandas.DataFrame
-        Forces in N, moments in N m, displacements in 1e-3 mm, as the columns' names say; an empty
-        cell is a robot that does not grip. Where a scene has more than one ground end, ``F_sup``
-        and ``M_sup`` are the largest over them, and a pair of further columns per end, such as
-        ``F_sup_25_N`` and ``M_sup_25_Nm`` for that of brick 25, has its own: empty until it acts.
+        One row per step. Forces are in N, moments in N m, displacements in 1e-3 mm, as the names of
+        the columns say. A cell is empty if the robot does not grip. If a scene has several ground
+        ends, ``F_sup`` and ``M_sup`` are the largest over them. Two further columns per end, such
+        as ``F_sup_25_N`` and ``M_sup_25_Nm`` for the end of brick 25, have its own values; they are
+        empty until the end acts.
 
     Raises
     ------
     MechanismError, SolverError
-        As the engine does, the step named.
+        As the engine raises them; the message says which step it is.
     SceneError, StepError
         If an argument is not an engine, or not a list of steps.
 

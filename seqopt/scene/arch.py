@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from seqopt.arrays import Floats, Vector
+from seqopt.arrays import Floats, Terse, Vector
 from seqopt.errors import SceneError, SceneWarning
 from seqopt.scene.checks import short
 from seqopt.scene.parts import THICKEST, Brick, Ground, Joint, Robot
@@ -21,8 +21,8 @@ LETTERS = "VLR"
 STANDARD_GRAVITY = 9.81  # m/s²
 
 
-@dataclass(frozen=True, kw_only=True)
-class ArchShape:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class ArchShape(Terse):
     """The numbers that shape a chain of bricks; lengths in m, angles in rad.
 
     Parameters
@@ -46,7 +46,7 @@ class ArchShape:
     stub : float
         Length of the rigid stub behind the joint at each ground end.
     translational_stiffness, rotational_stiffness : Vector
-        Of every joint: along it and across it twice, N/m and N m/rad.
+        Stiffness of every joint: along it, and across it in two directions, N/m and N m/rad.
     dimensions : Vector
         Length, width and thickness of a brick.
     density : float

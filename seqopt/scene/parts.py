@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from seqopt.arrays import Vector
+from seqopt.arrays import Terse, Vector
 from seqopt.errors import SceneError
 from seqopt.scene.checks import axes, positive, printable, short, vector, whole, wholes
 from seqopt.scene.polygon import convex_polygon, rows
@@ -22,8 +22,8 @@ THICKEST = 0.5  # of a joint that does not say, over the smallest dimension of i
 SAME_PLACE = 1e-6  # distance treated as zero, over the size of a block
 
 
-@dataclass(frozen=True, kw_only=True)
-class Brick:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Brick(Terse):
     """A rigid box or block with two inner nodes; in a box, these are the centroids of its halves.
 
     Parameters
@@ -124,8 +124,8 @@ class Brick:
         return x, y, z
 
 
-@dataclass(frozen=True, kw_only=True)
-class Spring:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Spring(Terse):
     """Where a joint acts and how stiff it is, in its own axes.
 
     Parameters
@@ -178,7 +178,7 @@ class Spring:
         return tuple((x, y, z) for x, y, z in points.tolist())
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Joint(Spring):
     """A spring between two bricks.
 
@@ -203,7 +203,7 @@ class Joint(Spring):
         self._check(where)
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Ground(Spring):
     """A spring between a brick and a rigid stub that ends at a fixed point.
 

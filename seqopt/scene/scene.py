@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 from seqopt.arrays import Vector
 from seqopt.errors import SceneError
@@ -14,12 +15,16 @@ from seqopt.scene.checks import parts, printable, vector, wholes
 from seqopt.scene.geometry import check_bricks, check_springs
 from seqopt.scene.parts import Brick, Ground, Joint, Robot
 from seqopt.scene.reach import Reach
+from seqopt.showing import Shown, display
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 KINDS = {"bricks": Brick, "joints": Joint, "grounds": Ground, "robots": Robot}
 
 
 @dataclass(frozen=True, kw_only=True)
-class Scene:
+class Scene(Shown):
     """Everything a build needs: what is built, in which order, and by which robots.
 
     Parameters
@@ -163,6 +168,27 @@ class Scene:
         """The bricks in build order."""
         by_name = {brick.name: brick for brick in self.bricks}
         return tuple(by_name[name] for name in self.build_order)
+
+    def plot(self, bricks: int | None = None) -> Figure:
+        """Draw the scene, or its first bricks.
+
+        Parameters
+        ----------
+        bricks : int, optional
+            How many, in build order; the others are drawn pale. All by default.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            A notebook shows it; ``savefig`` writes it to a file.
+
+        Raises
+        ------
+        ExtraError
+            If matplotlib is not installed (extra ``plot``).
+        """
+        figure: Figure = display("scene_picture")(self, bricks)
+        return figure
 
     @property
     def up(self) -> Vector:

@@ -87,8 +87,8 @@ def load_scene(name: str | Path) -> Scene:
     Parameters
     ----------
     name : str or pathlib.Path
-        One of `builtin_scenes`, the path of a file, or what
-        `seqopt.scene.library.by_words.scene_by_words` reads, as ``arch:span=2,rise=0.7``.
+        A name in `builtin_scenes`, the path of a file, or a few words that
+        `seqopt.scene.library.by_words.scene_by_words` reads, such as ``arch:span=2,rise=0.7``.
 
     Returns
     -------
@@ -104,7 +104,7 @@ def load_scene(name: str | Path) -> Scene:
     Warns
     -----
     SceneWarning
-        Where something in a file is probably not meant: see `seqopt.scene.doubts`.
+        If something in a file is probably a mistake; see `seqopt.scene.doubts`.
 
     Examples
     --------

@@ -48,22 +48,22 @@ class FreeRules:
     robots : tuple of str
         Names of the robots that take part, two to five; by default all of the scene.
     placers : tuple of str
-        Names of those that may place a brick; by default all that take part.
+        Names of the robots that may place a brick; by default all that take part.
     least_grips : int
-        How many nodes are held at least, from the second brick on.
+        Least number of nodes held, from the second brick on.
     newest : Newest or str
         Where the newest brick is held.
     payload : Payload or str
         Whether payloads are kept.
     regrips : int or None
-        How many grips may be taken between two bricks, beside those that place; any by default.
+        Most grips taken between two bricks, besides those that place; by default any number.
     ending : Ending or str
         How the build ends.
 
     Raises
     ------
     StepError
-        Naming the rule, its value and what would be accepted.
+        If a rule is malformed; the message gives its value and what would be accepted.
 
     Examples
     --------

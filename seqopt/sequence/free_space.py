@@ -15,7 +15,7 @@ from functools import cached_property
 
 import numpy as np
 
-from seqopt.arrays import Bools, Floats, Ints, frozen
+from seqopt.arrays import Bools, Floats, Ints, Terse, frozen
 from seqopt.network.network import Network
 from seqopt.sequence.free_moves import (
     Moves,
@@ -31,8 +31,8 @@ from seqopt.sequence.support import islands
 PAIRS = 4_000_000  # of states and nodes that are looked at together
 
 
-@dataclass(frozen=True)
-class FreeSpace:
+@dataclass(frozen=True, repr=False)
+class FreeSpace(Terse):
     """The states of a free schedule and the moves between them.
 
     Parameters

@@ -22,9 +22,9 @@ def read_plan(scene: Scene, path: Path) -> tuple[Step, ...]:
     Parameters
     ----------
     scene : Scene
-        In which every step must be possible.
+        The scene in which every step must be possible.
     path : pathlib.Path
-        CSV; see `parse_plan` for its columns.
+        The CSV file; see `parse_plan` for its columns.
 
     Returns
     -------
@@ -36,7 +36,7 @@ def read_plan(scene: Scene, path: Path) -> tuple[Step, ...]:
     FileError
         If the file cannot be read.
     StepError
-        If it is no such table or a step is impossible.
+        If the file is not such a table, or a step is impossible.
 
     Examples
     --------

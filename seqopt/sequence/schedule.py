@@ -5,10 +5,19 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
+import pandas as pd
+
+from seqopt.arrays import Terse
 from seqopt.errors import StepError
 from seqopt.scene.scene import Scene
+from seqopt.sequence.holds import holds
 from seqopt.sequence.steps import Step, StepKind, check_sequence
+from seqopt.showing import Shown, display
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True)
@@ -57,8 +66,8 @@ class OpenStep:
         return tuple(sorted({grip.move for grip in self.grips if isinstance(grip, OpenGrip)}))
 
 
-@dataclass(frozen=True)
-class Move:
+@dataclass(frozen=True, repr=False)
+class Move(Terse):
     """One repositioning to be decided.
 
     Parameters
@@ -79,8 +88,8 @@ class Move:
     candidates: tuple[int, ...]
 
 
-@dataclass(frozen=True)
-class Schedule:
+@dataclass(frozen=True, repr=False)
+class Schedule(Shown):
     """A sequence with open moves; at most two neighboring moves are open in one step.
 
     Parameters
@@ -94,7 +103,7 @@ class Schedule:
     moves : tuple of Move
         In the order in which they are made.
     left_out : str, optional
-        What was done to look at fewer candidates than there are; empty where all are open.
+        How candidates were left out, in words; empty if all are open.
 
     Raises
     ------
@@ -106,8 +115,8 @@ class Schedule:
     >>> import seqopt
     >>> network = seqopt.build_network(seqopt.load_scene("arch25"))
     >>> schedule = seqopt.three_robot_loop(network)
-    >>> len(schedule.steps), len(schedule.moves)
-    (90, 22)
+    >>> schedule
+    <Schedule three-robot of arch25: 90 steps, 22 grips to choose from 2 to 46 nodes>
     >>> schedule.steps[3].moves
     (0,)
     """
@@ -125,6 +134,62 @@ class Schedule:
                     f"step {step.number}: moves {[m + 1 for m in step.moves]} are open at once; "
                     "at most two neighboring ones can be"
                 )
+
+    def __repr__(self) -> str:
+        counts = [len(move.candidates) for move in self.moves]
+        nodes = f" from {min(counts)} to {max(counts)} nodes" if counts else ""
+        what = f"{len(self.steps)} steps, {len(counts)} grips to choose{nodes}"
+        return f"<Schedule {self.method} of {self.scene.name}: {what}>"
+
+    def table(self) -> pd.DataFrame:
+        """Return what is to be chosen.
+
+        Returns
+        -------
+        pandas.DataFrame
+            A row per open grip. Columns: ``move`` (from 1), ``robot``, ``step`` in which it takes
+            the grip, ``to_step``, the last before it lets go, ``bricks`` that stand, ``newest``,
+            the brick placed last, ``places``, whether the robot places it with this grip,
+            ``candidates``, how many nodes it may take, and these ``nodes``.
+        """
+        open_holds = {hold.move: hold for hold in holds(self.scene, self.steps)}
+        rows = [
+            {
+                "move": k + 1,
+                "robot": move.robot,
+                "step": move.step,
+                "to_step": open_holds[k].last,
+                "bricks": move.bricks,
+                "newest": self.scene.placed[move.bricks - 1].name,
+                "places": open_holds[k].places is not None,
+                "candidates": len(move.candidates),
+                "nodes": move.candidates,
+            }
+            for k, move in enumerate(self.moves)
+        ]
+        return pd.DataFrame(rows)
+
+    def gantt(self, first: int = 1, last: int | None = None) -> Figure:
+        """Draw the grips over the steps, a lane per robot; those to be chosen are hatched.
+
+        Parameters
+        ----------
+        first, last : int, optional
+            Numbers of the first and the last step that are drawn; by default all.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+
+        Raises
+        ------
+        ExtraError
+            If matplotlib is not installed (extra ``plot``).
+        StepError
+            If there are no such steps.
+        """
+        figure: Figure = display("gantt_picture")(self.scene, self.steps, None, (first, last))
+        return figure
 
     @cached_property
     def steps_of(self) -> Mapping[tuple[int, ...], tuple[OpenStep, ...]]:

@@ -28,21 +28,21 @@ def read_schedule(where: Network | Scene, path: Path) -> Schedule:
     Parameters
     ----------
     where : Network or Scene
-        In which every step must be possible.
+        The network or scene in which every step must be possible.
     path : pathlib.Path
-        CSV; see `parse_schedule` for its columns.
+        The CSV file; see `parse_schedule` for its columns.
 
     Returns
     -------
     Schedule
-        Called as the file is, without its suffix.
+        The schedule, named after the file without its suffix.
 
     Raises
     ------
     FileError
         If the file cannot be read.
     StepError
-        If it is no such table or a step is impossible.
+        If the file is not such a table, or a step is impossible.
 
     Examples
     --------

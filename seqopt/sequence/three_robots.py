@@ -38,10 +38,11 @@ class ScheduleMethod(Protocol):
 def three_robot_loop(network: Network | Scene, robots: Sequence[str] = ()) -> Schedule:
     """Return the four-step loop of three robots whose roles rotate.
 
-    The first three robots place a brick each. Then, once per brick: the robot whose grip was chosen
-    before last releases and places the next brick, the one that placed the brick before releases,
-    and takes a new grip, which is to be chosen. At least two robots grip, and the newest brick is
-    held, at every step after the first. Source: section 5.2.2 and figure 12 of Bruun et al.
+    The first three robots place a brick each. Then four steps are repeated for every brick. The
+    robot whose grip was chosen in the round before releases, and places the next brick. The robot
+    that placed the brick before releases, and takes a new grip, which is to be chosen. From the
+    second step on, at least two robots grip and the newest brick is held. Source: section 5.2.2
+    and figure 12 of Bruun et al.
 
     Parameters
     ----------

@@ -88,21 +88,21 @@ def sequential(network: Network | Scene, robots: Sequence[str] = ()) -> tuple[St
     Parameters
     ----------
     network : Network or Scene
-        Of a scene with at least two robots.
+        The network of a scene with at least two robots.
     robots : sequence of str, optional
-        Names of the one that places the first brick and of the other. By default the first two of
-        the scene whose reach allows the build; a third robot steps in where no two are enough.
+        Names of two robots; the first one places the first brick. By default the first two of the
+        scene whose reach allows the build; a third robot helps if no two are enough.
 
     Returns
     -------
     tuple of Step
-        Checked; every grip is given, the newest brick held until the next one is placed.
+        The checked steps. The newest brick is held until the next one is placed.
 
     Raises
     ------
     StepError
-        If there are fewer robots, none is left that reaches the next brick, or bricks that no joint
-        ties to a ground end would be held by nobody.
+        If there are fewer robots, no free robot reaches the next brick, or nobody would hold a
+        part that no joint connects to the ground.
 
     Examples
     --------
@@ -119,11 +119,12 @@ def sequential(network: Network | Scene, robots: Sequence[str] = ()) -> tuple[St
 
 
 def cantilever(network: Network | Scene, robots: Sequence[str] = ()) -> tuple[Step, ...]:
-    """One robot holds while the other places bricks, up to one that lies along; then they swap.
+    """One robot holds, the other places bricks up to one that lies along; then they swap.
 
-    A brick lies along the structure if joints meet both of its inner nodes. They also swap after a
-    brick that no joint ties to the stretch being built, so that what is held is always where the
-    build goes on: in a chain this is the first brick alone. Source: section 4.2 of Bruun et al.
+    A brick lies along the structure if joints meet both of its inner nodes. The robots also swap
+    after a brick that no joint connects to the stretch being built, so that the held brick is
+    always where the build continues. In a chain this happens only after the first brick. Source:
+    section 4.2 of Bruun et al.
 
     Parameters
     ----------

@@ -11,6 +11,8 @@ import numpy as np
 from seqopt.arrays import Floats, FrozenValue, Vector
 from seqopt.contact.assembly import Assembly
 from seqopt.contact.mortar import Mortar
+from seqopt.showing import Shown
+from seqopt.stability.failure import first_to_fail
 from seqopt.stability.limit_analysis import (
     CAP,
     EXACT,
@@ -25,7 +27,6 @@ from seqopt.stability.prover import Proven, Prover
 DIRECTIONS = 8  # in which an assembly is pulled sideways, evenly spread
 ROUGHEST = 10.0  # largest coefficient of friction that is tried
 FRICTION_STEP = 1e-4  # to which the least one is found
-STILL = 1e-6  # motion slower than this, beside the fastest, is none
 
 
 class Verdict(Enum):
@@ -37,30 +38,30 @@ class Verdict(Enum):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Stability(FrozenValue):
+class Stability(Shown, FrozenValue):
     """Verdict and margins of one assembly; a margin that is not proven is NaN.
 
     Attributes
     ----------
     verdict : Verdict
-        With the mortar and the payloads given.
+        The verdict with the given mortar and payloads.
     bond : float
-        Least strength, in tension and at the same time in shear, of a bond in every contact with
-        which it stands at the mortar's friction, Pa; inf if none is enough.
+        Least strength of a bond, in tension and at the same time in shear, with which it stands at
+        the mortar's friction, Pa; inf if none is enough.
     friction : float
         Least coefficient of friction with which it stands at the mortar's bond; inf if none is.
     pull : (8,) float
-        Largest sideways acceleration that it survives in each direction, over that of gravity;
-        NaN where it does not stand.
+        Largest sideways acceleration that it survives in each direction, relative to gravity; NaN
+        if it does not stand.
     grip : float
         The largest grip force, made as small as equilibrium with the mortar allows, N; inf if no
         payload is enough, 0 if nothing grips.
     motion : (B, 6) float
-        How it fails: if it does not stand by itself, else when pulled to the limit in the worst
-        direction. Translation (m) and rotation (rad) of the blocks, the largest translation or
-        rotation times lever being 1 m; zero if unknown.
+        How it fails: by itself if it does not stand, and otherwise when pulled to the limit in the
+        worst direction. Translation (m) and rotation (rad) of the blocks; the largest translation,
+        or rotation times lever, is 1 m; zero if unknown.
     first_block, first_contact : str
-        The fastest block and the contact that parts fastest in that motion; empty if unknown.
+        The fastest block and the contact that opens fastest in that motion; empty if unknown.
     claims : mapping of Claim to int
         How the solver said it ended, over all cases that were solved.
     unproven : int
@@ -88,6 +89,12 @@ class Stability(FrozenValue):
     first_contact: str
     claims: Mapping[Claim, int]
     unproven: int
+
+    def __repr__(self) -> str:
+        tilt = f", survives a tilt of {np.degrees(self.tilt):.3g} degrees"
+        margin = tilt if self.verdict is Verdict.STANDS else ""
+        first = f", block {self.first_block} fails first" if self.first_block else ""
+        return f"<Stability: {self.verdict.value}{margin}{first}>"
 
     @property
     def tilt(self) -> float:
@@ -269,28 +276,3 @@ def _grip(prove: Prover, fixed: Case) -> float:
     if not len(prove.assembly.payload):
         return 0.0
     return prove(replace(fixed, sense=Sense.SMALLEST, payload=(0.0, 1.0))).value
-
-
-def first_to_fail(assembly: Assembly, motion: Floats) -> tuple[str, str]:
-    """Return what fails first in a motion.
-
-    Parameters
-    ----------
-    assembly : Assembly
-    motion : (B, 6) float
-        As of `seqopt.stability.limit_analysis.Answer`.
-
-    Returns
-    -------
-    block, contact : str
-        The fastest block and the contact that parts fastest; empty where nothing moves.
-    """
-    speed = np.linalg.norm(motion, axis=1)
-    if not speed.max(initial=0.0) > 0:
-        return "", ""
-    block = str(assembly.block_name[int(speed.argmax())])
-    parting = (assembly.contact_map.T @ motion.ravel()).reshape(-1, 3)
-    apart = np.linalg.norm(parting, axis=1)
-    if not apart.max(initial=0.0) > STILL:
-        return block, ""
-    return block, assembly.contact_name[int(assembly.contact[int(apart.argmax())])]

@@ -32,9 +32,9 @@ def assess_steps(
     network : Network or Scene
     steps : sequence of Step
     mortar : Mortar or str
-        Of all joints; or its name.
+        The mortar of all joints, or its name.
     progress : callable, optional
-        Told in words which step is next.
+        Called with the number of the next step, in words.
 
     Returns
     -------

@@ -333,7 +333,7 @@ def test_compare_writes_tables_and_figures(capsys, tmp_path):
     )
     names = {path.name for path in tmp_path.iterdir()}
     assert {"comparison.csv", "published_ranks.csv", "steps_overlap_dp.csv"} <= names
-    for name in ("maxima.png", "responses.png", "gap_against_cost.png"):
+    for name in ("maxima.png", "responses.svg", "gap_against_cost.png"):
         assert (tmp_path / name).read_bytes().startswith(b"\x89PNG")
     ranks = pd.read_csv(tmp_path / "published_ranks.csv")
     assert len(ranks) == 22

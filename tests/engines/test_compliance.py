@@ -165,9 +165,9 @@ def test_a_correction_is_kept_for_the_same_bricks_and_gets_their_operator(monkey
             made.append(bricks)
             super().__init__(network, bricks, *more)
 
-        def solve(self, columns, operator, largest):
+        def solve(self, columns, operator, *more):
             helped.append(operator is not None)
-            return super().solve(columns, operator, largest)
+            return super().solve(columns, operator, *more)
 
     monkeypatch.setattr(compliance, "Refinement", Watched)
     engine = ComplianceEngine(build_network(loosened(chain(16), 1e-9, only_turning=True)))

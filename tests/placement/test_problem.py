@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import rankdata
 
+from seqopt.placement.plan_tables import choice_table
 from seqopt.placement.problem import pose
 from seqopt.placement.ranking import move_costs, rank_moves
 from seqopt.placement.ranks import mean_ranks, scaled_ranks
@@ -104,7 +105,7 @@ def test_raw_values_do_not_reverse(engine25, loop25):
 
 def test_tables_are_labeled(problem25):
     for state in (problem25.evaluation.steps[0], problem25.evaluation.steps[-4]):
-        table = problem25.table(state)
+        table = choice_table(problem25, state)
         moves = [problem25.schedule.moves[m] for m in state.moves]
         assert list(table.index.names) == [f"{m.robot}_node" for m in moves]
         assert "cost" in table

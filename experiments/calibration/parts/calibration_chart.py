@@ -5,21 +5,34 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
-from experiments.harness.plotting import new_figure, save_figure
 from seqopt.arrays import Floats
+from seqopt.report.style import (
+    BLUE,
+    GREEN,
+    ORANGE,
+    SMALL,
+    VERMILION,
+    dress,
+    name_panels,
+    new_figure,
+    plain,
+    styled,
+)
 
-COLORS = {"b t": "tab:orange", "b t2": "tab:green", "b t3/12": "tab:blue"}
+LOOKS = {"b t": (ORANGE, "--"), "b t2": (GREEN, ":"), "b t3/12": (BLUE, "-")}
 TEXTS = {"b t": "$b\\,t$", "b t2": "$b\\,t^2$", "b t3/12": "$b\\,t^3/12$"}
-MARKS = {"absolute": ("o", "tab:blue"), "squares": ("s", "tab:red")}
+MARKS = {"absolute": ("o", BLUE), "squares": ("s", VERMILION)}
 Pairs = dict[str, list[tuple[float, float]]]
 SERIES = {
-    "paper_percent": ("paper", "0.6"),
-    "fit_percent": ("fit, its mean minimized", "tab:blue"),
-    "left_out_percent": ("fitted without this test", "tab:cyan"),
+    "paper_percent": ("Bruun et al.", {"color": "0.6"}),
+    "fit_percent": ("fit, mean size least", {"color": BLUE}),
+    "left_out_percent": ("fit without this test", {"fc": "w", "ec": VERMILION, "hatch": "/////"}),
 }
 
 
+@styled
 def chart(
     bed: pd.DataFrame,
     fits: pd.DataFrame,
@@ -28,15 +41,16 @@ def chart(
     levels: tuple[float, float],
     outs: Pairs,
     profiles: dict[str, tuple[Floats, Floats]],
-) -> None:
-    figure = new_figure(10.5, 8)
+) -> Figure:
+    figure = new_figure(6.8)
     grid = figure.subplots(2, 2)
     absolute = bed[bed["measure"] == "absolute"]
     _stiffness(grid[0, 0], absolute)
     _bars(grid[0, 1], absolute)
     _region(grid[1, 0], region, levels, outs, fits[fits["law"] == "b t3/12"])
     _profiles(grid[1, 1], profiles, levels[0])
-    save_figure(figure, "calibration.png")
+    name_panels(*grid.ravel())
+    return figure
 
 
 def _stiffness(axes: Axes, table: pd.DataFrame) -> None:
@@ -45,8 +59,8 @@ def _stiffness(axes: Axes, table: pd.DataFrame) -> None:
     line = np.array([low, high])
     axes.fill_between(line, line / 1.2, line * 1.2, color="0.93", label="within 20 %")
     axes.loglog(line, line, color="k", lw=0.8)
-    axes.loglog(table["k_e"], table["k_m"], "s", color="0.55", ms=6, label="paper")
-    axes.loglog(table["k_e"], table["k_fit"], "o", color="tab:blue", ms=6, label="fit")
+    axes.loglog(table["k_e"], table["k_m"], "s", color="0.55", ms=6, label="Bruun et al.")
+    axes.loglog(table["k_e"], table["k_fit"], "o", color=BLUE, ms=6, label="fit")
     for row in table.to_dict("records"):
         ends = sorted([float(row["k_m"]), float(row["k_fit"])])
         axes.plot([row["k_e"], row["k_e"]], ends, color="0.6", lw=0.8, zorder=1)
@@ -58,7 +72,7 @@ def _stiffness(axes: Axes, table: pd.DataFrame) -> None:
             (shift, -14),
             textcoords="offset points",
             ha="center",
-            fontsize=8,
+            fontsize=SMALL,
         )
     ticks = [50, 100, 200, 500, 1000]
     axes.set_xticks(ticks, [str(tick) for tick in ticks])
@@ -66,25 +80,25 @@ def _stiffness(axes: Axes, table: pd.DataFrame) -> None:
     axes.minorticks_off()
     axes.set(xlim=(low, high), ylim=(low, high))
     axes.set(xlabel="measured stiffness [kN/mm]", ylabel="model [kN/mm]")
-    axes.set_title("Measured and modeled, by test", loc="left", fontsize=10)
-    axes.legend(frameon=False, fontsize=8, loc="upper left")
+    axes.set_title("stiffness, by test")
+    axes.legend(loc="upper left")
 
 
 def _bars(axes: Axes, table: pd.DataFrame) -> None:
     """Draw the error of every test."""
     place = table["test"].to_numpy(float)
-    for i, (column, (text, color)) in enumerate(SERIES.items()):
+    for i, (column, (text, look)) in enumerate(SERIES.items()):
         mean = table[column].abs().mean()
         label = f"{text}: mean {mean:.1f} %"
-        axes.bar(place + 0.27 * (i - 1), table[column], 0.25, color=color, label=label)
+        axes.bar(place + 0.27 * (i - 1), table[column], 0.25, label=label, **look)
     axes.axhline(0, color="k", lw=0.8)
     axes.set_xticks(place)
-    axes.set_ylim(top=52)
+    axes.set_ylim(top=75)
     axes.set(xlabel="test", ylabel="error of stiffness [%]")
-    title = "Error, its mean size minimized: two tests are met exactly"
-    axes.set_title(title, loc="left", fontsize=10)
-    axes.grid(visible=True, axis="y", lw=0.2)
-    axes.legend(frameon=False, fontsize=8, loc="upper right")
+    axes.set_title("error of each test")
+    dress(axes)
+    axes.grid(visible=False, axis="x")
+    axes.legend(loc="upper right")
 
 
 def _region(
@@ -101,36 +115,32 @@ def _region(
     axes.contourf(x, y, sums.T / best, levels=[0, levels[1]], colors=["0.9"])
     axes.contour(x, y, sums.T / best, levels=[levels[1]], colors=["k"], linewidths=1.0)
     axes.plot(x, x, color="k", lw=0.8, ls=":")
-    axes.text(118, 128, "$k_r = k_t$", fontsize=8, rotation=56, rotation_mode="anchor")
+    axes.text(118, 128, "$k_r = k_t$", fontsize=SMALL, rotation=56, rotation_mode="anchor")
     for row in fits.to_dict("records"):
         mark, color = MARKS[str(row["measure"])]
         pairs = np.array(outs[str(row["measure"])]) / 1e9
         word = "mean absolute error" if row["measure"] == "absolute" else "sum of squares"
         pair = (float(row["k_t"]) / 1e9, float(row["k_r"]) / 1e9)
         axes.plot(*pair, mark, color=color, ms=9, ls="none", label=f"least {word}")
-        label = "the same without one test"
+        label = "the same without a test"
         axes.plot(
             pairs[:, 0], pairs[:, 1], mark, mfc="w", color=color, ms=4.5, ls="none", label=label
         )
         for i in np.flatnonzero(np.abs(np.log(pairs / pair)).max(axis=1) > 0.3):
             spot, shift = tuple(pairs[i]), (-5, 6) if row["measure"] == "absolute" else (4, 5)
-            axes.annotate(
-                str(i + 1), spot, shift, textcoords="offset points", fontsize=9, color=color
-            )
+            axes.annotate(str(i + 1), spot, shift, textcoords="offset points", color=color)
     axes.set(xscale="log", yscale="log", xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
     _plain(axes)
     axes.set_xlabel("$k_t$ [10⁶ kN/m³]")
-    axes.set_ylabel("$k_r$, per second moment of area [10⁶ kN/m³]")
-    axes.set_title(
-        "95 % region (gray), and fits without one test (its number)", loc="left", fontsize=10
-    )
-    axes.legend(frameon=False, fontsize=8, loc="upper right")
+    axes.set_ylabel("$k_r$, per second moment\nof area [10⁶ kN/m³]")
+    axes.set_title("95 % region (gray); numbers: test left out")
+    axes.legend(loc="upper right", frameon=True, framealpha=1, edgecolor="none")
 
 
 def _plain(axes: Axes) -> None:
     """Label logarithmic axes by plain numbers."""
     for axis, ticks in (
-        (axes.xaxis, [10, 20, 50, 100, 200, 500, 1000]),
+        (axes.xaxis, [20, 50, 100, 200, 500, 1000]),
         (axes.yaxis, [50, 100, 200, 500]),
     ):
         axis.set_ticks(ticks, [str(tick) for tick in ticks])
@@ -140,14 +150,13 @@ def _plain(axes: Axes) -> None:
 def _profiles(axes: Axes, profiles: dict[str, tuple[Floats, Floats]], level: float) -> None:
     """Draw the least sum of squares for a given rotational stiffness under every law."""
     for law, (turn, sums) in profiles.items():
-        color = COLORS[law]
-        axes.plot(turn / 1e6, sums, color=color, label=f"rotational stiffness ∝ {TEXTS[law]}")
-        axes.axhline(level * sums.min(), color=color, lw=0.8, ls="--")
-    axes.set(xscale="log", xlim=(10, 1e4), ylim=(0, 3.3))
-    axes.set_xlabel("rotational stiffness of a joint 215 mm thick [MN m/rad per m]")
-    axes.set_ylabel("least sum of squared relative errors")
-    axes.set_title(
-        "Profile of squares; dashed: 95 % limit, its upper end not firm", loc="left", fontsize=10
-    )
-    axes.grid(visible=True, lw=0.2)
-    axes.legend(frameon=False, fontsize=8, loc="upper right")
+        color, dashes = LOOKS[law]
+        axes.plot(turn / 1e6, sums, color=color, ls=dashes, label=f"stiffness ∝ {TEXTS[law]}")
+        axes.axhline(level * sums.min(), color=color, lw=0.8, ls=dashes)
+    axes.set(xscale="log", xlim=(10, 1e4), ylim=(0, 3.6))
+    plain(axes.xaxis)
+    axes.set_xlabel("rotational stiffness of a joint\n215 mm thick [MN m/rad per m]")
+    axes.set_ylabel("least sum of squared\nrelative errors")
+    axes.set_title("profile of squares; level: 95 % limit")
+    dress(axes)
+    axes.legend(loc="upper right")

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import pandas as pd
+from matplotlib.figure import Figure
 
-from experiments.harness.plotting import new_figure, save_figure
+from seqopt.report.style import BLUE, GRAY, SMALL, VERMILION, name_panels, new_figure, plain, styled
 
 OURS, BOUND, SPARSE = "seqopt", "dense products", "sparse products"
 LABELS = {
@@ -23,32 +24,38 @@ TITLES = {
 }
 
 
-def chart(table: pd.DataFrame) -> None:
-    figure = new_figure(9, 3.6)
+@styled
+def chart(table: pd.DataFrame) -> Figure:
+    figure = new_figure(5.6)
     whole = table[table["setting"] == "all fields"].sort_values("model_us", ascending=False)
     order = [tool for tool in whole["tool"] if tool not in (BOUND, SPARSE)]
-    panels = figure.subplots(1, 2, sharex=True, sharey=True)
+    panels = figure.subplots(2, 1, sharex=True)
     for axes, (setting, title) in zip(panels, TITLES.items(), strict=True):
         part = table[table["setting"] == setting].set_index("tool")
+        least = float(part["model_us"][BOUND])
+        axes.axvline(least, color=GRAY, lw=0.8)
+        axes.annotate(
+            f"dense matrix products alone: {least:.1f} µs", (least, -0.75), (4, 0),
+            textcoords="offset points", va="center", fontsize=SMALL,
+        )  # fmt: skip
         for row, tool in enumerate(order):
             value, ratio = float(part["model_us"][tool]), float(part["ratio"][tool])
-            color = "C1" if tool == OURS else "C0"
-            axes.plot([0.5, value], [row, row], color=color, lw=1, alpha=0.5)
-            axes.plot(value, row, "o", color=color, ms=6)
-            text = f"{value:.1f}" if tool == OURS else f"{short(value)}  ({short(ratio)} times)"
-            axes.text(value * 1.45, row, text, va="center", fontsize=8)
-        least = float(part["model_us"][BOUND])
-        axes.axvline(least, color="k", lw=0.8, ls=":")
-        label = f"dense matrix products alone: {least:.1f}"
-        axes.text(least * 1.2, -0.8, label, fontsize=7.5, va="center")
-        axes.set(xscale="log", xlim=(0.5, 1e7), ylim=(len(order) - 0.4, -1.3))
-        axes.set_yticks(range(len(order)), [LABELS[tool] for tool in order], fontsize=8)
-        axes.set_xlabel("time per model [µs]", fontsize=9)
-        axes.tick_params(axis="x", labelsize=8)
+            color, marker = (VERMILION, "D") if tool == OURS else (BLUE, "o")
+            axes.plot([0.5, value], [row, row], color=color, lw=1, zorder=1)
+            axes.plot(value, row, marker, color=color, ms=6)
+            text = f"{value:.1f} µs" if tool == OURS else f"{short(value)} µs, {short(ratio)} times"
+            axes.annotate(
+                text, (value, row), (8, 0), textcoords="offset points", va="center", fontsize=SMALL
+            )
+        axes.set(xscale="log", xlim=(0.5, 1e6), ylim=(len(order) - 0.4, -1.3), title=title)
+        axes.set_yticks(range(len(order)), [LABELS[tool] for tool in order])
         axes.tick_params(axis="y", length=0)
-        axes.set_title(title, fontsize=9)
         axes.spines[["top", "right", "left"]].set_visible(False)
-    save_figure(figure, "peers.png")
+        axes.minorticks_off()
+    plain(panels[1].xaxis)
+    panels[1].set_xlabel("time per structure analyzed [µs]")
+    name_panels(*panels)
+    return figure
 
 
 def short(value: float) -> str:

@@ -4,53 +4,60 @@ from __future__ import annotations
 
 import pandas as pd
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
-from experiments.harness.plotting import new_figure, save_figure
+from seqopt.report.style import dress, looks, name_panels, new_figure, plain, styled
+from seqopt.report.wording import typed
 
-STYLES = {
-    "overlap_dp": ("o", "tab:blue"),
-    "minimax": ("D", "tab:cyan"),
-    "cascade": ("v", "tab:gray"),
-    "beam": ("s", "tab:olive"),
-    "rank_search": ("^", "tab:brown"),
-    "lagrangian": ("P", "tab:green"),
-    "labels": ("*", "tab:red"),
-    "overlap_lp": ("<", "tab:purple"),
-    "overlap_mip": (">", "tab:orange"),
-}  # marker and color
-SPREAD = 0.015  # of the brick count, by which marks of one formulation stand beside the next
+NAMES = (
+    "overlap_dp",
+    "minimax",
+    "lagrangian",
+    "labels",
+    "cascade",
+    "beam",
+    "rank_search",
+    "overlap_lp",
+    "overlap_mip",
+)
+BUDGETED = ("lagrangian", "labels", "overlap_lp", "overlap_mip")
+SPREAD = 0.06  # of the brick count, by which marks of one formulation stand beside the next
+LOOKS = looks(NAMES)
 
 
-def chart(table: pd.DataFrame) -> None:
+@styled
+def chart(table: pd.DataFrame) -> Figure:
     """Draw seconds over brick counts, without budgets on the left and with some on the right."""
-    figure = new_figure(9.5, 4.2)
+    figure = new_figure(4.4)
     left, right = figure.subplots(1, 2, sharey=True)
     free = table[table["budgets"] == 0]
-    for name, (mark, color) in STYLES.items():
+    for name, style in LOOKS.items():
         median = free[free["formulation"] == name].groupby("bricks")["solve"].median()
-        size = 9 if mark == "*" else 5
-        left.loglog(median.index, median, f"{mark}-", color=color, ms=size, lw=1, label=name)
+        label = typed(name)
+        left.plot(median.index, median, ms=5.5, mfc="white", label=label, **style.line())
     _budgeted(right, table[table["budgets"] > 0])
-    left.set(title="no budget (median)", xlabel="bricks", ylabel="time to choose [s]")
-    right.set(title="one to three budgets (each problem; open: stopped)", xlabel="bricks")
+    left.set(title="no budget: median", xlabel="bricks", ylabel="time to choose [s]")
+    right.set(title="one to three budgets: each problem", xlabel="bricks")
     for axes in (left, right):
+        axes.set(xscale="log", yscale="log", xlim=(21, 125))
         axes.set_xticks([25, 49, 100], ["25", "49", "100"])
+        dress(axes)
+        plain(axes.yaxis)
         axes.minorticks_off()
-        axes.grid(visible=True, lw=0.2)
-    figure.legend(*left.get_legend_handles_labels(), loc="outside right center", frameon=False)
-    save_figure(figure, "contest.png")
+    name_panels(left, right)
+    handles, labels = left.get_legend_handles_labels()
+    handles.append(Line2D([], [], marker="_", ms=12, mew=2, color="k", ls="none"))
+    labels.append("stopped before the proof (right)")
+    figure.legend(handles, labels, loc="outside lower center", ncols=3)
+    return figure
 
 
 def _budgeted(axes: Axes, table: pd.DataFrame) -> None:
-    """Draw a mark for every problem; open where a limit of time or labels stopped it."""
-    for place, name in enumerate(("lagrangian", "labels", "overlap_lp", "overlap_mip")):
-        mark, color = STYLES[name]
+    """Draw a mark for every problem; with a bar where a limit of time or labels stopped it."""
+    for place, name in enumerate(BUDGETED):
         own = table[table["formulation"] == name]
-        at = own["bricks"] * (1 + SPREAD * (place - 1.5) * 4)
-        for stopped, face in ((False, color), (True, "none")):
-            rows = (own["end"] == "stopped") == stopped
-            size = 60 if mark == "*" else 25
-            axes.scatter(
-                at[rows], own["solve"][rows], size, marker=mark, edgecolors=color, facecolors=face
-            )
-    axes.set(xscale="log", yscale="log")
+        at = own["bricks"] * (1 + SPREAD * (place - 1.5))
+        axes.plot(at, own["solve"], ms=5.5, **LOOKS[name].mark(filled=False))
+        rows = own["end"] == "stopped"
+        axes.plot(at[rows], own["solve"][rows], "_", color="k", ms=12, mew=2)

@@ -5,30 +5,33 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
-from experiments.harness.plotting import new_figure, save_figure
 from experiments.placement.parts.scenarios import POSITION, STIFFNESS, WEIGHT
+from seqopt.report.style import dress, looks, new_figure, styled
+from seqopt.report.wording import in_words
 
-PANELS: dict[str, tuple[tuple[str, str, Callable[[float], float]], ...]] = {
-    "stiffness, every joint\nat random|within a factor of": ((STIFFNESS, "-", float),),
-    "translational (dashed: inverse\nrotational), all joints alike|factor": (
-        ("stiffness, translational", "-", float),
-        ("stiffness, rotational", "--", lambda size: 1 / size),
+PANELS: dict[str, tuple[tuple[str, bool, Callable[[float], float]], ...]] = {
+    "stiffness, every joint\nat random|within a factor of": ((STIFFNESS, True, float),),
+    "stiffness, all joints alike:\ntranslational (hollow:\nrotational)|"
+    "factor (hollow: divided by)": (
+        ("stiffness, translational", True, float),
+        ("stiffness, rotational", False, lambda size: 1 / size),
     ),
-    "both stiffnesses,\nall joints alike|factor": (("stiffness, all", "-", float),),
-    "weight, every brick at random\n(dashed: all alike)|within %": (
-        (WEIGHT, "-", lambda size: 100 * size),
-        ("weight, all", "--", lambda size: abs(100 * size)),
+    "both stiffnesses,\nall joints alike|factor": (("stiffness, all", True, float),),
+    "weight, every brick at\nrandom (hollow: all alike)|within %": (
+        (WEIGHT, True, lambda size: 100 * size),
+        ("weight, all", False, lambda size: abs(100 * size)),
     ),
-    "position, every brick and\njoint at random|within mm": (
-        (POSITION, "-", lambda size: 1000 * size),
+    "position, every brick\nand joint at random|within mm": (
+        (POSITION, True, lambda size: 1000 * size),
     ),
-}  # title and abscissa, and what is drawn: kind, style, from size to abscissa
-COLORS = ("tab:blue", "tab:orange", "tab:green", "tab:red")
+}  # title and abscissa, and what is drawn: kind, filled or not, from size to abscissa
 ROWS = {
-    "changed": "exact plan:\nmoves changed [%]",
-    "changed_in_window": "search of one move:\nfirst place changed [%]",
-    "relative_regret": "regret of the nominal\nplan [% of the best]",
+    "changed": "moves of the exact plan\nthat change [%]",
+    "changed_in_window": "first places of one move\nthat change [%]",
+    "relative_regret": "what the plan made for the\nnominal arch gives up [%]",
 }
 
 
@@ -40,32 +43,38 @@ def curve(table: pd.DataFrame, kind: str, change: Callable[[float], float]) -> p
     return 100 * both.groupby(both["size"].map(change).round(6))[list(ROWS)].mean()
 
 
-def chart(table: pd.DataFrame) -> None:
-    figure = new_figure(12.5, 6.8)
-    looks = [*zip(table["criterion"].unique(), COLORS, "osv^", strict=True)]
-    axes = figure.subplots(len(ROWS), len(PANELS), sharex="col", sharey="row")
-    for column, (title, drawn) in enumerate(PANELS.items()):
-        for criterion, color, marker in looks:
+@styled
+def chart(table: pd.DataFrame) -> Figure:
+    """Draw a row of panels per kind of change, and a column per measure of a decision."""
+    figure = new_figure(9.4)
+    axes = figure.subplots(len(PANELS), len(ROWS), sharex="row", sharey="col")
+    for line, (title, drawn) in zip(axes, PANELS.items(), strict=True):
+        for criterion, look in looks(table["criterion"].unique()).items():
             mine = table[table["criterion"] == criterion]
-            for kind, style, change in drawn:
+            for kind, filled, change in drawn:
                 means = curve(mine, kind, change)
-                label = criterion if style == "-" else None
-                look = {"color": color, "ls": style, "marker": marker, "ms": 4, "lw": 1.3}
-                for row, name in enumerate(ROWS):
-                    axes[row, column].plot(means.index, means[name], label=label, **look)
-        axes[0, column].set_title(title.split("|")[0], fontsize=9)
-        axes[-1, column].set_xlabel(title.split("|")[1], fontsize=9)
-        if "factor" in title:
-            axes[-1, column].set_xscale("log")
-            ticks = [1.0, 1.5, 2.0, 3.0] if column == 0 else [1 / 3, 1 / 2, 1.0, 2.0, 3.0]
-            names = ["1/3", "1/2"] if column else []
-            axes[-1, column].set_xticks(ticks, names + [f"{t:g}" for t in ticks[len(names) :]])
-            axes[-1, column].set_xticks([], minor=True)
-    for row, name in enumerate(ROWS.values()):
-        axes[row, 0].set_ylabel(name, fontsize=9)
-        for one in axes[row]:
-            one.grid(visible=True, lw=0.3)
-            one.set_ylim(bottom=-0.03 * one.get_ylim()[1])  # a line of zeros stays in sight
+                style = look.line() | ({} if filled else {"mfc": "white", "lw": 0.8})
+                label = in_words(criterion) if filled else None
+                for panel, name in zip(line, ROWS, strict=True):
+                    panel.plot(means.index, means[name], label=label, **style)
+        words, abscissa = title.split("|")
+        line[0].set_ylabel(words)
+        line[1].set_xlabel(abscissa)
+        if "factor" in abscissa:
+            _factors(line[0], wide="all joints" in words)
+    for panel, name in zip(axes[0], ROWS.values(), strict=True):
+        panel.set_title(name)
+        panel.set_ylim(bottom=-0.04 * panel.get_ylim()[1])  # a line of zeros stays in sight
+    dress(*axes.ravel())
     handles, labels = axes[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=4, frameon=False, fontsize=9)
-    save_figure(figure, "decision_sensitivity.png")
+    figure.legend(handles, labels, loc="outside lower center", ncols=2)
+    return figure
+
+
+def _factors(panel: Axes, *, wide: bool) -> None:
+    """Give a logarithmic axis of factors its ticks."""
+    panel.set_xscale("log")
+    ticks = {1 / 3: "1/3", 1 / 2: "1/2", 1.0: "1", 2.0: "2", 3.0: "3"}
+    shown = ticks if wide else {1.0: "1", 1.5: "1.5", 2.0: "2", 3.0: "3"}
+    panel.set_xticks([*shown], [*shown.values()])
+    panel.set_xticks([], minor=True)

@@ -3,25 +3,26 @@
 from __future__ import annotations
 
 import pandas as pd
+from matplotlib.figure import Figure
 
-from experiments.harness.plotting import new_figure, save_figure
-
-COLORS = ("#2166ac", "#1b7837", "#b2182b")
+from seqopt.report.style import GRAY, dress, looks, name_panels, new_figure, plain, styled
 
 
-def chart(table: pd.DataFrame) -> None:
-    figure = new_figure(9.5, 3.6)
+@styled
+def chart(table: pd.DataFrame) -> Figure:
+    figure = new_figure(3.4)
     share, work = figure.subplots(1, 2)
-    for (name, rows), color in zip(table.groupby("case", sort=False), COLORS, strict=False):
-        style = {"color": color, "lw": 1.3, "marker": ".", "label": str(name)}
-        share.plot(rows["bricks"], 100 * rows["stand"] / rows["sets"], **style)
-        work.semilogy(rows["bricks"], rows["solved"].clip(lower=1), **style)
+    for name, style in looks(table["case"].unique()).items():
+        rows = table[table["case"] == name]
+        line = style.line() | {"lw": 1.1, "ms": 4, "label": name}
+        share.plot(rows["bricks"], 100 * rows["stand"] / rows["sets"], **line)
+        work.semilogy(rows["bricks"], rows["solved"].clip(lower=1), **line)
     sets = table.drop_duplicates("bricks")
-    work.semilogy(sets["bricks"], sets["sets"], "k:", lw=1.2, label="grip sets")
-    share.set(xlabel="bricks placed", ylabel="grip sets that stand [%]", ylim=(0, 103))
-    work.set(xlabel="bricks placed", ylabel="linear programs solved")
-    for axes in (share, work):
-        axes.grid(visible=True, lw=0.2)
-        axes.spines[["top", "right"]].set_visible(False)
-    work.legend(frameon=False, fontsize=8)
-    save_figure(figure, "dry_grips.png")
+    work.semilogy(sets["bricks"], sets["sets"], color=GRAY, lw=2, label="all sets of grips")
+    share.set(xlabel="bricks placed", title="sets of grips that stand [%]", ylim=(0, 104))
+    work.set(xlabel="bricks placed", title="linear programs solved")
+    plain(work.yaxis)
+    dress(share, work)
+    name_panels(share, work)
+    figure.legend(*work.get_legend_handles_labels(), loc="outside lower center", ncols=4)
+    return figure

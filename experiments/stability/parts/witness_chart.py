@@ -5,15 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from experiments.harness.plotting import new_figure, save_figure
+from experiments.harness.wording import two
 from experiments.stability.parts.witness_cra import SOUND, TORN
+from seqopt.report.style import SMALL, dress, name_panels, new_figure, styled
 from seqopt.stability.assessment import Verdict
 from seqopt.stability.limit_analysis import EXACT
 
 STANDS, FALLS, OPEN = (verdict.value for verdict in Verdict)
-COLOURS = {STANDS: "#0072B2", FALLS: "#D55E00", OPEN: "0.6"}
+COLOURS = {STANDS: "#0072B2", FALLS: "#D55E00", OPEN: "0.45"}
 GROUPS = {
     "sample": ("o", 5e-10),
     "stack": ("s", 8e-9),
@@ -24,26 +26,26 @@ CRA = {"optimal": STANDS, "acceptable": STANDS, "infeasible": FALLS}  # anything
 LEFT, RIGHT, BOTTOM, TOP = 5e-11, 40.0, 1e-9, 10.0
 
 
-def chart(table: pd.DataFrame, times: pd.DataFrame, differ: set[str]) -> None:
+@styled
+def chart(table: pd.DataFrame, times: pd.DataFrame, differ: set[str]) -> Figure:
     """Draw verdicts against RBE's tension, times, and one arch at several densities."""
-    figure = new_figure(9.6, 4.8)
+    figure = new_figure(6.8)
     panels = figure.subplot_mosaic(
-        [["all", "times"], ["all", "density"]],
-        width_ratios=[1.35, 1],
-        height_ratios=[1, 1.15],
+        [["all", "all"], ["times", "density"]], height_ratios=[2.1, 1], width_ratios=[1, 1.1]
     )
     _scatter(panels["all"], table[table["group"] != "density"], differ)
     _bars(panels["times"], times)
     density = table[table["group"] == "density"]
     if len(density):
         _density(panels["density"], density)
-    save_figure(figure, "witnesses.png")
+    name_panels(*panels.values())
+    return figure
 
 
 def _scatter(axes: Axes, table: pd.DataFrame, differ: set[str]) -> None:
     axes.axhspan(SOUND, TORN, color="0.9", lw=0)
     middle = np.sqrt(SOUND * TORN)
-    axes.text(RIGHT / 2, middle, "RBE decides nothing", ha="right", va="center", fontsize=8)
+    axes.text(RIGHT / 2, middle, "RBE decides nothing", ha="right", va="center", fontsize=SMALL)
     axes.axvline(10 * EXACT, color="0.4", lw=0.8)
     for group, (marker, none) in GROUPS.items():
         part = table[table["group"] == group]
@@ -57,48 +59,46 @@ def _scatter(axes: Axes, table: pd.DataFrame, differ: set[str]) -> None:
             x[odd], y[odd], 44, c="w", marker=marker, ec=part.loc[odd, "ours"].map(COLOURS), lw=1.8
         )
         for name, at in zip(part.loc[odd, "case"], zip(x[odd], y[odd], strict=True), strict=True):
-            axes.annotate(name, at, (8, 0), textcoords="offset points", va="center", fontsize=8)
+            axes.annotate(name, at, (8, 0), textcoords="offset points", va="center", fontsize=SMALL)
         axes.scatter([], [], 32, c="0.5", marker=marker, lw=0, label=group)
     for name, face, edge, width in (
-        ("LMGC90 agrees too", "0.5", "k", 0.9),
-        ("a witness differs", "w", "0.5", 1.8),
+        ("LMGC90 agrees too (black edge)", "0.5", "k", 0.9),
+        ("a witness differs (hollow)", "w", "0.5", 1.8),
     ):
         axes.scatter([], [], 32, c=face, marker="o", ec=edge, lw=width, label=name)
     for verdict in (STANDS, FALLS):
-        axes.scatter([], [], 32, c=COLOURS[verdict], marker="s", lw=0, label=f"we: {verdict}")
+        axes.scatter([], [], 32, c=COLOURS[verdict], marker="s", lw=0, label=f"seqopt: {verdict}")
     axes.set(xscale="log", yscale="log", xlim=(LEFT, RIGHT), ylim=(BOTTOM / 3, 3 * TOP))
     powers = range(-4, 2)
     axes.set_xticks(
         [3e-8, *(10.0**k for k in powers)], ["none", *(f"$10^{{{k}}}$" for k in powers)]
     )
     axes.minorticks_off()
-    axes.set_xlabel("bond that is lacking, by us (heaviest weight over mean face)")
-    axes.set_ylabel("tension that is left, by RBE (mean weight of a free block)")
-    axes.grid(visible=True, lw=0.2)
-    axes.legend(frameon=False, fontsize=8, loc="upper left")
+    axes.set_xlabel("bond that is lacking, by seqopt (heaviest weight over mean face)")
+    axes.set_ylabel("tension that is left, by RBE (mean weight of a block)")
+    axes.set_title("verdicts of seqopt and of rigid-block equilibrium (RBE of compas_cra)")
+    dress(axes)
+    axes.legend(loc="upper left", ncols=2)
 
 
 def _bars(axes: Axes, times: pd.DataFrame) -> None:
     rows = np.arange(len(times))
-    for shift, column, name, colour in (
-        (-0.2, "seconds", "we", "#009E73"),
-        (0.2, "rbe_seconds", "RBE", "0.6"),
+    for shift, column, name, look in (
+        (-0.2, "seconds", "seqopt", {"color": COLOURS[STANDS]}),
+        (0.2, "rbe_seconds", "RBE", {"fc": "w", "ec": "0.45", "hatch": "////"}),
     ):
-        bars = axes.barh(rows + shift, times[column], 0.38, color=colour, label=name)
-        axes.bar_label(bars, [f" {name} {x:.2g} s" for x in times[column]], fontsize=8)
-    labels = [
-        f"{case}\n×{ratio:.1f}" for case, ratio in zip(times["case"], times["ratio"], strict=True)
-    ]
-    axes.set_yticks(rows, labels, fontsize=8)
+        bars = axes.barh(rows + shift, times[column], 0.36, **look)
+        axes.bar_label(bars, [f" {name} {two(x)} s" for x in times[column]], fontsize=SMALL)
+    axes.set_yticks(rows, [str(case).replace("_", "\n", 1) for case in times["case"]])
     axes.invert_yaxis()
-    axes.set(xscale="log", xlabel="time to a verdict (s)")
-    axes.set_xlim(0.3 * times["seconds"].min(), 6 * times["rbe_seconds"].max())
+    axes.set(xlabel="time to a verdict [s]", title="two samples, in turns")
+    axes.set_xlim(0, 1.6 * times["rbe_seconds"].max())
     axes.spines[["top", "right"]].set_visible(False)
 
 
 def _density(axes: Axes, table: pd.DataFrame) -> None:
     words = {
-        "we": table["ours"],
+        "seqopt": table["ours"],
         "RBE": table["rbe"],
         "CRA": table["cra"].map(lambda word: CRA.get(word, OPEN)),
     }
@@ -107,10 +107,12 @@ def _density(axes: Axes, table: pd.DataFrame) -> None:
         for column, verdict in enumerate(word):
             corner = (column - 0.48, row - 0.44)
             axes.add_patch(Rectangle(corner, 0.96, 0.88, color=COLOURS[verdict], lw=0))
-            axes.text(column, row, short[verdict], ha="center", va="center", color="w", fontsize=7)
-    axes.set_yticks(range(len(words)), list(words), fontsize=8)
-    axes.set_xticks(range(len(table)), [f"{x:g}" for x in table["density"]], fontsize=8)
-    axes.set(xlim=(-0.5, len(table) - 0.5), ylim=(len(words) - 0.5, -0.5), xlabel="density")
-    axes.set_title("the same arch of 25 blocks", fontsize=9)
+            axes.text(
+                column, row, short[verdict], ha="center", va="center", color="w", fontsize=SMALL
+            )
+    axes.set_yticks(range(len(words)), list(words))
+    axes.set_xticks(range(len(table)), [f"{x:g}" for x in table["density"]])
+    axes.set(xlim=(-0.5, len(table) - 0.5), ylim=(len(words) - 0.5, -0.5), xlabel="density [kg/m³]")
+    axes.set_title("one arch of 25 blocks")
     axes.tick_params(length=0)
     axes.spines[:].set_visible(False)

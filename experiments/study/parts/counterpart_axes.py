@@ -5,7 +5,9 @@ from __future__ import annotations
 import pandas as pd
 from matplotlib.axes import Axes
 
-OURS, STUDY, OFF = "#2166ac", "#222222", "#c8102e"
+from seqopt.report.style import BLUE, INK, VERMILION, dress
+
+OURS, STUDY, OFF = BLUE, "#222222", VERMILION
 
 
 def of(table: pd.DataFrame, label: str, quantity: str = "") -> pd.DataFrame:
@@ -14,18 +16,18 @@ def of(table: pd.DataFrame, label: str, quantity: str = "") -> pd.DataFrame:
     return rows[rows["quantity"] == quantity] if quantity else rows
 
 
-def number(rows: pd.DataFrame) -> pd.Series:
+def number_of(rows: pd.DataFrame) -> pd.Series:
     """Return the numbers at the end of where the rows are: steps, tests, bricks."""
     return rows["at"].str.extract(r"(\d+)")[0].astype(int)
 
 
 def tidy(axes: Axes) -> None:
-    axes.grid(visible=True, lw=0.2)
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.tick_params(labelsize=7)
+    dress(axes)
 
 
 def pair(axes: Axes, x: object, rows: pd.DataFrame, color: str = OURS, name: str = "") -> None:
-    """Draw our values filled and printed ones as rings."""
-    axes.plot(x, rows["ours"], ".", ms=5, color=color, label=f"{name}here")
-    axes.plot(x, rows["printed"], "o", ms=7, mfc="none", mew=0.8, color=color, label="printed")
+    """Draw our values filled and printed ones around them; marks differ by color."""
+    ours, ring = {OFF: ("^", "^"), INK: ("s", "s")}.get(color, (".", "o"))
+    axes.plot(x, rows["ours"], ours, ms=4, color=color, ls="none", label=f"{name}here")
+    axes.plot(x, rows["printed"], ring, ms=8, mfc="none", mew=1, color=color, ls="none",
+              label=f"{name}printed")  # fmt: skip

@@ -10,104 +10,41 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 
-from experiments.calibration.parts.barrel_vaults import Vault, chain, vaults
-from experiments.discrete.parts.pad_readings import STEPS
-from experiments.harness.plotting import new_figure, save_figure
-from experiments.study.parts.counterpart_axes import OFF, OURS, STUDY, number, of, pair, tidy
+from experiments.study.parts.counterpart_axes import (
+    OFF,
+    OURS,
+    STUDY,
+    number_of,
+    of,
+    pair,
+    tidy,
+)
+from experiments.study.parts.counterpart_model_charts import discrete, geometry, vault_tests
 from experiments.study.parts.counterpart_models import (
     Ours,
-    arch_corners,
-    bed_of_springs,
-    node_displacements,
 )
-from experiments.study.parts.counterpart_page import NEAR, TITLES, caption
+from experiments.study.parts.counterpart_page import NEAR, caption
 from experiments.study.parts.counterpart_rows import LOOP, RESPONSES, plan_rows
 from seqopt.engines.interface import Want
 from seqopt.report.draw import ROBOT_COLORS, View, draw_bricks, draw_grips
-from seqopt.study.tables import printed
+from seqopt.report.style import INK, SMALL, new_figure, plain, styled
 
 VIEW = View(azimuth=35, elevation=22)
+CAPTIONS = {
+    "F_rob1 [N]": "robot 1, F_rob1 [N]",
+    "F_rob2 [N]": "robot 2, F_rob2 [N]",
+    "F_rob3 [N]": "robot 3, F_rob3 [N]",
+    "F_sup [N]": "support, F_sup [N]",
+    "M_sup [N m]": "support, M_sup [N m]",
+    "F_min [N]": "largest compression [N]",
+    "T_max [N]": "largest tension T_max [N]",
+    "F_avg [N]": "mean axial force [N]",
+    "T_pct [%]": "edges in tension [%]",
+    "D_max [1e-3 mm]": "D_max [1e-3 mm]",
+    "D_avg [1e-3 mm]": "mean displacement [1e-3 mm]",
+    "D_std [1e-3 mm]": "its deviation [1e-3 mm]",
+}
 Draw = Callable[[Figure, pd.DataFrame, Ours], None]
-
-
-def geometry(figure: Figure, table: pd.DataFrame, own: Ours) -> None:
-    side, plan = figure.subplots(1, 2, width_ratios=[1.2, 1])
-    net = own.engine.network
-    draw_bricks(side, net, 25, View(azimuth=0, elevation=0))
-    draw_bricks(plan, net, 25, View(azimuth=0, elevation=90))
-    corners = arch_corners(own.scene)
-    low, high = corners.min(axis=0), corners.max(axis=0)
-    rows = of(table, "fig:arch_vault").set_index("quantity")
-    text = {
-        name: f"{name.split(' ')[0]}: printed {rows.loc[name, 'printed']:.0f} mm, "
-        f"here {rows.loc[name, 'ours']:.0f} mm"
-        for name in ("span [mm]", "height [mm]")
-    }
-    arrow = {"arrowstyle": "<->", "color": STUDY, "lw": 0.9}
-    side.annotate("", (low[0], -0.1), (high[0], -0.1), arrowprops=arrow)
-    side.text(low[[0]].mean() + 1.0, -0.2, text["span [mm]"], ha="center", fontsize=9)
-    side.annotate("", (2.2, low[2]), (2.2, high[2]), arrowprops=arrow)
-    side.text(2.25, 0.95, text["height [mm]"], rotation=90, va="center", fontsize=9)
-    side.set(xlim=(-0.15, 2.5), ylim=(-0.3, 2.0))
-    side.set_title("side", fontsize=9)
-    plan.set_title("plan", fontsize=9)
-
-
-def vault_tests(figure: Figure, table: pd.DataFrame, _own: Ours) -> None:
-    outline, secants, bars = figure.subplots(1, 3, width_ratios=[1, 0.8, 1.2])
-    shapes: dict[tuple[float, ...], list[Vault]] = {}
-    for vault in vaults():
-        shapes.setdefault((vault.span, vault.rise, vault.thickness), []).append(vault)
-    for alike in shapes.values():
-        made = chain(alike[0])
-        x, y = made.points[:, 0] - made.points[:, 0].mean(), made.points[:, 1]
-        name = ", ".join(str(vault.test) for vault in alike)
-        (drawn,) = outline.plot(x, y, ".-", ms=2, lw=0.6, label=name)
-        at = float(made.loads[0] - made.points[:, 0].mean())
-        outline.plot(at, np.interp(at, x, y), "v", color=drawn.get_color(), ms=6)
-    outline.set_ylim(-0.1, 3.2)
-    outline.set_aspect("equal")
-    outline.set(xlabel="m", title="Joints and load of the eight tests")
-    study = printed("arch_stiffness")
-    slopes = {"measured": study["k_e_kN_mm"][0], "paper": study["k_m_kN_mm"][0]}
-    slopes["here"] = of(table, "fig:secant_stiff")["ours"].iloc[0]
-    marks = {"measured": ("k", "-", 2.5), "paper": ("0.5", "--", 1.5), "here": (OURS, ":", 2)}
-    for name, slope in slopes.items():
-        color, style, width = marks[name]
-        label = f"{name}: {slope:.1f} kN/mm"
-        secants.plot([0, 0.5], [0, 0.5 * slope], color=color, ls=style, lw=width, label=label)
-    secants.set(xlabel="displacement [mm]", ylabel="load [kN]", title="Secants of test 1")
-    at = study["test"].to_numpy(float)
-    shown = {"measured": study["k_e_kN_mm"], "paper": study["k_m_kN_mm"], "here": bed_of_springs()}
-    for i, (name, values) in enumerate(shown.items()):
-        bars.bar(at + 0.27 * (i - 1), values, 0.25, color=("k", "0.6", OURS)[i], label=name)
-    bars.set(yscale="log", xlabel="test", ylabel="stiffness [kN/mm]", title="Stiffness")
-    ticks = [50, 100, 200, 500]
-    bars.set_yticks(ticks, [str(tick) for tick in ticks])
-    bars.minorticks_off()
-    for axes in (outline, secants, bars):
-        tidy(axes)
-        axes.title.set_fontsize(9)
-        axes.legend(frameon=False, fontsize=7)
-
-
-def discrete(figure: Figure, table: pd.DataFrame, own: Ours) -> None:
-    panels = figure.subplots(1, 5)
-    for axes, (bricks, step) in zip(panels, STEPS.items(), strict=False):
-        moved = node_displacements(own, step)
-        for name, values in moved.items():
-            axes.plot(values.index, values, ".-", ms=3, lw=0.7, label=name)
-        axes.set(yscale="log", xlabel="node", title=f"{bricks} bricks, {len(values)} nodes")
-    panels[0].set_ylabel("displacement [1e-3 mm]")
-    panels[0].legend(frameon=False, fontsize=7)
-    rows = of(table, "table:validation_results")
-    pair(panels[4], number(rows).astype(str), rows)
-    panels[4].axhline(0, color="k", lw=0.6)
-    panels[4].legend(frameon=False, fontsize=7)
-    panels[4].set(xlabel="bricks", title="Mean error [%]")
-    for axes in panels:
-        tidy(axes)
-        axes.title.set_fontsize(9)
 
 
 def text_of(value: float) -> str:
@@ -124,18 +61,18 @@ def grid(axes: Axes, rows: pd.DataFrame, title: str) -> None:
         same = row["printed"] == row["ours"]
         text = text_of(row["printed"]) + ("" if same else f" (here {text_of(row['ours'])})")
         color = STUDY if same else OFF
-        axes.text(x, y, text, ha="center", va="center", fontsize=7, color=color)
+        axes.text(x, y, text, ha="center", va="center", fontsize=SMALL, color=color)
         if row["printed"] > 1000:
             axes.axhspan(y - 0.5, y + 0.5, (x + 0.1) / len(columns), (x + 0.9) / len(columns),
                          color="#cfe8f5", zorder=0)  # fmt: skip
     names = [name.removeprefix("node of ") for name in columns]
-    axes.set_xticks(range(len(columns)), names, fontsize=7)
-    axes.set_yticks(range(len(lines)), lines, fontsize=7)
+    axes.set_xticks(range(len(columns)), names, fontsize=SMALL)
+    axes.set_yticks(range(len(lines)), lines, fontsize=SMALL)
     axes.set(xlim=(-0.5, len(columns) - 0.5), ylim=(len(lines) - 0.5, -0.5))
     axes.xaxis.tick_top()
     axes.tick_params(length=0)
     axes.spines[:].set_visible(False)
-    axes.set_title(title, fontsize=9)
+    axes.set_title(title)
 
 
 def sequences(figure: Figure, table: pd.DataFrame, _own: Ours) -> None:
@@ -157,49 +94,50 @@ def plan(figure: Figure, table: pd.DataFrame, own: Ours) -> None:
 def grips_of_plan(axes: Axes, rows: pd.DataFrame, own: Ours) -> None:
     """Draw which node every robot holds, printed and ours, and where grips are optimized."""
     moves = {(move.robot, move.step) for move in own.problem.schedule.moves}
-    for i, color in enumerate(ROBOT_COLORS[:3], start=1):
+    for i, (color, ring) in enumerate(zip(ROBOT_COLORS, "os^", strict=False), start=1):
         part = rows[(rows["quantity"] == f"node of rob{i}")].reset_index(drop=True)
-        step = number(part)
+        step = number_of(part)
         free = part["printed"] < 0
-        axes.plot(step, part["ours"].mask(free), "-", color=color, lw=2, label=f"rob{i} here")
-        axes.plot(step, part["printed"].mask(free), "o", ms=4, mfc="none", color=color)
+        axes.plot(step, part["ours"].mask(free), "-", color=color, lw=2)
+        axes.plot(step, part["printed"].mask(free), ring, ms=4, mfc="none", color=color,
+                  label=f"robot {i}: line here, marks printed")  # fmt: skip
         taken = [s for s in step if (f"rob{i}", s) in moves]
-        axes.plot(taken, part["ours"][[s - 1 for s in taken]], "*", color=color, ms=9)
-    axes.plot([], [], "o", ms=4, mfc="none", color="k", label="printed")
-    axes.plot([], [], "*", color="k", ms=9, label="optimized grip taken")
-    axes.legend(frameon=False, fontsize=7, ncols=5)
-    axes.set(xlabel="step", ylabel="node", ylim=(0, 60))
+        axes.plot(taken, part["ours"][[s - 1 for s in taken]], "*", color=color, mec="k", ms=10)
+    axes.plot([], [], "*", color="w", mec="k", ms=10, label="optimized grip")
+    axes.legend(ncols=2, loc="upper left")
+    axes.set(xlabel="step", ylabel="node", ylim=(0, 72))
     tidy(axes)
 
 
 def twisting(figure: Figure, table: pd.DataFrame, own: Ours) -> None:
-    grid_of = figure.subplots(2, 3)
+    panels = figure.subplots(3, 2).ravel()
     names = ("M_sup [N m]", "D_max [1e-3 mm]", "T_max [N]")
-    for axes, name in zip(grid_of[0], names, strict=True):
+    for axes, name in zip(panels, names, strict=False):
         for side, color, method in (("S", OFF, "sequential "), ("C", OURS, "cantilever ")):
             rows = of(table, "table:cantilever_compare", f"{name}, {side}")
-            pair(axes, number(rows).astype(str), rows, color, method)
-        axes.set(yscale="log", title=f"Table 5: {name}")
-    grid_of[0, 0].legend(frameon=False, fontsize=7)
-    forces, arm, shape = grid_of[1]
-    for name, color in (("F_rob1 [N]", OFF), ("F_rob2 [N]", OURS), ("F_sup [N]", "#444444")):
+            pair(axes, number_of(rows).astype(str), rows, color, method)
+        axes.set(yscale="log", title=f"Table 5: {name}", xlabel="step")
+        plain(axes.yaxis)
+    panels[0].legend(loc="upper left")
+    panels[0].set_ylim(top=2000)
+    forces, arm, shape = panels[3:]
+    for name, color in (("F_rob1 [N]", OFF), ("F_rob2 [N]", OURS), ("F_sup [N]", INK)):
         rows = of(table, "table:sequential_twist", name)
-        pair(forces, number(rows), rows, color, f"{name.split(' ')[0]} ")
-    forces.set(title="Table 4: forces [N]", xlabel="step")
+        pair(forces, number_of(rows), rows, color, f"{name.split(' ')[0]} ")
+    forces.set(title="Table 4: forces [N]", xlabel="step", ylim=(0, 900))
     rows = of(table, "fig:sequential_twist", "lever arm [mm]")
     arm.axhspan(120, 150, color="0.9", label="printed: 135 ± 15")
-    arm.plot(number(rows).astype(str), rows["ours"], "o", color=OURS, label="here")
+    arm.plot(number_of(rows).astype(str), rows["ours"], "o", color=OURS, label="here")
     arm.set(title="Figure 10: lever arm [mm]", xlabel="step", ylim=(0, 180))
-    for axes in (forces, arm):
-        axes.legend(frameon=False, fontsize=7)
+    forces.legend(ncols=2, loc="upper left")
+    arm.legend()
     fields = own.engine.solve(18, [[35]], Want.ALL)
     draw_bricks(shape, own.engine.network, 18, VIEW, alpha=0.1)
     draw_bricks(shape, own.engine.network, 18, VIEW, twist=fields.brick_twist[0], magnify=2000)
     draw_grips(shape, own.engine.network, (None, 35, None), VIEW)
-    shape.set_title("Figure 10: step 35, motion x 2000", fontsize=9)
-    for axes in (*grid_of[0], forces, arm):
+    shape.set_title("Figure 10: step 35, motion × 2,000")
+    for axes in (*panels[:3], forces, arm):
         tidy(axes)
-        axes.title.set_fontsize(9)
 
 
 def maxima(figure: Figure, table: pd.DataFrame, _own: Ours) -> None:
@@ -216,7 +154,10 @@ def maxima(figure: Figure, table: pd.DataFrame, _own: Ours) -> None:
         colors = [OFF if error > NEAR else OURS for error in rows["error_pct"]]
         axes.axvspan(0.95, 1.05, color="0.93")
         axes.axvline(1, color="k", lw=0.6)
-        axes.scatter(ratio, range(len(rows)), c=colors, s=22, zorder=3)
+        for off, marker in ((False, "o"), (True, "D")):
+            some = (rows["error_pct"] > NEAR).to_numpy() == off
+            at = np.arange(len(rows))[some]
+            axes.scatter(ratio[some], at, c=np.array(colors)[some], marker=marker, s=26, zorder=3)
         texts = [
             f"{row['quantity'].removeprefix('largest ')}, {row['at']}: "
             f"printed {row['printed']:g}, here {row['ours']:.1f}"
@@ -225,20 +166,19 @@ def maxima(figure: Figure, table: pd.DataFrame, _own: Ours) -> None:
         axes.set_yticks(range(len(rows)), texts)
         axes.set(ylim=(len(rows) - 0.5, -0.5), title=title)
         tidy(axes)
-        axes.title.set_fontsize(9)
-    panels[-1].set_xlabel("here over printed (gray: within 5 %)", fontsize=8)
+    panels[-1].set_xlabel("here over printed (gray: within 5 %)")
 
 
 def loop(figure: Figure, table: pd.DataFrame, own: Ours) -> None:
     _, steps, _ = plan_rows(own)
     rows = of(table, "fig:3rob_sequence")
-    for axes, step in zip(figure.subplots(1, 4), LOOP, strict=True):
+    for axes, step in zip(figure.subplots(2, 2).ravel(), LOOP, strict=True):
         state = steps[step - 1]
         draw_bricks(axes, own.engine.network, state.bricks, VIEW, alpha=0.6)
         draw_grips(axes, own.engine.network, state.grips, VIEW)
         at = rows[(rows["at"] == f"step {step}") & rows["quantity"].str.startswith("node")]
         held = ", ".join(text_of(value) for value in at["printed"])
-        axes.set_title(f"step {step}: printed {held}", fontsize=9)
+        axes.set_title(f"step {step}; printed nodes: {held}", loc="center")
 
 
 def along_steps(label: str) -> Draw:
@@ -246,45 +186,48 @@ def along_steps(label: str) -> Draw:
 
     def draw(figure: Figure | SubFigure, table: pd.DataFrame, _own: Ours) -> None:
         names = [name for name in RESPONSES.values() if len(of(table, label, name))]
-        panels = figure.subplots(3, 4 + (len(names) > 11)).ravel()
+        panels = figure.subplots(-(-len(names) // 3), 3).ravel()
         for axes, name in zip(panels, names, strict=False):
             rows = of(table, label, name)
-            step, off = number(rows), rows["error_pct"] > NEAR
+            step, off = number_of(rows), rows["error_pct"] > NEAR
             axes.plot(step, rows["ours"], "-", color=OURS, lw=1.2, label="here")
             axes.plot(step, rows["printed"], "o", ms=3, mfc="none", mew=0.6, color=STUDY,
                       label="printed")  # fmt: skip
-            axes.plot(step[off], rows["ours"][off], "o", ms=9, mfc="none", color=OFF,
+            axes.plot(step[off], rows["ours"][off], "D", ms=8, mfc="none", color=OFF,
                       label="off by more than 5 %")  # fmt: skip
-            axes.set_title(name, fontsize=8)
+            axes.set_title(CAPTIONS.get(name, name))
             tidy(axes)
         handles, texts = panels[0].get_legend_handles_labels()
         for axes in panels[len(names) :]:
             axes.set_axis_off()
-        panels[-1].legend(handles, texts, frameon=False, fontsize=8, loc="center")
+        if len(names) < len(panels):
+            panels[-1].legend(handles, texts, loc="center")
+        else:
+            figure.legend(handles, texts, loc="outside lower center", ncols=3)
 
     return draw
 
 
-PICTURES: dict[str, tuple[Draw, tuple[float, float]]] = {
-    "geometry": (geometry, (9, 4.6)),
-    "vaults": (vault_tests, (11, 4.6)),
-    "discrete": (discrete, (12, 4)),
-    "sequences": (sequences, (9, 7.5)),
-    "twisting": (twisting, (11, 7.5)),
-    "maxima": (maxima, (8, 7.5)),
-    "loop": (loop, (12, 4.2)),
-    "sequential": (along_steps("table:experimental_data1"), (11, 7.5)),
-    "cantilever": (along_steps("table:experimental_data2"), (11, 7.5)),
-    "plan": (plan, (12, 10)),
-}
+PICTURES: dict[str, tuple[Draw, float]] = {
+    "geometry": (geometry, 4.2),
+    "vaults": (vault_tests, 5.8),
+    "discrete": (discrete, 5.4),
+    "sequences": (sequences, 8.2),
+    "twisting": (twisting, 8.6),
+    "maxima": (maxima, 8.0),
+    "loop": (loop, 6.8),
+    "sequential": (along_steps("table:experimental_data1"), 8.2),
+    "cantilever": (along_steps("table:experimental_data2"), 8.2),
+    "plan": (plan, 11.0),
+}  # and heights, inches
 
 
-def draw_all(table: pd.DataFrame, own: Ours) -> None:
-    """Draw and store every picture of `TITLES` with its caption."""
-    for name in TITLES:
-        draw, size = PICTURES[name]
-        figure = new_figure(*size)
-        draw(figure, table, own)
-        text = textwrap.fill(caption(name, table), int(15 * size[0]), break_on_hyphens=False)
-        figure.supxlabel(text, fontsize=8, x=0.01, ha="left", linespacing=1.4)
-        save_figure(figure, f"counterpart_{name}.png")
+@styled
+def drawn(name: str, table: pd.DataFrame, own: Ours) -> Figure:
+    """Return a picture of `TITLES` with its caption."""
+    draw, height = PICTURES[name]
+    figure = new_figure(height)
+    draw(figure, table, own)
+    text = textwrap.fill(caption(name, table), 118, break_on_hyphens=False)
+    figure.supxlabel(text, fontsize=SMALL, x=0.01, ha="left", linespacing=1.4)
+    return figure

@@ -29,9 +29,9 @@ INTRODUCTION = """\
 # Counterparts of the paper's figures and tables
 
 This page lists every figure and table of the [paper](paper.md), and compares those that have
-numbers with what seqopt computes. Photographs, sketches and definitions have no numbers. `python
--m experiments.study.paper_counterparts` computes everything again in a few seconds, draws the
-pictures and writes this page. All values are in `experiments/results/paper_counterparts.csv`.
+numbers with what seqopt computes. Photographs, sketches and definitions have no numbers.
+`python -m experiments.study.paper_counterparts` computes everything again in a few seconds, draws
+the pictures and writes this page. All values are in `experiments/results/paper_counterparts.csv`.
 Where another experiment goes into more detail, the table names it too.
 
 The error is the difference from the printed value beyond its rounding, relative to the printed

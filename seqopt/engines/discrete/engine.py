@@ -31,6 +31,7 @@ from seqopt.engines.interface import (
     no_sets,
     require_finite,
 )
+from seqopt.engines.named import NamedEngine
 from seqopt.engines.rigid.mechanism import mechanism_error, require_resistance
 from seqopt.engines.rigid.recovery import Solution, respond
 from seqopt.errors import SeqoptError, SolverError
@@ -43,7 +44,7 @@ from seqopt.scene.scene import Scene
 GONE = "joints open or slip and brick {brick} becomes unstable; add a grip, a bond or friction"
 
 
-class DiscreteEngine:
+class DiscreteEngine(NamedEngine):
     """Solves each grip set by discrete elements.
 
     Parameters

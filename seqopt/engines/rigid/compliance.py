@@ -29,6 +29,7 @@ from seqopt.engines.interface import (
     keep_wanted,
     require_finite,
 )
+from seqopt.engines.named import NamedEngine
 from seqopt.engines.rigid.grip_equations import grip_forces, pairs_of, share_pairs
 from seqopt.engines.rigid.kept import Kept
 from seqopt.engines.rigid.loads import load_matrix
@@ -51,7 +52,7 @@ EVEN = 5e-5  # softest over stiffest joint from which on pivots tell the whole e
 CANCEL = 10.0  # what the grips undo over what is left, where pivots do not
 
 
-class ComplianceEngine:
+class ComplianceEngine(NamedEngine):
     """Computes any batch of grip sets on any partial structure of a scene.
 
     Parameters
@@ -145,13 +146,11 @@ class ComplianceEngine:
     def _refined(self, bricks: int, columns: Ints, want: Want) -> Fields:
         """Return the fields of grip sets that the operator alone does not answer well enough."""
         largest = SCREEN if want & Want.SCREEN else LAST_CORRECTION
-        operator = None
-        if self._basis is SPACE and bricks <= len(self._tree.spring):
-            operator = self._operator(bricks, columns)
+        operator = self._operator(bricks, columns) if bricks <= len(self._tree.spring) else None
         with one_thread():
             if self._refinement is None or self._refinement.bricks != bricks:
                 self._refinement = Refinement(self._network, bricks, self._shared)
-            return self._refinement.solve(columns, operator, largest)
+            return self._refinement.solve(columns, operator, largest, self._basis)
 
 
 def solve_batch(

@@ -15,6 +15,7 @@ import numpy as np
 from scipy import sparse
 
 from seqopt.arrays import Bools, Floats, Ints
+from seqopt.engines.basis import SPACE, Basis
 from seqopt.engines.interface import Fields, join_sets, merge_sets, no_sets
 from seqopt.engines.rigid.grip_equations import grip_forces, still_forces
 from seqopt.engines.rigid.held_operator import held_operator
@@ -63,6 +64,7 @@ class Refinement:
         columns: Ints,
         operator: ComplianceOperator | None = None,
         largest: float = LAST_CORRECTION,
+        basis: Basis = SPACE,
     ) -> Fields:
         """Return all fields of grip sets.
 
@@ -71,10 +73,12 @@ class Refinement:
         columns : (S, r) int
             Grips as indices into ``network.inner.ravel()``.
         operator : ComplianceOperator, optional
-            Of all directions of space, with wrenches and twists, if there is one for these grips;
-            it serves if nothing is loose.
+            With wrenches and twists, if there is one for these grips; it serves if nothing is
+            loose.
         largest : float, optional
             Correction of a set after which it needs no other, over the largest of each kind.
+        basis : Basis, optional
+            The directions that the operator knows; in the others nothing may move.
 
         Returns
         -------
@@ -87,9 +91,9 @@ class Refinement:
         """
         empty = no_sets(self.network, self.bricks, columns.shape[1])
         starts = range(0, len(columns), TOGETHER)
-        corrector = Corrector(
-            self, self.own if operator is None or self.held.loose else operator, largest
-        )
+        if operator is None or self.held.loose:
+            operator, basis = self.own, SPACE
+        corrector = Corrector(self, operator, largest, basis)
         parts = (corrector.together(columns[i : i + TOGETHER]) for i in starts)
         return join_sets([empty, *parts])
 
@@ -101,17 +105,22 @@ class Corrector:
     ----------
     system : Refinement
     operator : ComplianceOperator
-        Of all directions of space.
-    largest : float
+    largest : float, optional
         Correction of a set after which it needs no other.
+    basis : Basis, optional
+        The directions that the operator knows.
     """
 
     def __init__(
-        self, system: Refinement, operator: ComplianceOperator, largest: float = LAST_CORRECTION
+        self,
+        system: Refinement,
+        operator: ComplianceOperator,
+        largest: float = LAST_CORRECTION,
+        basis: Basis = SPACE,
     ) -> None:
         self.network, self.bricks, self.parts = system.network, system.bricks, system.parts
         self.held, self.inner, self.pulls = system.held, system.inner, system.pulls
-        self.operator, self.largest = operator, largest
+        self.operator, self.largest, self.basis = operator, largest, basis
 
     def together(self, columns: Ints) -> Fields:
         """Return the fields of a few sets.
@@ -131,7 +140,7 @@ class Corrector:
         if operator.loose:
             for row in columns[~(pivot >= HARDLY_HELD)]:
                 require_resistance(self.network, bricks, row)
-        answers = _Answers(self._states(index, force), force[:, : 3 * columns.shape[1]].copy())
+        answers = _Answers(self._states(index, force), self._in_space(force, columns.shape[1]))
         done = self._correct(columns, index, answers)
         wrench, twist = unscaled(parts, answers.states[done])
         held = answers.force[done].reshape(int(done.sum()), columns.shape[1], 3)
@@ -144,8 +153,18 @@ class Corrector:
     def _states(self, index: Ints, force: Floats, weight: float = 1.0) -> Floats:
         """Return the scaled answers (S, n) to forces (S, k) at loads, and the weight or none."""
         load = load_matrix(index, force, len(self.operator.twist) - 1, weight)
-        wrench = (load @ self.operator.wrench).reshape(len(index), -1, 6)
-        return rescaled(self.parts, wrench, load @ self.operator.twist)
+        every = self.basis.wrench
+        wrench, twist = (
+            (load @ rows).reshape(len(index), -1, len(every)) @ every
+            for rows in (self.operator.wrench, self.operator.twist)
+        )
+        return rescaled(self.parts, wrench, twist.reshape(len(index), -1))
+
+    def _in_space(self, force: Floats, grips: int) -> Floats:
+        """Return forces of grips (S, 3r) that are given in the operator's directions (S, k)."""
+        width = len(self.basis.force)
+        nodes = force[:, : grips * width].reshape(len(force), grips, width)
+        return np.asarray(nodes @ self.basis.force).reshape(len(force), 3 * grips)
 
     def _correct(self, columns: Ints, index: Ints, answers: _Answers) -> Bools:
         """Correct answers until they no longer change; return which have come so far, (S,)."""
@@ -167,7 +186,7 @@ class Corrector:
     ) -> tuple[Floats, Floats]:
         """Return what must be added to scaled answers (S, n) and grip forces (S, 3r)."""
         operator, parts = self.operator, self.parts
-        joints, nodes = len(parts.wrench_unit), force.shape[1]
+        joints, grips = len(parts.wrench_unit), columns.shape[1]
         at = (3 * columns[:, :, None] + np.arange(3)).reshape(force.shape)
         pulled = load_matrix(at, force, 6 * self.bricks, 1.0) @ self.pulls
         missing = -(parts.matrix @ states.T).T
@@ -177,10 +196,11 @@ class Corrector:
         loose = -operator.softness * pull  # how far what is missing moves loose parts
         if operator.loose:
             moved += loose @ operator.flexibility[-operator.loose :, : -operator.loose]
-        moved = np.hstack([np.take_along_axis(moved, at, axis=1), -pull])
+        at_grips = np.take_along_axis(moved, at, axis=1).reshape(-1, 3) @ self.basis.force.T
+        moved = np.hstack([at_grips.reshape(len(moved), -1), -pull])
         change = still_forces(operator, columns, index, moved)
-        more = change[:, :nodes].copy()
-        change[:, nodes:] += loose
+        more = self._in_space(change, grips)
+        change[:, change.shape[1] - operator.loose :] += loose
         return answer + self._states(index, change, 0.0), more
 
 

@@ -1,4 +1,4 @@
-"""The page with the step viewer that commands write beside their tables."""
+"""The pages with the step viewer that commands write beside their tables, and plans show."""
 
 from __future__ import annotations
 
@@ -32,8 +32,14 @@ SMALL = 60  # bricks up to which a plan is shown beside the fixed methods
 Tables = Mapping[str, pd.DataFrame]
 
 
-def plan_page(
-    engine: Engine, name: str, table: pd.DataFrame, said: str, stands: Sequence[str] = ()
+def plan_page(  # a plan, what there is to say about it, and what is beside it
+    engine: Engine,
+    name: str,
+    table: pd.DataFrame,
+    said: str,
+    stands: Sequence[str] = (),
+    *,
+    others: Tables | None = None,
 ) -> str:
     """Return the page of a plan, beside the fixed methods where the scene is small.
 
@@ -48,15 +54,18 @@ def plan_page(
         What it is worth, in words.
     stands : sequence of str, optional
         Of every step, whether it stands.
+    others : mapping of str to pandas.DataFrame, optional
+        Responses of the steps of other plans for the scene, by name.
 
     Returns
     -------
     str
     """
     scene = engine.network.scene
-    tables = {name: table}
+    tables = {name: table, **(others or {})}
     if len(scene.bricks) <= SMALL:
-        tables |= _methods(engine)
+        methods = _methods(engine)
+        tables |= {key: each for key, each in methods.items() if key not in tables}
     builds = [
         _build(scene, key, each, stands if key == name else ()) for key, each in tables.items()
     ]

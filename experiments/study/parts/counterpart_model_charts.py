@@ -1,0 +1,133 @@
+"""Pictures of what the model rests on: geometry, vault tests and discrete elements."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from experiments.calibration.parts.barrel_vaults import Vault, chain, vaults
+from experiments.discrete.parts.pad_readings import STEPS
+from experiments.study.parts.counterpart_axes import OURS, STUDY, number_of, of, pair, tidy
+from experiments.study.parts.counterpart_models import (
+    Ours,
+    arch_corners,
+    bed_of_springs,
+    node_displacements,
+)
+from seqopt.report.draw import View, draw_bricks
+from seqopt.report.style import look, plain
+from seqopt.study.tables import printed
+
+BARS: tuple[dict[str, Any], ...] = (
+    {"color": "k"},
+    {"color": "0.65"},
+    {"fc": "w", "ec": OURS, "hatch": "/////"},
+)
+
+
+def geometry(figure: Figure, table: pd.DataFrame, own: Ours) -> None:
+    side, plan = figure.subplots(1, 2, width_ratios=[1.2, 1])
+    net = own.engine.network
+    draw_bricks(side, net, 25, View(azimuth=0, elevation=0))
+    draw_bricks(plan, net, 25, View(azimuth=0, elevation=90))
+    corners = arch_corners(own.scene)
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    rows = of(table, "fig:arch_vault").set_index("quantity")
+    text = {
+        name: f"{name.split(' ')[0]}: printed {rows.loc[name, 'printed']:.0f} mm, "
+        f"here {rows.loc[name, 'ours']:.0f} mm"
+        for name in ("span [mm]", "height [mm]")
+    }
+    arrow = {"arrowstyle": "<->", "color": STUDY, "lw": 0.9}
+    side.annotate("", (low[0], -0.1), (high[0], -0.1), arrowprops=arrow)
+    side.text(low[[0]].mean() + 1.0, -0.2, text["span [mm]"], ha="center")
+    side.annotate("", (2.2, low[2]), (2.2, high[2]), arrowprops=arrow)
+    side.text(2.25, 0.95, text["height [mm]"], rotation=90, va="center")
+    side.set(xlim=(-0.15, 2.5), ylim=(-0.3, 2.0))
+    side.set_title("from the side")
+    plan.set_title("from above")
+
+
+def vault_tests(figure: Figure, table: pd.DataFrame, _own: Ours) -> None:
+    panels = figure.subplot_mosaic([["outline", "outline"], ["secants", "bars"]])
+    outline, secants, bars = panels["outline"], panels["secants"], panels["bars"]
+    _outlines(outline)
+    study = printed("arch_stiffness")
+    slopes = {"measured": study["k_e_kN_mm"][0], "Bruun et al.": study["k_m_kN_mm"][0]}
+    slopes["here"] = of(table, "fig:secant_stiff")["ours"].iloc[0]
+    marks = {
+        "measured": ("k", "-", 2.5),
+        "Bruun et al.": ("0.5", "--", 1.5),
+        "here": (OURS, ":", 2),
+    }
+    for name, slope in slopes.items():
+        color, style, width = marks[name]
+        label = f"{name}: {slope:.1f} kN/mm"
+        secants.plot([0, 0.5], [0, 0.5 * slope], color=color, ls=style, lw=width, label=label)
+    secants.set(xlabel="displacement [mm]", ylabel="load [kN]", title="secants of test 1")
+    at = study["test"].to_numpy(float)
+    shown = {
+        "measured": study["k_e_kN_mm"],
+        "Bruun et al.": study["k_m_kN_mm"],
+        "here": bed_of_springs(),
+    }
+    for i, (name, values) in enumerate(shown.items()):
+        bars.bar(at + 0.27 * (i - 1), values, 0.25, label=name, **BARS[i])
+    bars.set(yscale="log", xlabel="test", ylabel="stiffness [kN/mm]", title="stiffness")
+    bars.set_ylim(top=3000)
+    ticks = [50, 100, 200, 500]
+    bars.set_yticks(ticks, [str(tick) for tick in ticks])
+    bars.minorticks_off()
+    bars.set_xticks(at)
+    for axes in (outline, secants, bars):
+        tidy(axes)
+    outline.legend(loc="center left", bbox_to_anchor=(1, 0.5))
+    secants.legend()
+    bars.legend(ncols=2)
+
+
+def _outlines(outline: Axes) -> None:
+    """Draw the joints of every vault that was tested, and where its load stands."""
+    shapes: dict[tuple[float, ...], list[Vault]] = {}
+    for vault in vaults():
+        shapes.setdefault((vault.span, vault.rise, vault.thickness), []).append(vault)
+    for number, alike in enumerate(shapes.values()):
+        style = look(number)
+        made = chain(alike[0])
+        x, y = made.points[:, 0] - made.points[:, 0].mean(), made.points[:, 1]
+        tests = ", ".join(str(vault.test) for vault in alike)
+        name = f"test{'s' * (len(alike) > 1)} {tests}"
+        line = style.line() | {"markevery": max(1, len(x) // 6), "mfc": "white"}
+        outline.plot(x, y, lw=1.2, label=name, **line)
+        at = float(made.loads[0] - made.points[:, 0].mean())
+        outline.plot(at, np.interp(at, x, y), "v", color=style.color, ms=9, zorder=3)
+    outline.set_aspect("equal")
+    outline.set(
+        xlabel="m", ylabel="m", title="lines of the joints of the eight tests; triangle: load"
+    )
+
+
+def discrete(figure: Figure, table: pd.DataFrame, own: Ours) -> None:
+    panels = figure.subplots(2, 3).ravel()
+    for axes, (bricks, step) in zip(panels, STEPS.items(), strict=False):
+        moved = node_displacements(own, step)
+        for number, (name, values) in enumerate(moved.items()):
+            style = look(number).line() | {"ms": 3.5, "lw": 0.9, "markevery": 3}
+            axes.plot(values.index, values, label=name, **style)
+        axes.set(yscale="log", xlabel="node", title=f"{bricks} bricks, {len(values)} nodes")
+        plain(axes.yaxis)
+    for axes in panels[[0, 3]]:
+        axes.set_ylabel("displacement [1e-3 mm]")
+    rows, errors = of(table, "table:validation_results"), panels[4]
+    pair(errors, number_of(rows).astype(str), rows)
+    errors.axhline(0, color="k", lw=0.6)
+    errors.legend()
+    errors.set(xlabel="bricks", title="mean error [%]")
+    for axes in panels:
+        tidy(axes)
+    panels[5].set_axis_off()
+    panels[5].legend(*panels[0].get_legend_handles_labels(), loc="center left", title="models")

@@ -1,0 +1,181 @@
+"""What every plan can show: its grips as a table, pictures of its steps, and a page."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import pandas as pd
+
+from seqopt.contact.mortar import Mortar
+from seqopt.engines.interface import Engine
+from seqopt.responses.grips import grips_table
+from seqopt.sequence.steps import Step
+from seqopt.showing import Page, Shown, display
+from seqopt.stability.steps import assess_steps, stability_table
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+class ShownBuild(Shown):
+    """Base of plans: builds whose every grip is known.
+
+    A plan says which engine computes it, which steps it has, and what these respond.
+    """
+
+    if TYPE_CHECKING:
+
+        @property
+        def engine(self) -> Engine:
+            """What computes the responses."""
+
+        @property
+        def steps(self) -> tuple[Step, ...]:
+            """The steps of the build."""
+
+        @property
+        def title(self) -> str:
+            """What the plan is called beside others."""
+
+        @property
+        def worth(self) -> str:
+            """What the plan is worth, in words."""
+
+        @property
+        def seconds(self) -> Mapping[str, float]:
+            """What finding it took, by stage, s."""
+
+        def responses(self) -> pd.DataFrame:
+            """Return the responses of every step, as `seqopt.analyze` makes them."""
+
+    def grips(self) -> pd.DataFrame:
+        """Return every grip of the build, for as long as it lasts.
+
+        Returns
+        -------
+        pandas.DataFrame
+            A row per grip, by first step: ``robot``, ``from_step``, ``to_step``, ``brick``,
+            ``node``, ``places`` (whether the robot places the brick with it), ``largest_force_N``
+            and ``at_step``, the step of that force.
+        """
+        return grips_table(self.engine.network.scene, self.steps, self.responses())
+
+    def stability(self, mortar: Mortar | str) -> pd.DataFrame:
+        """Return whether every step stands with a mortar, and by which margins.
+
+        Parameters
+        ----------
+        mortar : Mortar or str
+            Of all joints; or its name, ``dry`` or ``epoxy``.
+
+        Returns
+        -------
+        pandas.DataFrame
+            As of `seqopt.stability.steps.stability_table`.
+        """
+        results = assess_steps(self.engine.network, self.steps, mortar)
+        return stability_table(self.steps, results)
+
+    def plot(
+        self, step: int | Sequence[int] | None = None, *, forces: bool = False, magnify: float = 0.0
+    ) -> Figure:
+        """Draw steps of the build: bricks, and which robot holds which node.
+
+        Parameters
+        ----------
+        step : int or sequence of int, optional
+            Numbers of steps, from 1; by default six that are spread over the build.
+        forces : bool, optional
+            Whether to draw the network, colored by axial force, instead of the bricks.
+        magnify : float, optional
+            How many times larger displacements are drawn than they are; by default not at all.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            A notebook shows it; ``savefig`` writes it to a file.
+
+        Raises
+        ------
+        ExtraError
+            If matplotlib is not installed (extra ``plot``).
+        StepError
+            If there is no such step.
+        """
+        figure: Figure = display("steps_picture")(
+            self.engine, self.steps, step, forces=forces, magnify=magnify
+        )
+        return figure
+
+    def gantt(self, first: int = 1, last: int | None = None) -> Figure:
+        """Draw the grips over the steps of the build: a lane per robot, a bar per grip.
+
+        Every bar names its brick and its node, says whether the robot places the brick or holds it,
+        and is shaded by the force of the grip.
+
+        Parameters
+        ----------
+        first, last : int, optional
+            Numbers of the first and the last step that are drawn; by default all.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+
+        Raises
+        ------
+        ExtraError
+            If matplotlib is not installed (extra ``plot``).
+        StepError
+            If there are no such steps.
+        """
+        scene, responses = self.engine.network.scene, self.responses()
+        figure: Figure = display("gantt_picture")(scene, self.steps, responses, (first, last))
+        return figure
+
+    def animate(self, *, forces: bool = False, magnify: float = 0.0, seconds: float = 0.4) -> Any:
+        """Return the build as a film, a picture per step.
+
+        Parameters
+        ----------
+        forces, magnify : optional
+            As of `plot`.
+        seconds : float, optional
+            How long a step is shown, s.
+
+        Returns
+        -------
+        seqopt.report.film.Film
+            A notebook plays it; ``save("build.gif")`` writes it to a file.
+
+        Raises
+        ------
+        ExtraError
+            If matplotlib is not installed (extra ``plot``).
+        """
+        return display("Film")(self.engine, self.steps, forces, magnify, seconds)
+
+    def report(self, *others: ShownBuild) -> Page:
+        """Return a page that shows the build step by step, in three dimensions.
+
+        It has the fixed methods beside the plan where the scene is small, tables, and charts.
+
+        Parameters
+        ----------
+        *others : plan
+            Further plans for the same scene, to look at side by side.
+
+        Returns
+        -------
+        Page
+            A notebook shows it; ``save("report.html")`` writes it to a file, and ``open()`` shows
+            it in a browser.
+
+        Raises
+        ------
+        ProblemError
+            If another plan is for another scene.
+        """
+        page: Page = display("build_page")(self, *others)
+        return page

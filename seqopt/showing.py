@@ -1,0 +1,134 @@
+"""How values show themselves: the one lookup that goes against the order of the rooms.
+
+A scene or a plan has methods that draw it. Pictures are made in `seqopt.report`, which lies behind
+the rooms that such values come from, so these cannot import it. They call `display`, which finds
+the function when a picture is asked for. `DISPLAYS` lists every function that is found this way.
+"""
+
+from __future__ import annotations
+
+import tempfile
+import webbrowser
+from collections.abc import Callable
+from dataclasses import dataclass
+from html import escape
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from seqopt.errors import ExtraError
+from seqopt.files import write_text
+
+DISPLAYS = {
+    "card": "seqopt.report.cards",
+    "thumbnails": "seqopt.report.thumbnails",
+    "scene_picture": "seqopt.report.pictures",
+    "network_picture": "seqopt.report.pictures",
+    "steps_picture": "seqopt.report.step_pictures",
+    "gantt_picture": "seqopt.report.gantt",
+    "Film": "seqopt.report.film",
+    "build_page": "seqopt.report.build_page",
+}
+"""Functions that values call to show themselves, and the module that each is in."""
+
+
+def display(name: str) -> Callable[..., Any]:
+    """Return a function that draws, loaded when it is first asked for.
+
+    Parameters
+    ----------
+    name : str
+        A key of `DISPLAYS`.
+
+    Returns
+    -------
+    callable
+
+    Raises
+    ------
+    ExtraError
+        If it needs matplotlib and that is not installed.
+    """
+    try:
+        found: Callable[..., Any] = getattr(import_module(DISPLAYS[name]), name)
+    except ModuleNotFoundError as error:
+        if (error.name or "").split(".")[0] != "matplotlib":
+            raise
+        raise ExtraError(
+            "pictures need matplotlib, which is not installed: pip install 'seqopt[plot]'"
+        ) from None
+    return found
+
+
+class Shown:
+    """Base of values that a notebook shows as a small table and a small picture."""
+
+    __slots__ = ()
+
+    def _repr_html_(self) -> str:
+        """Return the table and, where matplotlib is installed, the picture, as HTML."""
+        return str(display("card")(self))
+
+
+@dataclass(frozen=True, repr=False)
+class Page:
+    """A page of HTML that needs nothing else: a notebook shows it, `open` a browser.
+
+    Attributes
+    ----------
+    text : str
+        The whole page.
+    height : int
+        How high a notebook shows it, pixels.
+    """
+
+    text: str
+    height: int = 900
+
+    def __repr__(self) -> str:
+        size = len(self.text.encode()) / 1e6
+        return f"<Page of {size:.1f} MB: save('report.html') writes it, open() shows it>"
+
+    def _repr_html_(self) -> str:
+        """Return a frame that holds the page."""
+        return (
+            f'<iframe srcdoc="{escape(self.text)}" width="100%" height="{self.height}" '
+            'style="border:0;background:#fff" title="step viewer"></iframe>'
+        )
+
+    def save(self, path: str | Path) -> Path:
+        """Write the page to a file.
+
+        Parameters
+        ----------
+        path : str or pathlib.Path
+
+        Returns
+        -------
+        pathlib.Path
+            Of the file.
+
+        Raises
+        ------
+        FileError
+            If it cannot be written.
+        """
+        write_text(Path(path), self.text)
+        return Path(path)
+
+    def open(self, path: str | Path | None = None) -> Path:
+        """Write the page to a file and show it in a browser.
+
+        Parameters
+        ----------
+        path : str or pathlib.Path, optional
+            By default a new file in the folder for temporary ones.
+
+        Returns
+        -------
+        pathlib.Path
+            Of the file.
+        """
+        written = self.save(path or Path(tempfile.mkdtemp(prefix="seqopt-")) / "report.html")
+        webbrowser.open(written.resolve().as_uri())
+        return written

@@ -1,0 +1,101 @@
+"""What a notebook shows: numbers of the value, escaped, light, with pictures."""
+
+from __future__ import annotations
+
+import base64
+import io
+import re
+from dataclasses import replace
+
+import pytest
+from PIL import Image
+
+import seqopt
+from seqopt.placement.order_problem import OrderProblem
+from seqopt.report.cards import card, facts
+from seqopt.report.comparison import largest
+from seqopt.report.draw import ROBOT_COLORS
+from seqopt.stability.steps import assess_steps
+
+HEAVIEST = 60_000  # letters of HTML
+
+
+@pytest.fixture(scope="module")
+def values(problem25):
+    plan = seqopt.solve(problem25, "overlap_dp")
+    small = seqopt.load_scene("wall:columns=2,courses=2")
+    free = seqopt.optimize(small, "free")
+    posed = seqopt.optimize(small, criterion="worst-ratio").problem
+    robust = seqopt.robust(posed, seqopt.scenarios(small, count=2, seed=1), "worst-peak")
+    network = problem25.engine.network
+    found = [plan, free, problem25, free.problem, OrderProblem(free.problem), robust]
+    found += [
+        problem25.schedule,
+        network,
+        network.scene,
+        *assess_steps(network, plan.steps[:1], "dry"),
+    ]
+    return {type(value).__name__: value for value in found}
+
+
+def images(html):
+    found = re.findall(r'src="data:image/png;base64,([^"]+)"', html)
+    return [Image.open(io.BytesIO(base64.b64decode(text))) for text in found]
+
+
+def test_every_value_has_a_table_and_a_picture_and_is_light(values):
+    for name, value in values.items():
+        html = value._repr_html_()
+        assert html == card(value)
+        assert html.count("<tr>") > 4, name
+        assert images(html), name
+        assert len(html) < HEAVIEST, name
+        assert html.count("<table") == html.count("</table>") == 1
+
+
+def test_colors_of_robots_survive_in_small_pictures(values):
+    steps, _ = images(values["Plan"]._repr_html_())
+    colors = {color for _, color in steps.convert("RGB").getcolors(100_000)}
+    for robot in ROBOT_COLORS[:3]:
+        wanted = [int(robot[i : i + 2], 16) for i in (1, 3, 5)]
+        assert min(max(abs(a - b) for a, b in zip(c, wanted, strict=True)) for c in colors) < 20
+
+
+def test_a_step_that_falls_has_a_table_alone(engine25):
+    scene = engine25.network.scene
+    bare = [seqopt.Step(1, seqopt.sequential(engine25.network)[0].kind, 3, (None,) * 3)]
+    (falls,) = assess_steps(scene, bare, "dry")
+    assert "does not stand" in falls._repr_html_()
+    assert images(falls._repr_html_()) == []
+
+
+def test_figures_are_those_of_the_plan(values):
+    plan = values["Plan"]
+    _, rows = facts(plan)
+    found = largest(plan.engine.network.scene, plan.responses())
+    assert rows["largest grip force, N"] == f"{found['F_rob']:.4g}"
+    assert rows["largest support moment, N m"] == f"{found['M_sup']:.4g}"
+    assert rows["largest tension, N"] == f"{found['T_max']:.4g}"
+    assert rows["steps"] == len(plan.steps)
+    grips = plan.grips()
+    row = grips.loc[grips["largest_force_N"].idxmax()]
+    assert f"{row['robot']} at node {row['node']}" in str(rows["at the largest grip force"])
+    assert f"{rows['largest grip force, N']}</td>" in plan._repr_html_()
+
+
+def test_facts_of_a_problem_are_not_computed_for_them(problem25):
+    fresh = replace(problem25, evaluation=replace(problem25.evaluation))
+    fresh._repr_html_()
+    assert "_found" not in vars(fresh.evaluation)
+    assert "_sums" not in vars(fresh)
+
+
+def test_names_of_others_are_escaped(values):
+    wild = replace(values["Scene"], name="<script>alert(1)</script>")
+    html = wild._repr_html_()
+    assert "<script" not in html
+    assert "&lt;script&gt;" in html
+
+
+def test_a_value_of_another_kind_is_its_words():
+    assert facts(3) == ("int", {"": "3"})

@@ -1,0 +1,145 @@
+"""What values say at the prompt is short, and in words."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+import pytest
+
+import seqopt
+from seqopt.arrays import LONGEST, Terse
+from seqopt.engines.registry import ENGINES
+from seqopt.errors import SceneError
+from seqopt.placement.budgets import travel
+from seqopt.placement.free_front import FreeFront
+from seqopt.placement.front import find_front
+from seqopt.placement.loop_front import LoopFront
+from seqopt.placement.order_plan import solve_order
+from seqopt.placement.order_problem import OrderProblem
+from seqopt.placement.unseen import judge_unseen
+from seqopt.report.comparison import compare
+from seqopt.scene.library import ArchForm, DomeShape, VaultShape
+from seqopt.stability.steps import assess_steps
+
+MOST = 300  # letters
+OURS = ("seqopt.", "formulations.")
+
+
+def engines(network):
+    for name in ENGINES:
+        try:
+            yield seqopt.make_engine(name, network)
+        except SceneError:  # planar bricks do not fit every scene
+            continue
+
+
+@pytest.fixture(scope="module")
+def met(problem25, arch25):
+    """What a user may meet, of every kind."""
+    network = problem25.engine.network
+    plan = seqopt.optimize(arch25, criterion="worst-ratio-published")
+    lean = seqopt.solve(problem25, "rank_search", proof=False)
+    small = seqopt.load_scene("wall:columns=2,courses=2")
+    free = seqopt.optimize(small, "free")
+    drawn = seqopt.scenarios(small, count=2, seed=1)
+    posed = seqopt.optimize(small, criterion="worst-ratio").problem
+    robust = seqopt.solve_robust(seqopt.robust(posed, drawn, "worst-peak"))
+    loop = LoopFront(posed.engine, posed.schedule, ["F_largest", "M_sup"])
+    aims = seqopt.pose_free(posed.engine, seqopt.FreeRules(), posed.criterion, "F_largest,steps")
+    values = [plan, lean, free, robust, free.report()]
+    values += [judge_unseen(robust, drawn), drawn, loop, find_front(loop), FreeFront(aims)]
+    values += [
+        solve_order(OrderProblem(free.problem)),
+        *engines(network),
+        *engines(posed.engine.network),
+    ]
+    values += [compare(posed.engine, posed.criterion), travel(problem25, 20.0)]
+    values += assess_steps(network, plan.steps[:1], seqopt.DRY)
+    values += [seqopt.DRY, seqopt.CRITERIA, seqopt.formulations(), seqopt.Limit("F_largest", 300.0)]
+    values += [ArchForm(span=2.0, rise=0.8), DomeShape(courses=4, around=12), VaultShape(bricks=9)]
+    values += [seqopt.StepCost("own", ("F_largest",), max), free.animate()]
+    values += [seqopt.GivenSequence(problem25.engine, seqopt.sequential(network))]
+    for each in (plan, free, robust):
+        each.responses()
+        each.table()
+    return values
+
+
+def within(values):
+    """Yield every value of ours in others, however deep."""
+    seen, stack = set(), list(values)
+    while stack:
+        thing = stack.pop()
+        if id(thing) in seen:
+            continue
+        seen.add(id(thing))
+        if isinstance(thing, dict):
+            stack += [*thing.keys(), *thing.values()]
+        elif isinstance(thing, list | tuple | set | frozenset):
+            stack += thing
+        elif type(thing).__module__.startswith(OURS):
+            yield thing
+            stack += [v for k, v in getattr(thing, "__dict__", {}).items() if k[0] != "_"]
+
+
+def too_long(values):
+    """Return what is long, holds arrays or tables, or says where in memory it is, by class."""
+    out = {}
+    for thing in within(values):
+        text = repr(thing)
+        if len(text) > MOST or text.count("\n") > 3 or re.search(r"array\(|dtype=| at 0x", text):
+            out[type(thing).__name__] = text
+    return out
+
+
+def test_everything_a_user_meets_is_short_at_the_prompt(met):
+    kinds = {type(thing).__name__ for thing in within(met)}
+    assert len(kinds) > 60  # or too little was looked at
+    assert too_long(met) == {}
+
+
+def test_every_class_of_the_door_was_met(met):
+    kinds = {type(thing) for thing in within(met)}
+    bases = {base for kind in kinds for base in kind.__mro__}
+    doors = {name: getattr(seqopt, name) for name in seqopt.__all__}
+    unmet = {
+        name for name, thing in doors.items() if isinstance(thing, type) and thing not in bases
+    }
+    assert unmet == {"ArchShape", "Engine", "SeqoptError"}  # numbers in, a protocol, an exception
+
+
+def test_what_is_long_is_seen():
+    @dataclass(frozen=True)
+    class Long:
+        numbers: tuple[int, ...] = tuple(range(500))
+
+    Long.__module__ = "seqopt.anything"
+    assert set(too_long([{"a": [Long()]}])) == {"Long"}
+
+
+def test_shapes_of_arches_are_short_too():
+    text = repr(seqopt.ArchShape(pitch=[1.0, 0.5, 0.0, -0.5, -1.0], pattern="V"))
+    assert len(text) < MOST
+
+
+def test_a_terse_value_leaves_out_defaults_and_counts_what_is_too_much():
+    @dataclass(frozen=True, repr=False)
+    class Part(Terse):
+        name: str
+        place: tuple[float, float]
+        kind: str = "plain"
+
+    assert repr(Part("a", (1 / 3, 2.0))) == "Part(name='a', place=(0.333333, 2))"
+    assert repr(Part("a", (0.0, 2.0), "odd")) == "Part(name='a', place=(0, 2), kind='odd')"
+    assert repr(Part("a" * LONGEST, (0.0, 2.0))).endswith("', and 1 more)")
+
+
+def test_figures_at_the_prompt_are_those_of_the_values(met):
+    plan = met[0]
+    assert f"objective {plan.certificate.objective:.6g}" in repr(plan)
+    assert f"objective {plan.certificate.objective:.6g}" in repr(plan.certificate)
+    counts = [len(move.candidates) for move in plan.problem.schedule.moves]
+    assert f"{len(counts)} grips to choose from {min(counts)} to {max(counts)}" in repr(
+        plan.problem.schedule
+    )
