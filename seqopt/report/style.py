@@ -18,6 +18,8 @@ from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
+from seqopt.report.picture import new_picture
+
 WIDTH = 7.36  # inches: the column of text of the site at 100 pixels an inch
 DPI = 200  # two pixels of the file for each one that the site shows
 SMALL, BODY = 8.0, 9.0  # points
@@ -139,7 +141,7 @@ def looks(names: Iterable[str]) -> dict[str, Look]:
 
 
 def new_figure(height: float, width: float = WIDTH) -> Figure:
-    """Return an empty figure that needs no screen.
+    """Return an empty figure that needs no screen, and that a notebook shows.
 
     Parameters
     ----------
@@ -152,7 +154,9 @@ def new_figure(height: float, width: float = WIDTH) -> Figure:
     -------
     matplotlib.figure.Figure
     """
-    return Figure(figsize=(width, height), layout="constrained")
+    figure = new_picture(width, height, constrained=False)
+    figure.set_layout_engine("constrained")
+    return figure
 
 
 def dress(*panels: Axes) -> None:
