@@ -63,5 +63,5 @@ def test_a_given_sequence_shows_itself_as_a_plan_does():
     assert len(verdicts) == len(steps)
     with pytest.raises(seqopt.SeqoptError, match="a Scene is not an engine"):
         seqopt.GivenSequence(scene, steps)
-    with pytest.raises(seqopt.SeqoptError, match="is no sequence of steps"):
+    with pytest.raises(seqopt.SeqoptError, match="is not a sequence of steps"):
         seqopt.GivenSequence(engine, scene)
