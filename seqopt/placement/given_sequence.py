@@ -1,4 +1,4 @@
-"""The steps of a fixed method or a file, with all displays that plans have."""
+"""A sequence that is given, of a fixed method or a file, with everything that a plan can show."""
 
 from __future__ import annotations
 
@@ -17,26 +17,26 @@ from seqopt.sequence.steps import Step, check_sequence, require_steps
 
 @dataclass(frozen=True, repr=False)
 class GivenSequence(ShownBuild):
-    """The steps of a fixed method or a file, with the same tables and pictures as a plan.
+    """Steps that were not optimized: those of a fixed method, or of a file.
 
     Parameters
     ----------
     engine : Engine
-        Computes the responses, for the scene that is built.
+        What computes the responses; it has the scene.
     steps : tuple of Step
         Of `seqopt.sequential`, `seqopt.cantilever` or `seqopt.read_plan`.
     title : str, optional
-        Its name where it is shown next to others.
+        What it is called beside others.
 
     Attributes
     ----------
     seconds : mapping of str to float
-        Empty, since nothing was searched.
+        Empty: nothing was searched.
 
     Raises
     ------
     SceneError, StepError
-        If it is not an engine, these are no steps, or they are not possible in the scene.
+        If an argument is not an engine or not a list of steps, or the steps are impossible.
 
     Examples
     --------
@@ -66,7 +66,7 @@ class GivenSequence(ShownBuild):
 
     @property
     def worth(self) -> str:
-        """A note that the sequence was not optimized."""
+        """What it is worth, in words."""
         return "given, not optimized"
 
     def table(self) -> pd.DataFrame:
