@@ -25,7 +25,7 @@ def faces(axes):
 
 def test_a_scene_draws_as_many_bricks_as_are_asked_for(arch25):
     (whole,) = arch25.plot().axes
-    assert whole.get_title() == "arch25: 25 of 25 bricks"
+    assert whole.get_title(loc="left") == "arch25: 25 of 25 bricks"
     (part,) = arch25.plot(7).axes
     assert len(part.collections) == 2  # the others are pale
     for wrong in (0, 26, 2.5, "all"):
