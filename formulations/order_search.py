@@ -25,7 +25,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from contextlib import closing
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import islice
 
 import numpy as np
@@ -43,6 +43,7 @@ from seqopt.responses.resources import HERE, Resources
 from seqopt.scene.orders import ORDERS, Order
 from seqopt.work.crew import hire
 from seqopt.work.ordered import map_ordered
+from seqopt.work.progress import Stage
 
 FAR_BELOW = 4.0  # the best order known, over the first threshold
 GROWTH = 1.1  # of the threshold
@@ -65,8 +66,10 @@ class _Search:
     bound: float = -np.inf
     evaluated: int = 0
     problems: dict[Key, FreeProblem] = field(default_factory=dict)
+    tried: Stage | None = None  # of orders beside the best, how many
+    each: float = 0.0  # share of one of them
 
-    def tell(self, what: str) -> None:
+    def tell(self, what: object) -> None:
         """Say how far it is; end the search in time."""
         if self.resources.progress is not None:
             self.resources.progress(what)
@@ -75,7 +78,7 @@ class _Search:
 
     def tell_bricks(self, bricks: int) -> None:
         """Say how far all orders are looked at."""
-        self.tell(f"all orders: {bricks} bricks, {len(self.problems)} sets")
+        self.tell(Stage("all orders", bricks / len(self.problem.scene.bricks)))
 
     def try_order(self, order: Order) -> bool:
         """Return whether an order is better than the best so far, and keep it if it is."""
@@ -85,11 +88,14 @@ class _Search:
 
     def trial(self, order: Order) -> Trial:
         """Return an order to be tried against the best so far; end the search in time."""
-        self.tell(f"{self.evaluated} orders, {self.value:.6g}")
+        best = f", the best {self.value:.6g}" if self.order else ""
+        self.tell(self.tried or f"{self.evaluated} orders{best}")
         return Trial(order, self.value * (1 - BETTER) if np.isfinite(self.value) else np.inf)
 
     def take(self, order: Order, value: float) -> bool:
         """Return whether an order that was tried is better than the best so far, and keep it."""
+        if self.tried is not None:
+            self.tried = replace(self.tried, share=min(1.0, self.tried.share + self.each))
         self.evaluated += 1
         better = value < self.value
         if better:
@@ -213,6 +219,7 @@ def _neighbors(search: _Search, tries: int, rng: np.random.Generator) -> None:
         work = trying(search.problem, elsewhere=crew is not None)
         while better and left > 0:
             before = search.evaluated
+            search.tried, search.each = Stage("orders beside the best", 1 - left / tries), 1 / tries
             orders = [*islice(_beside(search.order, search.problem, rng), left)]
             trials = map(search.trial, orders)
             with closing(map_ordered(work, trials, crew)) as found:  # ends at the first better one

@@ -18,7 +18,6 @@ and Vanderpooten, On the representation of the search region in multi-objective 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 
 import numpy as np
 
@@ -26,13 +25,14 @@ from seqopt.arrays import Bools, Floats
 from seqopt.placement.formulation import FormulationKind
 from seqopt.placement.front import FrontProblem, FrontSelection
 from seqopt.placement.schedule_formulation import Finds, ScheduleFormulation
+from seqopt.work.progress import Tell
 
 
 def solve(
     problem: FrontProblem,
     *,
     seconds: float = np.inf,
-    progress: Callable[[str], None] = lambda _: None,
+    progress: Tell = lambda _: None,
 ) -> FrontSelection:
     """Return all vectors that no plan dominates, and a plan for each.
 
@@ -56,7 +56,7 @@ def solve(
     stopped = ""
     try:
         while len(zones) and not stopped:
-            progress(f"{len(points)} points, {len(zones)} zones")
+            progress(f"{len(points)} plans found, {len(zones)} regions left")
             zone, rest = zones[-1], zones[:-1]
             found = problem.best_below(zone)
             zones = rest

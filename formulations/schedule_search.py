@@ -41,11 +41,12 @@ from seqopt.placement.schedule_formulation import ScheduleFormulation
 from seqopt.placement.schedule_selection import ScheduleSelection
 from seqopt.placement.sturdiest import best_margin
 from seqopt.work.memory import free_memory
+from seqopt.work.progress import Stage, Tell
 
 FAR_BELOW = 4.0  # what the narrow search finds, over the first threshold
 COPIES = 2.0  # of what is kept, that are needed at once while it grows
 
-Tell = Callable[[StateGraph], None]
+Watching = Callable[[StateGraph], None]
 
 
 class _StopError(Exception):
@@ -64,7 +65,7 @@ def solve(
     growth: float = 1.1,
     seconds: float = np.inf,
     max_memory: float = np.inf,
-    progress: Callable[[str], None] = lambda _: None,
+    progress: Tell = lambda _: None,
 ) -> ScheduleSelection:
     """Return the best free schedule.
 
@@ -81,7 +82,7 @@ def solve(
         Bytes that states, moves and responses may take, about; then likewise. By default as many as
         are free.
     progress : callable, optional
-        Told in a few words how far the search is.
+        Told as a `seqopt.work.Stage` how far each pass through the bricks is.
 
     Returns
     -------
@@ -109,13 +110,17 @@ def solve(
 def _watch(
     problem: FreeProblem,
     most: tuple[float, float],
-    progress: Callable[[str], None],
+    progress: Tell,
     reached: list[StateGraph],
-) -> Tell:
+) -> Watching:
     """Return what is told every level: it keeps the states and ends the search in time."""
+    passes = 0
 
     def tell(graph: StateGraph) -> None:
-        progress(f"{len(graph.levels) - 1} of {problem.space.bricks} bricks")
+        nonlocal passes
+        bricks = len(graph.levels) - 1
+        passes += bricks == 0
+        progress(Stage(f"free schedule, pass {passes}", bricks / problem.space.bricks))
         reached[:] = [graph]
         if time.perf_counter() > most[0]:
             raise _StopError("time")
@@ -134,7 +139,7 @@ def _require_order(problem: FreeProblem) -> None:
 
 
 def _search(
-    problem: FreeProblem, options: tuple[int, float], tell: Tell, reached: list[StateGraph]
+    problem: FreeProblem, options: tuple[int, float], tell: Watching, reached: list[StateGraph]
 ) -> ScheduleSelection:
     """Return the best free schedule, or the first one found where the search is stopped."""
     if problem.goals[0].of_margins:
@@ -165,7 +170,7 @@ def _search(
 
 
 def _below(
-    problem: FreeProblem, options: tuple[float, float], tell: Tell, proven: list[float]
+    problem: FreeProblem, options: tuple[float, float], tell: Watching, proven: list[float]
 ) -> StateGraph:
     """Return the states below the lowest threshold of a rising row that connects start to end.
 

@@ -29,7 +29,9 @@ def run() -> int:
         _open_streams()
         _answer_signals(_leave)  # libraries that are being loaded may lose what is raised in them
         _require_room()
-        from seqopt.cli.main import main  # noqa: PLC0415  # what an interrupt may meet
+        from seqopt.cli.main import load, main  # noqa: PLC0415  # what an interrupt may meet
+
+        load(sys.argv[1:])
 
         sys.unraisablehook = _raise_again
         _answer_signals(signal.default_int_handler)

@@ -84,27 +84,36 @@ class SceneWarning(UserWarning):
     """Something in a scene is possible but probably a mistake."""
 
 
-def did_you_mean(given: str, known: Iterable[str]) -> str:
+def did_you_mean(given: object, known: Iterable[str]) -> str:
     """Return a hint at the word that was probably meant.
 
     Parameters
     ----------
     given : str
-        A word that does not exist.
+        A word that does not exist; there is no hint at anything else.
     known : iterable of str
         The words that exist.
 
     Returns
     -------
     str
-        To be put after the word; empty if none is near.
+        To be put after the word; empty if none is near, or two are equally near.
 
     Examples
     --------
     >>> did_you_mean("overlap_pd", ["cascade", "overlap_dp"])
     ' (did you mean overlap_dp?)'
-    >>> did_you_mean("x", ["cascade", "overlap_dp"])
-    ''
+    >>> did_you_mean("t_max", ["T_max"]), did_you_mean("x", ["cascade", "overlap_dp"])
+    (' (did you mean T_max?)', '')
     """
-    near = difflib.get_close_matches(given, known, 1)
-    return f" (did you mean {near[0]}?)" if near else ""
+    meant = {name.lower(): name for name in known}
+    if not isinstance(given, str) or given in meant.values():
+        return ""
+    near = difflib.get_close_matches(given.lower(), meant, 2)
+    tied = len({_likeness(name, given) for name in near}) < len(near)
+    return f" (did you mean {meant[near[0]]}?)" if near and not tied else ""
+
+
+def _likeness(one: str, other: str) -> float:
+    """Return how much one word is like another, from 0 to 1."""
+    return difflib.SequenceMatcher(None, one.lower(), other.lower()).ratio()

@@ -1,8 +1,8 @@
-"""How values show themselves: the one lookup that goes against the order of the rooms.
+"""How values find the functions that draw them, although they may not import these.
 
-A scene or a plan has methods that draw it. Pictures are made in `seqopt.report`, which lies behind
-the rooms that such values come from, so these cannot import it. They call `display`, which finds
-the function when a picture is asked for. `DISPLAYS` lists every function that is found this way.
+A scene or a plan has methods that draw it. Pictures are made in `seqopt.report`, which imports the
+modules of scenes and plans, so these cannot import it in turn. They call `display` instead, which
+loads the function when a picture is needed. `DISPLAYS` lists every function that is found this way.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ DISPLAYS = {
     "Film": "seqopt.report.film",
     "build_page": "seqopt.report.build_page",
 }
-"""Functions that values call to show themselves, and the module that each is in."""
+"""The functions that draw, by name, and the module of each."""
 
 
 def display(name: str) -> Callable[..., Any]:
@@ -61,7 +61,7 @@ def display(name: str) -> Callable[..., Any]:
 
 
 class Shown:
-    """Base of values that a notebook shows as a small table and a small picture."""
+    """Base class of values that a notebook shows as a small table with a small picture."""
 
     __slots__ = ()
 
@@ -72,14 +72,14 @@ class Shown:
 
 @dataclass(frozen=True, repr=False)
 class Page:
-    """A page of HTML that needs nothing else: a notebook shows it, `open` a browser.
+    """A self-contained page of HTML, shown in a notebook or, by `open`, in a browser.
 
     Attributes
     ----------
     text : str
         The whole page.
     height : int
-        How high a notebook shows it, pixels.
+        Height of the frame that shows it in a notebook, pixels.
     """
 
     text: str

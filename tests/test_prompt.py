@@ -35,10 +35,10 @@ def engines(network):
 
 
 @pytest.fixture(scope="module")
-def met(problem25, arch25):
+def met(problem25):
     """What a user may meet, of every kind."""
     network = problem25.engine.network
-    plan = seqopt.optimize(arch25, criterion="worst-ratio-published")
+    plan = seqopt.solve(problem25, "overlap_dp")
     lean = seqopt.solve(problem25, "rank_search", proof=False)
     small = seqopt.load_scene("wall:columns=2,courses=2")
     free = seqopt.optimize(small, "free")

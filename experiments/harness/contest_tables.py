@@ -54,14 +54,8 @@ def shapes_table(table: pd.DataFrame) -> str:
 def _table(table: pd.DataFrame, when: dict[str, str]) -> str:
     kinds = {name: formulation.kind.value for name, formulation in formulations().items()}
     counts = sorted(table["bricks"].unique())
-    head = [
-        "formulation",
-        "use it for",
-        "kind",
-        "largest gap",
-        *(f"{n} bricks" for n in counts),
-        "memory",
-    ]
+    head = ["formulation", "use it for", "kind", "largest gap"]
+    head += [*(f"{n} bricks" for n in counts), "memory"]
     rows = []
     for name, use in when.items():
         own = table[table["formulation"] == name]

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import pandas as pd
 
+from seqopt.cli.answer import Answer
 from seqopt.cli.status import Status
-from seqopt.cli.terminal import (
-    complain,
-)
 from seqopt.contact.mortar import MORTARS
 from seqopt.engines.auto import AutoEngine
 from seqopt.engines.interface import Engine, Fields
@@ -24,6 +23,7 @@ from seqopt.scene.orders import in_order
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import dump_scene, load_scene
 from seqopt.sequence.steps import AnyStep, Step, idle_robots
+from seqopt.work.progress import told
 
 
 def asked_scene(options: argparse.Namespace) -> Scene:
@@ -39,7 +39,9 @@ def asked_scene(options: argparse.Namespace) -> Scene:
     Scene
     """
     if options.order == "search":
-        raise ProblemError("--order search: the free schedule of optimize has it alone")
+        raise ProblemError(
+            "--order search: only the free schedule has it; give optimize --schedule free"
+        )
     return in_order(load_scene(options.scene), options.order)
 
 
@@ -83,53 +85,80 @@ def asked_engine(options: argparse.Namespace, network: Network) -> Engine:
         raise SceneError(f"--engine {options.engine}: {error}") from error
 
 
-def say_levels(engine: Engine) -> None:
-    """Say which levels an engine that picks them took, and why.
+def level_notes(engine: Engine) -> tuple[str, ...]:
+    """Return which levels an engine that picks them took, and why.
 
     Parameters
     ----------
     engine : Engine
+
+    Returns
+    -------
+    tuple of str
+        None of other engines.
     """
     if not isinstance(engine, AutoEngine):
-        return
-    for choice, sets in engine.tally.items():
-        complain(f"engine: {choice.level.value} for {sets} grip sets: {choice.reason}")
-    if engine.unchecked:
-        complain(f"engine: {engine.unchecked}")
+        return ()
+    said = [
+        f"engine: {choice.level.value} for {sets} grip sets: {choice.reason}"
+        for choice, sets in engine.tally.items()
+    ]
+    return (*said, *([f"engine: {engine.unchecked}"] if engine.unchecked else []))
 
 
-def say_idle(scene: Scene, steps: Sequence[AnyStep]) -> None:
-    """Name the robots that never grip.
+def idle_notes(scene: Scene, steps: Sequence[AnyStep]) -> tuple[str, ...]:
+    """Return the robots that never grip, in words.
 
     Parameters
     ----------
     scene : Scene
     steps : sequence of Step or OpenStep
+
+    Returns
+    -------
+    tuple of str
+        Of one note, or none.
     """
-    if idle := idle_robots(scene, steps):
-        complain(f"robots: {', '.join(idle)} never grip{'s' * (len(idle) == 1)}")
+    idle = idle_robots(scene, steps)
+    return (f"robots: {', '.join(idle)} never grip{'s' * (len(idle) == 1)}",) if idle else ()
 
 
-def payloads_hold(options: argparse.Namespace, scene: Scene, *tables: pd.DataFrame) -> Status:
-    """Return the status that ``--strict`` asks for.
+def exceeded(scene: Scene, *tables: pd.DataFrame) -> tuple[str, ...]:
+    """Return the payloads that are exceeded, in words.
 
     Parameters
     ----------
-    options : argparse.Namespace
-        With ``strict``.
     scene : Scene
     *tables : pandas.DataFrame
         Responses of steps.
 
     Returns
     -------
-    Status
+    tuple of str
     """
-    over = [str(excess) for table in tables for excess in overloads(scene, table)]
-    if not options.strict or not over:
-        return Status.DONE
-    complain(f"seqopt: payload exceeded: {'; '.join(over)}")
-    return Status.DOES_NOT_HOLD
+    return tuple(str(excess) for table in tables for excess in overloads(scene, table))
+
+
+def strictly(answer: Answer, options: argparse.Namespace, over: Sequence[str]) -> Answer:
+    """Return an answer with the payloads that are exceeded, and the status of ``--strict``.
+
+    Parameters
+    ----------
+    answer : Answer
+    options : argparse.Namespace
+        With ``strict``.
+    over : sequence of str
+        From `exceeded`.
+
+    Returns
+    -------
+    Answer
+    """
+    answer = replace(answer, facts={**answer.facts, "payloads_exceeded": list(over)})
+    if not options.strict or not over or answer.status is not Status.DONE:
+        return answer
+    said = f"seqopt: payload exceeded: {'; '.join(over)}"
+    return replace(answer, failures=(*answer.failures, said), status=Status.DOES_NOT_HOLD)
 
 
 def step_answers(
@@ -140,7 +169,8 @@ def step_answers(
     Parameters
     ----------
     options : argparse.Namespace
-        With ``staged``, where bricks are set down or None, and ``engine``.
+        With ``staged``, where bricks are set down or None, ``engine``, and ``tell``, which is told
+        how far it is.
     engine : Engine
     steps : sequence of Step
 
@@ -154,10 +184,11 @@ def step_answers(
         If a staged analysis is asked of another engine than the one of rigid bricks.
     """
     if options.staged is None:
-        return ((step, step_fields(engine, step)) for step in steps)
+        return ((step, step_fields(engine, step)) for step in told("steps", steps, options.tell))
     if options.engine != "compliance":
         raise SceneError(
             f"--engine {options.engine}: --staged goes with exactly rigid bricks alone; "
             "give --engine compliance"
         )
-    return zip(steps, staged_fields(engine.network, steps, options.staged), strict=True)
+    fields = staged_fields(engine.network, steps, options.staged)
+    return zip(told("steps", steps, options.tell), fields, strict=True)

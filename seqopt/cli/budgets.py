@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from seqopt.errors import ProblemError
+from seqopt.errors import ProblemError, did_you_mean
 from seqopt.placement.budgets import steps_over, travel
 from seqopt.placement.costs import Budget
 from seqopt.placement.problem import Problem
@@ -95,7 +95,8 @@ def parse_budgets(texts: Sequence[str]) -> tuple[AskedBudget, ...]:
 def _parse(text: str) -> AskedBudget:
     found = SHAPE.fullmatch(text)
     if found is None or (found["level"] is None) != (found["kind"] == "travel"):
-        raise ProblemError(f"--budget {text}: there is no such; give {FORMS}")
+        hint = did_you_mean(re.split("[=:]", text)[0], ("travel", "steps_over", "robot_use"))
+        raise ProblemError(f"--budget {text} does not exist{hint}; give {FORMS}")
     is_travel = found["kind"] == "travel"
     if found["unit"] == "m" and not is_travel:
         raise ProblemError(f"--budget {text}: steps have no meters; give a number of them")

@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import argparse
 import re
-from collections.abc import Callable
 
 from seqopt.cli.values import LARGEST
 from seqopt.errors import ProblemError
 from seqopt.responses.resources import Resources
+from seqopt.work.progress import Tell
 
 SIZE = re.compile(r"([0-9]*\.?[0-9]+(?:e[0-9]+)?) *((?:[kmgt]i?)?b?)", re.IGNORECASE)
 MOST_WORKERS = 1024
 
 
-def parse_resources(
-    options: argparse.Namespace, progress: Callable[[str], None] | None = None
-) -> Resources:
+def parse_resources(options: argparse.Namespace, progress: Tell | None = None) -> Resources:
     """Return what a computation may use.
 
     Parameters

@@ -4,24 +4,50 @@ from __future__ import annotations
 
 import argparse
 import time
+from collections.abc import Mapping
 
-from seqopt.cli.asked import payloads_hold, say_idle, say_levels
+from seqopt.cli import optimize_arguments
+from seqopt.cli.answer import Answer
+from seqopt.cli.asked import exceeded, idle_notes, level_notes, strictly
+from seqopt.cli.facts import scene_facts
 from seqopt.cli.free import optimize_free, require_loop
 from seqopt.cli.outputs import plan_files, worth, write_outputs
 from seqopt.cli.posing import asked_problem
 from seqopt.cli.robust import optimize_robust, require_no_scenarios
 from seqopt.cli.status import Status
-from seqopt.cli.terminal import complain, progress, say, tell
 from seqopt.cli.values import parse_options, parse_time_limit
 from seqopt.placement.formulation import End, find_formulation
+from seqopt.placement.plan import Plan
+from seqopt.placement.problem import Problem
 from seqopt.placement.solving import solve
 from seqopt.report.plan_pages import PAGE, plan_page
 from seqopt.sequence.free_rules import FREE
 from seqopt.sequence.schedule import Schedule
 from seqopt.study.published import paper_models
+from seqopt.work.progress import within
+
+DESCRIPTION = (
+    "Choose where robots hold, over all steps of a sequence, by one formulation; or, with "
+    "--schedule free, choose every step. The answer is checked from the problem's own data, and "
+    "plan, selection, responses, summary and a page for the browser are written."
+)
+USAGE = (
+    "[SCENE] --formulation NAME --out DIR [other options]",
+    "[SCENE] --schedule free --out DIR [other options]",
+    "[SCENE] --robust AIM --out DIR [other options]",
+)
+EXAMPLES = (
+    "seqopt optimize arch25 --formulation overlap_dp --out best",
+    "seqopt optimize arch25 --schedule free --out free",
+    "seqopt optimize wall:columns=6,courses=4 --schedule free --out wall",
+    "seqopt optimize my.json --formulation overlap_dp --limit payload --out mine",
+    "seqopt optimize arch25 --robust worst-peak --out robust",
+)
+INTERRUPTED = "seqopt: interrupted; the plan is the best that was met"
+add_arguments = optimize_arguments.add_arguments
 
 
-def optimize(options: argparse.Namespace) -> Status:
+def run(options: argparse.Namespace) -> Answer:
     """Choose every open grip of a build, and write the plan.
 
     Parameters
@@ -31,7 +57,7 @@ def optimize(options: argparse.Namespace) -> Status:
 
     Returns
     -------
-    Status
+    Answer
     """
     if options.robust is not None:
         return optimize_robust(options)
@@ -46,28 +72,39 @@ def optimize(options: argparse.Namespace) -> Status:
     start = time.perf_counter()
     problem = asked_problem(options)
     assemble = time.perf_counter() - start
+    tell = within(options.tell, limit)
     plan = solve(problem, formulation, **how, time_limit=limit, progress=tell, **chosen)
-    progress("")
-    say_levels(problem.engine)
+    options.tell("writing the plan")
     report = plan.summary() | {
         "models_paper_count": _paper_count(problem.schedule),
         "seconds": {"assemble": assemble, **plan.seconds},
     }
-    table = plan.responses()
-    scene = problem.schedule.scene
-    page = plan_page(problem.engine, formulation.name, table, worth(plan))
-    write_outputs(options, plan_files(plan, scene, report) | {PAGE: page})
-    say(
-        f"{formulation.name} ({formulation.kind.value}): {worth(plan)}, "
+    page = plan_page(problem.engine, formulation.name, plan.responses(), worth(plan))
+    files = plan_files(plan, problem.schedule.scene, report)
+    write_outputs(options, files | {PAGE: page})
+    return _answer(options, problem, plan, report)
+
+
+def _answer(
+    options: argparse.Namespace, problem: Problem, plan: Plan, report: Mapping[str, object]
+) -> Answer:
+    """Return what a plan is worth, once it is written."""
+    table, scene = plan.responses(), problem.schedule.scene
+    over = exceeded(scene, table)
+    said = (
+        f"{plan.formulation.name} ({plan.formulation.kind.value}): {worth(plan)}, "
         f"{plan.models} models; written to {options.out}"
     )
-    for excess in plan.overloads:
-        say(f"payload exceeded: {excess}")
-    say_idle(scene, plan.steps)
-    if plan.selection.end is End.INTERRUPTED:
-        complain("seqopt: interrupted; the plan is the best that was met")
-        return Status.INTERRUPTED
-    return payloads_hold(options, scene, table)
+    stopped = plan.selection.end is End.INTERRUPTED
+    answer = Answer(
+        facts={"scene": scene_facts(scene), "summary": report, "plan": table},
+        text="\n".join([said, *(f"payload exceeded: {excess}" for excess in over)]),
+        written=(options.out,),
+        notes=(*level_notes(problem.engine), *idle_notes(scene, plan.steps)),
+        failures=(INTERRUPTED,) if stopped else (),
+        status=Status.INTERRUPTED if stopped else Status.DONE,
+    )
+    return strictly(answer, options, over)
 
 
 def _paper_count(schedule: Schedule) -> dict[str, int] | None:

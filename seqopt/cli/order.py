@@ -5,12 +5,14 @@ from __future__ import annotations
 import argparse
 from math import isfinite
 
+from seqopt.cli.answer import Answer
 from seqopt.cli.asked import scene_file
+from seqopt.cli.facts import scene_facts
 from seqopt.cli.free_files import free_files
+from seqopt.cli.layout import wrapped
 from seqopt.cli.means import parse_resources
 from seqopt.cli.outputs import write_outputs
 from seqopt.cli.status import Status
-from seqopt.cli.terminal import progress, say
 from seqopt.cli.values import parse_numbers, parse_time_limit
 from seqopt.errors import ProblemError
 from seqopt.files import require_folder
@@ -18,11 +20,12 @@ from seqopt.placement.free_problem import FreeProblem
 from seqopt.placement.order_plan import OrderPlan, solve_order
 from seqopt.placement.order_problem import OrderProblem
 from seqopt.placement.schedule_formulation import Finds, find_schedule_formulation
+from seqopt.work.progress import within
 
 SEARCH = "search"  # the order that is sought
 
 
-def optimize_order(options: argparse.Namespace, free: FreeProblem) -> Status:
+def optimize_order(options: argparse.Namespace, free: FreeProblem) -> Answer:
     """Find the order whose best free schedule is best, and write its plan.
 
     Parameters
@@ -34,7 +37,7 @@ def optimize_order(options: argparse.Namespace, free: FreeProblem) -> Status:
 
     Returns
     -------
-    Status
+    Answer
 
     Raises
     ------
@@ -55,16 +58,32 @@ def optimize_order(options: argparse.Namespace, free: FreeProblem) -> Status:
         problem,
         formulation,
         proof=not options.no_proof,
-        progress=progress,
+        progress=within(options.tell, limit),
         resources=parse_resources(options),
         **{"seconds": limit, **whole},
     )
-    plan = found.plan
-    files = free_files(plan, found.summary(), "best order", _said(found))
-    write_outputs(options, files | scene_file(plan.problem.network.scene))
-    say(f"{formulation.name} {_said(found)}; written to {options.out}")
-    say(f"order: {', '.join(map(str, found.order))}")
-    return Status.INTERRUPTED if found.selection.stopped == "interrupt" else Status.DONE
+    options.tell("writing the plan")
+    files = free_files(found.plan, found.summary(), "best order", _said(found))
+    write_outputs(options, files | scene_file(found.plan.problem.network.scene))
+    return _answer(options, found, formulation.name)
+
+
+def _answer(options: argparse.Namespace, found: OrderPlan, name: str) -> Answer:
+    """Return the order and what its plan is worth, once it is written."""
+    said = f"{name} {_said(found)}; written to {options.out}"
+    order = ", ".join(map(str, found.order))
+    stopped = found.selection.stopped == "interrupt"
+    return Answer(
+        facts={
+            "scene": scene_facts(found.plan.problem.network.scene),
+            "order": found.order,
+            "summary": found.summary(),
+            "plan": found.plan.responses(),
+        },
+        text="\n".join([said, wrapped(order, first="order: ")]),
+        written=(options.out,),
+        status=Status.INTERRUPTED if stopped else Status.DONE,
+    )
 
 
 def _said(found: OrderPlan) -> str:

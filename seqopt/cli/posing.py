@@ -8,7 +8,6 @@ from seqopt.cli.asked import asked_engine, asked_scene
 from seqopt.cli.budgets import parse_budgets, with_budgets
 from seqopt.cli.criteria import asked_criterion
 from seqopt.cli.means import parse_resources
-from seqopt.cli.terminal import progress
 from seqopt.cli.values import parse_limits, parse_robots
 from seqopt.files import require_folder
 from seqopt.network.build import build_network
@@ -32,7 +31,7 @@ def asked_problem(options: argparse.Namespace) -> Problem:
     criterion = asked_criterion(options)
     scene = asked_scene(options)
     limits = parse_limits(options.limit, scene)
-    resources = parse_resources(options, progress)
+    resources = parse_resources(options, options.tell)
     budgets = parse_budgets(options.budget)
     require_folder(options.out)
     network = build_network(scene)

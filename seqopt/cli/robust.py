@@ -8,13 +8,15 @@ import math
 import time
 from collections.abc import Mapping
 
-from seqopt.cli.asked import payloads_hold, say_idle, say_levels, scene_file
+import pandas as pd
+
+from seqopt.cli.answer import Answer
+from seqopt.cli.asked import exceeded, idle_notes, level_notes, scene_file, strictly
+from seqopt.cli.facts import scene_facts
 from seqopt.cli.outputs import write_outputs
 from seqopt.cli.posing import asked_problem
-from seqopt.cli.status import Status
-from seqopt.cli.terminal import progress, say, tell
 from seqopt.cli.values import number_word, parse_time_limit, split_word
-from seqopt.errors import ProblemError
+from seqopt.errors import ProblemError, did_you_mean
 from seqopt.files import csv_text
 from seqopt.placement.robust_aim import RobustAim, parse_robust
 from seqopt.placement.robust_plan import solve_robust
@@ -23,8 +25,8 @@ from seqopt.placement.unseen import Trial, judge_unseen
 from seqopt.responses.table import analyze
 from seqopt.scene.scenarios import MOST, Scenarios, scenarios
 from seqopt.scene.scene import Scene
-from seqopt.scene.scene_file import dump_scene
 from seqopt.sequence.steps import idle_robots
+from seqopt.work.progress import within
 
 ALONE = ("scenarios", "unseen", "seed", "vary")  # options that mean something with --robust alone
 NOT_WITH = ("formulation", "option", "no_proof", "lazy", "budget", "aim", "rule")
@@ -53,7 +55,7 @@ def require_no_scenarios(options: argparse.Namespace) -> None:
             )
 
 
-def optimize_robust(options: argparse.Namespace) -> Status:
+def optimize_robust(options: argparse.Namespace) -> Answer:
     """Choose every open grip of a build over scenarios, judge the plan on others, and write it.
 
     Parameters
@@ -63,7 +65,7 @@ def optimize_robust(options: argparse.Namespace) -> Status:
 
     Returns
     -------
-    Status
+    Answer
     """
     aim = _asked_aim(options)
     limit = parse_time_limit(options.time_limit)
@@ -72,33 +74,43 @@ def optimize_robust(options: argparse.Namespace) -> Status:
     seed = _count("--seed", options.seed, 0, least=0)
     start = time.perf_counter()
     problem = asked_problem(options)
-    known, unseen = (
-        _drawn(problem.schedule.scene, options, n, s) for n, s in ((count, seed), (other, seed + 1))
-    )
+    scene = problem.schedule.scene
+    known, unseen = (_drawn(scene, options, n, s) for n, s in ((count, seed), (other, seed + 1)))
     assemble = time.perf_counter() - start
-    plan = solve_robust(robust(problem, known, aim), time_limit=limit, progress=tell)
+    plan = solve_robust(
+        robust(problem, known, aim), time_limit=limit, progress=within(options.tell, limit)
+    )
     trial = judge_unseen(plan, unseen)
-    progress("")
-    say_levels(problem.engine)
     table = analyze(problem.engine, plan.steps)
     report = _report(trial, known, unseen)
     report["seconds"] = {"assemble": assemble, **plan.seconds}
-    files: dict[str, bytes | str] = {
-        "plan.csv": csv_text(table),
-        "selection.csv": csv_text(plan.table()),
-        "scenarios.csv": csv_text(trial.table),
-        "summary.json": json.dumps(_plain(report), indent=2) + "\n",
-        "scene.json": dump_scene(problem.schedule.scene),
-    }
-    write_outputs(options, files | scene_file(problem.schedule.scene))
+    write_outputs(options, _files(trial, table, report))
     worth = trial.summary()["unseen"]
-    say(
+    said = (
         f"{aim}: {plan.objective:.6g} over {count} scenarios, gap {100 * plan.gap:.3g} %; over "
         f"{other} unseen {worth['robust']:.6g}, the nominal plan {worth['nominal']:.6g}; "
         f"written to {options.out}"
     )
-    say_idle(problem.schedule.scene, plan.steps)
-    return payloads_hold(options, problem.schedule.scene, table)
+    answer = Answer(
+        facts={"scene": scene_facts(scene), "summary": report, "plan": table},
+        text=said,
+        written=(options.out,),
+        notes=(*level_notes(problem.engine), *idle_notes(scene, plan.steps)),
+    )
+    return strictly(answer, options, exceeded(scene, table))
+
+
+def _files(
+    trial: Trial, table: pd.DataFrame, report: Mapping[str, object]
+) -> dict[str, bytes | str]:
+    """Return what is written, by file name."""
+    return {
+        "plan.csv": csv_text(table),
+        "selection.csv": csv_text(trial.plan.table()),
+        "scenarios.csv": csv_text(trial.table),
+        "summary.json": json.dumps(_plain(report), indent=2) + "\n",
+        **scene_file(trial.plan.problem.nominal.schedule.scene),
+    }
 
 
 def _asked_aim(options: argparse.Namespace) -> RobustAim:
@@ -131,7 +143,8 @@ def _drawn(scene: Scene, options: argparse.Namespace, count: int, seed: int) -> 
         name, value = split_word(text)
         if name not in SPREADS:
             raise ProblemError(
-                f"--vary {text}: there is no such; give one of {', '.join(SPREADS)}, as stiffness=3"
+                f"--vary {text} does not exist{did_you_mean(name, SPREADS)}; give one of "
+                f"{', '.join(SPREADS)}, as stiffness=3"
             )
         asked[name] = number_word(value, f"--vary {text}", zero="allowed")
     factor = asked.pop("stiffness", 3.0)

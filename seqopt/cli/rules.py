@@ -9,9 +9,12 @@ from math import radians
 
 from seqopt.cli.values import number_word, parse_robots
 from seqopt.contact.mortar import find_mortar
-from seqopt.errors import ProblemError, StepError
+from seqopt.errors import ProblemError, StepError, did_you_mean
 from seqopt.placement.standing import Standing
 from seqopt.sequence.free_rules import FreeRules
+
+COUNTS = ("least_grips", "regrips")
+RULES = ("newest", "payload", "ending", "placers", *COUNTS)
 
 
 def parse_standing(options: argparse.Namespace) -> Standing | None:
@@ -64,13 +67,12 @@ def parse_rules(texts: Sequence[str], robots: tuple[str, ...]) -> FreeRules:
         If there is no such rule, or its value is none.
     """
     given: dict[str, object] = {"robots": robots}
-    counts = ("least_grips", "regrips")
-    known = ("newest", "payload", "ending", "placers", *counts)
     for text in texts:
         name, _, value = text.partition("=")
-        if name not in known:
-            raise StepError(f"--rule {text}: there is no such; give one of {', '.join(known)}")
-        if name in counts:
+        if name not in RULES:
+            why = f"does not exist{did_you_mean(name, RULES)}; give one of {', '.join(RULES)}"
+            raise StepError(f"--rule {text} {why}")
+        if name in COUNTS:
             given[name] = int(value) if value.isdecimal() else value
             if name == "regrips" and value == "any":
                 given[name] = None

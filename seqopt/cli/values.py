@@ -115,7 +115,8 @@ def parse_numbers(
     for text in texts:
         name, value = split_word(text)
         if known is not None and name not in known:
-            raise ProblemError(f"{where} {text}: there is no such; give one of {', '.join(known)}")
+            why = f"does not exist{did_you_mean(name, known)}; give one of {', '.join(known)}"
+            raise ProblemError(f"{where} {text} {why}")
         out[name] = number_word(value, f"{where} {text}")
     return out
 
@@ -145,8 +146,9 @@ def parse_options(formulation: Formulation | str, texts: Sequence[str]) -> dict[
     for text in texts:
         name, _, value = text.partition("=")
         if name not in known:
+            hint = did_you_mean(name, known)
             raise ProblemError(
-                f"--option {text}: {formulation.name} has {', '.join(known) or 'no options'}"
+                f"--option {text}: {formulation.name} has {', '.join(known) or 'no options'}{hint}"
             )
         kind = type(known[name])
         try:
@@ -224,7 +226,7 @@ def response_word(name: str, where: str) -> str:
         names = (*CRITERIA, *RESPONSES) if where == "--criteria" else ("payload", *CHOICE_RESPONSES)
         known = ", ".join((*names, "F_ROBOT"))
         hint = did_you_mean(name, names)
-        raise ProblemError(f"{where} {name}: there is no such{hint}; give {known}")
+        raise ProblemError(f"{where} {name} does not exist{hint}; give {known}")
     return name
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from seqopt.errors import SceneError
+from seqopt.errors import SceneError, did_you_mean
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -115,7 +115,8 @@ def find_mortar(mortar: Mortar | str) -> Mortar:
     try:
         pascal = float(strength if name == "bond" else "")
     except ValueError:
+        hint = did_you_mean(name, (*MORTARS, "bond"))
         raise SceneError(
-            f"mortar {mortar!r}: give a Mortar, or one of {known}, or bond=STRENGTH (Pa)"
+            f"mortar {mortar!r}{hint}: give a Mortar, or one of {known}, or bond=STRENGTH (Pa)"
         ) from None
     return bond_mortar(pascal)

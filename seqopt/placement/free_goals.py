@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from enum import Enum
 from math import degrees, pi
 
-from seqopt.errors import ProblemError
+from seqopt.errors import ProblemError, did_you_mean
 from seqopt.placement.standing import MARGINS
 from seqopt.scene.checks import short
 
@@ -103,7 +103,8 @@ def parse_goals(text: str) -> tuple[Goal, ...]:
     words = [word.strip() for word in text.split(",")] if isinstance(text, str) else [text]
     for word in words:
         if word not in known:
-            raise ProblemError(f"aim {short(word)} does not exist; give {', '.join(known)}")
+            why = f"does not exist{did_you_mean(word, known)}; give {', '.join(known)}"
+            raise ProblemError(f"aim {short(word)} {why}")
         if words.count(word) > 1:
             raise ProblemError(f"aim {word}: it is listed twice; name it once")
     return tuple(known[word] for word in words)

@@ -67,12 +67,12 @@ class FreePlan(ShownBuild):
 
     @property
     def title(self) -> str:
-        """What it is called beside other plans."""
+        """The name of the plan where it is shown next to others."""
         return "free schedule"
 
     @property
     def worth(self) -> str:
-        """What the plan is worth, in words."""
+        """The value of the plan, and what is proven about it, in words."""
         values = ", ".join(f"{name} {value:.6g}" for name, value in self.objective.items())
         return f"{values}, {self.status}"
 
@@ -247,6 +247,8 @@ def solve_free(
     except InfeasibleError:
         raise InfeasibleError(why_impossible(problem)) from None
     solved = time.perf_counter()
+    if proof and "progress" in options:
+        options["progress"]("proving that no plan is better")
     steps = steps_of(problem.space, selection.states)
     certificate = judge_schedule(problem, selection, steps) if proof else None
     seconds = {"solve": solved - start, "verify": time.perf_counter() - solved}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -11,13 +11,14 @@ import numpy as np
 import pandas as pd
 
 from seqopt.arrays import Floats, FrozenValue, Terse
-from seqopt.errors import InfeasibleError, ProblemError, SolverError
+from seqopt.errors import InfeasibleError, ProblemError, SolverError, did_you_mean
 from seqopt.placement.schedule_formulation import (
     Finds,
     ScheduleFormulation,
     find_schedule_formulation,
 )
 from seqopt.sequence.steps import Step, StepKind
+from seqopt.work.progress import Tell, told
 
 TOLERANCE = 1e-6  # of a value: how far a point may be from what the engine says of its plan
 
@@ -137,7 +138,7 @@ def find_front(
     formulation: ScheduleFormulation | str = "pareto_zones",
     *,
     seconds: float = np.inf,
-    progress: Callable[[str], None] = lambda _: None,
+    progress: Tell = lambda _: None,
 ) -> Front:
     """Return the Pareto set of a problem, its points recomputed and its completeness judged.
 
@@ -148,7 +149,7 @@ def find_front(
     seconds : float, optional
         After which the points found are returned.
     progress : callable, optional
-        Told in a few words how far it is.
+        Told how far it is, in a few words or as a `seqopt.work.Stage`.
 
     Returns
     -------
@@ -190,13 +191,10 @@ def _require_apart(points: Floats) -> None:
             raise SolverError(f"the point {point.tolist()} is dominated by another one")
 
 
-def _require_complete(
-    problem: FrontProblem, points: Floats, progress: Callable[[str], None]
-) -> None:
+def _require_complete(problem: FrontProblem, points: Floats, progress: Tell) -> None:
     """Raise an error if a plan exists that no point dominates: bounds are searched again."""
     bounds = upper_bounds(points)
-    for i, bound in enumerate(bounds):
-        progress(f"proof: {i} of {len(bounds)} zones")
+    for bound in told("proving that no plan is missing", bounds, progress):
         if not problem.is_empty_below(bound):
             raise SolverError(f"the set lacks a point below {bound.tolist()}")
 
@@ -271,8 +269,9 @@ def pick(table: pd.DataFrame, least: str, under: Mapping[str, float] | None = No
     under = dict(under or {})
     for name in (least, *under):
         if name not in table:
-            known = ", ".join(map(str, table.columns))
-            raise ProblemError(f"pick {name}: the set has no such column; give one of {known}")
+            known = [*map(str, table.columns)]
+            why = f"the set has no such column{did_you_mean(name, known)}"
+            raise ProblemError(f"pick {name}: {why}; give one of {', '.join(known)}")
     rows = np.ones(len(table), dtype=bool)
     for name, bound in under.items():
         rows &= table[name].to_numpy(float) < bound

@@ -17,7 +17,7 @@ from seqopt.sequence.steps import Step, check_sequence, require_steps
 
 @dataclass(frozen=True, repr=False)
 class GivenSequence(ShownBuild):
-    """Steps that nobody optimized: those of a fixed method, or of a file.
+    """Steps that were not optimized: those of a fixed method, or of a file.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ class GivenSequence(ShownBuild):
     Raises
     ------
     SceneError, StepError
-        If it is no engine, these are no steps, or they are not possible in the scene.
+        If an argument is not an engine or not a list of steps, or the steps are impossible.
 
     Examples
     --------
@@ -57,7 +57,7 @@ class GivenSequence(ShownBuild):
     def __post_init__(self) -> None:
         if not isinstance(getattr(self.engine, "network", None), Network):
             kind = type(self.engine).__name__
-            raise SceneError(f"a {kind} is no engine; give seqopt.make_engine('auto', scene)")
+            raise SceneError(f"a {kind} is not an engine; give seqopt.make_engine('auto', scene)")
         check_sequence(self.engine.network.scene, require_steps(self.steps))
 
     def __repr__(self) -> str:

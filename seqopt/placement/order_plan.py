@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -23,6 +23,7 @@ from seqopt.placement.shown_build import ShownBuild
 from seqopt.responses.resources import HERE, Resources
 from seqopt.scene.orders import Order, in_order
 from seqopt.sequence.steps import Step
+from seqopt.work.progress import Tell
 
 
 @dataclass(frozen=True, repr=False)
@@ -61,12 +62,12 @@ class OrderPlan(ShownBuild):
 
     @property
     def title(self) -> str:
-        """What it is called beside other plans."""
+        """The name of the plan where it is shown next to others."""
         return "best order"
 
     @property
     def worth(self) -> str:
-        """What the plan is worth, in words."""
+        """The value of the plan, and what is proven about it, in words."""
         return f"{self.problem.free.goals[0]} {self.selection.objective:.6g}, {self.status}"
 
     def responses(self) -> pd.DataFrame:
@@ -132,7 +133,7 @@ def solve_order(
     formulation: ScheduleFormulation | str = "order_search",
     *,
     proof: bool = True,
-    progress: Callable[[str], None] | None = None,
+    progress: Tell | None = None,
     resources: Resources = HERE,
     **options: Any,
 ) -> OrderPlan:

@@ -93,12 +93,12 @@ class Plan(ShownBuild):
 
     @property
     def title(self) -> str:
-        """The name of its formulation."""
+        """The name of the formulation that found it."""
         return self.formulation.name
 
     @property
     def worth(self) -> str:
-        """What the plan is worth, in words."""
+        """The value of the plan, and what is proven about it, in words."""
         if self.certificate is None:
             return "not compared with the optimum"
         value, left_out = self.certificate.objective, self._posed.schedule.left_out

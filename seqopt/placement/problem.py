@@ -12,7 +12,7 @@ import pandas as pd
 
 from seqopt.arrays import Floats
 from seqopt.engines.interface import Engine
-from seqopt.errors import ProblemError
+from seqopt.errors import ProblemError, did_you_mean
 from seqopt.placement.costs import Budget, LayeredCosts
 from seqopt.placement.interface import Aim
 from seqopt.placement.joining import Joined
@@ -284,6 +284,6 @@ def pose(
     limits = (limits,) if isinstance(limits, Limit) else limits
     asked = ResponsesAsked(criterion.for_scene(SceneFacts(engine)), tuple(limits), tuple(also))
     if unknown := {name for move in schedule.moves for name in asked(move.bricks)} - known:
-        listed = ", ".join(sorted(known))
-        raise ProblemError(f"response {min(unknown)} does not exist; give {listed}")
+        why = f"does not exist{did_you_mean(min(unknown), known)}"
+        raise ProblemError(f"response {min(unknown)} {why}; give {', '.join(sorted(known))}")
     return Problem(asked.criterion, asked.limits, Evaluation(engine, schedule, asked, resources))

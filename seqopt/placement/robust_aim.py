@@ -10,7 +10,7 @@ from numbers import Real
 import numpy as np
 
 from seqopt.arrays import Floats
-from seqopt.errors import ProblemError
+from seqopt.errors import ProblemError, did_you_mean
 from seqopt.placement.interface import Aim
 from seqopt.scene.checks import short
 
@@ -180,7 +180,8 @@ def parse_robust(text: str) -> RobustAim:
     except ValueError:
         level = math.nan
     if math.isnan(level):
+        hint = did_you_mean(name, (*known, RobustKind.CVAR.value))
         raise ProblemError(
-            f"robust aim {text} does not exist; give worst-peak, worst-total or cvar=0.9, say"
+            f"robust aim {text} does not exist{hint}; give worst-peak, worst-total or cvar=0.9, say"
         )
     return cvar(level)

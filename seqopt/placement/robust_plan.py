@@ -81,7 +81,7 @@ class RobustPlan(ShownBuild):
 
     @property
     def worth(self) -> str:
-        """What the plan is worth, in words."""
+        """The value of the plan, and what is proven about it, in words."""
         return f"objective {self.objective:.6g}, gap {100 * self.gap:.3g} %"
 
     def responses(self) -> pd.DataFrame:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any
 
-from seqopt.errors import ProblemError
+from seqopt.errors import ProblemError, did_you_mean
 from seqopt.placement.formulation import Formulation, FormulationKind
 from seqopt.plugins import plugins
 
@@ -78,6 +78,27 @@ class ScheduleFormulation:
                 raise ProblemError(f"option {name}: {self.name} has {known}")
 
 
+def schedule_formulation_names(*finds: Finds) -> tuple[str, ...]:
+    """Return the names of the formulations of the free schedule that answer something.
+
+    Parameters
+    ----------
+    *finds : Finds
+        What.
+
+    Returns
+    -------
+    tuple of str
+        In alphabetical order.
+
+    Examples
+    --------
+    >>> schedule_formulation_names(Finds.PLAN)
+    ('schedule_search',)
+    """
+    return tuple(name for name in sorted(plugins(GROUP)) if _loaded(name).finds in finds)
+
+
 def find_schedule_formulation(
     given: ScheduleFormulation | Formulation | str, finds: Finds = Finds.PLAN
 ) -> ScheduleFormulation:
@@ -123,7 +144,10 @@ def _loaded(given: Formulation | str) -> ScheduleFormulation:
     entries = plugins(GROUP)
     if not isinstance(given, str) or given not in entries:
         known = ", ".join(sorted(entries))
-        raise ProblemError(f"{given!r} is not a formulation of the free schedule; give {known}")
+        hint = did_you_mean(given, entries)
+        raise ProblemError(
+            f"{given!r} is not a formulation of the free schedule{hint}; give {known}"
+        )
     found: object = entries[given].load()
     if not isinstance(found, ScheduleFormulation):
         raise ProblemError(

@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 
 
 class ShownBuild(Shown):
-    """Base of plans: builds whose every grip is known.
+    """Base class of plans: builds in which every grip is known.
 
-    A plan says which engine computes it, which steps it has, and what these respond.
+    A subclass has an engine, steps, and the responses of these steps.
     """
 
     if TYPE_CHECKING:
@@ -36,11 +36,11 @@ class ShownBuild(Shown):
 
         @property
         def title(self) -> str:
-            """What the plan is called beside others."""
+            """The name of the plan where it is shown next to others."""
 
         @property
         def worth(self) -> str:
-            """What the plan is worth, in words."""
+            """The value of the plan, and what is proven about it, in words."""
 
         @property
         def seconds(self) -> Mapping[str, float]:
@@ -135,7 +135,7 @@ class ShownBuild(Shown):
         return figure
 
     def animate(self, *, forces: bool = False, magnify: float = 0.0, seconds: float = 0.4) -> Any:
-        """Return the build as a film, a picture per step.
+        """Return the build as a film, with one picture per step.
 
         Parameters
         ----------
@@ -147,7 +147,7 @@ class ShownBuild(Shown):
         Returns
         -------
         seqopt.report.film.Film
-            A notebook plays it; ``save("build.gif")`` writes it to a file.
+            A notebook plays the film; ``save("build.gif")`` writes it to a file.
 
         Raises
         ------
@@ -159,12 +159,13 @@ class ShownBuild(Shown):
     def report(self, *others: ShownBuild) -> Page:
         """Return a page that shows the build step by step, in three dimensions.
 
-        It has the fixed methods beside the plan where the scene is small, tables, and charts.
+        The page also has tables and charts. If the scene is small, the fixed methods are shown
+        next to the plan.
 
         Parameters
         ----------
         *others : plan
-            Further plans for the same scene, to look at side by side.
+            Other plans for the same scene, to compare side by side.
 
         Returns
         -------

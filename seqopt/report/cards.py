@@ -1,7 +1,7 @@
 """What a notebook shows of a value: a small table and, with matplotlib, a small picture.
 
-Colors of the table are the notebook's own, so that it can be read on dark ground too; the picture
-brings its own ground. Nothing that takes long is computed for it.
+The table has the notebook's own colors, so that it can be read on a dark background too; pictures
+have a white background. Nothing slow is computed for the display.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from seqopt.placement.robust_problem import RobustProblem
 from seqopt.placement.shown_build import ShownBuild
 from seqopt.report.comparison import largest
 from seqopt.report.plan_pages import WORDS
+from seqopt.report.wording import typed
 from seqopt.scene.boxes import boxes
 from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import Schedule
@@ -199,9 +200,9 @@ def _build(value: ShownBuild) -> tuple[str, Rows]:
         return "Plan", {"": repr(value)}
     criterion = _criterion(value)
     rows: dict[str, object] = {
-        "found by": value.title,
+        "found by": typed(value.title),
         **({"criterion": criterion} if criterion else {}),
-        "worth": value.worth,
+        "result": value.worth,
         "steps": len(value.steps),
     }
     if len(scene.bricks) <= SMALL:

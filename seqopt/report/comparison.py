@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,6 +25,7 @@ from seqopt.placement.solving import on_the_way, solve
 from seqopt.report.free_row import free_plan, free_row
 from seqopt.report.methods import idle_note, method_tables
 from seqopt.responses.quantities import RESPONSES, robot_response
+from seqopt.responses.resources import Resources
 from seqopt.responses.table import force_column
 from seqopt.scene.scene import Scene
 from seqopt.sequence.free_rules import FREE
@@ -37,6 +38,7 @@ from seqopt.study.published import (
     printed_maxima,
     published_choice,
 )
+from seqopt.work.progress import Stage, Tell
 
 LARGEST = {"F_rob": "N", "M_sup": "N m", "T_max": "N", "D_max": "1e-3 mm"}
 RANKS = ["pairs", "conditional", "short_sight", "change_of_objective"]
@@ -119,7 +121,7 @@ class Comparison(Terse):
 def compare(
     engine: Engine,
     criterion: Criterion,
-    progress: Callable[[str], None] = lambda _: None,
+    progress: Tell = lambda _: None,
     robots: Sequence[str] = (),
 ) -> Comparison:
     """Analyze every method on an engine's scene and solve its loop by every formulation.
@@ -133,7 +135,7 @@ def compare(
     criterion : Criterion
         What a step costs.
     progress : callable, optional
-        Told in a few words what is done next.
+        Told how far it is, in a few words or as a `seqopt.work.Stage`.
     robots : sequence of str, optional
         Names of the robots that take part, in the order of their roles, of which methods take as
         many as they need; found from reach by default.
@@ -156,8 +158,7 @@ def compare(
     tables |= {name: plan.responses() for name, plan in plans.items()}
     rows |= {name: _row(plan) for name, plan in plans.items()}
     loop = None if problem is None else _facts(problem, rows, robots)
-    progress("free schedule")
-    notes += _add_free(engine, robots, rows, tables)
+    notes += _add_free(engine, robots, progress, (rows, tables))
     if problem is not None:
         notes += idle_note(scene, f"{problem.schedule.method} loop", problem.schedule.steps)
     notes += _add_largest(scene, rows, tables)
@@ -182,11 +183,11 @@ def _add_largest(
 def _add_free(
     engine: Engine,
     robots: Sequence[str],
-    rows: dict[str, dict[str, object]],
-    tables: dict[str, pd.DataFrame],
+    progress: Tell,
+    known: tuple[dict[str, dict[str, object]], dict[str, pd.DataFrame]],
 ) -> list[str]:
     """Add the free schedule to rows and tables, or say why there is none."""
-    free, why_not = free_plan(engine, robots)
+    (rows, tables), (free, why_not) = known, free_plan(engine, robots, progress)
     if free is None:
         return [why_not]
     tables[FREE], rows[FREE] = free.responses(), free_row(free)
@@ -196,7 +197,7 @@ def _add_free(
 def _plans(
     engine: Engine,
     criterion: Criterion,
-    progress: Callable[[str], None],
+    progress: Tell,
     robots: Sequence[str],
 ) -> tuple[dict[str, Plan], Problem | None, str]:
     """Return the plan of the modified sequential method and of every formulation on the loop.
@@ -208,12 +209,13 @@ def _plans(
     try:
         loop = robot_loop(network, robots or count)  # whose refusal says most
         if count >= MOST:
-            progress("modified sequential method")
+            progress(Stage("comparing", 0.0))
             modified = pose(engine, modified_sequential(network, robots[:3]), criterion)
             plans["modified-sequential"] = on_the_way(solve(modified, "cascade"))
-        problem = pose(engine, loop, criterion)
-        for name, formulation in formulations().items():
-            progress(f"{loop.method} loop by {name}")
+        known = formulations()
+        problem = pose(engine, loop, criterion, resources=Resources(progress=progress))
+        for done, (name, formulation) in enumerate(known.items()):
+            progress(Stage("comparing", (done + 1) / (len(known) + 1)))
             plans[name] = on_the_way(solve(problem, formulation))
     except (StepError, ProblemError) as error:
         return {}, None, str(error)

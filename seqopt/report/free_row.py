@@ -11,11 +11,14 @@ from seqopt.placement.free_plan import FreePlan
 from seqopt.placement.free_problem import pose_free
 from seqopt.placement.solving import solve
 from seqopt.sequence.free_rules import FREE, FreeRules
+from seqopt.work.progress import Tell
 
 PATIENCE = 10.0  # s, after which the best plan so far is the row
 
 
-def free_plan(engine: Engine, robots: Sequence[str]) -> tuple[FreePlan | None, str]:
+def free_plan(
+    engine: Engine, robots: Sequence[str], progress: Tell = lambda _: None
+) -> tuple[FreePlan | None, str]:
     """Return the free schedule with the smallest worst step, and of these the shortest.
 
     Parameters
@@ -23,6 +26,8 @@ def free_plan(engine: Engine, robots: Sequence[str]) -> tuple[FreePlan | None, s
     engine : Engine
     robots : sequence of str
         Names of those that take part; all by default.
+    progress : callable, optional
+        Told how far it is.
 
     Returns
     -------
@@ -34,7 +39,8 @@ def free_plan(engine: Engine, robots: Sequence[str]) -> tuple[FreePlan | None, s
     try:
         rules = FreeRules(robots=tuple(robots))
         problem = pose_free(engine, rules, WORST_OVER_METHODS, "minmax,steps")
-        return solve(problem, "schedule_search", time_limit=PATIENCE), ""
+        plan = solve(problem, "schedule_search", time_limit=PATIENCE, progress=progress)
+        return plan, ""
     except SeqoptError as error:
         return None, f"{FREE}: {error}"
 

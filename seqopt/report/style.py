@@ -81,11 +81,26 @@ class Look:
     dashes: Any
 
     def line(self) -> dict[str, Any]:
-        """Return arguments of `matplotlib.axes.Axes.plot` for a line with marks."""
+        """Return arguments of `matplotlib.axes.Axes.plot` for a line with marks.
+
+        Returns
+        -------
+        dict of str to object
+        """
         return {"color": self.color, "marker": self.marker, "ls": self.dashes}
 
     def mark(self, *, filled: bool = True) -> dict[str, Any]:
-        """Return arguments of `matplotlib.axes.Axes.plot` for marks alone."""
+        """Return arguments of `matplotlib.axes.Axes.plot` for marks alone.
+
+        Parameters
+        ----------
+        filled : bool, optional
+            Whether the marks are filled.
+
+        Returns
+        -------
+        dict of str to object
+        """
         face = self.color if filled else "white"
         return {"color": self.color, "marker": self.marker, "ls": "none", "mfc": face}
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Iterator
 
 import numpy as np
@@ -10,6 +11,8 @@ import pandas as pd
 from seqopt.placement.requirements import Criterion
 from seqopt.report.comparison import LARGEST, Comparison, LoopFacts
 from seqopt.scene.scene import Scene
+
+WIDTH = 80  # columns
 
 
 def format_comparison(comparison: Comparison, scene: Scene, criterion: Criterion) -> str:
@@ -35,34 +38,55 @@ def format_comparison(comparison: Comparison, scene: Scene, criterion: Criterion
         blocks.append(f"Loop of robots: not possible here; {comparison.refusal}")
     else:
         blocks.append(_formulations(comparison.table, loop, criterion))
+    return "\n\n".join([*blocks, *_expert(comparison)])
+
+
+def format_details(comparison: Comparison, scene: Scene) -> str:
+    """Return the force of every robot, plans under both objectives of ranks, and published ranks.
+
+    Parameters
+    ----------
+    comparison : Comparison
+    scene : Scene
+        Which was compared.
+
+    Returns
+    -------
+    str
+        Of many lines, of at most 80 columns.
+    """
+    return "\n\n".join([_methods(comparison, scene), *_expert(comparison)])
+
+
+def _expert(comparison: Comparison) -> Iterator[str]:
+    """Yield what an expert of ranks wants to know, as far as there is something."""
     if comparison.table["conditional"].notna().any():
-        blocks.append(_objectives(comparison.table))
-    if loop is not None and loop.ranks is not None:
-        blocks.append(_ranks(loop.ranks))
-    return "\n\n".join(blocks)
+        yield _objectives(comparison.table)
+    if comparison.loop is not None and comparison.loop.ranks is not None:
+        yield _ranks(comparison.loop.ranks)
 
 
 def _methods(comparison: Comparison, scene: Scene) -> str:
     """Return the largest responses of methods: under each our value and, if any, the paper's."""
     maxima, paper = comparison.maxima, comparison.printed
-    width = 12 if paper is None else 22
+    width = 12 if paper is None else 21
     lines = [f"{scene.name}: {len(scene.bricks)} bricks; largest response of any step", ""]
     lines.append(f"{'':16}" + "".join(f"{name:>{width}}" for name in maxima))
     if paper is not None:
-        lines.append(f"{'':16}" + f"{'seqopt':>14}{'paper':>8}" * maxima.shape[1])
+        lines.append(f"{'':16}" + f"{'seqopt':>13}{'paper':>8}" * maxima.shape[1])
     for row, quantity in enumerate(maxima.index):
         cells = ""
         for column in range(maxima.shape[1]):
             own = _number(maxima.iloc[row, column])
             cells += (
-                f"{own:>12}" if paper is None else f"{own:>14}{_number(paper.iloc[row, column]):>8}"
+                f"{own:>12}" if paper is None else f"{own:>13}{_number(paper.iloc[row, column]):>8}"
             )
         lines.append(f"{quantity:16}{cells}")
     return "\n".join(lines)
 
 
 def _notes(comparison: Comparison) -> str:
-    return "\n".join(["Notes", *(f"- {note}" for note in comparison.notes or ["none"])])
+    return "\n".join(["Notes", *(_wrapped(f"- {note}") for note in comparison.notes or ["none"])])
 
 
 def _formulations(table: pd.DataFrame, loop: LoopFacts, criterion: Criterion) -> str:
@@ -120,8 +144,9 @@ def _line(name: str, row: pd.Series[float]) -> str:
 def _objectives(table: pd.DataFrame) -> str:
     """Return what every plan is worth under both objectives, and the parts of heuristics' gaps."""
     lines = [
-        "Ranks over all pairs, and given the choice before; a heuristic's gap in two parts:",
-        "what it loses by not looking ahead, and what the change of objective costs",
+        "Ranks over all pairs, and given the choice before; a heuristic's gap in two",
+        "parts: what it loses by not looking ahead, and what the change of objective",
+        "costs",
         f"{'':22}{'pairs':>11}{'given':>11}{'gap':>8}{'sight':>9}{'change':>9}",
     ]
     for problem, rows in table[table["conditional"].notna()].groupby("problem", sort=False):
@@ -130,9 +155,8 @@ def _objectives(table: pd.DataFrame) -> str:
             line = f"{f'  {name}':22}{row['pairs']:11.2f}{row['conditional']:11.2f}"
             if np.isfinite(row["short_sight"]):
                 line += f"{100 * row['gap']:7.2f}%"
-                line += "".join(
-                    f"{100 * row[part]:8.2f}%" for part in ("short_sight", "change_of_objective")
-                )
+                parts = (100 * row[part] for part in ("short_sight", "change_of_objective"))
+                line += "".join(f"{round(part, 2) + 0.0:8.2f}%" for part in parts)
             lines.append(line)
     return "\n".join(lines)
 
@@ -151,10 +175,16 @@ def _rank_lines(table: pd.DataFrame) -> Iterator[str]:
         ("rank_peak", "minimax"),
     ):
         ranks = table[column]
-        yield (
+        said = (
             f"  {label:21}first in {(ranks == 1).sum()} of {len(ranks)}, "
             f"among three in {(ranks <= 3).sum()}: {' '.join(map(str, ranks))}"
         )
+        yield _wrapped(said, 23)
+
+
+def _wrapped(text: str, indent: int = 2) -> str:
+    """Return a text in lines of `WIDTH` columns."""
+    return textwrap.fill(text, WIDTH, subsequent_indent=" " * indent, break_on_hyphens=False)
 
 
 def _number(value: object) -> str:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from seqopt.errors import ProblemError
+from seqopt.work.progress import Tell
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class Resources:
     executor: Executor | None = None
     cache: Path | str | None = None
     max_memory: float | None = None
-    progress: Callable[[str], None] | None = None
+    progress: Tell | None = None
 
     def __post_init__(self) -> None:
         if isinstance(self.workers, bool) or not isinstance(self.workers, int) or self.workers < 1:

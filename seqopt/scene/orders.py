@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import networkx as nx
 
-from seqopt.errors import SceneError
+from seqopt.errors import SceneError, did_you_mean
 from seqopt.scene.checks import short, wholes
 from seqopt.scene.scene import Scene
 
@@ -84,8 +84,10 @@ def parse_order(scene: Scene, text: str) -> Order:
     for part in text.split(","):
         found = PART.fullmatch(part.strip())
         if found is None:
+            hint = did_you_mean(text, (*ORDERS, "search"))
             raise SceneError(
-                f"order {short(text)}: give {', '.join(ORDERS)}, or names of bricks as 1,2,5..9"
+                f"order {short(text)}{hint}: give {', '.join(ORDERS)}, or names of bricks as "
+                "1,2,5..9"
             )
         first, last = int(found[1]), int(found[2] or found[1])
         if abs(last - first) > len(scene.bricks):

@@ -131,8 +131,10 @@ def load_scene(name: str | Path) -> Scene:
 
 def _no_such(name: str) -> str:
     """Return what there is to say of a name that stands for no scene."""
+    kind, colon, _ = name.partition(":")
+    hint = did_you_mean(kind, KINDS) if colon else did_you_mean(name, builtin_scenes())
     return (
-        f"scene {name}: no such built-in scene or file{did_you_mean(name, builtin_scenes())}; "
+        f"scene {name}: no such built-in scene or file{hint}; "
         f"built in: {', '.join(builtin_scenes())}; or in words, as arch:span=2,rise=0.7"
     )
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from enum import Enum
 from numbers import Integral
 
-from seqopt.errors import StepError
+from seqopt.errors import StepError, did_you_mean
 from seqopt.scene.checks import short
 from seqopt.scene.parts import Robot
 from seqopt.scene.scene import Scene
@@ -109,7 +109,8 @@ class FreeRules:
         for name in (*self.robots, *self.placers):
             if name not in known:
                 listed = ", ".join(known)
-                raise StepError(f"robot {name!r} does not exist; give some of {listed}")
+                hint = did_you_mean(name, known)
+                raise StepError(f"robot {name!r} does not exist{hint}; give some of {listed}")
         team = tuple(i for i, name in enumerate(known) if name in self.robots or not self.robots)
         if not 2 <= len(team) <= MOST_ROBOTS:
             raise StepError(
@@ -215,8 +216,11 @@ def _choice(name: str, kind: type[Enum], given: object) -> Enum:
     try:
         return kind(given)
     except ValueError:
-        known = ", ".join(str(member.value) for member in kind)
-        raise StepError(f"rule {name}: {short(given)}; give one of {known}") from None
+        known = [str(member.value) for member in kind]
+        hint = did_you_mean(given, known)
+        raise StepError(
+            f"rule {name}: {short(given)}{hint}; give one of {', '.join(known)}"
+        ) from None
 
 
 def _names(name: str, given: object) -> tuple[str, ...]:

@@ -108,7 +108,7 @@ def read_rows(scene: Scene, text: str, what: str) -> list[tuple[int, Row]]:
     Raises
     ------
     StepError
-        If a column is missing or stands there twice, or the text is no CSV.
+        If a column is missing or occurs twice, or the text is not a CSV file.
     """
     try:
         return _rows(scene, csv.DictReader(io.StringIO(text), restval=""), what)

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import maximum_bipartite_matching
 
-from seqopt.errors import StepError
+from seqopt.errors import StepError, did_you_mean
 from seqopt.network.network import Network
 from seqopt.scene.parts import Brick, Robot
 from seqopt.scene.scene import Scene
@@ -50,7 +50,8 @@ def find_robots(scene: Scene, names: Sequence[str], method: str, roles: int) -> 
         return list(range(len(known)))
     for name in names:
         if name not in known:
-            raise StepError(f"robot {name!r} does not exist; give some of {', '.join(known)}")
+            why = f"does not exist{did_you_mean(name, known)}; give some of {', '.join(known)}"
+            raise StepError(f"robot {name!r} {why}")
     if len({*names}) < len(names):
         raise StepError(f"robots {', '.join(names)}: one occurs twice; name different ones")
     if len(names) != roles:

@@ -8,7 +8,7 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
-from seqopt.errors import StepError
+from seqopt.errors import StepError, did_you_mean
 from seqopt.files import read_text
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
@@ -172,8 +172,9 @@ def find_schedule(
         return schedule
     path = Path(schedule)
     if isinstance(schedule, str) and not path.suffix and not path.exists():
+        hint = did_you_mean(schedule, SCHEDULES)
         raise StepError(
-            f"schedule {schedule!r} does not exist; give one of {', '.join(SCHEDULES)}, "
+            f"schedule {schedule!r} does not exist{hint}; give one of {', '.join(SCHEDULES)}, "
             "or a CSV file"
         )
     return read_schedule(network, path)

@@ -13,7 +13,7 @@ from dataclasses import replace
 
 import networkx as nx
 
-from seqopt.errors import StepError
+from seqopt.errors import StepError, did_you_mean
 from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import Move, Schedule
 
@@ -52,7 +52,8 @@ def thin(schedule: Schedule, rule: str) -> Schedule:
     """
     found = RULE.fullmatch(rule.strip()) if isinstance(rule, str) else None
     if found is None:
-        raise StepError(f"candidates {rule!r}: give near:JOINTS or within:METERS, as near:12")
+        hint = did_you_mean(str(rule).partition(":")[0], ("near", "within"))
+        raise StepError(f"candidates {rule!r}{hint}: give near:JOINTS or within:METERS, as near:12")
     distance = _joints_away if found[1] == "near" else _meters_away
     most, scene = float(found[2]), schedule.scene
     moves = tuple(_thinned(move, distance(scene, move.bricks), most) for move in schedule.moves)

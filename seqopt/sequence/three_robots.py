@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Protocol
 
-from seqopt.errors import StepError
+from seqopt.errors import StepError, did_you_mean
 from seqopt.network.build import network_of
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
@@ -183,5 +183,6 @@ def make_schedule(name: str, network: Network | Scene, robots: Sequence[str] = (
         If there is none of that name, or the scene cannot be built by it.
     """
     if name not in SCHEDULES:
-        raise StepError(f"schedule {name!r} does not exist; give one of {', '.join(SCHEDULES)}")
+        why = f"does not exist{did_you_mean(name, SCHEDULES)}; give one of {', '.join(SCHEDULES)}"
+        raise StepError(f"schedule {name!r} {why}")
     return SCHEDULES[name](network, robots)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 import pandas as pd
@@ -15,15 +15,14 @@ from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Step, require_steps
 from seqopt.stability.assessment import Stability, Verdict, assess
 from seqopt.stability.limit_analysis import Claim
-
-Progress = Callable[[str], None]
+from seqopt.work.progress import Tell, told
 
 
 def assess_steps(
     network: Network | Scene,
     steps: Sequence[Step],
     mortar: Mortar | str,
-    progress: Progress = lambda _: None,
+    progress: Tell | None = None,
 ) -> tuple[Stability, ...]:
     """Return verdict and margins of every step.
 
@@ -34,7 +33,7 @@ def assess_steps(
     mortar : Mortar or str
         The mortar of all joints, or its name.
     progress : callable, optional
-        Called with the number of the next step, in words.
+        Told as a `seqopt.work.Stage` how far it is, step by step.
 
     Returns
     -------
@@ -55,8 +54,7 @@ def assess_steps(
     """
     network, mortar = network_of(network), find_mortar(mortar)
     out = []
-    for step in require_steps(steps):
-        progress(f"step {step.number} of {len(steps)}")
+    for step in told("assessing steps", require_steps(steps), progress):
         out.append(
             assess(step_assembly(network, step.bricks, step.grips), mortar, network.scene.up)
         )

@@ -11,6 +11,6 @@ dies, its unfinished tasks are given out again.
 
 from seqopt.work.crew import Crew, hire
 from seqopt.work.ordered import map_ordered
-from seqopt.work.progress import Progress
+from seqopt.work.progress import Progress, Stage
 
-__all__ = ["Crew", "Progress", "hire", "map_ordered"]
+__all__ = ["Crew", "Progress", "Stage", "hire", "map_ordered"]

@@ -2,15 +2,54 @@
 
 from __future__ import annotations
 
+import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator, Sized
+from dataclasses import dataclass
+from typing import Protocol, TypeAlias, TypeVar
 
 QUIET = 1.0  # s after which a computation says how far it is
 PAUSE = 0.2  # s between two lines of that
 
+Tell: TypeAlias = Callable[[object], object]  # told in words, or a `Stage`, how far something is
+Item_co = TypeVar("Item_co", covariant=True)
+
+
+class SizedIterable(Sized, Iterable[Item_co], Protocol[Item_co]):
+    """Anything with a length whose items come one after the other."""
+
+
+@dataclass(frozen=True)
+class Stage:
+    """How far one stage of a computation is.
+
+    Attributes
+    ----------
+    what : str
+        What is being done, in a few words.
+    share : float
+        How much of it is done, from 0 to 1.
+    left : float or None
+        Seconds that it will still take, as far as whoever works knows; None if that is left to
+        whoever shows it.
+
+    Examples
+    --------
+    >>> print(Stage("responses", 0.25, 12.0))
+    responses: 25 %, 12 s left
+    """
+
+    what: str
+    share: float
+    left: float | None = None
+
+    def __str__(self) -> str:
+        said = f"{self.what}: {100 * self.share:.0f} %"
+        return said if self.left is None else f"{said}, {duration(self.left)} left"
+
 
 class Progress:
-    """How far a computation is, told in a few words once it takes longer than `QUIET`.
+    """How far a computation is, told as a `Stage` once it takes longer than `QUIET`.
 
     Parameters
     ----------
@@ -19,10 +58,10 @@ class Progress:
     total : float
         How much work that is, in any unit.
     tell : callable, optional
-        Told a line; by default nobody is.
+        Told a `Stage`, whose text is a line; by default nobody is.
     """
 
-    def __init__(self, what: str, total: float, tell: Callable[[str], None] | None) -> None:
+    def __init__(self, what: str, total: float, tell: Tell | None) -> None:
         self._what, self._total, self._tell = what, max(total, 1e-300), tell
         self._start = self._told = time.perf_counter()
         self._done = 0.0
@@ -42,11 +81,87 @@ class Progress:
         self._told = now
         share = min(self._done / self._total, 1.0)
         left = (now - self._start) * (1 - share) / max(share, 1e-9)
-        self._tell(f"{self._what}: {100 * share:.0f} %, {_duration(left)} left")
+        self._tell(Stage(self._what, share, left))
 
 
-def _duration(seconds: float) -> str:
-    """Return a time in words."""
+def told(what: str, items: SizedIterable[Item_co], tell: Tell | None) -> Iterator[Item_co]:
+    """Yield items one after the other, and tell how far that is.
+
+    Parameters
+    ----------
+    what : str
+        What is done with the items, in a few words.
+    items : sequence or other iterable with a length
+    tell : callable or None
+        Told a `Stage` before the work on each item.
+
+    Yields
+    ------
+    object
+        Each item.
+
+    Examples
+    --------
+    >>> [item for item in told("steps", [4, 7], print)]
+    steps: 0 %
+    steps: 50 %
+    [4, 7]
+    """
+    for done, item in enumerate(items):
+        if tell is not None:
+            tell(Stage(what, done / len(items)))
+        yield item
+
+
+def within(tell: Tell, seconds: float) -> Tell:
+    """Return what shows words as a stage of a computation that may take so long.
+
+    Parameters
+    ----------
+    tell : callable
+        Told words as a `Stage` whose share is that of the time; a `Stage` as it is.
+    seconds : float
+        From now on; as they come where it is infinite.
+
+    Returns
+    -------
+    callable
+
+    Examples
+    --------
+    >>> within(print, 60.0)("12 points")
+    12 points: 0 %, 60 s left
+    """
+    if math.isinf(seconds) or seconds <= 0:
+        return tell
+    start = time.perf_counter()
+
+    def timed(told: object) -> None:
+        if isinstance(told, Stage):
+            tell(told)
+            return
+        took = time.perf_counter() - start
+        tell(Stage(str(told), min(took / seconds, 1.0), max(seconds - took, 0.0)))
+
+    return timed
+
+
+def duration(seconds: float) -> str:
+    """Return a time in words.
+
+    Parameters
+    ----------
+    seconds : float
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> duration(12.3), duration(600), duration(9000)
+    ('12 s', '10 min', '2.5 h')
+    """
     if seconds < 100:
         return f"{seconds:.0f} s"
     return f"{seconds / 60:.0f} min" if seconds < 6000 else f"{seconds / 3600:.1f} h"

@@ -86,13 +86,13 @@ def test_the_sturdiest_plan_is_in_degrees(capsys, tmp_path, arch):
     ("words", "status", "said"),
     [
         (["--rule", "newest=never"], 2, "rule newest: 'never'; give one of either"),
-        (["--rule", "speed=2"], 2, "--rule speed=2: there is no such; give one of newest"),
+        (["--rule", "speed=2"], 2, "--rule speed=2 does not exist; give one of newest"),
         (["--rule", "regrips=few"], 2, "rule regrips: 'few'"),
         (["--aim", "speed"], 2, "aim 'speed' does not exist"),
         (["--robots", "7"], 2, "7 robots: the free schedule takes two to 5"),
         (["--robots", "rob9,rob1"], 2, "robot 'rob9' does not exist"),
         (["--option", "width=0"], 2, "--option width=0: '0' is not a positive number"),
-        (["--option", "speed=1"], 2, "--option speed=1: there is no such; give one of width"),
+        (["--option", "speed=1"], 2, "--option speed=1 does not exist; give one of width"),
         (["--formulation", "minimax"], 2, "not a formulation of the free schedule"),
         (["--criteria", "equations-2-3"], 2, "it ranks the choices of a move"),
         (["--tilt", "3"], 2, "--tilt: it goes with --stands"),
@@ -180,7 +180,7 @@ def test_the_best_order_is_written_with_its_scene(capsys, tmp_path, arch):
     [
         (
             ["--schedule", "loop", "--formulation", "minimax"],
-            "--order search: the free schedule of",
+            "--order search: only the free schedule has it",
         ),
         (["--schedule", "free", "--max-memory", "2GB"], "--max-memory: the search of orders has"),
         (["--schedule", "free", "--aim", "steps"], "an order is chosen by a worst step"),

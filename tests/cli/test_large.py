@@ -215,12 +215,12 @@ def test_an_interrupted_choice_is_written_with_its_bound(capsys, monkeypatch, tm
     """As ctrl-C at the first finding; what is written is whole."""
     came = []
 
-    def interrupt(_):
+    def interrupt(_):  # in the place of what shows how far it is
         came.append(1)
         if len(came) == 1:
             signal.raise_signal(signal.SIGINT)
 
-    monkeypatch.setattr("seqopt.cli.optimize.tell", interrupt)
+    monkeypatch.setattr("seqopt.cli.optimize.within", lambda tell, seconds: interrupt)
     words = ["optimize", "--formulation", name, "--budget", "travel=0.8"]
     assert main([*words, "--out", str(tmp_path / "out")]) == 130
     out, err = capsys.readouterr()

@@ -76,7 +76,7 @@ def test_a_plan_over_scenarios_is_written(capsys, tmp_path, scene, aim):
         (["--seed", "3", "--schedule", "free"], "--seed: plans over scenarios alone"),
         (["--robust", "worst-peak", "--scenarios", "x"], "--scenarios x: give a whole number"),
         (["--robust", "worst-peak", "--unseen", "0"], "--unseen 0: give a whole number from 1"),
-        (["--robust", "worst-peak", "--vary", "foo=1"], "--vary foo=1: there is no such"),
+        (["--robust", "worst-peak", "--vary", "foo=1"], "--vary foo=1 does not exist"),
         (["--robust", "worst-peak", "--vary", "density=-1"], "not a positive number"),
         (["--robust", "worst-peak", "--vary", "stiffness=0.5"], "give a factor from 1"),
         (["--robust", "worst-peak", "--vary", "density=1"], "density is 1.0"),

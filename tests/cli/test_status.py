@@ -12,7 +12,6 @@ from pathlib import Path
 
 import pytest
 
-from seqopt.cli import main as commands
 from seqopt.cli.main import main
 from seqopt.cli.status import Status
 from seqopt.scene.scene_file import load_scene, save_scene
@@ -95,7 +94,7 @@ def test_an_interrupt_is_one_line(tmp_path, which, after):
 def test_an_interrupt_is_not_lost_at_the_end_of_an_object():
     program = """
 import os, signal, sys, time
-import seqopt.cli.main as commands
+import seqopt.cli.scene
 from seqopt.__main__ import run
 
 class Ends:
@@ -107,7 +106,7 @@ def wait(options):
     Ends()
     time.sleep(20)
 
-commands.COMMANDS["scene"] = wait
+seqopt.cli.scene.run = wait
 sys.argv = ["seqopt", "scene"]
 sys.exit(run())
 """
@@ -134,7 +133,7 @@ def test_what_ends_a_command_is_one_line(capsys, monkeypatch, error, status, sai
     def fails(options):
         raise error
 
-    monkeypatch.setitem(commands.COMMANDS, "scene", fails)
+    monkeypatch.setattr("seqopt.cli.scene.run", fails)
     assert main(["scene"]) == status
     err = capsys.readouterr().err
     assert said in err

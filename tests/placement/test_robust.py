@@ -333,7 +333,7 @@ def test_what_is_no_problem_is_refused():
     with pytest.raises(ProblemError, match="give a problem of"):
         robust(problem, drawn, None)
     assert robust(problem, drawn, "worst-peak") == robust(problem, drawn, WORST_PEAK)
-    with pytest.raises(ProblemError, match="robust aim worst: there is no such"):
+    with pytest.raises(ProblemError, match="robust aim worst does not exist"):
         robust(problem, drawn, "worst")
     with pytest.raises(ProblemError, match="is not a scene"):
         robust(problem, [scene, None], WORST_PEAK)

@@ -61,7 +61,7 @@ def test_a_given_sequence_shows_itself_as_a_plan_does():
     assert "given, not optimized" in build._repr_html_()
     verdicts = build.stability("epoxy")["verdict"]
     assert len(verdicts) == len(steps)
-    with pytest.raises(seqopt.SeqoptError, match="a Scene is no engine"):
+    with pytest.raises(seqopt.SeqoptError, match="a Scene is not an engine"):
         seqopt.GivenSequence(scene, steps)
-    with pytest.raises(seqopt.SeqoptError, match="is no sequence of steps"):
+    with pytest.raises(seqopt.SeqoptError, match="is not a sequence of steps"):
         seqopt.GivenSequence(engine, scene)

@@ -223,6 +223,6 @@ def test_progress_is_told_after_a_while_only(monkeypatch):
     for _ in range(10):
         now[0] += 0.4
         progress.add(1.0)
-    assert said[0] == "responses: 30 %, 3 s left"
-    assert said[-1] == "responses: 100 %, 0 s left"
+    assert str(said[0]) == "responses: 30 %, 3 s left"
+    assert str(said[-1]) == "responses: 100 %, 0 s left"
     assert len(said) == 8

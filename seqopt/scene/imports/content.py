@@ -9,6 +9,7 @@ import numpy as np
 
 from seqopt.arrays import Floats
 from seqopt.scene.library.law import JointLaw
+from seqopt.work.progress import Tell
 
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254, "ft": 0.3048}  # m
 MOST_BLOCKS = 20_000
@@ -152,6 +153,8 @@ class Given:
         How many mobile robots the scene gets.
     name : str, optional
         Of the scene.
+    progress : callable, optional
+        Told how far it is to find faces, which takes long of many blocks.
     """
 
     unit: str | None = None
@@ -162,6 +165,7 @@ class Given:
     detect: bool = False
     robots: int = 3
     name: str | None = None
+    progress: Tell | None = None
 
 
 def mean_place(blocks: Sequence[FileBlock]) -> Floats:

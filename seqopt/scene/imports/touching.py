@@ -10,10 +10,10 @@ import numpy as np
 
 from seqopt.arrays import Floats
 from seqopt.scene.checks import positive
+from seqopt.scene.convex import convex_pieces
 from seqopt.scene.detection import (
     OPPOSED,
     Surface,
-    convex_pieces,
     require_polygons,
     touching_faces,
 )
@@ -91,7 +91,8 @@ def find_touching(
     elif content.joints and all(joint.translational for joint in content.joints):
         found, said = [], ["joints are those of a frame; none has a face"]
     else:
-        found = [(f.blocks, flat_face(f.corners, f.normal)) for f in touching_faces(facets, gap)]
+        touching = touching_faces(facets, gap, given.progress)
+        found = [(f.blocks, flat_face(f.corners, f.normal)) for f in touching]
         said = [f"faces are found where blocks are no more than {1e3 * gap:.3g} mm apart"]
     faces = [held for pair, face in found for held in _on_ground(pair, face, bricks)]
     known = {frozenset(pair) for pair, _ in faces}

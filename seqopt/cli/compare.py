@@ -1,0 +1,155 @@
+"""The command ``compare``: all ways to build a scene, side by side."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+import pandas as pd
+
+from seqopt.cli.answer import Answer
+from seqopt.cli.asked import asked_engine, asked_scene, exceeded, level_notes, strictly
+from seqopt.cli.common_arguments import (
+    criterion_arguments,
+    engine_arguments,
+    form_arguments,
+    group,
+    robots_argument,
+    scene_argument,
+    strict_argument,
+)
+from seqopt.cli.compare_text import printed_largest, tell_comparison
+from seqopt.cli.criteria import asked_criterion
+from seqopt.cli.facts import scene_facts
+from seqopt.cli.layout import wrapped
+from seqopt.cli.outputs import comparison_files, require_matplotlib, write_outputs
+from seqopt.cli.values import parse_robots
+from seqopt.files import require_folder
+from seqopt.network.build import build_network
+from seqopt.report.comparison import Comparison, compare
+from seqopt.report.plan_pages import PAGE, comparison_page
+from seqopt.report.text import format_details
+
+DESCRIPTION = (
+    "Build a scene in every way that seqopt knows, on paper: the fixed sequences, a loop of robots "
+    "whose grips each formulation chooses, and the free schedule. Show the largest forces, moments "
+    "and displacements side by side; for the arch of Bruun et al. beside the figures that they "
+    "print, with a list of the inconsistencies in print."
+)
+USAGE = ("[SCENE] [--out DIR] [--details] [other options]",)
+EXAMPLES = (
+    "seqopt compare",
+    "seqopt compare wall:columns=6,courses=4 --out wall",
+    "seqopt compare arch25 --criteria worst-ratio --json",
+)
+
+
+def add_arguments(command: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``compare``.
+
+    Parameters
+    ----------
+    command : argparse.ArgumentParser
+    """
+    basic = group(command, "what is compared")
+    scene_argument(basic)
+    robots_argument(basic, "all methods, each of which takes as many as it needs")
+    basic.add_argument(
+        "--out", type=Path, metavar="DIR", help="write tables, figures and a page with all builds"
+    )
+    basic.add_argument(
+        "--details",
+        action="store_true",
+        help="also show the largest force of each robot, every formulation under both objectives "
+        "of ranks, and where the grips of the published plan rank",
+    )
+    criterion_arguments(group(command, "what a step costs (advanced)"))
+    engine_arguments(group(command, "how responses are computed (advanced)"))
+    form = group(command, "what is printed")
+    strict_argument(form)
+    form_arguments(form)
+
+
+def run(options: argparse.Namespace) -> Answer:
+    """Compare all ways to build a scene.
+
+    Parameters
+    ----------
+    options : argparse.Namespace
+        Of the command.
+
+    Returns
+    -------
+    Answer
+    """
+    scene = asked_scene(options)
+    engine = asked_engine(options, build_network(scene))
+    criterion = asked_criterion(options)
+    if options.out is not None:
+        require_matplotlib(options.out)
+        require_folder(options.out)
+    result = compare(engine, criterion, options.tell, parse_robots(options.robots))
+    told = tell_comparison(result, scene, criterion)
+    blocks = [told.text]
+    if options.details:
+        blocks.append(format_details(result, scene))
+    written: tuple[Path, ...] = ()
+    if options.out is not None and result.loop is not None:
+        options.tell("drawing figures")
+        files = comparison_files(result)
+        options.tell("writing the page")
+        write_outputs(options, files | {PAGE: comparison_page(engine, result)})
+        written = (options.out,)
+        blocks.append(_where(options.out))
+    else:
+        more = "" if options.details else "; --details shows more here"
+        blocks.append(wrapped(f"--out DIR writes tables, figures and a step viewer{more}."))
+    answer = Answer(
+        facts={"scene": scene_facts(scene), "criterion": criterion.name, **_facts(result)},
+        text="\n\n".join(blocks),
+        headings=told.headings,
+        written=written,
+        notes=level_notes(engine),
+    )
+    return strictly(answer, options, exceeded(scene, *result.tables.values()))
+
+
+def _where(folder: Path) -> str:
+    """Return which file of a folder is for what."""
+    return (
+        f"tables and figures written to {folder}\n"
+        f"  {PAGE}: every build step by step; open it in a browser\n"
+        "  comparison.csv: a row per way to build; steps_NAME.csv: a row per step of each\n"
+        "  *.png, *.svg: the figures"
+    )
+
+
+def _facts(result: Comparison) -> dict[str, object]:
+    """Return rows, notes and what the paper prints, for scripts."""
+    table = result.table.assign(
+        steps=[len(result.tables[name]) for name in result.table.index],
+        paper=pd.Series({name: printed_largest(result, name) for name in result.table.index}),
+    )
+    loop = result.loop
+    return {
+        "rows": table.rename_axis("name").reset_index(),
+        "largest_by_robot": result.maxima.to_dict(),
+        "paper_by_robot": None if result.printed is None else _paper(result),
+        "loop": None
+        if loop is None
+        else {
+            "method": loop.method,
+            "seconds": dict(loop.seconds),
+            "models_paper_count": loop.paper_models,
+            "published_ranks": loop.ranks,
+        },
+        "why_no_loop": result.refusal or None,
+        "findings": list(result.notes),
+    }
+
+
+def _paper(result: Comparison) -> dict[str, object]:
+    """Return the largest responses that the paper prints, by method and quantity."""
+    assert result.printed is not None  # asked for
+    table = result.printed.set_axis(result.maxima.columns, axis=1)
+    return {str(name): column.to_dict() for name, column in table.items()}

@@ -1,0 +1,154 @@
+"""The three forms of an answer: text for people, paths alone, and JSON for scripts."""
+
+from __future__ import annotations
+
+import io
+import json
+from importlib.metadata import version
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from seqopt.cli.answer import plain
+from seqopt.cli.main import main
+from seqopt.responses.table import analyze
+from seqopt.sequence.two_robots import cantilever
+
+SMALL = "chain:bricks=7"
+
+
+def run(capsys, *words):
+    """Exit status, standard output and standard error of one command."""
+    status = main([str(word) for word in words])
+    out, err = capsys.readouterr()
+    return status, out, err
+
+
+def strict(text):
+    """Parse JSON that other languages read too: no NaN, no Infinity."""
+
+    def refuse(name):
+        raise ValueError(name)
+
+    return json.loads(text, parse_constant=refuse)
+
+
+def test_json_of_other_languages_is_asked_for():
+    with pytest.raises(ValueError, match="NaN"):
+        strict('{"gap": NaN}')
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("scene",),
+        ("scene", "--list"),
+        ("analyze", SMALL, "--method", "sequential"),
+        ("assess", SMALL, "--method", "sequential"),
+    ],
+)
+def test_json_is_one_document_with_the_same_keys_everywhere(capsys, words):
+    status, out, _ = run(capsys, *words, "--json")
+    found = strict(out)
+    assert (found["command"], found["seqopt"]) == (words[0], version("seqopt"))
+    assert (found["exit_status"], found["written"], found["failures"]) == (status, [], [])
+    assert isinstance(found["notes"], list)
+
+
+def test_json_has_the_facts_of_the_table_with_all_digits(capsys, engine25):
+    words = ("analyze", "--method", "cantilever")
+    _, out, err = run(capsys, *words, "--json")
+    found = strict(out)
+    assert found["notes"] == [err.strip()] == ["robots: rob3 never grips"]
+    _, text, _ = run(capsys, *words)
+    table = pd.read_csv(io.StringIO(text))
+    rows = pd.DataFrame(found["steps"])
+    assert list(rows.columns) == list(table.columns)
+    exact = analyze(engine25, cantilever(engine25.network))["F_max_N"].to_numpy(float)
+    assert (rows["F_max_N"].to_numpy(float) == exact).all()
+    assert not (table["F_max_N"].to_numpy(float) == exact).all()  # the CSV has six digits
+    np.testing.assert_allclose(table["F_max_N"], exact, rtol=1e-5)
+    (over,) = found["payloads_exceeded"]
+    assert over.startswith("rob2 holds up to 409.4 N")
+
+
+def test_json_of_compare_has_what_the_text_has(capsys):
+    _, out, _ = run(capsys, "compare", "--json")
+    found = strict(out)
+    _, text, _ = run(capsys, "compare")
+    rows = {row["name"]: row for row in found["rows"]}
+    for name, row in rows.items():
+        assert f"  {name}" in text or name in ("labels", "beam")
+        assert f"{row['F_rob']:.1f}" in text
+    assert rows["sequential"]["paper"]["F_rob"] == 406.0
+    assert rows["overlap_dp"]["paper"] == {}
+    assert rows["overlap_dp"]["gap"] == pytest.approx(0.0)
+    assert found["paper_by_robot"]["sequential"]["F_rob2 [N]"] == 406.0
+    assert found["largest_by_robot"]["sequential"]["F_rob2 [N]"] == rows["sequential"]["F_rob"]
+    assert rows["sequential"]["objective"] is None
+    said = " ".join(text.split())
+    assert all(" ".join(note.split()) in said.replace("- ", "") for note in _without(found))
+
+
+def _without(found):
+    """Findings as the text has them."""
+    return [note.removeprefix("In the paper: ").replace("- ", "") for note in found["findings"]]
+
+
+def test_json_of_optimize_is_its_summary_and_its_plan(capsys, tmp_path):
+    words = ("optimize", SMALL, "--formulation", "overlap_dp", "--out", tmp_path / "a")
+    status, out, err = run(capsys, *words, "--json")
+    found = strict(out)
+    assert (status, err) == (0, "")
+    assert found["written"] == [str(tmp_path / "a")]
+    stored = json.loads((tmp_path / "a" / "summary.json").read_text(encoding="utf-8"))
+    assert found["summary"]["objective"] == stored["objective"]
+    assert len(found["plan"]) == len(pd.read_csv(tmp_path / "a" / "plan.csv"))
+
+
+def test_where_a_command_fails_there_is_no_document(capsys, tmp_path):
+    words = ("optimize", "--formulation", "overlap_dp", "--limit", "F_largest=9")
+    status, out, err = run(capsys, *words, "--out", tmp_path / "a", "--json")
+    assert (status, out, err.count("\n")) == (3, "", 1)
+
+
+def test_an_answer_that_does_not_hold_is_still_a_document(capsys):
+    status, out, err = run(capsys, "analyze", "--method", "cantilever", "--strict", "--json")
+    found = strict(out)
+    assert status == found["exit_status"] == 1
+    assert found["failures"] == [err.splitlines()[-1]]
+    assert found["failures"][0].startswith("seqopt: payload exceeded: ")
+
+
+def test_quiet_prints_the_paths_of_what_is_written(capsys, tmp_path):
+    folder, path = tmp_path / "a", tmp_path / "s.json"
+    words = ("optimize", SMALL, "--formulation", "overlap_dp", "--out", folder)
+    assert run(capsys, *words, "--quiet") == (0, f"{folder}\n", "")
+    assert run(capsys, "report", folder, "--quiet") == (0, f"{folder / 'report.html'}\n", "")
+    assert run(capsys, "scene", "--export", path, "--quiet") == (0, f"{path}\n", "")
+    words = ("analyze", "--method", "cantilever", "--out", tmp_path / "c.csv")
+    _, out, err = run(capsys, *words)
+    assert (out.startswith("49 steps"), err) == (True, "robots: rob3 never grips\n")
+    assert run(capsys, *words, "--quiet") == (0, f"{tmp_path / 'c.csv'}\n", "")
+
+
+def test_quiet_keeps_a_table_that_has_no_file_and_errors(capsys):
+    status, out, err = run(capsys, "analyze", "--method", "cantilever", "--quiet")
+    assert (out.startswith("step,type"), out.count("\n"), err) == (True, 50, "")
+    status, out, err = run(capsys, "scene", "nowhere", "--quiet")
+    assert (status, out, err.count("\n")) == (2, "", 1)
+
+
+def test_one_form_at_a_time(capsys):
+    status, out, err = run(capsys, "scene", "--quiet", "--json")
+    assert (status, out) == (2, "")
+    assert "not allowed with argument" in err
+
+
+def test_values_as_json_can_hold_them():
+    table = pd.DataFrame({"a": [1, 2], "b": [0.1, np.inf]})
+    assert plain(table) == [{"a": 1, "b": 0.1}, {"a": 2, "b": "inf"}]
+    assert plain({1: np.float64("nan"), "n": np.int64(3)}) == {"1": None, "n": 3}
+    assert plain((True, None, -np.inf, np.arange(2))) == [True, None, "-inf", [0, 1]]
+    assert plain(1 / 3) == 1 / 3
