@@ -5,7 +5,6 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
-from importlib import import_module
 
 from seqopt.cli.answer import Answer, print_answer
 from seqopt.cli.arguments import COMMANDS, asked_command, parser
@@ -51,8 +50,9 @@ def load(words: Sequence[str]) -> None:
     """
     asked = asked_command(words)
     if asked in COMMANDS:
+        import seqopt.cli.watcher  # noqa: F401, PLC0415  # of which help needs nothing
+
         COMMANDS[asked].load()
-        import_module("seqopt.cli.watcher")
 
 
 def _run(words: Sequence[str]) -> int:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -37,6 +37,7 @@ MARKED = np.array([0.46, 0.63, 0.76])
 ROBOT_COLORS = ("#0b7a75", "#7b2d8b", "#b35900", "#444444")
 ROBOT_MARKERS = "XPDs"
 LINE = 11.0  # points from one line of text to the next
+NEAR_UP, NEAR_ASIDE = 0.08, 0.3  # share of a picture within which labels are neighbors
 
 
 def draw_bricks(  # noqa: PLR0913  # what is drawn, and how, each by its name
@@ -104,7 +105,7 @@ def draw_grips(axes: Axes, network: Network, grips: Sequence[int | None], view: 
         for i, node in enumerate(grips)
         if node is not None
     }
-    below = sorted(at, key=lambda i: float(at[i][1]))  # labels keep a line of text apart
+    shifts = _apart(at, max(axes.dataLim.width, axes.dataLim.height, 0.0))
     for i, (x, y) in at.items():
         color = ROBOT_COLORS[i % len(ROBOT_COLORS)]
         marker = ROBOT_MARKERS[i % len(ROBOT_MARKERS)]
@@ -112,7 +113,7 @@ def draw_grips(axes: Axes, network: Network, grips: Sequence[int | None], view: 
         axes.annotate(
             f"{network.scene.robots[i].name} at {grips[i]}",
             (x, y),
-            (10, LINE * (below.index(i) - (len(at) - 1) / 2)),
+            (10, shifts[i]),
             textcoords="offset points",
             va="center",
             fontsize=SMALL,
@@ -120,6 +121,23 @@ def draw_grips(axes: Axes, network: Network, grips: Sequence[int | None], view: 
             zorder=6,
             path_effects=HALO,
         )
+
+
+def _apart(at: Mapping[int, Floats], size: float) -> dict[int, float]:
+    """Return how far up every label goes, points, so that those of neighbors stand in lines.
+
+    ``at`` has where marks are (2,), ``size`` how large the picture is, both m.
+    """
+    out = {}
+    for i, (x, y) in at.items():
+        near = [
+            j
+            for j, (u, v) in at.items()
+            if abs(v - y) <= NEAR_UP * size and abs(u - x) <= NEAR_ASIDE * size
+        ]
+        below = sorted(near, key=lambda j: float(at[j][1]))
+        out[i] = LINE * (below.index(i) - (len(near) - 1) / 2)
+    return out
 
 
 def _moved(network: Network, bricks: int, twist: Floats | None, magnify: float) -> Floats:

@@ -79,3 +79,11 @@ def test_blocks_of_any_shape_show_the_faces_that_look_at_the_viewer(axes):
     draw_bricks(axes, network, 6, View(), twist=np.zeros((6, 6)), marked=(2,))
     (drawn,) = axes.collections
     assert len(drawn.get_paths()) == 6 * 3  # half of each box is turned away
+
+
+def test_names_of_neighbors_stand_in_lines_and_a_name_alone_beside_its_mark(axes, engine25):
+    draw_bricks(axes, engine25.network, 18, View())
+    draw_grips(axes, engine25.network, (31, 33, 4), View())
+    up = {text.get_text(): text.xyann[1] for text in axes.texts}
+    assert up["rob3 at 4"] == 0
+    assert abs(up["rob1 at 31"] - up["rob2 at 33"]) >= 11
