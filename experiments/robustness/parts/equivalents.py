@@ -117,7 +117,6 @@ EQUIVALENT = (
     Equivalent(
         GRIPS, "softness", "else 1.0", "else 2.0", "without loose motions nothing is scaled"
     ),
-    Equivalent(GRIPS, "bricks[couples", "pair, 0", "pair, 1", "both grips hold this brick"),
     Equivalent(
         "seqopt.engines.rigid.*", "reshape(", "-1", "-2", "a negative length is what is left"
     ),
