@@ -8,7 +8,7 @@ from sphinx.application import Sphinx
 WORDS = "What the code above draws"
 
 
-def _describe(app: Sphinx, doctree: nodes.document, docname: str) -> None:
+def _describe(_app: Sphinx, doctree: nodes.document, _docname: str) -> None:
     for picture in doctree.findall(nodes.image):
         if not picture.get("alt"):
             picture["alt"] = f"{WORDS}, under the heading: {_heading(picture)}"
