@@ -22,6 +22,7 @@ extensions = [
     "sphinx_copybutton",
     "extensions.equations",
     "extensions.downloads",
+    "extensions.pictures",
 ]
 html_theme = "furo"
 html_title = "seqopt"

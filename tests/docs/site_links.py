@@ -42,13 +42,15 @@ def read(path: Path) -> Page:
 
 
 def broken(root: Path) -> list[str]:
-    """Return the links of a site that lead nowhere, and what it loads from elsewhere."""
+    """Return links that lead nowhere, what is loaded from elsewhere, and images without words."""
     pages = {path.resolve(): read(path) for path in sorted(root.rglob("*.html"))}
     found = []
     for path, page in pages.items():
         outside = [address for address in page.loads if urlsplit(address).netloc]
         lost = [link for link in page.links if not _leads(path, link, pages)]
-        found += [f"{path.relative_to(root.resolve())}: {what}" for what in (*outside, *lost)]
+        mute = [f"image {words!r}" for words in page.images if len(words.split()) < 3]
+        faults = (*outside, *lost, *mute)
+        found += [f"{path.relative_to(root.resolve())}: {what}" for what in faults]
     return found
 
 

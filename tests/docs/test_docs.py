@@ -44,19 +44,38 @@ def test_the_site_builds_strictly(tmp_path):
         assert "guides/infeasible.html" in browsed(tmp_path, f"{search}?q=infeasible")
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("flaw", ["[lost](nowhere.md)", "```{code-cell}\nassert 1 == 2\n```"])
-def test_a_flaw_fails_the_build(tmp_path, flaw):
-    source = tmp_path / "docs"
+def build_page(folder, text):
+    """Build a site of one executed page with the settings of the documentation."""
+    source = folder / "docs"
     source.mkdir()
     shutil.copy(ROOT / "docs" / "conf.py", source)
     for part in ("extensions", "_static"):
         shutil.copytree(ROOT / "docs" / part, source / part)
     front = "---\nfile_format: mystnb\nkernelspec:\n  name: python3\n---\n"
-    (source / "index.md").write_text(f"{front}# Page\n\n{flaw}\n", encoding="utf-8")
-    done = build(source, tmp_path / "html")
+    (source / "index.md").write_text(f"{front}# Page\n\n{text}\n", encoding="utf-8")
+    return build(source, folder / "html")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "flaw",
+    ["[lost](nowhere.md)", "```{code-cell}\nassert 1 == 2\n```", "{term}`lost`", r"$\frac{1}$"],
+)
+def test_a_flaw_fails_the_build(tmp_path, flaw):
+    done = build_page(tmp_path, flaw)
     assert done.returncode != 0
-    assert "index.md" in done.stderr  # the page is at fault, not how it is built
+    assert "index.md" in done.stderr or "cannot become MathML" in done.stderr  # the page's fault
+
+
+@pytest.mark.slow
+def test_what_code_draws_has_words_and_equations_need_no_script(tmp_path):
+    cell = "```{code-cell}\nimport matplotlib.pyplot as plt\n_ = plt.plot([1, 2])\n```"
+    done = build_page(tmp_path, f"$$ x^2 $$\n\n## Curve\n\n{cell}")
+    assert done.returncode == 0, done.stderr
+    page = (tmp_path / "html" / "index.html").read_text(encoding="utf-8")
+    assert 'alt="What the code above draws, under the heading: Curve"' in page
+    assert "<msup><mi>x</mi><mn>2</mn></msup>" in page
+    assert broken(tmp_path / "html") == []
 
 
 @pytest.mark.slow

@@ -114,4 +114,9 @@ def test_equations_become_mathml():
 def test_links_that_lead_nowhere_are_seen(tmp_path):
     (tmp_path / "a.html").write_text('<h1 id="x"></h1><a href="b.html#y"></a><a href="#x"></a>')
     (tmp_path / "b.html").write_text('<script src="https://cdn.example/x.js"></script>')
-    assert broken(tmp_path) == ["a.html: b.html#y", "b.html: https://cdn.example/x.js"]
+    (tmp_path / "c.html").write_text('<img alt="_images/x.png"><img alt="A wall of bricks">')
+    assert broken(tmp_path) == [
+        "a.html: b.html#y",
+        "b.html: https://cdn.example/x.js",
+        "c.html: image '_images/x.png'",
+    ]
