@@ -70,6 +70,7 @@ def test_importing_the_door_loads_none_of_its_rooms():
     assert done.stdout.split() == []
 
 
+@pytest.mark.slow
 def test_a_heavy_import_is_seen():
     assert loaded_by("import seqopt.report.charts") == ["matplotlib"]
     assert "cvxpy" in loaded_by("import seqopt; seqopt.formulations()")

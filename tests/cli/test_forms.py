@@ -73,6 +73,7 @@ def test_json_has_the_facts_of_the_table_with_all_digits(capsys, engine25):
     assert over.startswith("rob2 holds up to 409.4 N")
 
 
+@pytest.mark.slow
 def test_json_of_compare_has_what_the_text_has(capsys):
     _, out, _ = run(capsys, "compare", "--json")
     found = strict(out)

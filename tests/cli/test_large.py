@@ -210,7 +210,14 @@ def test_fewer_candidates_are_a_heuristic_that_says_so(capsys, tmp_path):
     assert "give near:JOINTS or within:METERS" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("name", ["labels", "lagrangian", "overlap_mip"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "labels",
+        pytest.param("lagrangian", marks=pytest.mark.slow),
+        pytest.param("overlap_mip", marks=pytest.mark.slow),
+    ],
+)
 def test_an_interrupted_choice_is_written_with_its_bound(capsys, monkeypatch, tmp_path, name):
     """As ctrl-C at the first finding; what is written is whole."""
     came = []

@@ -171,6 +171,7 @@ def test_optimize(capsys, tmp_path):
     assert (status, out.count("\n")) == (0, 91)
 
 
+@pytest.mark.slow
 def test_optimize_a_schedule_from_a_file(capsys, tmp_path, loop25):
     """Written out and read again, the loop gives the same plan."""
     path = tmp_path / "mine.csv"

@@ -31,6 +31,7 @@ def test_a_list_and_an_export_are_two_things(capsys, tmp_path):
     assert not path.exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", builtin_scenes())
 def test_a_built_in_scene_is_exported_and_read_again(capsys, tmp_path, name):
     path = tmp_path / "scene.json"

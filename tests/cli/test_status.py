@@ -62,6 +62,7 @@ def test_streams_that_are_closed_or_full(line, status, said):
     assert len(notes) <= 1
 
 
+@pytest.mark.slow
 @posix
 def test_a_closed_stream_does_not_spoil_a_file(tmp_path):
     out = tmp_path / "out.csv"

@@ -174,6 +174,7 @@ def test_columns_are_those_of_the_terminal_within_reason(monkeypatch, width, fou
     assert all(line.startswith("  ") for line in lines[1:])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("words", [(), ("--details",)])
 def test_what_is_compared_fits_eighty_columns(capsys, monkeypatch, words):
     monkeypatch.setenv("COLUMNS", "80")

@@ -168,13 +168,17 @@ def test_readme_python_runs(capsys):
     assert capsys.readouterr().out.startswith("(4, ")
 
 
+QUICK = ("engines", "scenes")  # pages whose examples are among the quick tests
+
+
 def examples():
     """Python blocks of the documentation that are followed by the output they print."""
     pattern = re.compile(r"```python\n(.*?)```\n\n```text\n(.*?)```", flags=re.DOTALL)
     pages = {*(ROOT / "docs").rglob("*.md")} - {ROOT / "docs" / f"{name}.md" for name in PAGES}
     for page in sorted(pages):
         for number, match in enumerate(pattern.finditer(page.read_text(encoding="utf-8"))):
-            yield pytest.param(*match.groups(), id=f"{page.stem}-{number}")
+            marks = [] if page.stem in QUICK else pytest.mark.slow
+            yield pytest.param(*match.groups(), id=f"{page.stem}-{number}", marks=marks)
 
 
 @pytest.mark.parametrize(("code", "printed"), [*examples()])

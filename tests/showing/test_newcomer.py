@@ -18,7 +18,12 @@ BUILDS = {
 }
 
 
-@pytest.mark.parametrize("name", BUILDS)
+QUICK = ("own arch", "own wall")
+
+
+@pytest.mark.parametrize(
+    "name", [n if n in QUICK else pytest.param(n, marks=pytest.mark.slow) for n in BUILDS]
+)
 def test_one_line_makes_a_plan_that_shows_itself(name):
     scene, given = BUILDS[name]
     plan = seqopt.optimize(scene, **given)

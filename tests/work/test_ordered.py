@@ -109,6 +109,7 @@ def test_the_first_error_is_raised_whoever_works():
     assert multiprocessing.active_children() == []
 
 
+@pytest.mark.slow
 def test_a_worker_that_dies_is_replaced_and_nothing_is_lost(tmp_path):
     with hire(workers=2) as crew:
         assert list(map_ordered(partial(die_once, tmp_path), range(12), crew)) == WANTED
