@@ -44,6 +44,8 @@ if TYPE_CHECKING:
     from seqopt.placement.solving import solve
     from seqopt.responses.table import analyze
     from seqopt.scene.arch import ArchShape, arch_scene
+    from seqopt.scene.parts import Robot
+    from seqopt.scene.reach import Sphere
     from seqopt.scene.scenarios import scenarios
     from seqopt.scene.scene import Scene
     from seqopt.scene.scene_file import load_scene, save_scene
@@ -79,6 +81,8 @@ _HOMES = {
     "placement.solving": ("solve",),
     "responses.table": ("analyze",),
     "scene.arch": ("ArchShape", "arch_scene"),
+    "scene.parts": ("Robot",),
+    "scene.reach": ("Sphere",),
     "scene.scenarios": ("scenarios",),
     "scene.scene": ("Scene",),
     "scene.scene_file": ("load_scene", "save_scene"),
@@ -98,6 +102,8 @@ _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 
 __all__ = [  # noqa: RUF022  # in the order in which they are met
     "Scene",
+    "Robot",
+    "Sphere",
     "load_scene",
     "save_scene",
     "ArchShape",

@@ -19,7 +19,7 @@ from seqopt.cli.facts import scene_facts
 from seqopt.cli.free_files import free_files
 from seqopt.cli.means import parse_size
 from seqopt.cli.order import SEARCH, optimize_order
-from seqopt.cli.outputs import write_outputs
+from seqopt.cli.outputs import write_outputs, written_to
 from seqopt.cli.rules import parse_rules, parse_standing
 from seqopt.cli.status import Status
 from seqopt.cli.values import parse_limits, parse_numbers, parse_robots, parse_time_limit
@@ -87,7 +87,7 @@ def _said(plan: FreePlan, options: argparse.Namespace) -> str:
     return (
         f"{plan.formulation.name} ({plan.formulation.kind.value}): {values}, {plan.status}; "
         f"{len(plan.steps)} steps, {plan.regrips} regrips, {plan.problem.sets.solved} models; "
-        f"written to {options.out}"
+        f"{written_to(options.out)}"
     )
 
 

@@ -11,7 +11,7 @@ from seqopt.cli.answer import Answer
 from seqopt.cli.asked import exceeded, idle_notes, level_notes, strictly
 from seqopt.cli.facts import scene_facts
 from seqopt.cli.free import optimize_free, require_loop
-from seqopt.cli.outputs import plan_files, worth, write_outputs
+from seqopt.cli.outputs import plan_files, worth, write_outputs, written_to
 from seqopt.cli.posing import asked_problem
 from seqopt.cli.robust import optimize_robust, require_no_scenarios
 from seqopt.cli.status import Status
@@ -93,7 +93,7 @@ def _answer(
     over = exceeded(scene, table)
     said = (
         f"{plan.formulation.name} ({plan.formulation.kind.value}): {worth(plan)}, "
-        f"{plan.models} models; written to {options.out}"
+        f"{plan.models} models; {written_to(options.out)}"
     )
     stopped = plan.selection.end is End.INTERRUPTED
     answer = Answer(

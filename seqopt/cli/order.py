@@ -11,7 +11,7 @@ from seqopt.cli.facts import scene_facts
 from seqopt.cli.free_files import free_files
 from seqopt.cli.layout import wrapped
 from seqopt.cli.means import parse_resources
-from seqopt.cli.outputs import write_outputs
+from seqopt.cli.outputs import write_outputs, written_to
 from seqopt.cli.status import Status
 from seqopt.cli.values import parse_numbers, parse_time_limit
 from seqopt.errors import ProblemError
@@ -70,7 +70,7 @@ def optimize_order(options: argparse.Namespace, free: FreeProblem) -> Answer:
 
 def _answer(options: argparse.Namespace, found: OrderPlan, name: str) -> Answer:
     """Return the order and what its plan is worth, once it is written."""
-    said = f"{name} {_said(found)}; written to {options.out}"
+    said = f"{name} {_said(found)}; {written_to(options.out)}"
     order = ", ".join(map(str, found.order))
     stopped = found.selection.stopped == "interrupt"
     return Answer(

@@ -15,6 +15,7 @@ from seqopt.files import csv_text, require_apart, write_folder
 from seqopt.placement.plan import Plan
 from seqopt.placement.watch import trace_rows
 from seqopt.report.comparison import Comparison
+from seqopt.report.plan_pages import PAGE
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import builtin_scenes, dump_scene
 
@@ -106,6 +107,20 @@ def worth(plan: Plan) -> str:
     if among != "all":
         return f"objective {plan.certificate.objective:.6g}, {among}"
     return f"objective {plan.certificate.objective:.6g}, gap {100 * plan.certificate.gap:.3g} %"
+
+
+def written_to(folder: Path) -> str:
+    """Return where a folder with a page was written, and what shows it.
+
+    Parameters
+    ----------
+    folder : pathlib.Path
+
+    Returns
+    -------
+    str
+    """
+    return f"written to {folder}; {folder / PAGE} shows it step by step"
 
 
 def write_outputs(options: argparse.Namespace, files: Mapping[str, bytes | str]) -> None:

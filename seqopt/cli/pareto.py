@@ -22,7 +22,7 @@ from seqopt.cli.common_arguments import (
 from seqopt.cli.facts import scene_facts
 from seqopt.cli.free import posed_free
 from seqopt.cli.free_arguments import add_rules
-from seqopt.cli.outputs import require_matplotlib, write_outputs
+from seqopt.cli.outputs import require_matplotlib, write_outputs, written_to
 from seqopt.cli.values import parse_numbers, parse_robots
 from seqopt.engines.interface import Engine
 from seqopt.errors import ProblemError, StepError, did_you_mean
@@ -160,7 +160,7 @@ def run(options: argparse.Namespace) -> Answer:
             "points": shown_table(front.table),
             "picked": picked,
         },
-        text=f"{said}; written to {options.out}",
+        text=f"{said}; {written_to(options.out)}",
         written=(options.out,),
     )
 

@@ -105,6 +105,11 @@ class AutoEngine(NamedEngine):
         """The network whose nodes and edges the fields follow."""
         return self._rigid.network
 
+    @property
+    def rigid(self) -> ComplianceEngine:
+        """Rigid bricks on springs that never break: for what need not be the last word."""
+        return self._rigid
+
     def solve(self, bricks: int, grips: ArrayLike, want: Want = Want.RESPONSES) -> Fields:
         """Return the fields of a partial structure for many grip sets.
 

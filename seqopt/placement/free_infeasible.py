@@ -29,8 +29,10 @@ def why_impossible(problem: FreeProblem) -> str:
     -------
     str
         Naming the brick at which it stops and what opens a way: a rule to loosen, or how far a
-        limit has to be raised.
+        limit has to be raised. An engine that has a ``rigid`` one leaves this to it: what is tried
+        here may be far beyond what joints carry, where discrete elements take seconds a state.
     """
+    problem = replace(problem, engine=getattr(problem.engine, "rigid", problem.engine))
     graph = explore(replace(problem, goals=STEPS))
     placed = problem.network.scene.placed
     stops = len(graph.levels) - 1

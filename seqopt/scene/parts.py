@@ -13,13 +13,13 @@ import numpy as np
 
 from seqopt.arrays import Terse, Vector
 from seqopt.errors import SceneError
-from seqopt.scene.checks import axes, positive, printable, short, vector, whole, wholes
-from seqopt.scene.polygon import convex_polygon, rows
+from seqopt.scene.checks import axes, positive, printable, vector, whole, wholes
+from seqopt.scene.polygon import convex_polygon
 from seqopt.scene.reach import Anywhere, Reach, as_reach
 from seqopt.scene.shape import Polyhedron
+from seqopt.scene.shape_checks import check_shape, two_points
 
 THICKEST = 0.5  # of a joint that does not say, over the smallest dimension of its bricks
-SAME_PLACE = 1e-6  # distance treated as zero, over the size of a block
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -87,9 +87,10 @@ class Brick(Terse):
                 f"give one of its nodes {list(self.nodes)}"
             )
         if self.node_offsets is not None:
-            _set(self, "node_offsets", _offsets(where, self.node_offsets))
+            _set(self, "node_offsets", two_points(where, self.node_offsets))
         if self.shape is not None:
-            _check_shape(where, self)
+            across = (self.length_axis, self.width_axis)
+            check_shape(where, self.shape, self.dimensions, across)
 
     @property
     def volume(self) -> float:
@@ -254,6 +255,13 @@ class Robot:
     ------
     SceneError
         If the name cannot be printed or the payload is not a positive number.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> left = seqopt.Sphere(center=(0.3, -0.5, 0.6), radius=1.0)
+    >>> seqopt.Robot(name="left", payload=500.0, reach=left)
+    Robot(name='left', payload=500.0, reach=Sphere(center=(0.3, -0.5, 0.6), radius=1.0))
     """
 
     name: str
@@ -264,34 +272,6 @@ class Robot:
         printable("robot", self.name)
         _set(self, "reach", as_reach(f"robot {self.name}: reach", self.reach))
         _set(self, "payload", positive(f"robot {self.name}: payload", self.payload, "N"))
-
-
-def _offsets(where: str, given: tuple[Vector, Vector]) -> tuple[Vector, Vector]:
-    """Return where the nodes of a brick are if they are two places."""
-    found = [vector(f"{where}: node_offsets", row) for row in rows(f"{where}: node_offsets", given)]
-    if len(found) != 2 or found[0] == found[1]:
-        raise SceneError(f"{where}: node_offsets are {short(given)}; give two different points")
-    return found[0], found[1]
-
-
-def _check_shape(where: str, brick: Brick) -> None:
-    """Require a shape about the centroid that extends as far as the dimensions say."""
-    shape, size = brick.shape, max(brick.dimensions)
-    if not isinstance(shape, Polyhedron):
-        raise SceneError(f"{where}: shape is {short(shape)}; give a Polyhedron")
-    off = math.hypot(*shape.centroid.tolist())
-    if not off <= SAME_PLACE * size:
-        raise SceneError(
-            f"{where}: the centroid of its shape is {off:.3g} m from its position; give vertices "
-            "from the centroid"
-        )
-    length, width = np.array(brick.length_axis), np.array(brick.width_axis)
-    extents = shape.extents(np.stack([length, width, np.cross(length, width)]))
-    if not np.allclose(extents, brick.dimensions, rtol=0.0, atol=SAME_PLACE * size):
-        raise SceneError(
-            f"{where}: dimensions are {list(brick.dimensions)}, and its shape extends "
-            f"{[float(f'{e:.6g}') for e in extents]} along its axes; give these"
-        )
 
 
 def _set(value: object, name: str, content: object) -> None:

@@ -85,6 +85,12 @@ class Sphere:
     ------
     SceneError
         If the radius is not a positive number or the center is not finite.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> seqopt.Sphere(center=(0.0, 0.0, 0.5), radius=1.0).covers((0.0, 0.9, 0.5))
+    True
     """
 
     center: Vector

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -168,6 +168,27 @@ class Scene(Shown):
         """The bricks in build order."""
         by_name = {brick.name: brick for brick in self.bricks}
         return tuple(by_name[name] for name in self.build_order)
+
+    def with_robots(self, *robots: Robot) -> Scene:
+        """Return the same scene with other robots.
+
+        Parameters
+        ----------
+        *robots : Robot
+            All robots of the new scene.
+
+        Returns
+        -------
+        Scene
+
+        Examples
+        --------
+        >>> import seqopt
+        >>> pair = [seqopt.Robot(name=name, payload=400.0) for name in ("left", "right")]
+        >>> seqopt.load_scene("arch25").with_robots(*pair)
+        <Scene arch25: 25 bricks, 24 joints, 2 ground ends, 2 robots>
+        """
+        return replace(self, robots=robots)
 
     def plot(self, bricks: int | None = None) -> Figure:
         """Draw the scene, or its first bricks.

@@ -333,8 +333,9 @@ def test_compare_writes_tables_and_figures(capsys, tmp_path):
     )
     names = {path.name for path in tmp_path.iterdir()}
     assert {"comparison.csv", "published_ranks.csv", "steps_overlap_dp.csv"} <= names
-    for name in ("maxima.png", "responses.svg", "gap_against_cost.png"):
-        assert (tmp_path / name).read_bytes().startswith(b"\x89PNG")
+    for name in ("maxima", "responses", "gap_against_cost"):
+        assert (tmp_path / f"{name}.png").read_bytes().startswith(b"\x89PNG")
+        assert (tmp_path / f"{name}.svg").read_bytes().startswith(b"<?xml")
     ranks = pd.read_csv(tmp_path / "published_ranks.csv")
     assert len(ranks) == 22
 

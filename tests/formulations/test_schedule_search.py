@@ -12,6 +12,9 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import seqopt
+from seqopt.contact.elastic_limits import find_elastic_limits
+from seqopt.contact.mortar import EPOXY
+from seqopt.engines.auto import AutoEngine, Level
 from seqopt.engines.interface import Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, MechanismError, ProblemError
@@ -348,6 +351,17 @@ def test_travel_is_that_of_the_steps():
             for a, b in pairwise(held)
         )
     assert plan.certificate.objective[1] == pytest.approx(ways)
+
+
+def test_what_opens_a_way_is_asked_of_rigid_bricks(arch25):
+    """Far beyond what joints carry, discrete elements would take seconds a state."""
+    engine = AutoEngine(arch25)
+    two = FreeRules(robots=("rob1", "rob2"), least_grips=1)
+    with pytest.raises(InfeasibleError, match=r"brick 25 .* with payload=ignored"):
+        seqopt.solve(pose_free(engine, two, ONES, "steps"), "schedule_search")
+    assert {choice.level for choice in engine.tally} == {Level.RIGID}
+    far = engine.rigid.solve(24, [[1]], Want.JOINTS).joint_wrench  # a state on the way
+    assert find_elastic_limits(engine.network, EPOXY).exceeded(far).all()
 
 
 @pytest.mark.slow

@@ -32,6 +32,18 @@ def test_one_line_makes_a_plan_that_shows_itself(name):
         assert {*first} == {ground.brick for ground in plan.engine.network.scene.grounds}
 
 
+def test_own_robots_build_the_same_scene():
+    scene = seqopt.load_scene("wall:columns=2,courses=2")
+    near = seqopt.Sphere(center=(0.0, 0.0, 0.0), radius=5.0)
+    pair = [seqopt.Robot(name=name, payload=300.0, reach=near) for name in ("left", "right")]
+    own = scene.with_robots(*pair)
+    assert (own.robots, own.bricks) == (tuple(pair), scene.bricks)
+    plan = seqopt.optimize(own, "free", least_grips=1)
+    assert set(plan.grips()["robot"]) == {"left", "right"}
+    with pytest.raises(seqopt.SeqoptError, match="robots"):
+        scene.with_robots("left")
+
+
 def test_a_report_shows_plans_side_by_side():
     scene = seqopt.load_scene("wall:columns=3,courses=2")
     free, loop = seqopt.optimize(scene, "free"), seqopt.optimize(scene)
