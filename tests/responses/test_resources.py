@@ -213,7 +213,7 @@ def test_resources_that_cannot_be_meant_are_refused(wrong):
 
 @pytest.mark.parametrize(
     "criterion",
-    [c if c is CRITERIA[0] else pytest.param(c, marks=pytest.mark.slow) for c in CRITERIA],
+    [pytest.param(c, marks=[pytest.mark.slow] * bool(i)) for i, c in enumerate(CRITERIA)],
 )
 def test_costs_are_the_same_where_responses_are_not_kept(engine25, loop25, criterion):
     """Where there is memory for costs alone, responses come and go; nothing else changes."""
