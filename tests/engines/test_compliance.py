@@ -161,9 +161,9 @@ def test_a_correction_is_kept_for_the_same_bricks_and_gets_their_operator(monkey
     made, helped = [], []
 
     class Watched(compliance.Refinement):
-        def __init__(self, network, bricks, *more):
+        def __init__(self, network, bricks, *more, **named):
             made.append(bricks)
-            super().__init__(network, bricks, *more)
+            super().__init__(network, bricks, *more, **named)
 
         def solve(self, columns, operator, *more):
             helped.append(operator is not None)

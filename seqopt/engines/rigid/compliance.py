@@ -149,7 +149,8 @@ class ComplianceEngine(NamedEngine):
         operator = self._operator(bricks, columns) if bricks <= len(self._tree.spring) else None
         with one_thread():
             if self._refinement is None or self._refinement.bricks != bricks:
-                self._refinement = Refinement(self._network, bricks, self._shared)
+                tied = operator is not None  # the tree that it grew on reaches them all
+                self._refinement = Refinement(self._network, bricks, self._shared, tied=tied)
             return self._refinement.solve(columns, operator, largest, self._basis)
 
 

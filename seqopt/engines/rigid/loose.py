@@ -70,12 +70,14 @@ class HeldSystem:
         return states, force * self.parts.unit
 
 
-def hold_loose(parts: Ungripped) -> HeldSystem:
+def hold_loose(parts: Ungripped, *, tied: bool = False) -> HeldSystem:
     """Return the factored system of a partial structure with its loose motions held.
 
     Parameters
     ----------
     parts : Ungripped
+    tied : bool, optional
+        Whether springs are known to tie every brick to the ground, however softly.
 
     Returns
     -------
@@ -86,13 +88,13 @@ def hold_loose(parts: Ungripped) -> HeldSystem:
     SolverError
         If it is exactly singular all the same.
     """
-    matrix, rows = parts.matrix, _held_motions(parts)
+    matrix, rows = parts.matrix, _held_motions(parts, tied=tied)
     if rows.shape[0]:
         joints = len(parts.wrench_unit)
         wide = sparse.csr_array(
             (rows.data, rows.indices + joints, rows.indptr), shape=(rows.shape[0], matrix.shape[0])
         )
-        matrix = sparse.block_array([[matrix, -wide.T], [wide, None]], format="csr")
+        matrix = sparse.block_array([[matrix, -wide.T], [wide, None]], format="csc")
     try:
         # springs first, then bricks as they are built: neighbors stand near each other
         factors = splu(
@@ -108,13 +110,16 @@ def hold_loose(parts: Ungripped) -> HeldSystem:
     return HeldSystem(parts, rows.shape[0], factors)
 
 
-def _held_motions(parts: Ungripped) -> sparse.csr_array:
+def _held_motions(parts: Ungripped, *, tied: bool) -> sparse.csr_array:
     """Return the rows (m, 6b) whose products with scaled twists say how far loose motions go."""
     stiff = parts.stiffness.reshape(-1, 6)
     firm = stiff.min(axis=1) >= SOFT
+    none = sparse.csr_array((0, 6 * parts.bricks))
+    if tied and firm.all():
+        return none
     label, first = _clusters(parts, firm)
     if not len(first):
-        return sparse.csr_array((0, 6 * parts.bricks))
+        return none
     rigid = _cluster_motions(parts, label, first)
     soft = np.repeat(~firm, 6)
     strain = np.sqrt(parts.stiffness[soft])[:, None] * (parts.deformation[soft] @ rigid)

@@ -59,11 +59,11 @@ def mixed_system(parts: Ungripped, grips: Ints, shift: Floats | None = None) -> 
     matrix, joints = parts.matrix, len(parts.wrench_unit)
     if shift is not None:
         below = sparse.diags_array(np.concatenate([np.zeros(joints), shift]))
-        matrix = sparse.csr_array(matrix + below)
+        matrix = sparse.csc_array(matrix + below)
     if len(force):
         of_all = (forbidden.data, forbidden.indices + joints, forbidden.indptr)
         rows = sparse.csr_array(of_all, shape=(forbidden.shape[0], matrix.shape[0]))
-        matrix = sparse.block_array([[matrix, -rows.T], [rows, None]], format="csr")
+        matrix = sparse.block_array([[matrix, -rows.T], [rows, None]], format="csc")
     return MixedSystem(forbidden, sparse.csc_array(matrix), force)
 
 

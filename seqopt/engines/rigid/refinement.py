@@ -44,12 +44,16 @@ class Refinement:
         How many bricks stand.
     shared : Shared, optional
         What the systems of all brick counts are cut from, if it is known.
+    tied : bool, optional
+        Whether springs are known to tie every brick to the ground.
     """
 
-    def __init__(self, network: Network, bricks: int, shared: Shared | None = None) -> None:
+    def __init__(
+        self, network: Network, bricks: int, shared: Shared | None = None, *, tied: bool = False
+    ) -> None:
         self.network, self.bricks = network, bricks
         self.parts = ungripped_system(network, bricks, shared)
-        self.held: HeldSystem = hold_loose(self.parts)
+        self.held: HeldSystem = hold_loose(self.parts, tied=tied)
         self.inner = self.parts.inner
         weighed = sparse.csr_array(self.parts.load[None])
         self.pulls = sparse.vstack([self.inner / self.parts.unit, weighed], format="csr")
@@ -145,7 +149,8 @@ class Corrector:
         wrench, twist = unscaled(parts, answers.states[done])
         held = answers.force[done].reshape(int(done.sum()), columns.shape[1], 3)
         solution = Solution(twist, wrench, held)
-        fields = respond(self.network, parts.statics, parts.motion, columns[done], solution)
+        motion = operator.maps.motion if self.basis is SPACE else parts.motion
+        fields = respond(self.network, parts.statics, motion, columns[done], solution)
         if done.all():
             return fields
         return merge_sets(done, fields, solve_mixed(self.network, bricks, columns[~done]))

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy import sparse
 
-from seqopt.arrays import Floats, FrozenValue, Ints
+from seqopt.arrays import Floats, FrozenValue, Ints, frozen
 from seqopt.network.kinematics import deformation, node_motion, point_motion
 from seqopt.network.network import Network
 from seqopt.network.statics import Statics, build_statics
@@ -40,8 +41,6 @@ class Ungripped(FrozenValue):
     ----------
     network : Network
     bricks : int
-    motion : (3n, 6b) sparse
-        Displacements of the nodes for unit twists.
     inner : (6b, 6b) sparse
         Those of the inner nodes for scaled twists, in the order of ``network.inner``, m.
     statics : Statics
@@ -63,17 +62,21 @@ class Ungripped(FrozenValue):
 
     network: Network
     bricks: int
-    motion: sparse.csr_array
     inner: sparse.csr_array
     statics: Statics
     deformation: sparse.csr_array
     stiffness: Floats
-    matrix: sparse.csr_array
+    matrix: sparse.csc_array
     load: Floats
     acting: Ints
     twist_unit: Floats
     wrench_unit: Floats
     unit: float
+
+    @cached_property
+    def motion(self) -> sparse.csr_array:
+        """Displacements of the nodes for unit twists, (3n, 6b)."""
+        return frozen(node_motion(self.network, self.bricks))
 
 
 def share(network: Network) -> Shared:
@@ -130,7 +133,6 @@ def ungripped_system(network: Network, bricks: int, shared: Shared | None = None
     return Ungripped(
         network=network,
         bricks=bricks,
-        motion=node_motion(network, bricks),
         inner=inner,
         statics=shared.statics,
         deformation=gap,
@@ -148,7 +150,9 @@ def _scaled_gap(
     shared: Shared, acting: Ints, twist_unit: Floats, lever: Floats
 ) -> sparse.csr_array:
     """Return the deformation (6s, 6b) of the acting springs, all components made lengths."""
-    gap = shared.gap[(6 * acting[:, None] + np.arange(6)).ravel()]
+    first = len(acting) == 0 or acting[-1] + 1 == len(acting)  # none beyond them acts
+    rows = (6 * acting[:, None] + np.arange(6)).ravel()
+    gap = shared.gap[: len(rows)].copy() if first else shared.gap[rows]
     gap.data *= np.repeat(np.tile(lever, len(acting)), np.diff(gap.indptr))
     gap.data *= twist_unit[gap.indices]
     return sparse.csr_array(
@@ -164,21 +168,18 @@ def _leading(inner: sparse.csr_array, twist_unit: Floats) -> sparse.csr_array:
     return sparse.csr_array((data, column, inner.indptr[: size + 1]), shape=(size, size))
 
 
-def _side_by_side(gap: sparse.csr_array, stiffness: Floats) -> sparse.csr_array:
-    """Return the system without grips, row by row, from the scaled deformation (6s, 6b)."""
+def _side_by_side(gap: sparse.csr_array, stiffness: Floats) -> sparse.csc_array:
+    """Return the system without grips, column by column, from the scaled deformation (6s, 6b)."""
     row = 1 / np.maximum(1.0, stiffness)  # keeps a stiff joint's equation of order one
     joints, moves = gap.shape
-    pulled = np.repeat(row * stiffness, np.diff(gap.indptr)) * gap.data
+    first = gap.indptr[:-1] + np.arange(joints)  # of a joint's column, the joint itself
+    others = np.arange(gap.nnz) + np.repeat(np.arange(1, joints + 1), np.diff(gap.indptr))
     carried = gap.tocsc()
-    return sparse.csr_array(
-        (
-            np.concatenate([np.insert(pulled, gap.indptr[:-1], row), -carried.data]),
-            np.concatenate(
-                [np.insert(gap.indices + joints, gap.indptr[:-1], range(joints)), carried.indices]
-            ),
-            np.concatenate(
-                [gap.indptr + np.arange(joints + 1), carried.indptr[1:] + gap.nnz + joints]
-            ),
-        ),
-        shape=(joints + moves, joints + moves),
-    )
+    data, indices = np.empty(2 * gap.nnz + joints), np.empty(2 * gap.nnz + joints, np.int32)
+    data[first], indices[first] = row, np.arange(joints)
+    data[others], indices[others] = -gap.data, gap.indices + joints
+    data[joints + gap.nnz :] = (row * stiffness)[carried.indices] * carried.data
+    indices[joints + gap.nnz :] = carried.indices
+    starts = [gap.indptr + np.arange(joints + 1), carried.indptr[1:] + gap.nnz + joints]
+    entries = data, indices, np.concatenate(starts).astype(np.int32)
+    return sparse.csc_array(entries, shape=(joints + moves, joints + moves))
