@@ -22,7 +22,7 @@ from seqopt.cli.compare_text import printed_largest, tell_comparison
 from seqopt.cli.criteria import asked_criterion
 from seqopt.cli.facts import scene_facts
 from seqopt.cli.layout import wrapped
-from seqopt.cli.outputs import comparison_files, require_matplotlib, write_outputs
+from seqopt.cli.outputs import comparison_files, figure_notes, write_outputs
 from seqopt.cli.values import parse_robots
 from seqopt.files import require_folder
 from seqopt.network.build import build_network
@@ -86,7 +86,6 @@ def run(options: argparse.Namespace) -> Answer:
     engine = asked_engine(options, build_network(scene))
     criterion = asked_criterion(options)
     if options.out is not None:
-        require_matplotlib(options.out)
         require_folder(options.out)
     result = compare(engine, criterion, options.tell, parse_robots(options.robots))
     told = tell_comparison(result, scene, criterion)
@@ -109,7 +108,7 @@ def run(options: argparse.Namespace) -> Answer:
         text="\n\n".join(blocks),
         headings=told.headings,
         written=written,
-        notes=level_notes(engine),
+        notes=(*level_notes(engine), *(figure_notes() if written else ())),
     )
     return strictly(answer, options, exceeded(scene, *result.tables.values()))
 
@@ -117,11 +116,10 @@ def run(options: argparse.Namespace) -> Answer:
 def _where(folder: Path) -> str:
     """Return which file of a folder is for what."""
     return (
-        f"tables and figures written to {folder}\n"
+        f"written to {folder}\n"
         f"  {PAGE}: every build step by step; open it in a browser\n"
-        "  comparison.csv: a row per way to build; steps_NAME.csv: a row per step of each\n"
-        "  *.png, *.svg: the figures"
-    )
+        "  comparison.csv: a row per way to build; steps_NAME.csv: a row per step of each"
+    ) + ("" if figure_notes() else "\n  *.png, *.svg: the figures")
 
 
 def _facts(result: Comparison) -> dict[str, object]:

@@ -10,7 +10,6 @@ from pathlib import Path
 
 import pandas as pd
 
-from seqopt.errors import FileError
 from seqopt.files import csv_text, require_apart, write_folder
 from seqopt.placement.plan import Plan
 from seqopt.placement.watch import trace_rows
@@ -20,25 +19,20 @@ from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import builtin_scenes, dump_scene
 
 
-def require_matplotlib(folder: Path) -> None:
-    """Raise an error unless figures can be drawn.
+def figure_notes() -> tuple[str, ...]:
+    """Return why figures are left out, if they are: what draws them is an extra.
 
-    Parameters
-    ----------
-    folder : pathlib.Path
-        Where they are to be written.
-
-    Raises
-    ------
-    FileError
-        If the extra that draws them is not installed.
+    Returns
+    -------
+    tuple of str
     """
-    if find_spec("matplotlib") is None:
-        raise FileError(f"figures for {folder} need matplotlib: pip install matplotlib")
+    if find_spec("matplotlib") is not None:
+        return ()
+    return ("figures are left out, they need matplotlib: pip install 'seqopt[plot]'",)
 
 
 def comparison_files(result: Comparison) -> dict[str, bytes | str]:
-    """Return the tables and figures of a comparison by file name.
+    """Return the tables of a comparison by file name, and its figures if they can be drawn.
 
     Parameters
     ----------
@@ -48,15 +42,17 @@ def comparison_files(result: Comparison) -> dict[str, bytes | str]:
     -------
     dict of str to (bytes or str)
     """
-    from seqopt.report.charts import comparison_figures  # noqa: PLC0415  # matplotlib is an extra
-    from seqopt.report.style import picture_files  # noqa: PLC0415
-
     files: dict[str, bytes | str] = {
         "comparison.csv": result.table.to_csv(float_format="%.6g"),
         **{f"steps_{name}.csv": csv_text(table) for name, table in result.tables.items()},
     }
     if result.loop is not None and result.loop.ranks is not None:
         files["published_ranks.csv"] = result.loop.ranks.to_csv(index=False)
+    if figure_notes():
+        return files
+    from seqopt.report.charts import comparison_figures  # noqa: PLC0415  # matplotlib is an extra
+    from seqopt.report.style import picture_files  # noqa: PLC0415
+
     for name, figure in comparison_figures(result).items():
         files |= picture_files(name, figure)
     return files

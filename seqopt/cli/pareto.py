@@ -22,7 +22,7 @@ from seqopt.cli.common_arguments import (
 from seqopt.cli.facts import scene_facts
 from seqopt.cli.free import posed_free
 from seqopt.cli.free_arguments import add_rules
-from seqopt.cli.outputs import require_matplotlib, write_outputs, written_to
+from seqopt.cli.outputs import figure_notes, write_outputs, written_to
 from seqopt.cli.values import parse_numbers, parse_robots
 from seqopt.engines.interface import Engine
 from seqopt.errors import ProblemError, StepError, did_you_mean
@@ -131,7 +131,6 @@ def run(options: argparse.Namespace) -> Answer:
     -------
     Answer
     """
-    require_matplotlib(options.out)
     require_folder(options.out)
     scene, free = posed_free(options, options.aim)
     rounding = parse_numbers("--round", options.round, dict.fromkeys(map(str, free.goals)))
@@ -162,6 +161,7 @@ def run(options: argparse.Namespace) -> Answer:
         },
         text=f"{said}; {written_to(options.out)}",
         written=(options.out,),
+        notes=figure_notes(),
     )
 
 
@@ -187,9 +187,6 @@ def _front_files(
     front: Front, engine: Engine, methods: Mapping[str, pd.DataFrame], tell: Tell
 ) -> dict[str, bytes | str]:
     """Return table, plans, chart and summary of a Pareto set by file name."""
-    from seqopt.report.fronts import front_figure  # noqa: PLC0415  # matplotlib is an extra
-    from seqopt.report.style import picture_files  # noqa: PLC0415
-
     known: dict[tuple[Step, ...], pd.DataFrame] = {}
     plans = []
     for number, steps in enumerate(told("analyzing plans", front.steps, tell), start=1):
@@ -207,9 +204,19 @@ def _front_files(
         PAGE: front_page(engine, shown_table(front.table), [known[steps] for steps in front.steps]),
         "pareto.csv": csv_text(numbered),
         "plans.csv": csv_text(pd.concat(plans, ignore_index=True)),
-        **picture_files("pareto", front_figure(front, methods)),
+        **_picture(front, methods),
         "summary.json": json.dumps(summary, indent=2) + "\n",
     }
+
+
+def _picture(front: Front, methods: Mapping[str, pd.DataFrame]) -> Mapping[str, bytes | str]:
+    """Return the chart of a Pareto set by file name, if it can be drawn."""
+    if figure_notes():
+        return {}
+    from seqopt.report.fronts import front_figure  # noqa: PLC0415  # matplotlib is an extra
+    from seqopt.report.style import picture_files  # noqa: PLC0415
+
+    return picture_files("pareto", front_figure(front, methods))
 
 
 def _under(texts: Sequence[str], methods: Mapping[str, pd.DataFrame]) -> dict[str, float]:

@@ -272,7 +272,12 @@ def grip_columns(network: Network, bricks: int, grips: ArrayLike) -> Ints:
     total = len(network.inner)
     if not 1 <= bricks <= total:
         raise GripError(f"brick count {bricks}: the scene has 1 to {total} bricks")
-    numbers = np.asarray(grips)
+    try:
+        numbers = np.asarray(grips)
+    except ValueError:
+        raise GripError(
+            "grip sets have different sizes; give as many nodes in each, or solve them by size"
+        ) from None
     if numbers.ndim != 2 or (numbers.size and not np.issubdtype(numbers.dtype, np.integer)):
         raise GripError(
             f"grips have shape {numbers.shape}; give integer node numbers, (sets, grips)"

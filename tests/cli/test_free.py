@@ -145,6 +145,21 @@ def test_pareto_writes_table_plans_and_chart(capsys, tmp_path, arch):
     assert len(picked) == table["steps"][table["M_sup"].argmin()]
 
 
+def test_figures_that_cannot_be_drawn_are_left_out_and_it_says_so(
+    capsys, monkeypatch, tmp_path, arch
+):
+    """Without the extra that draws: tables and the page are written all the same."""
+    asked = ("pareto", arch, "--aim", "F_largest,steps")
+    assert run(capsys, *asked, "--out", str(tmp_path / "drawn"))[0] == 0
+    monkeypatch.setattr("seqopt.cli.outputs.find_spec", lambda name: None)
+    status, _, error = run(capsys, *asked, "--out", str(tmp_path / "plain"))
+    assert (status, error.count("\n")) == (0, 1)
+    assert "figures are left out, they need matplotlib" in error
+    drawn, plain = ({f.name for f in (tmp_path / n).iterdir()} for n in ("drawn", "plain"))
+    assert drawn - plain == {"pareto.png", "pareto.svg"}
+    assert "report.html" in plain
+
+
 def test_pareto_of_a_loop_and_methods_to_beat(capsys, tmp_path, arch):
     out = ["--out", str(tmp_path / "front")]
     loop = ["--schedule", "three-robot", "--aim", "F_largest,T_max"]

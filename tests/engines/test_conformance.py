@@ -65,6 +65,7 @@ def test_the_order_of_grips_does_not_matter(engine):
         (3, [[4, 4]], r"grip set \[4, 4\]: a node is held twice"),
         (3, [[1, 2], [5, 5]], r"grip set \[5, 5\]"),
         (3, [1, 2], r"grips have shape \(2,\)"),
+        (3, [[1], [2, 3]], "grip sets have different sizes"),
         (3, [[1.0]], "integer node numbers"),
         (3, [[float("nan")]], "integer node numbers"),
     ],
