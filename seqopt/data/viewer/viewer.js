@@ -3,6 +3,11 @@
   const data = JSON.parse(document.getElementById("data").textContent);
   const { structure, builds, responses } = data;
   const byId = (id) => document.getElementById(id);
+  const WORDS = {
+    F_sup_N: "support force, N", M_sup_Nm: "support moment, N m", F_max_N: "largest tension in an edge, N",
+    F_min_N: "largest compression in an edge, N", F_avg_N: "mean force of the edges, N", T_pct: "edges in tension, %",
+    "D_max_1e-3mm": "largest displacement, 1e-3 mm", "D_avg_1e-3mm": "mean displacement, 1e-3 mm", "D_std_1e-3mm": "spread of displacements, 1e-3 mm",
+  };
   const KINDS = { place: "place", release: "release", reposition: "reposition" };
   const CLAY = 0xcc8560, NEW = 0xe8b04a, TENSION = 0xc8102e, COMPRESSION = 0x1f5fa8, LARGEST = 32767;
 
@@ -246,9 +251,9 @@
       grips.append(row);
     });
     build.columns.forEach((name, i) => {
-      if (["step", "type", "bricks"].includes(name) || /_(node|brick)$/.test(name) || build.forces.includes(name) || build.rows[s][i] === "") return;
+      if (["step", "type", "bricks"].includes(name) || /_(node|brick)$|_sup_\d/.test(name) || build.forces.includes(name) || build.rows[s][i] === "") return;
       const row = document.createElement("tr"), bound = build.bounds[name];
-      row.append(text("td", name.replace("_1e-3mm", ", 1e-3 mm").replace(/_N(m?)$/, (_, m) => `, N${m ? " m" : ""}`).replace("_pct", ", %")));
+      row.append(text("td", WORDS[name] || name));
       row.append(text("td", build.rows[s][i], bound !== undefined && Number(build.rows[s][i]) > bound ? "over" : ""));
       rows.append(row);
     });
