@@ -178,7 +178,9 @@ function makeCharts(page) {
     }
     function mark() {
       const now = shown().map((build) => build.name);
-      place.querySelectorAll("circle").forEach((point) => point.classList.toggle("chosen", now.includes(point.dataset.build)));
+      place.querySelectorAll("circle").forEach((point) => {
+        if (point.classList.toggle("chosen", now.includes(point.dataset.build)) && point !== document.activeElement) point.parentNode.append(point);
+      });
     }
     out.className = "points";
     out.append(pick, place);
