@@ -1,18 +1,16 @@
-"""Where experiments put tables and figures, and how a figure is stored."""
+"""How figures of experiments are stored, and tables read again."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from pathlib import Path
 
 import pandas as pd
 from matplotlib.figure import Figure
 
+from experiments.harness.places import FIGURES, HOME, RESULTS
 from seqopt.report.style import DPI
 
-HOME = Path(__file__).resolve().parent.parent
-RESULTS = HOME / "results"
-FIGURES = HOME.parent / "docs" / "figures"
+__all__ = ["FIGURES", "HOME", "RESULTS", "save_all", "save_figure", "stored"]
 
 
 def save_figure(figure: Figure, name: str) -> None:

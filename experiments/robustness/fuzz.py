@@ -27,7 +27,7 @@ from __future__ import annotations
 import pandas as pd
 
 from experiments.harness.claim import Claim, Finding, Option, Options, Times
-from experiments.harness.plotting import RESULTS
+from experiments.harness.places import RESULTS
 from experiments.robustness.parts.kills import killed
 from experiments.robustness.parts.wording import COMMANDS
 from experiments.robustness.parts.worker import judged

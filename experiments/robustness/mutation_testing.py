@@ -33,7 +33,7 @@ import pandas as pd
 from scipy.stats import binomtest
 
 from experiments.harness.claim import Claim, ClaimError, Extra, Finding, Option, Options
-from experiments.harness.plotting import RESULTS
+from experiments.harness.places import RESULTS
 
 if TYPE_CHECKING:
     from experiments.robustness.parts.mutants import Mutant

@@ -154,7 +154,7 @@ def test_it_equals_brute_force(build):
 
 @pytest.mark.slow
 @given(build=free_builds(most_bricks=6, most_robots=4))
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=8, deadline=None)
 def test_it_equals_brute_force_on_more_bricks_and_robots(build):
     assume(len(build[0].bricks) >= 4)
     check_against_brute_force(*build)

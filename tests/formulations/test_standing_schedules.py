@@ -106,7 +106,7 @@ def test_a_small_arch_equals_brute_force(least):
 
 @pytest.mark.slow
 @given(build=free_builds(most_bricks=4, most_robots=3))
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=6, deadline=None)
 def test_it_equals_brute_force(build):
     scene, rules = build
     try:

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.harness.plotting import HOME
+from experiments.harness.places import HOME
 
 SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
 OPTIMIZE = (

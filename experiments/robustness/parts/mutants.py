@@ -22,7 +22,7 @@ from cosmic_ray.operators.operator import Example, Operator
 from parso.python.tree import Name
 from parso.tree import NodeOrLeaf
 
-from experiments.harness.plotting import HOME
+from experiments.harness.places import HOME
 
 ROOT = HOME.parent
 OPPOSITES = (("any", "all"), ("min", "max"), ("argmin", "argmax"), ("minimum", "maximum"))

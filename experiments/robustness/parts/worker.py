@@ -14,7 +14,7 @@ import threading
 from collections.abc import Iterator
 from dataclasses import asdict
 
-from experiments.harness.plotting import HOME
+from experiments.harness.places import HOME
 from experiments.robustness.parts.judging import LONGEST, judge
 from experiments.robustness.parts.mutations import Mutator
 
