@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
+import pandas as pd
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
@@ -61,7 +62,7 @@ def comparison_figures(result: Comparison) -> dict[str, Figure]:
     """
     return {
         "maxima": _maxima(result),
-        "responses": _responses(result),
+        "responses": responses_figure(result.tables),
         "gap_against_cost": _gaps(result),
     }
 
@@ -89,9 +90,20 @@ def _maxima(result: Comparison) -> Figure:
 
 
 @styled
-def _responses(result: Comparison) -> Figure:
-    plans = merged(result.tables)
-    tables = {_together(names): worst_steps(result.tables[one]) for one, names in plans.items()}
+def responses_figure(builds: Mapping[str, pd.DataFrame]) -> Figure:
+    """Return the largest responses at every number of bricks, a line a build.
+
+    Parameters
+    ----------
+    builds : mapping of str to pandas.DataFrame
+        By name, as `seqopt.analyze` makes them; equal ones share a line.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    plans = merged(builds)
+    tables = {_together(names): worst_steps(builds[one]) for one, names in plans.items()}
     figure = new_figure(6.6 + 0.2 * len(tables))
     figure.suptitle("Worst step at every number of bricks", x=0.01, ha="left")
     axes = figure.subplots(len(COLUMNS), 1, sharex=True)

@@ -125,6 +125,29 @@ def folder_page(engine: Engine, folder: Path) -> str:
     FileError, StepError
         If there are no plans in it, or they are not for the engine's scene.
     """
+    scene, builds = engine.network.scene, folder_builds(engine, folder)
+    tables = {build.name: build.table for build in builds}
+    sentence = f"{scene.name}, built in {len(builds)} way{'s' * (len(builds) > 1)}, step by step."
+    return report_page(engine, builds, sentence, [("Largest responses", _worst(scene, tables))])
+
+
+def folder_builds(engine: Engine, folder: Path) -> list[Build]:
+    """Return the plans in a folder that a command has written, analyzed.
+
+    Parameters
+    ----------
+    engine : Engine
+    folder : pathlib.Path
+
+    Returns
+    -------
+    list of Build
+
+    Raises
+    ------
+    FileError, StepError
+        As of `folder_page`.
+    """
     scene = engine.network.scene
     paths = [path for name in PLANS for path in sorted(folder.glob(name))]
     if not paths:
@@ -133,10 +156,7 @@ def folder_page(engine: Engine, folder: Path) -> str:
             "compare has written"
         )
     plans = {path.stem.removeprefix("steps_"): read_plan(scene, path) for path in paths}
-    tables = {name: analyze(engine, steps) for name, steps in plans.items()}
-    builds = [Build(name, plans[name], table) for name, table in tables.items()]
-    sentence = f"{scene.name}, built in {len(builds)} way{'s' * (len(builds) > 1)}, step by step."
-    return report_page(engine, builds, sentence, [("Largest responses", _worst(scene, tables))])
+    return [Build(name, steps, analyze(engine, steps)) for name, steps in plans.items()]
 
 
 def front_page(engine: Engine, table: pd.DataFrame, plans: Sequence[pd.DataFrame]) -> str:
