@@ -76,6 +76,7 @@ def test_a_closed_stream_does_not_spoil_a_file(tmp_path):
 @pytest.mark.parametrize("which", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 @pytest.mark.parametrize("after", [0.3, pytest.param(1.5, marks=pytest.mark.slow)])
 def test_an_interrupt_is_one_line(tmp_path, which, after):
+    """Also where who runs the tests ignores signals, as ``nohup`` does."""
     words = ["optimize", "--formulation", "overlap_dp", "--engine", "frame"]  # takes minutes
     words += ["--out", str(tmp_path / "out")]
     program = subprocess.Popen(
@@ -84,7 +85,7 @@ def test_an_interrupt_is_one_line(tmp_path, which, after):
         stderr=subprocess.PIPE,
         text=True,
         cwd=ROOT,
-        preexec_fn=partial(signal.signal, which, signal.SIG_DFL),  # whoever runs the tests
+        preexec_fn=partial(signal.signal, which, signal.SIG_DFL),  # noqa: PLW1509  # no threads
     )
     time.sleep(after)
     program.send_signal(which)
