@@ -17,7 +17,6 @@ version = release = installed_version("seqopt")
 extensions = [
     "myst_nb",
     "sphinx.ext.autodoc",
-    "sphinx.ext.viewcode",
     "numpydoc",
     "sphinx_copybutton",
     "extensions.equations",
@@ -41,8 +40,6 @@ nb_merge_streams = True
 
 nitpicky = True
 nitpick_ignore_regex = [("py:class", r"(numpy|collections)\..*")]  # they have pages elsewhere
-
-viewcode_follow_imported_members = False  # its links back would name the importing module
 
 autodoc_member_order = "bysource"
 autodoc_typehints = "none"  # the numpydoc sections carry shapes and units
