@@ -61,7 +61,7 @@ def free_row(plan: FreePlan) -> dict[str, object]:
     return {
         "problem": FREE,
         "objective": value,
-        "gap": (value - bound) / abs(value),
+        "gap": (value - bound) / (abs(value) or 1.0),  # without weight all responses are zero
         "models": plan.problem.sets.solved,
         "seconds": sum(plan.seconds.values()),
         "solve_seconds": plan.seconds["solve"],
