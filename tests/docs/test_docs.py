@@ -40,8 +40,14 @@ def test_the_site_builds_strictly(tmp_path):
     assert page.count("<table") >= 4
     assert broken(tmp_path / "html") == []
     search = (tmp_path / "html" / "search.html").as_uri()
-    if "<p>here</p>" in browsed(tmp_path, "data:text/html,<p>here</p>"):
-        assert "guides/infeasible.html" in browsed(tmp_path, f"{search}?q=infeasible")
+    if "<p>here</p>" in browsed(tmp_path, "data:text/html,<p>here</p>")[0]:
+        assert "guides/infeasible.html" in found(tmp_path, f"{search}?q=infeasible")
+        assert ".html" not in found(tmp_path, f"{search}?q=zzzz")  # the control
+
+
+def found(folder, search):
+    """Return the list of what a search finds; the sidebar around it has every page."""
+    return re.search(r'id="search-results".*?<ul(.*?)</ul>', browsed(folder, search)[0], re.S)[1]
 
 
 def build_page(folder, text):

@@ -5,10 +5,7 @@ from __future__ import annotations
 import base64
 import gzip
 import json
-import os
 import re
-import shutil
-import subprocess
 from dataclasses import replace
 
 import numpy as np
@@ -31,8 +28,8 @@ from seqopt.scene.parts import Robot
 from seqopt.scene.scene import Scene
 from seqopt.sequence.two_robots import cantilever, sequential
 from tests.blocks import L_SHAPE, prism
+from tests.browser import BROWSER, browsed
 
-BROWSER = next(filter(None, map(shutil.which, ("chromium", "google-chrome"))), None)
 browser = pytest.mark.skipif(BROWSER is None, reason="there is no Chromium")
 
 
@@ -162,38 +159,16 @@ def test_commands_write_it_and_folders_are_read_again(capsys, tmp_path):
 
 FIGURES = ("plan_steps", "plan_grips", "responses")
 
-WORDS = (
-    "--headless --no-sandbox --disable-gpu-sandbox --use-angle=swiftshader "
-    "--enable-unsafe-swiftshader --no-first-run --disable-background-networking "
-    "--disable-component-update --disable-sync --disable-quic --disable-dev-shm-usage "
-    "--enable-logging=stderr --virtual-time-budget=20000 --dump-dom"
-)
-
-
-def browsed(folder, address):
-    """Return what a headless browser made of an address."""
-    profile = f"--user-data-dir={folder / 'profile'}"
-    return subprocess.run(
-        [BROWSER, *WORDS.split(), profile, address],
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-        env=os.environ | {"HOME": str(folder)},
-    )
-
 
 @pytest.fixture
 def shown(tmp_path):
     """Show a page as a browser has it once its script has run, and what it said of errors."""
-    empty = browsed(tmp_path, "data:text/html,<p>here</p>")
-    if "<p>here</p>" not in empty.stdout:
+    if "<p>here</p>" not in browsed(tmp_path, "data:text/html,<p>here</p>")[0]:
         pytest.skip("Chromium does not run here")
 
     def show(path, state=""):
-        done = browsed(tmp_path, f"file://{path}#{state}")
-        said = done.stderr.splitlines()
-        return done.stdout, [line for line in said if "CONSOLE" in line and "error" in line]
+        text, said = browsed(tmp_path, f"file://{path}#{state}")
+        return text, [line for line in said.splitlines() if "CONSOLE" in line and "error" in line]
 
     return show
 
