@@ -25,7 +25,7 @@ from seqopt.engines.plane import Plane
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.engines.rigid.mechanism import rigid_structure
 from seqopt.engines.rigid.mixed import mixed_system
-from seqopt.engines.rigid.operator import OperatorBuilder
+from seqopt.engines.rigid.operator_builder import OperatorBuilder
 from seqopt.engines.rigid.recovery import Solution
 from seqopt.engines.rigid.response_maps import ResponseMaps, scene_maps
 from seqopt.engines.rigid.spanning_tree import grow_tree

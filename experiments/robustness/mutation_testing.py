@@ -52,7 +52,12 @@ MODULES = {
         *("engines/test_compliance", "engines/test_operator", "engines/test_rigid_bricks"),
         *("engines/test_planar", "responses/test_finite"),
     ),
+    "seqopt.engines.rigid.trial": (
+        *("engines/test_compliance", "engines/test_growth", "engines/test_operator"),
+        "engines/test_rigid_bricks",
+    ),
     "seqopt.engines.rigid.operator": RIGID,
+    "seqopt.engines.rigid.operator_builder": RIGID,
     "seqopt.engines.rigid.grip_equations": RIGID,
     "seqopt.engines.rigid.growth": ("engines/test_operator", "engines/test_growth"),
     "seqopt.placement.costs": ("placement/test_costs", "placement/test_values"),

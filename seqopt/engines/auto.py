@@ -18,14 +18,8 @@ from seqopt.arrays import Bools, Ints
 from seqopt.contact.elastic_limits import ElasticLimits, find_elastic_limits
 from seqopt.contact.mortar import EPOXY, Mortar
 from seqopt.engines.discrete.engine import DiscreteEngine
-from seqopt.engines.interface import (
-    Fields,
-    Want,
-    grip_columns,
-    keep_wanted,
-    merge_sets,
-    select_sets,
-)
+from seqopt.engines.interface import Fields, Want, grip_columns, keep_wanted
+from seqopt.engines.joined_fields import merge_sets, select_sets
 from seqopt.engines.named import NamedEngine
 from seqopt.engines.planar import PlanarEngine
 from seqopt.engines.plane import NoPlane, find_plane, off_plane

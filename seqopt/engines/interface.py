@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from enum import Flag, auto
+from functools import cache
 from itertools import combinations
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from seqopt.arrays import Bools, Floats, FrozenValue, Ints
+from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.errors import GripError, SolverError
 from seqopt.network.network import Network
 
@@ -116,6 +116,30 @@ FLAGS = {
 }
 
 
+SHAPES: dict[str, tuple[int, ...]] = {
+    "edge_force": (),
+    "displacement": (3,),
+    "support": (6,),
+    "joint_wrench": (6,),
+    "brick_twist": (6,),
+}  # of what each has for an edge, node, end, spring or brick
+
+
+@cache
+def names_wanted(want: Want) -> frozenset[str]:
+    """Return the names of the fields that are asked for, grip forces aside.
+
+    Parameters
+    ----------
+    want : Want
+
+    Returns
+    -------
+    frozenset of str
+    """
+    return frozenset(name for name, flag in FLAGS.items() if want & flag)
+
+
 def keep_wanted(answer: Fields, want: Want) -> Fields:
     """Return fields without what is not asked for.
 
@@ -128,7 +152,7 @@ def keep_wanted(answer: Fields, want: Want) -> Fields:
     -------
     Fields
     """
-    dropped = [name for name, flag in FLAGS.items() if not want & flag]
+    dropped = FLAGS.keys() - names_wanted(want)
     return replace(answer, **{name: getattr(answer, name)[:, :0] for name in dropped})
 
 
@@ -155,7 +179,7 @@ def require_finite(answer: Fields, bricks: int, grips: ArrayLike) -> Fields:
     """
     for name in NAMES:
         values = getattr(answer, name)
-        if not np.isfinite(values.sum()) and not np.isfinite(values).all():
+        if values.size and not np.isfinite(values.sum()) and not np.isfinite(values).all():
             of_set = ~np.isfinite(values).reshape(len(values), -1).all(axis=1)
             nodes = ", ".join(map(str, np.asarray(grips)[int(of_set.argmax())])) or "none"
             raise SolverError(
@@ -163,89 +187,6 @@ def require_finite(answer: Fields, bricks: int, grips: ArrayLike) -> Fields:
                 "correct lengths, masses or stiffnesses beyond all bounds in the scene"
             )
     return answer
-
-
-def no_sets(network: Network, bricks: int, held: int) -> Fields:
-    """Return the fields of no grip set at all: their shapes.
-
-    Parameters
-    ----------
-    network : Network
-    bricks : int
-        How many bricks stand.
-    held : int
-        How many nodes each set would hold.
-
-    Returns
-    -------
-    Fields
-        Arrays with a first axis of length zero.
-    """
-    return Fields(
-        edge_force=np.empty((0, network.count_edges(bricks))),
-        displacement=np.empty((0, network.count_nodes(bricks), 3)),
-        grip_force=np.empty((0, held, 3)),
-        support=np.empty((0, len(network.springs.support), 6)),
-        joint_wrench=np.empty((0, len(network.springs.since), 6)),
-        brick_twist=np.empty((0, bricks, 6)),
-    )
-
-
-def select_sets(answer: Fields, which: Bools | Ints) -> Fields:
-    """Return the fields of some grip sets.
-
-    Parameters
-    ----------
-    answer : Fields
-    which : (S,) bool or (s,) int
-
-    Returns
-    -------
-    Fields
-    """
-    return Fields(**{name: getattr(answer, name)[which] for name in NAMES})
-
-
-def join_sets(parts: Sequence[Fields], which: Sequence[Bools | slice] | None = None) -> Fields:
-    """Return the fields of the grip sets of several answers.
-
-    Parameters
-    ----------
-    parts : sequence of Fields
-        Alike in everything but the number of sets.
-    which : sequence of ((S,) bool or slice), optional
-        Which of all sets are those of each part, in their order; by default one part's come after
-        another's.
-
-    Returns
-    -------
-    Fields
-    """
-    after = np.cumsum([len(part.grip_force) for part in parts])
-    total = int(after[-1])
-    if which is None:
-        which = [slice(b - len(a.grip_force), b) for a, b in zip(parts, after, strict=True)]
-    whole = {name: np.empty((total, *getattr(parts[0], name).shape[1:])) for name in NAMES}
-    for part, mine in zip(parts, which, strict=True):
-        for name in NAMES:
-            whole[name][mine] = getattr(part, name)
-    return Fields(**whole)
-
-
-def merge_sets(which: Bools, inside: Fields, outside: Fields) -> Fields:
-    """Return the fields of grip sets, some from one answer and the rest from another.
-
-    Parameters
-    ----------
-    which : (S,) bool
-        The sets that the first answer is about, in their order.
-    inside, outside : Fields
-
-    Returns
-    -------
-    Fields
-    """
-    return join_sets([inside, outside], [which, ~which])
 
 
 def grip_columns(network: Network, bricks: int, grips: ArrayLike) -> Ints:
@@ -283,7 +224,10 @@ def grip_columns(network: Network, bricks: int, grips: ArrayLike) -> Ints:
             f"grips have shape {numbers.shape}; give integer node numbers, (sets, grips)"
         )
     known, index = network.index_of_grip
-    at = np.searchsorted(known, numbers).clip(max=len(known) - 1)
+    last = len(known) - 1
+    at = (numbers.astype(np.int64, copy=False) - known[0]).clip(0, last)
+    if (known[at] != numbers).any():  # names are not consecutive, or wrong
+        at = np.searchsorted(known, numbers).clip(max=last)
     columns = index[at]
     wrong = (known[at] != numbers) | (columns >= 2 * bricks)
     if wrong.any():
@@ -291,10 +235,15 @@ def grip_columns(network: Network, bricks: int, grips: ArrayLike) -> Ints:
             f"grip on node {numbers[wrong][0]}: with {bricks} bricks the free nodes are "
             f"{known[index < 2 * bricks].tolist()}"
         )
+    _require_different(columns, numbers)
+    return np.asarray(columns, dtype=np.int64)
+
+
+def _require_different(columns: Ints, numbers: Ints) -> None:
+    """Require that no set (S, r) holds a node twice; the message has its number."""
     for i, j in combinations(range(columns.shape[1]), 2):
         twice = columns[:, i] == columns[:, j]
         if twice.any():
             raise GripError(
                 f"grip set {numbers[twice][0].tolist()}: a node is held twice; name it once"
             )
-    return np.asarray(columns, dtype=np.int64)

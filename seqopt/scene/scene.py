@@ -169,6 +169,11 @@ class Scene(Shown):
         by_name = {brick.name: brick for brick in self.bricks}
         return tuple(by_name[name] for name in self.build_order)
 
+    @cached_property
+    def since(self) -> dict[int, int]:
+        """From which brick count on each brick stands, by name."""
+        return {name: count for count, name in enumerate(self.build_order, start=1)}
+
     def with_robots(self, *robots: Robot) -> Scene:
         """Return the same scene with other robots.
 

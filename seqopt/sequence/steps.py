@@ -223,12 +223,11 @@ def _check_state(scene: Scene, step: AnyStep) -> None:
 
 def _check_grip(scene: Scene, step: AnyStep, robot: Robot, node: int) -> None:
     """Require a node that exists, is free and stands within reach."""
-    placed = {n for brick in scene.placed[: step.bricks] for n in brick.nodes}
     if node not in scene.brick_of_node:
         reason = "there is no such node"
     elif node in scene.blocked_nodes:
         reason = "the node is blocked"
-    elif node not in placed:
+    elif scene.since[scene.brick_of_node[node].name] > step.bricks:
         reason = f"brick {scene.brick_of_node[node].name} is not placed yet"
     elif not robot.reach.covers(scene.brick_of_node[node].node_position(node)):
         reason = "the node is out of its reach"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from seqopt.network.network import Network, PartKind
 from seqopt.sequence.support import acting_bodies
 
@@ -19,12 +21,11 @@ def lies_along(network: Network) -> frozenset[int]:
         Names of the bricks.
     """
     half = network.edge_kind == PartKind.JOINT.value
-    touched = set(network.edge_nodes[half, 0].tolist())
-    return frozenset(
-        brick.name
-        for brick, (first, second) in zip(network.scene.placed, network.inner, strict=True)
-        if first in touched and second in touched
-    )
+    touched = np.zeros(len(network.node_kind), dtype=bool)
+    touched[network.edge_nodes[half, 0]] = True
+    placed = network.scene.placed
+    along = np.flatnonzero(touched[network.inner].all(axis=1))
+    return frozenset(placed[i].name for i in along.tolist())
 
 
 def begins_elsewhere(network: Network) -> frozenset[int]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Executor, Future
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -32,6 +32,14 @@ class Crew(Protocol):
         Returns
         -------
         concurrent.futures.Future
+        """
+
+    def drop(self, calls: Iterable[Future[Any]]) -> None:
+        """Let go of calls whose answers nobody waits for any more.
+
+        Parameters
+        ----------
+        calls : iterable of concurrent.futures.Future
         """
 
     def look_after(self) -> None:
@@ -79,6 +87,16 @@ class Given:
         concurrent.futures.Future
         """
         return self.executor.submit(function, *arguments)
+
+    def drop(self, calls: Iterable[Future[Any]]) -> None:
+        """Cancel calls; see `Crew`.
+
+        Parameters
+        ----------
+        calls : iterable of concurrent.futures.Future
+        """
+        for call in calls:
+            call.cancel()
 
     def look_after(self) -> None:
         """Leave the workers to the executor; see `Crew`."""

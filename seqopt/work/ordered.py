@@ -107,8 +107,7 @@ class _Course(Generic[Task, Result]):
                         raise result
                     yield result
         finally:
-            for future in self.running:
-                future.cancel()
+            self.crew.drop(self.running)
 
     def _take(self, number: int, tasks: Iterator[Task]) -> bool:
         """Take the next task up, whose result may be known; return whether there was one."""

@@ -7,7 +7,7 @@ import os
 import signal
 import threading
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ProcessPoolExecutor
 from contextlib import contextmanager, suppress
 from multiprocessing.connection import Connection
@@ -56,6 +56,17 @@ class Processes:
         if not self._started:
             self._started = [p for p in multiprocessing.active_children() if p not in before]
         return future
+
+    def drop(self, calls: Iterable[Future[Any]]) -> None:
+        """Leave calls to the pool, which cancels them when it ends; see `Crew`.
+
+        If its processes end before it has seen that a call was cancelled, its thread ends with an
+        `InvalidStateError` (Python's issue gh-107219) and leaves other calls without an answer.
+
+        Parameters
+        ----------
+        calls : iterable of concurrent.futures.Future
+        """
 
     def look_after(self) -> None:
         """End all processes if one has died while it sent an answer; see `Crew`.

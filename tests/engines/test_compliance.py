@@ -12,13 +12,14 @@ from experiments.engines.parts.limit_scenes import LOOSE_AT, chain, loosened
 from experiments.engines.parts.reference_chain import solve_exactly
 from seqopt.engines.interface import NAMES, Want, grip_columns
 from seqopt.engines.planar import PlanarEngine
-from seqopt.engines.rigid import compliance
-from seqopt.engines.rigid.compliance import CANCEL, EVEN, ComplianceEngine, cancels, solve_batch
-from seqopt.engines.rigid.loads import load_matrix
+from seqopt.engines.rigid import compliance, trial
+from seqopt.engines.rigid.compliance import EVEN, ComplianceEngine
+from seqopt.engines.rigid.loads import loads_of
 from seqopt.engines.rigid.mixed import solve_mixed
-from seqopt.engines.rigid.operator import OperatorBuilder
+from seqopt.engines.rigid.operator_builder import OperatorBuilder
 from seqopt.engines.rigid.refinement import Corrector
 from seqopt.engines.rigid.spanning_tree import grow_tree
+from seqopt.engines.rigid.trial import CANCEL, cancels, solve_batch
 from seqopt.network.build import build_network
 from tests.builders import from_both_sides, six_bricks, small_arch
 
@@ -80,7 +81,7 @@ def test_who_looks_for_what_cancels(monkeypatch, scene, kind, share, uneven):
     """Only what has a joint that is far softer or stiffer than others, from where it acts on."""
     looked = []
     monkeypatch.setattr(
-        compliance, "cancels", lambda *seen: looked.append(len(seen[0].axis)) or cancels(*seen)
+        trial, "cancels", lambda *seen: looked.append(len(seen[0].axis)) or cancels(*seen)
     )
     joint = scene.joints[2]
     engine = ComplianceEngine(build_network(evenly(scene, 2, kind, share)))
@@ -96,7 +97,7 @@ def test_motions_cancel_where_their_parts_are_ten_times_what_is_left(
     monkeypatch, share, seen, chunk
 ):
     """At any node that a grip loads, what forces and weight move, signs aside, over the rest."""
-    monkeypatch.setattr(compliance, "CHUNK", chunk)
+    monkeypatch.setattr(trial, "CHUNK", chunk)
     rng = np.random.default_rng(0)
     flexibility, dead, motion = rng.normal(size=(6, 6)), rng.normal(size=6), np.eye(7, 9)
     index = np.array([[0, 1, 2], [3, 4, 5], [0, 4, 2], [5, 1, 3], [2, 0, 4]])
@@ -114,7 +115,7 @@ def test_motions_cancel_where_their_parts_are_ten_times_what_is_left(
         own = SimpleNamespace(
             flexibility=size * flexibility,
             dead_displacement=size * dead,
-            answer=lambda _, rows, pull: load_matrix(rows, pull, 6) @ motion,
+            answer=lambda _, rows, pull: loads_of(rows, pull, 7).sum(motion),
         )
         assert cancels(own, index, force)[row] == seen
     assert cancels(own, np.zeros((3, 0), int), np.zeros((3, 0))).tolist() == [False] * 3
@@ -149,7 +150,7 @@ def test_what_is_only_compared_is_corrected_once_and_right_to_six_digits(monkeyp
     size = np.abs(exact.edge_force).max(axis=1)
     taken = {}
     for want, most in ((Want.RESPONSES, 1e-9), (Want.RESPONSES | Want.SCREEN, 1e-6)):
-        monkeypatch.setattr(compliance, "UNSEEN", 1.0)  # nothing is trusted
+        monkeypatch.setattr(trial, "UNSEEN", 1.0)  # nothing is trusted
         made.clear()
         off = np.abs(engine.solve(bricks, sets, want).edge_force - exact.edge_force).max(axis=1)
         assert (off <= most * size).all()

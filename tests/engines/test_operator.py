@@ -11,14 +11,21 @@ from experiments.harness.walls import running_bond
 from seqopt.engines.basis import SPACE
 from seqopt.engines.interface import FLAGS, NAMES, Want, grip_columns
 from seqopt.engines.planar import PlanarEngine
-from seqopt.engines.rigid.compliance import ComplianceEngine, solve_batch
+from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.engines.rigid.dense import solve_dense
-from seqopt.engines.rigid.grip_equations import grip_forces, share_pairs, still_forces
+from seqopt.engines.rigid.grip_equations import (
+    doubts,
+    grip_forces,
+    share_pairs,
+    still_forces,
+    trusted,
+)
 from seqopt.engines.rigid.held_operator import held_operator
-from seqopt.engines.rigid.loads import load_matrix
+from seqopt.engines.rigid.loads import GATHERED, loads_of
 from seqopt.engines.rigid.loose import hold_loose
-from seqopt.engines.rigid.operator import OperatorBuilder
+from seqopt.engines.rigid.operator_builder import OperatorBuilder
 from seqopt.engines.rigid.spanning_tree import grow_tree
+from seqopt.engines.rigid.trial import solve_batch
 from seqopt.engines.rigid.ungripped import ungripped_system
 from seqopt.network.build import build_network
 from seqopt.scene.arch import ArchShape, arch_scene
@@ -135,10 +142,20 @@ def test_only_what_is_wanted_is_computed():
 def test_loads_as_a_matrix():
     index, force = np.array([[2, 0], [1, 3]]), np.array([[5.0, 7.0], [9.0, 11.0]])
     dense = [[7.0, 0, 5, 0, 1], [0, 9, 0, 11, 1]]
-    assert load_matrix(index, force, 4).toarray().tolist() == dense
-    half = load_matrix(index, force, 4, weight=0.5).toarray()
+    assert loads_of(index, force, 5).matrix.toarray().tolist() == dense
+    half = loads_of(index, force, 5, weight=0.5).matrix.toarray()
     assert half[:, -1].tolist() == [0.5, 0.5]
-    assert load_matrix(index[:, :0], force[:, :0], 4).toarray().tolist() == [[0, 0, 0, 0, 1]] * 2
+    none = loads_of(index[:, :0], force[:, :0], 5)
+    assert none.matrix.toarray().tolist() == [[0, 0, 0, 0, 1]] * 2
+
+
+@pytest.mark.parametrize("sets", [0, 1, GATHERED // 20, GATHERED // 20 + 1])
+def test_loads_sum_rows_as_their_matrix_does(sets):
+    """Few are gathered, many multiplied."""
+    rng = np.random.default_rng(0)
+    loads = loads_of(rng.integers(6, size=(sets, 3)), rng.normal(size=(sets, 3)), 7)
+    rows = rng.normal(size=(7, 5))
+    assert loads.sum(rows) == pytest.approx(loads.matrix.toarray() @ rows, rel=1e-12)
 
 
 def test_which_loads_act_at_a_grip():
@@ -197,7 +214,8 @@ def test_loose_motions_are_unknowns_of_the_grips(loosen, loose, grips):
     assert operator.loose == loose
     columns = np.array([grips])
     index = operator.load_index(columns)
-    force, pivot, _ = grip_forces(operator, columns, index)
+    found = grip_forces(operator, columns, index)
+    force = found.force.copy()
     share_pairs(operator, columns, index, force, np.empty((1, 0)))
     part = operator.flexibility[np.ix_(index[0], index[0])]
     moved = part @ force[0] + operator.dead_displacement[index[0]]
@@ -206,7 +224,7 @@ def test_loose_motions_are_unknowns_of_the_grips(loosen, loose, grips):
     bricks = columns[0] // 2
     if len(set(bricks)) == len(grips):
         scale = np.append(np.diag(part)[:-loose], [-1 / operator.softness] * loose)
-        assert pivot == pytest.approx([min(1.0, (eliminated(part) / scale).min())], rel=1e-6)
+        assert found.lowest == pytest.approx([min(1.0, (eliminated(part) / scale).min())], rel=1e-6)
     else:
         weighed = operator.answer("edge_force", index, force)
         (brick,) = {b for b in bricks if (bricks == b).sum() == 2}
@@ -222,17 +240,25 @@ def test_what_rounding_may_change_grips_forces_by(grips):
     operator = replace(operator, loss=rng.uniform(1.0, 9.0, len(operator.loss)))
     columns = np.array([grips])
     index = operator.load_index(columns)
-    force, pivot, doubt = grip_forces(operator, columns, index)
+    found = grip_forces(operator, columns, index)
     part, loss = operator.flexibility[np.ix_(index[0], index[0])], operator.loss[index[0]]
-    own, size, dead = np.diag(part), np.abs(force[0]), np.abs(operator.dead_displacement[index[0]])
+    own, size, dead = (
+        np.diag(part),
+        np.abs(found.force[0]),
+        np.abs(operator.dead_displacement[index[0]]),
+    )
     left = eliminated(part)
     sums = [
         sum(np.sqrt(own[i] * loss[i] * own[j] * loss[j]) * size[j] for j in range(len(own)))
         + dead[i] * loss[i]
         for i in range(len(own))
     ]
-    assert doubt == pytest.approx([(sums / left).max() / size.max()], rel=1e-9)
-    assert pivot == pytest.approx([(left / own).min()], rel=1e-9)
+    doubt = (sums / left).max() / size.max()
+    assert doubts(operator, index, found) == pytest.approx([doubt], rel=1e-9)
+    assert found.lowest == pytest.approx([(left / own).min()], rel=1e-9)
+    assert doubt <= len(own) * operator.worst_doubt / found.lowest[0]
+    for most, stands in ((0.999 * doubt, False), (1.001 * doubt, True)):
+        assert trusted(operator, index, found, most).tolist() == [stands]
 
 
 @pytest.mark.parametrize("grips", [1, 2, 3])

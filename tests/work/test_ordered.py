@@ -9,7 +9,7 @@ import subprocess
 import sys
 import threading
 import time
-from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor, wait
 from functools import partial
 
 import numpy as np
@@ -17,6 +17,7 @@ import pytest
 
 from seqopt.errors import SolverError, WorkerError
 from seqopt.work import Progress, hire, map_ordered
+from seqopt.work.processes import Processes
 from tests.builders import ROOT
 
 
@@ -132,6 +133,26 @@ def test_workers_that_always_die_end_in_a_line():
         list(map_ordered(die, range(3), crew))
     assert "\n" not in str(caught.value)
     assert multiprocessing.active_children() == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("cancels", [False, True])
+def test_a_run_that_is_ended_leaves_no_error_behind(monkeypatch, cancels):
+    """Many calls wait when processes end; the control cancels them, over which a pool stumbles."""
+    seen = []
+    monkeypatch.setattr(threading, "excepthook", lambda seen_: seen.append(seen_.exc_type))
+    if cancels:
+        monkeypatch.setattr(Processes, "drop", lambda self, calls: [c.cancel() for c in calls])
+    with hire(workers=2) as crew:
+        calls = [crew.submit(time.sleep, seconds) for seconds in (0.0, *[30.0] * 20)]
+        calls[0].result()
+        time.sleep(0.5)  # until the pool has nothing to do but wait
+        crew.drop(calls)
+        for process in crew._started:
+            process.kill()
+        wait(calls, 2)
+    old = sys.version_info < (3, 12)  # its pools have the fault
+    assert [error.__name__ for error in seen] == ["InvalidStateError"] * (cancels and old)
 
 
 def test_an_executor_of_others_that_breaks_is_named(tmp_path):

@@ -42,6 +42,7 @@ class Equivalent:
 
 
 COMPLIANCE = "seqopt.engines.rigid.compliance"
+TRIAL = "seqopt.engines.rigid.trial"
 OPERATOR = "seqopt.engines.rigid.operator"
 GROWTH = "seqopt.engines.rigid.growth"
 GRIPS = "seqopt.engines.rigid.grip_equations"
@@ -89,11 +90,11 @@ EQUIVALENT = (
         for size in ("1.0", "-1.0")
     ),
     *(
-        Equivalent(COMPLIANCE, "CHUNK", "2048", size, "the size of a pass changes no answer")
-        for size in ("2047", "2049")
+        Equivalent(TRIAL, "CHUNK", "4096", size, "the size of a pass changes no answer")
+        for size in ("4095", "4097")
     ),
     *(
-        Equivalent(COMPLIANCE, "CANCEL", "10.0", size, "where one way of two that agree ends")
+        Equivalent(TRIAL, "CANCEL", "10.0", size, "where one way of two that agree ends")
         for size in ("9.0", "11.0")
     ),
     Equivalent(CRITERIA, "zeros_like", "[0][0]", "[-1][0]", "responses of a step have one shape"),
@@ -123,10 +124,9 @@ EQUIVALENT = (
     Equivalent(
         CERTIFICATE, "@dataclass", "repr=False", "repr=True", "without arrays both look alike"
     ),
-    Equivalent(GRIPS, "pivot > 0", ">", ">=", "what is over a pivot of zero is infinite"),
-    Equivalent(GRIPS, "TINY", "0.0", "-1.0", "without forces it is TINY either way"),
+    Equivalent(GRIPS, "lowest > 0", ">", ">=", "what is over a pivot of zero is infinite"),
     *(
-        Equivalent(COMPLIANCE, "UNSEEN", "100", size, "a margin that was met, to two digits")
+        Equivalent(TRIAL, "UNSEEN", "100", size, "a margin that was met, to two digits")
         for size in ("99", "101")
     ),
     *(
@@ -136,16 +136,20 @@ EQUIVALENT = (
         for old, new in (("2 *", "2 +"), (">=", "!="))
     ),
     *(
-        Equivalent(OPERATOR, "loads, every", "2 *", new, "which way of two that agree is taken")
+        Equivalent(
+            OPERATOR, "2 * self.axis.size", "2 *", new, "which way of two that agree is taken"
+        )
         for new in ("1 *", "3 *", "2 +", "2 -", "2 /")
     ),
     *(
-        Equivalent(OPERATOR, "every <= max", "<=", new, "which way of two that agree is taken")
+        Equivalent(
+            OPERATOR, "self.axis.size <= max", "<=", new, "which way of two that agree is taken"
+        )
         for new in ("<", "!=", ">", ">=", "==")
     ),
-    Equivalent(COMPLIANCE, "doubt <= accuracy", "<=", "<", "no doubt is it to the last bit"),
+    Equivalent(GRIPS, "doubts(", "<=", "<", "no doubt is it to the last bit"),
     *(
-        Equivalent(COMPLIANCE, "force[~trusted]", "0.0", size, "these sets are answered anew")
+        Equivalent(TRIAL, "force[~good]", "0.0", size, "these sets are answered anew")
         for size in ("1.0", "-1.0")
     ),
     *(

@@ -23,14 +23,8 @@ from seqopt.engines.discrete.equilibrium_path import Held, Settled, settle
 from seqopt.engines.discrete.pads import Pinch, pad_stiffness
 from seqopt.engines.discrete.system import BedStiffness, System, build_system
 from seqopt.engines.failures import failing_in_a_line
-from seqopt.engines.interface import (
-    Fields,
-    Want,
-    grip_columns,
-    join_sets,
-    no_sets,
-    require_finite,
-)
+from seqopt.engines.interface import Fields, Want, grip_columns, require_finite
+from seqopt.engines.joined_fields import join_sets, no_sets
 from seqopt.engines.named import NamedEngine
 from seqopt.engines.rigid.mechanism import mechanism_error, require_resistance
 from seqopt.engines.rigid.recovery import Solution, respond

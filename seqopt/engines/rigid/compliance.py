@@ -12,17 +12,15 @@ Brick counts are best asked in ascending order: what all of them share grows in 
 
 from __future__ import annotations
 
-import math
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from seqopt.arrays import Bools, Floats, Ints
+from seqopt.arrays import Ints
 from seqopt.engines.basis import SPACE, Basis
 from seqopt.engines.failures import failing_in_a_line
 from seqopt.engines.interface import (
-    FLAGS,
     Fields,
     Want,
     grip_columns,
@@ -30,13 +28,13 @@ from seqopt.engines.interface import (
     require_finite,
 )
 from seqopt.engines.named import NamedEngine
-from seqopt.engines.rigid.grip_equations import grip_forces, pairs_of, share_pairs
 from seqopt.engines.rigid.kept import Kept
-from seqopt.engines.rigid.loads import load_matrix
 from seqopt.engines.rigid.mixed import LAST_CORRECTION
-from seqopt.engines.rigid.operator import ComplianceOperator, OperatorBuilder
+from seqopt.engines.rigid.operator import ComplianceOperator
+from seqopt.engines.rigid.operator_builder import OperatorBuilder
 from seqopt.engines.rigid.refinement import Refinement
 from seqopt.engines.rigid.spanning_tree import grow_tree
+from seqopt.engines.rigid.trial import ACCURACY, try_forces
 from seqopt.engines.rigid.ungripped import Shared, share
 from seqopt.engines.threads import one_thread
 from seqopt.network.build import network_of
@@ -44,12 +42,8 @@ from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
 
 KEPT = 32e6  # bytes of operators that may stay when another is made
-CHUNK = 2048  # grip sets per pass: keeps the work arrays in the processor's cache
-ACCURACY = 1e-9  # largest error of fields over the largest of each
 SCREEN = 1e-6  # the same, of what is only to be compared
-UNSEEN = 100 * np.finfo(float).eps  # largest error that was met over what is read off the equations
 EVEN = 5e-5  # softest over stiffest joint from which on pivots tell the whole error
-CANCEL = 10.0  # what the grips undo over what is left, where pivots do not
 
 
 class ComplianceEngine(NamedEngine):
@@ -108,21 +102,25 @@ class ComplianceEngine(NamedEngine):
             return require_finite(answer, bricks, grips)
         operator = self._operator(bricks, columns)
         accuracy = max(SCREEN, self._accuracy) if want & Want.SCREEN else self._accuracy
-        even = bricks <= self._even
-        found, trusted = _answers(operator, columns, want, even=even, accuracy=accuracy)
+        tried = try_forces(operator, columns, even=bricks <= self._even, accuracy=accuracy)
+        if len(columns) and not tried.trusted.any():
+            answer = keep_wanted(self._refined(bricks, columns, want), want)
+            return require_finite(answer, bricks, grips)
+        found = tried.fields(want)
         if self._basis is not SPACE:
             found["grip_force"] = found["grip_force"] @ self._basis.force
-        if not trusted.all():
-            better = keep_wanted(self._refined(bricks, columns[~trusted], want), want)
+        if not tried.trusted.all():
+            wrong = ~tried.trusted
+            better = keep_wanted(self._refined(bricks, columns[wrong], want), want)
             for name, values in found.items():
-                values[~trusted] = getattr(better, name)
+                values[wrong] = getattr(better, name)
         return require_finite(Fields(**found), bricks, grips)
 
     def _operator(self, bricks: int, columns: Ints) -> ComplianceOperator:
         """Return an operator that answers grip sets: one that is kept, or else a new one."""
-        held = np.flatnonzero(np.bincount(columns.ravel() // 2))
         known = self._kept.take(bricks)
-        if known is None or not known.covers(held):
+        if known is None or not known.covers(columns // 2):
+            held = np.unique(columns // 2)
             if known is not None:
                 held = np.union1d(held, known.held)
             if 2 * len(held) >= bricks:
@@ -154,82 +152,6 @@ class ComplianceEngine(NamedEngine):
             return self._refinement.solve(columns, operator, largest, self._basis)
 
 
-def solve_batch(
-    operator: ComplianceOperator,
-    columns: Ints,
-    want: Want = Want.RESPONSES,
-    *,
-    even: bool = True,
-    accuracy: float = ACCURACY,
-) -> tuple[Fields, Bools]:
-    """Return the fields of grip sets, and which of them are accurate.
-
-    Parameters
-    ----------
-    operator : ComplianceOperator
-    columns : (S, r) int
-        Grips as indices into ``network.inner.ravel()``.
-    want : Want, optional
-    even : bool, optional
-        Whether the joints are about equally stiff: where not, pivots do not tell the whole error.
-    accuracy : float, optional
-        Largest error of fields, over the largest entry of each, that is accepted.
-
-    Returns
-    -------
-    fields : Fields
-        Grip forces in the directions of the operator.
-    trusted : (S,) bool
-    """
-    found, trusted = _answers(operator, columns, want, even=even, accuracy=accuracy)
-    return Fields(**found), trusted
-
-
-def _answers(
-    operator: ComplianceOperator, columns: Ints, want: Want, *, even: bool, accuracy: float
-) -> tuple[dict[str, Floats], Bools]:
-    """Return the fields of grip sets by name, not frozen yet, and which of them are accurate."""
-    sets = len(columns)
-    index = operator.load_index(columns)
-    force = np.empty(index.shape)
-    trusted = np.empty(sets, dtype=bool)
-    pairs = pairs_of(operator, columns)
-    for start in range(0, sets, CHUNK):
-        part = slice(start, start + CHUNK)
-        mine = pairs if sets <= CHUNK else pairs.within(start, start + CHUNK)
-        force[part], _, doubt = grip_forces(operator, columns[part], index[part], mine)
-        trusted[part] = UNSEEN * doubt <= accuracy
-    force[~trusted] = 0.0
-    if not even:
-        trusted &= ~cancels(operator, index, force)
-    found = _fields(operator, index, force, want)
-    share_pairs(operator, columns, index, force, found["edge_force"], pairs)
-    nodes = force[:, : columns.shape[1] * operator.directions]
-    return {**found, "grip_force": nodes.reshape(*columns.shape, operator.directions)}, trusted
-
-
-def _fields(
-    operator: ComplianceOperator, index: Ints, force: Floats, want: Want
-) -> dict[str, Floats]:
-    """Return the fields of grip sets whose loads are forces (S, k), those of the grips aside."""
-    sets = len(index)
-    load = load_matrix(index, force, len(operator.flexibility))
-
-    def answer(name: str, *shape: int) -> Floats:
-        if not want & FLAGS[name]:
-            return np.empty((sets, 0, *shape))
-        wanted = operator.answer(name, index, force, load)
-        return wanted.reshape(sets, wanted.shape[1] // math.prod(shape), *shape)
-
-    return {
-        "edge_force": answer("edge_force"),
-        "displacement": answer("displacement", 3),
-        "support": answer("support", 6),
-        "joint_wrench": answer("joint_wrench", 6),
-        "brick_twist": answer("brick_twist", 6),
-    }
-
-
 def _count_even(network: Network) -> int:
     """Return up to how many bricks all joints that act are about equally stiff."""
     springs = network.springs
@@ -240,32 +162,3 @@ def _count_even(network: Network) -> int:
         high = np.maximum.accumulate(stiffness[order].max(axis=1))
         even &= low >= EVEN * high
     return len(network.inner) if even.all() else int(springs.since[order][even.argmin()]) - 1
-
-
-def cancels(operator: ComplianceOperator, index: Ints, force: Floats) -> Bools:
-    """Return whether motions cancel at the grips of sets.
-
-    Parameters
-    ----------
-    operator : ComplianceOperator
-    index : (S, k) int
-        Rows of the operator that the grips load.
-    force : (S, k) float
-        There, N.
-
-    Returns
-    -------
-    (S,) bool
-    """
-    out = np.zeros(len(index), dtype=bool)
-    if not index.size:
-        return out
-    size = np.abs(operator.flexibility)
-    dead = operator.dead_displacement
-    for start in range(0, len(index), CHUNK):
-        rows, pull = index[start : start + CHUNK], force[start : start + CHUNK]
-        held = rows[:, :, None], rows[:, None]
-        parts = np.einsum("sij,sj->si", size[held], np.abs(pull)) + np.abs(dead[rows])
-        left = np.abs(operator.answer("displacement", rows, pull)).max(axis=1)
-        out[start : start + CHUNK] = parts.max(axis=1) > CANCEL * left
-    return out

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from seqopt.arrays import Floats, Ints
-from seqopt.engines.interface import Fields, join_sets, no_sets
+from seqopt.engines.interface import Fields
+from seqopt.engines.joined_fields import join_sets, no_sets
 from seqopt.engines.rigid.mechanism import (
     RigidStructure,
     lost_to_rounding,

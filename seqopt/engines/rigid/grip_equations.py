@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from functools import cache
 from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
 
-from seqopt.arrays import Floats, Ints
+from seqopt.arrays import Bools, Floats, Ints, frozen
 from seqopt.engines.rigid.ldlt import solve_positive
 from seqopt.engines.rigid.operator import ComplianceOperator
 
@@ -15,22 +16,23 @@ TINY = np.finfo(float).tiny
 
 
 class GripForces(NamedTuple):
-    """The forces of the grips of sets, and how far they can be trusted.
+    """The forces of the grips of sets, and how well they are determined.
 
     Attributes
     ----------
     force : (S, k) float
         N.
-    pivot : (S,) float
-        The smallest scaled pivot of the equations.
-    doubt : (S,) float
-        What rounding of one part in one may change them by, over the largest; infinite where the
-        equations are not definite.
+    pivot : (k, S) float
+        The scaled pivots of the equations.
     """
 
     force: Floats
     pivot: Floats
-    doubt: Floats
+
+    @property
+    def lowest(self) -> Floats:
+        """The smallest pivot of each set, (S,): one where there are no grips."""
+        return np.asarray(self.pivot.min(axis=0, initial=1.0))
 
 
 class Pairs(NamedTuple):
@@ -79,14 +81,27 @@ def pairs_of(operator: ComplianceOperator, columns: Ints) -> Pairs:
     -------
     Pairs
     """
+    first, second = couples(columns.shape[1])
     bricks = columns.T // 2
-    couples = [*combinations(range(columns.shape[1]), 2)]
-    shared = [np.flatnonzero(bricks[i] == bricks[j]) for i, j in couples]
-    sets = np.concatenate([np.empty(0, dtype=np.int64), *shared])
-    counts = [len(found) for found in shared]
-    first, second = np.repeat(np.array(couples, np.int64).reshape(-1, 2), counts, axis=0).T
+    couple, sets = np.divmod(np.flatnonzero(bricks[first] == bricks[second]), len(columns))
+    first, second = first[couple], second[couple]
     brick = bricks[first, sets]
     return Pairs(sets, first, second, brick, operator.axis[brick])
+
+
+@cache
+def couples(grips: int) -> Ints:
+    """Return all couples of a number of grips.
+
+    Parameters
+    ----------
+    grips : int
+
+    Returns
+    -------
+    (2, c) int
+    """
+    return frozen(np.array([*combinations(range(grips), 2)], dtype=np.int64).reshape(-1, 2).T)
 
 
 def grip_forces(
@@ -112,26 +127,61 @@ def grip_forces(
     GripForces
     """
     pairs = pairs_of(operator, columns) if pairs is None else pairs
-    dead = operator.dead_displacement.take(np.ascontiguousarray(index.T))
-    force, pivots = _solved(operator, pairs, index, dead)
-    pivot = pivots.min(axis=0, initial=1.0)
-    doubt = _doubt(operator, index, force, pivots)
-    return GripForces(force, pivot, np.where(pivot > 0, doubt, np.inf))
+    rows = np.ascontiguousarray(index.T)
+    force, pivot = _solved(operator, pairs, rows, operator.dead_displacement.take(rows))
+    return GripForces(force.T, pivot)
 
 
-def _doubt(operator: ComplianceOperator, index: Ints, force: Floats, pivots: Floats) -> Floats:
-    """Return the error of forces (S, k) for rounding of one part in one, over the largest.
+def trusted(operator: ComplianceOperator, index: Ints, found: GripForces, most: float) -> Bools:
+    """Return which sets' forces rounding changes little enough.
+
+    Parameters
+    ----------
+    operator : ComplianceOperator
+    index : (S, k) int
+        The loads at the grips.
+    found : GripForces
+    most : float
+        Largest of `doubts` that is accepted.
+
+    Returns
+    -------
+    (S,) bool
+    """
+    lowest = found.lowest
+    out = np.asarray(most * lowest >= len(found.pivot) * operator.worst_doubt)
+    rest = np.flatnonzero(~out & (lowest > 0))
+    if rest.size:
+        part = GripForces(found.force[rest], found.pivot[:, rest])
+        out[rest] = doubts(operator, index[rest], part) <= most
+    return out
+
+
+def doubts(operator: ComplianceOperator, index: Ints, found: GripForces) -> Floats:
+    """Return the error of forces for rounding of one part in one, over the largest of each set.
 
     A displacement is known to a share of all that adds up in it; with ``|G_ij| ≤ √(G_ii G_jj)``
     that is read off the diagonal. Over its pivot it is the force that it leaves undetermined.
+
+    Parameters
+    ----------
+    operator : ComplianceOperator
+    index : (S, k) int
+        The loads at the grips.
+    found : GripForces
+        With positive pivots.
+
+    Returns
+    -------
+    (S,) float
     """
-    size = np.abs(force.T)
+    size = np.abs(found.force.T)
     root, own, scale = operator.shares.take(np.ascontiguousarray(index.T), axis=1)
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-        own += np.einsum("ks,ks->s", root, size)
+        own += (root * size).sum(axis=0)
         own *= scale
-        own /= pivots
-        most = np.maximum(size.max(axis=0, initial=0.0), TINY)
+        own /= found.pivot
+        most = size.max(axis=0, initial=TINY)
         return np.asarray(own.max(axis=0, initial=0.0) / most)
 
 
@@ -151,7 +201,8 @@ def still_forces(operator: ComplianceOperator, columns: Ints, index: Ints, moved
     (S, k) float
         N; between two grips on one brick, none.
     """
-    return _solved(operator, pairs_of(operator, columns), index, np.ascontiguousarray(moved.T))[0]
+    pairs, rows = pairs_of(operator, columns), np.ascontiguousarray(index.T)
+    return _solved(operator, pairs, rows, np.ascontiguousarray(moved.T))[0].T
 
 
 def share_pairs(
@@ -199,25 +250,23 @@ def share_pairs(
 
 
 def _solved(
-    operator: ComplianceOperator, pairs: Pairs, index: Ints, dead: Floats
+    operator: ComplianceOperator, pairs: Pairs, rows: Ints, dead: Floats
 ) -> tuple[Floats, Floats]:
-    """Return forces (S, k) that undo displacements (k, S), and scaled pivots (k, S)."""
-    sets, count = index.shape
+    """Return forces at loads (k, S) that undo displacements (k, S), and scaled pivots (k, S)."""
+    count, sets = rows.shape
     size = len(operator.flexibility)
-    rows = np.ascontiguousarray(index.T)
     system = np.empty((count + 1, count, sets))
-    operator.flexibility.take(
-        rows[:, None] * size + rows,
-        out=system[:-1],
-        mode="clip",  # other modes copy once more
-    )
+    for i in range(0, count, operator.directions):  # what is above the diagonal is not read
+        mine = slice(i, min(i + operator.directions, count))
+        entries = rows[mine, None] * size + rows[: mine.stop]
+        part = system[mine, : mine.stop]
+        operator.flexibility.take(entries, out=part, mode="clip")  # others copy once more
     np.negative(dead, out=system[-1])
     if len(pairs.sets):
         nodes = count - operator.loose
         _brace(system[:nodes, :nodes], pairs)
     scale = 1 / operator.softness if operator.loose else 1.0
-    answer, pivot = solve_positive(system, operator.loose, scale)
-    return np.ascontiguousarray(answer.T), pivot
+    return solve_positive(system, operator.loose, scale)
 
 
 def _brace(system: Floats, pairs: Pairs) -> None:

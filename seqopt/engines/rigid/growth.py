@@ -76,7 +76,7 @@ class Growth:
         self._along = self._carried(center - center[tree.parent])
         self.loss = np.ones(len(tree.spring))
         self.twist = np.empty((1 + most, most))
-        self.wrench = np.empty((1 + most, self._size * springs))
+        self.wrench = np.zeros((1 + most, self._size * springs))
         self.bricks = self._closed = 0
         self._weighed: list[tuple[Floats, Floats]] = []
         self._ties: dict[int, dict[int, int]] = {}
@@ -127,6 +127,8 @@ class Growth:
         return self.wrench[rows, : self._size * self._count(self.bricks)]
 
     def _start(self) -> None:
+        if self._closed:
+            self.wrench[:] = 0.0  # springs not of the tree act on all rows
         self.bricks = self._closed = 0
         self._left = 1.0
         self._weighed = [(np.empty(0), np.empty(0))]
@@ -145,7 +147,7 @@ class Growth:
         old, after = slice(0, 1 + k * brick), 1 + k * brick
         mine, rows = slice(k * brick, k * brick + k), slice(after, after + k)
         self.bricks += 1
-        self._stressed(old)[:, k * self._count(brick) :] = 0.0
+        self._stressed(0)[k * self._count(brick) :] = 0.0  # as in all old rows, never written yet
         own, along = self._own_arm[brick], self._along[brick]
         flexibility = own @ self._compliance[spring] @ own.T
         if parent != GROUND:

@@ -9,7 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
-from seqopt.engines.interface import Fields, join_sets, no_sets
+from seqopt.engines.interface import Fields
+from seqopt.engines.joined_fields import join_sets, no_sets
 from seqopt.engines.rigid.mechanism import require_resistance
 from seqopt.engines.rigid.mixed_system import factorize, mixed_system, unscaled
 from seqopt.engines.rigid.recovery import Solution, respond

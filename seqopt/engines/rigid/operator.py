@@ -6,16 +6,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy import sparse
 
 from seqopt.arrays import Floats, FrozenValue, Ints, frozen
-from seqopt.engines.basis import SPACE, Basis
 from seqopt.engines.interface import FLAGS
-from seqopt.engines.rigid.growth import Growth
-from seqopt.engines.rigid.loads import inner_edges, inner_motions, load_matrix
-from seqopt.engines.rigid.response_maps import AT_ONCE, ResponseMaps, scene_maps
-from seqopt.engines.rigid.spanning_tree import SpanningTree
-from seqopt.network.network import Network
+from seqopt.engines.rigid.loads import Loads, loads_of
+from seqopt.engines.rigid.response_maps import AT_ONCE, ResponseMaps
 
 OF_TWISTS = ("displacement", "brick_twist")  # the other fields follow from wrenches
 FEW = 200  # loads whose responses take little, and are always made once for all
@@ -103,18 +98,30 @@ class ComplianceOperator(FrozenValue):
             np.stack([root, np.abs(self.dead_displacement) * self.loss / root, root / own])
         )
 
-    def covers(self, held: Ints) -> bool:
+    @cached_property
+    def worst_doubt(self) -> float:
+        """Most that a grip's force can be in doubt where pivots are one, over the loads at grips.
+
+        As `seqopt.engines.rigid.grip_equations.doubts`: the forces undo the displacements, so these
+        are no more in doubt than what the forces add up to.
+        """
+        own = np.sqrt(
+            np.abs(self.flexibility.diagonal()).max(initial=0.0) * self.loss.max(initial=1.0)
+        )
+        return float(2 * own * self.shares[2].max(initial=0.0))
+
+    def covers(self, bricks: Ints) -> bool:
         """Return whether loads act at the nodes of bricks.
 
         Parameters
         ----------
-        held : (h,) int
+        bricks : (..) int
 
         Returns
         -------
         bool
         """
-        return bool((self.place[held] >= 0).all())
+        return len(self.held) == self.bricks or bool((self.place[bricks] >= 0).all())
 
     def load_index(self, columns: Ints) -> Ints:
         """Return which loads act at every grip, and after them all loose motions.
@@ -129,7 +136,8 @@ class ComplianceOperator(FrozenValue):
         (S, rd + m) int
             Rows of the operator.
         """
-        nodes = 2 * self.place[columns // 2] + columns % 2
+        every = len(self.held) == self.bricks
+        nodes = columns if every else 2 * self.place[columns // 2] + columns % 2
         rows = self.directions * nodes[:, :, None] + np.arange(self.directions)
         rows = rows.reshape(len(columns), columns.shape[1] * self.directions)
         if self.loose:
@@ -137,9 +145,25 @@ class ComplianceOperator(FrozenValue):
             rows = np.hstack([rows, np.tile(after, (len(rows), 1))])
         return np.asarray(rows)
 
-    def answer(
-        self, name: str, index: Ints, force: Floats, load: sparse.csr_array | None = None
-    ) -> Floats:
+    def loads(self, index: Ints, force: Floats, weight: float = 1.0) -> Loads:
+        """Return forces at loads, and the weight.
+
+        Parameters
+        ----------
+        index : (S, k) int
+            Loads that act.
+        force : (S, k) float
+            By how much, N.
+        weight : float, optional
+            Share of the weight.
+
+        Returns
+        -------
+        Loads
+        """
+        return loads_of(index, force, len(self.twist), weight)
+
+    def answer(self, name: str, index: Ints, force: Floats, loads: Loads | None = None) -> Floats:
         """Return a field of sets of forces beside the weight.
 
         Where there are fewer sets than loads of all bricks, their twists and wrenches are summed
@@ -153,23 +177,21 @@ class ComplianceOperator(FrozenValue):
             Loads that act.
         force : (S, k) float
             By how much, N.
-        load : (S, l + 1) sparse, optional
-            The same as a matrix, `seqopt.engines.rigid.loads.load_matrix`, if it is known.
+        loads : Loads, optional
+            The same, if it was made before.
 
         Returns
         -------
         (S, Q) float
         """
-        loads, every = len(self.twist) - 1, 2 * self.axis.size
-        if every <= max(FEW, len(index)):  # whatever was asked before: answers do not depend on it
-            load = load_matrix(index, force, loads) if load is None else load
-            return np.asarray(load @ getattr(self, name))
+        if 2 * self.axis.size <= max(FEW, len(index)):  # not what was made: answers are the same
+            loads = self.loads(index, force) if loads is None else loads
+            return loads.sum(getattr(self, name))
         states, out = self._states(name), np.empty((len(index), self.maps.count(name)))
         step = max(16, AT_ONCE // states.shape[1])
         for start in range(0, len(index), step):
             part = slice(start, start + step)
-            load = load_matrix(index[part], force[part], loads)
-            self.maps.apply(name, load @ states, out[part])
+            self.maps.apply(name, self.loads(index[part], force[part]).sum(states), out[part])
         if name == "edge_force":
             out[:, self.inner_edge] += self.at_second
             self._add_grips(index, force, out)
@@ -219,76 +241,3 @@ class ComplianceOperator(FrozenValue):
     def brick_twist(self) -> Floats:
         """Twists of all bricks, (l + 1, 6b)."""
         return frozen(self._rows("brick_twist"))
-
-
-class OperatorBuilder:
-    """Makes the operator of any brick count of a tree from what grows with it.
-
-    Parameters
-    ----------
-    network : Network
-    tree : SpanningTree
-        On which the bricks hang.
-    basis : Basis, optional
-        The directions in which bricks are loaded and move; all by default.
-    """
-
-    def __init__(self, network: Network, tree: SpanningTree, basis: Basis = SPACE) -> None:
-        self.network, self.basis = network, basis
-        self.growth = Growth(network, tree, basis)
-        self._maps = scene_maps(network, basis)
-        self._nodes = inner_motions(network, basis)
-
-    def operator(self, bricks: int, held: Ints | None = None) -> ComplianceOperator:
-        """Return the operator of a partial structure.
-
-        Parameters
-        ----------
-        bricks : int
-            How many bricks stand, at most as many as the tree has.
-        held : (h,) int, optional
-            The bricks at whose nodes loads act, ascending; all by default.
-
-        Returns
-        -------
-        ComplianceOperator
-        """
-        self.growth.reach(bricks)
-        held = np.arange(bricks) if held is None else held
-        which = slice(bricks) if len(held) == bricks else held
-        nodes = self._nodes[which]
-        twist, wrench = self._rows(bricks, which, nodes)
-        moved = _at_nodes(twist.reshape(len(twist), bricks, nodes.shape[2])[:, which], nodes)
-        inner_edge, axis, at_second = inner_edges(self.network, bricks)
-        return ComplianceOperator(
-            held=held,
-            flexibility=moved[:-1],
-            dead_displacement=moved[-1],
-            twist=twist,
-            wrench=wrench,
-            maps=ResponseMaps(self._maps, bricks),
-            at_second=at_second,
-            axis=axis @ self.basis.force.T,
-            inner_edge=inner_edge,
-            loss=np.repeat(self.growth.loss[held], nodes.shape[1]),
-        )
-
-    def _rows(self, bricks: int, which: Ints | slice, nodes: Floats) -> tuple[Floats, Floats]:
-        """Return the twists and wrenches under unit loads at nodes, and under the weight."""
-        k, loads = nodes.shape[2], nodes.shape[0] * nodes.shape[1]
-        springs = int(np.searchsorted(self.network.springs.since, bricks, side="right"))
-        out = []
-        for answers, width in ((self.growth.twist, k * bricks), (self.growth.wrench, k * springs)):
-            by_brick = answers[1 : 1 + k * bricks, :width].reshape(bricks, k, width)
-            rows = np.empty((loads + 1, width))
-            np.matmul(nodes, by_brick[which], out=rows[:-1].reshape(*nodes.shape[:2], width))
-            rows[-1] = answers[0, :width]
-            out.append(rows)
-        return out[0], out[1]
-
-
-def _at_nodes(twist: Floats, nodes: Floats) -> Floats:
-    """Return the displacements (L, 2dh) of nodes for rows of twists (L, h, k)."""
-    out = np.empty((len(twist), *nodes.shape[:2]))
-    np.matmul(twist.transpose(1, 0, 2), nodes.swapaxes(1, 2), out=out.transpose(1, 0, 2))
-    return out.reshape(len(twist), nodes.shape[0] * nodes.shape[1])

@@ -16,10 +16,11 @@ from scipy import sparse
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.engines.basis import SPACE, Basis
-from seqopt.engines.interface import Fields, join_sets, merge_sets, no_sets
+from seqopt.engines.interface import Fields
+from seqopt.engines.joined_fields import join_sets, merge_sets, no_sets
 from seqopt.engines.rigid.grip_equations import grip_forces, still_forces
 from seqopt.engines.rigid.held_operator import held_operator
-from seqopt.engines.rigid.loads import load_matrix
+from seqopt.engines.rigid.loads import loads_of
 from seqopt.engines.rigid.loose import HeldSystem, hold_loose
 from seqopt.engines.rigid.mechanism import require_resistance
 from seqopt.engines.rigid.mixed import LAST_CORRECTION, solve_mixed, unchanged
@@ -140,11 +141,13 @@ class Corrector:
         """
         operator, parts, bricks = self.operator, self.parts, self.bricks
         index = operator.load_index(columns)
-        force, pivot, _ = grip_forces(operator, columns, index)
+        found = grip_forces(operator, columns, index)
         if operator.loose:
-            for row in columns[~(pivot >= HARDLY_HELD)]:
+            for row in columns[~(found.lowest >= HARDLY_HELD)]:
                 require_resistance(self.network, bricks, row)
-        answers = _Answers(self._states(index, force), self._in_space(force, columns.shape[1]))
+        answers = _Answers(
+            self._states(index, found.force), self._in_space(found.force, columns.shape[1])
+        )
         done = self._correct(columns, index, answers)
         wrench, twist = unscaled(parts, answers.states[done])
         held = answers.force[done].reshape(int(done.sum()), columns.shape[1], 3)
@@ -157,10 +160,10 @@ class Corrector:
 
     def _states(self, index: Ints, force: Floats, weight: float = 1.0) -> Floats:
         """Return the scaled answers (S, n) to forces (S, k) at loads, and the weight or none."""
-        load = load_matrix(index, force, len(self.operator.twist) - 1, weight)
+        loads = self.operator.loads(index, force, weight)
         every = self.basis.wrench
         wrench, twist = (
-            (load @ rows).reshape(len(index), -1, len(every)) @ every
+            loads.sum(rows).reshape(len(index), -1, len(every)) @ every
             for rows in (self.operator.wrench, self.operator.twist)
         )
         return rescaled(self.parts, wrench, twist.reshape(len(index), -1))
@@ -193,7 +196,7 @@ class Corrector:
         operator, parts = self.operator, self.parts
         joints, grips = len(parts.wrench_unit), columns.shape[1]
         at = (3 * columns[:, :, None] + np.arange(3)).reshape(force.shape)
-        pulled = load_matrix(at, force, 6 * self.bricks, 1.0) @ self.pulls
+        pulled = loads_of(at, force, 6 * self.bricks + 1).matrix @ self.pulls
         missing = -(parts.matrix @ states.T).T
         missing[:, joints:] += pulled
         answer, pull = self.held.solve(missing)

@@ -104,7 +104,8 @@ class ResponseMaps(FrozenValue):
         """How twists move nodes, (3n, kb)."""
         rows = 3 * self.scene.network.count_nodes(self.bricks)
         width = self.bricks * len(self.scene.basis.wrench)
-        alone = np.where(self.scene.since > self.bricks, 2.0, 1.0)
+        entries = int(self.scene.motion.indptr[rows])
+        alone = np.where(self.scene.since[:entries] > self.bricks, 2.0, 1.0)
         return frozen(_leading(self.scene.motion, rows, width, alone))
 
     @property
@@ -183,7 +184,7 @@ def _leading(
     """Return the first rows and columns of a map, scaled; ten times as fast as SciPy."""
     stop = int(maps.indptr[rows])
     kept = maps.indices[:stop] < width
-    data = maps.data[:stop] if scale is None else maps.data[:stop] * scale[:stop]
+    data = maps.data[:stop] if scale is None else maps.data[:stop] * scale
     before = np.concatenate([[0], np.cumsum(kept)])
     entries = data[kept], maps.indices[:stop][kept], before[maps.indptr[: rows + 1]]
     return sparse.csr_array(entries, shape=(rows, width))

@@ -150,14 +150,16 @@ def _scaled_gap(
     shared: Shared, acting: Ints, twist_unit: Floats, lever: Floats
 ) -> sparse.csr_array:
     """Return the deformation (6s, 6b) of the acting springs, all components made lengths."""
-    first = len(acting) == 0 or acting[-1] + 1 == len(acting)  # none beyond them acts
-    rows = (6 * acting[:, None] + np.arange(6)).ravel()
-    gap = shared.gap[: len(rows)].copy() if first else shared.gap[rows]
-    gap.data *= np.repeat(np.tile(lever, len(acting)), np.diff(gap.indptr))
-    gap.data *= twist_unit[gap.indices]
-    return sparse.csr_array(
-        (gap.data, gap.indices, gap.indptr), shape=(gap.shape[0], len(twist_unit))
-    )
+    rows = 6 * len(acting)
+    if len(acting) == 0 or acting[-1] + 1 == len(acting):  # none beyond them acts
+        indptr = shared.gap.indptr[: rows + 1]
+        indices, data = shared.gap.indices[: indptr[-1]], shared.gap.data[: indptr[-1]]
+    else:
+        part = shared.gap[(6 * acting[:, None] + np.arange(6)).ravel()]
+        indptr, indices, data = part.indptr, part.indices, part.data
+    data = data * np.repeat(np.tile(lever, len(acting)), np.diff(indptr))
+    data *= twist_unit[indices]
+    return sparse.csr_array((data, indices, indptr), shape=(rows, len(twist_unit)))
 
 
 def _leading(inner: sparse.csr_array, twist_unit: Floats) -> sparse.csr_array:
