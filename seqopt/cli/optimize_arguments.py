@@ -149,7 +149,8 @@ def _resources(takes: Takes) -> None:
     takes.add_argument(
         "--time-limit",
         metavar="SECONDS",
-        help="stop choosing after it, with the best choice so far and a bound",
+        help="stop choosing after it, with the best choice so far and a bound; with --no-proof, "
+        "where choosing and computing are one, with the moves that were chosen by then",
     )
     takes.add_argument(
         "--workers",

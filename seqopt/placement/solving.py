@@ -95,7 +95,8 @@ def solve(
     lazy : bool, optional
         Solve only the models that the proof needs; for exact formulations without budgets.
     time_limit : float, optional
-        Seconds after which it returns its best choice and a bound, as at an interrupt.
+        Seconds of choosing after which it returns its best choice and a bound, as at an interrupt;
+        without proof, of all it does, and an error names the moves that were chosen by then.
     progress : callable, optional
         Called with every better choice and bound as it is found.
     **options
@@ -132,7 +133,7 @@ def _solve_loop(
         return _solve_lazily(problem, formulation, run, options)
     if run.proof:
         return _solve_all(problem, formulation, run, options)
-    return _solve_windows(problem, formulation, options)
+    return _solve_windows(problem, formulation, run, options)
 
 
 def _solve_free(
@@ -212,7 +213,7 @@ def _solve_all(
 
 
 def _solve_windows(
-    problem: PlacementProblem, formulation: Formulation, options: Mapping[str, Any]
+    problem: PlacementProblem, formulation: Formulation, run: _Run, options: Mapping[str, Any]
 ) -> Plan:
     """Return the plan of a search that solves only the models it meets."""
     alone = formulation.window_options
@@ -233,7 +234,7 @@ def _solve_windows(
         )
     seconds: dict[str, float] = {}
     with _timed(seconds, "search"):
-        found = search_windows(problem)
+        found = search_windows(problem, Watch(run.time_limit))
     respond = sum(part.evaluation.seconds for part in (found.alone, *found.shared))
     with _timed(seconds, "verify"):
         steps = problem.steps(found.choice)

@@ -20,6 +20,7 @@ from seqopt.arrays import Floats, Terse
 from seqopt.errors import MemoryShortError, SolverError
 from seqopt.placement.joining import Joined
 from seqopt.placement.problem import Problem
+from seqopt.placement.watch import Watch
 from seqopt.placement.windows import possible_after, window
 from seqopt.responses.choices import StepChoices
 from seqopt.responses.resources import Resources
@@ -64,7 +65,7 @@ class WindowSearch(Terse):
         return np.asarray(self.alone.singles[move] + self.shared[move].singles[0])
 
 
-def search_windows(problem: Problem) -> WindowSearch:
+def search_windows(problem: Problem, watch: Watch | None = None) -> WindowSearch:
     """Choose every open grip of a build, one move after the other.
 
     Brick counts come in ascending order, each move being chosen as soon as its own steps are known.
@@ -73,6 +74,8 @@ def search_windows(problem: Problem) -> WindowSearch:
     ----------
     problem : Problem
         Its own responses are not computed.
+    watch : Watch, optional
+        With the time limit; by default there is none.
 
     Returns
     -------
@@ -82,7 +85,8 @@ def search_windows(problem: Problem) -> WindowSearch:
     Raises
     ------
     SolverError
-        If a move has no candidate left after the choices before it. Others may have led on.
+        If a move has no candidate left after the choices before it, while others may have led on,
+        or if time is over before the last move is chosen.
     MemoryShortError
         If there is not the memory for what it looks at.
     KeyboardInterrupt
@@ -92,6 +96,10 @@ def search_windows(problem: Problem) -> WindowSearch:
     try:
         with closing(walk.alone.evaluation.levels()) as levels:
             for steps in levels:
+                if watch is not None and watch.over:
+                    raise SolverError(
+                        f"time was over after {watch.seconds:.3g} s: {walk.so_far()}; give more"
+                    )
                 walk.look(steps)
                 walk.choose(known=steps[-1].step.bricks)
         walk.choose(known=math.inf)

@@ -7,16 +7,29 @@ from hypothesis import given
 
 from seqopt.engines.interface import Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.errors import SolverError
 from seqopt.network.build import build_network
 from seqopt.placement.problem import pose
 from seqopt.placement.requirements import Limit
 from seqopt.placement.solving import solve
+from seqopt.placement.watch import Watch
 from seqopt.placement.window_search import search_windows
 from seqopt.responses.choices import window_models
 from seqopt.sequence.three_robots import SCHEDULES, three_robot_loop
 from seqopt.study.presets import CRITERIA, EQUATIONS, WEIGHTED
 from tests.builders import far_reaching
 from tests.strategies import arches
+
+
+class Ticking(Watch):
+    """A second goes by whenever it is looked at."""
+
+    ticks = 0
+
+    @property
+    def seconds(self):
+        self.ticks += 1
+        return float(self.ticks)
 
 
 class Counting:
@@ -74,3 +87,14 @@ def test_on_any_chain_it_chooses_as_the_cascade_does(scene):
     problem = pose(engine, schedule, WEIGHTED)
     found = search_windows(problem)
     assert found.choice == solve(problem, "cascade").selection.choice
+
+
+def test_a_time_limit_ends_it_and_says_what_was_chosen(engine25):
+    """An hour is enough; of no time every moment is the last."""
+    problem = pose(engine25, three_robot_loop(engine25.network), EQUATIONS)
+    plan = solve(problem, "cascade", proof=False, time_limit=3600.0)
+    assert plan.nodes == solve(problem, "cascade", proof=False).nodes
+    with pytest.raises(SolverError, match=r"time was over after .* s: no move was chosen yet;"):
+        solve(problem, "cascade", proof=False, time_limit=0.0)
+    with pytest.raises(SolverError, match=r"[1-9] of 22 moves were chosen, at nodes 4"):
+        search_windows(problem, Ticking(time_limit=8.0))

@@ -31,7 +31,7 @@ SUMMED = 2**19  # the same, where much is done with each
 TAKEN = 1e3  # times less a brick moves in closed loops: rounding of what is gone would show
 WORSE = 10.0  # times the rounding that was left when they were summed anew
 SAMPLE = 600  # motions that are compared with each other, about
-MOST = 0.95  # share of all pairs of motions whose asymmetry counts as rounding
+MOST = 0.95  # share of all pairs of motions in space whose asymmetry counts as rounding
 
 
 class Growth:
@@ -224,7 +224,8 @@ class Growth:
         some = np.linspace(0, self._moves - 1, min(self._moves, SAMPLE)).astype(int)
         matrix, root = self.twist[np.ix_(1 + some, some)], np.sqrt(np.abs(self._own()[some]))
         apart = np.abs(matrix - matrix.T) / np.maximum(root * root[:, None], TINY)
-        return max(1.0, float(np.quantile(apart, MOST)) / ROUNDING)
+        more = (len(SPACE.wrench) / self._size) ** 2  # in space there are as many times the pairs
+        return max(1.0, float(np.quantile(apart, 1 - more * (1 - MOST))) / ROUNDING)
 
     def _gap(self, spring: int) -> Floats:
         """Return how far the bodies of a spring part at it under every load, (1 + kb, k)."""
