@@ -20,6 +20,7 @@ extensions = [
     "numpydoc",
     "sphinx_copybutton",
     "extensions.equations",
+    "extensions.docstrings",
     "extensions.downloads",
     "extensions.pictures",
 ]
