@@ -21,7 +21,7 @@ class _Remembering(SandboxedEnvironment):
         return self.templates[name]
 
 
-def setup(app: Sphinx) -> dict[str, bool]:
+def setup(_: Sphinx) -> dict[str, bool]:
     """Let numpydoc's environments remember."""
     docscrape_sphinx.SandboxedEnvironment = _Remembering
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -34,7 +34,7 @@ from seqopt.engines.rigid.operator import ComplianceOperator
 from seqopt.engines.rigid.operator_builder import OperatorBuilder
 from seqopt.engines.rigid.refinement import Refinement
 from seqopt.engines.rigid.spanning_tree import grow_tree
-from seqopt.engines.rigid.trial import ACCURACY, try_forces
+from seqopt.engines.rigid.trial import ACCURACY, Tried, try_forces
 from seqopt.engines.rigid.ungripped import Shared, share
 from seqopt.engines.threads import one_thread
 from seqopt.network.build import network_of
@@ -97,13 +97,8 @@ class ComplianceEngine(NamedEngine):
             As of `seqopt.engines.interface.Engine`.
         """
         columns = grip_columns(self._network, bricks, grips)
-        if bricks > len(self._tree.spring):
-            answer = keep_wanted(self._refined(bricks, columns, want), want)
-            return require_finite(answer, bricks, grips)
-        operator = self._operator(bricks, columns)
-        accuracy = max(SCREEN, self._accuracy) if want & Want.SCREEN else self._accuracy
-        tried = try_forces(operator, columns, even=bricks <= self._even, accuracy=accuracy)
-        if len(columns) and not tried.trusted.any():
+        tried = self._tried(bricks, columns, want) if bricks <= len(self._tree.spring) else None
+        if tried is None or (len(columns) and not tried.trusted.any()):
             answer = keep_wanted(self._refined(bricks, columns, want), want)
             return require_finite(answer, bricks, grips)
         found = tried.fields(want)
@@ -115,6 +110,12 @@ class ComplianceEngine(NamedEngine):
             for name, values in found.items():
                 values[wrong] = getattr(better, name)
         return require_finite(Fields(**found), bricks, grips)
+
+    def _tried(self, bricks: int, columns: Ints, want: Want) -> Tried:
+        """Return what the operator alone says about grip sets."""
+        operator, even = self._operator(bricks, columns), bricks <= self._even
+        accuracy = max(SCREEN, self._accuracy) if want & Want.SCREEN else self._accuracy
+        return try_forces(operator, columns, even=even, accuracy=accuracy)
 
     def _operator(self, bricks: int, columns: Ints) -> ComplianceOperator:
         """Return an operator that answers grip sets: one that is kept, or else a new one."""
