@@ -15,56 +15,19 @@ its move is taken out first.) Branching has to put back what ``assignment_tight`
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import cvxpy as cp
 import numpy as np
 from scipy import sparse
 
-from formulations.solvers import minimize_whole
+from formulations.whole_program import WholeProgram, below, largest_of_each, solve_whole
 from seqopt.arrays import Floats
 from seqopt.placement.costs import LayeredCosts
-from seqopt.placement.first_choice import stopped
-from seqopt.placement.flow import ACCURACY
-from seqopt.placement.formulation import End, Formulation, FormulationKind, Selection
+from seqopt.placement.formulation import Formulation, FormulationKind, Selection
 from seqopt.placement.interface import Aim, PlacementProblem
 from seqopt.placement.watch import Watch
 
 
-@dataclass(frozen=True, eq=False)
-class Written:
-    """The program, written down.
-
-    Attributes
-    ----------
-    program : cvxpy.Problem
-        Costs are scaled.
-    picks : cvxpy.Variable
-        Of every candidate of every move, one after the other.
-    scale : float
-        By which costs are divided.
-    """
-
-    program: cp.Problem
-    picks: cp.Variable
-    scale: float
-
-    def bound(self, value: float) -> float:
-        """Return a lower bound in the unit of the costs, lower by what the solver may be off.
-
-        Parameters
-        ----------
-        value : float
-            Of the scaled program.
-
-        Returns
-        -------
-        float
-        """
-        return self.scale * (value - ACCURACY * max(abs(value), 1.0))
-
-
-def write(problem: PlacementProblem) -> Written:
+def write(problem: PlacementProblem) -> WholeProgram:
     """Return the program of a problem.
 
     Parameters
@@ -74,7 +37,7 @@ def write(problem: PlacementProblem) -> Written:
 
     Returns
     -------
-    Written
+    WholeProgram
 
     Raises
     ------
@@ -103,7 +66,8 @@ def write(problem: PlacementProblem) -> Written:
         rules.append(cp.NonNeg(np.ones(len(banned[0])) - _both(banned, count) @ picks))
     if len(never):
         rules.append(cp.Zero(picks[never]))
-    return Written(cp.Problem(cp.Minimize(total), rules), picks, scale)
+    program = cp.Problem(cp.Minimize(total), rules)
+    return WholeProgram(program, picks, largest_of_each(costs.sizes), below(scale))
 
 
 def _links(costs: LayeredCosts, starts: np.ndarray) -> tuple[np.ndarray, Floats, np.ndarray, float]:
@@ -161,16 +125,7 @@ def solve(problem: PlacementProblem, *, watch: Watch | None = None) -> Selection
     SolverError
         If the solver ends without an optimum.
     """
-    watch = watch or Watch()
-    written = write(problem)
-    optimum = minimize_whole(written.program, feasible=True, watch=watch, told=written.bound)
-    if not np.isfinite(optimum.value):
-        return stopped(problem, bound=written.bound(optimum.bound))
-    ends = np.cumsum(problem.sums.sizes)[:-1]
-    choice = tuple(int(np.argmax(part)) for part in np.split(np.asarray(written.picks.value), ends))
-    bound = written.bound(optimum.bound if optimum.stopped else optimum.value)
-    end = End.STOPPED if optimum.stopped else End.DONE
-    return Selection(choice, problem.sums.cost(choice), bound, {}, optimum.compile_seconds, end)
+    return solve_whole(problem, write(problem), Aim.SUM, watch)
 
 
 FORMULATION = Formulation(

@@ -14,54 +14,18 @@ there are: the bound of the relaxation is that of the flow. The flow (``overlap_
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import cvxpy as cp
 import numpy as np
 from scipy import sparse
 
-from formulations.solvers import minimize_whole
-from seqopt.placement.first_choice import stopped
-from seqopt.placement.flow import LayeredFlow, layered_flow
-from seqopt.placement.formulation import End, Formulation, FormulationKind, Selection
+from formulations.whole_program import WholeProgram, largest_of_each, solve_whole
+from seqopt.placement.flow import layered_flow
+from seqopt.placement.formulation import Formulation, FormulationKind, Selection
 from seqopt.placement.interface import Aim, PlacementProblem
 from seqopt.placement.watch import Watch
 
 
-@dataclass(frozen=True, eq=False)
-class Written:
-    """The program, written down.
-
-    Attributes
-    ----------
-    program : cvxpy.Problem
-        Costs are scaled.
-    picks : cvxpy.Variable
-        Of every candidate of every move, one after the other.
-    flow : LayeredFlow
-        The arcs and their scale.
-    """
-
-    program: cp.Problem
-    picks: cp.Variable
-    flow: LayeredFlow
-
-    def bound(self, value: float) -> float:
-        """Return a lower bound in the unit of the costs, lower by what the solver may be off.
-
-        Parameters
-        ----------
-        value : float
-            Of the scaled program.
-
-        Returns
-        -------
-        float
-        """
-        return self.flow.bound(value)
-
-
-def write(problem: PlacementProblem) -> Written:
+def write(problem: PlacementProblem) -> WholeProgram:
     """Return the program of a problem.
 
     Parameters
@@ -71,7 +35,7 @@ def write(problem: PlacementProblem) -> Written:
 
     Returns
     -------
-    Written
+    WholeProgram
 
     Raises
     ------
@@ -102,7 +66,8 @@ def write(problem: PlacementProblem) -> Written:
     ]
     if continued:
         rules.append(cp.Zero(out[:continued] @ pairs - picks[:continued]))
-    return Written(cp.Problem(cp.Minimize(flow.cost @ pairs), rules), picks, flow)
+    program = cp.Problem(cp.Minimize(flow.cost @ pairs), rules)
+    return WholeProgram(program, picks, largest_of_each(sizes), flow.bound)
 
 
 def solve(problem: PlacementProblem, *, watch: Watch | None = None) -> Selection:
@@ -127,16 +92,7 @@ def solve(problem: PlacementProblem, *, watch: Watch | None = None) -> Selection
     SolverError
         If the solver ends without an optimum.
     """
-    watch = watch or Watch()
-    written = write(problem)
-    optimum = minimize_whole(written.program, feasible=True, watch=watch, told=written.bound)
-    if not np.isfinite(optimum.value):
-        return stopped(problem, bound=written.bound(optimum.bound))
-    ends = np.cumsum(problem.sums.sizes)[:-1]
-    choice = tuple(int(np.argmax(part)) for part in np.split(np.asarray(written.picks.value), ends))
-    bound = written.bound(optimum.bound if optimum.stopped else optimum.value)
-    end = End.STOPPED if optimum.stopped else End.DONE
-    return Selection(choice, problem.sums.cost(choice), bound, {}, optimum.compile_seconds, end)
+    return solve_whole(problem, write(problem), Aim.SUM, watch)
 
 
 FORMULATION = Formulation(

@@ -16,58 +16,24 @@ of the relaxation is zero. The program has the fewest variables, and proves leas
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import cvxpy as cp
 import numpy as np
 from scipy import sparse
 
-from formulations.solvers import minimize_whole
+from formulations.whole_program import (
+    WholeProgram,
+    below,
+    largest_of_each,
+    solve_whole,
+    worst_pairs,
+)
 from seqopt.arrays import Floats
-from seqopt.placement.first_choice import stopped
-from seqopt.placement.flow import ACCURACY
-from seqopt.placement.formulation import End, Formulation, FormulationKind, Selection
+from seqopt.placement.formulation import Formulation, FormulationKind, Selection
 from seqopt.placement.interface import Aim, PlacementProblem
 from seqopt.placement.watch import Watch
 
 
-@dataclass(frozen=True, eq=False)
-class Written:
-    """The program, written down.
-
-    Attributes
-    ----------
-    program : cvxpy.Problem
-        Costs are scaled, and less the least of all if that is negative.
-    picks : cvxpy.Variable
-        Of every candidate of every move, one after the other.
-    scale : float
-        By which costs are divided.
-    least : float
-        The least cost of any pair if negative, else zero.
-    """
-
-    program: cp.Problem
-    picks: cp.Variable
-    scale: float
-    least: float
-
-    def bound(self, value: float) -> float:
-        """Return a lower bound in the unit of the costs, lower by what the solver may be off.
-
-        Parameters
-        ----------
-        value : float
-            Of the scaled program.
-
-        Returns
-        -------
-        float
-        """
-        return self.least + self.scale * (value - ACCURACY * max(abs(value), 1.0))
-
-
-def write(problem: PlacementProblem) -> Written:
+def write(problem: PlacementProblem) -> WholeProgram:
     """Return the program of a problem.
 
     Parameters
@@ -77,7 +43,7 @@ def write(problem: PlacementProblem) -> Written:
 
     Returns
     -------
-    Written
+    WholeProgram
 
     Raises
     ------
@@ -86,8 +52,7 @@ def write(problem: PlacementProblem) -> Written:
     """
     costs = problem.peaks
     costs.continuable()
-    worst = [np.maximum(d, c) for d, c in zip(costs.shared, costs.single, strict=True)]
-    least = min(0.0, *(float(part.min()) for part in worst))
+    worst, least = worst_pairs(costs)
     starts = np.cumsum([0, *costs.sizes])
     count = int(starts[-1])
     picks = cp.Variable(count, boolean=True)
@@ -105,7 +70,8 @@ def write(problem: PlacementProblem) -> Written:
     never = np.flatnonzero(~np.isfinite(worst[0][0]))
     if len(never):
         rules.append(cp.Zero(picks[never]))
-    return Written(cp.Problem(cp.Minimize(peak), rules), picks, scale, least)
+    program = cp.Problem(cp.Minimize(peak), rules)
+    return WholeProgram(program, picks, largest_of_each(costs.sizes), below(scale, least))
 
 
 def _pairs(
@@ -156,17 +122,7 @@ def solve(problem: PlacementProblem, *, watch: Watch | None = None) -> Selection
     SolverError
         If the solver ends without an optimum.
     """
-    watch = watch or Watch()
-    written = write(problem)
-    optimum = minimize_whole(written.program, feasible=True, watch=watch, told=written.bound)
-    if not np.isfinite(optimum.value):
-        return stopped(problem, Aim.PEAK, written.bound(optimum.bound))
-    ends = np.cumsum(problem.peaks.sizes)[:-1]
-    choice = tuple(int(np.argmax(part)) for part in np.split(np.asarray(written.picks.value), ends))
-    worth = problem.peaks.worst(choice)
-    bound = written.bound(optimum.bound if optimum.stopped else optimum.value)
-    end = End.STOPPED if optimum.stopped else End.DONE
-    return Selection(choice, worth, bound, {}, optimum.compile_seconds, end)
+    return solve_whole(problem, write(problem), Aim.PEAK, watch)
 
 
 FORMULATION = Formulation(

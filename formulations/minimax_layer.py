@@ -15,58 +15,17 @@ programming in a thousandth of the time.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import cvxpy as cp
 import numpy as np
 from scipy import sparse
 
-from formulations.solvers import minimize_whole
-from seqopt.placement.costs import LayeredCosts
-from seqopt.placement.first_choice import stopped
-from seqopt.placement.flow import LayeredFlow, layered_flow
-from seqopt.placement.formulation import End, Formulation, FormulationKind, Selection
-from seqopt.placement.interface import Aim, CostProblem, PlacementProblem
+from formulations.whole_program import WholeProgram, flow_of_peaks, solve_whole
+from seqopt.placement.formulation import Formulation, FormulationKind, Selection
+from seqopt.placement.interface import Aim, PlacementProblem
 from seqopt.placement.watch import Watch
 
 
-@dataclass(frozen=True, eq=False)
-class Written:
-    """The program, written down.
-
-    Attributes
-    ----------
-    program : cvxpy.Problem
-        Costs are scaled, and less the least of all if that is negative.
-    arcs : cvxpy.Variable
-        Of every allowed pair.
-    flow : LayeredFlow
-        The arcs and their scale.
-    least : float
-        The least cost of any pair if negative, else zero.
-    """
-
-    program: cp.Problem
-    arcs: cp.Variable
-    flow: LayeredFlow
-    least: float
-
-    def bound(self, value: float) -> float:
-        """Return a lower bound in the unit of the costs, lower by what the solver may be off.
-
-        Parameters
-        ----------
-        value : float
-            Of the scaled program.
-
-        Returns
-        -------
-        float
-        """
-        return self.least + self.flow.bound(value)
-
-
-def write(problem: PlacementProblem) -> Written:
+def write(problem: PlacementProblem) -> WholeProgram:
     """Return the program of a problem.
 
     Parameters
@@ -76,25 +35,22 @@ def write(problem: PlacementProblem) -> Written:
 
     Returns
     -------
-    Written
+    WholeProgram
 
     Raises
     ------
     InfeasibleError
         If no choice is allowed.
     """
-    costs = problem.peaks
-    worst = [np.maximum(d, c) for d, c in zip(costs.shared, costs.single, strict=True)]
-    least = min(0.0, *(float(part.min()) for part in worst))
-    nothing = tuple(np.zeros(size) for size in costs.sizes)
-    flow = layered_flow(CostProblem(LayeredCosts(nothing, tuple(p - least for p in worst))))
+    flow, bound = flow_of_peaks(problem)
     arcs = cp.Variable(len(flow.cost), boolean=True)
     peak = cp.Variable(nonneg=True)
     conserve = cp.Zero(flow.balance @ arcs - flow.source)
     layer = np.repeat(np.arange(len(flow.allowed)), [int(mask.sum()) for mask in flow.allowed])
     of_layer = sparse.csr_array((flow.cost, (layer, np.arange(len(layer)))))
     above = cp.NonNeg(peak - of_layer @ arcs)
-    return Written(cp.Problem(cp.Minimize(peak), [conserve, above]), arcs, flow, least)
+    program = cp.Problem(cp.Minimize(peak), [conserve, above])
+    return WholeProgram(program, arcs, flow.choice, bound)
 
 
 def solve(problem: PlacementProblem, *, watch: Watch | None = None) -> Selection:
@@ -119,16 +75,7 @@ def solve(problem: PlacementProblem, *, watch: Watch | None = None) -> Selection
     SolverError
         If the solver ends without an optimum.
     """
-    watch = watch or Watch()
-    written = write(problem)
-    optimum = minimize_whole(written.program, feasible=True, watch=watch, told=written.bound)
-    if not np.isfinite(optimum.value):
-        return stopped(problem, Aim.PEAK, written.bound(optimum.bound))
-    choice = written.flow.choice(np.asarray(written.arcs.value))
-    worth = problem.peaks.worst(choice)
-    bound = written.bound(optimum.bound if optimum.stopped else optimum.value)
-    end = End.STOPPED if optimum.stopped else End.DONE
-    return Selection(choice, worth, bound, {}, optimum.compile_seconds, end)
+    return solve_whole(problem, write(problem), Aim.PEAK, watch)
 
 
 FORMULATION = Formulation(

@@ -13,53 +13,16 @@ programming gives the same answer hundreds of times faster.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import cvxpy as cp
-import numpy as np
 
-from formulations.solvers import minimize_whole
-from seqopt.placement.first_choice import stopped
-from seqopt.placement.flow import LayeredFlow, layered_flow
-from seqopt.placement.formulation import End, Formulation, FormulationKind, Selection
+from formulations.whole_program import WholeProgram, solve_whole
+from seqopt.placement.flow import layered_flow
+from seqopt.placement.formulation import Formulation, FormulationKind, Selection
 from seqopt.placement.interface import Aim, PlacementProblem
 from seqopt.placement.watch import Watch
 
 
-@dataclass(frozen=True, eq=False)
-class Written:
-    """The program, written down.
-
-    Attributes
-    ----------
-    program : cvxpy.Problem
-        Costs are scaled.
-    arcs : cvxpy.Variable
-        Of every allowed pair.
-    flow : LayeredFlow
-        The arcs and their scale.
-    """
-
-    program: cp.Problem
-    arcs: cp.Variable
-    flow: LayeredFlow
-
-    def bound(self, value: float) -> float:
-        """Return a lower bound in the unit of the costs, lower by what the solver may be off.
-
-        Parameters
-        ----------
-        value : float
-            Of the scaled program.
-
-        Returns
-        -------
-        float
-        """
-        return self.flow.bound(value)
-
-
-def write(problem: PlacementProblem) -> Written:
+def write(problem: PlacementProblem) -> WholeProgram:
     """Return the program of a problem.
 
     Parameters
@@ -69,7 +32,7 @@ def write(problem: PlacementProblem) -> Written:
 
     Returns
     -------
-    Written
+    WholeProgram
 
     Raises
     ------
@@ -82,7 +45,8 @@ def write(problem: PlacementProblem) -> Written:
     caps = [
         cp.NonNeg(cap - amount @ arcs) for cap, amount in zip(flow.caps, flow.amounts, strict=True)
     ]
-    return Written(cp.Problem(cp.Minimize(flow.cost @ arcs), [conserve, *caps]), arcs, flow)
+    program = cp.Problem(cp.Minimize(flow.cost @ arcs), [conserve, *caps])
+    return WholeProgram(program, arcs, flow.choice, flow.bound, flow.feasible)
 
 
 def solve(problem: PlacementProblem, *, watch: Watch | None = None) -> Selection:
@@ -107,18 +71,7 @@ def solve(problem: PlacementProblem, *, watch: Watch | None = None) -> Selection
     SolverError
         If the solver ends without an optimum, or stops and no choice is at hand.
     """
-    watch = watch or Watch()
-    written = write(problem)
-    flow = written.flow
-    optimum = minimize_whole(
-        written.program, feasible=flow.feasible, watch=watch, told=written.bound
-    )
-    if not np.isfinite(optimum.value):
-        return stopped(problem, bound=written.bound(optimum.bound))
-    choice = flow.choice(np.asarray(written.arcs.value))
-    bound = written.bound(optimum.bound if optimum.stopped else optimum.value)
-    end = End.STOPPED if optimum.stopped else End.DONE
-    return Selection(choice, problem.sums.cost(choice), bound, {}, optimum.compile_seconds, end)
+    return solve_whole(problem, write(problem), Aim.SUM, watch)
 
 
 FORMULATION = Formulation(

@@ -86,8 +86,7 @@ def solve(
     Parameters
     ----------
     problem : PlacementProblem or FreeProblem
-        The problem, from `seqopt.pose` or `seqopt.placement.free_problem.pose_free`, or a
-        `seqopt.placement.CostProblem`.
+        From `seqopt.pose` or `seqopt.pose_free`, or a `seqopt.placement.CostProblem`.
     formulation : Formulation, ScheduleFormulation or str
         Or a name in `seqopt.formulations`; ``schedule_search`` for the free schedule.
     proof : bool, optional
