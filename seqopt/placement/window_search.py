@@ -94,7 +94,7 @@ def search_windows(problem: Problem, watch: Watch | None = None) -> WindowSearch
     """
     walk = _Walk(problem)
     try:
-        with closing(walk.alone.evaluation.levels()) as levels:
+        with closing(walk.alone.evaluation.levels(soon=True)) as levels:
             for steps in levels:
                 if watch is not None and watch.over:
                     raise SolverError(

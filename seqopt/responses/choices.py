@@ -93,10 +93,16 @@ class Evaluation(Terse):
             )
         return self._found.steps
 
-    def levels(self) -> Generator[Sequence[StepChoices], None, None]:
+    def levels(self, *, soon: bool = False) -> Generator[Sequence[StepChoices], None, None]:
         """Return all open steps, in order, those of one brick count after the other.
 
         They are computed as they are taken, and kept for the next time where there is memory.
+
+        Parameters
+        ----------
+        soon : bool, optional
+            Whether there is much to do with each: several processes then work on the next ones
+            together. Else each works on a part of the build of its own, which takes less time.
 
         Yields
         ------
@@ -115,7 +121,7 @@ class Evaluation(Terse):
             return
         steps: list[StepChoices] = []
         models, seconds, start = 0, 0.0, time.perf_counter()
-        with closing(_by_level(self)) as levels:
+        with closing(_by_level(self, apart=keep and not soon)) as levels:
             for found, count in levels:
                 models += count
                 seconds += time.perf_counter() - start
@@ -185,7 +191,7 @@ def evaluate_choices(
 
 
 def _by_level(
-    evaluation: Evaluation,
+    evaluation: Evaluation, *, apart: bool
 ) -> Generator[tuple[list[StepChoices], int], None, None]:
     """Yield the steps with one brick count after the other, and how many models they have."""
     schedule = evaluation.schedule
@@ -206,8 +212,9 @@ def _by_level(
         for step in steps
     )
     found: list[Answers] = []
+    resources = evaluation.resources
     with closing(
-        answer_blocks(evaluation.engine, blocks(), total, evaluation.resources)
+        answer_blocks(evaluation.engine, blocks(), total, resources, apart=apart)
     ) as answers:
         for each in answers:
             found.append(each)

@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+from seqopt.work.lanes import Lanes
 from seqopt.work.processes import Processes
 
 UNKNOWN = 16  # workers of an executor that does not say how many it has
@@ -120,7 +121,9 @@ class Given:
 
 
 @contextmanager
-def hire(executor: Executor | None = None, workers: int = 1) -> Iterator[Crew | None]:
+def hire(
+    executor: Executor | None = None, workers: int = 1, *, lanes: bool = False
+) -> Iterator[Crew | None]:
     """Hire workers for the duration of a with block.
 
     Parameters
@@ -129,6 +132,8 @@ def hire(executor: Executor | None = None, workers: int = 1) -> Iterator[Crew | 
         Any; by default processes of our own.
     workers : int, optional
         How many processes, or how many tasks the executor works on at once if it does not say.
+    lanes : bool, optional
+        Whether tasks have a ``lane``: each process of our own then gets those of one.
 
     Yields
     ------
@@ -140,7 +145,7 @@ def hire(executor: Executor | None = None, workers: int = 1) -> Iterator[Crew | 
         most = known if isinstance(known, int) else UNKNOWN
         yield Given(executor, workers if workers > 1 else most)
     elif workers > 1:
-        processes = Processes(workers)
+        processes = Lanes(workers) if lanes else Processes(workers)
         try:
             yield processes
         except BaseException:

@@ -168,7 +168,7 @@ def test_an_interrupt_names_what_was_chosen(tmp_path, workers):
 @posix
 def test_a_killed_worker_is_replaced(tmp_path):
     """By the slow engine: most of the work is still to be done when the first answer is there."""
-    words = [*WORDS, "cascade", "--no-proof", "--engine", "frame"]
+    words = [*WORDS, "cascade", "--no-proof", "--engine", "frame", "--candidates", "near:6"]
     run = start(
         *words, "--out", tmp_path / "out", "--workers", "2", "--cache", tmp_path / "answers"
     )

@@ -36,7 +36,7 @@ from tests.builders import ROOT
 STAGES = ["assemble", "respond", "rank", "compile", "solve", "verify"]
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def smoke():
     """Every engine with every formulation and criterion on the smallest arch."""
     table = pd.concat(

@@ -62,14 +62,26 @@ def own_error(number):
     raise OddError(number)
 
 
+class Task(int):
+    """A number that belongs to a lane."""
+
+    @property
+    def lane(self):
+        return int(self) % 2
+
+
+TASKS = [Task(number) for number in range(12)]
 WANTED = [number * number for number in range(12)]
+whoever = pytest.mark.parametrize("lanes", [False, True])  # has the tasks: all, or each his own
 
 
 def test_results_come_in_order_whoever_works():
     assert list(map_ordered(square, range(12))) == WANTED
-    with hire(workers=2) as crew:
-        assert list(map_ordered(square, range(12), crew)) == WANTED
-        assert list(map_ordered(square, range(12), crew)) == WANTED  # again, on the same processes
+    for lanes in (False, True):
+        with hire(workers=2, lanes=lanes) as crew:
+            assert crew.workers == 2
+            for _ in range(2):  # again, on the same processes
+                assert list(map_ordered(square, TASKS, crew)) == WANTED
     assert multiprocessing.active_children() == []
     for kind in (ThreadPoolExecutor, ProcessPoolExecutor):
         with kind(2) as executor, hire(executor) as crew:
@@ -103,34 +115,37 @@ def test_what_is_known_is_not_worked_on():
 
 
 def test_the_first_error_is_raised_whoever_works():
-    for workers in (1, 2):
-        found = []
-        with pytest.raises(SolverError, match="no square of 3"), hire(workers=workers) as crew:
-            found.extend(map_ordered(square_or_fail, range(9), crew))
+    for workers, lanes in ((1, False), (2, False), (2, True)):
+        found, crew = [], hire(workers=workers, lanes=lanes)
+        with pytest.raises(SolverError, match="no square of 3"), crew as hired:
+            found.extend(map_ordered(square_or_fail, TASKS[:9], hired))
     assert multiprocessing.active_children() == []
 
 
 @pytest.mark.slow
-def test_a_worker_that_dies_is_replaced_and_nothing_is_lost(tmp_path):
-    with hire(workers=2) as crew:
-        assert list(map_ordered(partial(die_once, tmp_path), range(12), crew)) == WANTED
+@whoever
+def test_a_worker_that_dies_is_replaced_and_nothing_is_lost(tmp_path, lanes):
+    with hire(workers=2, lanes=lanes) as crew:
+        assert list(map_ordered(partial(die_once, tmp_path), TASKS, crew)) == WANTED
     assert len(list(tmp_path.iterdir())) == 2  # they did die
 
 
 @pytest.mark.slow
-def test_a_worker_that_dies_while_it_sends_keeps_nobody_waiting(tmp_path):
+@whoever
+def test_a_worker_that_dies_while_it_sends_keeps_nobody_waiting(tmp_path, lanes):
     """The rest of its answer was waited for without end."""
-    with hire(workers=2) as crew:
-        answers = map_ordered(partial(die_while_sending, tmp_path), range(3), crew)
+    with hire(workers=2, lanes=lanes) as crew:
+        answers = map_ordered(partial(die_while_sending, tmp_path), TASKS[:3], crew)
         assert [float(answer.max()) for answer in answers] == [0.0, 1.0, 2.0]
     assert len(list(tmp_path.iterdir())) == 1
 
 
 @pytest.mark.slow
-def test_workers_that_always_die_end_in_a_line():
+@whoever
+def test_workers_that_always_die_end_in_a_line(lanes):
     wanted = pytest.raises(WorkerError, match=r"workers ended 4 times .*BrokenProcessPool")
-    with wanted as caught, hire(workers=2) as crew:
-        list(map_ordered(die, range(3), crew))
+    with wanted as caught, hire(workers=2, lanes=lanes) as crew:
+        list(map_ordered(die, TASKS[:3], crew))
     assert "\n" not in str(caught.value)
     assert multiprocessing.active_children() == []
 
