@@ -21,7 +21,6 @@ formulation solves the problem, and the plan is the checked answer.
 from __future__ import annotations
 
 from importlib import import_module
-from importlib.metadata import version
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -149,6 +148,8 @@ __all__ = [  # noqa: RUF022  # in the order in which they are met
 def __getattr__(name: str) -> object:
     """Load a name of the door when it is first used (PEP 562)."""
     if name == "__version__":
+        from importlib.metadata import version  # noqa: PLC0415  # 30 ms that few ask for
+
         return version("seqopt")
     if name not in _HOME_OF:
         raise AttributeError(f"module 'seqopt' has no attribute {name!r}")
