@@ -50,11 +50,11 @@ STANDING = ("formulations/test_equilibrium", "validation/test_limit_analysis")
 MODULES = {
     "seqopt.engines.rigid.compliance": (
         *("engines/test_compliance", "engines/test_operator", "engines/test_rigid_bricks"),
-        *("engines/test_planar", "responses/test_finite"),
+        *("engines/test_loose", "engines/test_planar", "responses/test_finite"),
     ),
     "seqopt.engines.rigid.trial": (
-        *("engines/test_compliance", "engines/test_growth", "engines/test_operator"),
-        "engines/test_rigid_bricks",
+        *("engines/test_trial", "engines/test_compliance", "engines/test_growth"),
+        *("engines/test_operator", "engines/test_rigid_bricks"),
     ),
     "seqopt.engines.rigid.operator": RIGID,
     "seqopt.engines.rigid.operator_builder": RIGID,

@@ -131,6 +131,38 @@ def test_what_was_corrected_before_for_other_bricks_is_no_help():
         assert engine.solve(bricks, grips, Want.ALL) == own
 
 
+def test_grips_on_other_bricks_are_answered_as_if_nothing_had_been_asked():
+    """An operator of few bricks serves those alone; more of them are added, and it is kept."""
+    net = build_network(chain(16))
+    engine = ComplianceEngine(net)
+    asked = [[[3]], [[3], [4]], [[17, 22]], [[3, 17]], [[31]], [[3]]]
+    for sets in asked:
+        assert engine.solve(16, sets, Want.ALL) == engine.solve(16, sets, Want.ALL)
+        own = ComplianceEngine(net).solve(16, sets, Want.ALL)
+        again = engine.solve(16, sets, Want.ALL)
+        for name in NAMES:
+            size = np.abs(getattr(own, name)).max()
+            assert np.abs(getattr(again, name) - getattr(own, name)).max() <= 1e-9 * size, name
+
+
+def test_an_operator_that_covers_what_is_asked_is_not_made_again(monkeypatch):
+    made = []
+
+    class Counted(OperatorBuilder):
+        def operator(self, bricks, held=None):
+            made.append(held.tolist())
+            return super().operator(bricks, held)
+
+    monkeypatch.setattr(compliance, "OperatorBuilder", Counted)
+    scene = chain(16)
+    engine = ComplianceEngine(build_network(scene))
+    nodes = [brick.nodes for brick in scene.placed]
+    one, other, far = nodes[1][0], nodes[1][1], [nodes[8][0], nodes[10][1]]
+    for grips in ([one], [other], far, [other, far[0]], [one, far[1]]):
+        engine.solve(16, [grips])
+    assert made == [[1], [1, 8, 10]]
+
+
 def test_what_is_only_compared_is_corrected_once_and_right_to_six_digits(monkeypatch):
     """Grips close to the tip of a long chain, against the refined mixed system."""
     bricks, made = 120, []

@@ -133,7 +133,16 @@ EQUIVALENT = (
         Equivalent(
             COMPLIANCE, "len(held) >= bricks", old, new, "loads beyond those asked for are spare"
         )
-        for old, new in (("2 *", "2 +"), (">=", "!="))
+        for old, new in (("2 *", "2 +"), ("2 *", "3 *"), (">=", "!="))
+    ),
+    *(
+        Equivalent(TRIAL, "sets <= CHUNK", "<=", new, "those within all sets are all")
+        for new in ("<", "==")
+    ),
+    Equivalent(TRIAL, "CANCEL * left", ">", ">=", "no sum is it to the last bit"),
+    *(
+        Equivalent(COMPLIANCE, "KEPT", "32e6", size, "a bound on memory alone")
+        for size in ("31999999.0", "32000001.0")
     ),
     *(
         Equivalent(

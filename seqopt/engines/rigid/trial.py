@@ -76,8 +76,8 @@ def try_forces(
     operator: ComplianceOperator,
     columns: Ints,
     *,
-    even: bool = True,
-    accuracy: float = ACCURACY,
+    even: bool,
+    accuracy: float,
 ) -> Tried:
     """Return what an operator alone says about grip sets, and which of them it answers well enough.
 
@@ -86,9 +86,9 @@ def try_forces(
     operator : ComplianceOperator
     columns : (S, r) int
         Grips as indices into ``network.inner.ravel()``.
-    even : bool, optional
+    even : bool
         Whether the joints are about equally stiff: where not, pivots do not tell the whole error.
-    accuracy : float, optional
+    accuracy : float
         Largest error of fields, over the largest entry of each, that is accepted.
 
     Returns
@@ -125,8 +125,8 @@ def solve_batch(
     columns : (S, r) int
         Grips as indices into ``network.inner.ravel()``.
     want : Want, optional
-    even, accuracy
-        As of `try_forces`.
+    even, accuracy : optional
+        As of `try_forces`: joints about equally stiff, `ACCURACY`.
 
     Returns
     -------
