@@ -44,6 +44,7 @@ class Equivalent:
 COMPLIANCE = "seqopt.engines.rigid.compliance"
 TRIAL = "seqopt.engines.rigid.trial"
 OPERATOR = "seqopt.engines.rigid.operator"
+BUILDER = "seqopt.engines.rigid.operator_builder"
 GROWTH = "seqopt.engines.rigid.growth"
 GRIPS = "seqopt.engines.rigid.grip_equations"
 COSTS, CERTIFICATE = "seqopt.placement.costs", "seqopt.placement.certificate"
@@ -133,7 +134,7 @@ EQUIVALENT = (
         Equivalent(
             COMPLIANCE, "len(held) >= bricks", old, new, "loads beyond those asked for are spare"
         )
-        for old, new in (("2 *", "2 +"), ("2 *", "3 *"), (">=", "!="))
+        for old, new in (("2 *", "2 +"), ("2 *", "3 *"))
     ),
     *(
         Equivalent(TRIAL, "sets <= CHUNK", "<=", new, "those within all sets are all")
@@ -161,13 +162,23 @@ EQUIVALENT = (
         Equivalent(TRIAL, "force[~good]", "0.0", size, "these sets are answered anew")
         for size in ("1.0", "-1.0")
     ),
-    *(
-        Equivalent(
-            COMPLIANCE, "len(held) >= bricks", old, new, "which way of two that agree is taken"
-        )
-        for old, new in (("if 2", "if not 2"), (">=", ">"), (">=", "<="))
+    Equivalent(
+        COMPLIANCE, "len(held) >= bricks", ">=", ">", "which way of two that agree is taken"
     ),
-    Equivalent(OPERATOR, "AT_ONCE // states", "//", "%", "how many are answered at a time"),
+    *(
+        Equivalent(OPERATOR, "AT_ONCE // states", old, new, "how many are answered at a time")
+        for old, new in (("//", "%"), ("//", "**"), ("max", "min"), ("[1]", "[0]"))
+    ),
+    *(
+        Equivalent(OPERATOR, line, old, new, "which way of two that agree is taken")
+        for line, old, new in (("support", "or", "and"), ("if few", "if few", "if not few"))
+    ),
+    Equivalent(OPERATOR, "loss.max", "initial=1.0", "initial=0.0", "every loss is one at least"),
+    *(
+        Equivalent(BUILDER, "slice(bricks)", "==", new, "a slice of all bricks is all of them")
+        for new in (">", ">=")
+    ),
+    Equivalent(GRIPS, "worst_doubt", ">=", ">", "no doubt is it to the last bit"),
     Equivalent(GROWTH, "AT_ONCE = 2**17", "2", "1", "how many are changed at a time"),
     Equivalent(COSTS, "given.flat[0]", "0", "-1", "all of these entries are one"),
     Equivalent("formulations.beam", "len(met)", "==", ">=", "no more are met than were found"),
