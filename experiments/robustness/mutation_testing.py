@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from experiments.robustness.parts.mutants import Mutant
 
 RIGID = (
+    "engines/test_trial",
     "engines/test_operator",
     "engines/test_rigid_bricks",
     "validation/test_closed_forms",
@@ -75,7 +76,10 @@ MODULES = {
     "formulations.overlap_mip": CHOSEN,
     "formulations.rank_search": CHOSEN,
     "formulations.whole_program": ("formulations/test_whole_program",),
-    "formulations.solvers": ("formulations/test_equilibrium", *CHOSEN),
+    "formulations.solvers": (
+        *("formulations/test_whole_program", "formulations/test_equilibrium"),
+        *CHOSEN,
+    ),
 }
 LEAST = 0.95  # of the mutants that are not equivalent
 MOST, QUICK_MOST, QUICK = 60, 8, "seqopt.placement.ranks"
