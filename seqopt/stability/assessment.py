@@ -183,6 +183,8 @@ def bonded(assembly: Assembly, mortar: Mortar) -> Case:
 def verdict_of(stand: Proven) -> Verdict:
     """Return the verdict where a number is proven that must be zero.
 
+    It falls if the motion says so by itself: forces only show that no more is needed.
+
     Parameters
     ----------
     stand : Proven
@@ -193,7 +195,9 @@ def verdict_of(stand: Proven) -> Verdict:
     """
     if np.isnan(stand.value):
         return Verdict.UNDECIDED
-    return Verdict.STANDS if stand.value <= EXACT else Verdict.FALLS
+    if stand.bound > EXACT:
+        return Verdict.FALLS
+    return Verdict.STANDS if stand.value <= EXACT else Verdict.UNDECIDED
 
 
 def sideways(fixed: Case, up: Vector) -> list[Case]:
@@ -239,7 +243,8 @@ def least_friction(prove: Prover, mortar: Mortar) -> float:
     """
 
     def lacking(friction: float) -> float:
-        return prove(bonded(prove.assembly, replace(mortar, friction=friction))).value
+        proven = prove(bonded(prove.assembly, replace(mortar, friction=friction)))
+        return np.nan if verdict_of(proven) is Verdict.UNDECIDED else proven.value
 
     low = (0.0, lacking(0.0))
     if not low[1] > EXACT:

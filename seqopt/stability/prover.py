@@ -37,11 +37,14 @@ class Proven(FrozenValue):
     value : float
         z of the case; inf if it is proven that none up to
         `seqopt.stability.limit_analysis.CAP` will do, NaN if nothing is proven.
+    bound : float
+        What the motion alone proves: no smaller z will do, or of a largest z no larger one.
     answer : Answer
         What it rests on: forces and motion.
     """
 
     value: float
+    bound: float
     answer: Answer
 
 
@@ -86,11 +89,12 @@ class Prover:
             value = proven_value(self.assembly, case, answer)
             if answer.claim is Claim.INFEASIBLE or not np.isnan(value):
                 break
+        proven = bound(self.assembly, case, answer)
         if np.isnan(value) and case.sense is Sense.SMALLEST and answer.claim is Claim.INFEASIBLE:
             answer = self._refuted(case)
-            value = np.inf if answer.value > EXACT else np.nan
+            value = proven = np.inf if answer.value > EXACT else np.nan
         self.unproven += bool(np.isnan(value))
-        return Proven(value, answer)
+        return Proven(value, proven, answer)
 
     def _refuted(self, case: Case) -> Answer:
         """Return the answer with hands at every block, as weak as possible, at the largest z.
