@@ -83,9 +83,8 @@ def optimize_free(options: argparse.Namespace) -> Answer:
 
 def _said(plan: FreePlan, options: argparse.Namespace) -> str:
     """Return what a plan is worth, in a line."""
-    values = ", ".join(f"{name} {value:.6g}" for name, value in plan.objective.items())
     return (
-        f"{plan.formulation.name} ({plan.formulation.kind.value}): {values}, {plan.status}; "
+        f"{plan.formulation.name} ({plan.formulation.kind.value}): {plan.worth}; "
         f"{len(plan.steps)} steps, {plan.regrips} regrips, {plan.problem.sets.solved} models; "
         f"{written_to(options.out)}"
     )

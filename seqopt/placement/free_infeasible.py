@@ -11,6 +11,8 @@ from seqopt.placement.free_goals import STATE_RESPONSES, Goal, Measure
 from seqopt.placement.free_graph import explore
 from seqopt.placement.free_paths import least_to_end
 from seqopt.placement.free_problem import FreeProblem
+from seqopt.placement.standing import Standing
+from seqopt.placement.sturdiest import WORST, with_margin
 from seqopt.sequence.free_rules import FreeRules, Payload
 
 STEPS = (Goal(Measure.STEPS),)
@@ -33,6 +35,9 @@ def why_impossible(problem: FreeProblem) -> str:
         here may be far beyond what joints carry, where discrete elements take seconds a state.
     """
     problem = replace(problem, engine=getattr(problem.engine, "rigid", problem.engine))
+    for goal in problem.goals:
+        if goal.of_margins:  # some margin is asked for, whichever it is
+            problem = with_margin(problem, goal.response, WORST[goal.response])
     graph = explore(replace(problem, goals=STEPS))
     placed = problem.network.scene.placed
     stops = len(graph.levels) - 1
@@ -60,7 +65,7 @@ def _opening(problem: FreeProblem) -> Iterator[str]:
         if rule not in done and explore(replace(problem, rules=rules)).whole:
             done.add(rule)
             yield text
-    if problem.standing is not None and explore(replace(problem, standing=None)).whole:
+    if problem.demands and explore(replace(problem, standing=None, settled=())).whole:
         yield STANDING
     for limit in problem.limits:
         rest = tuple(other for other in problem.limits if other is not limit)
@@ -71,7 +76,7 @@ def _opening(problem: FreeProblem) -> Iterator[str]:
 def _loosened(problem: FreeProblem) -> Iterator[tuple[str, FreeRules]]:
     """Yield the rules that can be loosened: what stands is asked of robots with payloads."""
     for text, rules in problem.rules.loosened():
-        if problem.standing is None or rules.payload is Payload.KEPT:
+        if not problem.demands or rules.payload is Payload.KEPT:
             yield text, rules
 
 
@@ -86,8 +91,9 @@ def _pair(problem: FreeProblem) -> str:
 
 def _enough(problem: FreeProblem, way: str) -> str:
     """Return how far a limit has to be raised, where it is a limit that is loosened."""
-    if way == STANDING and problem.standing is not None and not problem.standing.tilt:
-        least = worst_least(replace(problem, standing=None), "bond")
+    if way == STANDING and not any(demand.tilt for demand in problem.demands):
+        strong = (problem.standing or Standing()).demanding("bond", WORST["bond"])
+        least = worst_least(replace(problem, standing=strong, settled=()), "bond")
         return f"a bond of {least:.4g} Pa" if np.isfinite(least) else way
     found = [limit for limit in problem.limits if limit.response == way]
     if not found or way not in STATE_RESPONSES:

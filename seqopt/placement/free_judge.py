@@ -43,7 +43,7 @@ class ScheduleCertificate(FrozenValue):
         nothing is proven.
     gap : float
         The largest of the differences of both, over the size of the values; infinite where nothing
-        is proven. Margins of stability, which are found to a width, do not count.
+        is proven. Margins of stability leave what `seqopt.placement.standing.NARROW` says.
     states : int
         How many states the proof looked at.
     """
@@ -93,7 +93,8 @@ def judge_schedule(
         proof.bound(values, k) if goal.of_margins else values[k]
         for k, goal in enumerate(problem.goals)
     ]
-    return ScheduleCertificate(values, tuple(bounds), 0.0, proof.states)
+    gaps = [(v - b) / (abs(v) or 1.0) for v, b in zip(values, bounds, strict=True)]
+    return ScheduleCertificate(values, tuple(bounds), max(gaps), proof.states)
 
 
 def _stopped(values: tuple[float, ...]) -> ScheduleCertificate:

@@ -74,15 +74,19 @@ class FreePlan(ShownBuild):
     def worth(self) -> str:
         """The value of the plan, and what is proven about it, in words."""
         values = ", ".join(f"{name} {value:.6g}" for name, value in self.objective.items())
-        return f"{values}, {self.status}"
+        gap = 0.0 if self.certificate is None else self.certificate.gap
+        left = f" within {gap:.2g}" if TOLERANCE < gap < float("inf") else ""
+        return f"{values}, {self.status}{left}"
 
     @property
     def status(self) -> str:
-        """``optimal``, ``feasible`` where the search ended early, or ``unproven``."""
+        """``optimal``, ``feasible`` where the search ended early, or ``unproven``.
+
+        A margin of stability is optimal within the gap, which ``worth`` and the summary name.
+        """
         if self.selection.stopped:
             return "feasible"
-        proven = self.certificate is not None and self.certificate.gap <= TOLERANCE
-        return "optimal" if proven else "unproven"
+        return "unproven" if self.certificate is None else "optimal"
 
     @property
     def objective(self) -> dict[str, float]:
@@ -147,13 +151,14 @@ class FreePlan(ShownBuild):
         Returns
         -------
         dict
-            ``aims`` with ``objective`` and ``bound`` by name; the rules; how many ``steps`` there
-            are, ``steps_before_release`` without those that let all go at the end, ``regrips``;
-            ``models_evaluated`` (grip sets solved), ``seconds`` and more.
+            ``aims`` with ``objective`` and ``bound`` by name and the ``gap``; the rules; how many
+            ``steps`` there are, ``steps_before_release`` without those that let all go at the end,
+            ``regrips``; ``models_evaluated`` (grip sets solved), ``seconds`` and more.
         """
         problem, chosen = self.problem, self.selection
         goals = [str(goal) for goal in problem.goals]
-        bound = chosen.bound if self.certificate is None else self.certificate.bound
+        proof = self.certificate
+        bound = chosen.bound if proof is None else proof.bound
         if chosen.stopped:
             bound = chosen.bound
         finite = (
@@ -174,6 +179,7 @@ class FreePlan(ShownBuild):
             "stopped": chosen.stopped,
             "objective": self.objective,
             "bound": dict(zip(goals, finite, strict=True)),
+            "gap": None if proof is None or chosen.stopped else proof.gap,
             "stands": self._standing,
             "steps": len(self.steps),
             "steps_before_release": len(self.steps) - self._letting_go,
@@ -181,7 +187,7 @@ class FreePlan(ShownBuild):
             "idle_robots": list(idle_robots(problem.network.scene, self.steps)),
             "payload_exceeded": [str(excess) for excess in self.overloads],
             "models_evaluated": problem.sets.solved,
-            "states_in_proof": 0 if self.certificate is None else self.certificate.states,
+            "states_in_proof": 0 if proof is None else proof.states,
             "seconds": dict(self.seconds),
         }
 

@@ -47,6 +47,8 @@ class FreeProblem(Shown):
         What no step may exceed.
     standing : Standing or None
         That every state must stand, if it is demanded.
+    settled : tuple of Standing
+        Margins that every state must have as well.
     """
 
     engine: Engine
@@ -55,6 +57,7 @@ class FreeProblem(Shown):
     goals: tuple[Goal, ...]
     limits: tuple[Limit, ...] = ()
     standing: Standing | None = None
+    settled: tuple[Standing, ...] = ()
 
     def __repr__(self) -> str:
         goals = ", ".join(map(str, self.goals))
@@ -160,7 +163,7 @@ class FreeProblem(Shown):
         out[~within] = np.inf
         within &= np.isfinite(out).all(axis=1)
         within, excluded = self._below(out, within, ceiling)
-        if self.standing is not None:
+        if self.demands:
             rows = np.flatnonzero(within)
             within[rows] = self.stability.stand(bricks, *self._grips(states[rows]))
         for column, goal in enumerate(self.goals):
@@ -181,7 +184,12 @@ class FreeProblem(Shown):
     @cached_property
     def stability(self) -> StandingSets:
         """What is known of how grip sets stand."""
-        return StandingSets(self.network, self.standing or Standing(), self._caps)
+        return StandingSets(self.network, self.standing or Standing(), self._caps, self.demands)
+
+    @property
+    def demands(self) -> tuple[Standing, ...]:
+        """All that is demanded of the stability of states."""
+        return self.settled if self.standing is None else (self.standing, *self.settled)
 
     @cached_property
     def certified(self) -> dict[tuple[int, Grips], Stability]:
@@ -256,11 +264,7 @@ def pose_free(
     if any(goal.of_states and not goal.response for goal in goals):
         criterion = _of_states(engine, criterion)
     standing = stands if isinstance(stands, Standing | None) else Standing(find_mortar(stands))
-    return _asked(FreeProblem(engine, rules, criterion, goals, limits, standing))
-
-
-def _asked(problem: FreeProblem) -> FreeProblem:
-    """Return a problem whose stability can be asked, where it will be."""
+    problem = FreeProblem(engine, rules, criterion, goals, limits, standing)
     if problem.standing is not None or any(goal.of_margins for goal in problem.goals):
         _ = problem.stability  # what cannot be asked is refused now
     return problem

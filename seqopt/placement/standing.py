@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import astuple, dataclass, field, replace
 from math import degrees, isfinite, pi
 
 import numpy as np
@@ -18,10 +18,11 @@ from seqopt.stability.margins import Margins
 from seqopt.stability.screens import FALLS, STANDS, Screen
 
 MARGINS = ("bond", "friction", "tilt")
-"""What goals may ask of the stability of states, each of them to be small: the least bond (Pa), the
-least coefficient of friction, and how far the tilt that is survived is from a right angle (rad)."""
+"""What goals may ask of the stability of states, each of them to be small: the least bond (Pa, in
+tension, with that times 1 + friction as cohesion), the least coefficient of friction, and how far
+the tilt that is survived is from a right angle (rad)."""
 TILTS = 1024  # steps of a right angle, to which the tilt of a state is found
-NARROW = {"bond": (0.02, 50.0), "friction": (0.0, 2.0**-6), "tilt": (0.0, 2e-3)}
+NARROW = {"bond": (0.02, 0.0), "friction": (0.0, 2.0**-6), "tilt": (0.0, 2e-3)}
 """By margin, within which share of itself and within what a value is proven: brackets' widths."""
 
 
@@ -56,7 +57,7 @@ class Standing:
             raise ProblemError(f"tilt {short(self.tilt)}: give an angle from 0 to below pi/2, rad")
 
     def demanding(self, name: str, value: float) -> Standing:
-        """Return the demand with which a margin is no worse than a value.
+        """Return the demand that a margin is no worse than a value, and nothing else.
 
         Parameters
         ----------
@@ -70,10 +71,25 @@ class Standing:
         Standing
         """
         if name == "tilt":
-            return replace(self, tilt=pi / 2 - value)
+            return Standing(self.mortar, max(0.0, pi / 2 - value))
         if name == "friction":
-            return replace(self, mortar=replace(self.mortar, friction=value))
-        return replace(self, mortar=bond_mortar(value, self.mortar.friction))
+            return Standing(replace(self.mortar, friction=value))
+        return Standing(bond_mortar(value, self.mortar.friction))
+
+    def implies(self, other: Standing) -> bool:
+        """Return whether what meets this demand meets another one.
+
+        Parameters
+        ----------
+        other : Standing
+
+        Returns
+        -------
+        bool
+        """
+        own, weaker = astuple(self.mortar), astuple(other.mortar)
+        stronger = all(a <= b for a, b in zip(own, weaker, strict=True))
+        return stronger and self.tilt >= other.tilt
 
     def described(self) -> dict[str, float]:
         """Return the demand, ready for JSON.
@@ -91,6 +107,22 @@ class Standing:
         }
 
 
+def without_implied(demands: Sequence[Standing]) -> tuple[Standing, ...]:
+    """Return demands without those that another one implies.
+
+    Parameters
+    ----------
+    demands : sequence of Standing
+
+    Returns
+    -------
+    tuple of Standing
+    """
+    out = set(demands)
+    implied = {one for one in out if any(other.implies(one) for other in out - {one})}
+    return tuple(demand for demand in dict.fromkeys(demands) if demand not in implied)
+
+
 class StandingSets:
     """Which grip sets of a scene stand, and by what margins; each is looked at once.
 
@@ -101,6 +133,8 @@ class StandingSets:
         Margins are those of its mortar.
     payloads : (k,) float
         All that robots may have, N.
+    demands : sequence of Standing, optional
+        All of which what stands has to meet; by default the one.
 
     Attributes
     ----------
@@ -113,14 +147,21 @@ class StandingSets:
         If a robot could hold anything.
     """
 
-    def __init__(self, network: Network, standing: Standing, payloads: Floats) -> None:
+    def __init__(
+        self,
+        network: Network,
+        standing: Standing,
+        payloads: Floats,
+        demands: Sequence[Standing] = (),
+    ) -> None:
         self._payloads = np.unique(payloads)
         if not all(isfinite(load) for load in self._payloads):
             raise ProblemError(
                 "a robot without a largest force holds up anything, and says nothing of what "
                 "stands; give it a payload, or a limit on its force, and keep payloads"
             )
-        self._screen = Screen(network, standing.mortar, standing.tilt)
+        demands = without_implied(demands or (standing,))
+        self._screens = [Screen(network, demand.mortar, demand.tilt) for demand in demands]
         self._margins = Margins(network, standing.mortar)
         self._network, self._mortar = network, standing.mortar
         self._tilts_known: dict[int, Screen] = {}
@@ -136,8 +177,8 @@ class StandingSets:
     @property
     def programs(self) -> int:
         """How many linear programs were solved."""
-        own = sum(screen.solved for screen in self._tilts_known.values())
-        return own + self._screen.solved + self._margins.solved
+        screens = (*self._screens, *self._tilts_known.values())
+        return sum(screen.solved for screen in screens) + self._margins.solved
 
     def stand(self, bricks: int, held: Ints, payload: Floats) -> Bools:
         """Return which grip sets are proven to stand.
@@ -173,9 +214,11 @@ class StandingSets:
 
     def _verdicts(self, bricks: int, held: Ints, payload: Floats) -> Floats:
         def verdicts(rows: Ints) -> Floats:
-            found = self._screen.stands(bricks, held[rows], payload[rows])
+            grips = bricks, held[rows], payload[rows]
+            each = [screen.stands(*grips) for screen in self._screens]
+            found: Floats = np.min(each, axis=0).astype(float)
             self.undecided += int(((found != STANDS) & (found != FALLS)).sum())
-            return found[:, None].astype(float)
+            return found[:, None]
 
         return self._ask("", bricks, (held, payload), verdicts)[:, 0]
 

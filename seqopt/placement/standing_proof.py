@@ -73,13 +73,15 @@ class StandingProof:
         (S,) bool
         """
         base = self._problem.standing
-        asked = base or Standing()
+        asked = [] if base is None else [base]
         for goal, value in zip(self._problem.goals, most, strict=False):
             if goal.of_margins:
-                asked = asked.demanding(goal.response, max(value, 0.0))
-        if not base and asked == Standing():
-            return np.ones(len(held), dtype=bool)
-        return self._known(asked).may_stand(bricks, held, payload)
+                margins = base or Standing()
+                asked.append(margins.demanding(goal.response, max(value, 0.0)))
+        out = np.ones(len(held), dtype=bool)
+        for demand in asked:
+            out[out] = self._known(demand).may_stand(bricks, held[out], payload[out])
+        return out
 
     def _known(self, asked: Standing) -> StandingSets:
         if asked not in self._sets:

@@ -45,23 +45,45 @@ def best_margin(
         If there is no plan, whatever the margin.
     """
     name = problem.goals[0].response
-    base = problem.standing or Standing()
 
     def demanding(value: float) -> FreeProblem:
         goals = problem.goals[1:] or (Goal(Measure.STEPS),)
-        return replace(problem, goals=goals, standing=base.demanding(name, value))
+        return replace(with_margin(problem, name, value), goals=goals)
 
     def exists(value: float) -> bool:
         reach = replace(demanding(value), goals=(Goal(Measure.STEPS),))
         return explore(reach, width=WIDTH, tell=tell).whole or explore(reach, tell=tell).whole
 
+    if problem.demands and not exists(WORST[name]):
+        raise InfeasibleError("no plan of the free schedule stands as is demanded")
     if name != "tilt" and exists(0.0):
         return 0.0, 0.0, demanding(0.0)
     low, high = _around(exists, FIRST[name], WORST[name])
     while high - low > 0.9 * slack(name, high):
-        middle = (low * high) ** 0.5 if low > 0 and name == "bond" else (low + high) / 2
+        middle = (low + high) / 2
+        if name == "bond":
+            middle = (low * high) ** 0.5 if low else high / 16
         low, high = (low, middle) if exists(middle) else (middle, high)
     return high, low, demanding(high)
+
+
+def with_margin(problem: FreeProblem, name: str, value: float) -> FreeProblem:
+    """Return a problem in which every state must have a margin as well.
+
+    Parameters
+    ----------
+    problem : FreeProblem
+    name : str
+        One of `seqopt.placement.standing.MARGINS`.
+    value : float
+        As goals count it.
+
+    Returns
+    -------
+    FreeProblem
+    """
+    demand = (problem.standing or Standing()).demanding(name, value)
+    return replace(problem, settled=(*problem.settled, demand))
 
 
 def _around(exists: Callable[[float], bool], first: float, worst: float) -> tuple[float, float]:

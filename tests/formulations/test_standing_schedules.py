@@ -20,15 +20,17 @@ from seqopt.errors import InfeasibleError, MechanismError, ProblemError, SceneEr
 from seqopt.network.build import build_network
 from seqopt.placement.criteria import WorstRatio
 from seqopt.placement.free_front import FreeFront
+from seqopt.placement.free_infeasible import worst_least
 from seqopt.placement.free_judge import judge_schedule
 from seqopt.placement.free_problem import pose_free
 from seqopt.placement.front import find_front
 from seqopt.placement.requirements import LIMIT_TOLERANCE
-from seqopt.placement.standing import Standing, StandingSets
+from seqopt.placement.standing import Standing, StandingSets, without_implied
 from seqopt.responses.quantities import CHOSEN_BY, lengths
 from seqopt.sequence.free_check import RuleBook
 from seqopt.sequence.free_rules import FreeRules
 from seqopt.stability.assessment import Verdict, bonded, verdict_of
+from seqopt.stability.limit_analysis import GAP
 from seqopt.stability.margins import Margins
 from seqopt.stability.prover import Prover
 from tests.builders import small_arch
@@ -166,6 +168,52 @@ def test_a_margin_is_the_best_to_its_width(dry, aim):
         past = Standing().demanding(name, bound)
         with pytest.raises(InfeasibleError):
             seqopt.solve(replace(rest, standing=past), "schedule_search")
+
+
+def leaning(scale=1.0, stands=None, aim="bond"):
+    """Three bricks, the second of which tips off the first without bond; densities by a scale."""
+    scene = seqopt.arch_scene(
+        seqopt.ArchShape(pitch=(1.2, 0.0, -1.2), pattern="VLR", density=2000.0 * scale)
+    )
+    engine = ComplianceEngine(build_network(scene))
+    return pose_free(engine, FreeRules(), ONES, aim, stands=stands)
+
+
+@pytest.mark.parametrize(
+    "aim", ["bond,minmax", "friction,minmax", pytest.param("tilt,minmax", marks=slow)]
+)
+def test_a_margin_is_sought_among_what_stands_as_demanded(aim):
+    """The demand was forgotten for the margin: plans were found that do not meet it."""
+    with pytest.raises(InfeasibleError, match=r"brick 2 \(2 of 3\) is never placed.*a bond of"):
+        seqopt.solve(leaning(stands="dry", aim=aim), "schedule_search")
+    plan = seqopt.solve(leaning(stands="bond=3e3", aim=aim), "schedule_search")
+    assert set(plan.stability()["verdict"]) == {"stands"}
+
+
+def test_a_second_margin_is_that_of_the_mortar_alone():
+    """A tilt that is survived only with the bond that was found first was promised without."""
+    with pytest.raises(InfeasibleError, match=r"it becomes possible with .*a bond of"):
+        seqopt.solve(leaning(aim="bond,tilt"), "schedule_search")
+
+
+@pytest.mark.parametrize("scale", [1.0, 1e-3, 1e3])
+def test_a_bond_is_found_to_its_share_at_every_size(scale):
+    """Fifty pascals were left open, whatever the size; the gap says what is."""
+    problem = leaning(scale)
+    plan = seqopt.solve(problem, "schedule_search")
+    (value,), (bound,) = plan.certificate.objective, plan.certificate.bound
+    true = worst_least(problem, "bond")
+    assert 0.98 * value <= bound <= true <= value * (1 + 2 * GAP)
+    assert plan.certificate.gap == pytest.approx((value - bound) / value)
+    assert plan.summary()["gap"] == plan.certificate.gap > 1e-3
+    assert f"optimal within {plan.certificate.gap:.2g}" in plan.worth
+
+
+def test_demands_that_others_imply_are_not_asked():
+    weak, strong = Standing("bond=3e3"), Standing("dry")
+    tilted = Standing("bond=1e3", 0.1)
+    assert without_implied((weak, strong, tilted, weak)) == (strong, tilted)
+    assert not strong.implies(tilted)
 
 
 def test_margins_come_before_other_aims(dry):

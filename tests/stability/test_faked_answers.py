@@ -27,7 +27,7 @@ SLIPPERY = Mortar(friction=1e-3)
 def wedged():
     """A bar between two walls, which only friction holds."""
     bar = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], dtype=float)
-    vertex = np.concatenate([bar, bar + [0, 0, 1]])
+    vertex = np.concatenate([bar, bar + np.array([0, 0, 1])])
     ends = [Contact((-1, 0), vertex[[0, 3, 7, 4]]), Contact((-1, 0), vertex[[1, 2, 6, 5]])]
     return Blocks(vertex[None], tuple(ends)).assembly(2000.0)
 
@@ -118,8 +118,8 @@ def judged():
                 if built is assembly:
                     return lambda *_: fake
 
-                def true(case, attempt):
-                    helped[:] = helped or [compile_equilibrium(built)(case, attempt)]
+                def true(asked, attempt):
+                    helped[:] = helped or [compile_equilibrium(built)(asked, attempt)]
                     return helped[0]
 
                 return true
@@ -145,7 +145,7 @@ def test_no_faked_answer_turns_a_verdict():
     assert len(verdicts) >= 600
     assert false(verdicts) == 0
     for truth in (Verdict.STANDS, Verdict.FALLS):
-        assert (truth, truth) in verdicts and (truth, Verdict.UNDECIDED) in verdicts
+        assert {(truth, truth), (truth, Verdict.UNDECIDED)} <= set(verdicts)
 
 
 @pytest.mark.parametrize("more", [2e-6, 5e-4, 9e-4])
