@@ -211,8 +211,7 @@ class FreeProblem(Shown):
     def _carried(self, states: Ints, forces: Floats) -> Bools:
         """Return in which states no grip exceeds what its robot may carry."""
         most = self._grips(states)[1]
-        slack = LIMIT_TOLERANCE * np.where(np.isfinite(most), most, 0.0)
-        return np.asarray((forces <= most + slack).all(axis=1))
+        return np.asarray((forces <= most + LIMIT_TOLERANCE * most).all(axis=1))
 
 
 def pose_free(
@@ -264,7 +263,11 @@ def pose_free(
     if any(goal.of_states and not goal.response for goal in goals):
         criterion = _of_states(engine, criterion)
     standing = stands if isinstance(stands, Standing | None) else Standing(find_mortar(stands))
-    problem = FreeProblem(engine, rules, criterion, goals, limits, standing)
+    return _asked(FreeProblem(engine, rules, criterion, goals, limits, standing))
+
+
+def _asked(problem: FreeProblem) -> FreeProblem:
+    """Return a problem whose stability can be asked, where it will be."""
     if problem.standing is not None or any(goal.of_margins for goal in problem.goals):
         _ = problem.stability  # what cannot be asked is refused now
     return problem

@@ -15,7 +15,7 @@ from seqopt.network.network import Network
 from seqopt.responses.known_rows import KnownRows
 from seqopt.scene.checks import short
 from seqopt.stability.margins import Margins
-from seqopt.stability.screens import FALLS, STANDS, Screen
+from seqopt.stability.screens import FALLS, OPEN, STANDS, Screen
 
 MARGINS = ("bond", "friction", "tilt")
 """What goals may ask of the stability of states, each of them to be small: the least bond (Pa, in
@@ -35,7 +35,7 @@ class Standing:
     mortar : Mortar or str
         Of all joints; or its name.
     tilt : float, optional
-        That every state must survive in whichever of eight directions is worst, rad.
+        That every state must survive in every direction, rad.
 
     Raises
     ------
@@ -76,17 +76,8 @@ class Standing:
             return Standing(replace(self.mortar, friction=value))
         return Standing(bond_mortar(value, self.mortar.friction))
 
-    def implies(self, other: Standing) -> bool:
-        """Return whether what meets this demand meets another one.
-
-        Parameters
-        ----------
-        other : Standing
-
-        Returns
-        -------
-        bool
-        """
+    def _implies(self, other: Standing) -> bool:
+        """Return whether what meets this demand meets another one."""
         own, weaker = astuple(self.mortar), astuple(other.mortar)
         stronger = all(a <= b for a, b in zip(own, weaker, strict=True))
         return stronger and self.tilt >= other.tilt
@@ -119,7 +110,7 @@ def without_implied(demands: Sequence[Standing]) -> tuple[Standing, ...]:
     tuple of Standing
     """
     out = set(demands)
-    implied = {one for one in out if any(other.implies(one) for other in out - {one})}
+    implied = {one for one in out if any(other._implies(one) for other in out - {one})}
     return tuple(demand for demand in dict.fromkeys(demands) if demand not in implied)
 
 
@@ -248,17 +239,20 @@ class StandingSets:
 
     def _tilts(self, bricks: int, held: Ints, payload: Floats) -> Floats:
         """Return between which angles from a right one tilts lie, by halving intervals."""
-        low, high = np.full(len(held), -1), np.full(len(held), TILTS)
-        fallen = high.copy()
-        while (left := high - low > 1).any():
-            middle = np.where(low < 0, 0, (low + high) // 2)
-            for step in np.unique(middle[left]).tolist():
-                rows = np.flatnonzero(left & (middle == step))
-                found = self._tilted(step).stands(bricks, held[rows], payload[rows])
-                low[rows[found == STANDS]] = step
-                high[rows[found != STANDS]] = step
-                fallen[rows[found == FALLS]] = step
-        survived = np.where(low < 0, -np.inf, low * (pi / 2 / TILTS))
+        low, fallen = np.full(len(held), -1), np.full(len(held), TILTS)
+        ends = []
+        for least in (STANDS, OPEN):  # what is proven to stand, then what may
+            high = fallen.copy()
+            while (left := high - low > 1).any():
+                middle = np.where(low < 0, 0, (low + high) // 2)
+                for step in np.unique(middle[left]).tolist():
+                    rows = np.flatnonzero(left & (middle == step))
+                    found = self._tilted(step).stands(bricks, held[rows], payload[rows])
+                    low[rows[found >= least]] = step
+                    high[rows[found < least]] = step
+                    fallen[rows[found == FALLS]] = step
+            ends.append(low.copy())
+        survived = np.where(ends[0] < 0, -np.inf, ends[0] * (pi / 2 / TILTS))
         return np.stack([pi / 2 - fallen * (pi / 2 / TILTS), pi / 2 - survived], axis=1)
 
     def _tilted(self, step: int) -> Screen:

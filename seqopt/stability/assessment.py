@@ -23,8 +23,8 @@ from seqopt.stability.limit_analysis import (
     compile_equilibrium,
 )
 from seqopt.stability.prover import Proven, Prover
+from seqopt.stability.tilts import DIRECTIONS, safe_pull
 
-DIRECTIONS = 8  # in which an assembly is pulled sideways, evenly spread
 ROUGHEST = 10.0  # largest coefficient of friction that is tried
 FRICTION_STEP = 1e-4  # to which the least one is found
 
@@ -53,6 +53,11 @@ class Stability(Shown, FrozenValue):
     pull : (8,) float
         Largest sideways acceleration that it survives in each direction, relative to gravity; NaN
         if it does not stand.
+    tilt : float
+        Tilt survived in every direction, rad: a safe bound by forces; NaN if it does not stand.
+        Gravity turned by atan(a) mixes no load with gravity and a sideways a, all survived. It is
+        less than the largest such tilt by what `seqopt.stability.tilts.safe_pull` leaves, and
+        for bonds and for grips at their payload by what weighs less once it is turned.
     grip : float
         The largest grip force, made as small as equilibrium with the mortar allows, N; inf if no
         payload is enough, 0 if nothing grips.
@@ -83,6 +88,7 @@ class Stability(Shown, FrozenValue):
     bond: float
     friction: float
     pull: Floats
+    tilt: float
     grip: float
     motion: Floats
     first_block: str
@@ -92,18 +98,9 @@ class Stability(Shown, FrozenValue):
 
     def __repr__(self) -> str:
         tilt = f", survives a tilt of {np.degrees(self.tilt):.3g} degrees"
-        margin = tilt if self.verdict is Verdict.STANDS else ""
+        margin = tilt if np.isfinite(self.tilt) else ""
         first = f", block {self.first_block} fails first" if self.first_block else ""
         return f"<Stability: {self.verdict.value}{margin}{first}>"
-
-    @property
-    def tilt(self) -> float:
-        """Tilt survived in whichever of the directions is worst, rad; NaN if it does not stand.
-
-        From the sideways acceleration a over gravity's: gravity turned by atan(a) mixes no load
-        with gravity and a, both survived. Exact for dry blocks whose grips stay below payload.
-        """
-        return float(np.arctan(self.pull.min()))
 
 
 def assess(
@@ -135,8 +132,8 @@ def assess(
     bond = stand if bare == growing else prove(bare)
     fixed = replace(growing, tension=(growing.tension[0], 0.0), cohesion=(growing.cohesion[0], 0.0))
     stands = verdict is Verdict.STANDS
-    pulls = [prove(case) for case in sideways(fixed, up)] if stands else []
-    failure = min(pulls, key=lambda pull: np.nan_to_num(pull.value, nan=CAP), default=stand)
+    pulls, worst = safe_pull(prove, fixed, up) if stands else ([], np.nan)
+    failure = min(pulls, key=lambda pull: np.nan_to_num(pull.held, nan=CAP), default=stand)
     known = failure.value < CAP if stands else verdict is Verdict.FALLS
     motion = failure.answer.motion if known else np.zeros((len(assembly.centroid), 6))
     motion = motion / (np.abs(motion).max(initial=0.0) or 1.0)
@@ -146,7 +143,8 @@ def assess(
         verdict=verdict,
         bond=_amount(bond.value) * assembly.stress_scale,
         friction=least_friction(prove, mortar),
-        pull=np.array([pull.value for pull in pulls] or [np.nan] * DIRECTIONS),
+        pull=np.array([pull.held for pull in pulls[:DIRECTIONS]] or [np.nan] * DIRECTIONS),
+        tilt=float(np.arctan(worst)),
         grip=_amount(_grip(prove, fixed)) * force,
         motion=motion / np.repeat([1.0, lever], 3),
         first_block=block,
@@ -198,31 +196,6 @@ def verdict_of(stand: Proven) -> Verdict:
     if stand.bound > EXACT:
         return Verdict.FALLS
     return Verdict.STANDS if stand.value <= EXACT else Verdict.UNDECIDED
-
-
-def sideways(fixed: Case, up: Vector) -> list[Case]:
-    """Return the cases of the largest sideways acceleration.
-
-    Parameters
-    ----------
-    fixed : Case
-        Whose strengths do not grow with z.
-    up : Vector
-        Unit vector against gravity.
-
-    Returns
-    -------
-    list of Case
-        One per direction.
-    """
-    axis = np.array(up)
-    first = np.eye(3)[np.abs(axis).argmin()]
-    first = first - axis * (axis @ first)
-    first /= np.linalg.norm(first)
-    second = np.cross(axis, first)
-    angles = 2 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
-    pulls = np.outer(np.cos(angles), first) + np.outer(np.sin(angles), second)
-    return [replace(fixed, sense=Sense.LARGEST, pull=(x, y, z)) for x, y, z in pulls.tolist()]
 
 
 def least_friction(prove: Prover, mortar: Mortar) -> float:

@@ -12,17 +12,18 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from seqopt.arrays import Bools, Floats, Ints, Vector
+from seqopt.arrays import Bools, Floats, Ints
 from seqopt.contact.assembly import Assembly
 from seqopt.contact.mortar import Mortar, find_mortar
 from seqopt.network.build import network_of
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
-from seqopt.stability.assessment import ROUGHEST, bonded, sideways
+from seqopt.stability.assessment import ROUGHEST, bonded
 from seqopt.stability.held_program import CompileHeld, compile_held
 from seqopt.stability.held_states import HeldStates, node_assembly
 from seqopt.stability.limit_analysis import CAP, GAP, Case
 from seqopt.stability.screens import FALLS, STANDS, Screen, held_places
+from seqopt.stability.tilts import DIRECTIONS, FINE, NEAR, in_every_direction, sideways
 
 Cases = Callable[[Assembly], list[Case]]
 
@@ -123,7 +124,7 @@ class Margins:
         return _or_inf(bracket) * level.assembly.scales[0]
 
     def tilt(self, bricks: int, held: ArrayLike, payload: ArrayLike | None = None) -> Floats:
-        """Return the tilt that grip sets survive in whichever of eight directions is worst.
+        """Return the tilt that grip sets survive in every direction.
 
         Parameters
         ----------
@@ -144,11 +145,27 @@ class Margins:
         out = np.full((len(np.asarray(held)), 2), np.nan)
         rows = np.flatnonzero(screen.stands(bricks, held, payload) == STANDS)
         if len(rows):
-            places = np.asarray(held)[rows]
-            loads = _of_rows(payload, rows)
-            brackets = self._brackets("tilt", self._pulls, bricks, (places, loads))
-            out[rows] = np.arctan(np.maximum(np.min(brackets, axis=0), 0.0))
+            out[rows] = self._tilts(DIRECTIONS, bricks, held, payload, rows)
+            rows = rows[out[rows, 0] < (1 - NEAR) * out[rows, 1]]
+        if len(rows):
+            out[rows] = self._tilts(FINE, bricks, held, payload, rows)
         return out
+
+    def _tilts(
+        self, count: int, bricks: int, held: ArrayLike, payload: ArrayLike | None, rows: Ints
+    ) -> Floats:
+        """Return brackets (n, 2) of the tilt of some grip sets, by a number of directions."""
+
+        def pulls(assembly: Assembly) -> list[Case]:
+            return sideways(self._fixed(assembly), self.network.scene.up, count)
+
+        grips = np.asarray(held)[rows], _of_rows(payload, rows)
+        brackets = np.array(self._brackets(f"tilt {count}", pulls, bricks, grips))
+        angles = 2 * np.pi * np.arange(count) / count
+        known = np.where(np.isfinite(brackets[..., 0]), np.maximum(brackets[..., 0], 0.0), np.nan)
+        least = [np.nan_to_num(in_every_direction(angles, row)[0]) for row in known.T]
+        most = np.maximum(brackets[..., 1].min(axis=0), 0.0)
+        return np.arctan(np.stack([np.array(least), most], axis=1))
 
     def friction(
         self,
@@ -214,10 +231,6 @@ class Margins:
     def _fixed(self, assembly: Assembly) -> Case:
         case = bonded(assembly, self.mortar)
         return replace(case, tension=(case.tension[0], 0.0), cohesion=(case.cohesion[0], 0.0))
-
-    def _pulls(self, assembly: Assembly) -> list[Case]:
-        up: Vector = self.network.scene.up
-        return sideways(self._fixed(assembly), up)
 
     def _brackets(
         self, name: str, cases: Cases, bricks: int, grips: tuple[ArrayLike, ArrayLike | None]

@@ -39,12 +39,15 @@ class Proven(FrozenValue):
         `seqopt.stability.limit_analysis.CAP` will do, NaN if nothing is proven.
     bound : float
         What the motion alone proves: no smaller z will do, or of a largest z no larger one.
+    held : float
+        What forces alone prove: a z that will do; NaN if nothing.
     answer : Answer
         What it rests on: forces and motion.
     """
 
     value: float
     bound: float
+    held: float
     answer: Answer
 
 
@@ -83,10 +86,13 @@ class Prover:
         -------
         Proven
         """
+        held = np.nan
         for attempt in range(ATTEMPTS):
             answer = self._program(case, attempt)
             self.claims[answer.claim] += 1
             value = proven_value(self.assembly, case, answer)
+            best = np.fmin if case.sense is Sense.SMALLEST else np.fmax
+            held = float(best(held, held_value(self.assembly, case, answer)))
             if answer.claim is Claim.INFEASIBLE or not np.isnan(value):
                 break
         proven = bound(self.assembly, case, answer)
@@ -94,7 +100,7 @@ class Prover:
             answer = self._refuted(case)
             value = proven = np.inf if answer.value > EXACT else np.nan
         self.unproven += bool(np.isnan(value))
-        return Proven(value, proven, answer)
+        return Proven(value, proven, held, answer)
 
     def _refuted(self, case: Case) -> Answer:
         """Return the answer with hands at every block, as weak as possible, at the largest z.
@@ -137,10 +143,26 @@ def proven_value(assembly: Assembly, case: Case, answer: Answer) -> float:
     float
         NaN if they do not, or a number of the answer is not finite.
     """
+    gap = abs(answer.value - bound(assembly, case, answer))
+    small = gap <= GAP * max(1.0, abs(answer.value))
+    return held_value(assembly, case, answer) if small else np.nan
+
+
+def held_value(assembly: Assembly, case: Case, answer: Answer) -> float:
+    """Return the z of an answer if its forces alone prove that it will do.
+
+    Parameters
+    ----------
+    assembly : Assembly
+    case : Case
+    answer : Answer
+
+    Returns
+    -------
+    float
+        NaN if they do not, or a number of the answer is not finite.
+    """
     if not is_finite(assembly, answer):
         return np.nan
-    scale = max(1.0, abs(answer.value))
-    if not violation(assembly, case, answer) <= EXACT * scale:
-        return np.nan
-    gap = abs(answer.value - bound(assembly, case, answer))
-    return max(answer.value, 0.0) if gap <= GAP * scale else np.nan
+    proven = violation(assembly, case, answer) <= EXACT * max(1.0, abs(answer.value))
+    return max(answer.value, 0.0) if proven else np.nan

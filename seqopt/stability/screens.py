@@ -13,17 +13,18 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from seqopt.arrays import Bools, Floats, Ints
+from seqopt.arrays import Bools, Floats, Ints, Vector
 from seqopt.contact.assembly import Assembly
 from seqopt.contact.mortar import Mortar, find_mortar
 from seqopt.errors import GripError
 from seqopt.network.build import network_of
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
-from seqopt.stability.assessment import bonded, sideways
+from seqopt.stability.assessment import bonded
 from seqopt.stability.held_program import CompileHeld, compile_held
 from seqopt.stability.held_states import HeldStates, node_assembly
 from seqopt.stability.limit_analysis import EXACT
+from seqopt.stability.tilts import DIRECTIONS, FINE, sideways
 
 STANDS, FALLS, OPEN = 1, -1, 0
 
@@ -37,8 +38,9 @@ class Screen:
     mortar : Mortar or str
         Of all joints; or its name.
     tilt : float, optional
-        By which it must survive being tilted in eight directions, rad: the sideways acceleration
-        tan(tilt) g.
+        By which it must survive being tilted in every direction, rad: the sideways acceleration
+        tan(tilt) g. A set stands if it does at corners around all of them, and falls if it does
+        in one; what survives between 0.997 and 1 of that acceleration may stay open.
     compiled : callable, optional
         Makes the programs to solve; the registered one by default.
 
@@ -61,7 +63,7 @@ class Screen:
         self.mortar = find_mortar(mortar)
         self.tilt = tilt
         self._compile = compiled
-        self._levels: dict[int, tuple[HeldStates, ...]] = {}
+        self._levels: dict[tuple[int, int, bool], tuple[HeldStates, ...]] = {}
 
     @property
     def solved(self) -> int:
@@ -95,8 +97,26 @@ class Screen:
             If there are no such nodes, or payloads are missing or not numbers.
         """
         places, loads = held_places(self.network, bricks, held, payload)
+        out = self._verdicts((bricks, DIRECTIONS, True), places, loads)
+        if not self.tilt:
+            return out
+        out[out != STANDS] = OPEN
+        for count, around, sure in (
+            (DIRECTIONS, False, FALLS),
+            (FINE, True, STANDS),
+            (FINE, False, FALLS),
+        ):
+            rows = np.flatnonzero(out == OPEN)
+            found = self._verdicts((bricks, count, around), places[rows], loads[rows])
+            out[rows[found == sure]] = sure
+        return out
+
+    def _verdicts(
+        self, level: tuple[int, int, bool], places: Ints, loads: Floats
+    ) -> NDArray[np.int8]:
+        """Return which sets stand in all directions of a level."""
         out = np.full(len(places), STANDS, dtype=np.int8)
-        for states in self._level(bricks):
+        for states in self._level(level):
             rows = np.flatnonzero(out != FALLS)
             bracket = states.bracket(places[rows], loads[rows], decided)
             fall, stand = bracket[:, 0] > EXACT, bracket[:, 1] <= EXACT
@@ -104,14 +124,16 @@ class Screen:
             out[rows[~fall & ~stand]] = OPEN
         return out
 
-    def _level(self, bricks: int) -> tuple[HeldStates, ...]:
-        if bricks not in self._levels:
+    def _level(self, level: tuple[int, int, bool]) -> tuple[HeldStates, ...]:
+        if level not in self._levels:
+            bricks, count, around = level
             upright = node_assembly(self.network, bricks)
-            self._levels[bricks] = tuple(
+            pull = np.tan(self.tilt) / (np.cos(np.pi / count) if around else 1.0)
+            self._levels[level] = tuple(
                 lacking(assembly, self.mortar, self._compile)
-                for assembly in tilted(upright, self.tilt, self.network.scene.up)
+                for assembly in pulled(upright, pull, self.network.scene.up, count)
             )
-        return self._levels[bricks]
+        return self._levels[level]
 
 
 def lacking(assembly: Assembly, mortar: Mortar, compiled: CompileHeld) -> HeldStates:
@@ -149,28 +171,30 @@ def decided(bracket: Floats) -> Bools:
     return np.asarray((bracket[:, 1] <= EXACT) | (bracket[:, 0] > EXACT))
 
 
-def tilted(assembly: Assembly, tilt: float, up: tuple[float, float, float]) -> tuple[Assembly, ...]:
-    """Return the assemblies to which the sideways pulls of a tilt turn one.
+def pulled(assembly: Assembly, pull: float, up: Vector, count: int) -> tuple[Assembly, ...]:
+    """Return the assemblies to which sideways pulls turn one.
 
     Parameters
     ----------
     assembly : Assembly
-    tilt : float
-        rad; for none it is the assembly itself.
+    pull : float
+        Over gravity; for none it is the assembly itself.
     up : Vector
         Unit vector against gravity.
+    count : int
+        Of directions, evenly spread.
 
     Returns
     -------
     tuple of Assembly
         One per direction.
     """
-    if not tilt:
+    if not pull:
         return (assembly,)
     weight = np.linalg.norm(assembly.weight, axis=1, keepdims=True)
-    cases = sideways(bonded(assembly, Mortar(friction=0.0)), up)
-    pulls = [np.tan(tilt) * weight * np.array(case.pull) for case in cases]
-    return tuple(replace(assembly, weight=assembly.weight + pull) for pull in pulls)
+    cases = sideways(bonded(assembly, Mortar(friction=0.0)), up, count)
+    loads = [pull * weight * np.array(case.pull) for case in cases]
+    return tuple(replace(assembly, weight=assembly.weight + load) for load in loads)
 
 
 def held_places(

@@ -13,9 +13,10 @@ from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import DRY, EPOXY
 from seqopt.network.build import build_network
 from seqopt.sequence.two_robots import METHODS
-from seqopt.stability.assessment import Verdict, assess, bonded, sideways
+from seqopt.stability.assessment import Verdict, assess, bonded
 from seqopt.stability.limit_analysis import CAP, EXACT, Answer, Case, Claim, Sense, bound, violation
 from seqopt.stability.prover import proven_value
+from seqopt.stability.tilts import sideways
 
 
 def liar(change):
