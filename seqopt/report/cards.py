@@ -28,7 +28,7 @@ from seqopt.scene.boxes import boxes
 from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import Schedule
 from seqopt.showing import display
-from seqopt.stability.assessment import Stability, Verdict
+from seqopt.stability.assessment import Stability
 
 Rows = Mapping[str, object]
 SMALL = 60  # bricks up to which the responses of a plan are computed to be shown
@@ -240,7 +240,9 @@ def _stability(value: Stability) -> tuple[str, Rows]:
         "friction needed": f"{value.friction:.4g}",
         "largest grip force, N": f"{value.grip:.4g}",
     }
-    if value.verdict is Verdict.STANDS:
+    if value.jammed:
+        rows["jammed"] = "stands only because it is wedged in place: do not trust it"
+    if np.isfinite(value.tilt):
         rows["tilt survived, degrees"] = f"{np.degrees(value.tilt):.3g}"
     if value.first_block:
         joint = f", joint {value.first_contact}" if value.first_contact else ""

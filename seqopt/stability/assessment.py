@@ -16,6 +16,7 @@ from seqopt.stability.failure import first_to_fail
 from seqopt.stability.limit_analysis import (
     CAP,
     EXACT,
+    LARGEST_FORCE,
     Case,
     Claim,
     Compile,
@@ -26,6 +27,7 @@ from seqopt.stability.prover import Proven, Prover
 from seqopt.stability.tilts import DIRECTIONS, safe_pull
 
 ROUGHEST = 10.0  # largest coefficient of friction that is tried
+LITTLE = 1e-3  # friction that holds nothing but what is jammed
 FRICTION_STEP = 1e-4  # to which the least one is found
 
 
@@ -67,6 +69,9 @@ class Stability(Shown, FrozenValue):
         or rotation times lever, is 1 m; zero if unknown.
     first_block, first_contact : str
         The fastest block and the contact that opens fastest in that motion; empty if unknown.
+    jammed : bool
+        Whether it stands only because it is wedged in place: the least friction is enough, by
+        contact forces that nothing makes develop. Do not trust that it stands.
     claims : mapping of Claim to int
         How the solver said it ended, over all cases that were solved.
     unproven : int
@@ -93,6 +98,7 @@ class Stability(Shown, FrozenValue):
     motion: Floats
     first_block: str
     first_contact: str
+    jammed: bool
     claims: Mapping[Claim, int]
     unproven: int
 
@@ -100,7 +106,8 @@ class Stability(Shown, FrozenValue):
         tilt = f", survives a tilt of {np.degrees(self.tilt):.3g} degrees"
         margin = tilt if np.isfinite(self.tilt) else ""
         first = f", block {self.first_block} fails first" if self.first_block else ""
-        return f"<Stability: {self.verdict.value}{margin}{first}>"
+        jammed = ", but only jammed" if self.jammed else ""
+        return f"<Stability: {self.verdict.value}{jammed}{margin}{first}>"
 
 
 def assess(
@@ -139,16 +146,18 @@ def assess(
     motion = motion / (np.abs(motion).max(initial=0.0) or 1.0)
     block, contact = first_to_fail(assembly, motion)
     force, lever = assembly.scales
+    friction = least_friction(prove, mortar)
     return Stability(
         verdict=verdict,
         bond=_amount(bond.value) * assembly.stress_scale,
-        friction=least_friction(prove, mortar),
+        friction=friction,
         pull=np.array([pull.held for pull in pulls[:DIRECTIONS]] or [np.nan] * DIRECTIONS),
         tilt=float(np.arctan(worst)),
         grip=_amount(_grip(prove, fixed)) * force,
         motion=motion / np.repeat([1.0, lever], 3),
         first_block=block,
         first_contact=contact,
+        jammed=stands and not friction > LITTLE and friction != 0 and is_jammed(prove, mortar),
         claims=dict(prove.claims),
         unproven=prove.unproven,
     )
@@ -242,6 +251,27 @@ def least_friction(prove: Prover, mortar: Mortar) -> float:
         else:
             before, low = low, (middle, value)
     return high
+
+
+def is_jammed(prove: Prover, mortar: Mortar) -> bool:
+    """Return whether hardly any friction is enough, by contact forces far above all loads.
+
+    Parameters
+    ----------
+    prove : Prover
+        Of an assembly that stands with the mortar, and not without friction.
+    mortar : Mortar
+
+    Returns
+    -------
+    bool
+        Only where that is proven by forces.
+    """
+    assembly, case = prove.assembly, bonded(prove.assembly, mortar)
+    proven = prove(replace(case, friction=min(LITTLE, mortar.friction)))
+    total = np.linalg.norm(assembly.weight, axis=1).sum() + assembly.payload.sum()
+    most = proven.answer.contact_force[:, 0].max(initial=0.0) * assembly.scales[0]
+    return bool(proven.held <= EXACT and most > LARGEST_FORCE * total)
 
 
 def _amount(value: float) -> float:

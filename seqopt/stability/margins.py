@@ -165,7 +165,7 @@ class Margins:
         known = np.where(np.isfinite(brackets[..., 0]), np.maximum(brackets[..., 0], 0.0), np.nan)
         least = [np.nan_to_num(in_every_direction(angles, row)[0]) for row in known.T]
         most = np.maximum(brackets[..., 1].min(axis=0), 0.0)
-        return np.arctan(np.stack([np.array(least), most], axis=1))
+        return np.asarray(np.arctan(np.stack([np.array(least), most], axis=1)))
 
     def friction(
         self,

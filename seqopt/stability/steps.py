@@ -74,8 +74,8 @@ def stability_table(steps: Sequence[Step], results: Sequence[Stability]) -> pd.D
     -------
     pandas.DataFrame
         ``step``, ``type``, ``bricks``, ``verdict``, ``bond_needed_Pa``, ``friction_needed``,
-        ``tilt_survived_deg``, ``largest_grip_force_N``, ``first_brick`` and ``first_joint``, as in
-        `seqopt.stability.assessment.Stability`; ``almost_solved``, ``stalled`` and ``unproven``
+        ``tilt_survived_deg``, ``largest_grip_force_N``, ``first_brick``, ``first_joint`` and
+        ``jammed``, as in `seqopt.stability.assessment.Stability`; ``almost_solved``, ``stalled`` and ``unproven``
         count cases.
     """
     rows = []
@@ -92,6 +92,7 @@ def stability_table(steps: Sequence[Step], results: Sequence[Stability]) -> pd.D
                 "largest_grip_force_N": result.grip,
                 "first_brick": result.first_block,
                 "first_joint": result.first_contact,
+                "jammed": result.jammed,
                 "almost_solved": result.claims.get(Claim.ALMOST, 0),
                 "stalled": result.claims.get(Claim.STALLED, 0),
                 "unproven": result.unproven,
@@ -121,6 +122,8 @@ def format_verdicts(results: Sequence[Stability]) -> str:
         f"{sum(result.verdict is verdict for result in results)} {word}"
         for verdict, word in words.items()
     )
+    jammed = sum(result.jammed for result in results)
+    verdicts += f" ({jammed} only jammed: do not trust these)" if jammed else ""
     claims = {
         claim: sum(result.claims.get(claim, 0) for result in results)
         for claim in (Claim.ALMOST, Claim.STALLED)

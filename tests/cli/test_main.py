@@ -352,6 +352,7 @@ CERTIFIED = [
     "largest_grip_force_N",
     "first_brick",
     "first_joint",
+    "jammed",
 ]
 
 
