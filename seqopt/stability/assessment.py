@@ -145,7 +145,6 @@ def assess(
     motion = failure.answer.motion if known else np.zeros((len(assembly.centroid), 6))
     motion = motion / (np.abs(motion).max(initial=0.0) or 1.0)
     block, contact = first_to_fail(assembly, motion)
-    force, lever = assembly.scales
     friction = least_friction(prove, mortar)
     return Stability(
         verdict=verdict,
@@ -153,8 +152,8 @@ def assess(
         friction=friction,
         pull=np.array([pull.held for pull in pulls[:DIRECTIONS]] or [np.nan] * DIRECTIONS),
         tilt=float(np.arctan(worst)),
-        grip=_amount(_grip(prove, fixed)) * force,
-        motion=motion / np.repeat([1.0, lever], 3),
+        grip=_amount(_grip(prove, fixed)) * assembly.scales[0],
+        motion=motion / np.repeat([1.0, assembly.scales[1]], 3),
         first_block=block,
         first_contact=contact,
         jammed=stands and not friction > LITTLE and friction != 0 and is_jammed(prove, mortar),

@@ -75,8 +75,8 @@ def stability_table(steps: Sequence[Step], results: Sequence[Stability]) -> pd.D
     pandas.DataFrame
         ``step``, ``type``, ``bricks``, ``verdict``, ``bond_needed_Pa``, ``friction_needed``,
         ``tilt_survived_deg``, ``largest_grip_force_N``, ``first_brick``, ``first_joint`` and
-        ``jammed``, as in `seqopt.stability.assessment.Stability`; ``almost_solved``, ``stalled`` and ``unproven``
-        count cases.
+        ``jammed``, as in `seqopt.stability.assessment.Stability`; ``almost_solved``, ``stalled``
+        and ``unproven`` count cases.
     """
     rows = []
     for step, result in zip(steps, results, strict=True):
