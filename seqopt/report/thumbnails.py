@@ -111,7 +111,7 @@ def _stability(value: Stability) -> list[bytes]:
     axes.plot(angles, [*tilts, tilts[0]], "o-", color=BLUE, ms=4)
     axes.fill(angles, [*tilts, tilts[0]], color=BLUE, alpha=0.15)
     axes.set_title("tilt survived, degrees", loc="center")
-    axes.set_yticks([float(f"{tilts.max() / 2:.2g}"), float(f"{tilts.max():.2g}")])
+    axes.set_yticks([float(f"{np.nanmax(tilts) / 2:.2g}"), float(f"{np.nanmax(tilts):.2g}")])
     return [small(figure)]
 
 
