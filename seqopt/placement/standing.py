@@ -21,7 +21,7 @@ MARGINS = ("bond", "friction", "tilt")
 """What goals may ask of the stability of states, each of them to be small: the least bond (Pa, in
 tension, with that times 1 + friction as cohesion), the least coefficient of friction, and how far
 the tilt that is survived is from a right angle (rad)."""
-TILTS = 1024  # steps of a right angle, to which the tilt of a state is found
+TILTS = 2048  # steps of a right angle, to which the tilt of a state is found
 NARROW = {"bond": (0.02, 0.0), "friction": (0.0, 2.0**-6), "tilt": (0.0, 2e-3)}
 """By margin, within which share of itself and within what a value is proven: brackets' widths."""
 

@@ -59,7 +59,7 @@ def best_margin(
     if name != "tilt" and exists(0.0):
         return 0.0, 0.0, demanding(0.0)
     low, high = _around(exists, FIRST[name], WORST[name])
-    while high - low > 0.9 * slack(name, high):
+    while high - low > 0.6 * slack(name, high):  # the rest is for sets that stay open
         middle = (low + high) / 2
         if name == "bond":
             middle = (low * high) ** 0.5 if low else high / 16

@@ -40,7 +40,7 @@ class Screen:
     tilt : float, optional
         By which it must survive being tilted in every direction, rad: the sideways acceleration
         tan(tilt) g. A set stands if it does at corners around all of them, and falls if it does
-        in one; what survives between 0.997 and 1 of that acceleration may stay open.
+        in one; what survives between 0.998 and 1 of that acceleration may stay open.
     compiled : callable, optional
         Makes the programs to solve; the registered one by default.
 

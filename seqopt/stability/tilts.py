@@ -15,7 +15,7 @@ from seqopt.stability.limit_analysis import Case, Sense
 from seqopt.stability.prover import Proven, Prover
 
 DIRECTIONS = 8  # in which an assembly is pulled sideways, evenly spread
-FINE = 5 * DIRECTIONS  # where these leave open what a grip set survives
+FINE = 8 * DIRECTIONS  # where these leave open what a grip set survives
 MORE = 8  # directions at most that are added where the bound for all others is least
 NEAR = 5e-3  # share of the least pull by which the bound may fall short before any is added
 
