@@ -9,6 +9,7 @@ from typing import Any
 from seqopt.errors import SceneError
 from seqopt.files import read_bytes, read_text
 from seqopt.scene.checks import printable, short
+from seqopt.scene.doubts import warn_of
 from seqopt.scene.imports.boxes_csv import read_boxes
 from seqopt.scene.imports.building import build_scene
 from seqopt.scene.imports.compas_assembly import read_assembly
@@ -54,6 +55,11 @@ def import_scene(path: str | Path, form: str | None = None, given: Given | None 
     SceneError
         If it is no such file, or lacks what is not given.
 
+    Warns
+    -----
+    SceneWarning
+        If something is probably a mistake; see `seqopt.scene.doubts`.
+
     Examples
     --------
     >>> import tempfile
@@ -69,7 +75,9 @@ def import_scene(path: str | Path, form: str | None = None, given: Given | None 
         raise SceneError(f"given is {short(given)}; give Given(unit=..., density=...)")
     where = Path(path)
     content = read_content(where, form)
-    return build_scene(content, given or Given(), printable("file", where.stem or "file"))
+    scene = build_scene(content, given or Given(), printable("file", where.stem or "file"))
+    warn_of(scene, scene.name)
+    return scene
 
 
 def read_content(path: Path, form: str | None = None) -> Content:
