@@ -196,8 +196,9 @@ def read_grip(scene: Scene, robot: Robot, row: Row, where: str) -> int | None:
 
 
 def _integer(row: Row, column: str, where: str) -> int:
+    """Return a whole number; 48.0, as tables with empty cells are often written, is one too."""
+    text = row[column].strip()
     try:
-        return whole(column, int(row[column]))
+        return whole(column, int(text.removesuffix(".0")))
     except ValueError as error:
-        text = short(row[column])
-        raise StepError(f"{where}: {column} is {text}; give a whole number") from error
+        raise StepError(f"{where}: {column} is {short(text)}; give a whole number") from error

@@ -93,9 +93,7 @@ def find_touching(
     if content.faces and not given.detect:
         off = _off_blocks(content, facets, gap)
         found = [*_file_faces(content, solids)]
-        said = [f"faces are those of the file: {len(content.faces)}"]
-        if off > gap:
-            said.append(f"faces of the file lie up to {1e3 * off:.3g} mm off their blocks")
+        said = [f"faces are those of the file: {len(content.faces)}", *off]
     elif content.joints and all(joint.translational for joint in content.joints):
         found, said = [], ["joints are those of a frame; none has a face"]
     else:
@@ -126,8 +124,8 @@ def _on_ground(pair: tuple[int, int], face: FlatFace, bricks: Mapping[int, Brick
     return [((a, b), face)]
 
 
-def _off_blocks(content: Content, facets: Sequence[Surface], gap: float) -> float:
-    """Return how far faces of a file lie off the blocks that they join, m; too far is an error."""
+def _off_blocks(content: Content, facets: Sequence[Surface], gap: float) -> list[str]:
+    """Say how far faces of a file lie off the blocks that they join; too far is an error."""
     shapely, farthest = import_module("shapely"), 0.0
     sides = {i: [*_sides(facets[i])] for i in {i for face in content.faces for i in face.blocks}}
     for held in content.faces:
@@ -145,7 +143,9 @@ def _off_blocks(content: Content, facets: Sequence[Surface], gap: float) -> floa
                     f"{content.blocks[i].key}; look for faces anew (detect), or allow a wider gap"
                 )
             farthest = max(farthest, off)
-    return farthest
+    if farthest <= gap:
+        return []
+    return [f"faces of the file lie up to {1e3 * farthest:.3g} mm off their blocks"]
 
 
 def _sides(solid: Surface) -> Iterator[tuple[FlatFace, Any]]:
