@@ -11,7 +11,7 @@ from seqopt.errors import SceneError
 from seqopt.scene.blocks import as_vectors, block_brick
 from seqopt.scene.checks import LARGEST_NUMBER, positive, short
 from seqopt.scene.face_joints import face_ground, face_joint
-from seqopt.scene.imports.content import MOST_CORNERS, UNITS, Content, FileJoint, Given
+from seqopt.scene.imports.content import MOST_CORNERS, UNITS, UPS, Content, FileJoint, Given
 from seqopt.scene.imports.ordering import upward_order
 from seqopt.scene.imports.tidying import Tidied, tidy_shape
 from seqopt.scene.imports.touching import GROUND, Touching, find_touching
@@ -49,7 +49,7 @@ def build_scene(content: Content, given: Given, source: str) -> Scene:
     try:
         said = list(content.said)
         _check_size(content)
-        content = content.scaled(_factor(content, given, said))
+        content = _upright(content.scaled(_factor(content, given, said)), given, said)
         supports = _supports(content, given, said)
         blocks = _tidied(content, supports, said)
         bricks = _bricks(content, given, blocks, supports, said)
@@ -92,6 +92,16 @@ def _factor(content: Content, given: Given, said: list[str]) -> float:
     if content.unit is None:
         said.append(f"lengths are in {given.unit}, as given")
     return UNITS[content.unit or given.unit or "m"]
+
+
+def _upright(content: Content, given: Given, said: list[str]) -> Content:
+    """Return the content with z up."""
+    if given.up not in UPS:
+        raise SceneError(f"up is {short(given.up)}; give one of {', '.join(UPS)}")
+    if given.up == "z":
+        return content
+    said.append("y is up in the file, as given: (x, y, z) is (x, -z, y) here")
+    return content.turned()
 
 
 def _supports(content: Content, given: Given, said: list[str]) -> set[int]:

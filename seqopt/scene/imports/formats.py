@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from seqopt.errors import SceneError
+from seqopt.errors import SceneError, SceneWarning
 from seqopt.files import read_bytes, read_text
 from seqopt.scene.checks import printable, short
 from seqopt.scene.doubts import warn_of
@@ -29,6 +30,7 @@ DOCUMENTS: dict[str, Callable[[Any, str], Content]] = {
     "frame": read_frame,
 }
 SUFFIXES = {".csv": "boxes", ".obj": "obj", ".ply": "ply", ".stl": "stl", ".json": ""}
+LYING = 3  # blocks on the ground from which on it is odd if most are there
 FORMATS = (*DOCUMENTS, "boxes", "obj", "ply", "stl")
 
 
@@ -77,6 +79,16 @@ def import_scene(path: str | Path, form: str | None = None, given: Given | None 
     content = read_content(where, form)
     scene = build_scene(content, given or Given(), printable("file", where.stem or "file"))
     warn_of(scene, scene.name)
+    low = {ground.brick for ground in scene.grounds}
+    if len(low) >= LYING and 2 * len(low) > len(scene.bricks):
+        text = (
+            f"{len(low)} of {len(scene.bricks)} blocks rest on the ground: if it lies on its side"
+        )
+        warnings.warn(
+            f"scene {scene.name}: {text} and y is up in the file, say so (--up y)",
+            SceneWarning,
+            stacklevel=2,
+        )
     return scene
 
 

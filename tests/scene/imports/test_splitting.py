@@ -8,12 +8,14 @@ import numpy as np
 import pytest
 import trimesh
 
-from seqopt.errors import SceneError
+from seqopt.cli.main import main
+from seqopt.errors import SceneError, SceneWarning
 from seqopt.scene.blocks import as_vectors
 from seqopt.scene.imports.content import Given
 from seqopt.scene.imports.formats import import_scene, read_content
 from seqopt.scene.imports.meshes import read_obj
 from seqopt.scene.imports.tidying import tidy_shape
+from seqopt.scene.scene_file import load_scene
 from seqopt.scene.shape import Polyhedron
 from tests.blocks import box
 from tests.documents import HIGH, LOW, TOP, obj
@@ -48,12 +50,14 @@ def merged():
     return mesh
 
 
-def loose():
-    """OBJ in which every face has vertices of its own, and there are no names."""
+def loose(*, turned=False):
+    """OBJ in which every face has vertices of its own, and there are no names; or its y is up."""
     out, before = [], 1
     for shape in SHAPES:
         for face in shape.faces:
-            out += ["v {:.6f} {:.6f} {:.6f}".format(*shape.points[v]) for v in face]
+            corners = shape.points[list(face)]
+            corners = corners[:, [0, 2, 1]] * [1, 1, -1] if turned else corners
+            out += ["v {:.6f} {:.6f} {:.6f}".format(*corner) for corner in corners]
             out.append("f " + " ".join(str(before + k) for k in range(len(face))))
             before += len(face)
     return "\n".join(out) + "\n"
@@ -130,3 +134,22 @@ def test_what_is_open_is_said_to_be_open(tmp_path):
     last = len(SHAPES) - 1
     with pytest.raises(SceneError, match=f"block {last}: shape: edge .* close the shape"):
         import_scene(path, given=Given(unit="m", density=2000.0))
+
+
+def test_a_file_whose_y_is_up_stands_if_that_is_said(tmp_path):
+    """An arch that lies on its side rests on the ground with all blocks: a doubt, and a way out."""
+    path = tmp_path / "arch.obj"
+    path.write_text(loose(turned=True), encoding="utf-8")
+    with pytest.warns(SceneWarning, match=r"15 of 15 blocks rest on the ground; .* \(--up y\)"):
+        lying = import_scene(path, given=Given(unit="m", density=2000.0))
+    assert len(lying.grounds) == 15
+    scene = import_scene(path, given=Given(unit="m", density=2000.0, up="y"))
+    assert len(scene.grounds) == 2
+    for brick, shape in zip(scene.bricks, SHAPES, strict=True):
+        np.testing.assert_allclose(brick.position, shape.centroid, atol=1e-5)
+    with pytest.raises(SceneError, match="up is 'x'; give one of z, y"):
+        import_scene(path, given=Given(unit="m", density=2000.0, up="x"))
+    out = tmp_path / "scene.json"
+    words = ["--unit", "m", "--density", "2000", "--up", "y", "--out", str(out)]
+    assert main(["import", str(path), *words]) == 0
+    assert load_scene(out).grounds == scene.grounds
