@@ -82,8 +82,8 @@ def import_scene(path: str | Path, form: str | None = None, given: Given | None 
     low = {ground.brick for ground in scene.grounds}
     if len(low) >= LYING and 2 * len(low) > len(scene.bricks):
         warnings.warn(
-            f"scene {scene.name}: {len(low)} of {len(scene.bricks)} blocks rest on the ground; if y "
-            "is up in the file, say so (--up y)",
+            f"scene {scene.name}: {len(low)} of {len(scene.bricks)} blocks rest on the ground; if "
+            "y is up in the file, say so (--up y)",
             SceneWarning,
             stacklevel=2,
         )
