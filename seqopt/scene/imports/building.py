@@ -141,7 +141,10 @@ def _bricks(
     said: list[str],
 ) -> dict[int, Brick]:
     """Return the bricks of the blocks that are built, by their places in the file."""
-    numbers = _numbers([block.key for block in content.blocks], said)
+    keys = [block.key for block in content.blocks]
+    numbers = block_numbers(keys)
+    if [str(number) for number in numbers] != keys:
+        said.append("blocks are numbered from 1 in the file's order")
     density = None if given.density is None else positive("density", given.density, "kg/m³")
     silent = [
         block.key
@@ -159,13 +162,22 @@ def _bricks(
     }
 
 
-def _numbers(keys: Sequence[str], said: list[str]) -> list[int]:
-    """Return numbers for blocks: their keys where these are numbers, else from 1."""
+def block_numbers(keys: Sequence[str]) -> list[int]:
+    """Return the names of bricks: the keys of their blocks where these are numbers, else from 1.
+
+    Parameters
+    ----------
+    keys : sequence of str
+        Of all blocks of a file.
+
+    Returns
+    -------
+    list of int
+    """
     if all(key.isascii() and key.isdigit() and len(key) < 10 for key in keys):
         found = [int(key) for key in keys]
         if len(set(found)) == len(keys) and max(found) < LARGEST_NUMBER // 4:
             return found
-    said.append("blocks are numbered from 1 in the file's order")
     return [*range(1, len(keys) + 1)]
 
 
