@@ -6,6 +6,7 @@ import csv
 import io
 from pathlib import Path
 
+from seqopt.cells import plain
 from seqopt.errors import StepError
 from seqopt.files import read_text
 from seqopt.scene.checks import short, whole
@@ -117,6 +118,7 @@ def read_rows(scene: Scene, text: str, what: str) -> list[tuple[int, Row]]:
 
 
 def _rows(scene: Scene, reader: csv.DictReader[str], what: str) -> list[tuple[int, Row]]:
+    reader.fieldnames = [plain(name or "") for name in reader.fieldnames or ()]
     wanted = ["step", "type", "bricks", *(f"{robot.name}_node" for robot in scene.robots)]
     missing = [column for column in wanted if column not in (reader.fieldnames or ())]
     if missing:
