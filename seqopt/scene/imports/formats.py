@@ -79,15 +79,20 @@ def import_scene(path: str | Path, form: str | None = None, given: Given | None 
     content = read_content(where, form)
     scene = build_scene(content, given or Given(), printable("file", where.stem or "file"))
     warn_of(scene, scene.name)
+    _warn_of_lying(scene)
+    return scene
+
+
+def _warn_of_lying(scene: Scene) -> None:
+    """Warn if most blocks rest on the ground, as they do where y is up and nobody says so."""
     low = {ground.brick for ground in scene.grounds}
     if len(low) >= LYING and 2 * len(low) > len(scene.bricks):
         warnings.warn(
             f"scene {scene.name}: {len(low)} of {len(scene.bricks)} blocks rest on the ground; if "
             "y is up in the file, say so (--up y)",
             SceneWarning,
-            stacklevel=2,
+            stacklevel=3,
         )
-    return scene
 
 
 def read_content(path: Path, form: str | None = None) -> Content:
