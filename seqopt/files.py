@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pandas as pd
 
+from seqopt.cells import harmless_table
 from seqopt.errors import FileError
 from seqopt.interrupts import undisturbed
 
@@ -91,9 +92,10 @@ def csv_text(table: pd.DataFrame) -> str:
     Returns
     -------
     str
-        A line per row, after one with the names of the columns.
+        A line per row, after one with the names of the columns; no text begins as a formula.
     """
-    return str(table.to_csv(index=False, float_format="%.6g", lineterminator="\n"))
+    safe = harmless_table(table)
+    return str(safe.to_csv(index=False, float_format="%.6g", lineterminator="\n"))
 
 
 def write_csv(path: Path, table: pd.DataFrame) -> None:

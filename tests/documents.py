@@ -74,18 +74,53 @@ def legacy():
 FLOOR = [[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [2.0, 1.0, 0.0], [0.0, 1.0, 0.0]]
 
 
+def matrix(rows):
+    """A transformation of COMPAS."""
+    return {"dtype": "compas.geometry/Transformation", "data": {"matrix": [*rows, [0, 0, 0, 1]]}}
+
+
+def element(guid, shape, **more):
+    """A block of compas_dem."""
+    held = {"geometry": mesh(shape), "material": "stone", "transformation": None, **more}
+    return {"dtype": "compas_dem.elements/Block", "data": held, "guid": guid}
+
+
+def nested():
+    """As compas_dem 0.6: a block in a group, another parented to it, a third beside them."""
+
+    def node(guid, *children):
+        return {"name": "ElementNode", "element": guid, "children": list(children)}
+
+    turned = matrix([[0, -1, 0, 3], [1, 0, 0, 0], [0, 0, 1, 1]])
+    group = {"transformation": turned, "features": [], "name": "g", "material": None}
+    tilted = matrix([[1, 0, 0, 0.25], [0, 0, -1, 0], [0, 1, 0, 0.5]])
+    raised = matrix([[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 7]])
+    rows = [
+        {"dtype": "compas_model.elements/Group", "data": group, "guid": "g"},
+        element("a", box((2.0, 1.0, 0.5))),
+        element("b", box((1.0, 1.0, 0.5)), transformation=tilted),
+        element("c", box((2.0, 1.0, 0.5)), transformation=raised),
+    ]
+    data = {
+        "transformation": matrix([[1e-3, 0, 0, 0], [0, 0, -1e-3, 0.02], [0, 1e-3, 0, 0]]),
+        "elements": {row["guid"]: row for row in rows},
+        "materials": {},
+        "tree": {"root": {"children": [node("g", node("a", node("b"))), node("c")]}},
+        "graph": {"node": {str(i): {"element": row["guid"]} for i, row in enumerate(rows)}},
+    }
+    return {"dtype": "compas_dem.models/BlockModel", "data": data}
+
+
 def model(*, shift=None):
     """As compas_dem 0.6; a transformation shifts every block."""
-
-    def element(guid, shape, **more):
-        held = {"geometry": mesh(shape), "material": "stone", "transformation": shift, **more}
-        return {"dtype": "compas_dem.elements/Block", "data": held, "guid": guid}
 
     def contact(corners):
         data = {"points": list(map(point, corners)), "size": 1.0}
         return {"contacts": [{"dtype": "compas_dem.interactions/FrictionContact", "data": data}]}
 
-    rows = [element("a", LOW, is_support=True), element("b", HIGH), element("c", TOP)]
+    more = {"transformation": shift}
+    supported = element("a", LOW, is_support=True, **more)
+    rows = [supported, element("b", HIGH, **more), element("c", TOP, **more)]
     stone = {"dtype": "compas_dem.material/Stone", "data": {"density": 2000}, "guid": "stone"}
     graph = {
         "node": {"0": {"element": "a"}, "1": {"element": "b"}, "2": {"element": "c"}},
@@ -149,6 +184,7 @@ DOCUMENTS = {
     "assembly": assembly(),
     "legacy": legacy(),
     "model": model(),
+    "nested": nested(),
     "problem": problem(),
     "timber": timber(),
     "frame": frame(),

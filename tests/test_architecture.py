@@ -15,7 +15,7 @@ from seqopt.showing import DISPLAYS
 ROOT = Path(__file__).resolve().parent.parent
 
 ROOMS = (
-    {"arrays", "errors", "interrupts", "plugins"},
+    {"arrays", "cells", "errors", "interrupts", "plugins"},
     {"files", "work"},
     {"showing"},
     {"scene"},

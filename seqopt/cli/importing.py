@@ -11,7 +11,7 @@ from seqopt.cli.facts import scene_facts
 from seqopt.cli.values import number_word
 from seqopt.errors import ProblemError
 from seqopt.files import require_apart, write_text
-from seqopt.scene.imports.content import UNITS, Given
+from seqopt.scene.imports.content import UNITS, UPS, Given
 from seqopt.scene.imports.formats import FORMATS, import_scene
 from seqopt.scene.library.law import JointLaw
 from seqopt.scene.scene_file import dump_scene
@@ -47,6 +47,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     basic.add_argument("--name", help="of the scene (default: that of the file)")
     said = group(command, "what the file does not say")
     said.add_argument("--unit", choices=UNITS, help="unit of length, where the file has none")
+    said.add_argument("--up", choices=UPS, default="z", help="axis that is up (default: z)")
     said.add_argument(
         "--density", metavar="KG/M3", help="of blocks for which the file has none, kg/m³"
     )
@@ -110,6 +111,7 @@ def _given(options: argparse.Namespace, tell: Tell) -> Given:
     keys = options.supports
     return Given(
         unit=options.unit,
+        up=options.up,
         density=_positive("--density", options.density),
         supports=None if keys is None else [key.strip() for key in keys.split(",") if key.strip()],
         law=_law(options.stiffness),

@@ -57,4 +57,4 @@ def status_of(error: BaseException) -> Status:
     return Status.NO_ANSWER if none else Status.BAD_INPUT
 
 
-LESS = "take robots that reach less, block nodes, or a computer with more memory"
+LESS = "take fewer bricks, robots that reach less, or a computer with more memory"

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Iterator
 
 import numpy as np
 
 from seqopt.arrays import Vector
+from seqopt.errors import SceneWarning
 from seqopt.scene.parts import Brick, Ground, Joint
 from seqopt.scene.scene import Scene
 
@@ -41,6 +43,24 @@ def doubts(scene: Scene) -> tuple[str, ...]:
     ('gravity is 9810 m/s²: give it in meters, if it is meant in millimeters',)
     """
     return (*_of_units(scene), *_of_places(scene), *_of_joints(scene))
+
+
+def warn_of(scene: Scene, name: str) -> None:
+    """Warn of what looks wrong in a scene.
+
+    Parameters
+    ----------
+    scene : Scene
+    name : str
+        What to call it.
+
+    Warns
+    -----
+    SceneWarning
+        A warning for each doubt.
+    """
+    for doubt in doubts(scene):
+        warnings.warn(f"scene {name}: {doubt}", SceneWarning, stacklevel=3)
 
 
 def _of_units(scene: Scene) -> Iterator[str]:

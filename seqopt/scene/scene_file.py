@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import json
 import os
-import warnings
 from dataclasses import asdict
 from functools import partial
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from seqopt.errors import SceneError, SceneWarning, did_you_mean
+from seqopt.errors import SceneError, did_you_mean
 from seqopt.files import read_text, write_text
-from seqopt.scene.doubts import doubts
+from seqopt.scene.doubts import warn_of
 from seqopt.scene.library.builtin import ABOUT, GENERATED
 from seqopt.scene.library.by_words import KINDS, scene_by_words
 from seqopt.scene.parts import Brick, Ground, Joint, Robot
@@ -124,8 +123,7 @@ def load_scene(name: str | Path) -> Scene:
     if not path.suffix and not os.path.lexists(path):
         raise SceneError(_no_such(name))
     scene = parse_scene(read_text(path), name)
-    for doubt in doubts(scene):
-        warnings.warn(f"scene {name}: {doubt}", SceneWarning, stacklevel=2)
+    warn_of(scene, name)
     return scene
 
 

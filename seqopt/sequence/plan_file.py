@@ -6,6 +6,7 @@ import csv
 import io
 from pathlib import Path
 
+from seqopt.cells import plain
 from seqopt.errors import StepError
 from seqopt.files import read_text
 from seqopt.scene.checks import short, whole
@@ -117,6 +118,7 @@ def read_rows(scene: Scene, text: str, what: str) -> list[tuple[int, Row]]:
 
 
 def _rows(scene: Scene, reader: csv.DictReader[str], what: str) -> list[tuple[int, Row]]:
+    reader.fieldnames = [plain(name or "") for name in reader.fieldnames or ()]
     wanted = ["step", "type", "bricks", *(f"{robot.name}_node" for robot in scene.robots)]
     missing = [column for column in wanted if column not in (reader.fieldnames or ())]
     if missing:
@@ -196,8 +198,9 @@ def read_grip(scene: Scene, robot: Robot, row: Row, where: str) -> int | None:
 
 
 def _integer(row: Row, column: str, where: str) -> int:
+    """Return a whole number; 48.0, as tables with empty cells are often written, is one too."""
+    text = row[column].strip()
     try:
-        return whole(column, int(row[column]))
+        return whole(column, int(text.removesuffix(".0")))
     except ValueError as error:
-        text = short(row[column])
-        raise StepError(f"{where}: {column} is {text}; give a whole number") from error
+        raise StepError(f"{where}: {column} is {short(text)}; give a whole number") from error

@@ -8,6 +8,7 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
+from seqopt.cells import harmless, plain
 from seqopt.errors import StepError, did_you_mean
 from seqopt.files import read_text
 from seqopt.network.build import build_network
@@ -125,7 +126,7 @@ def schedule_text(schedule: Schedule) -> str:
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     names = [f"{robot.name}_node" for robot in schedule.scene.robots]
-    writer.writerow(["step", "type", "bricks", *names])
+    writer.writerow(["step", "type", "bricks", *map(harmless, names)])
     for step in schedule.steps:
         cells = [f"?{g.move + 1}" if isinstance(g, OpenGrip) else g for g in step.grips]
         writer.writerow([step.number, step.kind.value, step.bricks, *cells])
@@ -183,7 +184,7 @@ def find_schedule(
 def _check_columns(scene: Scene, text: str, what: str) -> None:
     """Require that no column belongs to a robot which the scene does not have."""
     known = [f"{robot.name}_node" for robot in scene.robots]
-    for column in next(csv.reader(io.StringIO(text))):
+    for column in map(plain, next(csv.reader(io.StringIO(text)))):
         if column.endswith("_node") and column not in known:
             raise StepError(
                 f"{what}: column {column}: no robot of scene {scene.name} is called so; "

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import pandas as pd
 import pytest
 
 from seqopt.errors import StepError
+from seqopt.network.build import build_network
+from seqopt.sequence.exports.tables import plan_csv
 from seqopt.sequence.plan_file import parse_plan, read_plan
 from seqopt.sequence.steps import Step, StepKind
+from seqopt.sequence.two_robots import sequential
 
 HEADER = "step,type,bricks,rob1_brick,rob1_node,rob2_brick,rob2_node,rob3_brick,rob3_node\n"
 
@@ -57,3 +61,19 @@ def test_what_is_no_table_of_steps_gets_one_line(arch25, text, named):
     with pytest.raises(StepError, match=named) as caught:
         parse_plan(arch25, text, "plan.csv")
     assert len(str(caught.value)) < 300
+
+
+def test_a_plan_that_pandas_wrote_again_is_the_same(tmp_path, arch25):
+    """Columns with empty cells are floats in pandas: 48 is written as 48.0."""
+    steps = sequential(build_network(arch25))
+    path = tmp_path / "plan.csv"
+    path.write_text(plan_csv(arch25, steps), encoding="utf-8")
+    pd.read_csv(path).to_csv(path, index=False)
+    assert ",1.0," in path.read_text(encoding="utf-8")
+    assert read_plan(arch25, path) == tuple(steps)
+
+
+@pytest.mark.parametrize("cell", ["1.5", "1e3", "1.0.0", "nan", "inf"])
+def test_what_is_not_whole_is_refused(arch25, cell):
+    with pytest.raises(StepError, match=f"rob1_node is '{cell}'; give a whole number"):
+        parse_plan(arch25, HEAD + f"1,place,1,{cell},,\n", "plan.csv")

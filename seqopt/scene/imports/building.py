@@ -11,7 +11,7 @@ from seqopt.errors import SceneError
 from seqopt.scene.blocks import as_vectors, block_brick
 from seqopt.scene.checks import LARGEST_NUMBER, positive, short
 from seqopt.scene.face_joints import face_ground, face_joint
-from seqopt.scene.imports.content import MOST_CORNERS, UNITS, Content, FileJoint, Given
+from seqopt.scene.imports.content import MOST_CORNERS, UNITS, UPS, Content, FileJoint, Given
 from seqopt.scene.imports.ordering import upward_order
 from seqopt.scene.imports.tidying import Tidied, tidy_shape
 from seqopt.scene.imports.touching import GROUND, Touching, find_touching
@@ -49,7 +49,7 @@ def build_scene(content: Content, given: Given, source: str) -> Scene:
     try:
         said = list(content.said)
         _check_size(content)
-        content = content.scaled(_factor(content, given, said))
+        content = _upright(content.scaled(_factor(content, given, said)), given, said)
         supports = _supports(content, given, said)
         blocks = _tidied(content, supports, said)
         bricks = _bricks(content, given, blocks, supports, said)
@@ -94,6 +94,16 @@ def _factor(content: Content, given: Given, said: list[str]) -> float:
     return UNITS[content.unit or given.unit or "m"]
 
 
+def _upright(content: Content, given: Given, said: list[str]) -> Content:
+    """Return the content with z up."""
+    if given.up not in UPS:
+        raise SceneError(f"up is {short(given.up)}; give one of {', '.join(UPS)}")
+    if given.up == "z":
+        return content
+    said.append("y is up in the file, as given: (x, y, z) is (x, -z, y) here")
+    return content.turned()
+
+
 def _supports(content: Content, given: Given, said: list[str]) -> set[int]:
     """Return the places of the blocks that are the ground."""
     place = {block.key: i for i, block in enumerate(content.blocks)}
@@ -131,7 +141,10 @@ def _bricks(
     said: list[str],
 ) -> dict[int, Brick]:
     """Return the bricks of the blocks that are built, by their places in the file."""
-    numbers = _numbers([block.key for block in content.blocks], said)
+    keys = [block.key for block in content.blocks]
+    numbers = block_numbers(keys)
+    if [str(number) for number in numbers] != keys:
+        said.append("blocks are numbered from 1 in the file's order")
     density = None if given.density is None else positive("density", given.density, "kg/m³")
     silent = [
         block.key
@@ -149,13 +162,22 @@ def _bricks(
     }
 
 
-def _numbers(keys: Sequence[str], said: list[str]) -> list[int]:
-    """Return numbers for blocks: their keys where these are numbers, else from 1."""
+def block_numbers(keys: Sequence[str]) -> list[int]:
+    """Return the names of bricks: the keys of their blocks where these are numbers, else from 1.
+
+    Parameters
+    ----------
+    keys : sequence of str
+        Of all blocks of a file.
+
+    Returns
+    -------
+    list of int
+    """
     if all(key.isascii() and key.isdigit() and len(key) < 10 for key in keys):
         found = [int(key) for key in keys]
         if len(set(found)) == len(keys) and max(found) < LARGEST_NUMBER // 4:
             return found
-    said.append("blocks are numbered from 1 in the file's order")
     return [*range(1, len(keys) + 1)]
 
 

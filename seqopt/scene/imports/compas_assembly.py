@@ -40,7 +40,7 @@ def read_assembly(document: Any, source: str) -> Content:
     """
     if isinstance(document, list):
         return _meshes(document, source)
-    graph, meshes = _graph(document, source)
+    graph, meshes = assembly_graph(document, source)
     nodes = mapping(f"{source}: node", entry(source, graph, "node", "vertex"))
     common = mapping(source, payload(graph.get("node_attributes") or graph.get("dva") or {}))
     keys = [key for key in nodes if meshes is None or key in meshes]
@@ -58,8 +58,26 @@ def read_assembly(document: Any, source: str) -> Content:
     return Content(tuple(blocks), tuple(faces), said=tuple(said))
 
 
-def _graph(document: Any, source: str) -> tuple[Entry, dict[str, Any] | None]:
-    """Return the graph of an assembly, and its meshes by key where they stand beside it."""
+def assembly_graph(document: Any, source: str) -> tuple[Entry, dict[str, Any] | None]:
+    """Return the graph of an assembly, and its meshes by key where they stand beside it.
+
+    Parameters
+    ----------
+    document : object
+        A JSON document, of which they are parts.
+    source : str
+        What to call it in messages.
+
+    Returns
+    -------
+    graph : dict
+    meshes : dict or None
+
+    Raises
+    ------
+    SceneError
+        If it is no such assembly.
+    """
     held = mapping(source, payload(document))
     if "blocks" in held and "assembly" in held:
         return (

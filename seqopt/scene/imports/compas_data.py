@@ -12,6 +12,7 @@ from seqopt.scene.blocks import BOX_CORNERS, BOX_FACES
 from seqopt.scene.checks import short
 from seqopt.scene.imports.documents import entry, listing, mapping, number, point
 
+PLAIN = 1e-9  # by how much rounding may change the last row of a transformation
 Solid = tuple[Floats, list[list[int]]]
 
 
@@ -184,6 +185,8 @@ def transformation(where: str, value: Any) -> Floats:
     matrix = [[number(where, x) for x in listing(where, row)] for row in rows]
     if [len(row) for row in matrix] != [4] * 4:
         raise SceneError(f"{where} is {short(value)}; a matrix of four by four is expected")
+    if not np.allclose(matrix[3], (0.0, 0.0, 0.0, 1.0), rtol=0.0, atol=PLAIN):
+        raise SceneError(f"{where} ends in {matrix[3]}; give a matrix that ends in 0, 0, 0, 1")
     return np.array(matrix)
 
 

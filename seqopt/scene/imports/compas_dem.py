@@ -9,7 +9,8 @@ import numpy as np
 
 from seqopt.arrays import Floats
 from seqopt.errors import SceneError
-from seqopt.scene.imports.compas_data import kind, mesh, moved, payload, transformation
+from seqopt.scene.imports.compas_data import kind, mesh, moved, payload
+from seqopt.scene.imports.compas_tree import Element, by_guid, read_elements
 from seqopt.scene.imports.content import Content, FileBlock, FileFace
 from seqopt.scene.imports.documents import Entry, entry, listing, mapping, number, point
 from seqopt.scene.library.law import JointLaw
@@ -44,12 +45,15 @@ def read_model(document: Any, source: str) -> Content:
                 f"{source}: the problem does not hold its model; give the model itself"
             )
         held = mapping(f"{source}: model", payload(held["model"]))
-    elements = _elements(source, held)
+    elements = read_elements(source, held)
     densities = _densities(source, held)
-    blocks = [
-        _block(f"{source}: element {i}", str(i), item, densities) for i, item in enumerate(elements)
-    ]
-    place = _places(source, held, {str(item.get("guid")): i for i, item in enumerate(elements)})
+    kept = {i: e for i, e in enumerate(elements) if e.kind != "group"}
+    blocks = [_block(str(i), element, densities) for i, element in kept.items()]
+    if len(kept) < len(elements):
+        said.append(f"{len(elements) - len(kept)} groups only place what is in them")
+    known: dict[str, int | None] = {element.guid: None for element in elements}
+    known |= {element.guid: k for k, element in enumerate(kept.values())}
+    place = _places(source, held, known)
     faces = tuple(
         FileFace((entry(source, place, a), entry(source, place, b)), corners)
         for a, b, corners in _contacts(source, held)
@@ -57,47 +61,39 @@ def read_model(document: Any, source: str) -> Content:
     return Content(tuple(blocks), faces, law=law, said=tuple(said))
 
 
-def _elements(source: str, held: Entry) -> list[Entry]:
-    """Return the elements, which stand by their identifier or in a list."""
-    found = entry(source, held, "elements")
-    rows = [*found.values()] if isinstance(found, dict) else listing(f"{source}: elements", found)
-    return [mapping(f"{source}: element {i}", item) for i, item in enumerate(rows)]
-
-
 def _densities(source: str, held: Entry) -> dict[str, float]:
     """Return the densities of materials by their identifier."""
-    found = held.get("materials") or {}
-    rows = [*found.values()] if isinstance(found, dict) else listing(source, found)
     out = {}
-    for item in rows:
+    for guid, item in by_guid(f"{source}: materials", held.get("materials") or []):
         value = mapping(source, payload(item)).get("density")
         if value is not None:
-            out[str(item.get("guid"))] = number(f"{source}: density", value)
+            out[guid] = number(f"{source}: density", value)
     return out
 
 
-def _block(where: str, key: str, item: Entry, densities: dict[str, float]) -> FileBlock:
-    held = mapping(where, payload(item))
+def _block(key: str, element: Element, densities: dict[str, float]) -> FileBlock:
+    where, held = element.where, element.held
     vertices, faces = mesh(where, entry(where, held, "geometry", "shape"))
-    matrix = transformation(f"{where}: transformation", held.get("transformation"))
     return FileBlock(
         key,
-        moved(vertices, matrix),
+        moved(vertices, element.matrix),
         faces,
         support=held.get("is_support") is True,
         density=densities.get(str(held.get("material"))),
     )
 
 
-def _places(source: str, held: Entry, by_guid: dict[str, int]) -> dict[str, int]:
-    """Return the places of the elements of the graph's nodes."""
+def _places(source: str, held: Entry, known: dict[str, int | None]) -> dict[str, int]:
+    """Return the places of the blocks of the graph's nodes; groups have none."""
     nodes = mapping(source, mapping(source, held.get("graph") or {}).get("node") or {})
     out = {}
     for key, node in nodes.items():
         element = mapping(f"{source}: node {key}", node).get("element")
-        if str(element) not in by_guid:
+        if str(element) not in known:
             raise SceneError(f"{source}: node {key} is of element {element}, which is not there")
-        out[key] = by_guid[str(element)]
+        place = known[str(element)]
+        if place is not None:
+            out[key] = place
     return out
 
 

@@ -15,7 +15,8 @@ import numpy as np
 from seqopt.arrays import Floats
 from seqopt.errors import SceneError
 from seqopt.scene.blocks import BOX_CORNERS, BOX_FACES
-from seqopt.scene.imports.compas_data import frame, kind, moved, payload, transformation
+from seqopt.scene.imports.compas_data import frame, moved, payload
+from seqopt.scene.imports.compas_tree import Element, by_guid, read_elements
 from seqopt.scene.imports.content import Content, FileBlock, FileJoint
 from seqopt.scene.imports.documents import Entry, entry, listing, mapping, number
 
@@ -40,22 +41,22 @@ def read_timber(document: Any, source: str) -> Content:
         If it is no such model, or has no beams.
     """
     held = mapping(source, payload(document))
-    found = entry(source, held, "elements")
-    rows = [*found.values()] if isinstance(found, dict) else listing(f"{source}: elements", found)
-    beams = [mapping(source, item) for item in rows if kind(item) == "beam"]
+    elements = read_elements(source, held)
+    beams = [element for element in elements if element.kind == "beam"]
     if not beams:
         raise SceneError(f"{source}: it has no beams; give a model with some")
-    blocks = tuple(_beam(f"{source}: beam {i}", str(i), item) for i, item in enumerate(beams))
-    place = {str(item.get("guid")): i for i, item in enumerate(beams)}
+    blocks = tuple(_beam(f"{source}: beam {i}", str(i), beam) for i, beam in enumerate(beams))
+    place = {beam.guid: i for i, beam in enumerate(beams)}
     joints = tuple(_joint(blocks, pair) for pair in _pairs(source, held, place))
     said = ["beams are their blanks: cuts and fasteners are left out"]
-    if len(beams) < len(rows):
-        said.append(f"{len(rows) - len(beams)} elements that are not beams are left out")
+    if len(beams) < len(elements):
+        said.append(f"{len(elements) - len(beams)} elements that are not beams are left out")
     return Content(blocks, joints=joints, said=tuple(said))
 
 
-def _beam(where: str, key: str, item: Entry) -> FileBlock:
-    held = mapping(where, payload(item))
+def _beam(where: str, key: str, beam: Element) -> FileBlock:
+    """Return a beam; its frame, where it has one, is that in the model, not that in its group."""
+    held = beam.held
     names = ("length", "width", "height")
     size = np.array([number(f"{where}: {name}", entry(where, held, name)) for name in names])
     if not size.min() > 0:
@@ -65,16 +66,14 @@ def _beam(where: str, key: str, item: Entry) -> FileBlock:
         origin, axes = frame(where, held["frame"])
         points = origin + local @ axes
     else:
-        points = moved(local, transformation(where, held.get("transformation")))
+        points = moved(local, beam.matrix)
     return FileBlock(key, np.asarray(points), BOX_FACES)
 
 
 def _pairs(source: str, held: Entry, place: dict[str, int]) -> Iterator[tuple[int, int]]:
     """Yield the places of beams that the model's own joints hold together."""
-    found = held.get("joints") or {}
-    rows = [*found.values()] if isinstance(found, dict) else listing(f"{source}: joints", found)
     seen = set()
-    for item in rows:
+    for _, item in by_guid(f"{source}: joints", held.get("joints") or []):
         joint = mapping(source, payload(item))
         ends = [str(x) for x in listing(source, joint.get("element_guids") or [])]
         for a, b in combinations(sorted(place[x] for x in ends if x in place), 2):

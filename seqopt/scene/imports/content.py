@@ -12,6 +12,8 @@ from seqopt.scene.library.law import JointLaw
 from seqopt.work.progress import Tell
 
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254, "ft": 0.3048}  # m
+UPS = ("z", "y")
+Y_TO_Z = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])  # (x, y, z) to (x, -z, y)
 MOST_BLOCKS = 20_000
 MOST_CORNERS = 2_000_000  # of all faces of all blocks
 
@@ -130,6 +132,23 @@ class Content:
             ),
         )
 
+    def turned(self) -> Content:
+        """Return the content of a file whose y is up, with z up.
+
+        Returns
+        -------
+        Content
+        """
+        return replace(
+            self,
+            blocks=tuple(replace(b, vertices=b.vertices @ Y_TO_Z) for b in self.blocks),
+            faces=tuple(replace(f, corners=f.corners @ Y_TO_Z) for f in self.faces),
+            joints=tuple(
+                replace(j, position=j.position @ Y_TO_Z, along=j.along @ Y_TO_Z)
+                for j in self.joints
+            ),
+        )
+
 
 @dataclass(frozen=True, kw_only=True)
 class Given:
@@ -139,6 +158,8 @@ class Given:
     ----------
     unit : str, optional
         Unit of length of the file, one of `UNITS`.
+    up : str, optional
+        Which axis of the file points up, ``z`` or ``y``.
     density : float, optional
         Of blocks for which the file has none, kg/m³.
     supports : sequence of str, optional
@@ -158,6 +179,7 @@ class Given:
     """
 
     unit: str | None = None
+    up: str = "z"
     density: float | None = None
     supports: Sequence[str] | None = None
     law: JointLaw | None = None

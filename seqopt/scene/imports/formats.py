@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from seqopt.errors import SceneError
+from seqopt.errors import SceneError, SceneWarning
 from seqopt.files import read_bytes, read_text
 from seqopt.scene.checks import printable, short
+from seqopt.scene.doubts import warn_of
 from seqopt.scene.imports.boxes_csv import read_boxes
 from seqopt.scene.imports.building import build_scene
 from seqopt.scene.imports.compas_assembly import read_assembly
@@ -28,6 +30,7 @@ DOCUMENTS: dict[str, Callable[[Any, str], Content]] = {
     "frame": read_frame,
 }
 SUFFIXES = {".csv": "boxes", ".obj": "obj", ".ply": "ply", ".stl": "stl", ".json": ""}
+LYING = 3  # blocks on the ground from which on it is odd if most are there
 FORMATS = (*DOCUMENTS, "boxes", "obj", "ply", "stl")
 
 
@@ -54,6 +57,11 @@ def import_scene(path: str | Path, form: str | None = None, given: Given | None 
     SceneError
         If it is no such file, or lacks what is not given.
 
+    Warns
+    -----
+    SceneWarning
+        If something is probably a mistake; see `seqopt.scene.doubts`.
+
     Examples
     --------
     >>> import tempfile
@@ -69,7 +77,22 @@ def import_scene(path: str | Path, form: str | None = None, given: Given | None 
         raise SceneError(f"given is {short(given)}; give Given(unit=..., density=...)")
     where = Path(path)
     content = read_content(where, form)
-    return build_scene(content, given or Given(), printable("file", where.stem or "file"))
+    scene = build_scene(content, given or Given(), printable("file", where.stem or "file"))
+    warn_of(scene, scene.name)
+    _warn_of_lying(scene)
+    return scene
+
+
+def _warn_of_lying(scene: Scene) -> None:
+    """Warn if most blocks rest on the ground, as they do where y is up and nobody says so."""
+    low = {ground.brick for ground in scene.grounds}
+    if len(low) >= LYING and 2 * len(low) > len(scene.bricks):
+        warnings.warn(
+            f"scene {scene.name}: {len(low)} of {len(scene.bricks)} blocks rest on the ground; if "
+            "y is up in the file, say so (--up y)",
+            SceneWarning,
+            stacklevel=3,
+        )
 
 
 def read_content(path: Path, form: str | None = None) -> Content:

@@ -8,19 +8,19 @@ from __future__ import annotations
 
 import io
 import logging
+from collections import Counter
 from collections.abc import Sequence
 from importlib import import_module
 from importlib.util import find_spec
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from seqopt.arrays import Floats, Ints
 from seqopt.errors import FileError, SceneError
 from seqopt.scene.checks import short
 from seqopt.scene.imports.content import MOST_BLOCKS, Content, FileBlock
 from seqopt.scene.imports.documents import LARGEST
+from seqopt.scene.imports.splitting import split_blocks
 
 Faces = list[list[int]]
 UNASKED = logging.NullHandler()  # else Python prints what no one listens to
@@ -38,7 +38,7 @@ def read_obj(text: str, source: str) -> Content:
     Returns
     -------
     Content
-        A block for every part that shares no vertex with others.
+        Its blocks, by the names of objects or groups, whichever are more.
 
     Raises
     ------
@@ -47,6 +47,8 @@ def read_obj(text: str, source: str) -> Content:
     """
     vertices: list[list[float]] = []
     faces: Faces = []
+    named = {"o": "", "g": ""}
+    names: dict[str, list[str]] = {"o": [], "g": []}
     for i, line in enumerate(text.splitlines(), start=1):
         words = line.split("#", 1)[0].split()
         if words and words[0] == "v":
@@ -56,7 +58,12 @@ def read_obj(text: str, source: str) -> Content:
             if len(face) < 3:
                 raise SceneError(f"{source}, line {i}: a face has three vertices or more")
             faces.append(face)
-    return _content(np.array(vertices, dtype=float).reshape(-1, 3), faces, source)
+            for kind, name in named.items():
+                names[kind].append(name)
+        elif words and words[0] in named:
+            named[words[0]] = " ".join(words[1:])
+    points = np.array(vertices, dtype=float).reshape(-1, 3)
+    return _content(points, faces, source, max(names.values(), key=lambda own: len(set(own))))
 
 
 def read_mesh(content: bytes, source: str, form: str) -> Content:
@@ -73,7 +80,7 @@ def read_mesh(content: bytes, source: str, form: str) -> Content:
     Returns
     -------
     Content
-        A block for every part that shares no vertex with others.
+        Its blocks.
 
     Raises
     ------
@@ -110,25 +117,28 @@ def _loaded(content: bytes, source: str, form: str) -> tuple[Floats, Ints]:
         raise SceneError(f"{source}: no {form} file that can be read: {said}") from error
 
 
-def _content(vertices: Floats, faces: Faces, source: str) -> Content:
+def _content(vertices: Floats, faces: Faces, source: str, names: Sequence[str] = ()) -> Content:
     if not faces:
         raise SceneError(f"{source}: it has no faces; give closed meshes")
-    part = _parts(len(vertices), faces)
-    used = np.unique([part[face[0]] for face in faces])
-    if len(used) > MOST_BLOCKS:
-        raise SceneError(f"{source}: {len(used)} blocks; {MOST_BLOCKS} is the most")
-    sides: dict[int, Faces] = {int(k): [] for k in used}
-    for face in faces:
-        sides[int(part[face[0]])].append(face)
-    blocks = [_block(str(i), vertices, own) for i, own in enumerate(sides.values())]
+    own = split_blocks(vertices, faces)
+    if len(own) > MOST_BLOCKS:
+        raise SceneError(f"{source}: {len(own)} blocks; {MOST_BLOCKS} is the most")
+    keys = _keys([names[block[0]] if names else "" for block in own])
+    blocks = [
+        _block(key, vertices, [faces[i] for i in block])
+        for key, block in zip(keys, own, strict=True)
+    ]
     return Content(tuple(blocks), said=("a mesh: no supports, faces or order",))
 
 
-def _parts(count: int, faces: Faces) -> Ints:
-    """Return the number of the part that every vertex belongs to, in the order of the vertices."""
-    ends = np.array([(face[0], v) for face in faces for v in face[1:]]).reshape(-1, 2)
-    links = coo_array((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), shape=(count, count))
-    return np.asarray(connected_components(links, directed=False)[1], dtype=np.int64)
+def _keys(names: Sequence[str]) -> list[str]:
+    """Return the names of blocks, numbered where several have one; places if some have none."""
+    seen = Counter[str]()
+    keys = []
+    for name in names:
+        seen[name] += 1
+        keys.append(name if seen[name] == 1 else f"{name}-{seen[name]}")
+    return keys if "" not in seen and len(set(keys)) == len(keys) else [*map(str, range(len(keys)))]
 
 
 def _block(key: str, vertices: Floats, faces: Sequence[Sequence[int]]) -> FileBlock:

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
+from typing import Any
 
 import numpy as np
 
 from seqopt.arrays import Floats
+from seqopt.errors import SceneError
 from seqopt.scene.checks import positive
 from seqopt.scene.convex import convex_pieces
 from seqopt.scene.detection import (
@@ -24,6 +26,7 @@ from seqopt.scene.parts import Brick
 from seqopt.scene.shape import Polyhedron
 
 GAP = 0.05  # between faces that touch, over the thinnest block
+OFF = 0.05  # of a face from a block that it joins, over the size of the block
 ASIDE = 1e-2  # how far beside a face a point is that tells on which side of it a block lies
 GROUND = -1
 DOWN = np.array([0.0, 0.0, -1.0])
@@ -80,14 +83,17 @@ def find_touching(
     ------
     FileError
         If shapely is not installed.
+    SceneError
+        If a face of the file does not lie on a block that it joins.
     """
     require_polygons("finding where blocks touch")
     solids, facets = [block.solid for block in blocks], [block.facets for block in blocks]
     thin = min(min(brick.dimensions) for brick in bricks.values())
     gap = GAP * thin if given.gap is None else positive("gap", given.gap, "m")
     if content.faces and not given.detect:
+        off = _off_blocks(content, facets, gap)
         found = [*_file_faces(content, solids)]
-        said = [f"faces are those of the file: {len(content.faces)}"]
+        said = [f"faces are those of the file: {len(content.faces)}", *off]
     elif content.joints and all(joint.translational for joint in content.joints):
         found, said = [], ["joints are those of a frame; none has a face"]
     else:
@@ -116,6 +122,38 @@ def _on_ground(pair: tuple[int, int], face: FlatFace, bricks: Mapping[int, Brick
         turned = flat_face(face.center + face.corners @ face.axes[1:], -face.axes[0])
         return [((GROUND, a), turned)]
     return [((a, b), face)]
+
+
+def _off_blocks(content: Content, facets: Sequence[Surface], gap: float) -> list[str]:
+    """Say how far faces of a file lie off the blocks that they join; too far is an error."""
+    shapely, farthest = import_module("shapely"), 0.0
+    sides = {i: [*_sides(facets[i])] for i in {i for face in content.faces for i in face.blocks}}
+    for held in content.faces:
+        for i in held.blocks:
+            away = np.full(len(held.corners), np.inf)
+            for side, polygon in sides[i]:
+                seen = (held.corners - side.center) @ side.axes.T
+                beside = shapely.distance(polygon, shapely.points(seen[:, 1:]))
+                away = np.minimum(away, np.hypot(seen[:, 0], beside))
+            off = float(away.max(initial=0.0))
+            if off > max(gap, OFF * float(np.ptp(facets[i].points, axis=0).max())):
+                a, b = (content.blocks[k].key for k in held.blocks)
+                raise SceneError(
+                    f"the face between blocks {a} and {b} lies {off:.3g} m off block "
+                    f"{content.blocks[i].key}; look for faces anew (detect), or allow a wider gap"
+                )
+            farthest = max(farthest, off)
+    if farthest <= gap:
+        return []
+    return [f"faces of the file lie up to {1e3 * farthest:.3g} mm off their blocks"]
+
+
+def _sides(solid: Surface) -> Iterator[tuple[FlatFace, Any]]:
+    """Yield the sides of a block in their mean planes, and as polygons there."""
+    shapely = import_module("shapely")
+    for face in solid.faces:
+        flat = flat_face(solid.points[list(face)])
+        yield flat, shapely.make_valid(shapely.Polygon(flat.corners))
 
 
 def _file_faces(content: Content, solids: Sequence[Shape]) -> Iterator[Held]:

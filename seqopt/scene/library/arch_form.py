@@ -15,7 +15,7 @@ from seqopt.scene.boxes import require_apart
 from seqopt.scene.checks import positive, short, vector
 from seqopt.scene.library.arch_curve import CURVES, Line, chords
 from seqopt.scene.library.law import MASONRY, JointLaw
-from seqopt.scene.library.laying import joint_width, whole_number
+from seqopt.scene.library.laying import few_enough, joint_width, whole_number
 from seqopt.scene.parts import THICKEST, Robot
 from seqopt.scene.scene import Scene
 
@@ -180,6 +180,7 @@ def _counts(form: ArchForm) -> list[int]:
     points = np.array([form.line(at) for at in np.linspace(0, 1, 2001)])
     way = float(np.hypot(*np.diff(points, axis=0).T).sum())
     most = math.ceil(2 * way / (form.lengths(len(form.pattern)) + form.gap).min()) + 2
+    few_enough("arch", most // 2)
     over = np.cumsum(form.lengths(most) + form.gap) - way
     off = np.abs(over) / np.arange(1, most + 1)  # what each joint is wider, or narrower
     return [int(count) + 2 for count in np.argsort(off[1:], kind="stable")]

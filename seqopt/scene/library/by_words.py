@@ -120,6 +120,8 @@ def scene_by_words(words: str) -> Scene:
     try:
         scene = kind.make(kind.shape(**given)) if kind.shape else kind.make(**given)
         return replace(scene, provenance=f"{scene.provenance} In words: {words}.")
+    except OverflowError as error:
+        raise SceneError(f"scene {words}: its numbers are too large; give smaller ones") from error
     except TypeError as error:  # a number without a default is missing
         lacking = ", ".join(_required(kind) - given.keys())
         if not lacking:

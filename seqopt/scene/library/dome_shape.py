@@ -9,7 +9,7 @@ from seqopt.errors import SceneError
 from seqopt.scene.checks import positive, short
 from seqopt.scene.library.herringbone import REPEAT
 from seqopt.scene.library.law import MASONRY, JointLaw
-from seqopt.scene.library.laying import joint_width, whole_number
+from seqopt.scene.library.laying import few_enough, joint_width, whole_number
 
 BONDS = ("running", "herringbone")
 LENGTHS = ("span", "rise", "opening", "thickness")
@@ -67,6 +67,7 @@ class DomeShape:
     def __post_init__(self) -> None:
         _set(self, "courses", whole_number("dome: courses", self.courses, 1))
         _set(self, "around", whole_number("dome: around", self.around, 3))
+        few_enough("dome", self.courses * self.around)
         for name in LENGTHS:
             _set(self, name, positive(f"dome: {name}", getattr(self, name), "m"))
         _set(self, "gap", joint_width("dome: gap", self.gap))

@@ -8,10 +8,11 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from seqopt.errors import SceneError
-from seqopt.scene.checks import positive
+from seqopt.scene.checks import positive, short
 from seqopt.scene.parts import Brick, Robot
 
 STANDARD_GRAVITY = 9.81  # m/s²
+MOST_BRICKS = 20_000  # of a generated scene
 
 
 def mobile_robots(bricks: Sequence[Brick], count: int = 3) -> tuple[Robot, ...]:
@@ -63,7 +64,7 @@ def touching_order(
 
 
 def whole_number(where: str, value: int, least: int) -> int:
-    """Return a whole number that is large enough.
+    """Return a whole number that is large enough, and at most `MOST_BRICKS`.
 
     Parameters
     ----------
@@ -81,9 +82,30 @@ def whole_number(where: str, value: int, least: int) -> int:
     SceneError
         If it is something else.
     """
-    if not isinstance(value, int | np.integer) or isinstance(value, bool) or value < least:
-        raise SceneError(f"{where} is {value!r}; give a whole number from {least}")
+    whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
+    if not whole or not least <= value <= MOST_BRICKS:
+        raise SceneError(
+            f"{where} is {short(value)}; give a whole number from {least} to {MOST_BRICKS}"
+        )
     return int(value)
+
+
+def few_enough(where: str, bricks: int) -> None:
+    """Raise an error if a structure would have more than `MOST_BRICKS`.
+
+    Parameters
+    ----------
+    where : str
+        What it is, for the message.
+    bricks : int
+
+    Raises
+    ------
+    SceneError
+        Saying how many it would have.
+    """
+    if bricks > MOST_BRICKS:
+        raise SceneError(f"{where}: {bricks} bricks; give numbers that make at most {MOST_BRICKS}")
 
 
 def joint_width(where: str, value: float) -> float:

@@ -12,7 +12,7 @@ from seqopt.errors import SceneError
 from seqopt.scene.checks import finite, positive, vector
 from seqopt.scene.library.joints import ground_under, joints_between
 from seqopt.scene.library.law import MASONRY, JointLaw
-from seqopt.scene.library.laying import joint_width, mobile_robots, whole_number
+from seqopt.scene.library.laying import few_enough, joint_width, mobile_robots, whole_number
 from seqopt.scene.parts import Brick, Robot
 from seqopt.scene.scene import Scene
 
@@ -62,6 +62,7 @@ class WallShape:
     def __post_init__(self) -> None:
         for name in ("columns", "courses"):
             _set(self, name, whole_number(f"wall: {name}", getattr(self, name), 1))
+        few_enough("wall", self.columns * self.courses)
         _set(self, "dimensions", vector("wall: dimensions", self.dimensions))
         for length in self.dimensions:
             positive("wall: dimensions", length, "m")

@@ -6,33 +6,34 @@ Both are JSON as `compas.json_load` reads it, written without COMPAS.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from seqopt.arrays import Floats
-from seqopt.errors import SceneError, StepError
 from seqopt.scene.blocks import vertices_of
-from seqopt.scene.imports.compas_data import kind, payload
+from seqopt.scene.imports.compas_assembly import assembly_graph
+from seqopt.scene.imports.documents import entry
 from seqopt.scene.parts import Brick
 from seqopt.scene.scene import Scene
+from seqopt.sequence.exports.sources import Source
 from seqopt.sequence.exports.states import StepStates, step_states
 from seqopt.sequence.steps import Step
 
 Document = dict[str, Any]
 
 
-def timber_plan(scene: Scene, steps: Sequence[Step], document: object = None) -> str:
+def timber_plan(scene: Scene, steps: Sequence[Step], source: Source | None = None) -> str:
     """Return a plan as a ``BuildingPlan`` of compas_timber.
 
     Parameters
     ----------
     scene : Scene
     steps : sequence of Step
-    document : object, optional
-        The model from which the scene was imported: elements are then named by its identifiers.
+    source : Source, optional
+        From which the scene was imported: elements are then named by its identifiers or keys.
 
     Returns
     -------
@@ -40,7 +41,7 @@ def timber_plan(scene: Scene, steps: Sequence[Step], document: object = None) ->
         JSON. A step for every step of the plan: the elements that it places, and those that robots
         hold meanwhile.
     """
-    names = _element_ids(scene, document)
+    names = source.names if source else {b.name: str(b.name) for b in scene.bricks}
     rows = []
     for row in step_states(scene, steps):
         new = [brick for brick in scene.placed if brick.name in row.new]
@@ -64,25 +65,6 @@ def timber_plan(scene: Scene, steps: Sequence[Step], document: object = None) ->
     return json.dumps(whole) + "\n"
 
 
-def _element_ids(scene: Scene, document: object) -> dict[int, str]:
-    """Return identifiers of elements by the names of their bricks."""
-    own = {brick.name: str(brick.name) for brick in scene.bricks}
-    if document is None:
-        return own
-    held = payload(document)
-    found = held.get("elements") if isinstance(held, dict) else None
-    rows = [*found.values()] if isinstance(found, dict) else found
-    if not isinstance(rows, list):
-        raise SceneError("the source has no elements; give the model that was imported")
-    beams = [item for item in rows if kind(item) == "beam"] or rows
-    if max(own) >= len(beams):
-        raise SceneError(
-            f"the source has {len(beams)} elements, and the scene a brick {max(own)}; give the "
-            "model that was imported"
-        )
-    return {name: str(beams[name].get("guid", name)) for name in own}
-
-
 def _frame(brick: Brick | None) -> Document:
     """Return the pose of a brick, or the world's."""
     if brick is None:
@@ -91,16 +73,16 @@ def _frame(brick: Brick | None) -> Document:
     return {"point": list(brick.position), **axes}
 
 
-def compas_assembly(scene: Scene, steps: Sequence[Step], document: object = None) -> str:
+def compas_assembly(scene: Scene, steps: Sequence[Step], source: Source | None = None) -> str:
     """Return an assembly of compas_assembly with the plan as attributes.
 
     Parameters
     ----------
     scene : Scene
     steps : sequence of Step
-    document : object, optional
-        The assembly from which the scene was imported: it stays as it is, with attributes added;
-        by default blocks and faces are those of the scene.
+    source : Source, optional
+        From which the scene was imported. An assembly stays as it is, with attributes added;
+        otherwise blocks and faces are those of the scene, and ``name`` what the source calls them.
 
     Returns
     -------
@@ -109,17 +91,21 @@ def compas_assembly(scene: Scene, steps: Sequence[Step], document: object = None
         ``place_step`` and ``held``, a list of step, robot and node; the graph has ``plan``, a list
         of steps.
 
-    Raises
-    ------
-    StepError
-        If the document is no such assembly, or of other blocks.
     """
     rows = [*step_states(scene, steps)]
-    whole = _assembly(scene) if document is None else document
-    graph = _graph(whole)
-    nodes = _nodes(graph, scene)
+    kept = None if source is None else source.graph
+    whole = _assembly(scene) if kept is None else kept
+    graph = assembly_graph(whole, "source")[0]
+    found = entry("source", graph, "node", "vertex")
+    names = source.names if source else {}
+    nodes = {
+        brick.name: found[names[brick.name] if kept is not None else str(brick.name)]
+        for brick in scene.bricks
+    }
     for i, brick in enumerate(scene.placed):
         nodes[brick.name].update(order=i, place_step=None, held=[])
+        if source and kept is None:
+            nodes[brick.name]["name"] = names[brick.name]
     for row in rows:
         for name in row.new:
             nodes[name]["place_step"] = row.step.number
@@ -133,29 +119,6 @@ def _plain(row: StepStates) -> Document:
     holds = {robot: [node, brick] for robot, (node, brick) in row.holds.items()}
     step = row.step
     return {"step": step.number, "type": step.kind.value, "placed": list(row.new), "holds": holds}
-
-
-def _graph(whole: object) -> Document:
-    """Return the graph of an assembly, which is part of its document."""
-    held = payload(whole)
-    held = payload(held["graph"]) if isinstance(held, dict) and "graph" in held else held
-    if isinstance(held, dict) and isinstance(held.get("assembly"), dict):
-        held = held["assembly"]
-    if not isinstance(held, dict) or not isinstance(held.get("node", held.get("vertex")), dict):
-        raise StepError("the source is not an assembly of compas_assembly; give what was imported")
-    return held
-
-
-def _nodes(graph: Document, scene: Scene) -> dict[int, Document]:
-    """Return the nodes of bricks by their names: the node's key, or its place from 1."""
-    rows: Mapping[str, Document] = graph["node" if "node" in graph else "vertex"]
-    by_name = {int(key): node for key, node in rows.items() if key.isdigit()}
-    if len(by_name) < len(rows):
-        by_name = dict(enumerate(rows.values(), start=1))
-    lost = [brick.name for brick in scene.bricks if not isinstance(by_name.get(brick.name), dict)]
-    if lost:
-        raise StepError(f"the source has no block {lost[0]}; give the assembly that was imported")
-    return by_name
 
 
 def _assembly(scene: Scene) -> Document:

@@ -6,13 +6,12 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from seqopt.errors import FileError, StepError
-from seqopt.files import read_text
 from seqopt.scene.checks import short
-from seqopt.scene.imports.documents import parse_json
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.exports.compas_plans import compas_assembly, timber_plan
 from seqopt.sequence.exports.sequencer import sequencer_json
+from seqopt.sequence.exports.sources import Source, read_source
 from seqopt.sequence.exports.tables import plan_csv, plan_json
 from seqopt.sequence.plan_file import read_plan
 from seqopt.sequence.steps import Step
@@ -22,7 +21,7 @@ PLAIN: dict[str, Callable[[Scene, Sequence[Step]], str]] = {
     "json": plan_json,
     "sequencer": sequencer_json,
 }
-WITH_SOURCE: dict[str, Callable[[Scene, Sequence[Step], object], str]] = {
+WITH_SOURCE: dict[str, Callable[[Scene, Sequence[Step], Source | None], str]] = {
     "compas_timber": timber_plan,
     "compas_assembly": compas_assembly,
 }
@@ -42,8 +41,8 @@ def export_plan(
     form : str
         One of `EXPORTS`.
     source : str or pathlib.Path, optional
-        The file from which the scene was imported, for formats of COMPAS: the plan then names its
-        elements, or is written into it.
+        The file from which the scene was imported, of any format, for formats of COMPAS: the plan
+        then names its elements, or is written into it if it is an assembly.
 
     Returns
     -------
@@ -55,6 +54,8 @@ def export_plan(
         If there is no such format, or the source is not of this scene.
     FileError
         If the source cannot be read.
+    SceneError
+        If the source is no file of a known format.
 
     Examples
     --------
@@ -70,8 +71,8 @@ def export_plan(
         raise StepError(f"format {form} takes no source; leave it out")
     if form in PLAIN:
         return PLAIN[form](scene, steps)
-    document = None if source is None else parse_json(read_text(Path(source)), str(source))
-    return WITH_SOURCE[form](scene, steps, document)
+    read = None if source is None else read_source(scene, Path(source))
+    return WITH_SOURCE[form](scene, steps, read)
 
 
 def read_folder(folder: Path) -> tuple[Scene, tuple[Step, ...]]:

@@ -7,6 +7,7 @@ import io
 import json
 from collections.abc import Sequence
 
+from seqopt.cells import harmless
 from seqopt.errors import StepError
 from seqopt.scene.checks import short
 from seqopt.scene.scene import Scene
@@ -35,7 +36,7 @@ def plan_csv(scene: Scene, steps: Sequence[Step]) -> str:
     robots = [robot.name for robot in scene.robots]
     grips = [f"{name}_{what}" for name in robots for what in ("node", "brick")]
     blocks = [f"block_{brick.name}" for brick in scene.placed]
-    writer.writerow(["step", "type", "bricks", "placed", *grips, *blocks])
+    writer.writerow(["step", "type", "bricks", "placed", *map(harmless, grips), *blocks])
     for row in step_states(scene, steps):
         held = [cell for name in robots for cell in row.holds.get(name, ("", ""))]
         placed = " ".join(map(str, row.new))

@@ -138,7 +138,8 @@ def test_bars_of_a_frame(read):
 def test_meshes_of_every_kind(read):
     parts = [LOW, HIGH, TOP]
     scene = read("wall.obj", obj(*parts))
-    assert measures(scene) == ({0: 2400.0, 1: 1200.0, 2: 2400.0}, [1.0, 1.0], [2.0])
+    assert measures(scene) == ({1: 2400.0, 2: 1200.0, 3: 2400.0}, [1.0, 1.0], [2.0])
+    assert "blocks are numbered from 1" in scene.provenance  # their keys are names of objects
     assert len(scene.bricks[0].shape.faces) == 6  # polygons stay what they are
     fans = [(f[0], f[1], f[2]) for f in LOW.faces] + [(f[0], f[2], f[3]) for f in LOW.faces]
     mesh = trimesh.Trimesh(np.array(LOW.vertices), fans, process=False)

@@ -31,6 +31,7 @@ from seqopt.scene.library import (
     herringbone_vault,
     wall,
 )
+from seqopt.scene.library.by_words import scene_by_words
 from seqopt.scene.library.joints import joints_between
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.support import islands
@@ -227,6 +228,15 @@ def test_compliance_agrees_with_independent_routes(scene, share):
             lambda: arch(ArchForm(span=1.0, rise=0.5, bricks=7, dimensions=(0.2, 0.1, 0.15))),
             "arch of 7: bricks . and . interpenetrate by .* mm; give another number of bricks",
         ),
+        (lambda: chain(10**9), "chain: bricks is 1000000000; give a whole number from 2 to 20000"),
+        (
+            lambda: WallShape(columns=10**5, courses=1),
+            "wall: columns is 100000; give a whole number",
+        ),
+        (lambda: WallShape(columns=300, courses=100), "wall: 30000 bricks; give numbers that make"),
+        (lambda: DomeShape(courses=300, around=100), "dome: 30000 bricks; give numbers that make"),
+        (lambda: arch(ArchForm(span=1e9, rise=7.0)), "arch: .* bricks; give numbers that make at"),
+        (lambda: scene_by_words("arch:span=1e300,rise=7"), "numbers are too large; give smaller"),
         (lambda: VaultShape(bricks=0), "vault: bricks is 0; give a whole number from 1"),
         (lambda: VaultShape(bricks=30, skew=math.inf), "vault: skew is inf; give a finite number"),
         (lambda: VaultShape(bricks=30, plan_angle=5.1), "vault: plan_angle is 5.1 rad; give at"),

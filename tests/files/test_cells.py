@@ -1,0 +1,68 @@
+"""Names in CSV files are no formulas for spreadsheets, and come back as they were."""
+
+from __future__ import annotations
+
+import csv
+import io
+from dataclasses import replace
+
+import pandas as pd
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from seqopt.cells import FORMULA, harmless, plain
+from seqopt.engines.registry import make_engine
+from seqopt.files import csv_text
+from seqopt.network.build import build_network
+from seqopt.responses.table import analyze
+from seqopt.sequence.exports.tables import plan_csv
+from seqopt.sequence.plan_file import parse_plan
+from seqopt.sequence.schedule_file import parse_schedule, schedule_text
+from seqopt.sequence.three_robots import three_robot_loop
+from seqopt.sequence.two_robots import METHODS
+from tests.builders import small_arch
+
+NAMES = ("=cmd|'/c calc'!A1", "+1", "'@sum", "-x", "rob")
+
+
+def named(names):
+    """An arch whose robots are called so."""
+    scene = small_arch(6)
+    robots = zip(scene.robots, names, strict=False)
+    return replace(scene, robots=tuple(replace(robot, name=name) for robot, name in robots))
+
+
+@given(st.text("'=+-@a1"))
+def test_no_cell_begins_as_a_formula_and_every_one_comes_back(text):
+    assert not harmless(text).startswith(FORMULA)
+    assert plain(harmless(text)) == text
+
+
+@pytest.mark.parametrize("names", [NAMES[:3], NAMES[2:]])
+def test_a_plan_of_robots_with_such_names_is_read_again(names):
+    scene = named(names)
+    network = build_network(scene)
+    steps = METHODS["sequential"](network, names[:2])
+    table = csv_text(analyze(make_engine("compliance", network), steps))
+    for text in (table, plan_csv(scene, steps)):
+        cells = [cell for row in csv.reader(io.StringIO(text)) for cell in row]
+        assert not [c for c in cells if c.startswith(FORMULA) and not is_number(c)]
+        assert parse_plan(scene, text, "plan") == steps
+    schedule = three_robot_loop(network, [robot.name for robot in scene.robots])
+    text = schedule_text(schedule)
+    assert not text.splitlines()[0].count(",=")
+    assert parse_schedule(network, text, "schedule").steps == schedule.steps
+
+
+def is_number(cell):
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return True
+
+
+def test_numbers_stay_numbers():
+    table = pd.DataFrame({"-a": [-1.5, 2.0], "b": ["=1", "x"], "c": [pd.NA, -3]})
+    assert csv_text(table) == "'-a,b,c\n-1.5,'=1,\n2,x,-3\n"

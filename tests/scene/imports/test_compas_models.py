@@ -1,0 +1,150 @@
+"""Blocks of COMPAS models stand where COMPAS places them; faces elsewhere are refused."""
+
+from __future__ import annotations
+
+import copy
+import json
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from seqopt.cli.main import main
+from seqopt.errors import SceneError, SceneWarning
+from seqopt.scene.imports.compas_dem import read_model
+from seqopt.scene.imports.compas_timber import read_timber
+from seqopt.scene.imports.content import Given
+from seqopt.scene.imports.formats import import_scene
+from tests.blocks import box
+from tests.documents import element, matrix, model, nested, timber
+
+LYING = matrix([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0]])
+# of `nested`, as ``modelgeometry.aabb()`` of compas_model 0.9.3 gives them: lowest and highest
+BY_COMPAS = {
+    "1": ((0.002, 0.0185, 0.0), (0.003, 0.019, 0.002)),
+    "2": ((0.003, 0.0175, 0.00025), (0.0035, 0.0185, 0.00125)),
+    "3": ((0.0, 0.0125, 0.0), (0.002, 0.013, 0.001)),
+}
+
+
+def corners(block):
+    return np.array([block.vertices.min(axis=0), block.vertices.max(axis=0)])
+
+
+def test_blocks_stand_where_compas_places_them():
+    content = read_model(nested(), "nested")
+    assert [block.key for block in content.blocks] == list(BY_COMPAS)
+    for block in content.blocks:
+        np.testing.assert_allclose(corners(block), BY_COMPAS[block.key], atol=1e-15)
+    assert content.said == ("1 groups only place what is in them",)
+
+
+def affine(draw):
+    out = np.eye(4)
+    turn = draw(st.tuples(*[st.floats(-3, 3)] * 3))
+    out[:3, :3] = draw(st.sampled_from((1e-3, 1.0, 2.0))) * Rotation.from_rotvec(turn).as_matrix()
+    out[:3, 3] = draw(st.tuples(*[st.floats(-5, 5)] * 3))
+    return out
+
+
+@st.composite
+def trees(draw):
+    """A model of blocks in a tree, and where each of them belongs."""
+    whole = affine(draw)
+    placed, nodes, rows = [], [], []
+    root = {"children": []}
+    for i in range(draw(st.integers(1, 6))):
+        above = draw(st.integers(-1, i - 1))
+        own = affine(draw)
+        placed.append((placed[above] if above >= 0 else whole) @ own)
+        nodes.append({"element": str(i), "children": []})
+        (nodes[above] if above >= 0 else root)["children"].append(nodes[i])
+        shape = box((1.0, 2.0, 3.0))
+        rows.append(element(str(i), shape, transformation=matrix(own[:3].tolist())))
+    order = draw(st.permutations(range(len(rows))))
+    data = {
+        "transformation": matrix(whole[:3].tolist()),
+        "elements": {str(i): rows[i] for i in order},
+        "tree": {"root": root},
+    }
+    return {"dtype": "compas_dem.models/BlockModel", "data": data}, [placed[i] for i in order]
+
+
+@given(trees())
+def test_transformations_are_composed_from_the_model_down(drawn):
+    document, placed = drawn
+    local = np.array(box((1.0, 2.0, 3.0)).vertices)
+    for block, at in zip(read_model(document, "tree").blocks, placed, strict=True):
+        np.testing.assert_allclose(block.vertices, local @ at[:3, :3].T + at[:3, 3], atol=1e-12)
+
+
+def test_beams_of_a_group_move_with_it():
+    document = timber()
+    frame = document["data"]["elements"]["p"]["data"].pop("frame")
+    rows = [[0, 1, 0, 1000], [0, 0, 1, 0], [1, 0, 0, 50]]
+    document["data"]["elements"]["p"]["data"]["transformation"] = matrix(rows)
+    assert frame["data"]["point"] == [1000, 0, 50]
+    document["data"]["transformation"] = matrix([[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 7]])
+    before, after = read_timber(timber(), "t").blocks[1], read_timber(document, "t").blocks[1]
+    np.testing.assert_allclose(after.vertices - before.vertices, [[0, 0, 7]] * 8)
+
+
+def turned(**more):
+    document = model()
+    document["data"] |= {"transformation": LYING, **more}
+    return document
+
+
+def test_faces_that_are_not_on_their_blocks_are_refused(tmp_path):
+    """COMPAS moves the blocks of a model, and leaves the contacts where it found them."""
+    path = tmp_path / "lying.json"
+    path.write_text(json.dumps(turned()), encoding="utf-8")
+    with pytest.raises(SceneError, match=r"face between blocks 0 and 1 lies 1 m off block 0"):
+        import_scene(path, given=Given(unit="m"))
+    lying = import_scene(path, given=Given(unit="m", detect=True))
+    assert [round(brick.position[1], 9) for brick in lying.placed] == [-0.75, -1.25]
+
+
+def test_faces_a_little_off_their_blocks_are_said(tmp_path):
+    document = model()
+    for ends in document["data"]["graph"]["edge"].values():
+        for item in ends.values():
+            for corner in item["contacts"][0]["data"]["points"]:
+                corner["data"] = [corner["data"][0], corner["data"][1], corner["data"][2] + 0.03]
+    path = tmp_path / "near.json"
+    path.write_text(json.dumps(document), encoding="utf-8")
+    said = import_scene(path, given=Given(unit="m")).provenance
+    assert "faces of the file lie up to 30 mm off their blocks" in said
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"tree": {"root": {"children": [{"element": "x"}]}}}, "element 'x' of the tree is not"),
+        ({"tree": {"root": {"children": [{"element": "a"}] * 2}}}, "tree occurs twice"),
+        (
+            {"transformation": {"matrix": [*[[1, 0, 0, 0]] * 3, [0, 0, 1, 1]]}},
+            r"ends in \[0.0, 0.0, 1.0, 1.0\]; give a matrix that ends in 0, 0, 0, 1",
+        ),
+    ],
+)
+def test_a_tree_that_is_none_is_one_line(change, said):
+    document = copy.deepcopy(model())
+    document["data"] |= change
+    with pytest.raises(SceneError, match=said):
+        read_model(document, "m")
+
+
+def test_import_prints_what_is_doubtful(tmp_path, capsys):
+    document = model()
+    document["data"]["materials"]["stone"]["data"]["density"] = 2.4
+    path, out = tmp_path / "m.json", tmp_path / "scene.json"
+    path.write_text(json.dumps(document), encoding="utf-8")
+    assert main(["import", str(path), "--unit", "m", "--out", str(out)]) == 0
+    said = capsys.readouterr().err
+    assert "seqopt: warning: " in said
+    assert "a density of 2.4 kg/m³ is odd" in said
+    with pytest.warns(SceneWarning, match="is odd"):
+        import_scene(path, given=Given(unit="m"))

@@ -1,0 +1,155 @@
+"""Blocks of a mesh are found where its faces close, however a program wrote them."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+import trimesh
+
+from seqopt.cli.main import main
+from seqopt.errors import SceneError, SceneWarning
+from seqopt.scene.blocks import as_vectors
+from seqopt.scene.imports.content import Given
+from seqopt.scene.imports.formats import import_scene, read_content
+from seqopt.scene.imports.meshes import read_obj
+from seqopt.scene.imports.tidying import tidy_shape
+from seqopt.scene.scene_file import load_scene
+from seqopt.scene.shape import Polyhedron
+from tests.blocks import box
+from tests.documents import HIGH, LOW, TOP, obj
+
+
+def wedge(first, second):
+    """A voussoir between two angles; neighbors share four corners."""
+    outline = [(r * np.cos(t), r * np.sin(t)) for t in (first, second) for r in (1.0, 1.2)]
+    around = [outline[k] for k in (0, 1, 3, 2)]
+    points = np.array([(x, y, z) for y in (0.0, 0.3) for x, z in around])
+    sides = [(i, (i + 1) % 4, (i + 1) % 4 + 4, i + 4) for i in range(4)]
+    return Polyhedron(as_vectors(points), [(3, 2, 1, 0), (4, 5, 6, 7), *sides])
+
+
+ANGLES = np.linspace(np.pi, 0.0, 16)
+SHAPES = [wedge(a, b) for a, b in pairwise(ANGLES)]
+
+
+def whole():
+    """The bricks of an arch as one mesh of triangles, each with vertices of its own."""
+    parts = []
+    for shape in SHAPES:
+        fans = [(f[0], f[k], f[k + 1]) for f in shape.faces for k in range(1, len(f) - 1)]
+        parts.append(trimesh.Trimesh(shape.points, fans, process=False))
+    return trimesh.util.concatenate(parts)
+
+
+def merged():
+    """The same with corners that bricks share."""
+    mesh = whole()
+    mesh.merge_vertices()
+    return mesh
+
+
+def loose(*, turned=False):
+    """OBJ in which every face has vertices of its own, and there are no names; or its y is up."""
+    out, before = [], 1
+    for shape in SHAPES:
+        for face in shape.faces:
+            corners = shape.points[list(face)]
+            corners = corners[:, [0, 2, 1]] * [1, 1, -1] if turned else corners
+            out += ["v {:.6f} {:.6f} {:.6f}".format(*corner) for corner in corners]
+            out.append("f " + " ".join(str(before + k) for k in range(len(face))))
+            before += len(face)
+    return "\n".join(out) + "\n"
+
+
+FILES = {
+    "binary.stl": lambda: whole().export(file_type="stl"),
+    "text.stl": lambda: whole().export(file_type="stl_ascii"),
+    "parts.ply": lambda: whole().export(file_type="ply"),
+    "shared.ply": lambda: merged().export(file_type="ply"),
+    "shared.obj": lambda: merged().export(file_type="obj"),
+    "loose.obj": loose,
+}
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_an_arch_is_its_bricks_in_every_format(name, tmp_path):
+    path, content = tmp_path / name, FILES[name]()
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    blocks = read_content(path).blocks
+    assert [block.key for block in blocks] == [str(i) for i in range(len(SHAPES))]
+    for block, shape in zip(blocks, SHAPES, strict=True):
+        solid = tidy_shape(block).solid
+        assert solid.volume == pytest.approx(shape.volume, rel=1e-4)
+        np.testing.assert_allclose(solid.centroid, shape.centroid, atol=1e-5)
+    scene = import_scene(path, given=Given(unit="m", density=2000.0))
+    assert (len(scene.bricks), len(scene.joints), len(scene.grounds)) == (15, 14, 2)
+
+
+def keys(text):
+    return {block.key: len(block.faces) for block in read_obj(text, "file").blocks}
+
+
+def test_blocks_keep_the_names_of_objects_and_groups():
+    assert keys(obj(LOW, HIGH, TOP)) == {"block_0": 6, "block_1": 6, "block_2": 6}
+    grouped = obj(LOW, HIGH).replace("o block_0", "o all\ng low one").replace("o block_", "g ")
+    assert keys(grouped) == {"low one": 6, "1": 6}
+    assert keys(obj(LOW, HIGH).replace("o block_1\n", "")) == {"block_0": 6, "block_0-2": 6}
+    assert keys(obj(LOW, HIGH).replace("o block_0\n", "")) == {"0": 6, "1": 6}
+
+
+def lines(text, kind):
+    return [line for line in text.splitlines() if line.startswith(kind)]
+
+
+def test_faces_in_turn_from_two_blocks_are_two_blocks():
+    text = obj(LOW, box((1.0, 1.0, 1.0), at=(9.0, 0.0, 0.0)))
+    faces = lines(text, "f")
+    mixed = [face for pair in zip(faces[:6], faces[6:], strict=True) for face in pair]
+    assert keys("\n".join([*lines(text, "v"), *mixed])) == {"0": 6, "1": 6}
+
+
+def test_blocks_that_share_a_vertex_alone_are_two():
+    first, second = box((1.0, 1.0, 1.0)), box((1.0, 1.0, 1.0), at=(1.0, 1.0, 1.0))
+    parts = [trimesh.Trimesh(b.vertices, b.faces, process=False) for b in (first, second)]
+    mesh = trimesh.util.concatenate(parts)
+    mesh.merge_vertices()
+    assert len(mesh.vertices) == 15
+    assert len(keys(mesh.export(file_type="obj"))) == 2
+
+
+def test_faces_that_stand_there_twice_stay_one_block():
+    faces = lines(obj(LOW), "f")
+    for doubled in ([*faces, *faces], [face for face in faces for _ in (0, 1)]):
+        text = "\n".join([*lines(obj(LOW), "v"), *doubled])
+        (block,) = read_obj(text, "file").blocks
+        assert tidy_shape(block).solid.volume == pytest.approx(1.0)
+
+
+def test_what_is_open_is_said_to_be_open(tmp_path):
+    """Also where every face has vertices of its own, so that none says what belongs together."""
+    path = tmp_path / "open.obj"
+    path.write_text(loose().rsplit("f ", 1)[0], encoding="utf-8")
+    last = len(SHAPES) - 1
+    with pytest.raises(SceneError, match=f"block {last}: shape: edge .* close the shape"):
+        import_scene(path, given=Given(unit="m", density=2000.0))
+
+
+def test_a_file_whose_y_is_up_stands_if_that_is_said(tmp_path):
+    """An arch that lies on its side rests on the ground with all blocks: a doubt, and a way out."""
+    path = tmp_path / "arch.obj"
+    path.write_text(loose(turned=True), encoding="utf-8")
+    with pytest.warns(SceneWarning, match=r"15 of 15 blocks rest on the ground; .* \(--up y\)"):
+        lying = import_scene(path, given=Given(unit="m", density=2000.0))
+    assert len(lying.grounds) == 15
+    scene = import_scene(path, given=Given(unit="m", density=2000.0, up="y"))
+    assert len(scene.grounds) == 2
+    for brick, shape in zip(scene.bricks, SHAPES, strict=True):
+        np.testing.assert_allclose(brick.position, shape.centroid, atol=1e-5)
+    with pytest.raises(SceneError, match="up is 'x'; give one of z, y"):
+        import_scene(path, given=Given(unit="m", density=2000.0, up="x"))
+    out = tmp_path / "scene.json"
+    words = ["--unit", "m", "--density", "2000", "--up", "y", "--out", str(out)]
+    assert main(["import", str(path), *words]) == 0
+    assert load_scene(out).grounds == scene.grounds
