@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+from base64 import b64encode
 from collections.abc import Sequence
+from hashlib import sha256
 from html import escape
 from importlib import resources
 
@@ -13,6 +15,7 @@ import pandas as pd
 from seqopt.engines.interface import Engine
 from seqopt.errors import ProblemError
 from seqopt.report.page_data import Build, Scatter, build_data, size_of, structure_data
+from seqopt.responses.in_words import number_text
 
 RESPONSES = {
     "F_largest": "largest grip force, N",
@@ -67,13 +70,29 @@ def report_page(
     >>> len(report_page(engine, [build], "Two robots take turns.")) > 5e5
     True
     """
+    assets = {part: _asset(name) for part, name in PARTS.items()}
     return _filled(
+        policy=_policy(assets["style"], [each for part, each in assets.items() if part != "style"]),
         title=f"{escape(engine.network.scene.name)}, step by step",
         sentence=escape(sentence),
         tables="".join(_table(caption, table) for caption, table in tables),
         data=_json(_data(engine, builds, scatter)),
-        **{part: _asset(name) for part, name in PARTS.items()},
+        **assets,
     )
+
+
+def _policy(style: str, scripts: Sequence[str]) -> str:
+    """Return what a browser may run and load of the page: its own scripts and style, no other."""
+    own = " ".join(map(_hashed, scripts))
+    return (
+        f"default-src 'none'; script-src {own}; style-src {_hashed(style)}; img-src data: blob:; "
+        "base-uri 'none'; form-action 'none'"
+    )
+
+
+def _hashed(text: str) -> str:
+    """Return a part of the page as its policy names it."""
+    return f"'sha256-{b64encode(sha256(text.encode()).digest()).decode()}'"
 
 
 def _json(data: object) -> str:
@@ -114,6 +133,6 @@ def _asset(name: str) -> str:
 def _table(caption: str, table: pd.DataFrame) -> str:
     """Return a table as HTML, numbers with four digits."""
     body = table.to_html(
-        index=False, border=0, na_rep="", float_format=lambda value: f"{value:.4g}", classes="wide"
-    )
+        index=False, border=0, na_rep="", float_format=number_text, classes="wide"
+    ).replace(' style="text-align: right;"', "")  # as the page does itself
     return f'<figure class="table"><figcaption>{escape(caption)}</figcaption>{body}</figure>'
