@@ -22,10 +22,10 @@ WORDS = {
     "D_max": "displacement, 1e-3 mm",
 }  # as of seqopt.report.comparison.LARGEST
 OVER = "over payload"
-LEGEND = (
-    f"{OVER.capitalize()}: a robot would hold more than it can. "
-    f"{OUTSIDE.capitalize()}: its numbers are not reliable. Such steps are red below."
-)
+LEGEND = {
+    OVER: "a robot would hold more than it can",
+    OUTSIDE: "its numbers are not reliable",
+}
 
 
 def shown_build(
@@ -132,6 +132,22 @@ def in_units(name: str, value: float) -> str:
     return length_text(1e-6 * value) if name == "D_max" else f"{number_text(value)} {LARGEST[name]}"
 
 
+def with_legend(caption: str, table: pd.DataFrame) -> str:
+    """Return the caption of a table of builds, with a legend where it says what is wrong with them.
+
+    Parameters
+    ----------
+    caption : str
+    table : pandas.DataFrame
+
+    Returns
+    -------
+    str
+    """
+    said = "".join(f". {name.capitalize()}: {why}" for name, why in LEGEND.items() if name in table)
+    return f"{caption}{said}. Such steps are marked in red" if said else caption
+
+
 def worst_table(scene: Scene, builds: Sequence[Build]) -> tuple[str, pd.DataFrame]:
     """Return the largest responses of builds, a row each, under their caption.
 
@@ -154,5 +170,5 @@ def worst_table(scene: Scene, builds: Sequence[Build]) -> tuple[str, pd.DataFram
         found[OVER] = [f"{len(steps):,} steps" if steps else "" for steps in over]
     if any(build.departures for build in builds):
         found[OUTSIDE] = ["yes" if build.departures else "" for build in builds]
-    caption = "Largest responses" + (f". {LEGEND}" if {OVER, OUTSIDE} & {*found} else "")
+    caption = with_legend("Largest responses", found)
     return caption, found.rename(columns=WORDS).rename_axis("build").reset_index()

@@ -255,15 +255,13 @@ def build_data(engine: Engine, build: Build, *, fields: bool = True) -> dict[str
 
 
 def _marks(scene: Scene, build: Build) -> list[str]:
-    """Return what is wrong with every step: payloads that it exceeds, linear ranges that it leaves.
-
-    In words; empty for most.
-    """
-    wrong = [(f"{each.robot} exceeds its payload", each.steps) for each in build.overloads(scene)]
-    wrong += [(f"{OUTSIDE}: {each.what}", each.steps) for each in build.departures]
-    return [
-        "; ".join(said for said, steps in wrong if step.number in steps) for step in build.steps
-    ]
+    """Return payloads that every step exceeds, and the linear range where it leaves it, in words."""
+    over, out = build.overloads(scene), []
+    for step in build.steps:
+        said = [f"{each.robot} exceeds its payload" for each in over if step.number in each.steps]
+        left = [each.what for each in build.departures if step.number in each.steps]
+        out.append("; ".join(said + ([f"{OUTSIDE}: {', '.join(left)}"] if left else [])))
+    return out
 
 
 def _fields(engine: Engine, build: Build) -> dict[str, Floats]:

@@ -13,7 +13,6 @@ from seqopt.report.comparison import CLOSED, Comparison, largest
 from seqopt.report.methods import method_tables
 from seqopt.report.page import report_page
 from seqopt.report.page_builds import (
-    LEGEND,
     OVER,
     WORDS,
     count_overloads,
@@ -21,6 +20,7 @@ from seqopt.report.page_builds import (
     outside_in_words,
     overloads_in_words,
     shown_build,
+    with_legend,
     worst_table,
 )
 from seqopt.report.page_data import Build, Scatter
@@ -110,11 +110,12 @@ def comparison_page(engine: Engine, result: Comparison) -> str:
         for name, table in result.tables.items()
     ]
     marks = {"overloaded": OVER, "outside": OUTSIDE}
+    marks = {name: said for name, said in marks.items() if result.table[name].any()}
     columns = ["problem", "objective", "gap", *WORDS, *marks, "models", "seconds"]
     shown = result.table[columns].replace({True: "yes", False: ""}).rename(columns=WORDS | marks)
     shown = shown.sort_values("problem", key=lambda each: ~each.isin(FIRST), kind="stable")
     shown = shown.rename_axis("method or formulation").reset_index()
-    tables = [(f"Methods and formulations; a click shows the build. {LEGEND}", shown)]
+    tables = [(with_legend("Methods and formulations; a click shows the build", shown), shown)]
     if result.printed is not None:
         printed = result.printed.add_suffix(", printed").rename_axis("largest").reset_index()
         tables.append(("What the paper prints", printed))
@@ -219,7 +220,7 @@ def front_page(
         f"than another in everything{count_overloads(scene, builds)}."
     )
     scatter = Scatter("The Pareto set: every point is a plan; a click shows it", points)
-    shows = [("The Pareto set; a click shows a plan", shown)]
+    shows = [(with_legend("The Pareto set; a click shows a plan", shown), shown)]
     return report_page(engine, builds, sentence, shows, scatter)
 
 

@@ -240,7 +240,7 @@
     const newest = structure.bricks[step.bricks - 1];
     const what = step.kind === "place" ? `Brick ${newest.name} is placed` : step.kind === "release" ? "A robot lets go" : "A robot takes a new grip";
     out.append(text("p", `${what}; ${step.bricks} of ${structure.bricks.length} bricks stand.` + (build.stands[s] ? ` It ${build.stands[s]}.` : "")));
-    if (build.marks[s]) out.append(text("p", `${build.marks[s][0].toUpperCase()}${build.marks[s].slice(1)}.`, "over"));
+    if (build.marks[s]) out.append(text("p", build.marks[s], "over"));
     const grips = document.createElement("table"), rows = document.createElement("table");
     grips.innerHTML = "<tr><th>robot</th><th>brick</th><th>node</th><th>force, N</th></tr>";
     structure.robots.forEach((robot, r) => {
