@@ -70,20 +70,17 @@ def report_page(
     >>> len(report_page(engine, [build], "Two robots take turns.")) > 5e5
     True
     """
-    assets = {part: _asset(name) for part, name in PARTS.items()}
     return _filled(
-        policy=_policy(assets["style"], [each for part, each in assets.items() if part != "style"]),
         title=f"{escape(engine.network.scene.name)}, step by step",
         sentence=escape(sentence),
         tables="".join(_table(caption, table) for caption, table in tables),
         data=_json(_data(engine, builds, scatter)),
-        **assets,
     )
 
 
-def _policy(style: str, scripts: Sequence[str]) -> str:
+def _policy(style: str, **scripts: str) -> str:
     """Return what a browser may run and load of the page: its own scripts and style, no other."""
-    own = " ".join(map(_hashed, scripts))
+    own = " ".join(map(_hashed, scripts.values()))
     return (
         f"default-src 'none'; script-src {own}; style-src {_hashed(style)}; img-src data: blob:; "
         "base-uri 'none'; form-action 'none'"
@@ -101,9 +98,10 @@ def _json(data: object) -> str:
 
 
 def _filled(**parts: str) -> str:
-    """Return the page with its parts in their places."""
+    """Return the page with its parts in their places, and the policy that lets its own run."""
+    own = {part: _asset(name) for part, name in PARTS.items()}
     page = _asset("page.html")
-    for name, content in parts.items():
+    for name, content in {"policy": _policy(**own), **parts, **own}.items():
         page = page.replace(f"<!-- {name} -->", content, 1)
     return page
 

@@ -115,21 +115,23 @@ def count_overloads(scene: Scene, builds: Sequence[Build]) -> str:
     return f"; in {count} of them a robot would hold more than its payload" if count else ""
 
 
-def in_units(name: str, value: float) -> str:
-    """Return a largest response with its unit.
+def worst_in_words(scene: Scene, table: pd.DataFrame) -> str:
+    """Return the largest responses of any step, each with its unit.
 
     Parameters
     ----------
-    name : str
-        One of `WORDS`.
-    value : float
-        As of `seqopt.report.comparison.largest`.
+    scene : Scene
+    table : pandas.DataFrame
+        Responses of the steps.
 
     Returns
     -------
     str
     """
-    return length_text(1e-6 * value) if name == "D_max" else f"{number_text(value)} {LARGEST[name]}"
+    values = largest(scene, table)
+    said = {name: f"{number_text(values[name])} {LARGEST[name]}" for name in WORDS}
+    said["D_max"] = length_text(1e-6 * values["D_max"])
+    return ", ".join(f"{word.split(',')[0]} {said[name]}" for name, word in WORDS.items())
 
 
 def with_legend(caption: str, table: pd.DataFrame) -> str:

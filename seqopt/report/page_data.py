@@ -255,7 +255,7 @@ def build_data(engine: Engine, build: Build, *, fields: bool = True) -> dict[str
 
 
 def _marks(scene: Scene, build: Build) -> list[str]:
-    """Return payloads that every step exceeds, and the linear range where it leaves it, in words."""
+    """Return payloads that every step exceeds, and the linear range that it leaves, in words."""
     over, out = build.overloads(scene), []
     for step in build.steps:
         said = [f"{each.robot} exceeds its payload" for each in over if step.number in each.steps]

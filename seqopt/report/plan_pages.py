@@ -9,18 +9,18 @@ import pandas as pd
 
 from seqopt.engines.interface import Engine
 from seqopt.errors import FileError, StepError
-from seqopt.report.comparison import CLOSED, Comparison, largest
+from seqopt.report.comparison import CLOSED, Comparison
 from seqopt.report.methods import method_tables
 from seqopt.report.page import report_page
 from seqopt.report.page_builds import (
     OVER,
     WORDS,
     count_overloads,
-    in_units,
     outside_in_words,
     overloads_in_words,
     shown_build,
     with_legend,
+    worst_in_words,
     worst_table,
 )
 from seqopt.report.page_data import Build, Scatter
@@ -76,10 +76,6 @@ def plan_page(  # a plan, what there is to say about it, and what is beside it
         shown_build(scene, key, each, within.departures(each), stands if key == name else ())
         for key, each in tables.items()
     ]
-    values = largest(scene, table)
-    worst = ", ".join(
-        f"{word.split(',')[0]} {in_units(key, values[key])}" for key, word in WORDS.items()
-    )
     robots = int(sum(table[f"{robot.name}_node"].notna().any() for robot in scene.robots))
     over = overloads_in_words(scene, builds[0])
     who = "1 robot" if robots == 1 else f"{robots} robots"
@@ -87,7 +83,7 @@ def plan_page(  # a plan, what there is to say about it, and what is beside it
     sentence = (
         f"{outside_in_words(builds[:1])}{who} {does} {scene.name} in {len(table):,} steps"
         f"{' like this: ' if over else ''}{over} ({name}: {said}). "
-        f"The largest of any step: {worst}."
+        f"The largest of any step: {worst_in_words(scene, table)}."
     )
     return report_page(engine, builds, sentence, [worst_table(scene, builds)])
 

@@ -155,7 +155,9 @@ class LinearRange:
         nodes = table[[f"{robot.name}_node" for robot in self._network.scene.robots]]
         held = (tuple(int(n) for n in row if pd.notna(n)) for row in nodes.to_numpy(object))
         keys = [*zip(map(int, table["bricks"]), held, strict=True)]
-        for bricks, grips in {*keys} - self._known.keys():
+        for bricks, grips in dict.fromkeys(keys):  # in order: engines grow with the build
+            if (bricks, grips) in self._known:
+                continue
             asked = np.array([grips], dtype=np.int64).reshape(1, -1)
             found = self._engine.solve(bricks, asked, Want.BRICKS | Want.JOINTS)
             self._known[bricks, grips] = self._of(found)
