@@ -29,7 +29,8 @@ from seqopt.cli.outputs import keep_apart
 from seqopt.cli.steps_arguments import asked_steps, steps_arguments
 from seqopt.files import csv_text, write_bytes, write_csv
 from seqopt.network.build import build_network
-from seqopt.responses.staged import Placing
+from seqopt.responses.linear_range import LinearRange
+from seqopt.responses.staged import Placing, staged_fields
 from seqopt.responses.table import archive, response_table
 
 DESCRIPTION = (
@@ -98,6 +99,9 @@ def run(options: argparse.Namespace) -> Answer:
     network = build_network(scene)
     engine, steps = asked_engine(options, network), asked_steps(scene, options)
     table = response_table(network, step_answers(options, engine, steps))
+    within = LinearRange(engine)
+    staged = None if options.staged is None else staged_fields(network, steps, options.staged)
+    outside = within.departures(table, staged)
     written = [path for path in (options.out, options.fields) if path is not None]
     if options.fields is not None:
         write_bytes(options.fields, archive(network, step_answers(options, engine, steps)))
@@ -108,9 +112,9 @@ def run(options: argparse.Namespace) -> Answer:
         text="" if options.out is None else _said(table, options.out),
         data=csv_text(table) if options.out is None else "",
         written=tuple(written),
-        notes=(*level_notes(engine), *idle_notes(scene, steps)),
+        notes=(*level_notes(engine), *within.unchecked, *idle_notes(scene, steps)),
     )
-    return strictly(answer, options, exceeded(scene, table))
+    return strictly(answer, options, exceeded(scene, table), outside)
 
 
 def _said(table: pd.DataFrame, path: Path) -> str:

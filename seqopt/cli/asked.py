@@ -9,6 +9,7 @@ from dataclasses import replace
 import pandas as pd
 
 from seqopt.cli.answer import Answer
+from seqopt.cli.layout import wrapped
 from seqopt.cli.status import Status
 from seqopt.contact.mortar import MORTARS
 from seqopt.engines.auto import AutoEngine
@@ -17,6 +18,7 @@ from seqopt.engines.registry import make_engine
 from seqopt.errors import ProblemError, SceneError
 from seqopt.network.network import Network
 from seqopt.placement.promises import overloads
+from seqopt.responses.linear_range import OUTSIDE, REMEDY
 from seqopt.responses.staged import staged_fields
 from seqopt.responses.table import step_fields
 from seqopt.scene.orders import in_order
@@ -139,7 +141,34 @@ def exceeded(scene: Scene, *tables: pd.DataFrame) -> tuple[str, ...]:
     return tuple(str(excess) for table in tables for excess in overloads(scene, table))
 
 
-def strictly(answer: Answer, options: argparse.Namespace, over: Sequence[str]) -> Answer:
+def marked(answer: Answer, outside: Sequence[object]) -> Answer:
+    """Return an answer that begins with how results leave the linear range, and what to do.
+
+    Parameters
+    ----------
+    answer : Answer
+    outside : sequence of Departure or str
+
+    Returns
+    -------
+    Answer
+    """
+    left = [str(departure) for departure in outside]
+    answer = replace(answer, facts={**answer.facts, "outside_linear_range": left})
+    if not left:
+        return answer
+    lines = (*(f"{OUTSIDE}: {each}" for each in left), REMEDY)
+    if not answer.text:
+        return replace(answer, notes=(*lines, *answer.notes))
+    return replace(answer, text="\n".join([*map(wrapped, lines), answer.text]))
+
+
+def strictly(
+    answer: Answer,
+    options: argparse.Namespace,
+    over: Sequence[str],
+    outside: Sequence[object] = (),
+) -> Answer:
     """Return an answer with the payloads that are exceeded, and the status of ``--strict``.
 
     Parameters
@@ -149,16 +178,20 @@ def strictly(answer: Answer, options: argparse.Namespace, over: Sequence[str]) -
         With ``strict``.
     over : sequence of str
         From `exceeded`.
+    outside : sequence of Departure or str, optional
+        How results leave the linear range.
 
     Returns
     -------
     Answer
     """
+    answer = marked(answer, outside)
     answer = replace(answer, facts={**answer.facts, "payloads_exceeded": list(over)})
-    if not options.strict or not over or answer.status is not Status.DONE:
+    wrong = {"payload exceeded": over, OUTSIDE: [*map(str, outside)]}
+    said = [f"seqopt: {name}: {'; '.join(each)}" for name, each in wrong.items() if each]
+    if not options.strict or not said or answer.status is not Status.DONE:
         return answer
-    said = f"seqopt: payload exceeded: {'; '.join(over)}"
-    return replace(answer, failures=(*answer.failures, said), status=Status.DOES_NOT_HOLD)
+    return replace(answer, failures=(*answer.failures, *said), status=Status.DOES_NOT_HOLD)
 
 
 def step_answers(

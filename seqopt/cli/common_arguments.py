@@ -112,7 +112,8 @@ def strict_argument(takes: Takes) -> None:
     takes.add_argument(
         "--strict",
         action="store_true",
-        help="end with exit status 1 if a robot would exceed its payload in a step",
+        help="end with exit status 1 if a robot would exceed its payload in a step, or results "
+        "leave the linear range",
     )
 
 

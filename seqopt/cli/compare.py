@@ -29,6 +29,7 @@ from seqopt.network.build import build_network
 from seqopt.report.comparison import Comparison, compare
 from seqopt.report.plan_pages import PAGE, comparison_page
 from seqopt.report.text import format_details
+from seqopt.responses.linear_range import builds_in_words
 
 DESCRIPTION = (
     "Build a scene in every way that seqopt knows, on paper: the fixed sequences, a loop of robots "
@@ -93,7 +94,7 @@ def run(options: argparse.Namespace) -> Answer:
     if options.details:
         blocks.append(format_details(result, scene))
     written: tuple[Path, ...] = ()
-    if options.out is not None and result.loop is not None:
+    if options.out is not None:
         options.tell("drawing figures")
         files = comparison_files(result)
         options.tell("writing the page")
@@ -110,7 +111,8 @@ def run(options: argparse.Namespace) -> Answer:
         written=written,
         notes=(*level_notes(engine), *(figure_notes() if written else ())),
     )
-    return strictly(answer, options, exceeded(scene, *result.tables.values()))
+    over = exceeded(scene, *result.tables.values())
+    return strictly(answer, options, over, builds_in_words(result.departures))
 
 
 def _where(folder: Path) -> str:

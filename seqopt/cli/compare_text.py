@@ -107,8 +107,9 @@ def _cells(comparison: Comparison, name: str, row: pd.Series[float]) -> Iterator
         value = float(row[response])
         said = f"{value:.1f}" if abs(value) < 1e6 else f"{value:.0e}"
         said += f" ({paper[response]:.1f})" if response in paper else ""
-        mark = "!" if response == "F_rob" and row["overloaded"] else " "
-        yield f"{said + (mark if response == 'F_rob' else ''):>{width}}"
+        if response == "F_rob":
+            said += "!" if row["overloaded"] else " "
+        yield f"{said + ('?' if response == 'D_max' and row['outside'] else ''):>{width}}"
 
 
 def printed_largest(comparison: Comparison, name: str) -> dict[str, float]:
@@ -143,6 +144,8 @@ def _about(comparison: Comparison) -> str:
     )
     if comparison.table["overloaded"].astype(bool).any():
         said += " !: a robot holds more than its payload."
+    if comparison.departures:
+        said += " ?: outside the linear range, not reliable."
     if comparison.printed is not None:
         said += " In brackets: what Bruun et al. print."
     if " +" in "".join(_responses(comparison)):

@@ -78,7 +78,7 @@ def optimize_free(options: argparse.Namespace) -> Answer:
         notes=idle_notes(scene, plan.steps),
         status=Status.INTERRUPTED if stopped else Status.DONE,
     )
-    return strictly(answer, options, over)
+    return strictly(answer, options, over, plan.departures)
 
 
 def _said(plan: FreePlan, options: argparse.Namespace) -> str:

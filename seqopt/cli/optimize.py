@@ -104,7 +104,7 @@ def _answer(
         failures=(INTERRUPTED,) if stopped else (),
         status=Status.INTERRUPTED if stopped else Status.DONE,
     )
-    return strictly(answer, options, over)
+    return strictly(answer, options, over, plan.departures)
 
 
 def _paper_count(schedule: Schedule) -> dict[str, int] | None:

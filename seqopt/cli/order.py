@@ -6,7 +6,7 @@ import argparse
 from math import isfinite
 
 from seqopt.cli.answer import Answer
-from seqopt.cli.asked import scene_file
+from seqopt.cli.asked import exceeded, scene_file, strictly
 from seqopt.cli.facts import scene_facts
 from seqopt.cli.free_files import free_files
 from seqopt.cli.layout import wrapped
@@ -73,17 +73,21 @@ def _answer(options: argparse.Namespace, found: OrderPlan, name: str) -> Answer:
     said = f"{name} {_said(found)}; {written_to(options.out)}"
     order = ", ".join(map(str, found.order))
     stopped = found.selection.stopped == "interrupt"
-    return Answer(
+    scene, table = found.plan.problem.network.scene, found.responses()
+    over = exceeded(scene, table)
+    lines = [said, wrapped(order, first="order: "), *(f"payload exceeded: {each}" for each in over)]
+    answer = Answer(
         facts={
-            "scene": scene_facts(found.plan.problem.network.scene),
+            "scene": scene_facts(scene),
             "order": found.order,
             "summary": found.summary(),
-            "plan": found.plan.responses(),
+            "plan": table,
         },
-        text="\n".join([said, wrapped(order, first="order: ")]),
+        text="\n".join(lines),
         written=(options.out,),
         status=Status.INTERRUPTED if stopped else Status.DONE,
     )
+    return strictly(answer, options, over, found.departures)
 
 
 def _said(found: OrderPlan) -> str:

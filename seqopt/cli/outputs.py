@@ -48,7 +48,7 @@ def comparison_files(result: Comparison) -> dict[str, bytes | str]:
     }
     if result.loop is not None and result.loop.ranks is not None:
         files["published_ranks.csv"] = result.loop.ranks.to_csv(index=False)
-    if figure_notes():
+    if figure_notes() or result.loop is None:
         return files
     from seqopt.report.charts import comparison_figures  # noqa: PLC0415  # matplotlib is an extra
     from seqopt.report.style import picture_files  # noqa: PLC0415

@@ -10,7 +10,7 @@ from pathlib import Path
 import pandas as pd
 
 from seqopt.cli.answer import Answer
-from seqopt.cli.asked import scene_file
+from seqopt.cli.asked import marked, scene_file
 from seqopt.cli.common_arguments import (
     Takes,
     engine_arguments,
@@ -34,6 +34,7 @@ from seqopt.placement.loop_front import LoopFront
 from seqopt.report.fronts import shown_table, worst_of
 from seqopt.report.methods import method_tables
 from seqopt.report.plan_pages import PAGE, front_page
+from seqopt.responses.linear_range import LinearRange, builds_in_words
 from seqopt.responses.table import analyze
 from seqopt.sequence.free_rules import FREE
 from seqopt.sequence.schedule_file import find_schedule
@@ -140,7 +141,7 @@ def run(options: argparse.Namespace) -> Answer:
     seconds = float(options.seconds)
     front = find_front(problem, seconds=seconds, progress=within(options.tell, seconds))
     methods = _methods(free.engine)
-    files = _front_files(front, free.engine, methods, options.tell)
+    files, left = _front_files(front, free.engine, methods, options.tell)
     said = f"{len(front.steps)} points, {'complete' if front.complete else 'not complete'}"
     picked = None
     if options.pick:
@@ -151,7 +152,7 @@ def run(options: argparse.Namespace) -> Answer:
         row = ", ".join(f"{name} {value:.6g}" for name, value in values.items())
         said += f"; picked row {chosen + 1}: {row}"
     write_outputs(options, files | scene_file(scene))
-    return Answer(
+    answer = Answer(
         facts={
             "scene": scene_facts(scene),
             "complete": front.complete,
@@ -163,6 +164,7 @@ def run(options: argparse.Namespace) -> Answer:
         written=(options.out,),
         notes=figure_notes(),
     )
+    return marked(answer, left)
 
 
 def _loop(
@@ -185,28 +187,35 @@ def _methods(engine: Engine) -> dict[str, pd.DataFrame]:
 
 def _front_files(
     front: Front, engine: Engine, methods: Mapping[str, pd.DataFrame], tell: Tell
-) -> dict[str, bytes | str]:
-    """Return table, plans, chart and summary of a Pareto set by file name."""
+) -> tuple[dict[str, bytes | str], tuple[str, ...]]:
+    """Return the files of a Pareto set by name, and which points leave the linear range."""
     known: dict[tuple[Step, ...], pd.DataFrame] = {}
     plans = []
     for number, steps in enumerate(told("analyzing plans", front.steps, tell), start=1):
         table = known.setdefault(steps, analyze(engine, steps))
         plans.append(table.assign(point=number))
     tell("drawing and writing the page")
+    within = LinearRange(engine)
+    departures = [within.departures(known[steps]) for steps in front.steps]
+    said = builds_in_words({f"point {k}": each for k, each in enumerate(departures, start=1)})
     summary = {
         "points": len(front.steps),
         "complete": front.complete,
         "seconds": dict(front.seconds),
+        "outside_linear_range": list(said),
     }
     numbered = shown_table(front.table)
     numbered.insert(0, "point", range(1, len(numbered) + 1))
+    if said:
+        numbered["outside_linear_range"] = ["yes" if each else "" for each in departures]
+    tables = [known[steps] for steps in front.steps]
     return {
-        PAGE: front_page(engine, shown_table(front.table), [known[steps] for steps in front.steps]),
+        PAGE: front_page(engine, shown_table(front.table), tables, departures),
         "pareto.csv": csv_text(numbered),
         "plans.csv": csv_text(pd.concat(plans, ignore_index=True)),
         **_picture(front, methods),
         "summary.json": json.dumps(summary, indent=2) + "\n",
-    }
+    }, said
 
 
 def _picture(front: Front, methods: Mapping[str, pd.DataFrame]) -> Mapping[str, bytes | str]:

@@ -97,7 +97,7 @@ def optimize_robust(options: argparse.Namespace) -> Answer:
         written=(options.out,),
         notes=(*level_notes(problem.engine), *idle_notes(scene, plan.steps)),
     )
-    return strictly(answer, options, exceeded(scene, table))
+    return strictly(answer, options, exceeded(scene, table), plan.departures)
 
 
 def _files(
@@ -173,6 +173,7 @@ def _report(trial: Trial, known: Scenarios, unseen: Scenarios) -> dict[str, obje
         "proven_by_weights": plan.proven,
         "gap": plan.gap,
         "worth": trial.summary(),
+        "outside_linear_range": [str(departure) for departure in plan.departures],
         "idle_robots": list(idle_robots(schedule.scene, plan.steps)),
         "models_evaluated": sum(costs.models for costs in plan.problem.costs),
     }

@@ -185,6 +185,7 @@ class FreePlan(ShownBuild):
             "steps_before_release": len(self.steps) - self._letting_go,
             "regrips": self.regrips,
             "idle_robots": list(idle_robots(problem.network.scene, self.steps)),
+            "outside_linear_range": [str(departure) for departure in self.departures],
             "payload_exceeded": [str(excess) for excess in self.overloads],
             "models_evaluated": problem.sets.solved,
             "states_in_proof": 0 if proof is None else proof.states,

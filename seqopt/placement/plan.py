@@ -258,8 +258,9 @@ class Plan(ShownBuild):
             ranks the sums under both ``objectives`` and of heuristics the two ``gap_parts`` (see
             `seqopt.placement.objectives`), null without proof; of every one of the ``budgets`` what
             is there, spent and what one more unit would save; whether it ``ended`` ``done``, was
-            ``stopped`` before that or ``interrupted``; the payloads that are exceeded;
-            ``idle_robots``, which never grip; ``models_evaluated`` and ``seconds``.
+            ``stopped`` before that or ``interrupted``; the limits of the linear range that are left
+            and the payloads that are exceeded; ``idle_robots``, which never grip;
+            ``models_evaluated`` and ``seconds``.
         """
         schedule, proof = self._posed.schedule, self.certificate
         status = "unproven"
@@ -286,6 +287,7 @@ class Plan(ShownBuild):
             "budgets": self._budgets(),
             "ended": self.selection.end.value,
             "idle_robots": list(idle_robots(schedule.scene, self.steps)),
+            "outside_linear_range": [str(departure) for departure in self.departures],
             "payload_exceeded": [str(excess) for excess in self.overloads],
             "models_evaluated": self.models,
             "seconds": dict(self.seconds),

@@ -11,13 +11,12 @@ import pandas as pd
 from seqopt.errors import InfeasibleError
 from seqopt.placement.problem import Problem
 from seqopt.placement.requirements import Limit, payload_limits
+from seqopt.responses.in_words import steps_in_words
 from seqopt.responses.quantities import RESPONSES, robot_response
 from seqopt.responses.table import analyze, force_column
 from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import OpenStep
 from seqopt.sequence.steps import Step
-
-LISTED = 12  # steps that are named one by one
 
 
 @dataclass(frozen=True)
@@ -41,10 +40,7 @@ class Excess:
     robot: str = ""
 
     def __str__(self) -> str:
-        listed = ", ".join(map(str, self.steps[:LISTED]))
-        if len(self.steps) > LISTED:
-            listed += f" and {len(self.steps) - LISTED} more"
-        where = f"step{'s' * (len(self.steps) > 1)} {listed}"
+        where = steps_in_words(self.steps)
         if self.robot:
             return (
                 f"{self.robot} holds up to {self.largest:.1f} N, more than its payload of "

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import pandas as pd
@@ -10,6 +11,7 @@ import pandas as pd
 from seqopt.contact.mortar import Mortar
 from seqopt.engines.interface import Engine
 from seqopt.responses.grips import grips_table
+from seqopt.responses.linear_range import Departure, LinearRange
 from seqopt.sequence.steps import Step
 from seqopt.showing import Page, Shown, display
 from seqopt.stability.steps import assess_steps, stability_table
@@ -48,6 +50,11 @@ class ShownBuild(Shown):
 
         def responses(self) -> pd.DataFrame:
             """Return the responses of every step, as `seqopt.analyze` makes them."""
+
+    @cached_property
+    def departures(self) -> tuple[Departure, ...]:
+        """The limits of the linear range that steps leave: there the responses mean nothing."""
+        return LinearRange(self.engine).departures(self.responses())
 
     def grips(self) -> pd.DataFrame:
         """Return every grip of the build, for as long as it lasts.

@@ -22,8 +22,10 @@ from seqopt.placement.requirements import Limit
 from seqopt.placement.robust_problem import RobustProblem
 from seqopt.placement.shown_build import ShownBuild
 from seqopt.report.comparison import largest
-from seqopt.report.plan_pages import WORDS
+from seqopt.report.page_builds import WORDS
 from seqopt.report.wording import typed
+from seqopt.responses.in_words import number_text
+from seqopt.responses.linear_range import OUTSIDE, REMEDY
 from seqopt.scene.boxes import boxes
 from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import Schedule
@@ -199,13 +201,15 @@ def _build(value: ShownBuild) -> tuple[str, Rows]:
     except ProblemError:  # costs alone were given
         return "Plan", {"": repr(value)}
     criterion = _criterion(value)
+    small = len(scene.bricks) <= SMALL
     rows: dict[str, object] = {
+        **(_outside(value) if small else {"linear range": "see departures: not computed here"}),
         "found by": typed(value.title),
         **({"criterion": criterion} if criterion else {}),
         "result": value.worth,
         "steps": len(value.steps),
     }
-    if len(scene.bricks) <= SMALL:
+    if small:
         rows |= _worst(value)
     if value.seconds:
         rows["time to find it, s"] = f"{sum(value.seconds.values()):.3g}"
@@ -220,10 +224,16 @@ def _criterion(value: ShownBuild) -> str:
     return "" if problem is None else str(problem.criterion.name)
 
 
+def _outside(value: ShownBuild) -> Rows:
+    """Return how responses leave the linear range, if they do."""
+    left = "; ".join(map(str, value.departures))
+    return {OUTSIDE: f"{left}. {REMEDY}"} if left else {}
+
+
 def _worst(value: ShownBuild) -> Rows:
     """Return the largest responses of any step."""
     found = largest(value.engine.network.scene, value.responses())
-    rows = {f"largest {WORDS[name]}": f"{found[name]:.4g}" for name in WORDS}
+    rows = {f"largest {WORDS[name]}": number_text(found[name]) for name in WORDS}
     grips = value.grips()
     row = grips.iloc[int(grips["largest_force_N"].argmax())]
     rows["at the largest grip force"] = (

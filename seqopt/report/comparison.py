@@ -24,6 +24,7 @@ from seqopt.placement.requirements import Criterion
 from seqopt.placement.solving import on_the_way, solve
 from seqopt.report.free_row import free_plan, free_row
 from seqopt.report.methods import idle_note, method_tables
+from seqopt.responses.linear_range import Departure, LinearRange
 from seqopt.responses.quantities import RESPONSES, robot_response
 from seqopt.responses.resources import Resources
 from seqopt.responses.table import force_column
@@ -49,6 +50,7 @@ COLUMNS = [
     *RANKS,
     *LARGEST,
     "overloaded",
+    "outside",
     "models",
     "seconds",
     "solve_seconds",
@@ -96,8 +98,8 @@ class Comparison(Terse):
         ranks the sums over ``pairs`` and ``conditional`` on the choice before, and of heuristics
         the two parts of the gap, ``short_sight`` and ``change_of_objective``; the largest
         ``F_rob`` [N], ``M_sup`` [N m], ``T_max`` [N] and ``D_max`` [1e-3 mm] of any step, whether a
-        robot is ``overloaded``, the distinct ``models`` it looks at, and the ``seconds`` that it
-        took on its own, ``solve_seconds`` of them to choose.
+        robot is ``overloaded`` and results are ``outside`` the linear range, how many ``models`` it
+        looks at, and the ``seconds`` that it took alone, ``solve_seconds`` of them to choose.
     tables : mapping of str to pandas.DataFrame
         Responses of every step, by row of ``table``.
     loop : LoopFacts or None
@@ -107,6 +109,8 @@ class Comparison(Terse):
         the paper's own numbers.
     refusal : str
         Why the scene has no loop of its robots; empty if it has.
+    departures : mapping of str to tuple of Departure
+        The limits of the linear range that builds leave, by row of ``table``.
     """
 
     maxima: pd.DataFrame
@@ -116,6 +120,7 @@ class Comparison(Terse):
     loop: LoopFacts | None
     notes: tuple[str, ...]
     refusal: str
+    departures: Mapping[str, tuple[Departure, ...]]
 
 
 def compare(
@@ -162,10 +167,12 @@ def compare(
     if problem is not None:
         notes += idle_note(scene, f"{problem.schedule.method} loop", problem.schedule.steps)
     notes += _add_largest(scene, rows, tables)
+    left = LinearRange(engine).of_builds(tables)
     notes += [f"In the paper: {text}" for text in IRREGULARITIES if printed is not None]
     table = pd.DataFrame.from_dict(rows, orient="index").reindex(columns=COLUMNS)
     table[RANKS] = table[RANKS].astype(float)
-    return Comparison(maxima, printed, table, tables, loop, tuple(notes), refusal)
+    table["outside"] = [name in left for name in table.index]
+    return Comparison(maxima, printed, table, tables, loop, tuple(notes), refusal, left)
 
 
 def _add_largest(
@@ -195,10 +202,7 @@ def _add_free(
 
 
 def _plans(
-    engine: Engine,
-    criterion: Criterion,
-    progress: Tell,
-    robots: Sequence[str],
+    engine: Engine, criterion: Criterion, progress: Tell, robots: Sequence[str]
 ) -> tuple[dict[str, Plan], Problem | None, str]:
     """Return the plan of the modified sequential method and of every formulation on the loop.
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+from base64 import b64encode
 from collections.abc import Sequence
+from hashlib import sha256
 from html import escape
 from importlib import resources
 
@@ -13,6 +15,7 @@ import pandas as pd
 from seqopt.engines.interface import Engine
 from seqopt.errors import ProblemError
 from seqopt.report.page_data import Build, Scatter, build_data, size_of, structure_data
+from seqopt.responses.in_words import number_text
 
 RESPONSES = {
     "F_largest": "largest grip force, N",
@@ -72,8 +75,21 @@ def report_page(
         sentence=escape(sentence),
         tables="".join(_table(caption, table) for caption, table in tables),
         data=_json(_data(engine, builds, scatter)),
-        **{part: _asset(name) for part, name in PARTS.items()},
     )
+
+
+def _policy(style: str, **scripts: str) -> str:
+    """Return what a browser may run and load of the page: its own scripts and style, no other."""
+    own = " ".join(map(_hashed, scripts.values()))
+    return (
+        f"default-src 'none'; script-src {own}; style-src {_hashed(style)}; img-src data: blob:; "
+        "base-uri 'none'; form-action 'none'"
+    )
+
+
+def _hashed(text: str) -> str:
+    """Return a part of the page as its policy names it."""
+    return f"'sha256-{b64encode(sha256(text.encode()).digest()).decode()}'"
 
 
 def _json(data: object) -> str:
@@ -82,9 +98,10 @@ def _json(data: object) -> str:
 
 
 def _filled(**parts: str) -> str:
-    """Return the page with its parts in their places."""
+    """Return the page with its parts in their places, and the policy that lets its own run."""
+    own = {part: _asset(name) for part, name in PARTS.items()}
     page = _asset("page.html")
-    for name, content in parts.items():
+    for name, content in {"policy": _policy(**own), **parts, **own}.items():
         page = page.replace(f"<!-- {name} -->", content, 1)
     return page
 
@@ -114,6 +131,6 @@ def _asset(name: str) -> str:
 def _table(caption: str, table: pd.DataFrame) -> str:
     """Return a table as HTML, numbers with four digits."""
     body = table.to_html(
-        index=False, border=0, na_rep="", float_format=lambda value: f"{value:.4g}", classes="wide"
-    )
+        index=False, border=0, na_rep="", float_format=number_text, classes="wide"
+    ).replace(' style="text-align: right;"', "")  # as the page does itself
     return f'<figure class="table"><figcaption>{escape(caption)}</figcaption>{body}</figure>'

@@ -18,6 +18,8 @@ from seqopt.arrays import Floats
 from seqopt.engines.interface import Engine, Want
 from seqopt.files import csv_text
 from seqopt.network.network import GROUND, Network, PartKind
+from seqopt.placement.promises import Excess, overloads
+from seqopt.responses.linear_range import OUTSIDE, Departure
 from seqopt.responses.table import force_column
 from seqopt.scene.blocks import vertices_of
 from seqopt.scene.boxes import boxes
@@ -46,6 +48,8 @@ class Build:
         Of every step, whether it stands; empty where that was not asked.
     bounds : mapping of str to float, optional
         Limits by column of the table, or ``F_largest``; drawn beside the responses.
+    departures : sequence of Departure, optional
+        The limits of the linear range that steps leave.
     """
 
     name: str
@@ -53,6 +57,20 @@ class Build:
     table: pd.DataFrame
     stands: Sequence[str] = ()
     bounds: Mapping[str, float] = field(default_factory=dict)
+    departures: Sequence[Departure] = ()
+
+    def overloads(self, scene: Scene) -> tuple[Excess, ...]:
+        """Return the payloads that steps exceed.
+
+        Parameters
+        ----------
+        scene : Scene
+
+        Returns
+        -------
+        tuple of Excess
+        """
+        return overloads(scene, self.table)
 
 
 @dataclass(frozen=True, eq=False)
@@ -209,9 +227,9 @@ def build_data(engine: Engine, build: Build, *, fields: bool = True) -> dict[str
     dict
         ``name`` and ``bounds``; ``steps`` with number, kind, bricks and the node that each robot
         holds; ``columns`` and ``rows`` of the table of responses, as text, ``forces`` the columns
-        of the robots, and whether each step ``stands``; packed fields ``twist``, ``edge``,
-        ``push`` and ``turn`` (force and moment of every ground end) with the ``scale`` of each
-        step, or None.
+        of the robots; whether each step ``stands``, and as ``marks`` what is wrong with it; packed
+        fields ``twist``, ``edge``, ``push`` and ``turn`` (force and moment of every ground end)
+        with the ``scale`` of each step, or None.
     """
     lines = [line.split(",") for line in csv_text(build.table).splitlines()]
     found = _fields(engine, build) if fields else dict.fromkeys(FIELDS)
@@ -219,6 +237,7 @@ def build_data(engine: Engine, build: Build, *, fields: bool = True) -> dict[str
         "name": build.name,
         "bounds": dict(build.bounds),
         "stands": list(build.stands),
+        "marks": _marks(engine.network.scene, build),
         "steps": [
             {
                 "number": step.number,
@@ -233,6 +252,16 @@ def build_data(engine: Engine, build: Build, *, fields: bool = True) -> dict[str
         "forces": [force_column(robot) for robot in engine.network.scene.robots],
         **{name: None if part is None else _packed(part) for name, part in found.items()},
     }
+
+
+def _marks(scene: Scene, build: Build) -> list[str]:
+    """Return payloads that every step exceeds, and the linear range that it leaves, in words."""
+    over, out = build.overloads(scene), []
+    for step in build.steps:
+        said = [f"{each.robot} exceeds its payload" for each in over if step.number in each.steps]
+        left = [each.what for each in build.departures if step.number in each.steps]
+        out.append("; ".join(said + ([f"{OUTSIDE}: {', '.join(left)}"] if left else [])))
+    return out
 
 
 def _fields(engine: Engine, build: Build) -> dict[str, Floats]:

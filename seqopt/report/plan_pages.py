@@ -9,23 +9,29 @@ import pandas as pd
 
 from seqopt.engines.interface import Engine
 from seqopt.errors import FileError, StepError
-from seqopt.files import csv_text
-from seqopt.report.comparison import LARGEST, Comparison, largest
+from seqopt.report.comparison import CLOSED, Comparison
 from seqopt.report.methods import method_tables
 from seqopt.report.page import report_page
+from seqopt.report.page_builds import (
+    OVER,
+    WORDS,
+    count_overloads,
+    outside_in_words,
+    overloads_in_words,
+    shown_build,
+    with_legend,
+    worst_in_words,
+    worst_table,
+)
 from seqopt.report.page_data import Build, Scatter
+from seqopt.responses.linear_range import OUTSIDE, Departure, LinearRange
 from seqopt.responses.table import analyze
-from seqopt.scene.scene import Scene
-from seqopt.sequence.plan_file import parse_plan, read_plan
+from seqopt.sequence.free_rules import FREE
+from seqopt.sequence.plan_file import read_plan
 
 PAGE = "report.html"
-WORDS = {
-    "F_rob": "grip force, N",
-    "M_sup": "support moment, N m",
-    "T_max": "tension, N",
-    "D_max": "displacement, 1e-3 mm",
-}  # as of seqopt.report.comparison.LARGEST
 FORCES = {"F_largest": "F_rob"}  # another name for the same
+FIRST = (CLOSED, FREE)  # of a comparison: its other rows may be more than are seen at once
 PLANS = ("plan.csv", "pick.csv", "steps_*.csv")  # of optimize, pareto and compare
 SMALL = 60  # bricks up to which a plan is shown beside the fixed methods
 
@@ -61,25 +67,25 @@ def plan_page(  # a plan, what there is to say about it, and what is beside it
     -------
     str
     """
-    scene = engine.network.scene
+    scene, within = engine.network.scene, LinearRange(engine)
     tables = {name: table, **(others or {})}
     if len(scene.bricks) <= SMALL:
         methods = _methods(engine)
         tables |= {key: each for key, each in methods.items() if key not in tables}
     builds = [
-        _build(scene, key, each, stands if key == name else ()) for key, each in tables.items()
+        shown_build(scene, key, each, within.departures(each), stands if key == name else ())
+        for key, each in tables.items()
     ]
-    values = largest(scene, table)
-    worst = ", ".join(
-        f"{word.split(',')[0]} {values[key]:.4g} {LARGEST[key]}" for key, word in WORDS.items()
-    )
     robots = int(sum(table[f"{robot.name}_node"].notna().any() for robot in scene.robots))
-    who = "1 robot builds" if robots == 1 else f"{robots} robots build"
+    over = overloads_in_words(scene, builds[0])
+    who = "1 robot" if robots == 1 else f"{robots} robots"
+    does = "cannot build" if over else "builds" if robots == 1 else "build"
     sentence = (
-        f"{who} {scene.name} in {len(table)} steps ({name}: {said}). "
-        f"The largest of any step: {worst}."
+        f"{outside_in_words(builds[:1])}{who} {does} {scene.name} in {len(table):,} steps"
+        f"{' like this: ' if over else ''}{over} ({name}: {said}). "
+        f"The largest of any step: {worst_in_words(scene, table)}."
     )
-    return report_page(engine, builds, sentence, [("Largest responses", _worst(scene, tables))])
+    return report_page(engine, builds, sentence, [worst_table(scene, builds)])
 
 
 def comparison_page(engine: Engine, result: Comparison) -> str:
@@ -95,16 +101,24 @@ def comparison_page(engine: Engine, result: Comparison) -> str:
     str
     """
     scene = engine.network.scene
-    builds = [_build(scene, name, table) for name, table in result.tables.items()]
-    columns = ["problem", "objective", "gap", *WORDS, "overloaded", "models", "seconds"]
-    shown = result.table[columns].rename(columns=WORDS)
-    shown["overloaded"] = shown["overloaded"].map({True: "yes", False: ""})
+    builds = [
+        shown_build(scene, name, table, result.departures.get(name, ()))
+        for name, table in result.tables.items()
+    ]
+    marks = {"overloaded": OVER, "outside": OUTSIDE}
+    marks = {name: said for name, said in marks.items() if result.table[name].any()}
+    columns = ["problem", "objective", "gap", *WORDS, *marks, "models", "seconds"]
+    shown = result.table[columns].replace({True: "yes", False: ""}).rename(columns=WORDS | marks)
+    shown = shown.sort_values("problem", key=lambda each: ~each.isin(FIRST), kind="stable")
     shown = shown.rename_axis("method or formulation").reset_index()
-    tables = [("Methods and formulations; a click shows the build", shown)]
+    tables = [(with_legend("Methods and formulations; a click shows the build", shown), shown)]
     if result.printed is not None:
         printed = result.printed.add_suffix(", printed").rename_axis("largest").reset_index()
         tables.append(("What the paper prints", printed))
-    sentence = f"{len(builds)} ways to build {scene.name}, step by step and side by side."
+    sentence = (
+        f"{outside_in_words(builds)}{len(builds)} ways to build {scene.name}, step by step and "
+        f"side by side{count_overloads(scene, builds)}."
+    )
     return report_page(engine, builds, sentence, tables, _speed_and_accuracy(result))
 
 
@@ -126,9 +140,11 @@ def folder_page(engine: Engine, folder: Path) -> str:
         If there are no plans in it, or they are not for the engine's scene.
     """
     scene, builds = engine.network.scene, folder_builds(engine, folder)
-    tables = {build.name: build.table for build in builds}
-    sentence = f"{scene.name}, built in {len(builds)} way{'s' * (len(builds) > 1)}, step by step."
-    return report_page(engine, builds, sentence, [("Largest responses", _worst(scene, tables))])
+    sentence = (
+        f"{outside_in_words(builds)}{scene.name}, built in {len(builds)} "
+        f"way{'s' * (len(builds) > 1)}, step by step{count_overloads(scene, builds)}."
+    )
+    return report_page(engine, builds, sentence, [worst_table(scene, builds)])
 
 
 def folder_builds(engine: Engine, folder: Path) -> list[Build]:
@@ -156,10 +172,19 @@ def folder_builds(engine: Engine, folder: Path) -> list[Build]:
             "compare has written"
         )
     plans = {path.stem.removeprefix("steps_"): read_plan(scene, path) for path in paths}
-    return [Build(name, steps, analyze(engine, steps)) for name, steps in plans.items()]
+    within = LinearRange(engine)
+    tables = {name: analyze(engine, steps) for name, steps in plans.items()}
+    return [
+        shown_build(scene, name, table, within.departures(table)) for name, table in tables.items()
+    ]
 
 
-def front_page(engine: Engine, table: pd.DataFrame, plans: Sequence[pd.DataFrame]) -> str:
+def front_page(
+    engine: Engine,
+    table: pd.DataFrame,
+    plans: Sequence[pd.DataFrame],
+    departures: Sequence[Sequence[Departure]],
+) -> str:
     """Return the page of a Pareto set.
 
     Parameters
@@ -169,6 +194,8 @@ def front_page(engine: Engine, table: pd.DataFrame, plans: Sequence[pd.DataFrame
         A row per point.
     plans : sequence of pandas.DataFrame
         Responses of the steps of each.
+    departures : sequence of sequence of Departure
+        The limits of the linear range that each leaves.
 
     Returns
     -------
@@ -176,14 +203,20 @@ def front_page(engine: Engine, table: pd.DataFrame, plans: Sequence[pd.DataFrame
     """
     scene = engine.network.scene
     names = [f"point {number}" for number in range(1, len(plans) + 1)]
-    builds = [_build(scene, name, plan) for name, plan in zip(names, plans, strict=True)]
+    builds = [
+        shown_build(scene, name, plan, left)
+        for name, plan, left in zip(names, plans, departures, strict=True)
+    ]
     points = _in_words(table).set_axis(names)
     shown = points.rename_axis("plan").reset_index()
+    if any(departures):
+        shown[OUTSIDE] = ["yes" if left else "" for left in departures]
     sentence = (
-        f"{len(plans)} plans for {scene.name}, none of which is better than another in everything."
+        f"{outside_in_words(builds)}{len(plans)} plans for {scene.name}, none of which is better "
+        f"than another in everything{count_overloads(scene, builds)}."
     )
     scatter = Scatter("The Pareto set: every point is a plan; a click shows it", points)
-    shows = [("The Pareto set; a click shows a plan", shown)]
+    shows = [(with_legend("The Pareto set; a click shows a plan", shown), shown)]
     return report_page(engine, builds, sentence, shows, scatter)
 
 
@@ -205,20 +238,8 @@ def _in_words(table: pd.DataFrame) -> pd.DataFrame:
     return shown.assign(**{name: 1e6 * shown[name] for name in lengths})
 
 
-def _build(scene: Scene, name: str, table: pd.DataFrame, stands: Sequence[str] = ()) -> Build:
-    return Build(name, parse_plan(scene, csv_text(table), name), table, stands)
-
-
 def _methods(engine: Engine) -> dict[str, pd.DataFrame]:
     try:
         return method_tables(engine)[0]
     except StepError:
         return {}
-
-
-def _worst(scene: Scene, tables: Tables) -> pd.DataFrame:
-    """Return the largest responses of builds, a row each."""
-    rows = {name: largest(scene, table) for name, table in tables.items()}
-    found = pd.DataFrame.from_dict(rows, orient="index")
-    found.insert(0, "steps", [len(table) for table in tables.values()])
-    return found.rename(columns=WORDS).rename_axis("build").reset_index()

@@ -56,10 +56,13 @@ def test_compare_of_another_scene_shows_no_study(capsys, tmp_path):
 def test_compare_says_what_is_not_possible(capsys, tmp_path):
     path = tmp_path / "short.json"
     save_scene(replace(from_both_ends(3), robots=anywhere(3)), path)
-    status, out, _ = run(capsys, "compare", str(path))
+    folder = tmp_path / "out"
+    status, out, _ = run(capsys, "compare", str(path), "--out", str(folder))
     assert status == 0
     assert "cantilever" in out
     assert "Loop of robots: not possible here; " in out
+    assert "<td>cantilever</td>" in (folder / "report.html").read_text("utf-8")
+    assert "cantilever" in (folder / "comparison.csv").read_text("utf-8")
     path = scene_file(capsys, tmp_path, lambda d: d.update(robots=d["robots"][:1]))
     status, _, err = run(capsys, "compare", str(path))
     assert (status, err.count("\n")) == (2, 1)

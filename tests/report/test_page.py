@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import gzip
+import hashlib
 import json
 import re
 from dataclasses import replace
@@ -18,8 +19,11 @@ from seqopt.errors import ProblemError
 from seqopt.files import csv_text
 from seqopt.network.build import build_network
 from seqopt.report import page
+from seqopt.report.comparison import compare
 from seqopt.report.page import report_page
+from seqopt.report.page_builds import OVER
 from seqopt.report.page_data import LARGEST, Build, Scatter, build_data, structure_data
+from seqopt.report.plan_pages import comparison_page, plan_page
 from seqopt.responses.table import analyze
 from seqopt.scene.blocks import block_brick
 from seqopt.scene.face_joints import face_ground, flat_face
@@ -27,6 +31,8 @@ from seqopt.scene.library.law import MASONRY
 from seqopt.scene.parts import Robot
 from seqopt.scene.scene import Scene
 from seqopt.sequence.two_robots import cantilever, sequential
+from seqopt.study.presets import CRITERIA
+from seqopt.workflow import optimize
 from tests.blocks import L_SHAPE, prism
 from tests.browser import BROWSER, browsed
 
@@ -196,6 +202,88 @@ def test_a_browser_shows_the_numbers_of_the_step_that_is_asked_for(
     assert 'data-ready="true"' not in shown(path)[0]  # the control
 
 
+def tables_of(text):
+    """Return the rows of the tables of a page, a list of cells each."""
+    rows = re.findall(r"<tr.*?</tr>", text.split('id="data"')[0], re.S)
+    return [re.findall(r"<t[hd][^>]*>(.*?)</t", row) for row in rows]
+
+
+def test_what_robots_cannot_carry_is_said_first_in_the_table_and_at_the_step(engine25, builds):
+    table = builds["sequential"].table.copy()
+    table.loc[[3, 8], "F_rob1_N"] = [1565.0, 400.0]
+    text = plan_page(engine25, "cascade", table, "objective 1, gap 0 %")
+    sentence = re.search('<p id="sentence">(.*?)</p>', text)[1]
+    assert sentence.startswith("2 robots cannot build arch25 in 49 steps like this: in 3 of 49 a ")
+    assert "up to 1,565 N where rob1 can hold 392.4 N (cascade: " in sentence
+    assert "a robot would hold more than it can. Such steps are marked in red<" in text
+    rows = tables_of(text)
+    at = rows[0].index(OVER)
+    assert {row[0]: row[at] for row in rows[1:]}["cascade"] == "3 steps"
+    marks = data_of(text)["builds"][0]["marks"]
+    assert [k for k, said in enumerate(marks) if said] == [3, 8, 46]
+    assert marks[3] == "rob1 exceeds its payload"
+    assert data_of(text)["builds"][0]["bounds"] == {"F_largest": 392.4}
+
+
+def test_what_robots_carry_is_not_said_to_be_too_much(arch25):
+    plan = optimize(arch25, "free")
+    text = plan_page(plan.engine, "free schedule", plan.responses(), plan.worth)
+    assert '<p id="sentence">3 robots build arch25 in ' in text
+    assert not any(data_of(text)["builds"][0]["marks"])
+
+
+def test_large_numbers_are_readable(engine25, builds):
+    table = builds["sequential"].table.copy()
+    table.loc[3, "D_max_1e-3mm"] = 1.163e5
+    text = plan_page(engine25, "cascade", table, "").split('id="data"')[0]
+    assert "displacement 116.3 mm" in text
+    assert "116,300" in text
+    assert "e+0" not in text
+
+
+@pytest.mark.slow
+def test_the_free_schedule_is_seen_in_the_table_of_a_comparison(engine25):
+    """Of all formulations it would be the last row, below what is seen at once."""
+    text = comparison_page(engine25, compare(engine25, CRITERIA["equations-2-3"]))
+    assert [row[0] for row in tables_of(text)[:4]][1:] == ["sequential", "cantilever", "free"]
+
+
+def unguarded(text):
+    """Return a page without its policy, so that a test can add a script."""
+    changed = re.sub('<meta http-equiv="Content-Security-Policy"[^>]*>', "", text)
+    assert changed != text
+    return changed
+
+
+def test_the_policy_names_every_script_and_style_and_nothing_else(engine25, builds):
+    text = report_page(engine25, [builds["sequential"]], "")
+    policy = re.search('Content-Security-Policy" content="([^"]*)"', text)[1]
+    assert "default-src 'none'" in policy
+    assert "unsafe" not in policy
+    parts = re.findall(r"<(?:script|style)>(.*?)</(?:script|style)>", text, re.S)
+    own = {base64.b64encode(hashlib.sha256(part.encode()).digest()).decode() for part in parts}
+    assert own == set(re.findall("'sha256-([^']*)'", policy))
+    assert len(own) == 4
+    assert text.index("Content-Security-Policy") < text.index("<style>")
+    assert not re.search(
+        r"<[^>]* (style|on\w+)=", re.sub(r"<script.*?</script>", "", text, flags=re.S)
+    )
+
+
+@pytest.mark.slow
+@browser
+def test_a_browser_runs_no_script_that_is_not_the_pages_own(engine25, builds, shown, tmp_path):
+    path = tmp_path / "report.html"
+    text = report_page(engine25, [builds["sequential"]], "")
+    wrong = "<script>document.body.dataset.wrong = 1</script>"
+    wrong += "<img src='data:,' onerror='document.body.dataset.wrong = 2'></body>"
+    for page_text, runs in ((text, False), (unguarded(text), True)):  # the control
+        path.write_text(page_text.replace("</body>", wrong), "utf-8")
+        found, _ = shown(path)
+        assert 'data-ready="true"' in found
+        assert ('data-wrong="' in found) == runs
+
+
 LOOK = """<script>
 const light = (color) => {
   const [r, g, b] = color.match(/[\\d.]+/g).slice(0, 3).map((v) => v / 255)
@@ -235,6 +323,7 @@ def test_a_point_shows_its_build_and_words_stand_out(engine25, builds, shown, tm
     scatter = Scatter("both", points)
     text = report_page(engine25, list(builds.values()), "Two ways.", (), scatter)
     path, pale = tmp_path / "report.html", tmp_path / "pale.html"
+    text = unguarded(text)
     path.write_text(text.replace("</body>", f"{LOOK}</body>"), "utf-8")
     found, errors = shown(path, "step=12&build=sequential")
     assert errors == []

@@ -15,7 +15,7 @@ function makeCharts(page) {
     const box = document.createElement("div");
     box.className = "chart";
     const svg = draw("svg", { viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": title }, box);
-    draw("text", { x: left, y: 13, style: "font-weight:600" }, svg, title);
+    draw("text", { x: left, y: 13, class: "title" }, svg, title);
     const x = (s) => left + ((s + 0.5) * (width - left - 10)) / steps;
     const cursor = draw("line", { class: "cursor", y1: 18, y2: height - 18 }, svg);
     cursors.push((s) => { const at = x(Math.min(s, steps - 1)); cursor.setAttribute("x1", at); cursor.setAttribute("x2", at); });
@@ -30,7 +30,7 @@ function makeCharts(page) {
   }
   function gantt(build) {
     const steps = build.steps.length, rows = structure.robots.length, width = 1180, height = 40 + 26 * rows, left = 70;
-    const { box, svg, x, cursor } = frame(`${build.name}: which brick each robot holds; darker where it carries more; a white dot where it places the brick`, width, height, left, steps);
+    const { box, svg, x, cursor } = frame(`${build.name}: which brick each robot holds; darker where it carries more; a white dot where it places the brick${build.marks.some(Boolean) ? "; red below: over payload or outside the linear range" : ""}`, width, height, left, steps);
     const most = Math.max(1e-30, ...build.steps.flatMap((_, s) => build.forces.map((name) => Math.abs(number(build, s, name) || 0))));
     structure.robots.forEach((robot, r) => {
       const y = 22 + 26 * r;
@@ -59,6 +59,9 @@ function makeCharts(page) {
         }
         s = end + 1;
       }
+    });
+    build.marks.forEach((mark, k) => {
+      if (mark) draw("title", {}, draw("rect", { class: "marked", x: x(k - 0.5), y: height - 17, width: x(1) - x(0) + 0.3, height: 4 }, svg), mark);
     });
     svg.append(cursor);
     box.classList.add("wide");
@@ -150,7 +153,7 @@ function makeCharts(page) {
       const box = document.createElement("div");
       box.className = "chart";
       const svg = draw("svg", { viewBox: `0 0 ${width} ${height}`, role: "group", "aria-label": data.title }, box);
-      draw("text", { x: left, y: 14, style: "font-weight:600" }, svg, data.title);
+      draw("text", { x: left, y: 14, class: "title" }, svg, data.title);
       const [across, up] = axes.map((select) => select.value);
       const x = axis(data, across, up, left, width - 20), y = axis(data, up, across, bottom, 26);
       draw("line", { class: "axis", x1: left, x2: width - 20, y1: bottom, y2: bottom }, svg);

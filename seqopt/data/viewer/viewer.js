@@ -144,6 +144,8 @@
     show(build, at, options) {
       const s = Math.min(at, build.steps.length - 1), step = build.steps[s], p = [0, 0, 0];
       this.tag.textContent = `${build.name}: step ${step.number}, ${KINDS[step.kind] || step.kind}`;
+      this.tag.classList.toggle("over", build.marks[s] !== "");
+      if (build.marks[s]) this.tag.append(`; ${build.marks[s]}`);
       this.canvas.setAttribute("aria-label", `${structure.name}, ${this.tag.textContent}, ${step.bricks} bricks`);
       this.bricks.forEach(({ brick, mesh, outline, places, rims }, i) => {
         mesh.visible = outline.visible = i < step.bricks;
@@ -238,6 +240,7 @@
     const newest = structure.bricks[step.bricks - 1];
     const what = step.kind === "place" ? `Brick ${newest.name} is placed` : step.kind === "release" ? "A robot lets go" : "A robot takes a new grip";
     out.append(text("p", `${what}; ${step.bricks} of ${structure.bricks.length} bricks stand.` + (build.stands[s] ? ` It ${build.stands[s]}.` : "")));
+    if (build.marks[s]) out.append(text("p", build.marks[s], "over"));
     const grips = document.createElement("table"), rows = document.createElement("table");
     grips.innerHTML = "<tr><th>robot</th><th>brick</th><th>node</th><th>force, N</th></tr>";
     structure.robots.forEach((robot, r) => {

@@ -1,0 +1,234 @@
+"""Results outside the range of small displacements and elastic joints are never passed over."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from seqopt.cli.main import main
+from seqopt.engines.interface import Want
+from seqopt.engines.registry import make_engine
+from seqopt.network.build import build_network
+from seqopt.report.cards import card
+from seqopt.responses.linear_range import STRAIN, LinearRange
+from seqopt.responses.staged import staged_fields
+from seqopt.responses.table import analyze, response_table
+from seqopt.scene.library.by_words import scene_by_words
+from seqopt.scene.scene_file import save_scene
+from seqopt.sequence.two_robots import cantilever, sequential
+from seqopt.study.published import published_plan
+from seqopt.workflow import optimize
+from tests.builders import small_arch
+
+WORDS = "arch:span=3,rise=1.2,bricks=21,density=2000,dimensions=0.18x0.1x0.06"
+
+
+def changed(scene, stiffness=1.0, density=1.0, **joint):
+    """Return a scene with other joints and bricks."""
+
+    def spring(value):
+        both = {
+            name: tuple(stiffness * k for k in getattr(value, name))
+            for name in ("translational_stiffness", "rotational_stiffness")
+        }
+        return replace(value, **both, **joint)
+
+    return replace(
+        scene,
+        bricks=tuple(replace(brick, density=density * brick.density) for brick in scene.bricks),
+        joints=tuple(map(spring, scene.joints)),
+        grounds=tuple(map(spring, scene.grounds)),
+    )
+
+
+def found(scene, method=sequential, engine="compliance"):
+    made = make_engine(engine, build_network(scene))
+    left = LinearRange(made).departures(analyze(made, method(made.network)))
+    return {each.what: each for each in left}
+
+
+@pytest.fixture
+def soft(arch25):
+    """The reference arch on joints so soft that it would sag by half a brick."""
+    return changed(arch25, stiffness=1 / 100)
+
+
+@pytest.mark.parametrize(
+    "engine", ["compliance", "auto", pytest.param("frame", marks=pytest.mark.slow)]
+)
+def test_the_plans_of_the_reference_arch_are_within(arch25, engine):
+    made = make_engine(engine, build_network(arch25))
+    within = LinearRange(made)
+    for steps in (sequential(made.network), cantilever(made.network), published_plan(arch25)):
+        assert within.departures(analyze(made, steps)) == ()
+    assert within.unchecked == ()
+
+
+def test_every_limit_is_told_from_the_others(arch25, soft):
+    moved = found(soft)["displacement"]
+    assert moved.said == "30.59 mm, more than 5.3 mm, a tenth of the smallest side of a brick"
+    assert 47 in moved.steps
+    assert 1 not in moved.steps
+    assert {*found(changed(arch25, density=20.0))} == {"displacement", "stress in a joint"}
+    thin = changed(arch25, thickness=1e-7, face=None)
+    assert found(thin)["deformation of a joint"].said.endswith(f"more than {STRAIN:g} times")
+    assert "rotation" in found(changed(arch25, stiffness=1 / 1000))
+
+
+def test_bricks_that_turn_about_their_own_axis_are_seen(arch25):
+    """No node moves far where a brick turns about the line of its nodes."""
+    made = make_engine("compliance", build_network(arch25))
+    table = analyze(made, sequential(made.network)).iloc[:1]
+    fields = made.solve(1, np.array([[int(table["rob1_node"][0])]]), Want.ALL)
+    fields.brick_twist.flags.writeable = False
+    turned = np.array(fields.brick_twist)
+    turned[0, 0, 3:] = 0.2
+    (left,) = LinearRange(made).departures(table, [replace(fields, brick_twist=turned)])
+    assert (left.what, left.steps) == ("rotation", (1,))
+
+
+@pytest.mark.parametrize("engine", ["auto", "discrete"])
+def test_engines_whose_joints_break_are_asked_for_displacements_alone(arch25, engine):
+    heavy = changed(arch25, density=20.0)
+    made = make_engine(engine, build_network(heavy))
+    table = analyze(made, sequential(made.network)[:3])
+    table.loc[1, "D_max_1e-3mm"] = 6e3
+    (left,) = LinearRange(made).departures(table)
+    assert (left.what, left.steps) == ("displacement", (2,))
+
+
+def test_what_is_not_a_number_is_not_within(arch25):
+    made = make_engine("compliance", build_network(arch25))
+    table = analyze(made, sequential(made.network))
+    table.loc[4, "D_max_1e-3mm"] = np.nan
+    assert [each.steps for each in LinearRange(made).departures(table)] == [(5,)]
+
+
+def test_staged_builds_are_judged_by_what_they_lock_in(soft):
+    made = make_engine("compliance", build_network(soft))
+    steps = sequential(made.network)
+    fields = list(staged_fields(made.network, steps))
+    table = response_table(made.network, zip(steps, fields, strict=True))
+    own = {each.what: each.steps for each in LinearRange(made).departures(table, fields)}
+    scratch = {each.what: each.steps for each in LinearRange(made).departures(table)}
+    assert own["displacement"] == scratch["displacement"]
+    turns = np.array([np.abs(each.brick_twist[0, :, 3:]).max(initial=0.0) for each in fields])
+    assert ("rotation" in own) == bool((turns > 0.1).any())
+
+
+def moved(scene, network, twist):
+    """Return a scene in the shape that it has under load."""
+    index = {brick.name: i for i, brick in enumerate(scene.placed)}
+
+    def shifted(point, i):
+        arm = np.asarray(point) - network.centroid[i]
+        return np.asarray(point) + twist[i, :3] + np.cross(twist[i, 3:], arm)
+
+    def turned(vector, i):
+        return tuple(Rotation.from_rotvec(twist[i, 3:]).apply(vector))
+
+    bricks = [
+        replace(
+            brick,
+            position=tuple(shifted(brick.position, i)),
+            length_axis=turned(brick.length_axis, i),
+            width_axis=turned(brick.width_axis, i),
+        )
+        for brick in scene.bricks
+        for i in [index[brick.name]]
+    ]
+    joints = []
+    for joint in scene.joints:
+        i, k = (index[name] for name in joint.bricks)
+        middle = (shifted(joint.position, i) + shifted(joint.position, k)) / 2
+        axes = {name: turned(getattr(joint, name), i) for name in ("along", "across")}
+        joints.append(replace(joint, position=tuple(middle), **axes))
+    return replace(scene, bricks=tuple(bricks), joints=tuple(joints))
+
+
+def reached(engine, steps):
+    """Return the largest displacement of every step, and the motions of its bricks."""
+    for step in steps:
+        grips = np.array([step.held], dtype=int).reshape(1, -1)
+        fields = engine.solve(step.bricks, grips, Want.ALL)
+        twist = np.zeros((len(engine.network.inner), 6))
+        twist[: step.bricks] = fields.brick_twist[0]
+        yield np.linalg.norm(fields.displacement[0], axis=1).max(), twist
+
+
+@pytest.mark.parametrize("share", [0.2, 1.0, 5.0])
+def test_at_the_limit_the_displaced_shape_changes_displacements_by_a_tenth(share):
+    """What an analysis of second order would add grows with the displacement, as it should."""
+    scene, limit = scene_by_words(WORDS), 0.1 * 0.06
+    engine = make_engine("compliance", build_network(scene))
+    steps = sequential(engine.network)
+    most = max(shift for shift, _ in reached(engine, steps))
+    loaded = changed(scene, density=share * limit / most)
+    engine = make_engine("compliance", build_network(loaded))
+    changes = []
+    for step, (shift, twist) in zip(steps, reached(engine, steps), strict=True):
+        if shift > 0.5 * share * limit:
+            again = make_engine("compliance", build_network(moved(loaded, engine.network, twist)))
+            ((other, _),) = reached(again, [step])
+            changes.append(abs(other / shift - 1))
+    assert 0.05 * share < max(changes) < 0.1 * share
+
+
+@pytest.mark.slow
+def test_plans_say_it_wherever_they_are_shown(arch25):
+    plan = optimize(changed(arch25, stiffness=1 / 1000))
+    assert plan.departures
+    assert plan.summary()["outside_linear_range"] == [*map(str, plan.departures)]
+    assert card(plan).index("outside the linear range") < card(plan).index("found by")
+    text = plan.report().text
+    assert '<p id="sentence">Outside the linear range: displacement' in text
+    assert "e+0" not in text.split('id="data"')[0]
+
+
+LOOP = ("optimize", "--formulation", "cascade")
+FREE = ("optimize", "--schedule", "free", "--aim", "steps")
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("analyze", "--method", "sequential"),
+        ("analyze", "--method", "sequential", "--staged", "fitted"),
+        pytest.param(("compare",), marks=pytest.mark.slow),
+        LOOP,
+        FREE,
+        pytest.param(("pareto", "--aim", "steps,D_max"), marks=pytest.mark.slow),
+    ],
+    ids=" ".join,
+)
+def test_commands_say_it_first_and_tell_scripts(capsys, tmp_path, small_soft, words):
+    out = tmp_path / ("out.csv" if words[0] == "analyze" else "out")
+    asked = [words[0], small_soft, *words[1:], "--out", str(out)]
+    assert main(asked) == 0
+    assert capsys.readouterr().out.startswith("outside the linear range: ")
+    assert main([*asked, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["outside_linear_range"]
+    if words[0] in ("optimize", "pareto"):
+        assert json.loads((out / "summary.json").read_text("utf-8"))["outside_linear_range"]
+    if words[0] != "analyze":
+        assert '<p id="sentence">Outside the linear range' in (out / "report.html").read_text()
+    if words[0] in ("analyze", "compare"):
+        assert main([*asked, "--strict"]) == 1
+        assert "seqopt: outside the linear range: " in capsys.readouterr().err
+
+
+@pytest.fixture
+def small_soft(tmp_path):
+    save_scene(changed(small_arch(5), stiffness=1e-6), tmp_path / "soft.json")
+    return str(tmp_path / "soft.json")
+
+
+def test_a_table_on_standard_output_stays_a_table(capsys, small_soft):
+    assert main(["analyze", small_soft, "--method", "sequential"]) == 0
+    out, err = capsys.readouterr()
+    assert out.startswith("step,type,bricks")
+    assert err.startswith("outside the linear range: ")
