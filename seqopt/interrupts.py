@@ -1,7 +1,9 @@
-"""Interrupts that wait until a critical piece of work is done, or that call a function."""
+"""Interrupts that wait for critical work, that call a function, or that end work in time."""
 
 from __future__ import annotations
 
+import _thread
+import math
 import signal
 import threading
 from collections.abc import Callable, Iterator
@@ -69,3 +71,45 @@ def answered(told: Callable[[], object]) -> Iterator[None]:
         yield
     finally:
         give_back()
+
+
+@contextmanager
+def ending(seconds: float) -> Iterator[None]:
+    """Raise `TimeoutError` where a block of code takes longer than it may.
+
+    In the main thread alone, which is interrupted; elsewhere a block takes as long as it takes.
+
+    Parameters
+    ----------
+    seconds : float
+        Infinite for no end.
+
+    Raises
+    ------
+    TimeoutError
+        Between two instructions of the block; before the first one where no time is left.
+    """
+    if seconds <= 0:
+        raise TimeoutError
+    if math.isinf(seconds) or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    over = threading.Event()
+
+    def end() -> None:
+        over.set()
+        _thread.interrupt_main()
+
+    timer = threading.Timer(min(seconds, threading.TIMEOUT_MAX), end)
+    timer.daemon = True
+    try:
+        timer.start()
+        yield
+        timer.cancel()
+        timer.join()  # an end that is on its way comes now, and not later
+    except KeyboardInterrupt:
+        if not over.is_set():
+            raise
+        raise TimeoutError from None
+    finally:
+        timer.cancel()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterable
 from pathlib import Path
 
 import pandas as pd
@@ -16,6 +17,7 @@ from seqopt.cli.asked import (
     level_notes,
     step_answers,
     strictly,
+    timely,
 )
 from seqopt.cli.common_arguments import (
     engine_arguments,
@@ -23,15 +25,20 @@ from seqopt.cli.common_arguments import (
     group,
     scene_argument,
     strict_argument,
+    time_argument,
 )
 from seqopt.cli.facts import scene_facts
 from seqopt.cli.outputs import keep_apart
+from seqopt.cli.status import Status
 from seqopt.cli.steps_arguments import asked_steps, steps_arguments
+from seqopt.cli.values import parse_time_limit
+from seqopt.engines.interface import Fields
 from seqopt.files import csv_text, write_bytes, write_csv
 from seqopt.network.build import build_network
 from seqopt.responses.linear_range import LinearRange
 from seqopt.responses.staged import Placing, staged_fields
 from seqopt.responses.table import archive, response_table
+from seqopt.sequence.steps import Step
 
 DESCRIPTION = (
     "Compute how the structure responds in every step of one sequence, and write a table with the "
@@ -77,6 +84,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         help="also write every edge force, node displacement and reaction, as a NumPy archive "
         "(.npz)",
     )
+    time_argument(how, "stop after it, with the steps that were computed by then")
     form = group(command, "what is printed")
     strict_argument(form)
     form_arguments(form)
@@ -98,13 +106,20 @@ def run(options: argparse.Namespace) -> Answer:
     scene = asked_scene(options)
     network = build_network(scene)
     engine, steps = asked_engine(options, network), asked_steps(scene, options)
-    table = response_table(network, step_answers(options, engine, steps))
-    within = LinearRange(engine)
-    staged = None if options.staged is None else staged_fields(network, steps, options.staged)
+    limit = parse_time_limit(options.time_limit)
+    answers: Iterable[tuple[Step, Fields]] = timely(step_answers(options, engine, steps), limit)
+    if options.fields is not None:
+        answers = list(answers)
+    table = response_table(network, answers)
+    late = _late(options, len(table), len(steps))
+    if table.empty:
+        return Answer(facts={"steps": ()}, failures=late, status=Status.FAILED)
+    within, computed = LinearRange(engine), steps[: len(table)]
+    staged = None if options.staged is None else staged_fields(network, computed, options.staged)
     outside = within.departures(table, staged)
     written = [path for path in (options.out, options.fields) if path is not None]
     if options.fields is not None:
-        write_bytes(options.fields, archive(network, step_answers(options, engine, steps)))
+        write_bytes(options.fields, archive(network, answers))
     if options.out is not None:
         write_csv(options.out, table)
     answer = Answer(
@@ -113,8 +128,20 @@ def run(options: argparse.Namespace) -> Answer:
         data=csv_text(table) if options.out is None else "",
         written=tuple(written),
         notes=(*level_notes(engine), *within.unchecked, *idle_notes(scene, steps)),
+        failures=late,
+        status=Status.FAILED if late else Status.DONE,
     )
     return strictly(answer, options, exceeded(scene, table), outside)
+
+
+def _late(options: argparse.Namespace, computed: int, steps: int) -> tuple[str, ...]:
+    """Return a line if the time limit came before the last step, else none."""
+    if computed == steps:
+        return ()
+    so_far = f"{computed} of {steps} steps" if computed else "no step"
+    return (
+        f"seqopt: error: --time-limit {options.time_limit}: {so_far} computed; give more seconds",
+    )
 
 
 def _said(table: pd.DataFrame, path: Path) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import time
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
@@ -16,6 +17,7 @@ from seqopt.engines.auto import AutoEngine
 from seqopt.engines.interface import Engine, Fields
 from seqopt.engines.registry import make_engine
 from seqopt.errors import ProblemError, SceneError
+from seqopt.interrupts import ending
 from seqopt.network.network import Network
 from seqopt.placement.promises import overloads
 from seqopt.responses.linear_range import OUTSIDE, REMEDY
@@ -225,3 +227,29 @@ def step_answers(
         )
     fields = staged_fields(engine.network, steps, options.staged)
     return zip(told("steps", steps, options.tell), fields, strict=True)
+
+
+def timely(answers: Iterator[tuple[Step, Fields]], seconds: float) -> Iterator[tuple[Step, Fields]]:
+    """Yield the answers that come in time.
+
+    Parameters
+    ----------
+    answers : iterator of (Step, Fields)
+        From `step_answers`.
+    seconds : float
+        From the first one that is asked for.
+
+    Yields
+    ------
+    (Step, Fields)
+    """
+    end = time.perf_counter() + seconds
+    while True:
+        try:
+            with ending(end - time.perf_counter()):
+                answer = next(answers, None)
+        except TimeoutError:
+            return
+        if answer is None:
+            return
+        yield answer

@@ -117,6 +117,18 @@ def strict_argument(takes: Takes) -> None:
     )
 
 
+def time_argument(takes: Takes, said: str) -> None:
+    """Add the argument that says when a command ends.
+
+    Parameters
+    ----------
+    takes : argparse._ActionsContainer
+    said : str
+        What it leaves.
+    """
+    takes.add_argument("--time-limit", metavar="SECONDS", help=said)
+
+
 def robots_argument(takes: Takes, whose: str) -> None:
     """Add the argument that names robots.
 

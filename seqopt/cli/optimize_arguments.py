@@ -15,6 +15,7 @@ from seqopt.cli.common_arguments import (
     robots_argument,
     scene_argument,
     strict_argument,
+    time_argument,
 )
 from seqopt.cli.free_arguments import add_rules
 from seqopt.placement.formulation import formulation_names
@@ -146,10 +147,9 @@ def _robust(takes: Takes) -> None:
 
 
 def _resources(takes: Takes) -> None:
-    takes.add_argument(
-        "--time-limit",
-        metavar="SECONDS",
-        help="stop choosing after it, with the best choice so far and a bound; with --no-proof, "
+    time_argument(
+        takes,
+        "stop choosing after it, with the best choice so far and a bound; with --no-proof, "
         "where choosing and computing are one, with the moves that were chosen by then",
     )
     takes.add_argument(

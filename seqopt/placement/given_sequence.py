@@ -45,8 +45,8 @@ class GivenSequence(ShownBuild):
     >>> build = seqopt.GivenSequence(engine, seqopt.sequential(engine.network), "sequential")
     >>> build
     <GivenSequence sequential of arch25: 49 steps>
-    >>> build.grips()["largest_force_N"].max().round(1)
-    np.float64(406.1)
+    >>> float(build.grips()["largest_force_N"].max().round(1))
+    406.1
     """
 
     engine: Engine

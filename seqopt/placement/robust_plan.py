@@ -13,6 +13,7 @@ import pandas as pd
 from seqopt.arrays import Floats
 from seqopt.engines.interface import Engine
 from seqopt.errors import SolverError
+from seqopt.placement.anew import require_anew
 from seqopt.placement.certificate import TOLERANCE, least_peak, least_sum
 from seqopt.placement.costs import TINY, LayeredCosts
 from seqopt.placement.formulation import Formulation, Selection, find_formulation
@@ -180,6 +181,8 @@ def _judged(problem: RobustProblem, found: Searched, weights: Floats, taken: flo
     objective = _checked(problem, layers, found, proven)
     bound = min(max(found.bound, proven), objective)
     steps = problem.steps(found.choice)
+    for scenario in problem.from_cache:
+        require_anew(scenario, found.choice)
     seconds = {**problem.seconds, "solve": taken, "verify": time.perf_counter() - start}
     return RobustPlan(
         problem, found.choice, steps, objective, bound, min(proven, bound), weights, seconds

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -56,6 +56,13 @@ class RobustProblem(Shown):
     def _found(self) -> tuple[tuple[ScenarioCosts, ...], float]:
         resources = self.nominal.evaluation.resources
         return scenario_costs(tasks_of(self.nominal, self.scenes), resources)
+
+    @property
+    def from_cache(self) -> Iterator[Problem]:
+        """The problems of the scenarios, if their responses may come from files."""
+        if self.nominal.evaluation.resources.cache is None:
+            return iter(())
+        return (task.problem() for task in tasks_of(self.nominal, self.scenes))
 
     @property
     def seconds(self) -> Mapping[str, float]:

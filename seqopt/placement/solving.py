@@ -12,6 +12,7 @@ from typing import Any, overload
 import numpy as np
 
 from seqopt.errors import InfeasibleError, ProblemError
+from seqopt.placement.anew import require_anew
 from seqopt.placement.certificate import certify_partial, judge, least_sum
 from seqopt.placement.conflicts import refusal
 from seqopt.placement.fitting import require_fit, require_proof, require_time
@@ -207,6 +208,8 @@ def _solve_all(
     with _timed(seconds, "verify"):
         certificate = judge(problem, selection, formulation)
         steps = problem.steps(selection.choice)
+        if isinstance(problem, Problem):
+            require_anew(problem, selection.choice)
     order = {stage: seconds[stage] for stage in ("compile", "solve", "verify")}
     return Plan(problem, formulation, selection, certificate, steps, {**stages, **order})
 
@@ -237,6 +240,7 @@ def _solve_windows(
     respond = sum(part.evaluation.seconds for part in (found.alone, *found.shared))
     with _timed(seconds, "verify"):
         steps = problem.steps(found.choice)
+        require_anew(problem, found.choice, found.met)
     stages = {"respond": respond, "rank": seconds["search"] - respond, "verify": seconds["verify"]}
     return Plan(problem, formulation, Selection(found.choice, np.nan), None, steps, stages, found)
 
@@ -255,6 +259,7 @@ def _solve_lazily(
     with _timed(seconds, "verify"):
         certificate = certify_partial(found.costs, found.selection, found.objective)
         steps = problem.steps(found.selection.choice)
+        require_anew(problem, found.selection.choice, found.along.met)
     return Plan(
         problem,
         formulation,

@@ -50,6 +50,12 @@ class WindowSearch(Terse):
         """The problems of which responses were computed."""
         return (self.alone, *(problem for problem in self.shared if problem.evaluation.steps))
 
+    @property
+    def met(self) -> list[tuple[Problem, tuple[int, ...]]]:
+        """The problems with all steps of the build, and what is chosen in each."""
+        each = zip(self.shared, self.choice, strict=True)
+        return [(self.alone, self.choice), *((problem, (now,)) for problem, now in each)]
+
     def costs(self, move: int) -> Floats:
         """Return what the candidates of a move cost after the choices before it.
 

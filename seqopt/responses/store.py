@@ -1,15 +1,16 @@
 """Answers to blocks of states in a folder, by content, so that a run can go on where one ended.
 
-Every block is a file of its own, written whole. A file is believed only if it is complete and its
-block's own: whatever is damaged, or was put there by others, is computed again.
+Every block is a file of its own, written whole: a checksum of all that follows, the numbers, then
+what the engine counted. No more is read than an answer to the block can be, and a file is believed
+only if it is whole and its block's own: whatever is damaged is computed again. Against somebody who
+writes false numbers with their checksum there is `seqopt.placement.anew`.
 """
 
 from __future__ import annotations
 
-import io
+import hashlib
+import json
 import time
-import zipfile
-import zlib
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +24,8 @@ from seqopt.responses.shipping import known_recipe
 from seqopt.responses.states import Answers, Block
 
 LEFT = 3600.0  # s after which a file that is not complete is one that was given up
-DAMAGED = (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error, SyntaxError)
+DIGEST = 32  # bytes of a checksum
+WORDS = 2**16  # bytes that what an engine counted takes at most
 
 
 class Store:
@@ -68,7 +70,7 @@ class Store:
         -------
         pathlib.Path
         """
-        return self._folder / f"{block.bricks}-{block.key[:48]}.npz"
+        return self._folder / f"{block.bricks}-{block.key[:48]}.answers"
 
     def find(self, block: Block) -> Answers | None:
         """Return the answers to a block, if they are there and whole.
@@ -81,12 +83,26 @@ class Store:
         -------
         Answers or None
         """
+        sets, columns = len(block.grips), len(block.names) + block.grips.shape[1]
+        words = DIGEST + 8 * sets * columns
         try:
-            content = self.path(block).read_bytes()
-            with np.load(io.BytesIO(content), allow_pickle=False) as found:
-                return self._unpacked(block, found)
-        except DAMAGED:
+            with self.path(block).open("rb") as file:
+                content = file.read(words + WORDS + 1)
+        except OSError:
             return None
+        whole = words <= len(content) <= words + WORDS
+        if not whole or content[:DIGEST] != self._checksum(block, content[DIGEST:]):
+            return None
+        numbers = np.frombuffer(content[DIGEST:words], "<f8").reshape(columns, sets).astype(float)
+        if not np.isfinite(numbers).all():
+            return None
+        try:
+            rows = json.loads(content[words:])
+            tally = tuple((LevelChoice(Level(level), why), int(n)) for level, why, n in rows)
+        except (ArithmeticError, RecursionError, TypeError, ValueError):  # checked, and yet false
+            return None
+        values = dict(zip(block.names, numbers, strict=False))
+        return Answers(values, numbers[len(values) :].T.copy(), tally)
 
     def keep(self, block: Block, answers: Answers) -> None:
         """Write the answers to a block.
@@ -101,32 +117,14 @@ class Store:
         FileError
             If the file cannot be written.
         """
-        arrays = {f"value {name}": values for name, values in answers.values.items()}
-        if answers.tally:
-            arrays["tally"] = np.array([_words(what, count) for what, count in answers.tally])
-        buffer = io.BytesIO()
-        mark = np.array(self._mark(block))
-        np.savez(buffer, allow_pickle=False, mark=mark, forces=answers.forces, **arrays)
-        write_bytes(self.path(block), buffer.getvalue())
+        numbers = np.array([*(answers.values[name] for name in block.names), *answers.forces.T])
+        words = json.dumps([_words(what, count) for what, count in answers.tally])
+        content = numbers.astype("<f8").tobytes() + words.encode()
+        write_bytes(self.path(block), self._checksum(block, content) + content)
 
-    def _mark(self, block: Block) -> str:
-        return f"{self._recipe.key} {block.key}"
-
-    def _unpacked(self, block: Block, found: np.lib.npyio.NpzFile) -> Answers | None:
-        """Return the answers of a file, None if they are not those of the block."""
-        if str(found["mark"]) != self._mark(block):
-            return None
-        values = {name: found[f"value {name}"] for name in block.names}
-        forces = found["forces"]
-        sets = len(block.grips)
-        whole = forces.shape == block.grips.shape and all(
-            v.shape == (sets,) for v in values.values()
-        )
-        if not whole or not all(np.isfinite(a).all() for a in (forces, *values.values())):
-            return None
-        rows = found["tally"].tolist() if "tally" in found else []
-        tally = [(LevelChoice(Level(level), reason), int(n)) for level, reason, n in rows]
-        return Answers(values, forces, tuple(tally))
+    def _checksum(self, block: Block, content: bytes) -> bytes:
+        """Return the checksum of what is to be known of a block."""
+        return hashlib.sha256(f"{self._recipe.key} {block.key} ".encode() + content).digest()
 
 
 def open_store(folder: Path | str | None, engine: Engine) -> Store | None:
@@ -150,10 +148,10 @@ def open_store(folder: Path | str | None, engine: Engine) -> Store | None:
     return None if folder is None else Store(Path(folder), engine)
 
 
-def _words(what: object, count: int) -> list[str]:
+def _words(what: object, count: int) -> list[str | int]:
     if not isinstance(what, LevelChoice):
         raise SceneError(f"cache: an engine that counts {what!r} cannot be kept; take no cache")
-    return [what.level.value, what.reason, str(count)]
+    return [what.level.value, what.reason, count]
 
 
 def _tidy(folder: Path) -> None:

@@ -21,7 +21,7 @@ from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.sequence.two_robots import METHODS
 from seqopt.study.presets import WEIGHTED
 from seqopt.study.published import published_plan
-from tests.builders import hinged, scaled, six_bricks, small_arch
+from tests.builders import block, hinged, scaled, six_bricks, small_arch
 from tests.strategies import arches, both_sided, loosened, states, walls
 
 FIELDS = ("edge_force", "displacement", "grip_force", "support", "joint_wrench", "brick_twist")
@@ -176,6 +176,15 @@ def test_a_loose_brick_needs_grips(arch25, engine_type):
             apart.solve(13, np.array(grips, dtype=int).reshape(1, -1))
     held = apart.solve(15, [[25, 26, 29]])  # three grips off one line hold what is cut off
     assert np.isfinite(held.displacement).all()
+
+
+@pytest.mark.parametrize("engine_type", [ComplianceEngine, FrameEngine])
+@pytest.mark.parametrize("grips", [[], [1], [1, 2]])
+def test_a_brick_on_springs_without_stiffness_is_loose(engine_type, grips):
+    """Where nothing holds it either, no row at all says what resists."""
+    none = {f"{way}_stiffness": (0.0, 0.0, 0.0) for way in ("translational", "rotational")}
+    with pytest.raises(MechanismError, match="nothing resists a motion of brick 1"):
+        engine_type(build_network(block(**none))).solve(1, [grips])
 
 
 def test_engines_agree_where_grips_hold_a_hinged_chain(arch25):

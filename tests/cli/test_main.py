@@ -13,6 +13,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from seqopt.cli import analyze as analyze_command
+from seqopt.cli.arguments import parser
 from seqopt.cli.main import main
 from seqopt.responses.table import analyze, step_fields
 from seqopt.scene.scene_file import save_scene
@@ -132,6 +134,46 @@ def test_full_fields_on_request(capsys, tmp_path, engine25, arch25):
         assert archive["step49_support"].shape == (2, 6)
         assert archive["support_brick"].tolist() == [1, 25]
         assert archive["support_point"].tolist() == [list(g.anchor) for g in arch25.grounds]
+
+
+def ends_in_step(number):
+    """Return what is told of every step, and ends as a time limit does: in the midst of one."""
+    told = iter(range(1, number))
+
+    def tell(_):
+        if next(told, None) is None:
+            raise TimeoutError
+
+    return tell
+
+
+def test_a_time_limit_of_analyze_leaves_the_rows_so_far(tmp_path):
+    path, fields = tmp_path / "rows.csv", tmp_path / "fields.npz"
+    words = ["analyze", "--method", "cantilever", "--out", str(path), "--fields", str(fields)]
+    options = parser("analyze").parse_args([*words, "--time-limit", "1e9"])
+    options.tell = ends_in_step(4)
+    answer = analyze_command.run(options)
+    assert answer.status == 4
+    assert answer.failures == (
+        "seqopt: error: --time-limit 1e9: 3 of 49 steps computed; give more seconds",
+    )
+    assert pd.read_csv(path)["step"].tolist() == [1, 2, 3]
+    with np.load(fields) as archive:
+        assert {name.split("_")[0] for name in archive} > {"step1", "step2", "step3"}
+        assert "step4_support" not in archive
+
+
+def test_a_time_limit_of_analyze_before_the_first_row_is_one_line(capsys, tmp_path):
+    path = tmp_path / "rows.csv"
+    words = ("analyze", "--method", "cantilever", "--time-limit", "0", "--out", str(path))
+    assert run(capsys, *words) == (
+        4,
+        "",
+        "seqopt: error: --time-limit 0: no step computed; give more seconds\n",
+    )
+    assert not path.exists()
+    assert run(capsys, *words[:4], "soon", *words[5:])[0] == 2
+    assert run(capsys, *words[:4], "1e9", *words[5:])[0] == 0
 
 
 def test_a_plan_from_a_file(capsys, tmp_path):

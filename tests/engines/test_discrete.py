@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from seqopt.contact.mortar import Mortar
 from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.discrete.pads import Across, Pinch
 from seqopt.engines.discrete.system import BedStiffness
 from seqopt.engines.interface import Want
+from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import SceneError
 from seqopt.network.build import build_network
 from seqopt.scene.scene_file import load_scene
@@ -29,3 +33,17 @@ def test_beds_alone_are_other_joints_and_pads_let_a_brick_turn():
     assert total == pytest.approx(weight, abs=1e-6 * np.abs(weight).max())
     with pytest.raises(SceneError, match="bed: normal is 0"):
         BedStiffness(0.0, 1.0)
+
+
+@pytest.mark.parametrize("stiff", [1e10, 1e12])
+def test_a_hinge_far_stiffer_the_other_ways_comes_to_rest(stiff):
+    """Its bed is stiffer still: what the bed deforms must not drown in how far the bricks move."""
+    scene = load_scene("arch25")
+    hinge = next(joint for joint in scene.joints if joint.bricks == (3, 4))
+    ways = replace(hinge, rotational_stiffness=(hinge.rotational_stiffness[0], stiff, 0.0))
+    joints = tuple(ways if joint is hinge else joint for joint in scene.joints)
+    net = build_network(replace(scene, joints=joints))
+    strong = Mortar(friction=1.0, tensile_strength=1e12, cohesion=1e12)
+    found = DiscreteEngine(net, strong).solve(24, [[47]], Want.ALL)
+    exact = ComplianceEngine(net).solve(24, [[47]], Want.ALL)
+    assert largest_difference(found, exact, net) <= 1e-8

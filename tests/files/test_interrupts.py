@@ -10,7 +10,7 @@ import time
 import pytest
 
 from seqopt.files import write_folder
-from seqopt.interrupts import answered, undisturbed
+from seqopt.interrupts import answered, ending, undisturbed
 
 
 def meanwhile(number):
@@ -86,3 +86,29 @@ def test_other_threads_write_without_signals(tmp_path):
     writer.start()
     writer.join()
     assert (tmp_path / "out" / "a.txt").read_text(encoding="utf-8") == "a"
+
+
+def wait():
+    while True:
+        time.sleep(0.001)
+
+
+def test_what_takes_too_long_ends():
+    with pytest.raises(TimeoutError), ending(0.01):
+        wait()
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_what_has_no_time_does_not_begin():
+    done = []
+    with pytest.raises(TimeoutError), ending(0.0):
+        done.append(1)
+    assert not done
+
+
+@pytest.mark.parametrize("seconds", [1e300, float("inf")])
+def test_an_end_leaves_what_is_in_time_and_interrupts_of_others(seconds):
+    with ending(seconds):
+        pass
+    with pytest.raises(KeyboardInterrupt), ending(seconds):
+        signal.raise_signal(signal.SIGINT)

@@ -8,19 +8,23 @@ import subprocess
 import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from seqopt.engines.registry import make_engine
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import FileError, SceneError
+from seqopt.placement.criteria import WeightedSum
 from seqopt.placement.problem import pose
+from seqopt.placement.robust_plan import solve_robust
+from seqopt.placement.robust_problem import robust
 from seqopt.placement.solving import solve
 from seqopt.responses import states
 from seqopt.responses.choices import Evaluation
 from seqopt.responses.resources import Resources
+from seqopt.responses.store import Store
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.study.presets import EQUATIONS
 from tests.builders import ROOT, six_bricks
@@ -87,7 +91,9 @@ DAMAGE = {
     "a byte short": lambda content, _: content[:-1],
     "its start changed": lambda content, _: flipped(content, 0),
     "its middle changed": lambda content, _: flipped(content, len(content) // 2),
-    "a number changed": lambda content, _: flipped(content, content.index(b"NUMPY") + 140),
+    "a number changed": lambda content, _: flipped(content, 32),
+    "its end changed": lambda content, _: flipped(content, len(content) - 1),
+    "a byte long": lambda content, _: content + b"]",
     "text": lambda content, _: b"no archive at all\n" * 20,
     "of another block": lambda _, other: other,
 }
@@ -106,6 +112,18 @@ def test_what_is_damaged_is_computed_again(tmp_path, asked, how):
     assert {path: path.read_bytes() for path in files} == contents  # and is mended
 
 
+def test_no_more_is_read_than_an_answer_can_be(tmp_path, asked):
+    """A terabyte, of which nothing but the start is on the disk."""
+    whole = evaluation(tmp_path).steps
+    path = next(iter(tmp_path.glob("*/*")))
+    content = path.read_bytes()
+    os.truncate(path, 2**40)
+    asked.clear()
+    assert evaluation(tmp_path).steps == whole
+    assert len(asked) == 1
+    assert path.read_bytes() == content
+
+
 def test_a_folder_in_the_place_of_a_file_is_named(tmp_path):
     _ = evaluation(tmp_path).steps
     path = next(iter(tmp_path.glob("*/*")))
@@ -115,15 +133,54 @@ def test_a_folder_in_the_place_of_a_file_is_named(tmp_path):
         _ = evaluation(tmp_path).steps
 
 
+@pytest.fixture
+def halved(monkeypatch):
+    """Stores keep half of what is true, and its checksum."""
+    keep = Store.keep
+
+    def keep_half(store, block, answers):
+        values = {name: 0.5 * found for name, found in answers.values.items()}
+        keep(store, block, replace(answers, values=values, forces=0.5 * answers.forces))
+
+    monkeypatch.setattr(Store, "keep", keep_half)
+
+
+@pytest.mark.usefixtures("halved")
 def test_whole_but_false_answers_are_believed(tmp_path):
     """So that the tests above see that files are read at all."""
     whole = evaluation(tmp_path).steps
-    for path in tmp_path.glob("*/*"):
-        with np.load(path) as found:
-            arrays = {name: found[name] for name in found}
-        arrays["forces"] = arrays["forces"] + 1.0
-        np.savez(path, **arrays)
     assert evaluation(tmp_path).steps != whole
+
+
+SEARCHES = {
+    "all": lambda problem: solve(problem, "overlap_dp"),
+    "lazy": lambda problem: solve(problem, "overlap_dp", lazy=True),
+    "without proof": lambda problem: solve(problem, "cascade", proof=False),
+    "over scenarios": lambda problem: solve_robust(robust(problem, [SCENE], "worst-total")),
+}
+
+
+def posed(cache):
+    engine, schedule = make_engine("compliance", SCENE), three_robot_loop(SCENE)
+    criterion = WeightedSum("all", tuple((name, 1.0, 1.0) for name in ("T_max", "M_sup", "F_move")))
+    return pose(engine, schedule, criterion, resources=Resources(cache=cache))
+
+
+@pytest.mark.parametrize("how", SEARCHES)
+@pytest.mark.usefixtures("halved")
+def test_a_plan_by_false_answers_is_refused(tmp_path, how):
+    with suppress(FileError):  # some read what they wrote
+        SEARCHES[how](posed(tmp_path))
+    false = r"cache .*: \w+ of step \d+ is \S+ in a file, and \S+ when it is computed; delete"
+    with pytest.raises(FileError, match=false):
+        SEARCHES[how](posed(tmp_path))
+
+
+@pytest.mark.parametrize("how", SEARCHES)
+def test_a_plan_by_true_answers_is_the_same(tmp_path, how):
+    """The negative control: a cache changes nothing."""
+    plain = SEARCHES[how](posed(None))
+    assert {SEARCHES[how](posed(tmp_path)).steps for _ in range(2)} == {plain.steps}
 
 
 def test_answers_are_those_of_scene_engine_and_responses(tmp_path, asked, monkeypatch):
@@ -175,9 +232,12 @@ def test_a_search_without_proof_uses_it_too(tmp_path, asked):
         return solve(problem, "cascade", proof=False)
 
     first = plan()
+    blocks = len(asked)
     asked.clear()
     assert plan().alternatives().equals(first.alternatives())
-    assert not asked
+    open_steps = sum(len(step.moves) > 0 for step in first.problem.schedule.steps)
+    assert 0 < len(asked) <= open_steps  # those of the plan itself are computed anew
+    assert len(asked) < blocks
 
 
 RUN = """
@@ -203,12 +263,12 @@ def test_a_run_that_was_killed_goes_on(tmp_path, workers):
         return subprocess.Popen([sys.executable, str(script), *words], env=environment)
 
     killed = start("killed")
-    while len(list(cache.glob("*/*.npz"))) < 5 and killed.poll() is None:
+    while len(list(cache.glob("*/*.answers"))) < 5 and killed.poll() is None:
         time.sleep(0.002)
     killed.send_signal(signal.SIGKILL)
     assert killed.wait() == -signal.SIGKILL
     assert not (tmp_path / "killed").exists()
-    kept = {path: path.stat().st_mtime_ns for path in cache.glob("*/*.npz")}
+    kept = {path: path.stat().st_mtime_ns for path in cache.glob("*/*.answers")}
     runs = [start("one"), start("other")]
     assert [run.wait() for run in runs] == [0, 0]
     assert {path: path.stat().st_mtime_ns for path in kept} == kept  # used as they were

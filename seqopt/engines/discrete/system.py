@@ -194,23 +194,21 @@ def _joined(
 ) -> tuple[sparse.csr_array, sparse.csr_array, Floats]:
     """Return twists across beds (6J, 6n), stiffness of layers (6n, 6n) and unit (6n,) of bodies.
 
-    Between a joint's layer of stiffness ``own`` (J, 6, 6) and its bed is one more body, a plate.
+    Between a joint's layer of stiffness ``own`` (J, 6, 6) and its bed is one more body, a plate. It
+    moves as the twist across its bed says: as a difference of two motions, the twist across a bed
+    that is far stiffer than the rest would be lost to rounding.
     """
     acting = network.springs.acting(bricks)
     bodies, where = network.springs.bodies[acting], network.springs.position[acting]
-    below, center = bodies, network.centroid[:bricks]
-    if own is not None:
-        plates = bricks + np.arange(len(acting))
-        center = np.vstack([center, where])
-        below = np.stack([bodies[:, 0], plates], axis=1)
-        bodies = np.stack([plates, bodies[:, 1]], axis=1)
-    unit = np.tile(np.repeat([1.0, 1.0 / length], 3), len(center))
-    layers = sparse.csr_array((unit.size, unit.size))
-    if own is not None:
-        across = deformation(below, where, center) @ sparse.diags_array(unit)
-        layers = layers + across.T @ _diagonal(own) @ across
-    gap = deformation(bodies, where, center) @ sparse.diags_array(unit)
-    return sparse.csr_array(gap), sparse.csr_array(layers), unit
+    plates = 0 if own is None else len(acting)
+    unit = np.tile(np.repeat([1.0, 1.0 / length], 3), bricks + plates)
+    units = sparse.csr_array(sparse.diags_array(unit))
+    brick, gap = units[: 6 * bricks, : 6 * bricks], units[6 * bricks :]
+    joint = sparse.csr_array(deformation(bodies, where, network.centroid[:bricks]) @ brick)
+    if own is None:
+        return joint, sparse.csr_array(units.shape), unit
+    layer = sparse.hstack([joint, -gap[:, 6 * bricks :]])
+    return gap, sparse.csr_array(layer.T @ _diagonal(own) @ layer), unit
 
 
 def _load(network: Network, bricks: int, unit: Floats) -> Floats:

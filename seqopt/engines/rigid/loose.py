@@ -12,7 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import linalg, sparse
+from scipy import sparse
 from scipy.sparse import csgraph
 from scipy.sparse.linalg import SuperLU, splu
 
@@ -123,7 +123,7 @@ def _held_motions(parts: Ungripped, *, tied: bool) -> sparse.csr_array:
     rigid = _cluster_motions(parts, label, first)
     soft = np.repeat(~firm, 6)
     strain = np.sqrt(parts.stiffness[soft])[:, None] * (parts.deformation[soft] @ rigid)
-    _, sizes, modes = linalg.svd(strain, full_matrices=True)
+    _, sizes, modes = np.linalg.svd(strain)  # SciPy 1.12 refuses an empty matrix
     weak = np.ones(len(modes), dtype=bool)
     weak[: len(sizes)] = sizes < np.sqrt(SOFT)
     held = (6 * first[:, None] + np.arange(6)).ravel()

@@ -137,7 +137,7 @@ def free_motion(network: Network, bricks: int, columns: Ints) -> Floats | None:
     held = parts.motion[node.ravel()].toarray() * parts.twist_unit
     ties = np.vstack([parts.deformation[parts.stiffness > 0].toarray(), held])
     with one_thread():
-        _, sizes, motions = linalg.svd(ties, full_matrices=len(ties) < ties.shape[1])
+        _, sizes, motions = np.linalg.svd(ties, full_matrices=len(ties) < ties.shape[1])
     if len(sizes) == ties.shape[1] and sizes[-1] > UNTIED * sizes[0]:
         return None
     motion = motions[-1]
