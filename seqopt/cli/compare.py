@@ -22,9 +22,8 @@ from seqopt.cli.compare_text import printed_largest, tell_comparison
 from seqopt.cli.criteria import asked_criterion
 from seqopt.cli.facts import scene_facts
 from seqopt.cli.layout import wrapped
-from seqopt.cli.outputs import comparison_files, figure_notes, write_outputs
+from seqopt.cli.outputs import comparison_files, figure_notes, require_out, write_outputs
 from seqopt.cli.values import parse_robots
-from seqopt.files import require_folder
 from seqopt.network.build import build_network
 from seqopt.report.comparison import Comparison, compare
 from seqopt.report.plan_pages import PAGE, comparison_page
@@ -85,8 +84,7 @@ def run(options: argparse.Namespace) -> Answer:
     scene = asked_scene(options)
     engine = asked_engine(options, build_network(scene))
     criterion = asked_criterion(options)
-    if options.out is not None:
-        require_folder(options.out)
+    require_out(options)
     result = compare(engine, criterion, options.tell, parse_robots(options.robots))
     told = tell_comparison(result, scene, criterion)
     blocks = [told.text]
@@ -96,9 +94,8 @@ def run(options: argparse.Namespace) -> Answer:
     if options.out is not None and result.loop is not None:
         options.tell("drawing figures")
         files = comparison_files(result)
-        options.tell("writing the page")
-        write_outputs(options, files | {PAGE: comparison_page(engine, result)})
-        written = (options.out,)
+        page = {PAGE: comparison_page(engine, result)}
+        written = write_outputs(options, lambda: files | page)
         blocks.append(_where(options.out))
     else:
         more = "" if options.details else "; --details shows more here"

@@ -20,7 +20,7 @@ from seqopt.cli.common_arguments import (
     scene_argument,
 )
 from seqopt.cli.facts import scene_facts
-from seqopt.cli.free import posed_free
+from seqopt.cli.free import asked_free
 from seqopt.cli.free_arguments import add_rules
 from seqopt.cli.outputs import figure_notes, write_outputs, written_to
 from seqopt.cli.values import parse_numbers, parse_robots
@@ -132,7 +132,7 @@ def run(options: argparse.Namespace) -> Answer:
     Answer
     """
     require_folder(options.out)
-    scene, free = posed_free(options, options.aim)
+    scene, free = asked_free(options)
     rounding = parse_numbers("--round", options.round, dict.fromkeys(map(str, free.goals)))
     problem: FrontProblem = FreeFront(free, rounding)
     if options.schedule != FREE:
@@ -150,7 +150,7 @@ def run(options: argparse.Namespace) -> Answer:
         picked = {"point": chosen + 1, **values}
         row = ", ".join(f"{name} {value:.6g}" for name, value in values.items())
         said += f"; picked row {chosen + 1}: {row}"
-    write_outputs(options, files | scene_file(scene))
+    write_outputs(options, lambda: files | scene_file(scene))
     return Answer(
         facts={
             "scene": scene_facts(scene),

@@ -40,7 +40,7 @@ class Problem(Shown):
     criterion : Criterion
         What a step costs.
     limits : tuple of Limit
-        Bounds that no step with an open grip may exceed.
+        Bounds that no step may exceed, whether or not a grip is open in it.
     evaluation : Evaluation
         Raw responses of every open step.
     budgets : tuple of Budget
@@ -256,7 +256,7 @@ def pose(
     criterion : Criterion
         What a step costs.
     limits : sequence of Limit
-        Bounds that no step with an open grip may exceed.
+        Bounds that no step may exceed, whether or not a grip is open in it.
     also : sequence of str
         Further responses to compute, besides those that criterion and limits use.
     resources : Resources, optional

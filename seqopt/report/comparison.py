@@ -29,7 +29,7 @@ from seqopt.responses.resources import Resources
 from seqopt.responses.table import force_column
 from seqopt.scene.scene import Scene
 from seqopt.sequence.free_rules import FREE
-from seqopt.sequence.loops import robot_loop
+from seqopt.sequence.schedule_file import MOST, find_schedule
 from seqopt.sequence.three_robots import modified_sequential
 from seqopt.study.published import (
     IRREGULARITIES,
@@ -53,7 +53,6 @@ COLUMNS = [
     "seconds",
     "solve_seconds",
 ]
-MOST = 3  # robots that take part where none are named: as many as in the paper's loop
 CLOSED = "no choice"  # the problem of a sequence without open grips
 
 
@@ -207,7 +206,7 @@ def _plans(
     network, plans = engine.network, {}
     count = len(robots) or min(len(network.scene.robots), MOST)
     try:
-        loop = robot_loop(network, robots or count)  # whose refusal says most
+        loop = find_schedule(network, robots=robots)  # whose refusal says most
         if count >= MOST:
             progress(Stage("comparing", 0.0))
             modified = pose(engine, modified_sequential(network, robots[:3]), criterion)
