@@ -10,7 +10,7 @@ from typing import Any, Literal, overload
 
 from seqopt.contact.mortar import Mortar
 from seqopt.engines.interface import Engine
-from seqopt.engines.registry import make_engine
+from seqopt.engines.registry import USUAL, make_engine
 from seqopt.errors import ProblemError
 from seqopt.network.build import build_network
 from seqopt.placement.asked_budgets import parse_budgets, with_budgets
@@ -59,7 +59,7 @@ class Defaults:
     criterion: Criterion
     formulation: str
     with_budgets: str = ""
-    engine: str = "compliance"
+    engine: str = USUAL
     aim: str = "minmax"
 
     def chosen_by(self, budgets: object) -> str:

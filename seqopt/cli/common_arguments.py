@@ -180,6 +180,6 @@ def limit_argument(takes: Takes) -> None:
         action="append",
         default=[],
         metavar="LIMIT",
-        help="no step may exceed it, whether or not a grip is open in it: payload (of every robot), or "
-        "RESPONSE=VALUE in SI units, as F_largest=300; may be repeated",
+        help="no step may exceed it, whether or not a grip is open in it: payload (of every "
+        "robot), or RESPONSE=VALUE in SI units, as F_largest=300; may be repeated",
     )

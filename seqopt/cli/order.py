@@ -7,6 +7,7 @@ from dataclasses import replace
 from math import isfinite
 
 from seqopt.cli.answer import Answer
+from seqopt.cli.asked import level_notes
 from seqopt.cli.facts import scene_facts
 from seqopt.cli.free_files import free_files
 from seqopt.cli.layout import wrapped
@@ -80,6 +81,7 @@ def _answer(options: argparse.Namespace, found: OrderPlan, name: str) -> Answer:
             "summary": found.summary(),
             "plan": found.plan.responses(),
         },
+        notes=level_notes(found.engine),
         text="\n".join([said, wrapped(order, first="order: ")]),
         status=Status.INTERRUPTED if stopped else Status.DONE,
     )

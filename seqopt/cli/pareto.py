@@ -10,7 +10,7 @@ from pathlib import Path
 import pandas as pd
 
 from seqopt.cli.answer import Answer
-from seqopt.cli.asked import scene_file
+from seqopt.cli.asked import level_notes, scene_file
 from seqopt.cli.common_arguments import (
     Takes,
     engine_arguments,
@@ -25,9 +25,11 @@ from seqopt.cli.free_arguments import add_rules
 from seqopt.cli.outputs import figure_notes, write_outputs, written_to
 from seqopt.cli.values import parse_numbers, parse_robots
 from seqopt.engines.interface import Engine
+from seqopt.engines.provenance import provenance
 from seqopt.errors import ProblemError, StepError, did_you_mean
 from seqopt.files import csv_text, require_folder
 from seqopt.placement.free_front import FreeFront
+from seqopt.placement.free_goals import judged_by
 from seqopt.placement.free_problem import FreeProblem
 from seqopt.placement.front import Front, FrontProblem, find_front, pick
 from seqopt.placement.loop_front import LoopFront
@@ -39,7 +41,7 @@ from seqopt.sequence.free_rules import FREE
 from seqopt.sequence.schedule_file import find_schedule
 from seqopt.sequence.steps import Step
 from seqopt.sequence.three_robots import SCHEDULES
-from seqopt.work.progress import Tell, told, within
+from seqopt.work.progress import told, within
 
 FOUR = "F_largest,M_sup,T_max,D_max"
 DESCRIPTION = (
@@ -140,7 +142,7 @@ def run(options: argparse.Namespace) -> Answer:
     seconds = float(options.seconds)
     front = find_front(problem, seconds=seconds, progress=within(options.tell, seconds))
     methods = _methods(free.engine)
-    files = _front_files(front, free.engine, methods, options.tell)
+    files = _front_files(front, free, methods, options)
     said = f"{len(front.steps)} points, {'complete' if front.complete else 'not complete'}"
     picked = None
     if options.pick:
@@ -161,7 +163,7 @@ def run(options: argparse.Namespace) -> Answer:
         },
         text=f"{said}; {written_to(options.out)}",
         written=(options.out,),
-        notes=figure_notes(),
+        notes=(*level_notes(free.engine), *figure_notes()),
     )
 
 
@@ -184,19 +186,32 @@ def _methods(engine: Engine) -> dict[str, pd.DataFrame]:
 
 
 def _front_files(
-    front: Front, engine: Engine, methods: Mapping[str, pd.DataFrame], tell: Tell
+    front: Front,
+    free: FreeProblem,
+    methods: Mapping[str, pd.DataFrame],
+    options: argparse.Namespace,
 ) -> dict[str, bytes | str]:
     """Return table, plans, chart and summary of a Pareto set by file name."""
+    engine, tell = free.engine, options.tell
     known: dict[tuple[Step, ...], pd.DataFrame] = {}
     plans = []
     for number, steps in enumerate(told("analyzing plans", front.steps, tell), start=1):
         table = known.setdefault(steps, analyze(engine, steps))
         plans.append(table.assign(point=number))
     tell("drawing and writing the page")
+    posed = {
+        "scene": engine.network.scene.name,
+        "schedule": str(options.schedule),
+        "aims": [str(goal) for goal in free.goals],
+        **judged_by(free.goals, free.criterion),
+        "limits": {limit.response: limit.bound for limit in free.limits},
+    }
     summary = {
         "points": len(front.steps),
         "complete": front.complete,
         "seconds": dict(front.seconds),
+        **posed,
+        **provenance(engine),
     }
     numbered = shown_table(front.table)
     numbered.insert(0, "point", range(1, len(numbered) + 1))

@@ -16,6 +16,7 @@ from seqopt.cli.facts import scene_facts
 from seqopt.cli.outputs import write_outputs, written_to
 from seqopt.cli.posing import asked_problem
 from seqopt.cli.values import number_word, parse_time_limit, split_word
+from seqopt.engines.provenance import provenance
 from seqopt.errors import ProblemError, did_you_mean
 from seqopt.files import csv_text
 from seqopt.placement.robust_aim import RobustAim, parse_robust
@@ -175,6 +176,7 @@ def _report(trial: Trial, known: Scenarios, unseen: Scenarios) -> dict[str, obje
         "worth": trial.summary(),
         "idle_robots": list(idle_robots(schedule.scene, plan.steps)),
         "models_evaluated": sum(costs.models for costs in plan.problem.costs),
+        **provenance(problem.engine),
     }
 
 

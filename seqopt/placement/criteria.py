@@ -61,10 +61,12 @@ class RankSum(Terse):
 
     @property
     def settings(self) -> Mapping[str, object]:
-        """Its crown, None where there is none, what it rounds to and what it ranks among."""
+        """Its weights and crown, None if it has none, what it rounds to and what it ranks among."""
         crown = None if self.crown == NEVER else self.crown
+        weights = {"before_crown": dict(self.before), "from_crown_on": dict(self.after)}
         ranks = {"ranked": self.ranked.value, "among": self.among.value}
-        return {"crown": crown, "resolution": dict(self.resolution or ()), **ranks}
+        rounding = {"resolution": dict(self.resolution or ())}
+        return {"weights": weights, "crown": crown, **rounding, **ranks}
 
     def wanted(self, bricks: int) -> tuple[str, ...]:
         """Return the responses that it needs of a move.
@@ -157,8 +159,9 @@ class WeightedSum(Terse):
 
     @property
     def settings(self) -> Mapping[str, object]:
-        """What responses are divided by, SI units."""
-        return {"scales": {name: scale for name, _, scale in self.terms}}
+        """What responses are divided by, SI units, and their weights."""
+        weights = {name: weight for name, weight, _ in self.terms}
+        return {"scales": {name: scale for name, _, scale in self.terms}, "weights": weights}
 
     def wanted(self, bricks: int) -> tuple[str, ...]:
         """Return the responses that it needs.

@@ -22,7 +22,7 @@ from seqopt.placement.promises import overloads
 from seqopt.placement.ranking import rank_choice
 from seqopt.placement.requirements import Criterion
 from seqopt.placement.solving import on_the_way, solve
-from seqopt.report.free_row import free_plan, free_row
+from seqopt.report.free_row import free_criterion, free_plan, free_row
 from seqopt.report.methods import idle_note, method_tables
 from seqopt.responses.quantities import RESPONSES, robot_response
 from seqopt.responses.resources import Resources
@@ -106,6 +106,8 @@ class Comparison(Terse):
         the paper's own numbers.
     refusal : str
         Why the scene has no loop of its robots; empty if it has.
+    criteria : mapping of str to Criterion
+        With all of their numbers, by the problem whose rows they are the objective of.
     """
 
     maxima: pd.DataFrame
@@ -115,6 +117,7 @@ class Comparison(Terse):
     loop: LoopFacts | None
     notes: tuple[str, ...]
     refusal: str
+    criteria: Mapping[str, Criterion]
 
 
 def compare(
@@ -157,14 +160,20 @@ def compare(
     tables |= {name: plan.responses() for name, plan in plans.items()}
     rows |= {name: _row(plan) for name, plan in plans.items()}
     loop = None if problem is None else _facts(problem, rows, robots)
-    notes += _add_free(engine, robots, progress, (rows, tables))
+    judged = {} if problem is None else {problem.schedule.method: problem.criterion}
+    closed = [largest(scene, tables[str(name)]) for name in maxima]
+    free, why_not = free_plan(engine, free_criterion(criterion, closed), robots, progress)
+    if free is not None:
+        tables[FREE], rows[FREE] = free.responses(), free_row(free)
+        judged[FREE] = free.problem.criterion
+    notes += [why_not] if why_not else []
     if problem is not None:
         notes += idle_note(scene, f"{problem.schedule.method} loop", problem.schedule.steps)
     notes += _add_largest(scene, rows, tables)
     notes += [f"In the paper: {text}" for text in IRREGULARITIES if printed is not None]
     table = pd.DataFrame.from_dict(rows, orient="index").reindex(columns=COLUMNS)
     table[RANKS] = table[RANKS].astype(float)
-    return Comparison(maxima, printed, table, tables, loop, tuple(notes), refusal)
+    return Comparison(maxima, printed, table, tables, loop, tuple(notes), refusal, judged)
 
 
 def _add_largest(
@@ -177,20 +186,6 @@ def _add_largest(
         rows[name].update(largest(scene, steps), overloaded=bool(over))
         notes += [f"{name}: {excess}" for excess in over]
     return notes
-
-
-def _add_free(
-    engine: Engine,
-    robots: Sequence[str],
-    progress: Tell,
-    known: tuple[dict[str, dict[str, object]], dict[str, pd.DataFrame]],
-) -> list[str]:
-    """Add the free schedule to rows and tables, or say why there is none."""
-    (rows, tables), (free, why_not) = known, free_plan(engine, robots, progress)
-    if free is None:
-        return [why_not]
-    tables[FREE], rows[FREE] = free.responses(), free_row(free)
-    return []
 
 
 def _plans(
