@@ -11,7 +11,7 @@ from seqopt.cli.asked import (
     asked_scene,
     exceeded,
     idle_notes,
-    level_notes,
+    posed_notes,
     strictly,
 )
 from seqopt.cli.criteria import parse_criterion
@@ -69,7 +69,7 @@ def optimize_free(options: argparse.Namespace) -> Answer:
         facts={"scene": scene_facts(scene), "summary": report, "plan": table},
         text="\n".join([_said(plan, options), *(f"payload exceeded: {each}" for each in over)]),
         written=written,
-        notes=(*level_notes(problem.engine), *idle_notes(scene, plan.steps)),
+        notes=(*posed_notes(problem), *idle_notes(scene, plan.steps)),
         status=Status.INTERRUPTED if stopped else Status.DONE,
     )
     return strictly(answer, options, over)

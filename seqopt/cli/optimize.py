@@ -9,7 +9,7 @@ from dataclasses import replace
 
 from seqopt.cli import optimize_arguments
 from seqopt.cli.answer import Answer
-from seqopt.cli.asked import exceeded, idle_notes, level_notes, strictly
+from seqopt.cli.asked import exceeded, idle_notes, posed_notes, strictly
 from seqopt.cli.facts import scene_facts
 from seqopt.cli.free import optimize_free, require_loop
 from seqopt.cli.outputs import plan_files, worth, write_outputs, written_to
@@ -106,7 +106,7 @@ def _answer(
     answer = Answer(
         facts={"scene": scene_facts(scene), "summary": report, "plan": table},
         text="\n".join([said, *(f"payload exceeded: {excess}" for excess in over)]),
-        notes=(*level_notes(problem.engine), *idle_notes(scene, plan.steps)),
+        notes=(*posed_notes(problem), *idle_notes(scene, plan.steps)),
         failures=(INTERRUPTED,) if stopped else (),
         status=Status.INTERRUPTED if stopped else Status.DONE,
     )

@@ -18,7 +18,7 @@ from seqopt.arrays import Floats, Terse
 from seqopt.placement.ranks import Among, Ranked, ranks_of
 from seqopt.placement.requirements import ChoiceResponses
 from seqopt.placement.scales import NEVER, ROUNDED, SceneFacts
-from seqopt.placement.terms import known, present, scale_of, spell_out
+from seqopt.placement.terms import known, named, present, scale_of, spell_out
 
 
 @dataclass(frozen=True, repr=False)
@@ -194,7 +194,8 @@ class WeightedSum(Terse):
         scaled = tuple(
             (name, weight, scale_of(facts, name, scale)) for name, weight, scale in terms
         )
-        return replace(self, terms=scaled)
+        name = named(self.name, facts, [scale for _, _, scale in terms])
+        return replace(self, name=name, terms=scaled)
 
     def costs(self, responses: ChoiceResponses, bricks: int, choices: int) -> Floats:
         """Return the weighted sums.
@@ -267,7 +268,9 @@ class WorstRatio(Terse):
         WorstRatio
         """
         limits = spell_out(self.limits, facts.robots)
-        return replace(self, limits=tuple((name, scale_of(facts, name, s)) for name, s in limits))
+        name = named(self.name, facts, [scale for _, scale in limits])
+        scaled = tuple((response, scale_of(facts, response, s)) for response, s in limits)
+        return replace(self, name=name, limits=scaled)
 
     def costs(self, responses: ChoiceResponses, bricks: int, choices: int) -> Floats:
         """Return the largest ratios.

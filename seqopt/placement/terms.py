@@ -43,6 +43,23 @@ def scale_of(facts: SceneFacts, response: str, given: float | None) -> float:
     return scales[response] or 1.0  # what every method keeps at zero
 
 
+def named(name: str, facts: SceneFacts, given: Sequence[float | None]) -> str:
+    """Return the name of a criterion, which says where its scales are not those of fixed methods.
+
+    Parameters
+    ----------
+    name : str
+    facts : SceneFacts
+    given : sequence of float or None
+        Its scales before it was posed, None where it takes them from the scene.
+
+    Returns
+    -------
+    str
+    """
+    return name + facts.basis if None in given else name
+
+
 def known(number: Number | None, criterion: str) -> Number:
     """Return a number that must not be open any more.
 

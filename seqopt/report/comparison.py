@@ -14,6 +14,7 @@ from seqopt.errors import ProblemError, StepError
 from seqopt.placement.certificate import least_sum
 from seqopt.placement.costs import TINY
 from seqopt.placement.formulation import formulations
+from seqopt.placement.free_plan import FreePlan
 from seqopt.placement.interface import Aim
 from seqopt.placement.objectives import under_both
 from seqopt.placement.plan import Plan
@@ -126,9 +127,7 @@ def compare(
     progress: Tell = lambda _: None,
     robots: Sequence[str] = (),
 ) -> Comparison:
-    """Analyze every method on an engine's scene and solve its loop by every formulation.
-
-    The loop is that of three robots; of two, where the scene has no third; of those that are named.
+    """Analyze every method on an engine's scene and solve its usual loop by every formulation.
 
     Parameters
     ----------
@@ -139,8 +138,7 @@ def compare(
     progress : callable, optional
         Told how far it is, in a few words or as a `seqopt.work.Stage`.
     robots : sequence of str, optional
-        Names of the robots that take part, in the order of their roles, of which methods take as
-        many as they need; found from reach by default.
+        Of those that take part, as many as a method needs; found from reach by default.
 
     Returns
     -------
@@ -160,20 +158,19 @@ def compare(
     tables |= {name: plan.responses() for name, plan in plans.items()}
     rows |= {name: _row(plan) for name, plan in plans.items()}
     loop = None if problem is None else _facts(problem, rows, robots)
-    judged = {} if problem is None else {problem.schedule.method: problem.criterion}
-    closed = [largest(scene, tables[str(name)]) for name in maxima]
-    free, why_not = free_plan(engine, free_criterion(criterion, closed), robots, progress)
+    own = free_criterion(criterion, [largest(scene, tables[str(name)]) for name in maxima])
+    free, why_not = free_plan(engine, own, robots, progress)
+    notes += [why_not] if why_not else []
     if free is not None:
         tables[FREE], rows[FREE] = free.responses(), free_row(free)
-        judged[FREE] = free.problem.criterion
-    notes += [why_not] if why_not else []
     if problem is not None:
         notes += idle_note(scene, f"{problem.schedule.method} loop", problem.schedule.steps)
     notes += _add_largest(scene, rows, tables)
     notes += [f"In the paper: {text}" for text in IRREGULARITIES if printed is not None]
     table = pd.DataFrame.from_dict(rows, orient="index").reindex(columns=COLUMNS)
     table[RANKS] = table[RANKS].astype(float)
-    return Comparison(maxima, printed, table, tables, loop, tuple(notes), refusal, judged)
+    known = (tuple(notes), refusal, _criteria(problem, free))
+    return Comparison(maxima, printed, table, tables, loop, *known)
 
 
 def _add_largest(
@@ -186,6 +183,12 @@ def _add_largest(
         rows[name].update(largest(scene, steps), overloaded=bool(over))
         notes += [f"{name}: {excess}" for excess in over]
     return notes
+
+
+def _criteria(problem: Problem | None, free: FreePlan | None) -> dict[str, Criterion]:
+    """Return the criteria as they were posed, by problem."""
+    found = {} if problem is None else {problem.schedule.method: problem.criterion}
+    return found if free is None else found | {FREE: free.problem.criterion}
 
 
 def _plans(

@@ -182,16 +182,14 @@ def find_schedule(
 
 def _from_file(network: Network, schedule: object) -> Schedule:
     """Return the schedule of a file, unless it is a name that does not exist or no file at all."""
-    known = (FREE, *SCHEDULES)
+    known = f"{', '.join(SCHEDULES)}, or a CSV file, or {FREE}"
     if not isinstance(schedule, str | Path):
-        raise StepError(
-            f"schedule {short(schedule)}: give a Schedule, a CSV file or one of {', '.join(known)}"
-        )
+        raise StepError(f"schedule {short(schedule)}: give a Schedule, or one of {known}")
     path = Path(schedule)
     if isinstance(schedule, str) and not path.suffix and not path.exists():
         raise StepError(
-            f"schedule {schedule!r} does not exist{did_you_mean(schedule, known)}; give one of "
-            f"{', '.join(known)}, or a CSV file"
+            f"schedule {schedule!r} does not exist{did_you_mean(schedule, (*SCHEDULES, FREE))}; "
+            f"give one of {known}"
         )
     return read_schedule(network, path)
 
