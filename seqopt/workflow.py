@@ -263,7 +263,9 @@ def _open(
     engine: Engine, schedule: Schedule | Path | str | None, options: dict[str, Any]
 ) -> Schedule:
     """Return the schedule with open grips; take out of options what they say of it."""
-    robots, rule = options.pop("robots", ()), options.pop("candidates", None)
+    robots, rule = options.pop("robots", None) or (), options.pop("candidates", None)
+    if isinstance(robots, str) or not isinstance(robots, Sequence):
+        raise ProblemError(f"robots {short(robots)}: give names, as ['rob1', 'rob2']")
     found = find_schedule(engine.network, schedule, robots)
     return found if rule is None else thin(found, rule)
 

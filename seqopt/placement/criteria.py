@@ -109,7 +109,7 @@ class RankSum(Terse):
             after=spell_out(self.after, facts.robots),
             crown=crown,
             delay=0,
-            resolution=resolution,
+            resolution=spell_out(resolution, ()),
         )
 
     def costs(self, responses: ChoiceResponses, bricks: int, choices: int) -> Floats:

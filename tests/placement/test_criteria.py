@@ -27,6 +27,7 @@ class Facts:
     reference: dict[str, float] = field(
         default_factory=lambda: {"F_largest": 7.0, "M_sup": 0.0, "T_max": 5.0, "D_max": 1e-3}
     )
+    basis: str = ""
 
 
 RESPONSES = {
