@@ -30,7 +30,7 @@ from itertools import islice
 
 import numpy as np
 
-from seqopt.errors import InfeasibleError, ProblemError
+from seqopt.errors import InfeasibleError, ProblemError, TimeUpError
 from seqopt.placement.formulation import FormulationKind
 from seqopt.placement.free_paths import TIED
 from seqopt.placement.free_problem import FreeProblem
@@ -135,7 +135,7 @@ def solve(
 
     Raises
     ------
-    InfeasibleError, ProblemError
+    InfeasibleError, ProblemError, TimeUpError
         If no order has a plan; a number is none, or no plan was found by the end of the search.
     """
     if most < 0 or tries < 0:
@@ -147,10 +147,10 @@ def solve(
         if not search.order and isinstance(stop, KeyboardInterrupt):
             raise
         why = "time" if isinstance(stop, _StopError) else "interrupt"
+    if not search.order and why == "time":
+        raise TimeUpError("no order with a plan was found yet; give more")
     if not search.order:
-        raise ProblemError(
-            "options most, tries, seconds: no order was found with a plan; give more"
-        )
+        raise ProblemError("options most, tries: no order was found with a plan; give more")
     bound = min(search.bound, search.value)
     return OrderSelection(search.order, search.value, bound, search.evaluated, why)
 

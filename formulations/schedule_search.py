@@ -31,7 +31,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from seqopt.errors import InfeasibleError, ProblemError
+from seqopt.errors import InfeasibleError, ProblemError, SeqoptError, TimeUpError
 from seqopt.placement.formulation import FormulationKind
 from seqopt.placement.free_goals import Measure
 from seqopt.placement.free_graph import StateGraph, explore
@@ -52,10 +52,11 @@ Watching = Callable[[StateGraph], None]
 class _StopError(Exception):
     """Time or memory that was given is used up; says which."""
 
-    def too_little(self) -> ProblemError:
+    def too_little(self) -> SeqoptError:
         """Return what to say where no plan was found before."""
-        option = {"time": "seconds", "memory": "max_memory"}[str(self)]
-        return ProblemError(f"option {option}: it is too little to find a plan; give more")
+        if str(self) == "time":
+            return TimeUpError("no plan was found yet; give more")
+        return ProblemError("option max_memory: it is too little to find a plan; give more")
 
 
 def solve(
@@ -93,8 +94,8 @@ def solve(
     ------
     InfeasibleError
         If no plan is allowed.
-    ProblemError
-        If the width is not positive, or time or memory is up before any plan is found.
+    ProblemError, TimeUpError
+        If the width is not positive, or memory or time is up before any plan is found.
     """
     if width < 1 or not growth > 1:
         raise ProblemError(

@@ -68,6 +68,10 @@ class SolverError(SeqoptError, ArithmeticError):
     """A numerical method failed to answer; this says nothing about the structure."""
 
 
+class TimeUpError(SolverError):
+    """The time that was given is over before any answer was found; more time may find one."""
+
+
 class MemoryShortError(SeqoptError, MemoryError):
     """There is not enough memory; the text says how much is needed."""
 

@@ -4,21 +4,25 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import fields, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, Literal, overload
 
-from seqopt.engines.registry import make_engine
-from seqopt.errors import ProblemError, did_you_mean
+from seqopt.contact.mortar import Mortar
+from seqopt.engines.interface import Engine
+from seqopt.engines.registry import USUAL, make_engine
+from seqopt.errors import ProblemError
 from seqopt.network.build import build_network
+from seqopt.placement.asked_budgets import parse_budgets, with_budgets
 from seqopt.placement.criteria import WORST_OVER_METHODS
 from seqopt.placement.free_plan import FreePlan
 from seqopt.placement.free_problem import FreeProblem, pose_free
 from seqopt.placement.plan import Plan
-from seqopt.placement.problem import pose
+from seqopt.placement.problem import Problem, pose
 from seqopt.placement.requirements import Criterion, Limit
 from seqopt.placement.solving import solve
-from seqopt.responses.resources import Resources
+from seqopt.placement.standing import Standing
+from seqopt.responses.resources import HERE, Resources
 from seqopt.scene.checks import short
 from seqopt.scene.orders import in_order
 from seqopt.scene.scene import Scene
@@ -26,20 +30,57 @@ from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.free_rules import FREE, FreeRules, with_robots
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.schedule_file import find_schedule
-from seqopt.study.presets import CRITERIA, EQUATIONS
+from seqopt.sequence.thinning import thin
+from seqopt.study.presets import EQUATIONS, find_criterion
 
 RULES = tuple(field.name for field in fields(FreeRules) if field.name != "robots")
-FREE_WORDS = ("aim", "rules", "robots", "stands", *RULES)
-"""Options that the free schedule alone has.
+FREE_WORDS = ("aim", "rules", "stands", *RULES)
+"""Options that the free schedule alone has."""
+LOOP_WORDS = ("budgets", "candidates", "workers", "executor", "cache")
+"""Options that it does not have."""
 
-``robots`` are names, or how many take part: further ones than the scene's are mobile.
-"""
-DEFAULTS: dict[str, tuple[Criterion, str]] = {
-    FREE: (WORST_OVER_METHODS, "schedule_search"),
-    "any other": (EQUATIONS, "overlap_dp"),
+
+@dataclass(frozen=True)
+class Defaults:
+    """What is taken where nothing is asked for, in Python and on the command line alike.
+
+    Attributes
+    ----------
+    criterion : Criterion
+        What a step costs.
+    formulation, with_budgets : str
+        What chooses, without and with budgets.
+    engine : str
+        What computes responses.
+    aim : str
+        What a free schedule is to make as small as possible.
+    """
+
+    criterion: Criterion
+    formulation: str
+    with_budgets: str = ""
+    engine: str = USUAL
+    aim: str = "minmax"
+
+    def chosen_by(self, budgets: object) -> str:
+        """Return the formulation, which has to take budgets where there are any.
+
+        Parameters
+        ----------
+        budgets : sequence
+
+        Returns
+        -------
+        str
+        """
+        return self.with_budgets if budgets else self.formulation
+
+
+DEFAULTS = {
+    FREE: Defaults(WORST_OVER_METHODS, "schedule_search"),
+    "any other": Defaults(EQUATIONS, "overlap_dp", "labels"),
 }
-"""Criterion and formulation by schedule, where none is given."""
-Asked = tuple[Criterion | str | None, str | None, str]  # criterion, formulation, engine
+"""By schedule; of those with open grips the loop of three robots, or of two without a third."""
 
 
 @overload
@@ -48,7 +89,7 @@ def optimize(
     schedule: Literal["free"],
     criterion: Criterion | str | None = None,
     formulation: str | None = None,
-    engine: str = "auto",
+    engine: str = Defaults.engine,
     *,
     limits: Sequence[Limit] = (),
     **options: Any,
@@ -58,10 +99,10 @@ def optimize(
 @overload
 def optimize(
     scene: Scene | str | Path,
-    schedule: Schedule | Path | str = "three-robot",
+    schedule: Schedule | Path | str | None = None,
     criterion: Criterion | str | None = None,
     formulation: str | None = None,
-    engine: str = "auto",
+    engine: str = Defaults.engine,
     *,
     limits: Sequence[Limit] = (),
     **options: Any,
@@ -70,10 +111,10 @@ def optimize(
 
 def optimize(
     scene: Scene | str | Path,
-    schedule: Schedule | Path | str = "three-robot",
+    schedule: Schedule | Path | str | None = None,
     criterion: Criterion | str | None = None,
     formulation: str | None = None,
-    engine: str = "auto",
+    engine: str = Defaults.engine,
     *,
     limits: Sequence[Limit] = (),
     **options: Any,
@@ -84,19 +125,19 @@ def optimize(
     ----------
     scene : Scene, str or pathlib.Path
         The scene, the name of a built-in scene, a few words, or a scene file.
-    schedule : Schedule, pathlib.Path or str
+    schedule : Schedule, pathlib.Path or str, optional
         The schedule, its file, a name in `seqopt.sequence.three_robots.SCHEDULES`, or ``"free"``.
     criterion : Criterion or str, optional
-        What a step costs, or a name in `seqopt.CRITERIA`; by default that of `DEFAULTS`.
+        What a step costs, or a name in `seqopt.CRITERIA`.
     formulation : str, optional
-        A name in `seqopt.formulations`, or for the free schedule; by default that of `DEFAULTS`.
+        A name in `seqopt.formulations`; here and above, `DEFAULTS` say what is taken otherwise.
     engine : str
         A name in `seqopt.engines.registry.ENGINES`; ``"auto"`` uses the simplest sufficient model.
     limits : sequence of Limit
-        Bounds that no step with an open grip may exceed; in the free schedule, no step at all.
+        Bounds that no step may exceed, whether or not a grip is open in it.
     **options
-        Options of `seqopt.solve`, the formulation and `seqopt.responses.Resources` (``workers=2``);
-        an ``order``; if free, ``robots``, and options of `seqopt.FreeRules`, `seqopt.pose_free`.
+        Of `seqopt.solve`, the formulation, `seqopt.responses.Resources`, if free of `FreeRules` and
+        `pose_free`; ``order``, ``mortar``, ``robots``; ``budgets``, ``candidates`` in words.
 
     Returns
     -------
@@ -105,7 +146,7 @@ def optimize(
     Raises
     ------
     SeqoptError
-        With one line that says what to change; see `seqopt.errors`.
+        With one line that says what to change.
 
     Examples
     --------
@@ -113,68 +154,136 @@ def optimize(
     >>> seqopt.optimize("arch25", "free", "worst-ratio-published", aim="minmax,steps")
     FreePlan('arch25', 50 steps, minmax 0.840088, steps 50, optimal)
     """
+    usual = DEFAULTS[_kind(schedule)].chosen_by(options.get("budgets"))
+    problem, assemble = _pose(scene, schedule, (criterion, engine), limits, options)
+    plan = solve(problem, formulation or usual, **options)
+    return replace(plan, seconds={"assemble": assemble, **plan.seconds})
+
+
+def _kind(schedule: object) -> str:
+    """Return which of `DEFAULTS` are those of a schedule."""
+    return FREE if isinstance(schedule, str) and schedule == FREE else "any other"
+
+
+def _pose(
+    scene: Scene | str | Path,
+    schedule: Schedule | Path | str | None,
+    asked: tuple[Criterion | str | None, str],
+    limits: Sequence[Limit],
+    options: dict[str, Any],
+) -> tuple[Problem | FreeProblem, float]:
+    """Return the problem, and the seconds to it; what options say of it is taken out of them."""
+    start = time.perf_counter()
     found = load_scene(scene) if isinstance(scene, str | Path) else scene
-    made = in_order(found, options.pop("order", None))
-    if isinstance(schedule, str) and schedule == FREE:
-        return _optimize_free(made, (criterion, formulation, engine), limits, options)
-    return _optimize(made, schedule, (criterion, formulation, engine), limits, options)
+    made, free = in_order(found, options.pop("order", None)), _kind(schedule) == FREE
+    if free:
+        _refuse(options, LOOP_WORDS, "the free schedule has no such option; leave it out")
+        if isinstance(options.get("robots"), int):
+            made = with_robots(made, options.pop("robots"))
+    else:
+        _refuse(options, FREE_WORDS, f"only the free schedule has it; give schedule={FREE!r}")
+    engine = make_engine(asked[1], build_network(made), options.pop("mortar", None))
+    problem: Problem | FreeProblem
+    if free:
+        problem = posed_free(engine, asked[0], limits=limits, **_free_words(options))
+    else:
+        opened = _open(engine, schedule, options)
+        problem = posed(engine, opened, asked[0], limits, *_means(options))
+    return problem, time.perf_counter() - start
 
 
-def _optimize(
-    scene: Scene,
-    schedule: Schedule | Path | str,
-    asked: Asked,
-    limits: Sequence[Limit],
-    options: dict[str, Any],
-) -> Plan:
-    """Return the plan of a schedule with open grips."""
-    start, (criterion, formulation) = time.perf_counter(), DEFAULTS["any other"]
-    _refuse(options, FREE_WORDS, f"only the free schedule has it; give schedule={FREE!r}")
-    network = build_network(scene)
-    engine, found = make_engine(asked[2], network), find_schedule(network, schedule)
-    chosen, resources = find_criterion(asked[0] or criterion), _resources(options)
-    problem = pose(engine, found, chosen, limits, (), resources)
-    assemble = time.perf_counter() - start
-    plan = solve(problem, asked[1] or formulation, **options)
-    return replace(plan, seconds={"assemble": assemble, **plan.seconds})
+def posed(
+    engine: Engine,
+    schedule: Schedule,
+    criterion: Criterion | str | None = None,
+    limits: Sequence[Limit] = (),
+    budgets: Sequence[str] = (),
+    resources: Resources = HERE,
+) -> Problem:
+    """Return the problem of a schedule with open grips, by what people say of it.
+
+    Parameters
+    ----------
+    engine : Engine
+        What computes responses; it has the scene.
+    schedule : Schedule
+        With the grips that are open.
+    criterion : Criterion or str, optional
+        As of `optimize`.
+    limits : sequence of Limit, optional
+        As of `seqopt.pose`.
+    budgets : sequence of str, optional
+        Caps on totals over the build, as of `seqopt.placement.asked_budgets.parse_budgets`.
+    resources : Resources, optional
+        What the computation may use.
+
+    Returns
+    -------
+    Problem
+    """
+    asked = parse_budgets(budgets)
+    chosen = find_criterion(criterion or DEFAULTS["any other"].criterion)
+    counted = [budget.response for budget in asked if budget.response]
+    return with_budgets(pose(engine, schedule, chosen, limits, counted, resources), asked)
 
 
-def _optimize_free(
-    scene: Scene, asked: Asked, limits: Sequence[Limit], options: dict[str, Any]
-) -> FreePlan:
-    """Return the plan of the free schedule."""
-    start, (criterion, formulation) = time.perf_counter(), DEFAULTS[FREE]
-    problem = _pose_free(scene, (asked[0] or criterion, asked[2]), limits, options)
-    assemble = time.perf_counter() - start
-    plan = solve(problem, asked[1] or formulation, **options)
-    return replace(plan, seconds={"assemble": assemble, **plan.seconds})
-
-
-def _pose_free(
-    scene: Scene,
-    asked: tuple[Criterion | str, str],
-    limits: Sequence[Limit],
-    options: dict[str, Any],
+def posed_free(
+    engine: Engine,
+    criterion: Criterion | str | None = None,
+    aim: str | None = None,
+    *,
+    rules: FreeRules | None = None,
+    limits: Sequence[Limit] = (),
+    stands: Standing | Mortar | str | None = None,
 ) -> FreeProblem:
-    """Return the problem of a free schedule; what options say of it is taken out of them."""
-    own = [field.name for field in fields(Resources) if field.name != "max_memory"]
-    _refuse(options, own, "the free schedule has no such option; leave it out")
-    aim, stands = options.pop("aim", "minmax"), options.pop("stands", None)
-    rules, robots = _rules(options), options.pop("robots", ())
-    if isinstance(robots, int):
-        scene = with_robots(scene, robots)
-    elif robots:
-        rules = replace(rules, robots=robots)
-    engine = make_engine(asked[1], build_network(scene))
-    return pose_free(engine, rules, find_criterion(asked[0]), aim, limits, stands)
+    """Return the problem of a free schedule, by what people say of it.
+
+    Parameters
+    ----------
+    engine : Engine
+        What computes responses; it has the scene.
+    criterion : Criterion or str, optional
+        As of `optimize`.
+    aim : str, optional
+        What is to be as small as possible.
+    rules : FreeRules, optional
+    limits, stands : optional
+        As of `seqopt.pose_free`.
+
+    Returns
+    -------
+    FreeProblem
+    """
+    usual = DEFAULTS[FREE]
+    chosen = find_criterion(criterion or usual.criterion)
+    return pose_free(engine, rules or FreeRules(), chosen, aim or usual.aim, limits, stands)
 
 
-def _rules(options: dict[str, Any]) -> FreeRules:
-    """Take out of options what they say of the rules of a free schedule."""
+def _open(
+    engine: Engine, schedule: Schedule | Path | str | None, options: dict[str, Any]
+) -> Schedule:
+    """Return the schedule with open grips; take out of options what they say of it."""
+    robots, rule = options.pop("robots", None) or (), options.pop("candidates", None)
+    if isinstance(robots, str) or not isinstance(robots, Sequence):
+        raise ProblemError(f"robots {short(robots)}: give names, as ['rob1', 'rob2']")
+    found = find_schedule(engine.network, schedule, robots)
+    return found if rule is None else thin(found, rule)
+
+
+def _means(options: dict[str, Any]) -> tuple[Sequence[str], Resources]:
+    """Take out of options what they say of budgets and resources."""
+    given = {field.name for field in fields(Resources)} & options.keys()
+    return options.pop("budgets", ()), Resources(**{name: options.pop(name) for name in given})
+
+
+def _free_words(options: dict[str, Any]) -> dict[str, Any]:
+    """Take out of options what they say of the problem of a free schedule."""
     rules = options.pop("rules", FreeRules())
     if not isinstance(rules, FreeRules):
         raise ProblemError(f"rules {short(rules)}: give a seqopt.FreeRules")
-    return replace(rules, **{name: options.pop(name) for name in RULES if name in options})
+    given = {name: options.pop(name) for name in ("robots", *RULES) if name in options}
+    words = {name: options.pop(name, None) for name in ("aim", "stands")}
+    return {**words, "rules": replace(rules, **given)}
 
 
 def _refuse(options: dict[str, Any], names: Sequence[str], why: str) -> None:
@@ -182,36 +291,3 @@ def _refuse(options: dict[str, Any], names: Sequence[str], why: str) -> None:
     for name in names:
         if name in options:
             raise ProblemError(f"option {name}: {why}")
-
-
-def _resources(options: dict[str, Any]) -> Resources:
-    """Take out of options what they say of resources."""
-    given = {field.name for field in fields(Resources)} & options.keys()
-    return Resources(**{name: options.pop(name) for name in given})
-
-
-def find_criterion(criterion: Criterion | str) -> Criterion:
-    """Return a criterion, by name or itself.
-
-    Parameters
-    ----------
-    criterion : Criterion or str
-        A criterion, or a name of `seqopt.CRITERIA`.
-
-    Returns
-    -------
-    Criterion
-
-    Raises
-    ------
-    ProblemError
-        If there is none of that name.
-    """
-    if not isinstance(criterion, str):
-        return criterion
-    if criterion not in CRITERIA:
-        raise ProblemError(
-            f"criterion {criterion!r} does not exist{did_you_mean(criterion, CRITERIA)}; give "
-            f"one of {', '.join(CRITERIA)}"
-        )
-    return CRITERIA[criterion]

@@ -15,6 +15,7 @@ from seqopt.engines.planar import PlanarEngine
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import SeqoptError
 from seqopt.placement.certificate import judge
+from seqopt.placement.criteria import RankSum, WeightedSum, WorstRatio
 from seqopt.placement.fitting import require_fit
 from seqopt.scene.parts import Robot
 from seqopt.scene.reach import Anywhere
@@ -69,7 +70,28 @@ def test_what_is_meant_is_taken(tmp_path):
     assert len(seqopt.read_plan(SCENE, str(tmp_path / "plan.csv"))) == 1  # type: ignore[arg-type]
 
 
+WEIGHTS, SCALES = (("T_max", 0.0, 1.0),), (("T_max", 1.0, 0.0),)
+COARSE = RankSum("own", (("T_max", 1.0),), (("T_max", 1.0),), resolution=(("T", 0.0),))
+
 WRONG = {
+    "limits 'payload': give values": lambda: seqopt.optimize(SCENE, limits="payload"),
+    "limits 'payload': give": lambda: seqopt.optimize(SCENE, "free", limits="payload"),
+    "limits [5]: give values": lambda: seqopt.pose(ENGINE, LOOP, EQUATIONS, [5]),
+    "schedule 5: give a Schedule": lambda: seqopt.optimize(SCENE, 5),
+    "cache is 5; give the path of a folder": lambda: seqopt.optimize(SCENE, cache=5),
+    "cache is ''; give the path": lambda: seqopt.optimize(SCENE, cache=""),
+    "robots 5: give names": lambda: seqopt.optimize(SCENE, robots=5),
+    "robots 'rob1': give names": lambda: seqopt.optimize(SCENE, robots="rob1"),
+    "aims 5: give goals": lambda: seqopt.optimize(SCENE, "free", aim=5),
+    "T_max has the weight, scale or rounding 0.0; give a positive number": lambda: seqopt.optimize(
+        SCENE, criterion=WeightedSum("own", WEIGHTS)
+    ),
+    "the weight, scale or rounding 0.0": lambda: seqopt.optimize(
+        SCENE, "free", WeightedSum("own", SCALES)
+    ),
+    "T has the weight, scale or rounding 0.0": lambda: seqopt.optimize(SCENE, criterion=COARSE),
+    "rounding -1.0": lambda: seqopt.pose(ENGINE, LOOP, WorstRatio("own", (("T_max", -1.0),))),
+    "a criterion of no response": lambda: seqopt.pose(ENGINE, LOOP, WeightedSum("own", ())),
     "a float is not a network": lambda: ComplianceEngine(3.0),
     "a str is not a network": lambda: seqopt.sequential("arch25"),
     "a NoneType is not a network": lambda: seqopt.make_engine("auto", None),

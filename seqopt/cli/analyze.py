@@ -33,6 +33,7 @@ from seqopt.cli.status import Status
 from seqopt.cli.steps_arguments import asked_steps, steps_arguments
 from seqopt.cli.values import parse_time_limit
 from seqopt.engines.interface import Fields
+from seqopt.engines.provenance import provenance
 from seqopt.files import csv_text, write_bytes, write_csv
 from seqopt.network.build import build_network
 from seqopt.responses.linear_range import LinearRange
@@ -123,7 +124,12 @@ def run(options: argparse.Namespace) -> Answer:
     if options.out is not None:
         write_csv(options.out, table)
     answer = Answer(
-        facts={"scene": scene_facts(scene), "units": UNITS, "steps": table},
+        facts={
+            "scene": scene_facts(scene),
+            "units": UNITS,
+            "steps": table,
+            **provenance(engine),
+        },
         text="" if options.out is None else _said(table, options.out),
         data=csv_text(table) if options.out is None else "",
         written=tuple(written),

@@ -19,7 +19,10 @@ from seqopt.engines.registry import make_engine
 from seqopt.errors import ProblemError, SceneError
 from seqopt.interrupts import ending
 from seqopt.network.network import Network
+from seqopt.placement.free_problem import FreeProblem
+from seqopt.placement.problem import Problem
 from seqopt.placement.promises import overloads
+from seqopt.placement.scales import OWN
 from seqopt.responses.linear_range import OUTSIDE, REMEDY
 from seqopt.responses.staged import staged_fields
 from seqopt.responses.table import step_fields
@@ -108,6 +111,23 @@ def level_notes(engine: Engine) -> tuple[str, ...]:
         for choice, sets in engine.tally.items()
     ]
     return (*said, *([f"engine: {engine.unchecked}"] if engine.unchecked else []))
+
+
+def posed_notes(problem: Problem | FreeProblem) -> tuple[str, ...]:
+    """Return which levels the engine took, and whether scales are not those of fixed methods.
+
+    Parameters
+    ----------
+    problem : Problem or FreeProblem
+
+    Returns
+    -------
+    tuple of str
+    """
+    said, name = level_notes(problem.engine), problem.criterion.name
+    if not name.endswith(OWN):
+        return said
+    return (*said, f"criterion: {name}: no fixed method builds this scene to take scales from")
 
 
 def idle_notes(scene: Scene, steps: Sequence[AnyStep]) -> tuple[str, ...]:

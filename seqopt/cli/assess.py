@@ -15,6 +15,7 @@ from seqopt.cli.status import Status
 from seqopt.cli.steps_arguments import asked_steps, steps_arguments
 from seqopt.cli.values import parse_mortar
 from seqopt.contact.mortar import MORTARS
+from seqopt.engines.provenance import versions
 from seqopt.files import csv_text, write_csv
 from seqopt.network.build import build_network
 from seqopt.stability.assessment import Verdict
@@ -97,6 +98,7 @@ def run(options: argparse.Namespace) -> Answer:
         facts={
             "scene": scene_facts(scene),
             "mortar": asdict(mortar),
+            "versions": versions(),
             "verdicts": {verdict.value: verdicts.count(verdict) for verdict in Verdict},
             "steps": table,
         },

@@ -11,6 +11,7 @@ from seqopt.placement.ranks import Among, Ranked
 from seqopt.scene.orders import ORDERS
 from seqopt.scene.scene_file import builtin_scenes
 from seqopt.study.presets import CRITERIA
+from seqopt.workflow import Defaults
 
 Takes: TypeAlias = argparse._ActionsContainer  # a parser, or a group of its arguments
 
@@ -66,11 +67,11 @@ def engine_arguments(takes: Takes) -> None:
     takes.add_argument(
         "--engine",
         choices=tuple(ENGINES),
-        default="compliance",
-        help="what computes responses: compliance: exactly rigid bricks, fast (default); planar: "
-        "the same with three unknowns per brick, where all lies in a plane; frame: stiff bars, a "
-        "slow independent check; discrete: joints that open and slip; auto: the cheapest of "
-        "planar, compliance and discrete that is enough",
+        default=Defaults.engine,
+        help="what computes responses (default: %(default)s): compliance: exactly rigid bricks, "
+        "fast; planar: the same with three unknowns per brick, where all lies in a plane; frame: "
+        "stiff bars, a slow independent check; discrete: joints that open and slip; auto: the "
+        "cheapest of planar, compliance and discrete that is enough",
     )
     takes.add_argument(
         "--mortar",
@@ -192,6 +193,6 @@ def limit_argument(takes: Takes) -> None:
         action="append",
         default=[],
         metavar="LIMIT",
-        help="no open step may exceed it: payload (of every robot), or RESPONSE=VALUE in SI units, "
-        "as F_largest=300; may be repeated",
+        help="no step may exceed it, whether or not a grip is open in it: payload (of every "
+        "robot), or RESPONSE=VALUE in SI units, as F_largest=300; may be repeated",
     )

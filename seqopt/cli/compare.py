@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 from pathlib import Path
 
 import pandas as pd
@@ -22,9 +23,9 @@ from seqopt.cli.compare_text import printed_largest, tell_comparison
 from seqopt.cli.criteria import asked_criterion
 from seqopt.cli.facts import scene_facts
 from seqopt.cli.layout import wrapped
-from seqopt.cli.outputs import comparison_files, figure_notes, write_outputs
+from seqopt.cli.outputs import comparison_files, figure_notes, require_out, write_outputs
 from seqopt.cli.values import parse_robots
-from seqopt.files import require_folder
+from seqopt.engines.provenance import provenance
 from seqopt.network.build import build_network
 from seqopt.report.comparison import Comparison, compare
 from seqopt.report.plan_pages import PAGE, comparison_page
@@ -86,9 +87,9 @@ def run(options: argparse.Namespace) -> Answer:
     scene = asked_scene(options)
     engine = asked_engine(options, build_network(scene))
     criterion = asked_criterion(options)
-    if options.out is not None:
-        require_folder(options.out)
+    require_out(options)
     result = compare(engine, criterion, options.tell, parse_robots(options.robots))
+    about = {"scene": scene.name, "criteria": _criteria(result), **provenance(engine)}
     told = tell_comparison(result, scene, criterion)
     blocks = [told.text]
     if options.details:
@@ -96,16 +97,15 @@ def run(options: argparse.Namespace) -> Answer:
     written: tuple[Path, ...] = ()
     if options.out is not None:
         options.tell("drawing figures")
-        files = comparison_files(result)
-        options.tell("writing the page")
-        write_outputs(options, files | {PAGE: comparison_page(engine, result)})
-        written = (options.out,)
+        files = comparison_files(result) | {"summary.json": json.dumps(about, indent=2) + "\n"}
+        page = {PAGE: comparison_page(engine, result)}
+        written = write_outputs(options, lambda: files | page)
         blocks.append(_where(options.out))
     else:
         more = "" if options.details else "; --details shows more here"
         blocks.append(wrapped(f"--out DIR writes tables, figures and a step viewer{more}."))
     answer = Answer(
-        facts={"scene": scene_facts(scene), "criterion": criterion.name, **_facts(result)},
+        facts={**about, "scene": scene_facts(scene), "criterion": criterion.name, **_facts(result)},
         text="\n\n".join(blocks),
         headings=told.headings,
         written=written,
@@ -120,8 +120,17 @@ def _where(folder: Path) -> str:
     return (
         f"written to {folder}\n"
         f"  {PAGE}: every build step by step; open it in a browser\n"
-        "  comparison.csv: a row per way to build; steps_NAME.csv: a row per step of each"
+        "  comparison.csv: a row per way to build; steps_NAME.csv: a row per step of each\n"
+        "  summary.json: the criteria with their numbers, the engine, and versions of packages"
     ) + ("" if figure_notes() else "\n  *.png, *.svg: the figures")
+
+
+def _criteria(result: Comparison) -> dict[str, object]:
+    """Return the criteria of the rows that have an objective, with all of their numbers."""
+    return {
+        problem: {"criterion": criterion.name, **criterion.settings}
+        for problem, criterion in result.criteria.items()
+    }
 
 
 def _facts(result: Comparison) -> dict[str, object]:

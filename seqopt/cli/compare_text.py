@@ -9,11 +9,13 @@ import numpy as np
 import pandas as pd
 
 from seqopt.cli.layout import wrapped
+from seqopt.placement.criteria import RankSum
 from seqopt.placement.formulation import FormulationKind, formulations
 from seqopt.placement.requirements import Criterion
 from seqopt.report.comparison import CLOSED, Comparison
 from seqopt.scene.scene import Scene
 from seqopt.sequence.free_rules import FREE
+from seqopt.study.published import PUBLISHED
 
 NAME = 21  # columns of a name
 RESPONSES = {
@@ -177,11 +179,11 @@ def _known(value: float, width: int, form: str) -> str:
 
 def _about_choices(comparison: Comparison, criterion: Criterion) -> str:
     said = (
-        f"Objective: what the criterion {criterion.name} adds up to over all steps; of minimax its "
-        "largest step, of the free schedule the worst response over what the fixed sequences "
-        "reach. Only rows under one heading, and of one aim, compete. Gap: how far the objective "
-        "is above the proven optimum of that aim. Models: how many partial structures with "
-        f"different grips it looks at{_counted(comparison)}. Seconds: to choose and to check"
+        f"Objective: what the criterion {criterion.name} adds up to over all steps; "
+        f"{_of_steps(comparison, criterion)}. Only rows under one heading, and of one aim, "
+        "compete. Gap: how far the objective is above the proven optimum of that aim. Models: "
+        f"how many partial structures with different grips it looks at{_counted(comparison)}. "
+        "Seconds: to choose and to check"
     )
     if comparison.loop is not None:
         seconds = comparison.loop.seconds
@@ -190,6 +192,17 @@ def _about_choices(comparison: Comparison, criterion: Criterion) -> str:
             f"{seconds['respond']:.2f} s more and their ranks {seconds['rank']:.2f} s"
         )
     return wrapped(said + ".")
+
+
+def _of_steps(comparison: Comparison, criterion: Criterion) -> str:
+    """Return what the objective is of aims that are about the worst step, in words."""
+    if not isinstance(criterion, RankSum):
+        return "of minimax and the free schedule its largest step"
+    known = "the fixed sequences" + (" and the published plan" * (PUBLISHED in comparison.tables))
+    return (
+        "of minimax its largest step, of the free schedule, which has no ranks, its worst response "
+        f"over the least that {known} reach"
+    )
 
 
 def _counted(comparison: Comparison) -> str:

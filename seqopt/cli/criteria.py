@@ -12,7 +12,8 @@ from seqopt.placement.criteria import RankSum
 from seqopt.placement.ranks import Among, Ranked
 from seqopt.placement.requirements import Criterion
 from seqopt.placement.scales import NEVER
-from seqopt.study.presets import CRITERIA, EQUATIONS
+from seqopt.study.presets import CRITERIA
+from seqopt.workflow import DEFAULTS
 
 BETWEEN = re.compile(r",(?![^\[]*\])")  # a comma that is not in brackets
 
@@ -29,7 +30,8 @@ def asked_criterion(options: argparse.Namespace) -> Criterion:
     -------
     Criterion
     """
-    criterion = parse_criterion(options.criteria or EQUATIONS.name, options.crown)
+    usual = DEFAULTS["any other"].criterion.name
+    criterion = parse_criterion(options.criteria or usual, options.crown)
     return rank_otherwise(criterion, options.ranked, options.among)
 
 

@@ -11,7 +11,7 @@ from seqopt.cli.asked import (
     asked_scene,
     exceeded,
     idle_notes,
-    scene_file,
+    posed_notes,
     strictly,
 )
 from seqopt.cli.criteria import parse_criterion
@@ -19,23 +19,19 @@ from seqopt.cli.facts import scene_facts
 from seqopt.cli.free_files import free_files
 from seqopt.cli.means import parse_size
 from seqopt.cli.order import SEARCH, optimize_order
-from seqopt.cli.outputs import write_outputs, written_to
+from seqopt.cli.outputs import require_out, write_outputs, written_to
 from seqopt.cli.rules import parse_rules, parse_standing
 from seqopt.cli.status import Status
 from seqopt.cli.values import parse_limits, parse_numbers, parse_robots, parse_time_limit
-from seqopt.errors import ProblemError, StepError, did_you_mean
-from seqopt.files import require_folder
+from seqopt.errors import ProblemError, StepError
 from seqopt.network.build import build_network
-from seqopt.placement.criteria import WORST_OVER_METHODS
-from seqopt.placement.formulation import formulation_names
 from seqopt.placement.free_plan import FreePlan
-from seqopt.placement.free_problem import FreeProblem, pose_free
-from seqopt.placement.requirements import Criterion
+from seqopt.placement.free_problem import FreeProblem
 from seqopt.placement.schedule_formulation import find_schedule_formulation
 from seqopt.placement.solving import solve
 from seqopt.scene.scene import Scene
 from seqopt.sequence.free_rules import FREE, with_robots
-from seqopt.sequence.three_robots import SCHEDULES
+from seqopt.workflow import DEFAULTS, posed_free
 
 
 def optimize_free(options: argparse.Namespace) -> Answer:
@@ -53,29 +49,27 @@ def optimize_free(options: argparse.Namespace) -> Answer:
     _require_free(options)
     if options.order == SEARCH:
         options.order = None
-        return optimize_order(options, posed_free(options, options.aim or "minmax")[1])
-    formulation = find_schedule_formulation(options.formulation or "schedule_search")
+        return optimize_order(options, asked_free(options)[1])
+    formulation = find_schedule_formulation(options.formulation or DEFAULTS[FREE].formulation)
     numbers = parse_numbers("--option", options.option, formulation.options)
-    scene, problem = posed_free(options, options.aim or "minmax")
-    require_folder(options.out)
+    scene, problem = asked_free(options)
+    require_out(options)
     whole = {name: type(formulation.options[name])(value) for name, value in numbers.items()}
     limit = parse_time_limit(options.time_limit)
     if options.max_memory is not None:
         whole["max_memory"] = parse_size(options.max_memory)
     how: dict[str, Any] = {"proof": not options.no_proof, "lazy": options.lazy, **whole}
     plan = solve(problem, formulation, time_limit=limit, progress=options.tell, **how)
-    options.tell("writing the plan")
-    table = plan.responses()
+    table, report = plan.responses(), plan.summary()
     said = f"{', '.join(map(str, problem.goals))}; {plan.status}"
-    files = free_files(plan, plan.summary(), "free schedule", said)
-    write_outputs(options, files | scene_file(scene))
+    written = write_outputs(options, lambda: free_files(plan, report, "free schedule", said))
     stopped = plan.selection.stopped == "interrupt"
     over = () if stopped else exceeded(scene, table)
     answer = Answer(
-        facts={"scene": scene_facts(scene), "summary": plan.summary(), "plan": table},
+        facts={"scene": scene_facts(scene), "summary": report, "plan": table},
         text="\n".join([_said(plan, options), *(f"payload exceeded: {each}" for each in over)]),
-        written=(options.out,),
-        notes=idle_notes(scene, plan.steps),
+        written=written,
+        notes=(*posed_notes(problem), *idle_notes(scene, plan.steps)),
         status=Status.INTERRUPTED if stopped else Status.DONE,
     )
     return strictly(answer, options, over, plan.departures)
@@ -101,18 +95,12 @@ def require_loop(options: argparse.Namespace) -> None:
     Raises
     ------
     ProblemError
-        Naming the option, or the formulation that is missing.
+        Naming the option.
     """
     free = ("aim", "rule", "stands", "tilt", "friction")
     for name, given in ((f"--{word}", getattr(options, word)) for word in free):
         if given:
             raise ProblemError(f"{name}: only the free schedule has it; give --schedule {FREE}")
-    if options.formulation is None:
-        known = ", ".join(formulation_names())
-        meant = (*SCHEDULES, FREE)
-        if options.schedule not in meant and (hint := did_you_mean(options.schedule, meant)):
-            raise ProblemError(f"--schedule {options.schedule} does not exist{hint}")
-        raise ProblemError(f"--formulation: it is missing; give one of {known}")
 
 
 def _require_free(options: argparse.Namespace) -> None:
@@ -126,15 +114,13 @@ def _require_free(options: argparse.Namespace) -> None:
         )
 
 
-def posed_free(options: argparse.Namespace, aim: str) -> tuple[Scene, FreeProblem]:
+def asked_free(options: argparse.Namespace) -> tuple[Scene, FreeProblem]:
     """Return the scene with its robots, and the problem of its free schedule.
 
     Parameters
     ----------
     options : argparse.Namespace
         Of the command ``optimize`` or ``pareto``.
-    aim : str
-        What is to be small, in words.
 
     Returns
     -------
@@ -148,9 +134,11 @@ def posed_free(options: argparse.Namespace, aim: str) -> tuple[Scene, FreeProble
     if options.schedule != FREE and (options.rule or options.robots.isdecimal()):
         raise StepError(f"--schedule {options.schedule}: rules and a count of robots go with free")
     rules = parse_rules(options.rule, names if options.schedule == FREE else ())
-    criterion: Criterion = WORST_OVER_METHODS
+    criterion = None
     if options.criteria is not None:
         criterion = parse_criterion(options.criteria, options.crown)
     engine = asked_engine(options, build_network(scene))
-    limits = parse_limits(options.limit, scene)
-    return scene, pose_free(engine, rules, criterion, aim, limits, parse_standing(options))
+    limits, stands = parse_limits(options.limit, scene), parse_standing(options)
+    return scene, posed_free(
+        engine, criterion, options.aim, rules=rules, limits=limits, stands=stands
+    )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 
+from seqopt.cli.asked import scene_file
 from seqopt.files import csv_text
 from seqopt.placement.free_plan import FreePlan
 from seqopt.report.plan_pages import PAGE, plan_page
@@ -39,4 +40,4 @@ def free_files(
         files["stability.csv"] = csv_text(verdicts)
         stands = [str(verdict) for verdict in verdicts["verdict"]]
     files[PAGE] = plan_page(plan.problem.engine, name, table, said, stands)
-    return files
+    return files | scene_file(plan.problem.network.scene)

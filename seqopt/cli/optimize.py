@@ -5,10 +5,11 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Mapping
+from dataclasses import replace
 
 from seqopt.cli import optimize_arguments
 from seqopt.cli.answer import Answer
-from seqopt.cli.asked import exceeded, idle_notes, level_notes, strictly
+from seqopt.cli.asked import exceeded, idle_notes, posed_notes, strictly
 from seqopt.cli.facts import scene_facts
 from seqopt.cli.free import optimize_free, require_loop
 from seqopt.cli.outputs import plan_files, worth, write_outputs, written_to
@@ -25,6 +26,7 @@ from seqopt.sequence.free_rules import FREE
 from seqopt.sequence.schedule import Schedule
 from seqopt.study.published import paper_models
 from seqopt.work.progress import within
+from seqopt.workflow import DEFAULTS
 
 DESCRIPTION = (
     "Choose where robots hold, over all steps of a sequence, by one formulation; or, with "
@@ -32,15 +34,15 @@ DESCRIPTION = (
     "plan, selection, responses, summary and a page for the browser are written."
 )
 USAGE = (
-    "[SCENE] --formulation NAME --out DIR [other options]",
-    "[SCENE] --schedule free --out DIR [other options]",
-    "[SCENE] --robust AIM --out DIR [other options]",
+    "[SCENE] [--formulation NAME] [--out DIR] [other options]",
+    "[SCENE] --schedule free [--out DIR] [other options]",
+    "[SCENE] --robust AIM [--out DIR] [other options]",
 )
 EXAMPLES = (
-    "seqopt optimize arch25 --formulation overlap_dp --out best",
+    "seqopt optimize arch25 --out best",
     "seqopt optimize arch25 --schedule free --out free",
     "seqopt optimize wall:columns=6,courses=4 --schedule free --out wall",
-    "seqopt optimize my.json --formulation overlap_dp --limit payload --out mine",
+    "seqopt optimize my.json --formulation minimax --limit payload --out mine",
     "seqopt optimize arch25 --robust worst-peak --out robust",
 )
 INTERRUPTED = "seqopt: interrupted; the plan is the best that was met"
@@ -65,7 +67,9 @@ def run(options: argparse.Namespace) -> Answer:
     if options.schedule == FREE:
         return optimize_free(options)
     require_loop(options)
-    formulation = find_formulation(options.formulation)
+    formulation = find_formulation(
+        options.formulation or DEFAULTS["any other"].chosen_by(options.budget)
+    )
     chosen = parse_options(formulation, options.option)
     limit = parse_time_limit(options.time_limit)
     how = {"proof": not options.no_proof, "lazy": options.lazy}
@@ -74,15 +78,18 @@ def run(options: argparse.Namespace) -> Answer:
     assemble = time.perf_counter() - start
     tell = within(options.tell, limit)
     plan = solve(problem, formulation, **how, time_limit=limit, progress=tell, **chosen)
-    options.tell("writing the plan")
     report = plan.summary() | {
         "models_paper_count": _paper_count(problem.schedule),
         "seconds": {"assemble": assemble, **plan.seconds},
     }
-    page = plan_page(problem.engine, formulation.name, plan.responses(), worth(plan))
-    files = plan_files(plan, problem.schedule.scene, report)
-    write_outputs(options, files | {PAGE: page})
-    return _answer(options, problem, plan, report)
+    written = write_outputs(options, lambda: _files(plan, report))
+    return replace(_answer(options, problem, plan, report), written=written)
+
+
+def _files(plan: Plan, report: Mapping[str, object]) -> dict[str, bytes | str]:
+    """Return what is written, by file name."""
+    page = plan_page(plan.engine, plan.formulation.name, plan.responses(), worth(plan))
+    return plan_files(plan, plan.engine.network.scene, report) | {PAGE: page}
 
 
 def _answer(
@@ -99,8 +106,7 @@ def _answer(
     answer = Answer(
         facts={"scene": scene_facts(scene), "summary": report, "plan": table},
         text="\n".join([said, *(f"payload exceeded: {excess}" for excess in over)]),
-        written=(options.out,),
-        notes=(*level_notes(problem.engine), *idle_notes(scene, plan.steps)),
+        notes=(*posed_notes(problem), *idle_notes(scene, plan.steps)),
         failures=(INTERRUPTED,) if stopped else (),
         status=Status.INTERRUPTED if stopped else Status.DONE,
     )

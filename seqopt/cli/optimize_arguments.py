@@ -21,6 +21,9 @@ from seqopt.cli.free_arguments import add_rules
 from seqopt.placement.formulation import formulation_names
 from seqopt.sequence.free_rules import FREE
 from seqopt.sequence.three_robots import SCHEDULES
+from seqopt.workflow import DEFAULTS
+
+_USUAL = DEFAULTS["any other"]
 
 
 def add_arguments(command: argparse.ArgumentParser) -> None:
@@ -50,19 +53,22 @@ def _basic(takes: Takes) -> None:
     takes.add_argument(
         "--formulation",
         metavar="NAME",
-        help=f"which mathematical program chooses: {', '.join(formulation_names())}; overlap_dp "
-        "is exact and the fastest; --schedule free and --robust have their own",
+        help=f"which mathematical program chooses: {', '.join(formulation_names())} (default: "
+        f"{_USUAL.formulation}, which is exact and the fastest, or {_USUAL.with_budgets} with "
+        "--budget); --schedule free and --robust have their own",
     )
     takes.add_argument(
         "--schedule",
-        default=next(iter(SCHEDULES)),
         metavar="NAME|FILE",
         help=f"which sequence has the open grips: {', '.join(SCHEDULES)} (of all robots), a CSV "
         "file of steps in which open grips are marked ?, or "
-        f"{FREE}: any robot may release, hold or place next (default: %(default)s)",
+        f"{FREE}: any robot may release, hold or place next (default: the loop of three robots, or "
+        "of two where there is no third)",
     )
-    robots_argument(takes, "a schedule that is named")
-    takes.add_argument("--out", type=Path, metavar="DIR", required=True, help="folder to write")
+    robots_argument(takes, "a loop, or a schedule that is named")
+    takes.add_argument(
+        "--out", type=Path, metavar="DIR", help="folder to write plan, tables, summary and page to"
+    )
 
 
 def _budget(takes: Takes) -> None:

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from math import isfinite
 
 from seqopt.cli.answer import Answer
-from seqopt.cli.asked import exceeded, scene_file, strictly
+from seqopt.cli.asked import exceeded, level_notes, strictly
 from seqopt.cli.facts import scene_facts
 from seqopt.cli.free_files import free_files
 from seqopt.cli.layout import wrapped
 from seqopt.cli.means import parse_resources
-from seqopt.cli.outputs import write_outputs, written_to
+from seqopt.cli.outputs import require_out, write_outputs, written_to
 from seqopt.cli.status import Status
 from seqopt.cli.values import parse_numbers, parse_time_limit
 from seqopt.errors import ProblemError
-from seqopt.files import require_folder
 from seqopt.placement.free_problem import FreeProblem
 from seqopt.placement.order_plan import OrderPlan, solve_order
 from seqopt.placement.order_problem import OrderProblem
@@ -52,7 +52,7 @@ def optimize_order(options: argparse.Namespace, free: FreeProblem) -> Answer:
     numbers = parse_numbers("--option", options.option, formulation.options)
     whole = {name: type(formulation.options[name])(value) for name, value in numbers.items()}
     problem = OrderProblem(free)
-    require_folder(options.out)
+    require_out(options)
     limit = parse_time_limit(options.time_limit)
     found = solve_order(
         problem,
@@ -62,10 +62,11 @@ def optimize_order(options: argparse.Namespace, free: FreeProblem) -> Answer:
         resources=parse_resources(options),
         **{"seconds": limit, **whole},
     )
-    options.tell("writing the plan")
-    files = free_files(found.plan, found.summary(), "best order", _said(found))
-    write_outputs(options, files | scene_file(found.plan.problem.network.scene))
-    return _answer(options, found, formulation.name)
+    report = found.summary()
+    written = write_outputs(
+        options, lambda: free_files(found.plan, report, "best order", _said(found))
+    )
+    return replace(_answer(options, found, formulation.name), written=written)
 
 
 def _answer(options: argparse.Namespace, found: OrderPlan, name: str) -> Answer:
@@ -83,8 +84,8 @@ def _answer(options: argparse.Namespace, found: OrderPlan, name: str) -> Answer:
             "summary": found.summary(),
             "plan": table,
         },
+        notes=level_notes(found.engine),
         text="\n".join(lines),
-        written=(options.out,),
         status=Status.INTERRUPTED if stopped else Status.DONE,
     )
     return strictly(answer, options, over, found.departures)

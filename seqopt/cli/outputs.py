@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from importlib.util import find_spec
 from pathlib import Path
 
 import pandas as pd
 
-from seqopt.files import csv_text, require_apart, write_folder
+from seqopt.files import csv_text, require_apart, require_folder, write_folder
 from seqopt.placement.plan import Plan
 from seqopt.placement.watch import trace_rows
 from seqopt.report.comparison import Comparison
@@ -105,37 +105,68 @@ def worth(plan: Plan) -> str:
     return f"objective {plan.certificate.objective:.6g}, gap {100 * plan.certificate.gap:.3g} %"
 
 
-def written_to(folder: Path) -> str:
-    """Return where a folder with a page was written, and what shows it.
+def written_to(folder: Path | None) -> str:
+    """Return where a folder with a page was written, and what shows it, or how to have one.
 
     Parameters
     ----------
-    folder : pathlib.Path
+    folder : pathlib.Path or None
 
     Returns
     -------
     str
     """
+    if folder is None:
+        return "--out DIR writes the plan, its tables and a page that shows it step by step"
     return f"written to {folder}; {folder / PAGE} shows it step by step"
 
 
-def write_outputs(options: argparse.Namespace, files: Mapping[str, bytes | str]) -> None:
-    """Write the folder that a command was asked for, whole.
+def write_outputs(
+    options: argparse.Namespace, files: Callable[[], Mapping[str, bytes | str]]
+) -> tuple[Path, ...]:
+    """Write the folder that a command was asked for, whole, if it was asked for one.
 
     Parameters
     ----------
     options : argparse.Namespace
-        With ``out``, the folder, and what the command reads.
-    files : mapping of str to (bytes or str)
-        By file name.
+        With ``out``, the folder or None, ``tell``, and what the command reads.
+    files : callable
+        Returns contents by file name.
+
+    Returns
+    -------
+    tuple of pathlib.Path
+        The folder, or nothing.
 
     Raises
     ------
     FileError
         If one would overwrite what the command reads, or the folder cannot be written.
     """
-    require_apart([options.out / name for name in files], inputs(options))
-    write_folder(options.out, files)
+    if options.out is None:
+        return ()
+    options.tell("writing the plan")
+    made = files()
+    require_apart([options.out / name for name in made], inputs(options))
+    write_folder(options.out, made)
+    return (options.out,)
+
+
+def require_out(options: argparse.Namespace) -> None:
+    """Raise an error, before anything is computed, if the folder asked for cannot be written.
+
+    Parameters
+    ----------
+    options : argparse.Namespace
+        With ``out``, the folder or None.
+
+    Raises
+    ------
+    FileError
+        Naming it.
+    """
+    if options.out is not None:
+        require_folder(options.out)
 
 
 def keep_apart(options: argparse.Namespace, *outputs: Path | None) -> None:

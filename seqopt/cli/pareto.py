@@ -10,7 +10,7 @@ from pathlib import Path
 import pandas as pd
 
 from seqopt.cli.answer import Answer
-from seqopt.cli.asked import marked, scene_file
+from seqopt.cli.asked import level_notes, marked, scene_file
 from seqopt.cli.common_arguments import (
     Takes,
     engine_arguments,
@@ -20,14 +20,16 @@ from seqopt.cli.common_arguments import (
     scene_argument,
 )
 from seqopt.cli.facts import scene_facts
-from seqopt.cli.free import posed_free
+from seqopt.cli.free import asked_free
 from seqopt.cli.free_arguments import add_rules
 from seqopt.cli.outputs import figure_notes, write_outputs, written_to
 from seqopt.cli.values import parse_numbers, parse_robots
 from seqopt.engines.interface import Engine
+from seqopt.engines.provenance import provenance
 from seqopt.errors import ProblemError, StepError, did_you_mean
 from seqopt.files import csv_text, require_folder
 from seqopt.placement.free_front import FreeFront
+from seqopt.placement.free_goals import judged_by
 from seqopt.placement.free_problem import FreeProblem
 from seqopt.placement.front import Front, FrontProblem, find_front, pick
 from seqopt.placement.loop_front import LoopFront
@@ -40,7 +42,7 @@ from seqopt.sequence.free_rules import FREE
 from seqopt.sequence.schedule_file import find_schedule
 from seqopt.sequence.steps import Step
 from seqopt.sequence.three_robots import SCHEDULES
-from seqopt.work.progress import Tell, told, within
+from seqopt.work.progress import told, within
 
 FOUR = "F_largest,M_sup,T_max,D_max"
 DESCRIPTION = (
@@ -133,7 +135,7 @@ def run(options: argparse.Namespace) -> Answer:
     Answer
     """
     require_folder(options.out)
-    scene, free = posed_free(options, options.aim)
+    scene, free = asked_free(options)
     rounding = parse_numbers("--round", options.round, dict.fromkeys(map(str, free.goals)))
     problem: FrontProblem = FreeFront(free, rounding)
     if options.schedule != FREE:
@@ -141,7 +143,7 @@ def run(options: argparse.Namespace) -> Answer:
     seconds = float(options.seconds)
     front = find_front(problem, seconds=seconds, progress=within(options.tell, seconds))
     methods = _methods(free.engine)
-    files, left = _front_files(front, free.engine, methods, options.tell)
+    files, left = _front_files(front, free, methods, options)
     said = f"{len(front.steps)} points, {'complete' if front.complete else 'not complete'}"
     picked = None
     if options.pick:
@@ -151,7 +153,7 @@ def run(options: argparse.Namespace) -> Answer:
         picked = {"point": chosen + 1, **values}
         row = ", ".join(f"{name} {value:.6g}" for name, value in values.items())
         said += f"; picked row {chosen + 1}: {row}"
-    write_outputs(options, files | scene_file(scene))
+    write_outputs(options, lambda: files | scene_file(scene))
     answer = Answer(
         facts={
             "scene": scene_facts(scene),
@@ -162,7 +164,7 @@ def run(options: argparse.Namespace) -> Answer:
         },
         text=f"{said}; {written_to(options.out)}",
         written=(options.out,),
-        notes=figure_notes(),
+        notes=(*level_notes(free.engine), *figure_notes()),
     )
     return marked(answer, left)
 
@@ -186,9 +188,13 @@ def _methods(engine: Engine) -> dict[str, pd.DataFrame]:
 
 
 def _front_files(
-    front: Front, engine: Engine, methods: Mapping[str, pd.DataFrame], tell: Tell
+    front: Front,
+    free: FreeProblem,
+    methods: Mapping[str, pd.DataFrame],
+    options: argparse.Namespace,
 ) -> tuple[dict[str, bytes | str], tuple[str, ...]]:
     """Return the files of a Pareto set by name, and which points leave the linear range."""
+    engine, tell = free.engine, options.tell
     known: dict[tuple[Step, ...], pd.DataFrame] = {}
     plans = []
     for number, steps in enumerate(told("analyzing plans", front.steps, tell), start=1):
@@ -198,11 +204,20 @@ def _front_files(
     within = LinearRange(engine)
     departures = [within.departures(known[steps]) for steps in front.steps]
     said = builds_in_words({f"point {k}": each for k, each in enumerate(departures, start=1)})
+    posed = {
+        "scene": engine.network.scene.name,
+        "schedule": str(options.schedule),
+        "aims": [str(goal) for goal in free.goals],
+        **judged_by(free.goals, free.criterion),
+        "limits": {limit.response: limit.bound for limit in free.limits},
+    }
     summary = {
         "points": len(front.steps),
         "complete": front.complete,
         "seconds": dict(front.seconds),
         "outside_linear_range": list(said),
+        **posed,
+        **provenance(engine),
     }
     numbered = shown_table(front.table)
     numbered.insert(0, "point", range(1, len(numbered) + 1))

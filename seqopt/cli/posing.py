@@ -5,15 +5,16 @@ from __future__ import annotations
 import argparse
 
 from seqopt.cli.asked import asked_engine, asked_scene
-from seqopt.cli.budgets import parse_budgets, with_budgets
 from seqopt.cli.criteria import asked_criterion
 from seqopt.cli.means import parse_resources
+from seqopt.cli.outputs import require_out
 from seqopt.cli.values import parse_limits, parse_robots
-from seqopt.files import require_folder
 from seqopt.network.build import build_network
-from seqopt.placement.problem import Problem, pose
+from seqopt.placement.asked_budgets import parse_budgets
+from seqopt.placement.problem import Problem
 from seqopt.sequence.schedule_file import find_schedule
 from seqopt.sequence.thinning import thin
+from seqopt.workflow import posed
 
 
 def asked_problem(options: argparse.Namespace) -> Problem:
@@ -32,12 +33,10 @@ def asked_problem(options: argparse.Namespace) -> Problem:
     scene = asked_scene(options)
     limits = parse_limits(options.limit, scene)
     resources = parse_resources(options, options.tell)
-    budgets = parse_budgets(options.budget)
-    require_folder(options.out)
-    network = build_network(scene)
-    engine = asked_engine(options, network)
-    schedule = find_schedule(network, options.schedule, parse_robots(options.robots))
+    parse_budgets(options.budget)  # what is wrong is said before anything is built
+    require_out(options)
+    engine = asked_engine(options, build_network(scene))
+    schedule = find_schedule(engine.network, options.schedule, parse_robots(options.robots))
     if options.candidates is not None:
         schedule = thin(schedule, options.candidates)
-    counted = [budget.response for budget in budgets if budget.response]
-    return with_budgets(pose(engine, schedule, criterion, limits, counted, resources), budgets)
+    return posed(engine, schedule, criterion, limits, options.budget, resources)

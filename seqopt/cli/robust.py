@@ -13,9 +13,10 @@ import pandas as pd
 from seqopt.cli.answer import Answer
 from seqopt.cli.asked import exceeded, idle_notes, level_notes, scene_file, strictly
 from seqopt.cli.facts import scene_facts
-from seqopt.cli.outputs import write_outputs
+from seqopt.cli.outputs import write_outputs, written_to
 from seqopt.cli.posing import asked_problem
 from seqopt.cli.values import number_word, parse_time_limit, split_word
+from seqopt.engines.provenance import provenance
 from seqopt.errors import ProblemError, did_you_mean
 from seqopt.files import csv_text
 from seqopt.placement.robust_aim import RobustAim, parse_robust
@@ -84,17 +85,17 @@ def optimize_robust(options: argparse.Namespace) -> Answer:
     table = analyze(problem.engine, plan.steps)
     report = _report(trial, known, unseen)
     report["seconds"] = {"assemble": assemble, **plan.seconds}
-    write_outputs(options, _files(trial, table, report))
+    written = write_outputs(options, lambda: _files(trial, table, report))
     worth = trial.summary()["unseen"]
     said = (
         f"{aim}: {plan.objective:.6g} over {count} scenarios, gap {100 * plan.gap:.3g} %; over "
         f"{other} unseen {worth['robust']:.6g}, the nominal plan {worth['nominal']:.6g}; "
-        f"written to {options.out}"
+        f"{f'written to {options.out}' if written else written_to(None)}"
     )
     answer = Answer(
         facts={"scene": scene_facts(scene), "summary": report, "plan": table},
         text=said,
-        written=(options.out,),
+        written=written,
         notes=(*level_notes(problem.engine), *idle_notes(scene, plan.steps)),
     )
     return strictly(answer, options, exceeded(scene, table), plan.departures)
@@ -176,6 +177,7 @@ def _report(trial: Trial, known: Scenarios, unseen: Scenarios) -> dict[str, obje
         "outside_linear_range": [str(departure) for departure in plan.departures],
         "idle_robots": list(idle_robots(schedule.scene, plan.steps)),
         "models_evaluated": sum(costs.models for costs in plan.problem.costs),
+        **provenance(problem.engine),
     }
 
 

@@ -10,6 +10,7 @@ from seqopt.errors import (
     MechanismError,
     SeqoptError,
     SolverError,
+    TimeUpError,
     WorkerError,
 )
 
@@ -45,7 +46,8 @@ def status_of(error: BaseException) -> Status:
         complain(f"seqopt: out of memory: {str(error) or 'no more is to be had'}{advice}")
         return Status.FAILED
     if isinstance(error, SolverError):
-        complain(f"seqopt: solver failed: {error}")
+        what = "time is over" if isinstance(error, TimeUpError) else "solver failed"
+        complain(f"seqopt: {what}: {error}")
         return Status.FAILED
     if isinstance(error, OSError) and not isinstance(error, SeqoptError):
         complain(f"seqopt: error: cannot write standard output: {error.strerror or error}")

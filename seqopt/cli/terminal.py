@@ -19,7 +19,9 @@ from seqopt.errors import FileError, SceneWarning
 
 CLEAR = "\r\033[K"  # of a terminal: the line it is on
 LONGEST = 2000  # characters of a line on standard error
-BEGIN = re.compile(r"seqopt: (error|warning|solver failed|out of memory|payload exceeded)(?=:)")
+BEGIN = re.compile(
+    r"seqopt: (error|warning|solver failed|time is over|out of memory|payload exceeded)(?=:)"
+)
 
 
 def harmless(text: str, kept: str = "") -> str:

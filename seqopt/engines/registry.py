@@ -24,6 +24,7 @@ ENGINES: dict[str, Callable[[Network], Engine]] = {
     "frame": FrameEngine,
     "discrete": DiscreteEngine,
 }
+USUAL = "compliance"  # the engine where none is asked for
 LIMITED: dict[str, Callable[[Network, Mortar], Engine]] = {
     "auto": AutoEngine,
     "discrete": DiscreteEngine,

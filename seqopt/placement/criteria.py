@@ -18,7 +18,7 @@ from seqopt.arrays import Floats, Terse
 from seqopt.placement.ranks import Among, Ranked, ranks_of
 from seqopt.placement.requirements import ChoiceResponses
 from seqopt.placement.scales import NEVER, ROUNDED, SceneFacts
-from seqopt.placement.terms import known, present, scale_of, spell_out
+from seqopt.placement.terms import known, named, present, scale_of, spell_out
 
 
 @dataclass(frozen=True, repr=False)
@@ -61,10 +61,12 @@ class RankSum(Terse):
 
     @property
     def settings(self) -> Mapping[str, object]:
-        """Its crown, None where there is none, what it rounds to and what it ranks among."""
+        """Its weights and crown, None if it has none, what it rounds to and what it ranks among."""
         crown = None if self.crown == NEVER else self.crown
+        weights = {"before_crown": dict(self.before), "from_crown_on": dict(self.after)}
         ranks = {"ranked": self.ranked.value, "among": self.among.value}
-        return {"crown": crown, "resolution": dict(self.resolution or ()), **ranks}
+        rounding = {"resolution": dict(self.resolution or ())}
+        return {"weights": weights, "crown": crown, **rounding, **ranks}
 
     def wanted(self, bricks: int) -> tuple[str, ...]:
         """Return the responses that it needs of a move.
@@ -107,7 +109,7 @@ class RankSum(Terse):
             after=spell_out(self.after, facts.robots),
             crown=crown,
             delay=0,
-            resolution=resolution,
+            resolution=spell_out(resolution, ()),
         )
 
     def costs(self, responses: ChoiceResponses, bricks: int, choices: int) -> Floats:
@@ -157,8 +159,9 @@ class WeightedSum(Terse):
 
     @property
     def settings(self) -> Mapping[str, object]:
-        """What responses are divided by, SI units."""
-        return {"scales": {name: scale for name, _, scale in self.terms}}
+        """What responses are divided by, SI units, and their weights."""
+        weights = {name: weight for name, weight, _ in self.terms}
+        return {"scales": {name: scale for name, _, scale in self.terms}, "weights": weights}
 
     def wanted(self, bricks: int) -> tuple[str, ...]:
         """Return the responses that it needs.
@@ -191,7 +194,8 @@ class WeightedSum(Terse):
         scaled = tuple(
             (name, weight, scale_of(facts, name, scale)) for name, weight, scale in terms
         )
-        return replace(self, terms=scaled)
+        name = named(self.name, facts, [scale for _, _, scale in terms])
+        return replace(self, name=name, terms=scaled)
 
     def costs(self, responses: ChoiceResponses, bricks: int, choices: int) -> Floats:
         """Return the weighted sums.
@@ -264,7 +268,9 @@ class WorstRatio(Terse):
         WorstRatio
         """
         limits = spell_out(self.limits, facts.robots)
-        return replace(self, limits=tuple((name, scale_of(facts, name, s)) for name, s in limits))
+        name = named(self.name, facts, [scale for _, scale in limits])
+        scaled = tuple((response, scale_of(facts, response, s)) for response, s in limits)
+        return replace(self, name=name, limits=scaled)
 
     def costs(self, responses: ChoiceResponses, bricks: int, choices: int) -> Floats:
         """Return the largest ratios.

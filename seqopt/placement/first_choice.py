@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from seqopt.arrays import Floats
-from seqopt.errors import SolverError
+from seqopt.errors import SolverError, TimeUpError
 from seqopt.placement.costs import LayeredCosts
 from seqopt.placement.formulation import End, Selection
 from seqopt.placement.interface import Aim, PlacementProblem
@@ -47,10 +47,11 @@ def stopped(
             value = aim.worth(costs, choice)
             return Selection(choice, value, max(bound, at_least(costs, aim)), end=End.STOPPED)
     known = f" (no choice is below {bound:.6g})" if np.isfinite(bound) else ""
-    raise SolverError(
-        f"{why or f'it ended{known}'} before any choice within all budgets was found; "
-        "give it more time"
-    )
+    if why:
+        raise SolverError(
+            f"{why} before any choice within all budgets was found; give it more time"
+        )
+    raise TimeUpError(f"no choice within all budgets was found yet{known}; give more")
 
 
 def at_least(costs: LayeredCosts, aim: Aim) -> float:

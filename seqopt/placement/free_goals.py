@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 from math import degrees, pi
 
 from seqopt.errors import ProblemError, did_you_mean
+from seqopt.placement.requirements import Criterion
 from seqopt.placement.standing import MARGINS
 from seqopt.scene.checks import short
 
@@ -68,6 +70,24 @@ class Goal:
         float
         """
         return degrees(pi / 2 - value) if self.response == "tilt" else value
+
+
+def judged_by(goals: Sequence[Goal], criterion: Criterion) -> dict[str, object]:
+    """Return the criterion with its numbers, for a summary.
+
+    Parameters
+    ----------
+    goals : sequence of Goal
+    criterion : Criterion
+
+    Returns
+    -------
+    dict of str to object
+        ``criterion`` is None where every goal names a response of its own, or is about moves.
+    """
+    if not any(goal.of_states and not goal.response for goal in goals):
+        return {"criterion": None}
+    return {"criterion": criterion.name, **criterion.settings}
 
 
 def parse_goals(text: str) -> tuple[Goal, ...]:

@@ -12,8 +12,10 @@ import pandas as pd
 
 from seqopt.contact.mortar import Mortar
 from seqopt.engines.interface import Engine
+from seqopt.engines.provenance import provenance
 from seqopt.errors import InfeasibleError
 from seqopt.placement.formulation import Formulation
+from seqopt.placement.free_goals import judged_by
 from seqopt.placement.free_infeasible import why_impossible
 from seqopt.placement.free_judge import TOLERANCE, ScheduleCertificate, judge_schedule
 from seqopt.placement.free_problem import FreeProblem
@@ -153,7 +155,8 @@ class FreePlan(ShownBuild):
         dict
             ``aims`` with ``objective`` and ``bound`` by name and the ``gap``; the rules; how many
             ``steps`` there are, ``steps_before_release`` without those that let all go at the end,
-            ``regrips``; ``models_evaluated`` (grip sets solved), ``seconds`` and more.
+            ``regrips``; ``models_evaluated`` (grip sets solved), ``seconds`` and more, as of
+            `Plan.summary`.
         """
         problem, chosen = self.problem, self.selection
         goals = [str(goal) for goal in problem.goals]
@@ -171,8 +174,7 @@ class FreePlan(ShownBuild):
             "formulation": self.formulation.name,
             "kind": self.formulation.kind.value,
             "aims": goals,
-            "criterion": problem.criterion.name,
-            **problem.criterion.settings,
+            **judged_by(problem.goals, problem.criterion),
             "limits": {limit.response: limit.bound for limit in problem.limits},
             "rules": problem.rules.described(problem.network.scene),
             "status": self.status,
@@ -190,6 +192,7 @@ class FreePlan(ShownBuild):
             "models_evaluated": problem.sets.solved,
             "states_in_proof": 0 if proof is None else proof.states,
             "seconds": dict(self.seconds),
+            **provenance(self.engine),
         }
 
     @property

@@ -15,7 +15,7 @@ from seqopt.errors import ProblemError
 from seqopt.network.network import Network
 from seqopt.placement.criteria import RankSum
 from seqopt.placement.free_goals import LARGEST, STATE_RESPONSES, Goal, Measure, parse_goals
-from seqopt.placement.requirements import LIMIT_TOLERANCE, Criterion, Limit
+from seqopt.placement.requirements import LIMIT_TOLERANCE, Criterion, Limit, as_limits
 from seqopt.placement.scales import SceneFacts
 from seqopt.placement.standing import Standing, StandingSets
 from seqopt.responses.grip_sets import GripSets
@@ -256,14 +256,20 @@ def pose_free(
     >>> pose_free(engine, FreeRules(), seqopt.CRITERIA["worst-ratio"], "minmax,steps")
     FreeProblem('arch25', minmax, steps, 0 limits)
     """
-    goals = parse_goals(goals) if isinstance(goals, str) else tuple(goals)
-    if not goals or not all(isinstance(goal, Goal) for goal in goals):
-        raise ProblemError(f"aims {short(goals)}: give goals, or their names, as 'minmax,steps'")
+    named = _goals(goals)
     limits = _checked(limits, engine.network)
-    if any(goal.of_states and not goal.response for goal in goals):
+    if any(goal.of_states and not goal.response for goal in named):
         criterion = _of_states(engine, criterion)
     standing = stands if isinstance(stands, Standing | None) else Standing(find_mortar(stands))
-    return _asked(FreeProblem(engine, rules, criterion, goals, limits, standing))
+    return _asked(FreeProblem(engine, rules, criterion, named, limits, standing))
+
+
+def _goals(given: Sequence[Goal] | str) -> tuple[Goal, ...]:
+    """Return goals that are given as such, or by their names."""
+    goals = parse_goals(given) if isinstance(given, str) else given
+    if not isinstance(goals, Sequence) or {*map(type, goals)} != {Goal}:
+        raise ProblemError(f"aims {short(given)}: give goals, or their names, as 'minmax,steps'")
+    return tuple(goals)
 
 
 def _asked(problem: FreeProblem) -> FreeProblem:
@@ -275,7 +281,7 @@ def _asked(problem: FreeProblem) -> FreeProblem:
 
 def _checked(limits: Sequence[Limit], network: Network) -> tuple[Limit, ...]:
     """Return limits that are all on what a state has."""
-    limits = (limits,) if isinstance(limits, Limit) else tuple(limits)
+    limits = as_limits(limits)
     robots = {robot_response(robot.name) for robot in network.scene.robots}
     for limit in limits:
         _require(limit.response, {*STATE_RESPONSES, *robots}, "limit")

@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from seqopt.arrays import Floats, Ints
-from seqopt.errors import InfeasibleError, ProblemError, SolverError
+from seqopt.errors import InfeasibleError, ProblemError, SolverError, TimeUpError
 from seqopt.interrupts import answered
 from seqopt.placement.criteria import WeightedSum, WorstRatio
 from seqopt.placement.floors import floor_of
@@ -97,7 +97,7 @@ def search_pairs(problem: Problem, formulation: Formulation, watch: Watch) -> Pa
         If no choice is allowed.
     ProblemError
         If the formulation is not exact, there are budgets, or costs have no floor.
-    SolverError
+    TimeUpError
         If it is stopped before a choice is known.
     """
     floor = _floor(problem, formulation)
@@ -107,7 +107,7 @@ def search_pairs(problem: Problem, formulation: Formulation, watch: Watch) -> Pa
     costs = walk.costs
     if math.isinf(costs.best):
         if watch.over:
-            raise SolverError("it ended before any choice was found; give it more time")
+            raise TimeUpError("no choice was found yet; give more")
         raise InfeasibleError("no choice is allowed; relax a limit or widen a reach")
     selection = _best_known(costs, formulation, watch)
     return PairSearch(costs, selection, walk.along(selection.choice), walk.models)

@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 
 from seqopt.engines.interface import Engine
+from seqopt.engines.provenance import provenance
 from seqopt.errors import ProblemError
 from seqopt.placement.certificate import TOLERANCE, Certificate
 from seqopt.placement.formulation import (
@@ -260,7 +261,8 @@ class Plan(ShownBuild):
             is there, spent and what one more unit would save; whether it ``ended`` ``done``, was
             ``stopped`` before that or ``interrupted``; the limits of the linear range that are left
             and the payloads that are exceeded; ``idle_robots``, which never grip;
-            ``models_evaluated`` and ``seconds``.
+            ``models_evaluated`` and ``seconds``; the ``engine`` and ``versions`` (see
+            `seqopt.engines.provenance`).
         """
         schedule, proof = self._posed.schedule, self.certificate
         status = "unproven"
@@ -291,4 +293,5 @@ class Plan(ShownBuild):
             "payload_exceeded": [str(excess) for excess in self.overloads],
             "models_evaluated": self.models,
             "seconds": dict(self.seconds),
+            **provenance(self.engine),
         }

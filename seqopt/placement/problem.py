@@ -18,7 +18,7 @@ from seqopt.placement.interface import Aim
 from seqopt.placement.joining import Joined
 from seqopt.placement.kinds import robots_of
 from seqopt.placement.possible import compared, spread_over_pairs
-from seqopt.placement.requirements import Criterion, Limit, ResponsesAsked
+from seqopt.placement.requirements import Criterion, Limit, ResponsesAsked, as_limits
 from seqopt.placement.scales import SceneFacts
 from seqopt.placement.windows import by_move, possible_after, window_anew, window_kept
 from seqopt.responses.choices import CHOICE_RESPONSES, Evaluation, StepChoices
@@ -40,7 +40,7 @@ class Problem(Shown):
     criterion : Criterion
         What a step costs.
     limits : tuple of Limit
-        Bounds that no step with an open grip may exceed.
+        Bounds that no step may exceed, whether or not a grip is open in it.
     evaluation : Evaluation
         Raw responses of every open step.
     budgets : tuple of Budget
@@ -256,7 +256,7 @@ def pose(
     criterion : Criterion
         What a step costs.
     limits : sequence of Limit
-        Bounds that no step with an open grip may exceed.
+        Bounds that no step may exceed, whether or not a grip is open in it.
     also : sequence of str
         Further responses to compute, besides those that criterion and limits use.
     resources : Resources, optional
@@ -281,8 +281,8 @@ def pose(
     Problem('arch25', 'three-robot': 90 steps, 22 moves, criterion 'equations-2-3', ...
     """
     known = {*CHOICE_RESPONSES, *map(robot_response, robots_of(engine, schedule, criterion))}
-    limits = (limits,) if isinstance(limits, Limit) else limits
-    asked = ResponsesAsked(criterion.for_scene(SceneFacts(engine)), tuple(limits), tuple(also))
+    posed = criterion.for_scene(SceneFacts(engine))
+    asked = ResponsesAsked(posed, as_limits(limits), tuple(also))
     if unknown := {name for move in schedule.moves for name in asked(move.bricks)} - known:
         why = f"does not exist{did_you_mean(min(unknown), known)}"
         raise ProblemError(f"response {min(unknown)} {why}; give {', '.join(sorted(known))}")

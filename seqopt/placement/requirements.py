@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from numbers import Real
 from typing import Protocol
@@ -129,6 +129,31 @@ class Limit:
         (...) bool
         """
         return np.asarray(values > self.bound + LIMIT_TOLERANCE * abs(self.bound))
+
+
+def as_limits(given: Sequence[Limit] | Limit) -> tuple[Limit, ...]:
+    """Return limits, one or several.
+
+    Parameters
+    ----------
+    given : sequence of Limit, or Limit
+
+    Returns
+    -------
+    tuple of Limit
+
+    Raises
+    ------
+    ProblemError
+        If it is something else.
+    """
+    limits = (given,) if isinstance(given, Limit) else given
+    if not isinstance(limits, Sequence) or not all(isinstance(each, Limit) for each in limits):
+        raise ProblemError(
+            f"limits {short(given)}: give values, as [seqopt.Limit('F_largest', 300.0)]; "
+            "seqopt.placement.requirements.payload_limits(scene) has those of all payloads"
+        )
+    return tuple(limits)
 
 
 def payload_limits(scene: Scene) -> tuple[Limit, ...]:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from seqopt.engines.interface import Engine
-from seqopt.errors import MechanismError, ProblemError, StepError
+from seqopt.errors import MechanismError, StepError
 from seqopt.network.network import Network
 from seqopt.responses.quantities import RESPONSES, robot_response
 from seqopt.responses.table import analyze, force_column
@@ -20,6 +21,7 @@ from seqopt.sequence.two_robots import METHODS
 
 LEVEL = 1e-9  # heights this close, over the height of the structure, are equal
 NEVER = math.inf  # the brick count of a crown that is never reached
+OWN = " over payload, weight and size"  # what it is named after where no fixed method gives scales
 ROUNDED = (
     ("F", 0.0278513762761887),
     ("T", 0.0278513762761887),
@@ -94,6 +96,34 @@ def scene_units(network: Network) -> Units:
     return Units(weight, weight * length, weight / middle)
 
 
+def own_scales(network: Network) -> Mapping[str, float]:
+    """Return scales that every scene has, for one that no fixed method builds.
+
+    Parameters
+    ----------
+    network : Network
+
+    Returns
+    -------
+    mapping of str to float
+        SI units: of grip forces the smallest payload; of ``T_max`` the weight of the structure, of
+        ``M_sup`` this at its size, of ``D_max`` what it moves a chain of a joint for every brick.
+    """
+    scene, units = network.scene, scene_units(network)
+    count = len(scene.bricks)
+    size = np.ptp([brick.position for brick in scene.bricks], axis=0).max()
+    size += max(max(brick.dimensions) for brick in scene.bricks)
+    weight, payload = count * units.force, min(robot.payload for robot in scene.robots)
+    forces = {robot_response(robot.name): payload for robot in scene.robots}
+    moved = count**2 * units.displacement
+    return forces | {
+        "F_largest": payload,
+        "T_max": weight,
+        "M_sup": weight * float(size),
+        "D_max": moved,
+    }
+
+
 def crown(scene: Scene) -> float:
     """Return how many bricks are placed when a build reaches its crown.
 
@@ -143,26 +173,29 @@ class SceneFacts:
         """See `scene_units`."""
         return scene_units(self.engine.network)
 
-    @cached_property
+    @property
     def reference(self) -> Mapping[str, float]:
         """The least that any fixed method reaches of each response's largest value, SI units.
 
-        Raises
-        ------
-        ProblemError
-            If no fixed method can build the scene, or none stands on the way.
+        Where no fixed method can build the scene, or none stands on the way: see `own_scales`.
         """
+        if not self._reached:
+            return own_scales(self.engine.network)
+        return {name: min(values[name] for values in self._reached) for name in self._reached[0]}
+
+    @property
+    def basis(self) -> str:
+        """What is added to the name of a criterion where no fixed method gives scales."""
+        return "" if self._reached else OWN
+
+    @cached_property
+    def _reached(self) -> tuple[dict[str, float], ...]:
+        """The largest responses of every fixed method that can build the scene."""
         found: list[dict[str, float]] = []
         for method in METHODS.values():
-            try:
+            with suppress(StepError, MechanismError):
                 found.append(self._largest(method(self.engine.network)))
-            except (StepError, MechanismError) as error:
-                refused = error
-        if not found:
-            raise ProblemError(
-                f"no fixed method gives scales for this scene ({refused}); give your own"
-            )
-        return {name: min(values[name] for values in found) for name in found[0]}
+        return tuple(found)
 
     def _largest(self, steps: tuple[Step, ...]) -> dict[str, float]:
         """Return the largest responses of a method's steps, SI units."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from numbers import Real
 from typing import Any, TypeVar
 
 import numpy as np
@@ -11,6 +12,7 @@ from seqopt.arrays import Floats
 from seqopt.errors import ProblemError
 from seqopt.placement.scales import SceneFacts
 from seqopt.responses.quantities import robot_response
+from seqopt.scene.checks import short
 
 Term = tuple[Any, ...]  # a name and its numbers
 Number = TypeVar("Number")
@@ -41,6 +43,23 @@ def scale_of(facts: SceneFacts, response: str, given: float | None) -> float:
     if response not in scales:
         raise ProblemError(f"{response} has no scale of its own; give one, or take F_largest")
     return scales[response] or 1.0  # what every method keeps at zero
+
+
+def named(name: str, facts: SceneFacts, given: Sequence[float | None]) -> str:
+    """Return the name of a criterion, which says where its scales are not those of fixed methods.
+
+    Parameters
+    ----------
+    name : str
+    facts : SceneFacts
+    given : sequence of float or None
+        Its scales before it was posed, None where it takes them from the scene.
+
+    Returns
+    -------
+    str
+    """
+    return name + facts.basis if None in given else name
 
 
 def known(number: Number | None, criterion: str) -> Number:
@@ -82,7 +101,7 @@ def present(values: Floats) -> Floats:
 
 
 def spell_out(terms: tuple[Term, ...], robots: Sequence[str]) -> tuple[Term, ...]:
-    """Return terms in which ``F_each`` stands once for every robot.
+    """Return terms in which ``F_each`` stands once for every robot; all numbers are positive.
 
     Parameters
     ----------
@@ -93,9 +112,22 @@ def spell_out(terms: tuple[Term, ...], robots: Sequence[str]) -> tuple[Term, ...
     Returns
     -------
     tuple of Term
+
+    Raises
+    ------
+    ProblemError
+        If there is no term, or a number of one is not positive and finite.
     """
+    if not terms:
+        raise ProblemError("a criterion of no response; name at least one, as T_max")
     out: list[Term] = []
     for term in terms:
+        for number in term[1:]:
+            if number is not None and not (isinstance(number, Real) and 0 < float(number) < np.inf):
+                raise ProblemError(
+                    f"criterion: {term[0]} has the weight, scale or rounding "
+                    f"{short(number)}; give a positive number"
+                )
         names = [robot_response(robot) for robot in robots] if term[0] == "F_each" else [term[0]]
         out += [(name, *term[1:]) for name in names]
     return tuple(out)

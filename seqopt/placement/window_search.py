@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from seqopt.arrays import Floats, Terse
-from seqopt.errors import MemoryShortError, SolverError
+from seqopt.errors import MemoryShortError, SolverError, TimeUpError
 from seqopt.placement.joining import Joined
 from seqopt.placement.problem import Problem
 from seqopt.placement.watch import Watch
@@ -103,9 +103,7 @@ def search_windows(problem: Problem, watch: Watch | None = None) -> WindowSearch
         with closing(walk.alone.evaluation.levels(soon=True)) as levels:
             for steps in levels:
                 if watch is not None and watch.over:
-                    raise SolverError(
-                        f"time was over after {watch.seconds:.3g} s: {walk.so_far()}; give more"
-                    )
+                    raise TimeUpError(f"{watch.seconds:.3g} s: {walk.so_far()}; give more")
                 walk.look(steps)
                 walk.choose(known=steps[-1].step.bricks)
         walk.choose(known=math.inf)

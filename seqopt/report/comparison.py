@@ -14,6 +14,7 @@ from seqopt.errors import ProblemError, StepError
 from seqopt.placement.certificate import least_sum
 from seqopt.placement.costs import TINY
 from seqopt.placement.formulation import formulations
+from seqopt.placement.free_plan import FreePlan
 from seqopt.placement.interface import Aim
 from seqopt.placement.objectives import under_both
 from seqopt.placement.plan import Plan
@@ -22,7 +23,7 @@ from seqopt.placement.promises import overloads
 from seqopt.placement.ranking import rank_choice
 from seqopt.placement.requirements import Criterion
 from seqopt.placement.solving import on_the_way, solve
-from seqopt.report.free_row import free_plan, free_row
+from seqopt.report.free_row import free_criterion, free_plan, free_row
 from seqopt.report.methods import idle_note, method_tables
 from seqopt.responses.linear_range import Departure, LinearRange
 from seqopt.responses.quantities import RESPONSES, robot_response
@@ -30,7 +31,7 @@ from seqopt.responses.resources import Resources
 from seqopt.responses.table import force_column
 from seqopt.scene.scene import Scene
 from seqopt.sequence.free_rules import FREE
-from seqopt.sequence.loops import robot_loop
+from seqopt.sequence.schedule_file import MOST, find_schedule
 from seqopt.sequence.three_robots import modified_sequential
 from seqopt.study.published import (
     IRREGULARITIES,
@@ -55,7 +56,6 @@ COLUMNS = [
     "seconds",
     "solve_seconds",
 ]
-MOST = 3  # robots that take part where none are named: as many as in the paper's loop
 CLOSED = "no choice"  # the problem of a sequence without open grips
 
 
@@ -111,6 +111,8 @@ class Comparison(Terse):
         Why the scene has no loop of its robots; empty if it has.
     departures : mapping of str to tuple of Departure
         The limits of the linear range that builds leave, by row of ``table``.
+    criteria : mapping of str to Criterion
+        With all of their numbers, by the problem whose rows they are the objective of.
     """
 
     maxima: pd.DataFrame
@@ -121,6 +123,7 @@ class Comparison(Terse):
     notes: tuple[str, ...]
     refusal: str
     departures: Mapping[str, tuple[Departure, ...]]
+    criteria: Mapping[str, Criterion]
 
 
 def compare(
@@ -129,9 +132,7 @@ def compare(
     progress: Tell = lambda _: None,
     robots: Sequence[str] = (),
 ) -> Comparison:
-    """Analyze every method on an engine's scene and solve its loop by every formulation.
-
-    The loop is that of three robots; of two, where the scene has no third; of those that are named.
+    """Analyze every method on an engine's scene and solve its usual loop by every formulation.
 
     Parameters
     ----------
@@ -142,8 +143,7 @@ def compare(
     progress : callable, optional
         Told how far it is, in a few words or as a `seqopt.work.Stage`.
     robots : sequence of str, optional
-        Names of the robots that take part, in the order of their roles, of which methods take as
-        many as they need; found from reach by default.
+        Of those that take part, as many as a method needs; found from reach by default.
 
     Returns
     -------
@@ -163,7 +163,11 @@ def compare(
     tables |= {name: plan.responses() for name, plan in plans.items()}
     rows |= {name: _row(plan) for name, plan in plans.items()}
     loop = None if problem is None else _facts(problem, rows, robots)
-    notes += _add_free(engine, robots, progress, (rows, tables))
+    own = free_criterion(criterion, [largest(scene, tables[str(name)]) for name in maxima])
+    free, why_not = free_plan(engine, own, robots, progress)
+    notes += [why_not] if why_not else []
+    if free is not None:
+        tables[FREE], rows[FREE] = free.responses(), free_row(free)
     if problem is not None:
         notes += idle_note(scene, f"{problem.schedule.method} loop", problem.schedule.steps)
     notes += _add_largest(scene, rows, tables)
@@ -172,7 +176,8 @@ def compare(
     table = pd.DataFrame.from_dict(rows, orient="index").reindex(columns=COLUMNS)
     table[RANKS] = table[RANKS].astype(float)
     table["outside"] = [name in left for name in table.index]
-    return Comparison(maxima, printed, table, tables, loop, tuple(notes), refusal, left)
+    known = (tuple(notes), refusal, left, _criteria(problem, free))
+    return Comparison(maxima, printed, table, tables, loop, *known)
 
 
 def _add_largest(
@@ -187,18 +192,10 @@ def _add_largest(
     return notes
 
 
-def _add_free(
-    engine: Engine,
-    robots: Sequence[str],
-    progress: Tell,
-    known: tuple[dict[str, dict[str, object]], dict[str, pd.DataFrame]],
-) -> list[str]:
-    """Add the free schedule to rows and tables, or say why there is none."""
-    (rows, tables), (free, why_not) = known, free_plan(engine, robots, progress)
-    if free is None:
-        return [why_not]
-    tables[FREE], rows[FREE] = free.responses(), free_row(free)
-    return []
+def _criteria(problem: Problem | None, free: FreePlan | None) -> dict[str, Criterion]:
+    """Return the criteria as they were posed, by problem."""
+    found = {} if problem is None else {problem.schedule.method: problem.criterion}
+    return found if free is None else found | {FREE: free.problem.criterion}
 
 
 def _plans(
@@ -211,7 +208,7 @@ def _plans(
     network, plans = engine.network, {}
     count = len(robots) or min(len(network.scene.robots), MOST)
     try:
-        loop = robot_loop(network, robots or count)  # whose refusal says most
+        loop = find_schedule(network, robots=robots)  # whose refusal says most
         if count >= MOST:
             progress(Stage("comparing", 0.0))
             modified = pose(engine, modified_sequential(network, robots[:3]), criterion)

@@ -53,6 +53,8 @@ class Resources:
                 f"executor: a {type(self.executor).__name__} is not an executor; "
                 "give one of concurrent.futures, or workers"
             )
+        if not (self.cache is None or (isinstance(self.cache, str | Path) and str(self.cache))):
+            raise ProblemError(f"cache is {self.cache!r}; give the path of a folder")
         most = self.max_memory
         known = most is None or (
             isinstance(most, int | float) and most > 0 and not math.isnan(most)

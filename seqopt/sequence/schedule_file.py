@@ -13,7 +13,10 @@ from seqopt.errors import StepError, did_you_mean
 from seqopt.files import read_text
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
+from seqopt.scene.checks import short
 from seqopt.scene.scene import Scene
+from seqopt.sequence.free_rules import FREE
+from seqopt.sequence.loops import robot_loop
 from seqopt.sequence.moves import open_schedule
 from seqopt.sequence.plan_file import Row, read_cells, read_grip, read_rows
 from seqopt.sequence.schedule import OpenGrip, OpenStep, Schedule, ScheduledGrips
@@ -21,6 +24,7 @@ from seqopt.sequence.steps import check_step
 from seqopt.sequence.three_robots import SCHEDULES, make_schedule
 
 MARK = re.compile(r"\?\s*(\d*)")  # an open grip, and the number of its move if it is given
+MOST = 3  # robots that take part where nobody says who: as many as in the loop of Bruun et al.
 
 
 def read_schedule(where: Network | Scene, path: Path) -> Schedule:
@@ -134,17 +138,18 @@ def schedule_text(schedule: Schedule) -> str:
 
 
 def find_schedule(
-    network: Network, schedule: Schedule | Path | str, robots: Sequence[str] = ()
+    network: Network, schedule: Schedule | Path | str | None = None, robots: Sequence[str] = ()
 ) -> Schedule:
-    """Return a schedule by name, from a file, or itself.
+    """Return a schedule by name, from a file, or itself; the usual loop where none is given.
 
     Parameters
     ----------
     network : Network
-    schedule : Schedule, pathlib.Path or str
-        A schedule of the same scene, a file, or a key of `SCHEDULES`.
+    schedule : Schedule, pathlib.Path or str, optional
+        A schedule of the same scene, a file, or a key of `SCHEDULES`; by default the loop of the
+        robots that are named, else of three, or of two where the scene has no third.
     robots : sequence of str, optional
-        Of a schedule by name: robots in the order of their roles.
+        Of a loop or a schedule by name: robots in the order of their roles.
 
     Returns
     -------
@@ -157,6 +162,8 @@ def find_schedule(
     StepError
         If there is no such schedule, it is impossible in the scene or belongs to another one.
     """
+    if schedule is None:
+        return robot_loop(network, robots or min(len(network.scene.robots), MOST))
     if isinstance(schedule, str) and schedule in SCHEDULES:
         return make_schedule(schedule, network, robots)
     if robots:
@@ -171,12 +178,19 @@ def find_schedule(
                 f"{network.scene.name}; make it from the network of this scene"
             )
         return schedule
+    return _from_file(network, schedule)
+
+
+def _from_file(network: Network, schedule: object) -> Schedule:
+    """Return the schedule of a file, unless it is a name that does not exist or no file at all."""
+    known = f"{', '.join(SCHEDULES)}, or a CSV file, or {FREE}"
+    if not isinstance(schedule, str | Path):
+        raise StepError(f"schedule {short(schedule)}: give a Schedule, or one of {known}")
     path = Path(schedule)
     if isinstance(schedule, str) and not path.suffix and not path.exists():
-        hint = did_you_mean(schedule, SCHEDULES)
         raise StepError(
-            f"schedule {schedule!r} does not exist{hint}; give one of {', '.join(SCHEDULES)}, "
-            "or a CSV file"
+            f"schedule {schedule!r} does not exist{did_you_mean(schedule, (*SCHEDULES, FREE))}; "
+            f"give one of {known}"
         )
     return read_schedule(network, path)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from seqopt.engines.discrete.system import BedStiffness
+from seqopt.errors import ProblemError, did_you_mean
 from seqopt.placement.criteria import (
     OVER_METHODS,
     WORST_OVER_METHODS,
@@ -74,3 +75,30 @@ Examples
 >>> seqopt.CRITERIA["worst-ratio"].wanted(bricks=10)
 ('F_largest', 'M_sup', 'T_max', 'D_max')
 """
+
+
+def find_criterion(criterion: Criterion | str) -> Criterion:
+    """Return a criterion, by name or itself.
+
+    Parameters
+    ----------
+    criterion : Criterion or str
+        A criterion, or a name of `seqopt.CRITERIA`.
+
+    Returns
+    -------
+    Criterion
+
+    Raises
+    ------
+    ProblemError
+        If there is none of that name.
+    """
+    if not isinstance(criterion, str):
+        return criterion
+    if criterion not in CRITERIA:
+        raise ProblemError(
+            f"criterion {criterion!r} does not exist{did_you_mean(criterion, CRITERIA)}; give "
+            f"one of {', '.join(CRITERIA)}"
+        )
+    return CRITERIA[criterion]

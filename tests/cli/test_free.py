@@ -119,9 +119,6 @@ def test_what_only_the_free_schedule_has(capsys, tmp_path, arch):
         status, _, error = run(capsys, "optimize", arch, *words, *out)
         assert status == 2
         assert "only the free schedule has it; give --schedule free" in error
-    status, _, error = run(capsys, "optimize", arch, *out)
-    assert status == 2
-    assert "--formulation: it is missing; give one of beam" in error
 
 
 def test_pareto_writes_table_plans_and_chart(capsys, tmp_path, arch):

@@ -304,7 +304,7 @@ def test_the_loop_of_two_is_compared_where_there_is_no_third(capsys, tmp_path):
             "schedule 'ring' does not exist",
         ),
         (("--formulation", "overlap_dp", "--schedule", "no.csv"), "cannot read no.csv"),
-        (("--formulation", "overlap_dp", "--robots", "rob1,rob2"), "three-robot takes three"),
+        (("--schedule", "three-robot", "--robots", "rob1,rob2"), "three-robot takes three"),
         (("--formulation", "overlap_dp", "--robots", "rob1,,rob2"), "robot '' does not exist"),
         (("--formulation", "simplex"), "formulation 'simplex'"),
         (("--formulation", "beam", "--option", "depth=3"), "--option depth=3: beam has width"),
@@ -609,7 +609,7 @@ def test_budgets_that_cannot_be_get_one_line(tmp_path, capsys, budget, status, s
 def test_a_budget_is_given_once(tmp_path, capsys):
     words = ("--formulation", "labels", "--budget", "travel=2m", "--budget", "travel=0.5")
     assert main(["optimize", "arch25", *words, "--out", str(tmp_path / "a")]) == 2
-    assert "--budget travel=0.5: it stands there twice" in capsys.readouterr().err
+    assert "budget travel=0.5: it stands there twice" in capsys.readouterr().err
 
 
 def test_a_time_limit_ends_with_a_choice_and_a_trace(tmp_path, capsys):

@@ -91,7 +91,7 @@ def test_an_option_before_its_command_is_told_where_it_stands(capsys):
 
 
 def test_a_missing_argument_is_named_where_nothing_is_mistyped(capsys):
-    assert main(["optimize", "--formulation", "beam"]) == 2
+    assert main(["pareto", "--aim", "T_max"]) == 2
     assert "arguments are required: --out" in capsys.readouterr().err
 
 

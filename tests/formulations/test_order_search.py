@@ -12,7 +12,7 @@ from hypothesis import given, settings
 
 import seqopt
 from formulations.order_search import FORMULATION
-from seqopt.errors import InfeasibleError, ProblemError, SolverError
+from seqopt.errors import InfeasibleError, ProblemError, SolverError, TimeUpError
 from seqopt.placement.criteria import WorstRatio
 from seqopt.placement.free_problem import pose_free
 from seqopt.placement.order_bound import whole_bound
@@ -143,7 +143,7 @@ def test_time_leaves_an_order_and_a_bound():
     assert found.selection.stopped == "interrupt"
     assert found.status == "heuristic"
     assert found.selection.bound <= found.selection.objective
-    with pytest.raises(ProblemError, match="no order was found with a plan; give more"):
+    with pytest.raises(TimeUpError, match="no order with a plan was found yet; give more"):
         solve_order(problem, FORMULATION, seconds=0.0)
 
 

@@ -17,7 +17,7 @@ from seqopt.contact.mortar import EPOXY
 from seqopt.engines.auto import AutoEngine, Level
 from seqopt.engines.interface import Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.errors import InfeasibleError, MechanismError, ProblemError
+from seqopt.errors import InfeasibleError, MechanismError, ProblemError, TimeUpError
 from seqopt.network.build import build_network
 from seqopt.placement.criteria import WorstRatio
 from seqopt.placement.free_counts import steps_with, with_held
@@ -316,7 +316,7 @@ def test_time_and_interrupts_leave_a_plan_and_a_bound(arch, monkeypatch):
     assert plan.selection.stopped == "interrupt"
     assert 0 < plan.selection.bound[0] <= 0.8401 <= plan.selection.objective[0] + 1e-4
     assert plan.certificate.gap == np.inf
-    with pytest.raises(ProblemError, match="too little to find a plan"):
+    with pytest.raises(TimeUpError, match="no plan was found yet; give more"):
         seqopt.solve(arch, "schedule_search", seconds=0.0)
     with pytest.raises(ProblemError, match="option speed: schedule_search has width"):
         seqopt.solve(arch, "schedule_search", speed=2)

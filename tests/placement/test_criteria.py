@@ -27,6 +27,7 @@ class Facts:
     reference: dict[str, float] = field(
         default_factory=lambda: {"F_largest": 7.0, "M_sup": 0.0, "T_max": 5.0, "D_max": 1e-3}
     )
+    basis: str = ""
 
 
 RESPONSES = {
@@ -129,7 +130,11 @@ def test_a_weighted_sum_divides_by_its_scales():
     own = WeightedSum("own", (("T_max", 2.0, 4.0), ("M_sup", 3.0, 0.5), ("F_a", 9.0, 1.0)))
     assert own.costs(RESPONSES, 1, 3).tolist() == [21, 17, 28]
     assert own.wanted(1) == ("T_max", "M_sup", "F_a")
-    assert own.settings == {"scales": {"T_max": 4.0, "M_sup": 0.5, "F_a": 1.0}}
+    weights = {"T_max": 2.0, "M_sup": 3.0, "F_a": 9.0}
+    assert own.settings == {
+        "scales": {"T_max": 4.0, "M_sup": 0.5, "F_a": 1.0},
+        "weights": weights,
+    }
     partly = replace(own, terms=(("D_max", 1.0, 1e-3),)).costs(RESPONSES, 1, 3)
     assert partly == pytest.approx([2, NAN, 1], nan_ok=True)
 

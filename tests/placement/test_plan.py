@@ -16,7 +16,7 @@ from seqopt.placement.costs import LayeredCosts
 from seqopt.placement.formulation import FormulationKind
 from seqopt.placement.interface import CostProblem
 from seqopt.placement.problem import Problem
-from seqopt.workflow import find_criterion
+from seqopt.study.presets import find_criterion
 
 WORST = seqopt.CRITERIA["worst-ratio-published"]
 

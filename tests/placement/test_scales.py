@@ -12,17 +12,20 @@ from hypothesis import strategies as st
 
 import seqopt
 from experiments.harness.walls import running_bond
+from seqopt.cli.main import main
 from seqopt.contact.mortar import bond_mortar
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.errors import MechanismError, ProblemError
+from seqopt.errors import MechanismError, ProblemError, StepError
 from seqopt.network.build import build_network
 from seqopt.placement.criteria import OVER_METHODS, RankSum, WeightedSum
-from seqopt.placement.scales import NEVER, ROUNDED, SceneFacts, crown
+from seqopt.placement.scales import NEVER, ROUNDED, SceneFacts, crown, own_scales
 from seqopt.placement.terms import equal
 from seqopt.scene.arch import ArchShape, arch_scene
+from seqopt.scene.reach import Sphere
+from seqopt.sequence.free_rules import FreeRules
 from seqopt.sequence.two_robots import METHODS
 from seqopt.study.presets import CLOSEST, EQUATIONS, RESOLUTION
-from tests.builders import far_reaching, rescaled, small_arch
+from tests.builders import anywhere, far_reaching, rescaled, small_arch
 from tests.strategies import arches
 
 
@@ -103,8 +106,56 @@ def test_a_method_that_falls_on_its_way_gives_no_scales():
             (table,) = stand.values()
             assert facts.reference["M_sup"] == table["M_sup_Nm"].max()
         else:
-            with pytest.raises(ProblemError, match="no fixed method gives scales for this scene"):
-                _ = facts.reference
+            assert facts.reference == own_scales(network)
+            assert facts.basis == " over payload, weight and size"
+
+
+def one_places(count):
+    """An arch that no fixed method builds: only one robot reaches its other end."""
+    scene = small_arch(count)
+    near = Sphere(center=scene.placed[0].position, radius=0.15)
+    first, second = anywhere(2)
+    return replace(scene, robots=(first, replace(second, reach=near)))
+
+
+ALONE = FreeRules(newest="free", least_grips=1)
+
+
+@pytest.mark.parametrize("criterion", ["worst-ratio", "weighted"])
+def test_a_scene_that_no_fixed_method_builds_has_scales_of_its_own(criterion):
+    scene = one_places(6)
+    for method in METHODS.values():
+        with pytest.raises(StepError):
+            method(build_network(scene))
+    plan = seqopt.optimize(scene, "free", criterion, rules=ALONE)
+    assert plan.status == "optimal"
+    summary = plan.summary()
+    assert summary["criterion"] == f"{criterion} over payload, weight and size"
+    weight = float(np.linalg.norm(build_network(scene).weight.sum(axis=0)))
+    assert summary["scales"]["F_largest"] == min(robot.payload for robot in scene.robots)
+    assert summary["scales"]["T_max"] == pytest.approx(weight)
+    given = seqopt.optimize(scene, "free", "worst-ratio-published", rules=ALONE)
+    assert given.summary()["criterion"] == "worst-ratio-published"
+
+
+def test_the_command_line_says_so(capsys, tmp_path):
+    seqopt.save_scene(one_places(5), tmp_path / "s.json")
+    words = ["--schedule", "free", "--rule", "newest=free", "--rule", "least_grips=1"]
+    assert main(["optimize", str(tmp_path / "s.json"), *words]) == 0
+    said = capsys.readouterr().err
+    assert "criterion: worst-ratio over payload, weight and size: no fixed method builds" in said
+
+
+def test_scales_of_a_scene_go_with_its_units():
+    """Powers of two: the same digits in other units of length, force and stiffness."""
+    scene = one_places(5)
+    length, force, softness = 2.0, 8.0, 4.0
+    own, other = (
+        own_scales(build_network(s)) for s in (scene, rescaled(scene, length, force, softness))
+    )
+    ratio = {name: other[name] / own[name] for name in ("F_largest", "T_max", "M_sup")}
+    assert ratio == {"F_largest": force, "T_max": force, "M_sup": force * length}
+    assert all(value > 0 for value in own.values())
 
 
 def test_a_response_without_a_scale_is_named(arch25):

@@ -8,8 +8,8 @@ import pytest
 
 from seqopt.engines.registry import make_engine
 from seqopt.placement.formulation import formulations
-from seqopt.report.comparison import compare
-from seqopt.study.presets import EQUATIONS
+from seqopt.report.comparison import LARGEST, compare
+from seqopt.study.presets import CRITERIA, EQUATIONS
 from tests.builders import small_arch
 
 
@@ -30,3 +30,18 @@ def test_without_weight_nothing_is_above_the_best():
     scene = replace(small_arch(4), gravity=(0.0, 0.0, 0.0))
     table = compare(make_engine("compliance", scene), EQUATIONS).table
     assert table.loc["free", ["objective", "gap"]].tolist() == [0.0, 0.0]
+
+
+def test_the_free_schedule_is_compared_by_the_criterion_that_is_asked_for(engine25):
+    """No figure of the row is above the least of the closed rows and the published plan."""
+    published = CRITERIA["worst-ratio-published"]
+    asked = compare(engine25, published)
+    assert asked.table.loc["free", "objective"] == pytest.approx(0.840088, rel=1e-5)
+    assert asked.criteria["free"] == published
+    ranks = compare(engine25, CRITERIA["equations-2-3"])
+    for table in (asked.table, ranks.table):
+        others = table.loc[["sequential", "cantilever", "published"], [*LARGEST]]
+        assert (table.loc["free", [*LARGEST]] <= others.min()).all()
+    least = ranks.criteria["free"].limits
+    assert dict(least)["F_largest"] == pytest.approx(others["F_rob"].min())
+    assert dict(least)["D_max"] == pytest.approx(1e-6 * others["D_max"].min())

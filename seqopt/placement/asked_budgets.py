@@ -1,4 +1,4 @@
-"""Budgets on the command line: what their words stand for."""
+"""Budgets in words, before there is the problem that they are for."""
 
 from __future__ import annotations
 
@@ -14,8 +14,9 @@ from seqopt.placement.costs import Budget
 from seqopt.placement.problem import Problem
 from seqopt.placement.solving import on_the_way, solve
 from seqopt.responses.quantities import robot_response
+from seqopt.scene.checks import short
 
-FREE = "overlap_dp"  # finds the optimum without budgets, of which a share may be asked
+UNBOUND = "overlap_dp"  # finds the optimum without budgets, of which a share may be asked
 SHAPE = re.compile(
     r"(?P<kind>travel|steps_over:(?P<response>.+)|robot_use:(?P<robot>.+))"
     r"=((?P<level>[^:=]+):)?(?P<bound>[^:=]+?)(?P<unit>m|x|)"
@@ -30,7 +31,6 @@ class AskedBudget:
     Attributes
     ----------
     words : str
-        Of the command line.
     response : str
         Whose steps over a level are counted; empty for the way that robots go.
     level : float
@@ -65,13 +65,13 @@ class AskedBudget:
         return steps_over(problem, self.response, self.level, bound)
 
 
-def parse_budgets(texts: Sequence[str]) -> tuple[AskedBudget, ...]:
+def parse_budgets(texts: Sequence[str] | str) -> tuple[AskedBudget, ...]:
     """Return budgets from words.
 
     Parameters
     ----------
-    texts : sequence of str
-        Each ``travel=BOUND``, ``steps_over:RESPONSE=LEVEL:BOUND`` or
+    texts : sequence of str, or str
+        One or several, each ``travel=BOUND``, ``steps_over:RESPONSE=LEVEL:BOUND`` or
         ``robot_use:ROBOT=LEVEL:BOUND``, SI units. A bound of travel is a share of what the optimum
         without budgets travels, or in meters, as ``3.5m``; other bounds are numbers of steps, or
         shares, as ``0.8x``.
@@ -85,10 +85,13 @@ def parse_budgets(texts: Sequence[str]) -> tuple[AskedBudget, ...]:
     ProblemError
         If one has another form, or stands there twice.
     """
+    texts = (texts,) if isinstance(texts, str) else texts
+    if not isinstance(texts, Sequence) or not all(isinstance(text, str) for text in texts):
+        raise ProblemError(f"budgets {short(texts)}: give {FORMS}, as words")
     found = tuple(_parse(text) for text in texts)
     for i, budget in enumerate(found):
         if any((b.response, b.level) == (budget.response, budget.level) for b in found[:i]):
-            raise ProblemError(f"--budget {budget.words}: it stands there twice; give one bound")
+            raise ProblemError(f"budget {budget.words}: it stands there twice; give one bound")
     return found
 
 
@@ -96,10 +99,10 @@ def _parse(text: str) -> AskedBudget:
     found = SHAPE.fullmatch(text)
     if found is None or (found["level"] is None) != (found["kind"] == "travel"):
         hint = did_you_mean(re.split("[=:]", text)[0], ("travel", "steps_over", "robot_use"))
-        raise ProblemError(f"--budget {text} does not exist{hint}; give {FORMS}")
+        raise ProblemError(f"budget {text} does not exist{hint}; give {FORMS}")
     is_travel = found["kind"] == "travel"
     if found["unit"] == "m" and not is_travel:
-        raise ProblemError(f"--budget {text}: steps have no meters; give a number of them")
+        raise ProblemError(f"budget {text}: steps have no meters; give a number of them")
     response = found["response"] or (robot_response(found["robot"]) if found["robot"] else "")
     level = 0.0 if is_travel else _positive(found["level"], text)
     share = found["unit"] == "x" or (is_travel and not found["unit"])
@@ -112,7 +115,7 @@ def _positive(text: str, words: str) -> float:
     except ValueError:
         value = -1.0
     if not (np.isfinite(value) and value >= 0):
-        raise ProblemError(f"--budget {words}: {text!r} is not a number from 0; give {FORMS}")
+        raise ProblemError(f"budget {words}: {text!r} is not a number from 0; give {FORMS}")
     return value
 
 
@@ -133,7 +136,7 @@ def with_budgets(problem: Problem, asked: Sequence[AskedBudget]) -> Problem:
     for each in asked:
         bound = each.bound
         if each.share:
-            free = on_the_way(solve(problem, FREE)).selection.choice
+            free = on_the_way(solve(problem, UNBOUND)).selection.choice
             bound *= each.of(problem, np.inf).spent(free)
         budgets.append(each.of(problem, bound))
     return replace(problem, budgets=tuple(budgets))

@@ -1,0 +1,101 @@
+"""What is taken where nothing is asked for: the same in Python and on the command line."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import pytest
+
+import seqopt
+from seqopt.cli.main import main
+from seqopt.scene.scene_file import save_scene
+from seqopt.work.progress import Stage
+from tests.builders import anywhere, small_arch
+
+UNLIKE = ("seconds", "models_paper_count")  # what differs from run to run, and what the paper says
+
+
+def answered(capsys, *arguments):
+    """Return the JSON document of a command that ends well."""
+    assert main([*map(str, arguments), "--json"]) == 0
+    return json.loads(capsys.readouterr().out)
+
+
+def same(summary):
+    """Return a summary as JSON has it, without what need not be the same."""
+    plain = json.loads(json.dumps(summary))
+    return {name: value for name, value in plain.items() if name not in UNLIKE}
+
+
+@pytest.fixture
+def arch(tmp_path):
+    path = tmp_path / "arch.json"
+    save_scene(small_arch(6), path)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("words", "given"),
+    [
+        ((), {}),
+        (("--schedule", "free"), {"schedule": "free"}),
+        (("--budget", "travel=0.9"), {"budgets": ["travel=0.9"]}),
+        (("--robots", "rob3,rob1"), {"robots": ["rob3", "rob1"]}),
+        (("--candidates", "near:2"), {"candidates": "near:2"}),
+    ],
+)
+def test_python_and_the_command_line_answer_alike(capsys, arch, words, given):
+    found = answered(capsys, "optimize", arch, *words)
+    plan = seqopt.optimize(arch, **given)
+    assert same(found["summary"]) == same(plan.summary())
+    assert [row["step"] for row in found["plan"]] == [step.number for step in plan.steps]
+    assert (found["written"], found["exit_status"]) == ([], 0)
+
+
+def test_optimize_alone_says_what_it_found_and_how_to_keep_it(capsys):
+    assert main(["optimize", "arch25"]) == 0
+    said = capsys.readouterr().out
+    assert "overlap_dp (exact): objective 657.465, gap 0 %" in said
+    assert "--out DIR writes the plan" in said
+
+
+def test_two_robots_get_the_loop_of_two(capsys, tmp_path):
+    scene = replace(small_arch(5), robots=anywhere(2))
+    save_scene(scene, tmp_path / "two.json")
+    found = answered(capsys, "optimize", tmp_path / "two.json")
+    assert found["summary"]["schedule"] == "two-robot"
+    assert seqopt.optimize(scene).problem.schedule.method == "two-robot"
+    four = replace(scene, robots=anywhere(4))
+    assert seqopt.optimize(four).problem.schedule.method == "three-robot"
+    named = seqopt.optimize(four, robots=[robot.name for robot in four.robots])
+    assert named.problem.schedule.method == "four-robot"
+
+
+def test_budgets_are_kept_in_python():
+    free, bound = seqopt.optimize("arch25"), seqopt.optimize("arch25", budgets="travel=20m")
+    (kept,) = bound.summary()["budgets"].values()
+    assert kept["spent"] <= kept["bound"] == 20
+    assert bound.formulation.name == "labels"  # overlap_dp takes none
+    assert bound.certificate.objective > free.certificate.objective
+
+
+@pytest.mark.parametrize("budgets", [5, ["speed=3"], [7], "travel=fast"])
+def test_budgets_that_are_none_get_one_line(budgets):
+    with pytest.raises(seqopt.SeqoptError, match=r"^budget.*give travel=0\.8") as caught:
+        seqopt.optimize(small_arch(5), budgets=budgets)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_free_schedule_tells_python_how_far_it_is():
+    told = []
+    seqopt.optimize(small_arch(4), "free", progress=told.append)
+    assert all(isinstance(each, str | Stage) for each in told)
+    assert told
+
+
+@pytest.mark.slow
+def test_a_chain_that_opens_its_joints_has_a_plan_in_python_too():
+    """The engine that opens joints is taken where it is asked for."""
+    plan = seqopt.optimize("chain:bricks=75", "three-robot", formulation="cascade")
+    assert len(plan.steps) == 290

@@ -1,0 +1,91 @@
+"""What results came from: every summary names engine, reason, criterion with numbers, versions."""
+
+from __future__ import annotations
+
+import json
+import platform
+from importlib.metadata import version
+
+import numpy as np
+import pytest
+
+import seqopt
+from seqopt.cli.main import main
+from seqopt.engines.provenance import provenance
+from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.scene.scene_file import save_scene
+from tests.builders import small_arch
+
+
+@pytest.fixture
+def arch(tmp_path):
+    path = tmp_path / "arch.json"
+    save_scene(small_arch(5), path)
+    return str(path)
+
+
+WRITES = {
+    "loop": ("optimize",),
+    "free": ("optimize", "--schedule", "free"),
+    "order": ("optimize", "--schedule", "free", "--order", "search"),
+    "robust": ("optimize", "--robust", "worst-peak", "--scenarios", "2"),
+    "pareto": ("pareto", "--aim", "F_largest,steps"),
+    "compare": ("compare", "--criteria", "worst-ratio"),
+}
+
+
+@pytest.mark.parametrize("name", WRITES)
+def test_every_summary_says_what_it_came_from(capsys, tmp_path, arch, name):
+    command, *words = WRITES[name]
+    assert main([command, arch, *words, "--out", str(tmp_path / "out")]) == 0
+    found = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
+    assert found["engine"] == {"name": "compliance", "reason": "the default"}
+    for package in ("seqopt", "numpy", "scipy", "pandas", "highspy", "clarabel"):
+        assert found["versions"][package] == version(package)
+    assert found["versions"]["python"] == platform.python_version()
+    if name == "compare":
+        assert {*found["criteria"]} == {"three-robot", "free"}
+        for criterion in found["criteria"].values():
+            assert criterion["criterion"] == "worst-ratio"
+            assert all(scale > 0 for scale in criterion["scales"].values())
+    elif name == "pareto":
+        assert (found["criterion"], found["aims"]) == (None, ["F_largest", "steps"])
+    elif name in ("free", "order"):
+        assert all(scale > 0 for scale in found["scales"].values())
+    else:
+        assert {*found["weights"]} == {"before_crown", "from_crown_on"}
+        assert found["resolution"]["F"] > 0
+
+
+@pytest.mark.parametrize("name", ["free", "order", "pareto"])
+def test_a_free_schedule_says_which_levels_an_automatic_engine_took(capsys, tmp_path, arch, name):
+    command, *words = WRITES[name]
+    arguments = [command, arch, *words, "--engine", "auto", "--mortar", "epoxy"]
+    assert main([*arguments, "--out", str(tmp_path / "out")]) == 0
+    assert "engine: compliance for " in capsys.readouterr().err
+    found = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
+    engine = found["engine"]
+    assert (engine["name"], engine["reason"]) == ("auto", "asked for by name")
+    assert engine["mortar"]["tensile_strength"] == seqopt.EPOXY.tensile_strength
+    assert {level["engine"] for level in engine["levels"]} <= {"planar", "compliance", "discrete"}
+    assert all(level["sets"] > 0 and level["reason"] for level in engine["levels"])
+
+
+def test_one_step_after_the_other_says_it_too(capsys, arch):
+    assert main(["analyze", arch, "--method", "cantilever", "--engine", "frame", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["engine"] == {"name": "frame", "reason": "asked for by name"}
+    assert main(["assess", arch, "--method", "cantilever", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["versions"]["numpy"] == np.__version__
+
+
+def test_an_engine_of_ones_own_is_named_by_its_class():
+    engine = ComplianceEngine(seqopt.build_network(small_arch(3)))
+    said = provenance(engine)["engine"]
+    assert said == {"name": "ComplianceEngine", "reason": "given as an object"}
+
+
+def test_goals_without_a_criterion_name_none():
+    plan = seqopt.optimize(small_arch(4), "free", aim="F_largest")
+    assert plan.summary()["criterion"] is None
+    assert "scales" not in plan.summary()
