@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 from seqopt.cli.main import main
 from seqopt.engines.interface import Want
 from seqopt.engines.registry import make_engine
+from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network
 from seqopt.report.cards import card
 from seqopt.responses.linear_range import STRAIN, LinearRange
@@ -148,6 +149,26 @@ def moved(scene, network, twist):
         axes = {name: turned(getattr(joint, name), i) for name in ("along", "across")}
         joints.append(replace(joint, position=tuple(middle), **axes))
     return replace(scene, bricks=tuple(bricks), joints=tuple(joints))
+
+
+def test_an_engine_is_asked_once_for_a_state_and_in_the_order_of_the_build(arch25):
+    """Engines grow with the build: in any other order they would begin again and again."""
+    asked = []
+
+    class Asked(ComplianceEngine):
+        def solve(self, bricks, grips, want=Want.RESPONSES):
+            asked.append((bricks, *np.ravel(grips)))
+            return super().solve(bricks, grips, want)
+
+    made = Asked(build_network(arch25))
+    table = analyze(made, sequential(made.network))
+    asked.clear()
+    within = LinearRange(made)
+    for _ in range(2):
+        within.departures(table)
+    counts = [state[0] for state in asked]
+    assert counts == sorted(counts)
+    assert len(asked) == len({*asked}) <= len(table)
 
 
 def reached(engine, steps):
