@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from seqopt.graph.paths import least_peak
 from seqopt.placement.free_goals import STATE_RESPONSES, Goal, Measure
-from seqopt.placement.free_graph import explore
-from seqopt.placement.free_paths import least_to_end
 from seqopt.placement.free_problem import FreeProblem
+from seqopt.placement.free_states import explore
 from seqopt.sequence.free_rules import FreeRules, Payload
 
 STEPS = (Goal(Measure.STEPS),)
@@ -35,7 +35,7 @@ def why_impossible(problem: FreeProblem) -> str:
     problem = replace(problem, engine=getattr(problem.engine, "rigid", problem.engine))
     graph = explore(replace(problem, goals=STEPS))
     placed = problem.network.scene.placed
-    stops = len(graph.levels) - 1
+    stops = graph.reached
     where = f"after brick {placed[-1].name} the build cannot end"
     if stops < len(placed):
         where = f"brick {placed[stops].name} ({stops + 1} of {len(placed)}) is never placed"
@@ -111,5 +111,5 @@ def worst_least(problem: FreeProblem, response: str) -> float:
     float
         SI units; infinite if there is no plan.
     """
-    graph = explore(replace(problem, goals=(Goal(Measure.PEAK, response),)))
-    return float(least_to_end(graph, 0)[0].min()) if graph.whole else np.inf
+    found = explore(replace(problem, goals=(Goal(Measure.PEAK, response),)))
+    return least_peak(found.graph().graph, 0) if found.whole else np.inf

@@ -180,7 +180,7 @@ class FreePlan(ShownBuild):
             "regrips": self.regrips,
             "idle_robots": list(idle_robots(problem.network.scene, self.steps)),
             "payload_exceeded": [str(excess) for excess in self.overloads],
-            "models_evaluated": problem.sets.solved,
+            "models_evaluated": problem.models,
             "states_in_proof": 0 if self.certificate is None else self.certificate.states,
             "seconds": dict(self.seconds),
         }
@@ -250,6 +250,6 @@ def solve_free(
     if proof and "progress" in options:
         options["progress"]("proving that no plan is better")
     steps = steps_of(problem.space, selection.states)
-    certificate = judge_schedule(problem, selection, steps) if proof else None
+    certificate = judge_schedule(problem, selection, steps, dict(enumerate(selection.visited))) if proof else None
     seconds = {"solve": solved - start, "verify": time.perf_counter() - solved}
     return FreePlan(problem, formulation, selection, certificate, steps, seconds)

@@ -1,264 +1,294 @@
-"""The proof that no free schedule is better: the states that a better one could pass.
+"""The proof that no free schedule is better: a graph of its own, and what no path stays below.
 
-Worst values and numbers of steps are proven for many states at once, by tables of the rules; what
-else adds up over a build is proven state by state.
+The graph is built anew by a second version of the rules, with responses that the engine computes
+again. Which states a search visited may be told, so that many are looked at together; states that
+this leaves out are found all the same.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from functools import cached_property
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
+from seqopt.arrays import Bools, Floats, Ints
+from seqopt.errors import InfeasibleError
+from seqopt.graph.duality import lexicographic_bounds
+from seqopt.graph.graph import Graph
+from seqopt.graph.paths import lexicographic, reached, tied
 from seqopt.placement.free_answers import ask
 from seqopt.placement.free_goals import Measure
 from seqopt.placement.free_problem import FreeProblem
-from seqopt.placement.free_reach import Reach, counts_alone
-from seqopt.placement.free_tables import RuleTables
+from seqopt.placement.free_states import move_amounts
+from seqopt.placement.free_tables import Follows, RuleTables
 from seqopt.placement.requirements import LIMIT_TOLERANCE
-from seqopt.placement.standing import slack
 from seqopt.placement.standing_proof import StandingProof
+from seqopt.responses.known_rows import KnownRows
 from seqopt.sequence.free_check import RuleBook
-from seqopt.sequence.free_rules import Ending, Payload
-from seqopt.sequence.steps import Grips, StepKind
+from seqopt.sequence.free_rules import Payload
 
 BELOW = 1e-9  # by how much a plan must be better, over the size of the value
-ROUNDING = 1e-12  # by how much it may be worse in a goal before, likewise
-REMEMBERED = 50_000  # states of which what follows is kept
-State = tuple[int, Grips, int, Grips]  # bricks, grips, regrips since the last, where robots were
-Label = tuple[float, ...]  # what the goals that add up took so far
-Known = dict[State, list[Label]]
-GripSet = tuple[int, ...]
-Move = tuple[State, Label, StepKind, State]
+Hint = Mapping[int, Ints]  # states that a search visited, by brick count
 
 
 class Proof:
-    """Looks for plans that are better than claimed, by independent rules and new responses.
+    """What no free schedule stays below, by independent rules and new responses.
 
     Parameters
     ----------
     problem : FreeProblem
+    hint : mapping of int to (n, c) int, optional
+        States that are likely to be passed, by brick count, as of
+        `seqopt.sequence.free_space.FreeSpace`; only time depends on them.
 
     Attributes
     ----------
     states : int
-        How many states were looked at for the first goal.
+        How many states a better plan could pass.
     """
 
-    def __init__(self, problem: FreeProblem) -> None:
-        self._problem = problem
-        self._book = RuleBook(problem.network, problem.rules)
+    def __init__(self, problem: FreeProblem, hint: Hint | None = None) -> None:
+        self._problem, self._hint = problem, hint or {}
+        book = RuleBook(problem.network, problem.rules)
+        most = _loads(problem, book)
         self._parks = any(goal.measure is Measure.TRAVEL for goal in problem.goals)
-        self._groups = self._alike()
-        self._most = self._loads()
-        self._worth: dict[tuple[int, GripSet], tuple[Label, dict[int, float]] | None] = {}
-        self._stands = StandingProof(problem, self._most)
-        self._follows: dict[State, list[tuple[StepKind, State]]] = {}
+        self._tables = RuleTables(book, _alike(book, most), parks=self._parks)
+        self._payload = np.array([most[r] for r in book.team])
+        columns = [r for kind in problem.space.kinds for r in kind.robots]
+        self._columns = [columns.index(r) for r in book.team]
+        self._stands = StandingProof(problem, most)
+        self._known = KnownRows()
+        self._fallen: dict[int, Ints] = {}
+        self._leading = sum(goal.of_margins for goal in problem.goals)
         self.states = 0
 
-    def finds_better(self, values: Label, k: int) -> bool:
-        """Return whether a plan keeps the goals before one at their values and takes less of it.
+    def bounds(self, values: Sequence[float]) -> tuple[float, ...]:
+        """Return what no plan stays below in every goal, those before it being at their values.
 
         Parameters
         ----------
-        values : tuple of float
-            Of every goal.
-        k : int
-            Which goal is to be less.
+        values : sequence of float
+            Of every goal; what is said of margins of stability means nothing.
+
+        Returns
+        -------
+        tuple of float
+            Infinite where there is no plan.
+        """
+        while True:
+            levels = _Levels(self, values)
+            self.states = sum(map(len, levels.states))
+            out = lexicographic_bounds(levels.graph(), values)
+            if not self._fall(levels, values, out):
+                return out
+
+    def is_impossible(self, margins: Sequence[float] = ()) -> bool:
+        """Return whether no plan is allowed, or none in which all states have better margins.
+
+        Parameters
+        ----------
+        margins : sequence of float, optional
+            Of the first goals.
 
         Returns
         -------
         bool
         """
-        if self._problem.goals[k].of_margins and values[k] == 0:
+        levels = _Levels(self, (), margins)
+        graph = levels.graph()
+        self.states = max(self.states, graph.states)
+        return not graph.ends[reached(graph)].any()
+
+    def _fall(self, levels: _Levels, values: Sequence[float], bounds: Sequence[float]) -> bool:
+        """Return whether a state on a path that would be better is proven to fall."""
+        margins = values[: self._leading]
+        pairs = zip(values[self._leading :], bounds[self._leading :], strict=True)
+        if not self._stands.asked(margins) or all(v - BELOW * abs(v) <= b for v, b in pairs):
             return False
-        most = [value + ROUNDING * abs(value) for value in values[:k]]
-        most.append(self.bound(values, k))
-        if counts_alone(self._problem.goals[: k + 1]):
-            found = self._reach.finds_end(most)
-            self.states += self._reach.states if not k else 0
-            return found
-        return self._finds_end(most)
+        try:
+            path = np.array(lexicographic(levels.graph()).path)
+        except InfeasibleError:
+            return False
+        first, found = 0, False
+        for bricks, rows in enumerate(levels.states):
+            own = rows[path[(path >= first) & (path < first + len(rows))] - first]
+            fall = own[~self._may_stand(bricks, own, margins)] if bricks else own[:0]
+            before = self._fallen.get(bricks, np.zeros(0, dtype=np.int64))
+            self._fallen[bricks] = np.concatenate([before, self._tables.codes(fall)])
+            first, found = first + len(rows), found or len(fall) > 0
+        return found
 
-    @cached_property
-    def _reach(self) -> Reach:
-        """For goals that leave nothing to remember of a way but its length."""
-        payload = np.array([self._most[r] for r in self._book.team])
-        tables = RuleTables(self._book, self._groups)
-        return Reach(self._problem, tables, payload, self._stands)
+    def told(self, bricks: int) -> Ints:
+        """Return the states with some bricks of which it was told, as rows of the tables."""
+        rows = self._hint.get(bricks)
+        start = self._tables.start()
+        if rows is None:
+            return start[:0]
+        robots = self._tables.robots
+        columns = [*self._columns, *range(robots, rows.shape[1])]
+        return self._tables.in_order(rows[:, columns].astype(start.dtype))
 
-    def _finds_end(self, most: list[float]) -> bool:
-        """Return whether a plan takes no more than bounds say, state by state."""
-        k = len(most) - 1
-        none: Grips = (None,) * len(self._problem.network.scene.robots)
-        known: Known = {(0, none, 0, none): [(0.0,) * (k + 1)]}
-        for bricks in range(len(self._problem.network.inner) + 1):
-            following: Known = {}
-            work = [(state, label) for state, labels in known.items() for label in labels]
-            while work:
-                moves = [(s, label, *move) for s, label in work for move in self._after(s)]
-                self._solve({(s[0], _held(s)) for *_, s in moves})
-                labels = [self._add(label, s, kind, after, most) for s, label, kind, after in moves]
-                work = []
-                for after, new in self._standing(moves, labels, most):
-                    if not _keep(following if after[0] > bricks else known, after, new):
-                        continue
-                    if self._book.ends(after[0], after[1]):
-                        return True
-                    if after[0] == bricks:
-                        work.append((after, new))
-            self.states += len(known) if not k else 0
-            known = following
-        return False
-
-    def bound(self, values: Label, k: int) -> float:
-        """Return what a plan must stay below to be better in a goal.
+    def valued(
+        self, bricks: int, states: Ints, asked: tuple[Sequence[float], Sequence[float]]
+    ) -> tuple[Floats, Bools]:
+        """Return what goals take of states, and which ones a better plan could pass.
 
         Parameters
         ----------
-        values : tuple of float
-        k : int
+        bricks : int
+        states : (n, c) int
+        asked : tuple of (sequence of float, sequence of float)
+            Values of goals, of which the first bounds states if it is about a worst step, and
+            margins that states must have.
 
         Returns
         -------
-        float
+        values : (n, g) float
+        ok : (n,) bool
         """
-        value, goal = values[k], self._problem.goals[k]
-        if goal.of_margins:
-            return max(0.0, value - slack(goal.response, value))
-        less = float(np.nextafter(value, -np.inf))  # of none there is no share
-        return min(less, value - BELOW * abs(value))
+        goals = self._problem.goals
+        if not bricks:
+            return np.zeros((len(states), len(goals))), np.ones(len(states), dtype=bool)
+        held, payload = self._held(states)
+        values, forces, ok = self._answers(bricks, held)
+        ok &= (forces <= payload).all(axis=1)
+        most, margins = asked
+        k = self._leading
+        if len(most) > k and goals[k].measure is Measure.PEAK:
+            ok &= values[:, k] <= tied(most[k])
+        if bricks in self._fallen:
+            ok &= ~np.isin(self._tables.codes(states), self._fallen[bricks])
+        if len(margins):
+            ok[ok] = self._may_stand(bricks, states[ok], margins)
+        return values, ok
 
-    def _standing(
-        self, moves: list[Move], labels: list[Label | None], most: list[float]
-    ) -> Iterator[tuple[State, Label]]:
-        """Yield the states that may be passed, and what goals took on the way to them."""
-        found = [(move[3], new) for move, new in zip(moves, labels, strict=True) if new is not None]
-        stand = self._stands.allows([(after[0], after[1]) for after, _ in found], most)
-        yield from (pair for pair, ok in zip(found, stand, strict=True) if ok)
+    def _held(self, states: Ints) -> tuple[Ints, Floats]:
+        """Return nodes held, ascending, and the payloads of those who hold them, (n, r)."""
+        grips = states[:, : self._tables.robots].clip(min=0)
+        order = np.argsort(grips, axis=1, kind="stable")
+        return np.take_along_axis(grips, order, axis=1), self._payload[order]
 
-    def _add(
-        self, label: Label, before: State, kind: StepKind, after: State, most: list[float]
-    ) -> Label | None:
-        """Return what goals took after a step; None if it is more than they may, or not allowed."""
-        found = self._worth[after[0], _held(after)]
-        if found is None or not self._carried(after[1], found[1]):
-            return None
-        out = []
-        for goal, value, taken, bound in zip(
-            self._problem.goals, found[0], label, most, strict=False
-        ):
-            total = max(taken, value) if goal.measure is Measure.PEAK else taken + value
-            if goal.measure is Measure.STEPS:
-                total = taken + 1
-            elif goal.measure is Measure.REGRIPS:
-                total = taken + (kind is StepKind.REPOSITION)
-            elif goal.measure is Measure.TRAVEL:
-                total = taken + self._way(before, after)
-            if total + (self._to_go(after) if goal.measure is Measure.STEPS else 0) > bound:
-                return None
-            out.append(0.0 if goal.measure is Measure.PEAK else total)
-        return tuple(out)
+    def _may_stand(self, bricks: int, states: Ints, margins: Sequence[float]) -> Bools:
+        return self._stands.allows_rows(bricks, *self._held(states), margins)
 
-    def _to_go(self, state: State) -> int:
-        """Return the least steps after a state: each brick left takes a robot that is free."""
-        left = len(self._problem.network.inner) - state[0]
-        held = sum(node is not None for node in state[1])
-        ends = self._problem.rules.ending is not Ending.HELD and (held > 0 or left > 0)
-        return left + max(0, held + left - len(self._book.team)) + ends
+    def _answers(self, bricks: int, held: Ints) -> tuple[Floats, Floats, Bools]:
+        """Return values, forces of grips and what is within limits, of rows of nodes held."""
+        goals, robots = len(self._problem.goals), held.shape[1]
+        out = np.zeros((len(held), goals + robots + 1))
+        count = np.count_nonzero(held, axis=1)
+        for taken in np.unique(count).tolist():
+            rows = np.flatnonzero(count == taken)
+            nodes = held[rows, robots - taken :]
+            codes = nodes @ len(self._tables.nodes) ** np.arange(taken)
 
-    def _after(self, state: State) -> list[tuple[StepKind, State]]:
-        """Return the steps that are possible from a state, alike ones once."""
-        if state in self._follows:
-            return self._follows[state]
-        bricks, grips, regrips, stays = state
-        found: dict[State, StepKind] = {}
-        for kind, count, after, taken in self._book.follow(bricks, grips, regrips):
-            rest = stays
-            if self._parks:
-                rest = tuple(s if g is None else g for g, s in zip(after, stays, strict=True))
-            counted = taken if self._problem.rules.regrips is not None else 0
-            found.setdefault(self._sorted(count, after, counted, rest), kind)
-        out = [(kind, after) for after, kind in found.items()]
-        if len(self._follows) < REMEMBERED:
-            self._follows[state] = out
-        return out
+            def compute(new: Ints, nodes: Ints = nodes) -> Floats:
+                found = ask(self._problem, bricks, self._tables.nodes[nodes[new]])
+                return np.column_stack([found.worth, found.forces, found.fit])
 
-    def _sorted(self, bricks: int, grips: Grips, regrips: int, stays: Grips) -> State:
-        """Return a state in which robots that could change places stand in the order of grips."""
-        new, rest = list(grips), list(stays)
-        for group in self._groups:
-            pairs = [(-1 if grips[r] is None else grips[r], stays[r] or -1) for r in group]
-            order = sorted(range(len(group)), key=pairs.__getitem__)
-            for r, i in zip(group, order, strict=True):
-                new[r], rest[r] = grips[group[i]], stays[group[i]]
-        return bricks, tuple(new), regrips, tuple(rest)
+            found = self._known.of((bricks, taken), codes, compute)
+            out[rows, :goals] = found[:, :goals]
+            out[rows, goals + robots - taken :] = found[:, goals:]
+        return out[:, :goals], out[:, goals:-1], out[:, -1] > 0
 
-    def _alike(self) -> list[tuple[int, ...]]:
-        """Return the robots that could change places, group by group."""
-        scene, last = self._problem.network.scene, len(self._problem.network.inner)
-        groups: dict[object, list[int]] = {}
-        for r in self._book.team:
-            name = scene.robots[r].name
-            may = not self._problem.rules.placers or name in self._problem.rules.placers
-            nodes = [self._book.newest_nodes[r, b] for b in range(1, last + 1)]
-            key = (self._book.reached[r, last], tuple(nodes), may, self._loads()[r])
-            groups.setdefault(key, []).append(r)
-        return [tuple(group) for group in groups.values() if len(group) > 1]
+    def follow(self, bricks: int, states: Ints) -> Iterator[Follows]:
+        """Yield what follows from states by the rules."""
+        return self._tables.follow(bricks, states)
 
-    def _loads(self) -> dict[int, float]:
-        """Return the most that every robot may carry, N."""
-        out = {}
-        for r, robot in enumerate(self._problem.network.scene.robots):
-            kept = self._problem.rules.payload is Payload.KEPT
-            cap = min(robot.payload if kept else np.inf, self._problem.caps.get(robot.name, np.inf))
-            out[r] = cap * (1 + LIMIT_TOLERANCE)
-        return out
-
-    def _carried(self, grips: Grips, forces: dict[int, float]) -> bool:
-        held = ((r, node) for r, node in enumerate(grips) if node is not None)
-        return all(forces[node] <= self._most[r] for r, node in held)
-
-    def _way(self, before: State, after: State) -> float:
-        """Return how far the robot went that took a grip: places may have changed, ways not."""
-        scene = self._problem.network.scene
-        fresh = [n for n in after[1] if n is not None and n not in before[1]]
-        if not fresh:
-            return 0.0
-        left = [s for g, s in zip(after[1], after[3], strict=True) if g is None]
-        stayed = [s for g, s in zip(before[1], before[3], strict=True) if g is None]
-        for stay in left:
-            stayed.remove(stay)
-        if stayed[0] is None:
-            return 0.0
-        ends = [scene.node_position(node) for node in (stayed[0], fresh[0])]
-        return float(np.linalg.norm(np.array(ends[0]) - np.array(ends[1])))
-
-    def _solve(self, asked: Iterable[tuple[int, GripSet]]) -> None:
-        """Ask the engine for the grip sets that are not known yet."""
-        alike: dict[tuple[int, int], list[GripSet]] = {}
-        for bricks, held in sorted(asked):
-            if (bricks, held) not in self._worth:
-                alike.setdefault((bricks, len(held)), []).append(held)
-        for (bricks, count), sets in alike.items():
-            grips = np.array(sets, dtype=np.int64).reshape(len(sets), count)
-            found = ask(self._problem, bricks, grips)
-            rows = zip(sets, found.worth.tolist(), found.forces.tolist(), found.fit, strict=True)
-            for held, worth, forces, fits in rows:
-                known = (tuple(worth), dict(zip(held, forces, strict=True))) if fits else None
-                self._worth[bricks, held] = known
+    def moved(self, values: Floats, found: Follows) -> Floats:
+        """Return what goals take of moves to states with such values, (m, g)."""
+        taken = np.column_stack([np.full(len(found.way), float(found.regrip)), found.way])
+        return move_amounts(self._problem, values, taken)
 
 
-def _held(state: State) -> GripSet:
-    return tuple(sorted(node for node in state[1] if node is not None))
+class _Levels:
+    """The states that a better plan could pass, level by level, and the moves between them."""
+
+    def __init__(
+        self, proof: Proof, values: Sequence[float], margins: Sequence[float] = ()
+    ) -> None:
+        self._proof, self._asked = proof, (values, margins)
+        self._tables = tables = proof._tables
+        self.states: list[Ints] = []
+        self._arcs: list[tuple[Ints, Ints, Floats]] = []
+        self._ends = np.zeros(0, dtype=bool)
+        self._graph: Graph | None = None
+        self._count = 0
+        coming: list[tuple[Ints, Follows]] = []
+        fresh = tables.start()
+        for bricks in range(tables.last + 1):
+            coming = self._close(bricks, [fresh, proof.told(bricks)], coming)
+            fresh = np.concatenate([fresh[:0], *(found.states for _, found in coming)])
+
+    def _close(
+        self, bricks: int, entries: list[Ints], coming: list[tuple[Ints, Follows]]
+    ) -> list[tuple[Ints, Follows]]:
+        """Add the states of a brick count; return the moves that place the next one."""
+        tables, first = self._tables, self._count
+        fresh = np.concatenate(entries)
+        seen = np.zeros(0, dtype=np.int64)
+        codes, states, values = [seen], [fresh[:0]], [np.zeros((0, len(self._proof._problem.goals)))]
+        onward: list[tuple[Ints, Follows]] = []
+        while len(fresh):
+            own, at = np.unique(tables.codes(fresh), return_index=True)
+            new = ~np.isin(own, seen, assume_unique=True)
+            seen = np.concatenate([seen, own[new]])
+            rows = fresh[at[new]]
+            worth, ok = self._proof.valued(bricks, rows, self._asked)
+            states.append(rows[ok])
+            codes.append(own[new][ok])
+            values.append(worth[ok])
+            found = [
+                (found.source + self._count, found) for found in tables.follow(bricks, rows[ok])
+            ]
+            self._count += int(ok.sum())
+            onward += [pair for pair in found if pair[1].bricks > bricks]
+            inner = [pair for pair in found if pair[1].bricks == bricks]
+            coming = coming + inner
+            fresh = np.concatenate([fresh[:0], *(found.states for _, found in inner)])
+        known, rows = np.concatenate(codes), np.concatenate(states)
+        worth, order = np.concatenate(values), np.argsort(known, kind="stable")
+        for source, found in coming:
+            wanted = tables.codes(found.states)
+            at = np.searchsorted(known, wanted, sorter=order).clip(max=max(0, len(known) - 1))
+            kept = np.zeros(len(wanted), dtype=bool)
+            if len(known):
+                kept = known[order[at]] == wanted
+            target = order[at[kept]] if len(known) else at[:0]
+            part = Follows(bricks, found.source, found.states, found.regrip, found.way[kept])
+            amounts = self._proof.moved(worth[target], part)
+            self._arcs.append((source[kept], first + target, amounts))
+        self.states.append(rows)
+        self._ends = np.concatenate([self._ends, tables.ends(bricks, rows)])
+        return onward
+
+    def graph(self) -> Graph:
+        """Return them as a graph."""
+        if self._graph is None:
+            source, target, amounts = map(np.concatenate, zip(*self._arcs, strict=True))
+            peaks = tuple(g.measure is Measure.PEAK for g in self._proof._problem.goals)
+            rows = source.astype(np.int32), target.astype(np.int32)
+            self._graph = Graph(*rows, amounts, peaks, self._ends)
+            self._arcs = []
+        return self._graph
 
 
-def _keep(known: Known, state: State, label: Label) -> bool:
-    """Keep a label unless one that is known takes no more of anything; say which."""
-    labels = known.get(state, [])
-    if any(all(a <= b for a, b in zip(old, label, strict=True)) for old in labels):
-        return False
-    better = [o for o in labels if not all(a <= b for a, b in zip(label, o, strict=True))]
-    known[state] = [*better, label]
-    return True
+def _alike(book: RuleBook, most: Mapping[int, float]) -> list[tuple[int, ...]]:
+    """Return the robots that could change places, group by group."""
+    scene, last = book.network.scene, len(book.network.inner)
+    groups: dict[object, list[int]] = {}
+    for r in book.team:
+        may = not book.rules.placers or scene.robots[r].name in book.rules.placers
+        nodes = [book.newest_nodes[r, b] for b in range(1, last + 1)]
+        key = (book.reached[r, last], tuple(nodes), may, most[r])
+        groups.setdefault(key, []).append(r)
+    return [tuple(group) for group in groups.values() if len(group) > 1]
+
+
+def _loads(problem: FreeProblem, book: RuleBook) -> dict[int, float]:
+    """Return the most that every robot of the scene may carry, N."""
+    out = {}
+    for r, robot in enumerate(problem.network.scene.robots):
+        kept = book.rules.payload is Payload.KEPT
+        cap = min(robot.payload if kept else np.inf, problem.caps.get(robot.name, np.inf))
+        out[r] = cap * (1 + LIMIT_TOLERANCE)
+    return out

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
-from seqopt.arrays import FrozenValue
+from seqopt.arrays import FrozenValue, Ints
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -20,6 +20,9 @@ class ScheduleSelection(FrozenValue):
         Claimed value of every goal.
     bound : tuple of float
         Claimed lower bound of every goal, those before it being at their values.
+    visited : tuple of (n, c) int
+        States that a better plan could pass, by brick count, if the formulation knows them: the
+        proof looks at these together, and depends on them in nothing but its time.
     stopped : str
         Why the search ended before all was proven: ``time``, ``memory`` or ``interrupt``; empty if
         it did not.
@@ -28,4 +31,5 @@ class ScheduleSelection(FrozenValue):
     states: tuple[tuple[int, ...], ...]
     objective: tuple[float, ...]
     bound: tuple[float, ...]
+    visited: tuple[Ints, ...] = field(default=(), repr=False)
     stopped: str = ""
