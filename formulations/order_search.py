@@ -213,7 +213,7 @@ def _take_best(search: _Search, found: Explorer) -> None:
     if best.values[0] < search.value * (1 - BETTER):
         keys = dict.fromkeys(part for _, part, _ in visited.of(best.path))
         search.value = best.values[0]
-        search.order = tuple(newest for _, newest in keys)  # type: ignore[misc]
+        search.order = tuple(key[1] for key in keys)
 
 
 def _neighbors(search: _Search, tries: int, rng: np.random.Generator) -> None:

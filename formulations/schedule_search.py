@@ -29,14 +29,15 @@ states must have it.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Hashable
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
 from seqopt.arrays import Ints
 from seqopt.errors import InfeasibleError, ProblemError
-from seqopt.graph.explore import Explorer, Visited
+from seqopt.graph.explore import Explorer
+from seqopt.graph.parts import Key, Visited
 from seqopt.graph.paths import Best, distances, lexicographic, reached, tied
 from seqopt.placement.formulation import FormulationKind
 from seqopt.placement.free_goals import Measure
@@ -237,9 +238,7 @@ def _passable(visited: Visited, value: float) -> tuple[Ints, ...]:
     )
 
 
-def _leave_out(
-    problem: FreeProblem, found: Explorer, states: list[tuple[int, Hashable, Ints]]
-) -> bool:
+def _leave_out(problem: FreeProblem, found: Explorer, states: list[tuple[int, Key, Ints]]) -> bool:
     """Leave out states of a path that do not stand; return whether there were any."""
     fallen = False
     for level, part, state in states:

@@ -48,17 +48,26 @@ def potentials(graph: Graph, goal: int, value: float) -> tuple[float, Bools]:
     """Return the bound of a sum, and the moves that can be on a path of no more than a value."""
     costs = graph.amounts[:, goal]
     before, after = distances(graph, costs), distances(graph, costs, back=True)
-    largest = np.max(before[np.isfinite(before)], initial=0.0)
-    if before[0] > 0 or not _hold(before, costs, (graph.source, graph.target), largest):
-        return -np.inf, np.ones(len(costs), dtype=bool)
-    bound = float(before[graph.ends].min(initial=np.inf))
-    if after[graph.ends].any() or not _hold(after, costs, (graph.target, graph.source), largest):
-        return bound, np.ones(len(costs), dtype=bool)
+    bound, every = sum_bound(graph, goal, before), np.ones(len(costs), dtype=bool)
+    if bound == -np.inf or after[graph.ends].any() or not _hold(after, costs, graph, back=True):
+        return bound, every
     return bound, before[graph.source] + costs + after[graph.target] <= tied(value)
 
 
-def _hold(least: Floats, costs: Floats, moves: tuple[Floats, Floats], largest: float) -> bool:
+def sum_bound(graph: Graph, goal: int, before: Floats) -> float:
+    """Return what the sum of a path is at least, by potentials of states (n,).
+
+    Minus infinity where a move takes less than the difference of its states' potentials.
+    """
+    if before[0] > 0 or not _hold(before, graph.amounts[:, goal], graph):
+        return -np.inf
+    return float(before[graph.ends].min(initial=np.inf))
+
+
+def _hold(least: Floats, costs: Floats, graph: Graph, *, back: bool = False) -> bool:
     """Return whether no move leads from a state to another by less than their difference."""
-    first, second = least[moves[0]], least[moves[1]]
+    ends = (graph.target, graph.source) if back else (graph.source, graph.target)
+    first, second = least[ends[0]], least[ends[1]]
     ways = np.isfinite(first)
-    return bool((second[ways] <= first[ways] + costs[ways] + ROUNDING * largest).all())
+    slack = ROUNDING * np.max(np.abs(least[np.isfinite(least)]), initial=0.0)
+    return bool((second[ways] <= first[ways] + costs[ways] + slack).all())

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Hashable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import accumulate
 from typing import NamedTuple, Protocol
 
@@ -11,10 +11,9 @@ import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.graph.graph import Graph, Rows
+from seqopt.graph.parts import CLOSED, OPEN, PENDING, Key, Part, Visited
 
 BAND = 1e-5  # share of a value within which six digits do not decide
-PENDING, OPEN, CLOSED = 0, 1, 2  # of a state: above the threshold, visited, not allowed
-Key = Hashable
 
 
 class Moves(NamedTuple):
@@ -75,49 +74,6 @@ class Space(Protocol):
         """Return in which states of the last level a build may end, (n,)."""
 
 
-class Part:
-    """The states of one part that were met so far, in the order in which they were."""
-
-    def __init__(self, width: int, kind: np.dtype, goals: int) -> None:
-        self.states = np.zeros((0, width), dtype=kind)
-        self.values = np.zeros((0, goals))
-        self.mark = np.zeros(0, dtype=np.int8)
-        self.exact = np.zeros(0, dtype=bool)
-        self._codes = np.zeros(0, dtype=np.int64)
-        self._rows = np.zeros(0, dtype=np.int32)
-
-    def add(self, codes: Ints, states: Ints) -> Rows:
-        """Return the rows of states, of which those that are new are added, not yet valued."""
-        distinct, first, back = np.unique(codes, return_index=True, return_inverse=True)
-        at = np.searchsorted(self._codes, distinct)
-        new = np.ones(len(distinct), dtype=bool)
-        inside = at < len(self._codes)
-        new[inside] = self._codes[at[inside]] != distinct[inside]
-        rows = np.empty(len(distinct), dtype=np.int32)
-        rows[~new] = self._rows[at[~new]]
-        rows[new] = np.arange(len(self.states), len(self.states) + new.sum())
-        if new.any():
-            self.states = np.concatenate([self.states, states[first[new]]])
-            self.mark = np.concatenate([self.mark, np.zeros(new.sum(), dtype=np.int8)])
-            self.exact = np.concatenate([self.exact, np.zeros(new.sum(), dtype=bool)])
-            self._codes = np.insert(self._codes, at[new], distinct[new])
-            self._rows = np.insert(self._rows, at[new], rows[new])
-        return rows[back]
-
-    def value(self, valued: Callable[[Ints], tuple[Floats, Bools]]) -> None:
-        """Value the states that were added since the last time."""
-        known = len(self.values)
-        if known == len(self.states):
-            return
-        values, allowed = valued(self.states[known:])
-        self.values = np.concatenate([self.values, values])
-        self.mark[known:][~allowed] = CLOSED
-
-    def order(self) -> Ints:
-        """Return the rows of visited states, by their codes."""
-        return self._rows[self.mark[self._rows] == OPEN]
-
-
 class Explorer:
     """The states of a space that are reached through states below a threshold, which may rise.
 
@@ -169,11 +125,11 @@ class Explorer:
         """Visit the states below a threshold; return whether a build may end in one of them."""
         self.threshold = max(self.threshold, threshold)
         self.passes += 1
-        for self.level, parts in enumerate(self._parts):
-            visited = 0
+        for level, parts in enumerate(self._parts):
+            self.level, visited = level, 0
             for key, part in list(parts.items()):
-                fresh = self._visit(self.level, key, part)
-                self._go_on(self.level, key, part, fresh)
+                fresh = self._visit(level, key, part)
+                self._go_on(level, key, part, fresh)
                 visited += len(fresh)
             if visited:
                 self._tell(self)
@@ -261,9 +217,7 @@ class Explorer:
         for following, moves in self._space.onward(key, part.states[fresh]):
             self._keep((level, key, following), fresh, moves, self._part(level + 1, following))
 
-    def _keep(
-        self, which: tuple[int, Key, Key], fresh: Ints, moves: Moves, to: Part
-    ) -> None:
+    def _keep(self, which: tuple[int, Key, Key], fresh: Ints, moves: Moves, to: Part) -> None:
         rows = to.add(self._space.codes(which[2], moves.states), moves.states)
         self._moves[which].append((fresh[moves.source].astype(np.int32), rows, moves.taken))
 
@@ -291,31 +245,11 @@ class Explorer:
             for (level, key), order in zip(keys, orders, strict=True)
         )
         ends = [
-            self._space.ended(key, rows) if level == self._space.levels else np.zeros(len(rows), bool)
+            self._space.ended(key, rows)
+            if level == self._space.levels
+            else np.zeros(len(rows), bool)
             for level, key, rows in states
         ]
-        arrays = (np.concatenate(part) for part in (sources, targets, amounts))
-        return Visited(Graph(*arrays, self._space.peaks, np.concatenate(ends)), states)
-
-
-class Visited(NamedTuple):
-    """A graph, and which states its numbers stand for.
-
-    Attributes
-    ----------
-    graph : Graph
-    states : tuple of (int, Key, (n, c) int)
-        Level, part and states, in the order of numbers.
-    """
-
-    graph: Graph
-    states: tuple[tuple[int, Key, Ints], ...]
-
-    def of(self, path: Sequence[int]) -> list[tuple[int, Key, Ints]]:
-        """Return level, part and state (c,) of numbers that rise with levels."""
-        firsts = [0, *accumulate(len(rows) for _, _, rows in self.states)]
-        found = np.searchsorted(firsts, path, side="right") - 1
-        return [
-            (*self.states[i][:2], self.states[i][2][n - firsts[i]])
-            for i, n in zip(found.tolist(), path, strict=True)
-        ]
+        source, target, taken = map(np.concatenate, (sources, targets, amounts))
+        graph = Graph(source, target, taken, self._space.peaks, np.concatenate(ends))
+        return Visited(graph, states)

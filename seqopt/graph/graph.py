@@ -47,14 +47,16 @@ class Graph(FrozenValue):
             raise ProblemError("an amount is no number; give one for every move")
         if (sums < 0).any():
             raise ProblemError(
-                f"a step adds {sums.min():.4g} to a sum: to repeat it would pay without end; ask for "
-                "the worst value, or for a quantity that is never negative"
+                f"a step adds {sums.min():.4g} to a sum: to repeat it would pay without end; ask "
+                "for the worst value, or for a quantity that is never negative"
             )
         codes = self.source.astype(np.int64) * self.states + self.target
         if (np.diff(codes) < 0).any():
             order = np.argsort(codes, kind="stable")
             for name in ("source", "target", "amounts"):
                 object.__setattr__(self, name, getattr(self, name)[order])
+        for name in ("source", "target"):  # as csgraph wants them
+            object.__setattr__(self, name, np.ascontiguousarray(getattr(self, name)))
         super().__post_init__()
 
     @property

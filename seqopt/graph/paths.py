@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.sparse.csgraph import breadth_first_order, dijkstra
@@ -101,7 +101,7 @@ def distances(graph: Graph, costs: Floats, *, back: bool = False) -> Floats:
 
     Infinite where no path leads, (n,).
     """
-    matrix = graph.matrix(costs)
+    matrix: Any = graph.matrix(costs)
     if not back:
         return np.asarray(dijkstra(matrix, indices=0))
     ends = np.flatnonzero(graph.ends)

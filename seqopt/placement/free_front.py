@@ -10,8 +10,8 @@ import numpy as np
 
 from seqopt.arrays import Floats, Ints
 from seqopt.errors import InfeasibleError, ProblemError
-from seqopt.graph.explore import Visited
 from seqopt.graph.graph import Graph
+from seqopt.graph.parts import Visited
 from seqopt.graph.paths import distances, fewest_moves, keep_best, reached
 from seqopt.placement.free_counts import steps_with, with_held
 from seqopt.placement.free_goals import Measure
@@ -91,11 +91,10 @@ class FreeFront:
         plan : object
             None for both where there is no plan.
         """
-        graph: Graph | None = self._below(bounds)
-        if not graph.ends[reached(graph)].any():
+        below = self._below(bounds)
+        if not below.ends[reached(below)].any():
             return None
-        if len(self._counted) > 1:
-            graph = self._fewest(graph, bounds)
+        graph = self._fewest(below, bounds) if len(self._counted) > 1 else below
         point = np.zeros(len(bounds))
         for k in sorted(range(len(bounds)), key=lambda k: k not in self._counted):
             if graph is None:
@@ -110,7 +109,7 @@ class FreeFront:
     def _below(self, bounds: Floats) -> Graph:
         """Return the moves to states whose values are all below bounds."""
         graph = self._visited.graph
-        return graph.only((graph.amounts < self._peaks(bounds)).all(axis=1))
+        return graph.only(np.asarray((graph.amounts < self._peaks(bounds)).all(axis=1)))
 
     def _fewest(self, graph: Graph, bounds: Floats) -> Graph | None:
         """Return the paths with as many grips held at the end as those with the fewest moves."""

@@ -250,6 +250,10 @@ def solve_free(
     if proof and "progress" in options:
         options["progress"]("proving that no plan is better")
     steps = steps_of(problem.space, selection.states)
-    certificate = judge_schedule(problem, selection, steps, dict(enumerate(selection.visited))) if proof else None
+    certificate = (
+        judge_schedule(problem, selection, steps, dict(enumerate(selection.visited)))
+        if proof
+        else None
+    )
     seconds = {"solve": solved - start, "verify": time.perf_counter() - solved}
     return FreePlan(problem, formulation, selection, certificate, steps, seconds)

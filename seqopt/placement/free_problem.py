@@ -159,11 +159,9 @@ class FreeProblem(Shown):
         for limit in self.limits:
             if limit.response in found:
                 close |= _near(found[limit.response], limit.bound)
-        return close
+        return np.asarray(close)
 
-    def values(
-        self, bricks: int, states: Ints, *, rough: bool = False
-    ) -> tuple[Floats, Bools]:
+    def values(self, bricks: int, states: Ints, *, rough: bool = False) -> tuple[Floats, Bools]:
         """Return what goals take of states, and which states are within all limits.
 
         Parameters

@@ -226,7 +226,11 @@ class _Levels:
         tables, first = self._tables, self._count
         fresh = np.concatenate(entries)
         seen = np.zeros(0, dtype=np.int64)
-        codes, states, values = [seen], [fresh[:0]], [np.zeros((0, len(self._proof._problem.goals)))]
+        codes, states, values = (
+            [seen],
+            [fresh[:0]],
+            [np.zeros((0, len(self._proof._problem.goals)))],
+        )
         onward: list[tuple[Ints, Follows]] = []
         while len(fresh):
             own, at = np.unique(tables.codes(fresh), return_index=True)
@@ -247,15 +251,12 @@ class _Levels:
             fresh = np.concatenate([fresh[:0], *(found.states for _, found in inner)])
         known, rows = np.concatenate(codes), np.concatenate(states)
         worth, order = np.concatenate(values), np.argsort(known, kind="stable")
-        for source, found in coming:
-            wanted = tables.codes(found.states)
+        for source, move in coming:
+            wanted = tables.codes(move.states)
             at = np.searchsorted(known, wanted, sorter=order).clip(max=max(0, len(known) - 1))
-            kept = np.zeros(len(wanted), dtype=bool)
-            if len(known):
-                kept = known[order[at]] == wanted
+            kept = known[order[at]] == wanted if len(known) else np.zeros(len(wanted), dtype=bool)
             target = order[at[kept]] if len(known) else at[:0]
-            part = Follows(bricks, found.source, found.states, found.regrip, found.way[kept])
-            amounts = self._proof.moved(worth[target], part)
+            amounts = self._proof.moved(worth[target], move._replace(way=move.way[kept]))
             self._arcs.append((source[kept], first + target, amounts))
         self.states.append(rows)
         self._ends = np.concatenate([self._ends, tables.ends(bricks, rows)])

@@ -112,9 +112,10 @@ class RuleTables:
         for robot in self._takers() if bricks else ():
             source, after, way = self._taken(states, able, robot, self._reach[bricks][robot])
             after[:, self.robots :] += 1
-            yield Follows(bricks, source, self.in_order(after), True, way)
+            yield Follows(bricks, source, self.in_order(after), regrip=True, way=way)
         for source, after in self._released(bricks, states):
-            yield Follows(bricks, source, self.in_order(after), False, np.zeros(len(source)))
+            none = np.zeros(len(source))
+            yield Follows(bricks, source, self.in_order(after), regrip=False, way=none)
         if bricks == self.last:
             return
         for robot in self._takers():
@@ -123,7 +124,8 @@ class RuleTables:
                 source, after, way = self._taken(states, keeps, robot, newest)
                 after[:, self.robots :] = 0
                 ok = self.keep(bricks + 1, after)
-                yield Follows(bricks + 1, source[ok], self.in_order(after[ok]), False, way[ok])
+                placed = self.in_order(after[ok])
+                yield Follows(bricks + 1, source[ok], placed, regrip=False, way=way[ok])
 
     def _taken(
         self, states: Ints, rows: Ints, robot: int, places: Sequence[int]

@@ -17,8 +17,8 @@ from seqopt.contact.mortar import EPOXY
 from seqopt.engines.auto import AutoEngine, Level
 from seqopt.engines.interface import Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.graph.paths import fewest_moves, keep_best, reached
 from seqopt.errors import InfeasibleError, MechanismError, ProblemError
+from seqopt.graph.paths import fewest_moves, keep_best, reached
 from seqopt.network.build import build_network
 from seqopt.placement.criteria import WorstRatio
 from seqopt.placement.free_counts import steps_with, with_held
