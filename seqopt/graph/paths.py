@@ -103,7 +103,7 @@ def distances(graph: Graph, costs: Floats, *, back: bool = False) -> Floats:
     """
     matrix: Any = graph.matrix(costs)
     if not back:
-        return np.asarray(dijkstra(matrix, indices=0))
+        return np.asarray(dijkstra(matrix, indices=[0])[0])
     ends = np.flatnonzero(graph.ends)
     if not len(ends):
         return np.full(graph.states, np.inf)
