@@ -50,10 +50,19 @@ class FreeFront:
                 raise ProblemError(
                     f"pareto: {goal} adds up along a plan; give responses, steps and regrips"
                 )
-        self._round = rounding_steps(self.names, rounding)
+        self._round, self._rounding = rounding_steps(self.names, rounding), rounding
 
     def __repr__(self) -> str:
         return f"<FreeFront of {self._problem}>"
+
+    def anew(self) -> FreeFront:
+        """Return the same problem with nothing known of it, for its judge.
+
+        Returns
+        -------
+        FreeFront
+        """
+        return FreeFront(replace(self._problem), self._rounding)
 
     @property
     def names(self) -> tuple[str, ...]:

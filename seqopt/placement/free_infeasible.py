@@ -7,14 +7,39 @@ from dataclasses import replace
 
 import numpy as np
 
+from seqopt.errors import InfeasibleError, SeqoptError, SolverError
 from seqopt.graph.paths import least_peak
 from seqopt.placement.free_goals import STATE_RESPONSES, Goal, Measure
 from seqopt.placement.free_problem import FreeProblem
+from seqopt.placement.free_proof import Proof
 from seqopt.placement.free_states import explore
 from seqopt.sequence.free_rules import FreeRules, Payload
 
 STEPS = (Goal(Measure.STEPS),)
 STANDING = "no requirement to stand"
+
+
+def confirmed(problem: FreeProblem, name: str) -> SeqoptError:
+    """Return the error that says why no plan is allowed, once it is proven that none is.
+
+    Parameters
+    ----------
+    problem : FreeProblem
+    name : str
+        Of the formulation that says so.
+
+    Returns
+    -------
+    InfeasibleError or SolverError
+        The latter where a plan is allowed. What is not proven is called claimed.
+    """
+    found = explore(replace(problem, goals=STEPS))
+    if found.whole:
+        return SolverError(f"formulation {name} says that no plan is allowed, and some are")
+    hint = {level: rows for level, _, rows in found.graph().states}
+    proven = Proof(replace(problem, goals=STEPS), hint).is_impossible()
+    why = why_impossible(problem)
+    return InfeasibleError(why if proven else f"claimed by {name}, and not proven: {why}")
 
 
 def why_impossible(problem: FreeProblem) -> str:

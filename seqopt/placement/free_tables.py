@@ -45,6 +45,15 @@ class Follows(NamedTuple):
     way: Floats
 
 
+class _Places(NamedTuple):
+    """Places that count with so many bricks: lists by robot, and rows over places."""
+
+    reach: list[list[int]]  # that robots may hold
+    newest: list[list[int]]  # at which they hold the newest brick
+    holds: Bools  # the same as rows
+    parts: list[Bools]  # of bricks that nothing ties to the ground
+
+
 class RuleTables:
     """A book of rules for many states at once.
 
@@ -69,23 +78,32 @@ class RuleTables:
         self._groups = [[book.team.index(r) for r in group] for group in groups]
         names = [book.network.scene.robots[r].name for r in book.team]
         self._able = [not self._rules.placers or name in self._rules.placers for name in names]
-        self._reach, self._newest, self._parts = [], [], []
-        for b in range(self.last + 1):
-            reached = [book.reached[r, b] for r in book.team]
-            newest = [book.newest_nodes[r, b] if b else () for r in book.team]
-            self._reach.append([[place[node] for node in nodes] for nodes in reached])
-            self._newest.append([[place[node] for node in nodes] for nodes in newest])
-            self._parts.append(list(self._held_parts(book, b)))
-        self._holds_newest = np.zeros((self.last + 1, self.robots, len(self.nodes)), dtype=bool)
-        for b, robots in enumerate(self._newest):
-            for robot, places in enumerate(robots):
-                self._holds_newest[b, robot, places] = True
+        self._book, self._place = book, place
+        self._known: dict[int, _Places] = {}
 
-    def _held_parts(self, book: RuleBook, bricks: int) -> Iterator[Bools]:
-        """Yield for every part that nothing ties to the ground which places belong to it."""
-        owner = book.network.scene.brick_of_node
-        for part in islands(book.network, bricks) if bricks else ():
-            yield np.array([n >= 0 and owner[n].name in part for n in self.nodes.tolist()])
+    def _of(self, bricks: int) -> _Places:
+        """Return the places that count with so many bricks, looked up once."""
+        if bricks not in self._known:
+            book, robots = self._book, range(self.robots)
+            reach = [[self._place[n] for n in book.reached[r, bricks]] for r in book.team]
+            newest = [
+                [self._place[n] for n in (book.newest_nodes[r, bricks] if bricks else ())]
+                for r in book.team
+            ]
+            holds = np.zeros((self.robots, len(self.nodes)), dtype=bool)
+            for robot in robots:
+                holds[robot, newest[robot]] = True
+            owner, parts = book.network.scene.brick_of_node, []
+            for part in islands(book.network, bricks) if bricks else ():
+                own = [n >= 0 and owner[n].name in part for n in self.nodes.tolist()]
+                parts.append(np.array(own))
+            self._known[bricks] = _Places(reach, newest, holds, parts)
+        return self._known[bricks]
+
+    @property
+    def team(self) -> tuple[int, ...]:
+        """Indices of the robots of the columns."""
+        return self._book.team
 
     @property
     def robots(self) -> int:
@@ -110,7 +128,7 @@ class RuleTables:
         if bricks and self._rules.regrips is not None:
             able = able[states[able, -1] < self._rules.regrips]
         for robot in self._takers() if bricks else ():
-            source, after, way = self._taken(states, able, robot, self._reach[bricks][robot])
+            source, after, way = self._taken(states, able, robot, self._of(bricks).reach[robot])
             after[:, self.robots :] += 1
             yield Follows(bricks, source, self.in_order(after), regrip=True, way=way)
         for source, after in self._released(bricks, states):
@@ -120,7 +138,7 @@ class RuleTables:
             return
         for robot in self._takers():
             if self._able[robot]:
-                newest = self._newest[bricks + 1][robot]
+                newest = self._of(bricks + 1).newest[robot]
                 source, after, way = self._taken(states, keeps, robot, newest)
                 after[:, self.robots :] = 0
                 ok = self.keep(bricks + 1, after)
@@ -177,8 +195,8 @@ class RuleTables:
         if bricks > 1:
             ok &= np.count_nonzero(grips, axis=1) >= self._rules.least_grips
         if self._rules.newest is not Newest.FREE:
-            ok &= self._holds_newest[bricks][np.arange(self.robots), grips].any(axis=1)
-        for part in self._parts[bricks]:
+            ok &= self._of(bricks).holds[np.arange(self.robots), grips].any(axis=1)
+        for part in self._of(bricks).parts:
             ok &= part[grips].any(axis=1)
         return ok
 
