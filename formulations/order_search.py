@@ -25,18 +25,18 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from contextlib import closing
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from itertools import islice
 
 import numpy as np
 
 from seqopt.errors import InfeasibleError, ProblemError, TimeUpError
+from seqopt.graph.explore import Explorer
+from seqopt.graph.paths import lexicographic
 from seqopt.placement.formulation import FormulationKind
-from seqopt.placement.free_paths import TIED
-from seqopt.placement.free_problem import FreeProblem
 from seqopt.placement.order_bound import whole_bound
-from seqopt.placement.order_graph import Key, OrderGraph, explore_orders
 from seqopt.placement.order_problem import OrderProblem, OrderSelection
+from seqopt.placement.order_states import OrderStates, TooManySetsError
 from seqopt.placement.order_work import Trial, trying, worth
 from seqopt.placement.schedule_formulation import Finds, ScheduleFormulation
 from seqopt.responses.resources import HERE, Resources
@@ -65,7 +65,6 @@ class _Search:
     value: float = np.inf
     bound: float = -np.inf
     evaluated: int = 0
-    problems: dict[Key, FreeProblem] = field(default_factory=dict)
     tried: Stage | None = None  # of orders beside the best, how many
     each: float = 0.0  # share of one of them
 
@@ -76,9 +75,9 @@ class _Search:
         if time.perf_counter() > self.end:
             raise _StopError
 
-    def tell_bricks(self, bricks: int) -> None:
+    def tell_bricks(self, found: Explorer) -> None:
         """Say how far all orders are looked at."""
-        self.tell(Stage("all orders", bricks / len(self.problem.scene.bricks)))
+        self.tell(Stage("all orders", found.level / len(self.problem.scene.bricks)))
 
     def try_order(self, order: Order) -> bool:
         """Return whether an order is better than the best so far, and keep it if it is."""
@@ -182,32 +181,39 @@ def _all_orders(search: _Search, most: int) -> bool:
     ceiling, threshold = search.value, search.value / FAR_BELOW
     if np.isfinite(ceiling):
         threshold = max(threshold, search.bound)
-    while True:
-        tied = threshold + TIED * abs(threshold) if np.isfinite(threshold) else threshold
-        graph = explore_orders(search.problem, search.problems, tied, most, search.tell_bricks)
-        search.evaluated = max(search.evaluated, len(search.problems) - 1)
-        ended = _ended(graph, search)
-        if ended is not None:
-            return ended
-        threshold = min(ceiling, max(graph.excluded, threshold * GROWTH))
-
-
-def _ended(graph: OrderGraph, search: _Search) -> bool | None:
-    """Return True if the best order is known, False if sets are too many; None to go on."""
-    search.bound = max(search.bound, graph.bound)
-    best = graph.best()
-    if best is not None:
-        if best[0] < search.value * (1 - BETTER):  # of orders that are as good the one known stays
-            search.value, search.order = best[0], graph.order(*best)
-        search.bound = search.value
-        return True
-    if graph.cut:
+    space = OrderStates(search.problem, most)
+    found = Explorer(space, tell=search.tell_bricks)
+    try:
+        while not found.rise(threshold if np.isfinite(threshold) else -np.inf):
+            search.bound = max(search.bound, min(found.excluded, ceiling))
+            if found.excluded == np.inf or threshold >= ceiling:
+                break
+            threshold = max(found.excluded, min(ceiling, threshold * GROWTH))
+    except TooManySetsError:
         return False
-    if np.isinf(graph.excluded):
+    finally:
+        search.evaluated = max(search.evaluated, len(space.parts) - 1)
+    if found.whole:
+        _take_best(search, found)
+    elif not search.order:
         raise InfeasibleError(
             "no order of the bricks has a plan; extend a reach, loosen a rule or raise a limit"
         )
-    return None
+    search.bound = search.value
+    return True
+
+
+def _take_best(search: _Search, found: Explorer) -> None:
+    """Keep the best order below the threshold, if it is better than the one that is known."""
+    while True:
+        visited = found.graph()
+        best = lexicographic(visited.graph)
+        if not found.refine(best.values):
+            break
+    if best.values[0] < search.value * (1 - BETTER):
+        keys = dict.fromkeys(part for _, part, _ in visited.of(best.path))
+        search.value = best.values[0]
+        search.order = tuple(key[1] for key in keys)
 
 
 def _neighbors(search: _Search, tries: int, rng: np.random.Generator) -> None:

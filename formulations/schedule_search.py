@@ -16,11 +16,14 @@ in their order,
 with :math:`v` the value of a state and :math:`c` the cost of a step. A narrow search without
 regrips, which keeps the best states of every brick count, gives a first plan. Then a threshold
 rises until states below it connect the empty site to an end; responses are computed only for states
-next to those that are reached below it. Among these every goal is a shortest path, with the maximum
-instead of the sum for a peak; what is not on a best path of one goal is left out before the
-next. A margin of stability comes first: the best one with which states still connect both ends is
-found by halving an interval, and all further states must have it. The certificate proves every
-value again: below it no path connects the empty site to an end.
+next to those that are reached below it, and with six digits until their value is close to that of
+the plan. Among these every goal is a shortest path, with the maximum instead of the sum for a peak;
+what is not on a best path of one goal is left out before the next. Whether states stand is asked
+only of those on the best path; where one falls, the next best path is sought without it (Dellin and
+Srinivasa, A unifying formalism for shortest path problems with expensive edge evaluations via lazy
+best-first search over paths with edge selectors, 2016). A margin of stability comes first: the best
+one with which states still connect both ends is found by halving an interval, and all further
+states must have it.
 """
 
 from __future__ import annotations
@@ -31,12 +34,15 @@ from dataclasses import replace
 
 import numpy as np
 
+from seqopt.arrays import Ints
 from seqopt.errors import InfeasibleError, ProblemError, SeqoptError, TimeUpError
+from seqopt.graph.explore import Explorer
+from seqopt.graph.parts import Key, Visited
+from seqopt.graph.paths import Best, distances, lexicographic, reached, tied
 from seqopt.placement.formulation import FormulationKind
 from seqopt.placement.free_goals import Measure
-from seqopt.placement.free_graph import StateGraph, explore
-from seqopt.placement.free_paths import TIED, keep_best, least_from_start, shortest
 from seqopt.placement.free_problem import FreeProblem
+from seqopt.placement.free_states import FreeStates
 from seqopt.placement.schedule_formulation import ScheduleFormulation
 from seqopt.placement.schedule_selection import ScheduleSelection
 from seqopt.placement.sturdiest import best_margin
@@ -46,7 +52,7 @@ from seqopt.work.progress import Stage, Tell
 FAR_BELOW = 4.0  # what the narrow search finds, over the first threshold
 COPIES = 2.0  # of what is kept, that are needed at once while it grows
 
-Watching = Callable[[StateGraph], None]
+Watching = Callable[[Explorer], None]
 
 
 class _StopError(Exception):
@@ -103,7 +109,7 @@ def solve(
             "number above 1"
         )
     _require_order(problem)
-    reached: list[StateGraph] = []
+    reached: list[Explorer] = []
     tell = _watch(problem, (time.perf_counter() + seconds, max_memory), progress, reached)
     return _search(problem, (width, growth), tell, reached)
 
@@ -112,21 +118,18 @@ def _watch(
     problem: FreeProblem,
     most: tuple[float, float],
     progress: Tell,
-    reached: list[StateGraph],
+    reached: list[Explorer],
 ) -> Watching:
     """Return what is told every level: it keeps the states and ends the search in time."""
-    passes = 0
 
-    def tell(graph: StateGraph) -> None:
-        nonlocal passes
-        bricks = len(graph.levels) - 1
-        passes += bricks == 0
-        progress(Stage(f"free schedule, pass {passes}", bricks / problem.space.bricks))
-        reached[:] = [graph]
+    def tell(found: Explorer) -> None:
+        share = found.level / problem.space.bricks
+        progress(Stage(f"free schedule, pass {found.passes}", share))
+        reached[:] = [found]
         if time.perf_counter() > most[0]:
             raise _StopError("time")
-        room = min(most[1], free_memory() + graph.nbytes)
-        if COPIES * (graph.nbytes + problem.sets.nbytes) > room:
+        room = min(most[1], free_memory() + found.nbytes)
+        if COPIES * (found.nbytes + problem.sets.nbytes + problem.screened.nbytes) > room:
             raise _StopError("memory")
 
     return tell
@@ -140,7 +143,7 @@ def _require_order(problem: FreeProblem) -> None:
 
 
 def _search(
-    problem: FreeProblem, options: tuple[int, float], tell: Watching, reached: list[StateGraph]
+    problem: FreeProblem, options: tuple[int, float], tell: Watching, reached: list[Explorer]
 ) -> ScheduleSelection:
     """Return the best free schedule, or the first one found where the search is stopped."""
     if problem.goals[0].of_margins:
@@ -153,27 +156,39 @@ def _search(
             after = replace(after, objective=(), bound=())
         return replace(after, objective=(value, *after.objective), bound=(bound, *after.bound))
     found, proven = None, [-np.inf]
+    wide = Explorer(FreeStates(problem), tell=tell)
     try:
-        narrow = explore(problem, width=options[0], tell=tell)
-        reached.clear()  # of which nothing is proven, and which is used up
-        found = _selection(narrow) if narrow.whole else None
+        found = _narrow(problem, options[0], tell)
+        reached.clear()  # of which nothing is proven
         ceiling = found.objective[0] if found else np.inf
-        graph = _below(problem, (ceiling, options[1]), tell, proven)
+        return _best(problem, wide, (ceiling, options[1]), proven)
     except (_StopError, KeyboardInterrupt) as stop:
         if found is None and isinstance(stop, _StopError):
             raise stop.too_little() from None
         if found is None:
             raise
-        return _unproven(found, reached, proven[-1], str(stop) or "interrupt")
-    if not graph.whole:
-        raise InfeasibleError("no plan of the free schedule is allowed")
-    return _selection(graph)
+        return _unproven(found, wide, proven[-1], str(stop) or "interrupt")
 
 
-def _below(
-    problem: FreeProblem, options: tuple[float, float], tell: Watching, proven: list[float]
-) -> StateGraph:
-    """Return the states below the lowest threshold of a rising row that connects start to end.
+def _narrow(problem: FreeProblem, width: int, tell: Watching) -> ScheduleSelection | None:
+    """Return the best plan through a few states of every brick count, if there is one.
+
+    Where states must stand it is asked of all of them only if the best paths fall.
+    """
+    for standing in (False, True)[: 1 + bool(problem.demands)]:
+        narrow = Explorer(FreeStates(problem, regrips=False, standing=standing), width, tell)
+        if narrow.rise():
+            try:
+                return _standing(problem, narrow)
+            except InfeasibleError:
+                continue
+    return None
+
+
+def _best(
+    problem: FreeProblem, wide: Explorer, options: tuple[float, float], proven: list[float]
+) -> ScheduleSelection:
+    """Return the best plan below the lowest threshold of a rising row that connects both ends.
 
     What is proven of the first goal is added to a list on the way.
     """
@@ -181,35 +196,72 @@ def _below(
     if np.isfinite(ceiling) or problem.goals[0].measure is not Measure.PEAK:
         threshold = ceiling / FAR_BELOW
     while True:
-        tied = threshold + TIED * abs(threshold) if np.isfinite(threshold) else threshold
-        graph = explore(problem, tied, tell=tell)
-        if graph.whole or threshold >= ceiling or graph.excluded == np.inf:
-            return graph
-        proven.append(graph.excluded)  # of a state that every plan would have to pass, or a larger
-        threshold = min(ceiling, max(graph.excluded, threshold * growth))
-        del graph  # or two of them would need memory at once
+        if wide.rise(threshold):
+            try:
+                return _standing(problem, wide)
+            except InfeasibleError:  # of what stands
+                pass
+        if wide.excluded == np.inf:
+            raise InfeasibleError("no plan of the free schedule is allowed")
+        proven.append(wide.excluded)  # of a state that every plan would have to pass, or a larger
+        grown = threshold * growth if np.isfinite(threshold) else -np.inf
+        threshold = max(wide.excluded, min(ceiling, grown))
 
 
-def _selection(graph: StateGraph) -> ScheduleSelection:
-    """Return the best path through a graph for all goals in their order."""
-    values = []
-    for goal in range(len(graph.problem.goals)):
-        graph, least = keep_best(graph, goal)
-        values.append(least)
-    path = shortest(graph)
-    states = tuple((b, *graph.levels[b].states[row].tolist()) for b, row in path)
-    return ScheduleSelection(states, tuple(values), tuple(values))
+def _standing(problem: FreeProblem, found: Explorer) -> ScheduleSelection:
+    """Return the best path through visited states that stand as is demanded."""
+    while True:
+        visited, best = _exact(found)
+        states = visited.of(best.path)
+        if not problem.demands or not _leave_out(problem, found, states):
+            rows = tuple((level, *state.tolist()) for level, _, state in states)
+            hint = _passable(visited, best.values[0])
+            return ScheduleSelection(rows, best.values, best.values, hint)
+
+
+def _exact(found: Explorer) -> tuple[Visited, Best]:
+    """Return the best path through visited states, values close to its own being exact."""
+    while True:
+        visited = found.graph()
+        best = lexicographic(visited.graph)
+        if not found.refine(best.values):
+            return visited, best
+
+
+def _passable(visited: Visited, value: float) -> tuple[Ints, ...]:
+    """Return the states that paths within a value of the first goal can pass, by brick count."""
+    graph, states = visited
+    kept = graph.amounts[:, 0] <= tied(value) if graph.peaks[0] else None
+    inside = reached(graph, kept)
+    ends = np.cumsum([len(rows) for _, _, rows in states])
+    return tuple(
+        rows[inside[end - len(rows) : end]] for end, (_, _, rows) in zip(ends, states, strict=True)
+    )
+
+
+def _leave_out(problem: FreeProblem, found: Explorer, states: list[tuple[int, Key, Ints]]) -> bool:
+    """Leave out states of a path that do not stand; return whether there were any."""
+    fallen = False
+    for level, part, state in states:
+        if not problem.stand(level, state[None])[0]:
+            found.close((level, part), state[None])
+            fallen = True
+    return fallen
 
 
 def _unproven(
-    found: ScheduleSelection, reached: list[StateGraph], proven: float, why: str
+    found: ScheduleSelection, wide: Explorer, proven: float, why: str
 ) -> ScheduleSelection:
     """Return the first plan, and what thresholds and the levels reached prove of the first goal."""
     bound = proven
-    for graph in reached:
-        bound = max(bound, float(least_from_start(graph, 0)[-1].min()))
-    bound = min(bound, found.objective[0])
+    if not wide.peaks[0] and wide.level:
+        graph, states = wide.graph()
+        least = distances(graph, graph.amounts[:, 0])
+        count = [len(rows) for level, _, rows in states if level <= wide.level]
+        last = [len(rows) for level, _, rows in states if level == wide.level]
+        bound = float(least[sum(count) - sum(last) : sum(count)].min(initial=np.inf))
     rest = (-np.inf,) * (len(found.objective) - 1)
+    bound = min(bound, found.objective[0])
     return ScheduleSelection(found.states, found.objective, (bound, *rest), stopped=why)
 
 

@@ -20,7 +20,7 @@ ROOMS = (
     {"showing"},
     {"scene"},
     {"network"},
-    {"sequence", "contact"},
+    {"sequence", "contact", "graph"},
     {"engines", "stability"},
     {"responses"},
     {"placement"},
@@ -37,7 +37,7 @@ MECHANICS = {"network.statics", "network.kinematics", "engines.rigid"}  # not fo
 LINES, LINES_OF_A_FUNCTION = 300, 50
 PARAMETERS = 6  # of an experiment's function
 DRAWS_ON_ALL = "study"  # the topic that sets every other one beside the paper
-MOST_ROOMS = 15
+MOST_ROOMS = 16
 
 
 def sources(folder: str) -> list[Path]:

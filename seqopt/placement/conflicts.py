@@ -69,13 +69,15 @@ def least_spent(costs: LayeredCosts, budget: Budget) -> float:
     return least_sum(LayeredCosts(single, shared))
 
 
-def refusal(problem: PlacementProblem) -> InfeasibleError:
-    """Return the error that says which budgets no choice keeps.
+def refusal(problem: PlacementProblem, name: str) -> InfeasibleError:
+    """Return the error that says which budgets no choice keeps, or that this is claimed alone.
 
     Parameters
     ----------
     problem : PlacementProblem
-        Some choice is allowed, and none is within all budgets.
+        Some choice is allowed, and it is claimed that none is within all budgets.
+    name : str
+        Of the formulation that claims it.
 
     Returns
     -------
@@ -83,7 +85,9 @@ def refusal(problem: PlacementProblem) -> InfeasibleError:
     """
     found = smallest_conflict(problem)
     if not found:
-        return InfeasibleError("no choice is within all budgets; raise a bound")
+        return InfeasibleError(
+            f"claimed by {name}, and not proven: no choice is within all budgets; raise a bound"
+        )
     if len(found) == 1:
         least = least_spent(problem.sums, found[0])
         return InfeasibleError(

@@ -247,12 +247,12 @@ def as_formulation(given: Formulation | str) -> Formulation:
     raise ProblemError(f"a {type(given).__name__} is not a formulation; give one of {known}")
 
 
-def said(error: Exception) -> str:
+def said(error: BaseException) -> str:
     """Return the message of an error in one line.
 
     Parameters
     ----------
-    error : Exception
+    error : BaseException
 
     Returns
     -------

@@ -12,8 +12,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from seqopt.arrays import Floats, Ints
-from seqopt.placement.free_graph import StateGraph
+from seqopt.arrays import Bools, Floats, Ints
+from seqopt.graph.graph import Graph
 from seqopt.placement.free_problem import FreeProblem
 from seqopt.sequence.free_rules import Ending
 
@@ -37,24 +37,20 @@ def steps_with(problem: FreeProblem, regrips: Floats, held: Ints) -> Floats:
     return np.asarray(2 * problem.space.bricks + 2 * regrips - held + released)
 
 
-def with_held(graph: StateGraph, held: int) -> StateGraph:
-    """Return a graph whose paths end with so many grips held, or let so many go last.
+def with_held(problem: FreeProblem, graph: Graph, held: Bools) -> Graph:
+    """Return a graph whose paths end in some states, or let all go in them last.
 
     Parameters
     ----------
-    graph : StateGraph
-        With all levels.
-    held : int
+    problem : FreeProblem
+    graph : Graph
+    held : (n,) bool
+        Which states hold as many grips as wanted.
 
     Returns
     -------
-    StateGraph
+    Graph
     """
-    levels = [*graph.levels]
-    if graph.problem.rules.ending is Ending.HELD:
-        return StateGraph(graph.problem, levels, held=held)
-    last = levels[-1]
-    ends = graph.ends()[last.inner.target]
-    grips = graph.problem.space.grips(last.states)[last.inner.source]
-    levels[-1] = replace(last, inner=last.inner.only(~ends | (grips == held)))
-    return StateGraph(graph.problem, levels)
+    if problem.rules.ending is Ending.HELD:
+        return replace(graph, ends=graph.ends & held)
+    return graph.only(~graph.ends[graph.target] | held[graph.source])

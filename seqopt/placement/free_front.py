@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
-from scipy import sparse
-from scipy.sparse.csgraph import breadth_first_order, shortest_path
 
-from seqopt.arrays import Bools, Floats, Ints
+from seqopt.arrays import Floats, Ints
 from seqopt.errors import InfeasibleError, ProblemError
+from seqopt.graph.graph import Graph
+from seqopt.graph.parts import Visited
+from seqopt.graph.paths import distances, fewest_moves, keep_best, reached
 from seqopt.placement.free_counts import steps_with, with_held
 from seqopt.placement.free_goals import Measure
-from seqopt.placement.free_graph import StateGraph, explore
 from seqopt.placement.free_infeasible import why_impossible
 from seqopt.placement.free_judge import plan_values
-from seqopt.placement.free_paths import below, keep_best, least_to_end, reaches_end, shortest
 from seqopt.placement.free_problem import FreeProblem
+from seqopt.placement.free_states import explore
 from seqopt.placement.free_steps import steps_of
 from seqopt.sequence.free_rules import Ending
 from seqopt.sequence.steps import Step
@@ -49,10 +50,19 @@ class FreeFront:
                 raise ProblemError(
                     f"pareto: {goal} adds up along a plan; give responses, steps and regrips"
                 )
-        self._round = rounding_steps(self.names, rounding)
+        self._round, self._rounding = rounding_steps(self.names, rounding), rounding
 
     def __repr__(self) -> str:
         return f"<FreeFront of {self._problem}>"
+
+    def anew(self) -> FreeFront:
+        """Return the same problem with nothing known of it, for its judge.
+
+        Returns
+        -------
+        FreeFront
+        """
+        return FreeFront(replace(self._problem), self._rounding)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -60,13 +70,16 @@ class FreeFront:
         return tuple(map(str, self._problem.goals))
 
     @cached_property
-    def _graph(self) -> StateGraph:
-        graph = explore(self._problem)
-        if not graph.whole:
+    def _visited(self) -> Visited:
+        found = explore(self._problem)
+        if not found.whole:
             raise InfeasibleError(why_impossible(self._problem))
-        for level in graph.levels:
-            level.values = rounded_up(level.values, self._round)
-        return graph
+        found.refine()
+        graph, states = found.graph()
+        amounts = graph.amounts.copy()
+        peaks = [k for k, peak in enumerate(graph.peaks) if peak]
+        amounts[:, peaks] = rounded_up(amounts[:, peaks], self._round[peaks])
+        return Visited(replace(graph, amounts=amounts), states)
 
     @cached_property
     def _counted(self) -> list[int]:
@@ -87,11 +100,10 @@ class FreeFront:
         plan : object
             None for both where there is no plan.
         """
-        graph = below(self._graph, self._peaks(bounds))
-        if graph is None or not reaches_end(graph):
+        below = self._below(bounds)
+        if not below.ends[reached(below)].any():
             return None
-        if len(self._counted) > 1:
-            graph = self._fewest(graph, bounds)
+        graph = self._fewest(below, bounds) if len(self._counted) > 1 else below
         point = np.zeros(len(bounds))
         for k in sorted(range(len(bounds)), key=lambda k: k not in self._counted):
             if graph is None:
@@ -100,16 +112,21 @@ class FreeFront:
             if not point[k] < bounds[k]:
                 return None
         assert graph is not None
-        path = shortest(graph)
-        return point, tuple((b, *graph.levels[b].states[row].tolist()) for b, row in path)
+        states = self._visited.of(fewest_moves(graph))
+        return point, tuple((level, *state.tolist()) for level, _, state in states)
 
-    def _fewest(self, graph: StateGraph, bounds: Floats) -> StateGraph | None:
+    def _below(self, bounds: Floats) -> Graph:
+        """Return the moves to states whose values are all below bounds."""
+        graph = self._visited.graph
+        return graph.only(np.asarray((graph.amounts < self._peaks(bounds)).all(axis=1)))
+
+    def _fewest(self, graph: Graph, bounds: Floats) -> Graph | None:
         """Return the paths with as many grips held at the end as those with the fewest moves."""
         steps, regrips = self._of(Measure.STEPS), self._of(Measure.REGRIPS)
         found = []
         for held in range(self._problem.space.robots + 1):
-            part = with_held(graph, held)
-            least = least_to_end(part, regrips)[0]
+            part = with_held(self._problem, graph, self._held == held)
+            least = distances(part, part.amounts[:, regrips], back=True)[:1]
             count = steps_with(self._problem, least, np.array([held]))
             if least[0] < bounds[regrips] and count[0] < bounds[steps]:
                 found.append((count[0], least[0], part))
@@ -124,7 +141,7 @@ class FreeFront:
         return out
 
     def is_empty_below(self, bounds: Floats) -> bool:
-        """Return whether there is no plan below bounds, by a search through one flat graph.
+        """Return whether there is no plan below bounds, by distances from the empty site.
 
         Parameters
         ----------
@@ -134,56 +151,29 @@ class FreeFront:
         -------
         bool
         """
-        source, target, regrip, values, ends = self._flat
-        ok = np.asarray((values < self._peaks(bounds)).all(axis=1))
-        ok[0] = True
-        kept = ok[source] & ok[target]
+        graph = self._below(bounds)
         if not self._counted:
-            graph = sparse.csr_array(
-                (np.ones(kept.sum(), dtype=np.int8), (source[kept], target[kept])), (len(ok),) * 2
-            )
-            reached = breadth_first_order(graph, 0, return_predecessors=False)
-            return not ends[reached].any()
+            return not graph.ends[reached(graph)].any()
         if [self._problem.goals[k].measure for k in self._counted] == [Measure.STEPS]:
-            steps = self._least_moves(kept, np.ones(kept.sum()))
-            return not steps[ends].min(initial=np.inf) < bounds[self._counted[0]]
-        least = self._least_moves(kept, 1.0 + len(ok) * regrip[kept].astype(float))
-        least[np.isfinite(least)] //= len(ok)
-        last = np.flatnonzero(ends)
+            steps = distances(graph, np.ones(len(graph.source)))
+            return not steps[graph.ends].min(initial=np.inf) < bounds[self._counted[0]]
+        regrips = graph.amounts[:, self._of(Measure.REGRIPS)]
+        least = distances(graph, 1.0 + graph.states * regrips)
+        least[np.isfinite(least)] //= graph.states
+        last = np.flatnonzero(graph.ends)
         if self._problem.rules.ending is not Ending.HELD:
-            last = np.unique(source[kept & ends[target]])
+            last = np.unique(graph.source[graph.ends[graph.target]])
         found, held = least[last], self._held[last]
         room = found < bounds[self._of(Measure.REGRIPS)]
         if len(self._counted) > 1:
             room &= steps_with(self._problem, found, held) < bounds[self._of(Measure.STEPS)]
         return not room.any()
 
-    def _least_moves(self, kept: Bools, cost: Floats) -> Floats:
-        """Return the least cost of a way from the empty site to every state."""
-        source, target, _, values, _ = self._flat
-        graph = sparse.csr_array((cost, (source[kept], target[kept])), (len(values),) * 2)
-        return np.asarray(shortest_path(graph, indices=0))
-
     @cached_property
     def _held(self) -> Ints:
         """How many grips every state holds."""
-        grips = [self._problem.space.grips(level.states) for level in self._graph.levels]
+        grips = [self._problem.space.grips(rows) for _, _, rows in self._visited.states]
         return np.concatenate(grips)
-
-    @cached_property
-    def _flat(self) -> tuple[Ints, Ints, Bools, Floats, Bools]:
-        """All moves of the graph between states numbered through, their values, and the ends."""
-        levels = self._graph.levels
-        first = np.cumsum([0, *(len(level.states) for level in levels)])
-        parts = []
-        for b, level in enumerate(levels):
-            for to, arcs in ((b, level.inner), (b + 1, level.onward)):
-                parts.append((arcs.source + first[b], arcs.target + first[to], arcs.regrip))
-        source, target, regrip = (np.concatenate(part) for part in zip(*parts, strict=True))
-        ends = np.zeros(first[-1], dtype=bool)
-        ends[first[-2] :] = self._graph.ends()
-        values = np.concatenate([level.values for level in levels])
-        return source, target, regrip, values, ends
 
     def steps(self, plan: object) -> tuple[Step, ...]:
         """Return the checked steps of a plan.

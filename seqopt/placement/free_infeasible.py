@@ -7,16 +7,41 @@ from dataclasses import replace
 
 import numpy as np
 
+from seqopt.errors import InfeasibleError, SeqoptError, SolverError
+from seqopt.graph.paths import least_peak
 from seqopt.placement.free_goals import STATE_RESPONSES, Goal, Measure
-from seqopt.placement.free_graph import explore
-from seqopt.placement.free_paths import least_to_end
 from seqopt.placement.free_problem import FreeProblem
+from seqopt.placement.free_proof import Proof
+from seqopt.placement.free_states import explore
 from seqopt.placement.standing import Standing
 from seqopt.placement.sturdiest import WORST, with_margin
 from seqopt.sequence.free_rules import FreeRules, Payload
 
 STEPS = (Goal(Measure.STEPS),)
 STANDING = "no requirement to stand"
+
+
+def confirmed(problem: FreeProblem, name: str) -> SeqoptError:
+    """Return the error that says why no plan is allowed, once it is proven that none is.
+
+    Parameters
+    ----------
+    problem : FreeProblem
+    name : str
+        Of the formulation that says so.
+
+    Returns
+    -------
+    InfeasibleError or SolverError
+        The latter where a plan is allowed. What is not proven is called claimed.
+    """
+    found = explore(replace(problem, goals=STEPS))
+    if found.whole:
+        return SolverError(f"formulation {name} says that no plan is allowed, and some are")
+    hint = {level: rows for level, _, rows in found.graph().states}
+    proven = Proof(replace(problem, goals=STEPS), hint).is_impossible()
+    why = why_impossible(problem)
+    return InfeasibleError(why if proven else f"claimed by {name}, and not proven: {why}")
 
 
 def why_impossible(problem: FreeProblem) -> str:
@@ -40,7 +65,7 @@ def why_impossible(problem: FreeProblem) -> str:
             problem = with_margin(problem, goal.response, WORST[goal.response])
     graph = explore(replace(problem, goals=STEPS))
     placed = problem.network.scene.placed
-    stops = len(graph.levels) - 1
+    stops = graph.reached
     where = f"after brick {placed[-1].name} the build cannot end"
     if stops < len(placed):
         where = f"brick {placed[stops].name} ({stops + 1} of {len(placed)}) is never placed"
@@ -117,5 +142,5 @@ def worst_least(problem: FreeProblem, response: str) -> float:
     float
         SI units; infinite if there is no plan.
     """
-    graph = explore(replace(problem, goals=(Goal(Measure.PEAK, response),)))
-    return float(least_to_end(graph, 0)[0].min()) if graph.whole else np.inf
+    found = explore(replace(problem, goals=(Goal(Measure.PEAK, response),)))
+    return least_peak(found.graph().graph, 0) if found.whole else np.inf

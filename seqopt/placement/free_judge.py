@@ -1,9 +1,10 @@
 """Certificates of free schedules: a plan recomputed, and a proof that none is better.
 
-The plan's own values come from the responses of its steps, one after the other. For every goal all
-plans are then sought that keep the goals before it at their values and take less of this one: state
-by state, by a second version of the rules, with responses computed again. None must reach an
-end. This shares nothing with the search that is judged.
+The plan's own values come from the responses of its steps, one after the other. What no plan stays
+below is then proven goal by goal: the states that a better plan could pass and the moves between
+them are found by a second version of the rules, with responses computed again, and weak duality
+bounds every path through them (`seqopt.graph.duality`). This shares nothing with the search that is
+judged but the states that it visited, on which only the time depends.
 """
 
 from __future__ import annotations
@@ -19,8 +20,9 @@ from seqopt.arrays import FrozenValue
 from seqopt.errors import SolverError
 from seqopt.placement.free_goals import LARGEST, Goal, Measure
 from seqopt.placement.free_problem import FreeProblem
-from seqopt.placement.free_proof import Proof
+from seqopt.placement.free_proof import BELOW, Hint, Proof
 from seqopt.placement.schedule_selection import ScheduleSelection
+from seqopt.placement.standing import slack
 from seqopt.placement.standing_proof import proven_margins, require_margin
 from seqopt.responses.quantities import CHOSEN_BY
 from seqopt.responses.table import analyze, force_column
@@ -55,7 +57,10 @@ class ScheduleCertificate(FrozenValue):
 
 
 def judge_schedule(
-    problem: FreeProblem, selection: ScheduleSelection, steps: Sequence[Step]
+    problem: FreeProblem,
+    selection: ScheduleSelection,
+    steps: Sequence[Step],
+    hint: Hint | None = None,
 ) -> ScheduleCertificate:
     """Check a free schedule from the problem's own data, without the search.
 
@@ -66,6 +71,9 @@ def judge_schedule(
         What a formulation claims.
     steps : sequence of Step
         Of the selection, checked in the scene.
+    hint : mapping of int to (n, c) int, optional
+        States that a search visited, by brick count; only the time that the proof takes depends on
+        them.
 
     Returns
     -------
@@ -85,16 +93,28 @@ def judge_schedule(
             raise SolverError(f"{goal} is {value:.9g}, not {claimed:.9g} as claimed")
     if selection.stopped:
         return _stopped(values)
-    proof = Proof(problem)
-    for k, goal in enumerate(problem.goals):
-        if proof.finds_better(values, k):
-            raise SolverError(f"{goal}: {values[k]:.9g} is promised as the least; a plan has less")
-    bounds = [
-        proof.bound(values, k) if goal.of_margins else values[k]
-        for k, goal in enumerate(problem.goals)
-    ]
+    proof = Proof(problem, hint)
+    bounds = _bounds(problem, proof, values)
+    for goal, value, bound in zip(problem.goals, values, bounds, strict=True):
+        if not goal.of_margins and not bound >= value - BELOW * abs(value):
+            raise SolverError(f"{goal}: {value:.9g} is promised as the least; a plan has less")
     gaps = [(v - b) / (abs(v) or 1.0) for v, b in zip(values, bounds, strict=True)]
-    return ScheduleCertificate(values, tuple(bounds), max(gaps), proof.states)
+    return ScheduleCertificate(values, bounds, max(gaps), proof.states)
+
+
+def _bounds(problem: FreeProblem, proof: Proof, values: tuple[float, ...]) -> tuple[float, ...]:
+    """Return what no plan stays below, goal by goal; margins come first and have their width."""
+    out: list[float] = []
+    for goal, value in zip(problem.goals, values, strict=True):
+        if goal.of_margins:
+            bound = max(0.0, value - slack(goal.response, value))
+            if value > 0 and not proof.is_impossible((*values[: len(out)], bound)):
+                raise SolverError(f"{goal}: {value:.9g} is promised as the least; a plan has less")
+            out.append(bound)
+    if len(out) < len(values):
+        pairs = zip(proof.bounds(values), values, strict=True)
+        out += [min(bound, value) for bound, value in pairs][len(out) :]
+    return tuple(out)
 
 
 def _stopped(values: tuple[float, ...]) -> ScheduleCertificate:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -16,13 +16,14 @@ from seqopt.engines.provenance import provenance
 from seqopt.errors import InfeasibleError
 from seqopt.placement.formulation import Formulation
 from seqopt.placement.free_goals import judged_by
-from seqopt.placement.free_infeasible import why_impossible
+from seqopt.placement.free_infeasible import confirmed
 from seqopt.placement.free_judge import TOLERANCE, ScheduleCertificate, judge_schedule
 from seqopt.placement.free_problem import FreeProblem
 from seqopt.placement.free_steps import steps_of
+from seqopt.placement.guard import called
 from seqopt.placement.promises import Excess, overloads
 from seqopt.placement.schedule_formulation import ScheduleFormulation, find_schedule_formulation
-from seqopt.placement.schedule_selection import ScheduleSelection
+from seqopt.placement.schedule_selection import ScheduleSelection, with_numbers
 from seqopt.placement.shown_build import ShownBuild
 from seqopt.placement.standing_proof import certified
 from seqopt.responses.table import analyze
@@ -189,7 +190,7 @@ class FreePlan(ShownBuild):
             "idle_robots": list(idle_robots(problem.network.scene, self.steps)),
             "outside_linear_range": [str(departure) for departure in self.departures],
             "payload_exceeded": [str(excess) for excess in self.overloads],
-            "models_evaluated": problem.sets.solved,
+            "models_evaluated": problem.models,
             "states_in_proof": 0 if proof is None else proof.states,
             "seconds": dict(self.seconds),
             **provenance(self.engine),
@@ -251,15 +252,20 @@ def solve_free(
     """
     formulation = find_schedule_formulation(formulation)
     formulation.require_options(options)
-    start = time.perf_counter()
+    start, twin = time.perf_counter(), replace(problem)  # which no formulation can reach
+    name = formulation.name
     try:
-        selection = formulation.solve(problem, **options)
+        selection = called(
+            name, lambda: problem, ScheduleSelection, lambda: formulation.solve(problem, **options)
+        )
     except InfeasibleError:
-        raise InfeasibleError(why_impossible(problem)) from None
+        raise confirmed(twin, name) from None
+    selection = with_numbers(name, selection, len(problem.goals))
     solved = time.perf_counter()
     if proof and "progress" in options:
         options["progress"]("proving that no plan is better")
-    steps = steps_of(problem.space, selection.states)
-    certificate = judge_schedule(problem, selection, steps) if proof else None
+    steps = steps_of(twin.space, selection.states)
+    hint = dict(enumerate(selection.visited))
+    certificate = judge_schedule(twin, selection, steps, hint) if proof else None
     seconds = {"solve": solved - start, "verify": time.perf_counter() - solved}
     return FreePlan(problem, formulation, selection, certificate, steps, seconds)

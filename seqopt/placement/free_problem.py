@@ -28,6 +28,8 @@ from seqopt.sequence.steps import Grips
 from seqopt.showing import Shown
 from seqopt.stability.assessment import Stability
 
+BAND = 1e-5  # share of a value within which six digits do not decide
+
 
 @dataclass(frozen=True, repr=False)
 class FreeProblem(Shown):
@@ -104,7 +106,21 @@ class FreeProblem(Shown):
         """Responses of grip sets, those of the engine that are named; the forces come with them."""
         return GripSets(self.engine, [name for name in self.named if name != LARGEST])
 
-    def responses(self, bricks: int, states: Ints) -> tuple[Mapping[str, Floats], Bools]:
+    @cached_property
+    def screened(self) -> GripSets:
+        """The same with six digits, to choose by: enough where only worst values count."""
+        if any(goal.of_states and goal.measure is not Measure.PEAK for goal in self.goals):
+            return self.sets
+        return GripSets(self.engine, self.sets.names, screen=True)
+
+    @property
+    def models(self) -> int:
+        """How many grip sets were solved."""
+        return self.sets.solved + self.screened.solved * (self.screened is not self.sets)
+
+    def responses(
+        self, bricks: int, states: Ints, *, rough: bool = False
+    ) -> tuple[Mapping[str, Floats], Bools]:
         """Return the named responses of states, and which states are within all limits.
 
         Parameters
@@ -112,6 +128,8 @@ class FreeProblem(Shown):
         bricks : int
         states : (n, c) int
             As in `seqopt.sequence.free_space`.
+        rough : bool, optional
+            Whether six digits are enough, except for what is close to a limit.
 
         Returns
         -------
@@ -120,20 +138,61 @@ class FreeProblem(Shown):
         within : (n,) bool
         """
         held = self.space.held(states)
-        answers, forces = self.sets.answers(bricks, held)
-        names = [name for name in self.named if name != LARGEST]
-        found = dict(zip(names, answers.T, strict=True))
-        found[LARGEST] = forces.max(axis=1, initial=0.0)
+        answers, forces = (self.screened if rough else self.sets).answers(bricks, held)
+        if rough and self.screened is not self.sets:
+            close = self._close(answers, forces, states)
+            answers[close], forces[close] = self.sets.answers(bricks, held[close])
+        found = self._by_name(answers, forces)
         within = np.isfinite(answers).all(axis=1) & np.isfinite(forces).all(axis=1)
         for limit in self.limits:
             if limit.response in found:
                 within &= ~limit.exceeded(found[limit.response])
         return found, within & self._carried(states, forces)
 
-    def worth(
-        self, bricks: int, states: Ints, ceiling: float = np.inf
-    ) -> tuple[Floats, Bools, float]:
-        """Return what goals that are about states take of them.
+    def _by_name(self, answers: Floats, forces: Floats) -> dict[str, Floats]:
+        found = dict(zip(self.sets.names, answers.T, strict=True))
+        found[LARGEST] = forces.max(axis=1, initial=0.0)
+        return found
+
+    def _close(self, answers: Floats, forces: Floats, states: Ints) -> Bools:
+        """Return which states are so close to a limit that more digits decide."""
+        most = self._grips(states)[1]
+        close = _near(forces, np.where(np.isfinite(most), most, np.nan)).any(axis=1)
+        found = self._by_name(answers, forces)
+        for limit in self.limits:
+            if limit.response in found:
+                close |= _near(found[limit.response], limit.bound)
+        return np.asarray(close)
+
+    def values(self, bricks: int, states: Ints, *, rough: bool = False) -> tuple[Floats, Bools]:
+        """Return what goals take of states, and which states are within all limits.
+
+        Parameters
+        ----------
+        bricks : int
+        states : (n, c) int
+        rough : bool, optional
+            Whether six digits are enough.
+
+        Returns
+        -------
+        values : (n, g) float
+            A column for every goal; zero for one that is about moves, or about margins.
+        within : (n,) bool
+        """
+        found, within = self.responses(bricks, states, rough=rough)
+        out = np.zeros((len(states), len(self.goals)))
+        for column, goal in enumerate(self.goals):
+            if goal.of_states and not goal.of_margins:
+                named = found[goal.response] if goal.response else None
+                costs = self.criterion.costs(found, bricks, len(states)) if named is None else named
+                out[:, column] = costs
+        within &= np.isfinite(out).all(axis=1)
+        out[~within] = np.inf
+        return out, within
+
+    def standing_values(self, bricks: int, states: Ints) -> tuple[Floats, Bools]:
+        """Return the same where states must also stand as is demanded, margins among the goals.
 
         What stands, and by what margin, is asked only of states that nothing else rules out.
 
@@ -141,45 +200,37 @@ class FreeProblem(Shown):
         ----------
         bricks : int
         states : (n, c) int
-        ceiling : float, optional
-            The first goal must not take more, where it is about a peak.
 
         Returns
         -------
         values : (n, g) float
-            A column for every goal; zero for one that is about moves alone.
         within : (n,) bool
-            Which states are within all limits and below the ceiling, and stand if they must.
-        excluded : float
-            The least that the first goal takes of a state that is left out for the ceiling.
         """
-        found, within = self.responses(bricks, states)
-        out = np.zeros((len(states), len(self.goals)))
-        for column, goal in enumerate(self.goals):
-            if goal.of_states and not goal.of_margins:
-                named = found[goal.response] if goal.response else None
-                costs = self.criterion.costs(found, bricks, len(states)) if named is None else named
-                out[:, column] = costs
-        out[~within] = np.inf
-        within &= np.isfinite(out).all(axis=1)
-        within, excluded = self._below(out, within, ceiling)
+        out, within = self.values(bricks, states)
         if self.demands:
             rows = np.flatnonzero(within)
-            within[rows] = self.stability.stand(bricks, *self._grips(states[rows]))
+            within[rows] = self.stand(bricks, states[rows])
         for column, goal in enumerate(self.goals):
             if goal.of_margins:
                 rows = np.flatnonzero(within)
                 ends = self.stability.margins(goal.response, bricks, *self._grips(states[rows]))
                 out[rows, column] = ends[:, 1]
-        within, more = self._below(out, within & np.isfinite(out).all(axis=1), ceiling)
-        return out, within, min(excluded, more)
+        within &= np.isfinite(out).all(axis=1)
+        return out, within
 
-    def _below(self, values: Floats, within: Bools, ceiling: float) -> tuple[Bools, float]:
-        """Return which states the first goal leaves, and the least value that is left out."""
-        if self.goals[0].measure is not Measure.PEAK:
-            return within, np.inf
-        above = within & (values[:, 0] > ceiling)
-        return within & ~above, float(values[above, 0].min(initial=np.inf))
+    def stand(self, bricks: int, states: Ints) -> Bools:
+        """Return which states are proven to stand as is demanded.
+
+        Parameters
+        ----------
+        bricks : int
+        states : (n, c) int
+
+        Returns
+        -------
+        (n,) bool
+        """
+        return self.stability.stand(bricks, *self._grips(states))
 
     @cached_property
     def stability(self) -> StandingSets:
@@ -212,6 +263,12 @@ class FreeProblem(Shown):
         """Return in which states no grip exceeds what its robot may carry."""
         most = self._grips(states)[1]
         return np.asarray((forces <= most + LIMIT_TOLERANCE * most).all(axis=1))
+
+
+def _near(values: Floats, bound: Floats | float) -> Bools:
+    """Return which values are so close to a bound, NaN if there is none, that digits decide."""
+    finite = np.where(np.isfinite(values), values, np.nan)
+    return np.asarray(np.abs(finite - bound) <= BAND * np.abs(bound))
 
 
 def pose_free(

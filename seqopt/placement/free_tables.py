@@ -2,20 +2,56 @@
 
 The book says in plain words which nodes a robot may hold and what a state must keep to; here its
 words are tables. A state is a row: the place in build order of the node that each robot of the team
-holds, from 1, zero for a robot that is free; then how many grips were taken since the last brick
-where that counts.
+holds, from 1, zero for a robot that is free, or where travel counts the place that it held last
+with a minus; then how many grips were taken since the last brick where that counts.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
-from seqopt.arrays import Bools, Ints
+from seqopt.arrays import Bools, Floats, Ints
 from seqopt.sequence.free_check import RuleBook
 from seqopt.sequence.free_rules import Ending, Newest
 from seqopt.sequence.support import islands
+
+PAIRS = 1_000_000  # of states and places that are looked at together
+
+
+class Follows(NamedTuple):
+    """What follows from states by steps of one kind.
+
+    Attributes
+    ----------
+    bricks : int
+        How many stand then.
+    source : (m,) int
+        The row of the state before.
+    states : (m, c) int
+        Some of them more than once.
+    regrip : bool
+        Whether a grip is taken on a brick that stands.
+    way : (m,) float
+        How far the robot goes that takes a grip, m.
+    """
+
+    bricks: int
+    source: Ints
+    states: Ints
+    regrip: bool
+    way: Floats
+
+
+class _Places(NamedTuple):
+    """Places that count with so many bricks: lists by robot, and rows over places."""
+
+    reach: list[list[int]]  # that robots may hold
+    newest: list[list[int]]  # at which they hold the newest brick
+    holds: Bools  # the same as rows
+    parts: list[Bools]  # of bricks that nothing ties to the ground
 
 
 class RuleTables:
@@ -26,29 +62,48 @@ class RuleTables:
     book : RuleBook
     groups : sequence of tuple of int
         Robots that could change places, by their indices: of these the entries are sorted.
+    parks : bool, optional
+        Whether it counts where a free robot was last.
     """
 
-    def __init__(self, book: RuleBook, groups: Sequence[tuple[int, ...]]) -> None:
+    def __init__(
+        self, book: RuleBook, groups: Sequence[tuple[int, ...]], *, parks: bool = False
+    ) -> None:
         self._rules, placed = book.rules, book.network.scene.placed
-        self.last = len(placed)
+        self.last, self._parks = len(placed), parks
+        at = [brick.node_position(node) for brick in placed for node in brick.nodes]
+        self._at = np.array([[np.nan] * 3, *at])
         self.nodes = np.array([-1, *(node for brick in placed for node in brick.nodes)])
         place = {node: i for i, node in enumerate(self.nodes.tolist())}
         self._groups = [[book.team.index(r) for r in group] for group in groups]
         names = [book.network.scene.robots[r].name for r in book.team]
         self._able = [not self._rules.placers or name in self._rules.placers for name in names]
-        self._reach, self._newest, self._parts = [], [], []
-        for b in range(self.last + 1):
-            reached = [book.reached[r, b] for r in book.team]
-            newest = [book.newest_nodes[r, b] if b else () for r in book.team]
-            self._reach.append([[place[node] for node in nodes] for nodes in reached])
-            self._newest.append([[place[node] for node in nodes] for nodes in newest])
-            self._parts.append(list(self._held_parts(book, b)))
+        self._book, self._place = book, place
+        self._known: dict[int, _Places] = {}
 
-    def _held_parts(self, book: RuleBook, bricks: int) -> Iterator[Bools]:
-        """Yield for every part that nothing ties to the ground which places belong to it."""
-        owner = book.network.scene.brick_of_node
-        for part in islands(book.network, bricks) if bricks else ():
-            yield np.array([n >= 0 and owner[n].name in part for n in self.nodes.tolist()])
+    def _of(self, bricks: int) -> _Places:
+        """Return the places that count with so many bricks, looked up once."""
+        if bricks not in self._known:
+            book, robots = self._book, range(self.robots)
+            reach = [[self._place[n] for n in book.reached[r, bricks]] for r in book.team]
+            newest = [
+                [self._place[n] for n in (book.newest_nodes[r, bricks] if bricks else ())]
+                for r in book.team
+            ]
+            holds = np.zeros((self.robots, len(self.nodes)), dtype=bool)
+            for robot in robots:
+                holds[robot, newest[robot]] = True
+            owner, parts = book.network.scene.brick_of_node, []
+            for part in islands(book.network, bricks) if bricks else ():
+                own = [n >= 0 and owner[n].name in part for n in self.nodes.tolist()]
+                parts.append(np.array(own))
+            self._known[bricks] = _Places(reach, newest, holds, parts)
+        return self._known[bricks]
+
+    @property
+    def team(self) -> tuple[int, ...]:
+        """Indices of the robots of the columns."""
+        return self._book.team
 
     @property
     def robots(self) -> int:
@@ -65,125 +120,103 @@ class RuleTables:
         columns = self.robots + (self._rules.regrips is not None)
         return np.zeros((1, columns), dtype=np.int32)
 
-    def follow(self, bricks: int, states: Ints) -> Iterator[tuple[int, Ints]]:
-        """Yield what follows from some of the states, by one step each.
-
-        Parameters
-        ----------
-        bricks : int
-        states : (n, c) int
-
-        Yields
-        ------
-        bricks : int
-        states : (m, c) int
-            Some of them more than once.
-        """
-        keeps = self.keep(bricks, states) if bricks else np.ones(len(states), dtype=bool)
-        able = states[keeps]
+    def follow(self, bricks: int, states: Ints) -> Iterator[Follows]:
+        """Yield what follows from states (n, c) by one step each, of those that the rules allow."""
+        rows = np.arange(len(states))
+        keeps = rows[self.keep(bricks, states)] if bricks else rows
+        able = keeps
         if bricks and self._rules.regrips is not None:
-            able = able[able[:, -1] < self._rules.regrips]
+            able = able[states[able, -1] < self._rules.regrips]
         for robot in self._takers() if bricks else ():
-            after = self._taken(able, robot, self._reach[bricks][robot])
+            source, after, way = self._taken(states, able, robot, self._of(bricks).reach[robot])
             after[:, self.robots :] += 1
-            yield bricks, self._sorted(after)
-        yield from ((bricks, self._sorted(part)) for part in self._released(bricks, states))
+            yield Follows(bricks, source, self.in_order(after), regrip=True, way=way)
+        for source, after in self._released(bricks, states):
+            none = np.zeros(len(source))
+            yield Follows(bricks, source, self.in_order(after), regrip=False, way=none)
         if bricks == self.last:
             return
         for robot in self._takers():
             if self._able[robot]:
-                after = self._taken(states[keeps], robot, self._newest[bricks + 1][robot])
+                newest = self._of(bricks + 1).newest[robot]
+                source, after, way = self._taken(states, keeps, robot, newest)
                 after[:, self.robots :] = 0
-                yield bricks + 1, self._sorted(after[self.keep(bricks + 1, after)])
+                ok = self.keep(bricks + 1, after)
+                placed = self.in_order(after[ok])
+                yield Follows(bricks + 1, source[ok], placed, regrip=False, way=way[ok])
 
-    def _taken(self, states: Ints, robot: int, places: Sequence[int]) -> Ints:
-        """Return the states after a robot that is free took one of the places that nobody holds."""
-        free = states[states[:, robot] == 0]
-        parts = [free[:0]]
-        for place in places:
-            after = free[~(free[:, : self.robots] == place).any(axis=1)]
-            after[:, robot] = place
-            parts.append(after)
-        return np.concatenate(parts)
+    def _taken(
+        self, states: Ints, rows: Ints, robot: int, places: Sequence[int]
+    ) -> tuple[Ints, Ints, Floats]:
+        """Return what follows where a free robot took one of the places that nobody holds."""
+        free = rows[states[rows, robot] <= 0]
+        wanted, step = np.array(places, dtype=np.int64), max(1, PAIRS // max(1, len(places)))
+        parts = [(free[:0], states[:0], np.zeros(0))]
+        for start in range(0, len(free) if len(wanted) else 0, step):
+            block = free[start : start + step]
+            held = states[block, : self.robots, None] == wanted
+            row, at = np.nonzero(~held.any(axis=1))
+            source, after = block[row], states[block[row]]
+            way = np.zeros(len(row))
+            if self._parks:  # who held nothing yet comes from nowhere: that is no way
+                between = self._at[-after[:, robot]] - self._at[wanted[at]]
+                way = np.nan_to_num(np.linalg.norm(between, axis=1))
+            after[:, robot] = wanted[at]
+            parts.append((source, after, way))
+        source, after, way = map(np.concatenate, zip(*parts, strict=True))
+        return source, after, way
 
     def _takers(self) -> Iterator[int]:
         """Yield the robots of which one could take a grip: of a group the last, if it is free."""
-        first = {robot for group in self._groups for robot in group[:-1]}
+        first = {robot for group in self._groups for robot in group[:-1] if not self._parks}
         yield from (robot for robot in range(self.robots) if robot not in first)
 
-    def _released(self, bricks: int, states: Ints) -> Iterator[Ints]:
-        """Yield the states after one robot let go, or at the end all."""
+    def _released(self, bricks: int, states: Ints) -> Iterator[tuple[Ints, Ints]]:
+        """Yield the states after one robot let go, or at the end all, and those before."""
         ending = self._rules.ending
         for robot in range(self.robots):
-            after = states[states[:, robot] > 0]
-            after[:, robot] = 0
+            source = np.flatnonzero(states[:, robot] > 0)
+            after = states[source]
+            after[:, robot] = -after[:, robot] if self._parks else 0
             if not (bricks == self.last and ending is Ending.ONE_BY_ONE):
-                after = after[self.keep(bricks, after)]
-            yield after
+                ok = self.keep(bricks, after)
+                source, after = source[ok], after[ok]
+            yield source, after
         if bricks == self.last and ending is Ending.RELEASED:
-            after = states[(states[:, : self.robots] > 0).any(axis=1)]
+            source = np.flatnonzero((states[:, : self.robots] > 0).any(axis=1))
+            after = states[source]
             after[:, : self.robots] = 0
-            yield after
+            yield source, after
 
     def keep(self, bricks: int, states: Ints) -> Bools:
-        """Return which states keep the rules as long as the build goes on.
-
-        Parameters
-        ----------
-        bricks : int
-            From 1.
-        states : (n, c) int
-
-        Returns
-        -------
-        (n,) bool
-        """
-        grips = states[:, : self.robots]
+        """Return which states (n, c) keep the rules as long as the build goes on, from 1 brick."""
+        grips = states[:, : self.robots].clip(min=0)
         ok = np.ones(len(states), dtype=bool)
         if bricks > 1:
             ok &= np.count_nonzero(grips, axis=1) >= self._rules.least_grips
         if self._rules.newest is not Newest.FREE:
-            held = [np.isin(grips[:, r], self._newest[bricks][r]) for r in range(self.robots)]
-            ok &= np.any(held, axis=0)
-        for part in self._parts[bricks]:
+            ok &= self._of(bricks).holds[np.arange(self.robots), grips].any(axis=1)
+        for part in self._of(bricks).parts:
             ok &= part[grips].any(axis=1)
         return ok
 
     def ends(self, bricks: int, states: Ints) -> Bools:
-        """Return which states end the build.
-
-        Parameters
-        ----------
-        bricks : int
-        states : (n, c) int
-
-        Returns
-        -------
-        (n,) bool
-        """
+        """Return which states (n, c) end the build."""
         if bricks < self.last:
             return np.zeros(len(states), dtype=bool)
         if self._rules.ending is Ending.HELD:
             return self.keep(bricks, states)
-        return np.asarray(~states[:, : self.robots].any(axis=1))
+        return np.asarray(~(states[:, : self.robots] > 0).any(axis=1))
 
     def codes(self, states: Ints) -> Ints:
-        """Return a number for every state that no other one of its brick count has.
-
-        Parameters
-        ----------
-        states : (n, c) int
-
-        Returns
-        -------
-        (n,) int
-        """
-        bases = [len(self.nodes)] * self.robots + [2 + (self._rules.regrips or 0)]
+        """Return a number for every state (n, c) that no other one of its brick count has."""
+        shift = len(self.nodes) if self._parks else 0
+        bases = [len(self.nodes) + shift] * self.robots + [2 + (self._rules.regrips or 0)]
         weights = np.cumprod([1, *bases[: states.shape[1] - 1]], dtype=np.int64)
-        return np.asarray(states @ weights)
+        return np.asarray(states @ weights + shift * weights[: self.robots].sum())
 
-    def _sorted(self, states: Ints) -> Ints:
-        """Return states with the entries of robots that could change places sorted."""
+    def in_order(self, states: Ints) -> Ints:
+        """Sort the entries of robots that could change places in states (n, c); return these."""
         for group in self._groups:
             states[:, group] = np.sort(states[:, group], axis=1)[:, ::-1]
         return states

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Protocol
 
 import numpy as np
@@ -12,6 +13,7 @@ import pandas as pd
 
 from seqopt.arrays import Floats, FrozenValue, Terse
 from seqopt.errors import InfeasibleError, ProblemError, SolverError, did_you_mean
+from seqopt.placement.guard import called, readable
 from seqopt.placement.schedule_formulation import (
     Finds,
     ScheduleFormulation,
@@ -29,6 +31,14 @@ class FrontProblem(Protocol):
     @property
     def names(self) -> tuple[str, ...]:
         """The numbers that are to be small."""
+
+    def anew(self) -> FrontProblem:
+        """Return the same problem with nothing known of it, for its judge.
+
+        Returns
+        -------
+        FrontProblem
+        """
 
     def best_below(self, bounds: Floats) -> tuple[Floats, object] | None:
         """Return a plan below bounds that no other such plan beats in everything.
@@ -164,13 +174,18 @@ def find_front(
     """
     start = time.perf_counter()
     formulation = find_schedule_formulation(formulation, Finds.FRONT)
-    found: FrontSelection = formulation.solve(problem, seconds=seconds, progress=progress)
+    twin, name = problem.anew(), formulation.name  # which no formulation can reach
+    solve = partial(formulation.solve, problem, seconds=seconds, progress=progress)
+    found = _with_numbers(name, called(name, lambda: twin, FrontSelection, solve), problem.names)
+    solved, problem = time.perf_counter(), twin
     if not len(found.points) and not found.stopped:
+        if not problem.is_empty_below(np.full(len(problem.names), np.inf)):
+            raise SolverError(f"formulation {name} found no plan, and some are allowed")
         raise InfeasibleError("pareto: no plan is within the limits; relax one")
-    solved = time.perf_counter()
     order = np.lexsort(found.points.T[::-1])
     points = found.points[order]
-    plans = tuple(problem.steps(found.plans[i]) for i in order)
+    with readable(name):
+        plans = tuple(problem.steps(found.plans[i]) for i in order)
     for point, steps in zip(points, plans, strict=True):
         values = problem.values(steps, point)
         if not (np.abs(values - point) <= TOLERANCE * np.abs(point)).all():
@@ -182,6 +197,15 @@ def find_front(
         _require_complete(problem, points, progress)
     spent = {"solve": solved - start, "verify": time.perf_counter() - solved}
     return Front(_table(problem, points, plans), plans, not found.stopped, spent)
+
+
+def _with_numbers(name: str, found: FrontSelection, names: Sequence[str]) -> FrontSelection:
+    """Return a selection with numbers where numbers belong."""
+    with readable(name):
+        points = np.array(found.points, dtype=float).reshape(-1, len(names))
+        if not np.isfinite(points).all() or len(points) != len(found.plans):
+            raise ValueError(f"{len(points)} points, {len(found.plans)} plans, or one is no number")
+        return FrontSelection(points, tuple(found.plans), str(found.stopped))
 
 
 def _require_apart(points: Floats) -> None:

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from copy import deepcopy
 from dataclasses import dataclass, field
 from enum import Enum
-from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -194,85 +192,3 @@ class CostProblem(FrozenValue):
             Empty.
         """
         return {}
-
-
-class Handed:
-    """A problem as it is handed to a formulation: copies of its data, made when they are read.
-
-    Whatever a formulation does to them, its answer is judged by the originals.
-
-    Parameters
-    ----------
-    problem : PlacementProblem
-    """
-
-    def __init__(self, problem: PlacementProblem) -> None:
-        self.__problem = problem
-        self.budgets = tuple(deepcopy(budget) for budget in problem.budgets)
-
-    @cached_property
-    def sums(self) -> LayeredCosts:
-        """The costs whose sum over the build is minimized."""
-        return _copied(self.__problem.sums)
-
-    @cached_property
-    def peaks(self) -> LayeredCosts:
-        """The costs whose largest over the build is minimized."""
-        return _copied(self.__problem.peaks)
-
-    def conditional(self, move: int, before: int) -> Floats:
-        """Return the cost of what a move shares with the one before; see `PlacementProblem`.
-
-        Parameters
-        ----------
-        move, before : int
-            A move, and the candidate chosen for the move before it.
-
-        Returns
-        -------
-        (C_k,) float
-        """
-        return self.__problem.conditional(move, before).copy()
-
-    def nodes(self, choice: Sequence[int]) -> tuple[int, ...]:
-        """Return the nodes that one candidate per move stands for.
-
-        Parameters
-        ----------
-        choice : sequence of int
-
-        Returns
-        -------
-        tuple of int
-        """
-        return self.__problem.nodes(choice)
-
-    def steps(self, choice: Sequence[int]) -> tuple[Step, ...]:
-        """Return the checked steps with one candidate per move.
-
-        Parameters
-        ----------
-        choice : sequence of int
-
-        Returns
-        -------
-        tuple of Step
-        """
-        return self.__problem.steps(choice)
-
-    def seconds(self, aim: Aim) -> Mapping[str, float]:
-        """Return what computing the costs of an aim took, by stage.
-
-        Parameters
-        ----------
-        aim : Aim
-
-        Returns
-        -------
-        mapping of str to float
-        """
-        return self.__problem.seconds(aim)
-
-
-def _copied(costs: LayeredCosts) -> LayeredCosts:
-    return LayeredCosts(costs.single, costs.shared)  # which copies what it is given

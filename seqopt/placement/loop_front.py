@@ -50,12 +50,22 @@ class LoopFront:
         rounding: Mapping[str, float] | None = None,
     ) -> None:
         self._names = tuple(names)
-        self._round = rounding_steps(self._names, rounding)
+        self._round, self._rounding = rounding_steps(self._names, rounding), rounding
         ones = WorstRatio("front", tuple((name, 1.0) for name in names))
         self._problem: Problem = pose(engine, schedule, ones, limits)
 
     def __repr__(self) -> str:
         return f"<LoopFront of {self._problem.schedule}: {', '.join(self._names)}>"
+
+    def anew(self) -> LoopFront:
+        """Return the same problem with nothing known of it, for its judge.
+
+        Returns
+        -------
+        LoopFront
+        """
+        posed = self._problem
+        return LoopFront(posed.engine, posed.schedule, self._names, posed.limits, self._rounding)
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+import operator
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import partial
+from math import isfinite, isnan
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from seqopt.engines.interface import Engine
-from seqopt.errors import SolverError
+from seqopt.errors import InfeasibleError, SolverError
 from seqopt.placement.free_judge import TOLERANCE
 from seqopt.placement.free_plan import FreePlan, solve_free
+from seqopt.placement.guard import called, readable
 from seqopt.placement.order_problem import OrderProblem, OrderSelection
+from seqopt.placement.order_proof import no_order_below
 from seqopt.placement.schedule_formulation import (
     Finds,
     ScheduleFormulation,
@@ -39,13 +45,16 @@ class OrderPlan(ShownBuild):
     plan : FreePlan
         The best of this order, with its own certificate.
     seconds : mapping of str to float
-        By stage, s: ``order``, and those of the plan.
+        By stage, s: ``order``, those of the plan, ``prove_order``.
+    proven : bool
+        Whether it is proven that no order stays below the bound.
     """
 
     problem: OrderProblem
     selection: OrderSelection
     plan: FreePlan
     seconds: Mapping[str, float]
+    proven: bool = False
 
     def __repr__(self) -> str:
         return f"OrderPlan({self.problem.scene.name!r}, {self.worth})"
@@ -103,8 +112,10 @@ class OrderPlan(ShownBuild):
 
     @property
     def status(self) -> str:
-        """``optimal`` where no order is better, else ``heuristic``: there is a bound alone."""
-        return "optimal" if self.gap <= TOLERANCE else "heuristic"
+        """``optimal`` where no order is proven better, ``claimed``, or ``heuristic``."""
+        if self.gap > TOLERANCE:
+            return "heuristic"
+        return "optimal" if self.proven else "claimed"
 
     def summary(self) -> dict[str, object]:
         """Return a summary, ready for JSON.
@@ -170,12 +181,35 @@ def solve_order(
     found = find_schedule_formulation(formulation, Finds.ORDER)
     found.require_options(options)
     means, start = replace(resources, progress=progress or resources.progress), time.perf_counter()
-    selection: OrderSelection = found.solve(problem, resources=means, **options)
+    twin = replace(problem, free=replace(problem.free))  # which no formulation can reach
+    solve = partial(found.solve, problem, resources=means, **options)
+    try:
+        selection = called(found.name, lambda: problem, OrderSelection, solve)
+    except InfeasibleError as error:
+        if no_order_below(twin, np.inf):
+            raise
+        why = f"claimed by {found.name}, and not proven: {error}"
+        raise InfeasibleError(why) from None
+    selection, problem = _with_numbers(found.name, selection), twin
     seconds = {"order": time.perf_counter() - start}
     _require_allowed(found.name, problem, selection.order)
     plan = solve_free(problem.at(selection.order), "schedule_search", proof=proof)
     _require_worth(found.name, plan.selection.objective[0], selection)
-    return OrderPlan(problem, selection, plan, {**seconds, **plan.seconds})
+    start = time.perf_counter()
+    proven = proof and no_order_below(problem, min(selection.bound, selection.objective))
+    seconds |= {**plan.seconds, "prove_order": time.perf_counter() - start}
+    return OrderPlan(problem, selection, plan, seconds, proven)
+
+
+def _with_numbers(name: str, found: OrderSelection) -> OrderSelection:
+    """Return a selection with numbers where numbers belong."""
+    with readable(name):
+        order = tuple(operator.index(brick) for brick in found.order)
+        objective, bound = float(found.objective), float(found.bound)
+        if not isfinite(objective) or isnan(bound):
+            raise ValueError(f"value {objective}, bound {bound}")
+        evaluated = operator.index(found.evaluated)
+        return OrderSelection(order, objective, bound, evaluated, str(found.stopped))
 
 
 def _require_allowed(name: str, problem: OrderProblem, order: Order) -> None:

@@ -10,9 +10,9 @@ from functools import partial
 import numpy as np
 
 from seqopt.errors import ProblemError
-from seqopt.placement.free_graph import explore
-from seqopt.placement.free_paths import least_to_end
+from seqopt.graph.paths import least_peak
 from seqopt.placement.free_problem import FreeProblem
+from seqopt.placement.free_states import explore
 from seqopt.placement.order_problem import OrderProblem
 from seqopt.responses.shipping import Shipment, engine_of, pack
 from seqopt.scene.orders import Order
@@ -51,9 +51,10 @@ def worth(problem: OrderProblem, trial: Trial) -> float:
     """
     judged, ceiling, found = problem.judging(trial.order), trial.ceiling, np.inf
     for width in (NARROW, None):
-        graph = explore(judged, ceiling, width)
-        if graph.whole:
-            found = ceiling = float(least_to_end(graph, 0)[0].min())
+        visited = explore(judged, ceiling, width)
+        if visited.whole:
+            visited.refine()
+            found = ceiling = least_peak(visited.graph().graph, 0)
     return found
 
 

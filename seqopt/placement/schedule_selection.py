@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import operator
+from dataclasses import dataclass, field
+from math import isnan
 
-from seqopt.arrays import FrozenValue
+import numpy as np
+
+from seqopt.arrays import FrozenValue, Ints
+from seqopt.placement.guard import readable
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -20,6 +25,9 @@ class ScheduleSelection(FrozenValue):
         Claimed value of every goal.
     bound : tuple of float
         Claimed lower bound of every goal, those before it being at their values.
+    visited : tuple of (n, c) int
+        States that a better plan could pass, by brick count, if the formulation knows them: the
+        proof looks at these together, and depends on them in nothing but its time.
     stopped : str
         Why the search ended before all was proven: ``time``, ``memory`` or ``interrupt``; empty if
         it did not.
@@ -28,4 +36,39 @@ class ScheduleSelection(FrozenValue):
     states: tuple[tuple[int, ...], ...]
     objective: tuple[float, ...]
     bound: tuple[float, ...]
+    visited: tuple[Ints, ...] = field(default=(), repr=False)
     stopped: str = ""
+
+
+def with_numbers(name: str, found: ScheduleSelection, goals: int) -> ScheduleSelection:
+    """Return a selection with numbers where numbers belong.
+
+    Parameters
+    ----------
+    name : str
+        Of the formulation that made it.
+    found : ScheduleSelection
+    goals : int
+        How many goals there are.
+
+    Returns
+    -------
+    ScheduleSelection
+
+    Raises
+    ------
+    SolverError
+        If a number is none, or there are too few.
+    """
+    with readable(name):
+        states = tuple(tuple(operator.index(n) for n in state) for state in found.states)
+        objective, bound = (tuple(map(float, part)) for part in (found.objective, found.bound))
+        if not len(objective) == len(bound) == goals or not states:
+            raise ValueError(
+                f"{len(states)} states, {len(objective)} values and {len(bound)} bounds for "
+                f"{goals} goals"
+            )
+        if any(map(isnan, (*objective, *bound))):
+            raise ValueError("a value or bound is NaN")
+        visited = tuple(np.asarray(rows) for rows in found.visited)
+        return ScheduleSelection(states, objective, bound, visited, str(found.stopped))

@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from seqopt.errors import SeqoptError, SolverError
+from seqopt.errors import SolverError
 from seqopt.interrupts import answered
-from seqopt.placement.formulation import WATCH, End, Formulation, Selection, said
+from seqopt.placement.formulation import WATCH, End, Formulation, Selection
+from seqopt.placement.guard import called, readable
 from seqopt.placement.interface import PlacementProblem
 from seqopt.placement.watch import Finding, Watch
 
@@ -54,25 +55,23 @@ def _called(
 ) -> Selection:
     """Return what a formulation returns, if that is a selection."""
     told = {WATCH: watch} if formulation.watched else {}
+    aim = formulation.aim
     try:
-        found: object = formulation.solve(problem, **told, **options)
+        return called(
+            formulation.name,
+            lambda: (aim.costs(problem), problem.budgets),
+            Selection,
+            lambda: formulation.solve(problem, **told, **options),
+        )
     except SolverError as error:
         if watch.interrupted:
             raise KeyboardInterrupt(str(error)) from error
         raise
-    except (SeqoptError, MemoryError):
-        raise
-    except Exception as error:  # whatever a formulation of others may raise
-        raise SolverError(f"formulation {formulation.name} failed: {said(error)}") from error
-    if not isinstance(found, Selection):
-        kind = type(found).__name__
-        raise SolverError(f"formulation {formulation.name} returned a {kind}, not a Selection")
-    return found
 
 
 def _with_numbers(formulation: Formulation, found: Selection, watch: Watch) -> Selection:
     """Return a selection with numbers where numbers belong, or raise a `SolverError`."""
-    try:
+    with readable(formulation.name):
         seconds = float(found.compile_seconds)
         if not 0 <= seconds < np.inf:
             raise ValueError(f"compile_seconds is {seconds}")
@@ -86,10 +85,6 @@ def _with_numbers(formulation: Formulation, found: Selection, watch: Watch) -> S
             end=End.INTERRUPTED if watch.interrupted else End(found.end),
             trace=trace,
         )
-    except (TypeError, ValueError, AttributeError, OverflowError) as error:
-        raise SolverError(
-            f"formulation {formulation.name} returned an invalid Selection: {said(error)}"
-        ) from error
 
 
 def _traced(watch: Watch, objective: float, bound: float) -> tuple[Finding, ...]:

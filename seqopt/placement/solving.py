@@ -11,7 +11,7 @@ from typing import Any, overload
 
 import numpy as np
 
-from seqopt.errors import InfeasibleError, ProblemError
+from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.placement.anew import require_anew
 from seqopt.placement.certificate import certify_partial, judge, least_sum
 from seqopt.placement.conflicts import refusal
@@ -25,7 +25,7 @@ from seqopt.placement.formulation import (
 )
 from seqopt.placement.free_plan import FreePlan, solve_free
 from seqopt.placement.free_problem import FreeProblem
-from seqopt.placement.interface import Handed, PlacementProblem
+from seqopt.placement.interface import PlacementProblem
 from seqopt.placement.pair_search import search_pairs
 from seqopt.placement.plan import Plan
 from seqopt.placement.problem import Problem
@@ -200,9 +200,8 @@ def _solve_all(
     """Return the certified plan of a formulation that is given the costs of all choices."""
     seconds: dict[str, float] = {}
     stages = problem.seconds(formulation.aim)  # computes the costs: solving is timed alone
-    with _timed(seconds, "solve"), _conflicts_named(problem):
-        handed = Handed(problem)  # the judge has the originals
-        selection = select(formulation, handed, Watch(run.time_limit, run.progress), **options)
+    with _timed(seconds, "solve"), _infeasible_confirmed(problem, formulation):
+        selection = select(formulation, problem, Watch(run.time_limit, run.progress), **options)
     seconds["compile"] = selection.compile_seconds
     seconds["solve"] -= selection.compile_seconds
     with _timed(seconds, "verify"):
@@ -273,14 +272,19 @@ def _solve_lazily(
 
 
 @contextmanager
-def _conflicts_named(problem: PlacementProblem) -> Iterator[None]:
-    """Name the budgets that conflict where a formulation says that none can be kept together."""
+def _infeasible_confirmed(problem: PlacementProblem, formulation: Formulation) -> Iterator[None]:
+    """Say why there is no choice where a formulation says that there is none, if that is so."""
     try:
         yield
-    except InfeasibleError:
-        if not problem.budgets or not np.isfinite(least_sum(problem.sums)):
-            raise
-        raise refusal(problem) from None
+    except InfeasibleError as error:
+        costs = formulation.aim.costs(problem)
+        if not np.isfinite(least_sum(costs)):
+            costs.continuable()  # names the move
+        if problem.budgets:
+            raise refusal(problem, formulation.name) from None
+        raise SolverError(
+            f"formulation {formulation.name} says that no choice is allowed, and some are: {error}"
+        ) from None
 
 
 @contextmanager

@@ -11,7 +11,7 @@ from seqopt.arrays import Bools, Floats, Ints
 from seqopt.errors import SolverError
 from seqopt.placement.free_problem import FreeProblem
 from seqopt.placement.standing import Standing, StandingSets, slack
-from seqopt.sequence.steps import Grips, Step
+from seqopt.sequence.steps import Step
 from seqopt.stability.assessment import Stability, Verdict
 from seqopt.stability.steps import assess_steps
 
@@ -31,33 +31,18 @@ class StandingProof:
     def __init__(self, problem: FreeProblem, payload: dict[int, float]) -> None:
         self._problem, self._payload = problem, payload
         self._sets: dict[Standing, StandingSets] = {}
-        scene = problem.network.scene
-        nodes = (None, *(node for brick in scene.placed for node in brick.nodes))
-        self._place = {node: place for place, node in enumerate(nodes)}
 
-    def allows(self, states: Sequence[tuple[int, Grips]], most: Sequence[float]) -> list[bool]:
-        """Return which states stand, if they must, and are not proven to lack a margin.
+    def asked(self, margins: Sequence[float]) -> tuple[Standing, ...]:
+        """Return what is demanded of states where the first goals, margins, have values."""
+        base = self._problem.standing
+        pairs = zip(self._problem.goals, margins, strict=False)
+        own = ((base or Standing()).demanding(g.response, max(v, 0.0)) for g, v in pairs)
+        return (*self._problem.demands, *own)
 
-        Parameters
-        ----------
-        states : sequence of (int, tuple of (int or None))
-            How many bricks stand, and which node each of the scene's robots holds.
-        most : sequence of float
-            What the first goals may take.
-
-        Returns
-        -------
-        list of bool
-        """
-        out = np.ones(len(states), dtype=bool)
-        for bricks in {bricks for bricks, _ in states}:
-            rows = np.array([i for i, (count, _) in enumerate(states) if count == bricks])
-            held, payload = self._rows([states[i][1] for i in rows])
-            out[rows] = self.allows_rows(bricks, held, payload, most)
-        return out.tolist()
-
-    def allows_rows(self, bricks: int, held: Ints, payload: Floats, most: Sequence[float]) -> Bools:
-        """Return the same of states of one brick count.
+    def allows_rows(
+        self, bricks: int, held: Ints, payload: Floats, margins: Sequence[float]
+    ) -> Bools:
+        """Return which states are not proven to fall, or to lack a margin.
 
         Parameters
         ----------
@@ -66,20 +51,15 @@ class StandingProof:
             Nodes held, ascending, as places in build order counted from 1; zeros for none.
         payload : (S, r) float
             Largest force of each, N.
-        most : sequence of float
+        margins : sequence of float
+            Of the first goals.
 
         Returns
         -------
         (S,) bool
         """
-        base = self._problem.standing
-        asked = [] if base is None else [base]
-        for goal, value in zip(self._problem.goals, most, strict=False):
-            if goal.of_margins:
-                margins = base or Standing()
-                asked.append(margins.demanding(goal.response, max(value, 0.0)))
         out = np.ones(len(held), dtype=bool)
-        for demand in asked:
+        for demand in self.asked(margins):
             out[out] = self._known(demand).may_stand(bricks, held[out], payload[out])
         return out
 
@@ -88,13 +68,6 @@ class StandingProof:
             loads = np.array(list(self._payload.values()))
             self._sets[asked] = StandingSets(self._problem.network, asked, loads)
         return self._sets[asked]
-
-    def _rows(self, grips: Sequence[Grips]) -> tuple[Ints, Floats]:
-        """Return nodes held and the payloads of those who hold them, ascending by node."""
-        held = np.array([[self._place[node] for node in row] for row in grips])
-        payload = np.array([self._payload[r] for r in range(held.shape[1])])
-        order = np.argsort(held, axis=1, kind="stable")
-        return np.take_along_axis(held, order, axis=1), payload[order]
 
 
 def proven_margins(problem: FreeProblem, steps: Sequence[Step]) -> dict[str, float]:

@@ -7,9 +7,10 @@ from dataclasses import replace
 from math import pi
 
 from seqopt.errors import InfeasibleError
+from seqopt.graph.explore import Explorer
 from seqopt.placement.free_goals import Goal, Measure
-from seqopt.placement.free_graph import StateGraph, explore
 from seqopt.placement.free_problem import FreeProblem
+from seqopt.placement.free_states import explore
 from seqopt.placement.standing import Standing, slack
 from seqopt.stability.assessment import ROUGHEST
 
@@ -19,7 +20,7 @@ WIDTH = 50  # states of a brick count from which a quick look for a plan goes on
 
 
 def best_margin(
-    problem: FreeProblem, tell: Callable[[StateGraph], None] = lambda _: None
+    problem: FreeProblem, tell: Callable[[Explorer], object] = lambda _: None
 ) -> tuple[float, float, FreeProblem]:
     """Return the best value of the first goal, a margin, and what is left to choose at it.
 

@@ -30,6 +30,8 @@ class GripSets:
         What solves them.
     names : sequence of str
         Responses of `seqopt.responses.quantities.CHOSEN_BY` that are wanted.
+    screen : bool, optional
+        Whether six digits are enough, to choose by.
 
     Examples
     --------
@@ -42,16 +44,22 @@ class GripSets:
     ((2, 1), (2, 2), 2)
     """
 
-    def __init__(self, engine: Engine, names: Sequence[str]) -> None:
+    def __init__(self, engine: Engine, names: Sequence[str], *, screen: bool = False) -> None:
         self._engine = engine
         self._names = tuple(names)
-        self._want = reduce(or_, (CHOSEN_BY[name].needs for name in names), Want(0))
+        digits = Want.SCREEN if screen else Want(0)
+        self._want = reduce(or_, (CHOSEN_BY[name].needs for name in names), digits)
         self._known = KnownRows()
         scene = engine.network.scene
         self._number = np.array([0, *(node for brick in scene.placed for node in brick.nodes)])
 
     def __repr__(self) -> str:
         return f"<GripSets of {self._engine}: {self.solved} solved>"
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The responses that are wanted."""
+        return self._names
 
     @property
     def solved(self) -> int:

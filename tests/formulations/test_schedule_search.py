@@ -18,13 +18,13 @@ from seqopt.engines.auto import AutoEngine, Level
 from seqopt.engines.interface import Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, MechanismError, ProblemError, TimeUpError
+from seqopt.graph.paths import fewest_moves, keep_best, reached
 from seqopt.network.build import build_network
 from seqopt.placement.criteria import WorstRatio
 from seqopt.placement.free_counts import steps_with, with_held
 from seqopt.placement.free_front import FreeFront
-from seqopt.placement.free_graph import explore
-from seqopt.placement.free_paths import keep_best, least_to_end, shortest
 from seqopt.placement.free_problem import pose_free
+from seqopt.placement.free_states import explore
 from seqopt.placement.front import find_front, pick, upper_bounds
 from seqopt.placement.loop_front import LoopFront
 from seqopt.placement.requirements import LIMIT_TOLERANCE, Limit
@@ -251,13 +251,14 @@ def test_who_holds_more_at_the_end_has_fewer_steps():
         )
         found = []
         for held in range(5):
-            part = with_held(explore(problem), held)
-            least = least_to_end(part, 0)[0]
-            if np.isfinite(least[0]):
-                part, _ = keep_best(part, 0)
+            graph, states = explore(problem).graph()
+            grips = np.concatenate([problem.space.grips(rows) for _, _, rows in states])
+            part = with_held(problem, graph, grips == held)
+            if part.ends[reached(part)].any():
+                part, least = keep_best(part, 0)
                 found.append(held)
-                steps = len(shortest(part))
-                assert steps == steps_with(problem, least, np.array([held]))[0]
+                steps = len(fewest_moves(part))
+                assert steps == steps_with(problem, np.array([least]), np.array([held]))[0]
         assert found == [1, 2, 3, 4]
 
 
@@ -281,7 +282,7 @@ def test_the_arch_of_the_paper(arch):
     plan = seqopt.solve(replace(arch, goals=pose_goals("minmax,steps,regrips")), "schedule_search")
     assert plan.certificate.objective == pytest.approx((0.84009, 50, 1), abs=1e-5)
     assert plan.summary()["steps_before_release"] == 49
-    assert plan.problem.sets.solved < 8000  # of 19,490 that robots can hold
+    assert plan.problem.models < 8000  # of 19,490 that robots can hold
     assert not plan.overloads
 
 
@@ -299,8 +300,7 @@ def pose_goals(text):
 
 
 def test_all_states_of_the_arch_are_counted(arch):
-    graph = explore(arch)
-    assert sum(len(level.states) for level in graph.levels) == 71035  # start and end among them
+    assert explore(arch).graph().graph.states == 71035  # start and end among them
 
 
 def test_time_and_interrupts_leave_a_plan_and_a_bound(arch, monkeypatch):

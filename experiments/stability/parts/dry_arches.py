@@ -8,8 +8,8 @@ import numpy as np
 
 from seqopt.contact.mortar import Mortar
 from seqopt.engines.registry import make_engine
-from seqopt.placement.free_graph import explore
 from seqopt.placement.free_problem import pose_free
+from seqopt.placement.free_states import explore
 from seqopt.placement.standing import Standing
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.parts import Robot

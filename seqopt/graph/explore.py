@@ -1,0 +1,255 @@
+"""Visits the states of a space below a rising threshold, each once, part by part."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Sequence
+from itertools import accumulate
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from seqopt.arrays import Bools, Floats, Ints
+from seqopt.graph.graph import Graph, Rows
+from seqopt.graph.parts import CLOSED, OPEN, PENDING, Key, Part, Visited
+
+BAND = 1e-5  # share of a value within which six digits do not decide
+
+
+class Moves(NamedTuple):
+    """Moves from states of one part to states of one part.
+
+    Attributes
+    ----------
+    source : (m,) int
+        Row of the state that each leads from, among those that were asked for.
+    states : (m, c) int
+        The states that they lead to.
+    taken : (m, k) float
+        What they take of amounts that are about moves.
+    """
+
+    source: Ints
+    states: Ints
+    taken: Floats
+
+
+class Space(Protocol):
+    """States and moves that an `Explorer` visits.
+
+    States stand in parts, rows of integers (n, c), and parts on levels; moves stay within a part or
+    lead to one of the next level.
+    """
+
+    @property
+    def levels(self) -> int:
+        """How many levels follow the first, on the last of which builds may end."""
+
+    @property
+    def peaks(self) -> tuple[bool, ...]:
+        """By goal, whether the largest amount on a path counts."""
+
+    def start(self) -> tuple[Key, Ints]:
+        """Return the first part and its only state, (1, c)."""
+
+    def codes(self, part: Key, states: Ints) -> Ints:
+        """Return a number for every state that no other one of its part has, (n,)."""
+
+    def within(self, part: Key, states: Ints) -> Moves:
+        """Return the moves that stay within the part."""
+
+    def onward(self, part: Key, states: Ints) -> Iterator[tuple[Key, Moves]]:
+        """Yield the moves that lead to the next level, by part."""
+
+    def values(self, part: Key, states: Ints, *, rough: bool) -> tuple[Floats, Bools]:
+        """Return what goals take of every state, (n, g), and which states are allowed, (n,).
+
+        Where rough values are enough six digits decide.
+        """
+
+    def amounts(self, values: Floats, taken: Floats) -> Floats:
+        """Return what goals take of moves (m, g), from values of targets and what moves take."""
+
+    def ended(self, part: Key, states: Ints) -> Bools:
+        """Return in which states of the last level a build may end, (n,)."""
+
+
+class Explorer:
+    """The states of a space that are reached through states below a threshold, which may rise.
+
+    Parameters
+    ----------
+    space : Space
+    width : int, optional
+        From how many new states of a level, those of least value, the search goes on, within parts
+        only by moves that take nothing; from all by default.
+    tell : callable, optional
+        Called after every level on which states were visited; may raise to end the search.
+
+    Attributes
+    ----------
+    threshold : float
+        What the first goal takes of a visited state is no more, where it is about a peak.
+    reached : int
+        The last level on which a state is visited.
+    level : int
+        The last level that was looked at.
+    passes : int
+        How often the threshold rose.
+    """
+
+    def __init__(
+        self,
+        space: Space,
+        width: int | None = None,
+        tell: Callable[[Explorer], object] = lambda _: None,
+    ) -> None:
+        self._space, self._width, self._tell = space, width, tell
+        key, states = space.start()
+        self._parts: list[dict[Key, Part]] = [{} for _ in range(space.levels + 1)]
+        self._moves: dict[tuple[int, Key, Key], list[tuple[Rows, Rows, Floats]]] = defaultdict(list)
+        self._shape = (states.shape[1], states.dtype, len(space.peaks))
+        self._first = key
+        part = self._part(0, key)
+        part.add(space.codes(key, states), states)
+        part.value(lambda some: (np.zeros((len(some), len(space.peaks))), np.ones(1, dtype=bool)))
+        self.threshold = -np.inf
+        self.reached = self.level = self.passes = 0
+
+    @property
+    def peaks(self) -> tuple[bool, ...]:
+        """By goal, whether the largest amount on a path counts."""
+        return self._space.peaks
+
+    def rise(self, threshold: float = np.inf) -> bool:
+        """Visit the states below a threshold; return whether a build may end in one of them."""
+        self.threshold = max(self.threshold, threshold)
+        self.passes += 1
+        for level, parts in enumerate(self._parts):
+            self.level, visited = level, 0
+            for key, part in list(parts.items()):
+                fresh = self._visit(level, key, part)
+                self._go_on(level, key, part, fresh)
+                visited += len(fresh)
+            if visited:
+                self._tell(self)
+        return self.whole
+
+    @property
+    def whole(self) -> bool:
+        """Whether a build may end in a visited state."""
+        parts = self._parts[-1].items()
+        return any(self._space.ended(k, p.states[p.mark == OPEN]).any() for k, p in parts)
+
+    @property
+    def excluded(self) -> float:
+        """The least that the first goal takes of a state above the threshold; infinite if none."""
+        least = [p.values[p.mark[: len(p.values)] == PENDING, 0] for p in self._all()]
+        return float(min((values.min() for values in least if len(values)), default=np.inf))
+
+    @property
+    def nbytes(self) -> int:
+        """How much memory states and moves take."""
+        states = sum(p.states.nbytes + p.values.nbytes + 13 * len(p.mark) for p in self._all())
+        moves = sum(a.nbytes for part in self._moves.values() for three in part for a in three)
+        return int(states + moves)
+
+    def _all(self) -> Iterator[Part]:
+        return (part for parts in self._parts for part in parts.values())
+
+    def _part(self, level: int, key: Key) -> Part:
+        return self._parts[level].setdefault(key, Part(*self._shape))
+
+    def _visit(self, level: int, key: Key, part: Part) -> Ints:
+        """Visit states below the threshold and what they lead to within a part; return which."""
+        visited = [np.zeros(0, dtype=np.int64)]
+        while True:
+            part.value(lambda states: self._space.values(key, states, rough=True))
+            fresh = np.flatnonzero((part.mark == PENDING) & self._below(part.values))
+            if self._width is not None:
+                fresh = fresh[np.argsort(part.values[fresh, 0], kind="stable")[: self._width]]
+                part.mark[part.mark == PENDING] = CLOSED
+            if not len(fresh):
+                return np.concatenate(visited)
+            part.mark[fresh] = OPEN
+            self.reached = max(self.reached, level)
+            visited.append(fresh)
+            if level:
+                moves = self._space.within(key, part.states[fresh])
+                self._keep((level, key, key), fresh, moves, part)
+
+    def refine(self, values: Sequence[float] | None = None) -> bool:
+        """Value states exactly that are close to the worst values of a path; return if any were.
+
+        All of them where no values are given.
+        """
+        found = False
+        for parts in self._parts[1:]:
+            for key, part in parts.items():
+                close = ~part.exact[: len(part.values)] & (part.mark[: len(part.values)] == OPEN)
+                near = np.full(len(close), values is None)
+                for column, peak in enumerate(self._space.peaks):
+                    if peak and values is not None:
+                        gap = np.abs(part.values[:, column] - values[column])
+                        near |= gap <= BAND * abs(values[column])
+                rows = np.flatnonzero(close & near)
+                if len(rows):
+                    part.values[rows] = self._space.values(key, part.states[rows], rough=False)[0]
+                    part.exact[rows] = found = True
+        return found
+
+    def close(self, part: tuple[int, Key], states: Ints) -> None:
+        """Leave out visited states of a part, given by its level and key, from now on."""
+        level, key = part
+        found = self._parts[level][key]
+        found.mark[found.add(self._space.codes(key, states), states)] = CLOSED
+
+    def _below(self, values: Floats) -> Bools:
+        if not self._space.peaks[0]:
+            return np.ones(len(values), dtype=bool)
+        band = BAND * abs(self.threshold) if np.isfinite(self.threshold) else 0.0
+        return np.asarray(values[:, 0] <= self.threshold + band)
+
+    def _go_on(self, level: int, key: Key, part: Part, fresh: Ints) -> None:
+        """Add what visited states lead to on the next level."""
+        if level == self._space.levels or not len(fresh):
+            return
+        for following, moves in self._space.onward(key, part.states[fresh]):
+            self._keep((level, key, following), fresh, moves, self._part(level + 1, following))
+
+    def _keep(self, which: tuple[int, Key, Key], fresh: Ints, moves: Moves, to: Part) -> None:
+        rows = to.add(self._space.codes(which[2], moves.states), moves.states)
+        self._moves[which].append((fresh[moves.source].astype(np.int32), rows, moves.taken))
+
+    def graph(self) -> Visited:
+        """Return the visited states and the moves among them, states in the order of codes."""
+        keys = [(level, key) for level, parts in enumerate(self._parts) for key in parts]
+        orders = [self._parts[level][key].order() for level, key in keys]
+        firsts = dict(zip(keys, accumulate(map(len, orders), initial=0), strict=False))
+        number = {}
+        for (level, key), order in zip(keys, orders, strict=True):
+            number[level, key] = np.full(len(self._parts[level][key].mark), -1, dtype=np.int32)
+            number[level, key][order] = firsts[level, key] + np.arange(len(order))
+        sources, targets, amounts = [], [], []
+        for (level, key, to), parts in self._moves.items():
+            source, target, taken = map(np.concatenate, zip(*parts, strict=True))
+            further = level + (to != key)
+            source, found = number[level, key][source], number[further, to][target]
+            kept = (source >= 0) & (found >= 0)
+            values = self._parts[further][to].values[target[kept]]
+            sources.append(source[kept])
+            targets.append(found[kept])
+            amounts.append(self._space.amounts(values, taken[kept]))
+        states = tuple(
+            (level, key, self._parts[level][key].states[order])
+            for (level, key), order in zip(keys, orders, strict=True)
+        )
+        ends = [
+            self._space.ended(key, rows)
+            if level == self._space.levels
+            else np.zeros(len(rows), bool)
+            for level, key, rows in states
+        ]
+        source, target, taken = map(np.concatenate, (sources, targets, amounts))
+        graph = Graph(source, target, taken, self._space.peaks, np.concatenate(ends))
+        return Visited(graph, states)

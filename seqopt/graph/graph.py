@@ -1,0 +1,87 @@
+"""A build as a graph: states, moves between them, and what every move takes, as arrays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from seqopt.arrays import Bools, Floats, FrozenValue
+from seqopt.errors import ProblemError
+
+Rows = NDArray[np.int32]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Graph(FrozenValue):
+    """States of a build and the moves between them; the first state is where the build starts.
+
+    Parameters
+    ----------
+    source, target : (m,) int
+        The states that every move leads from and to; moves are sorted by these.
+    amounts : (m, g) float
+        What every goal takes of every move; from 0 where amounts are added up.
+    peaks : tuple of bool
+        By goal: whether the largest amount on a path counts, or their sum.
+    ends : (n,) bool
+        The states in which a build may end.
+
+    Raises
+    ------
+    ProblemError
+        If an amount is no number, or negative where amounts are added up.
+    """
+
+    source: Rows
+    target: Rows
+    amounts: Floats
+    peaks: tuple[bool, ...]
+    ends: Bools
+
+    def __post_init__(self) -> None:
+        sums = self.amounts[:, [not peak for peak in self.peaks]]
+        if np.isnan(self.amounts).any():
+            raise ProblemError("an amount is no number; give one for every move")
+        if (sums < 0).any():
+            raise ProblemError(
+                f"a step adds {sums.min():.4g} to a sum: to repeat it would pay without end; ask "
+                "for the worst value, or for a quantity that is never negative"
+            )
+        codes = self.source.astype(np.int64) * self.states + self.target
+        if (np.diff(codes) < 0).any():
+            order = np.argsort(codes, kind="stable")
+            for name in ("source", "target", "amounts"):
+                object.__setattr__(self, name, getattr(self, name)[order])
+        for name in ("source", "target"):  # as csgraph wants them
+            object.__setattr__(self, name, np.ascontiguousarray(getattr(self, name)))
+        super().__post_init__()
+
+    @property
+    def states(self) -> int:
+        """How many states there are."""
+        return len(self.ends)
+
+    def __repr__(self) -> str:
+        return f"<Graph: {self.states} states, {len(self.source)} moves, {len(self.peaks)} goals>"
+
+    def only(self, kept: Bools) -> Graph:
+        """Return the graph with some of its moves, (m,) bool; all its states stay."""
+        if kept.all():
+            return self
+        moves = self.source[kept], self.target[kept], self.amounts[kept]
+        return Graph(*moves, self.peaks, self.ends)
+
+    def matrix(self, costs: Floats, kept: Bools | None = None) -> sparse.csr_array:
+        """Return costs (m,) of some of the moves, (m,) bool, from states to states, (n, n).
+
+        Costs of zero are entries too, and so are all costs of moves side by side.
+        """
+        source, target = self.source, self.target
+        if kept is not None:
+            source, target, costs = source[kept], target[kept], costs[kept]
+        starts = np.searchsorted(source, np.arange(self.states + 1, dtype=source.dtype))
+        shape = (self.states, self.states)
+        return sparse.csr_array((costs, target, starts.astype(np.int32)), shape=shape)

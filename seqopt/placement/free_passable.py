@@ -1,0 +1,208 @@
+"""The states that a better free schedule could pass, by a second version of the rules."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from seqopt.arrays import Bools, Floats, Ints
+from seqopt.graph.paths import tied
+from seqopt.placement.free_answers import ask
+from seqopt.placement.free_goals import Measure
+from seqopt.placement.free_problem import FreeProblem
+from seqopt.placement.free_states import move_amounts
+from seqopt.placement.free_tables import Follows, RuleTables
+from seqopt.placement.requirements import LIMIT_TOLERANCE
+from seqopt.placement.standing_proof import StandingProof
+from seqopt.responses.known_rows import KnownRows
+from seqopt.sequence.free_check import RuleBook
+from seqopt.sequence.free_rules import Payload
+
+
+class Asked(NamedTuple):
+    """What states must keep to.
+
+    Attributes
+    ----------
+    values : sequence of float
+        Of goals; the first that is about no margin bounds states, if it is about a worst step.
+    margins : sequence of float or None
+        With which states must stand, as is demanded and by the first goals; None does not ask.
+    """
+
+    values: Sequence[float] = ()
+    margins: Sequence[float] | None = None
+
+
+class Closed(NamedTuple):
+    """States of one brick count that may be passed.
+
+    Attributes
+    ----------
+    codes : (n,) int
+    states : (n, c) int
+    values : (n, g) float
+        What goals take of them.
+    follows : list of Follows
+        What the rules allow after them, by rows of these states.
+    """
+
+    codes: Ints
+    states: Ints
+    values: Floats
+    follows: list[Follows]
+
+
+class Passable:
+    """Which states may be passed, with responses that the engine computes again.
+
+    Parameters
+    ----------
+    problem : FreeProblem
+
+    Attributes
+    ----------
+    tables : RuleTables
+    fallen : dict of int to (n,) int
+        Codes of states that are proven to fall, by brick count.
+    stands : StandingProof
+    margins : int
+        How many goals are about margins; they come first.
+    """
+
+    def __init__(self, problem: FreeProblem) -> None:
+        self.problem = problem
+        book = RuleBook(problem.network, problem.rules)
+        most = _loads(problem, book)
+        parks = any(goal.measure is Measure.TRAVEL for goal in problem.goals)
+        self.tables = RuleTables(book, _alike(book, most), parks=parks)
+        self.fallen: dict[int, Ints] = {}
+        self.stands = StandingProof(problem, most)
+        self._payload = np.array([most[r] for r in book.team])
+        self._known = KnownRows()
+        self.margins = sum(goal.of_margins for goal in problem.goals)
+
+    def closed(self, bricks: int, entries: Ints, asked: Asked) -> Closed:
+        """Return the states that are reached from some without placing a brick.
+
+        Parameters
+        ----------
+        bricks : int
+        entries : (n, c) int
+            Some of them perhaps more than once.
+        asked : Asked
+            As of `valued`, which says which ones may be passed.
+
+        Returns
+        -------
+        Closed
+        """
+        seen, count, fresh = np.zeros(0, dtype=np.int64), 0, entries
+        parts = [Closed(seen, entries[:0], np.zeros((0, len(self.problem.goals))), [])]
+        while len(fresh):
+            own, at = np.unique(self.tables.codes(fresh), return_index=True)
+            new = ~np.isin(own, seen, assume_unique=True)
+            seen, rows = np.concatenate([seen, own[new]]), fresh[at[new]]
+            values, ok = self.valued(bricks, rows, asked)
+            follows = [
+                move._replace(source=move.source + count)
+                for move in self.tables.follow(bricks, rows[ok])
+            ]
+            parts.append(Closed(own[new][ok], rows[ok], values[ok], follows))
+            count += int(ok.sum())
+            inner = [move.states for move in follows if move.bricks == bricks]
+            fresh = np.concatenate([entries[:0], *inner])
+        return Closed(
+            np.concatenate([part.codes for part in parts]),
+            np.concatenate([part.states for part in parts]),
+            np.concatenate([part.values for part in parts]),
+            [move for part in parts for move in part.follows],
+        )
+
+    def valued(self, bricks: int, states: Ints, asked: Asked) -> tuple[Floats, Bools]:
+        """Return what goals take of states, and which ones a better plan could pass.
+
+        Parameters
+        ----------
+        bricks : int
+        states : (n, c) int
+        asked : Asked
+
+        Returns
+        -------
+        values : (n, g) float
+        ok : (n,) bool
+        """
+        goals = self.problem.goals
+        if not bricks:
+            return np.zeros((len(states), len(goals))), np.ones(len(states), dtype=bool)
+        held, payload = self._held(states)
+        values, forces, ok = self._answers(bricks, held)
+        ok &= (forces <= payload).all(axis=1)
+        most, margins = asked
+        k = self.margins
+        if len(most) > k and goals[k].measure is Measure.PEAK:
+            ok &= values[:, k] <= tied(most[k])
+        if bricks in self.fallen:
+            ok &= ~np.isin(self.tables.codes(states), self.fallen[bricks])
+        if margins is not None:
+            ok[ok] = self.may_stand(bricks, states[ok], margins)
+        return values, ok
+
+    def _held(self, states: Ints) -> tuple[Ints, Floats]:
+        """Return nodes held, ascending, and the payloads of those who hold them, (n, r)."""
+        grips = states[:, : self.tables.robots].clip(min=0)
+        order = np.argsort(grips, axis=1, kind="stable")
+        return np.take_along_axis(grips, order, axis=1), self._payload[order]
+
+    def may_stand(self, bricks: int, states: Ints, margins: Sequence[float]) -> Bools:
+        """Return which states (n, c) are not proven to fall, or to lack margins of first goals."""
+        return self.stands.allows_rows(bricks, *self._held(states), margins)
+
+    def _answers(self, bricks: int, held: Ints) -> tuple[Floats, Floats, Bools]:
+        """Return values, forces of grips and what is within limits, of rows of nodes held."""
+        goals, robots = len(self.problem.goals), held.shape[1]
+        out = np.zeros((len(held), goals + robots + 1))
+        count = np.count_nonzero(held, axis=1)
+        for taken in np.unique(count).tolist():
+            rows = np.flatnonzero(count == taken)
+            nodes = held[rows, robots - taken :]
+            codes = nodes @ len(self.tables.nodes) ** np.arange(taken)
+
+            def compute(new: Ints, nodes: Ints = nodes) -> Floats:
+                found = ask(self.problem, bricks, self.tables.nodes[nodes[new]])
+                return np.column_stack([found.worth, found.forces, found.fit])
+
+            found = self._known.of((bricks, taken), codes, compute)
+            out[rows, :goals] = found[:, :goals]
+            out[rows, goals + robots - taken :] = found[:, goals:]
+        return out[:, :goals], out[:, goals:-1], out[:, -1] > 0
+
+    def moved(self, values: Floats, found: Follows) -> Floats:
+        """Return what goals take of moves to states with such values, (m, g)."""
+        taken = np.column_stack([np.full(len(found.way), float(found.regrip)), found.way])
+        return move_amounts(self.problem, values, taken)
+
+
+def _alike(book: RuleBook, most: Mapping[int, float]) -> list[tuple[int, ...]]:
+    """Return the robots that could change places, group by group."""
+    scene, last = book.network.scene, len(book.network.inner)
+    groups: dict[object, list[int]] = {}
+    for r in book.team:
+        may = not book.rules.placers or scene.robots[r].name in book.rules.placers
+        nodes = [book.newest_nodes[r, b] for b in range(1, last + 1)]
+        key = (book.reached[r, last], tuple(nodes), may, most[r])
+        groups.setdefault(key, []).append(r)
+    return [tuple(group) for group in groups.values() if len(group) > 1]
+
+
+def _loads(problem: FreeProblem, book: RuleBook) -> dict[int, float]:
+    """Return the most that every robot of the scene may carry, N."""
+    out = {}
+    for r, robot in enumerate(problem.network.scene.robots):
+        kept = book.rules.payload is Payload.KEPT
+        cap = min(robot.payload if kept else np.inf, problem.caps.get(robot.name, np.inf))
+        out[r] = cap * (1 + LIMIT_TOLERANCE)
+    return out

@@ -1,0 +1,142 @@
+"""The states and moves of a free schedule, as an `seqopt.graph.Explorer` visits them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from seqopt.arrays import Bools, Floats, Ints
+from seqopt.graph.explore import Explorer, Moves
+from seqopt.placement.free_goals import Measure
+from seqopt.placement.free_problem import FreeProblem
+from seqopt.sequence import free_moves
+
+
+@dataclass(frozen=True)
+class FreeStates:
+    """The states of a free schedule, a part for every brick count.
+
+    Moves take a column each: whether they are regrips, and how far robots go, m.
+
+    Attributes
+    ----------
+    problem : FreeProblem
+    regrips : bool
+        Whether robots may take grips on bricks that stand.
+    standing : bool
+        Whether it is asked of every state that it stands, and by which margins.
+    """
+
+    problem: FreeProblem
+    regrips: bool = True
+    standing: bool = False
+
+    @property
+    def levels(self) -> int:
+        """How many bricks there are."""
+        return self.problem.space.bricks
+
+    @property
+    def peaks(self) -> tuple[bool, ...]:
+        """By goal, whether its worst counts."""
+        return tuple(goal.measure is Measure.PEAK for goal in self.problem.goals)
+
+    def start(self) -> tuple[int, Ints]:
+        """Return the empty site."""
+        return 0, self.problem.space.start()
+
+    def codes(self, part: int, states: Ints) -> Ints:
+        """Return a number for every state."""
+        return self.problem.space.codes(states)
+
+    def within(self, part: int, states: Ints) -> Moves:
+        """Return the moves that place no brick."""
+        space = self.problem.space
+        moves = [_moves(space.releases(part, states), regrip=False)]
+        if self.regrips:
+            moves.append(_moves(space.holds(part, states), regrip=True))
+        return Moves(*map(np.concatenate, zip(*moves, strict=True)))
+
+    def onward(self, part: int, states: Ints) -> Iterator[tuple[int, Moves]]:
+        """Yield the moves that place the next brick."""
+        yield part + 1, self.placed(part, states)
+
+    def placed(self, bricks: int, states: Ints) -> Moves:
+        """Return the moves that place the next brick after some."""
+        return _moves(self.problem.space.places(bricks, states), regrip=False)
+
+    def values(self, part: int, states: Ints, *, rough: bool) -> tuple[Floats, Bools]:
+        """Return what goals take of states, and which are allowed."""
+        if self.standing:
+            return self.problem.standing_values(part, states)
+        return self.problem.values(part, states, rough=rough)
+
+    def amounts(self, values: Floats, taken: Floats) -> Floats:
+        """Return what goals take of moves."""
+        return move_amounts(self.problem, values, taken)
+
+    def ended(self, part: int, states: Ints) -> Bools:
+        """Return which states end the build."""
+        return self.problem.space.ended(states)
+
+
+def move_amounts(problem: FreeProblem, values: Floats, taken: Floats) -> Floats:
+    """Return what goals take of moves, (m, g).
+
+    Parameters
+    ----------
+    problem : FreeProblem
+    values : (m, g) float
+        What they take of the states that the moves lead to.
+    taken : (m, 2) float
+        Whether the moves are regrips, and how far robots go, m.
+
+    Returns
+    -------
+    (m, g) float
+    """
+    out = values.copy()
+    for k, goal in enumerate(problem.goals):
+        if goal.measure is Measure.STEPS:
+            out[:, k] = 1.0
+        elif goal.measure is Measure.REGRIPS:
+            out[:, k] = taken[:, 0]
+        elif goal.measure is Measure.TRAVEL:
+            out[:, k] = taken[:, 1]
+    return out
+
+
+def explore(
+    problem: FreeProblem,
+    ceiling: float = np.inf,
+    width: int | None = None,
+    tell: Callable[[Explorer], object] = lambda _: None,
+) -> Explorer:
+    """Return the states of a free schedule below a ceiling that stand as is demanded.
+
+    Parameters
+    ----------
+    problem : FreeProblem
+    ceiling : float, optional
+        The first goal must not take more of a state, where it is about a peak.
+    width : int, optional
+        From how many new states of a brick count the search goes on, and without regrips.
+    tell : callable, optional
+        Called after every level; may raise to end the search.
+
+    Returns
+    -------
+    Explorer
+    """
+    asked = bool(problem.demands) or any(goal.of_margins for goal in problem.goals)
+    space = FreeStates(problem, regrips=width is None, standing=asked)
+    found = Explorer(space, width, tell)
+    found.rise(ceiling)
+    return found
+
+
+def _moves(found: free_moves.Moves, *, regrip: bool) -> Moves:
+    taken = np.column_stack([np.full(len(found.way), float(regrip)), found.way])
+    return Moves(found.source, found.states, taken)

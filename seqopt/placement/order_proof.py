@@ -1,0 +1,105 @@
+"""The proof that no build order is better: a cut through the states of all orders.
+
+Sets of bricks that stand, the newest known, are met one after the other; with each the states below
+a value that are reached, by a second version of the rules and with responses computed again. Where
+none of them ends the build no order stays below the value.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from seqopt.arrays import Ints
+from seqopt.network.build import build_network
+from seqopt.placement.free_passable import Asked, Passable
+from seqopt.placement.free_proof import BELOW
+from seqopt.placement.free_tables import RuleTables
+from seqopt.placement.order_problem import OrderProblem
+from seqopt.scene.orders import Order
+from seqopt.sequence.free_check import RuleBook
+
+Key = tuple[frozenset[int], int]  # bricks that stand, and the newest
+MOST = 5000  # sets of bricks that are looked at
+
+
+def no_order_below(problem: OrderProblem, value: float, most: int = MOST) -> bool:
+    """Return whether it is proven that no order has a plan whose worst step is below a value.
+
+    Parameters
+    ----------
+    problem : OrderProblem
+    value : float
+        Of the first goal.
+    most : int, optional
+        Up to how many sets of bricks with a newest one are looked at; with more nothing is proven.
+
+    Returns
+    -------
+    bool
+    """
+    below = value - 4 * BELOW * abs(value)  # further than what is tied with it
+    empty: Key = (frozenset(), 0)
+    entries: dict[Key, list[Ints]] = {empty: []}
+    looked = 0
+    for bricks in range(len(problem.scene.bricks) + 1):
+        following: dict[Key, list[Ints]] = {}
+        for key, parts in entries.items():
+            looked += 1
+            if looked > most:
+                return False
+            states, tables = _closed(problem, key, parts, below)
+            if tables.ends(bricks, states).any():
+                return False
+            for after, rows in _placed(problem, key, _nodes(tables, states)):
+                following.setdefault(after, []).append(rows)
+        entries = following
+    return True
+
+
+def _closed(
+    problem: OrderProblem, key: Key, parts: list[Ints], below: float
+) -> tuple[Ints, RuleTables]:
+    """Return the states with a set of bricks that are reached below a value."""
+    passable = Passable(problem.judging(_order(problem, key)))
+    tables = passable.tables
+    rows = [_places(tables, nodes) for nodes in parts] if key[0] else [tables.start()]
+    margins = () if problem.free.demands else None
+    asked = Asked((below,), margins)
+    return passable.closed(len(key[0]), np.concatenate(rows), asked).states, tables
+
+
+def _placed(problem: OrderProblem, key: Key, nodes: Ints) -> Iterator[tuple[Key, Ints]]:
+    """Yield what follows by placing a brick, as nodes that are held: some more than once."""
+    for brick in problem.next_bricks(key[0]) if len(nodes) else ():
+        network = build_network(problem.scene, _order(problem, key, brick))
+        tables = RuleTables(RuleBook(network, problem.free.rules), [])
+        for move in tables.follow(len(key[0]), _places(tables, nodes)):
+            if move.bricks > len(key[0]) and len(move.states):
+                yield (key[0] | {brick}, brick), _nodes(tables, move.states)
+
+
+def _order(problem: OrderProblem, key: Key, following: int | None = None) -> Order:
+    """Return an order that begins with a set, its newest brick last, and maybe another one."""
+    own, (stand, newest) = problem.scene.build_order, key
+    first = [name for name in own if name in stand and name != newest]
+    last = [newest] if stand else []
+    last += [] if following is None else [following]
+    return (*first, *last, *(name for name in own if name not in stand and name != following))
+
+
+def _nodes(tables: RuleTables, states: Ints) -> Ints:
+    """Return states with the nodes themselves for places in build order."""
+    out = states.astype(np.int64)
+    out[:, : tables.robots] = tables.nodes[states[:, : tables.robots]]
+    return out
+
+
+def _places(tables: RuleTables, states: Ints) -> Ints:
+    """Return states of nodes as rows of tables of any order."""
+    place = np.zeros(tables.nodes.max() + 2, dtype=np.int64)  # -1, who holds none, is the last
+    place[tables.nodes] = np.arange(len(tables.nodes))
+    out = states.astype(tables.start().dtype)
+    out[:, : tables.robots] = place[states[:, : tables.robots]]
+    return tables.in_order(out)

@@ -1,0 +1,204 @@
+"""Best paths, their bounds and the visits of an explorer, against brute force and networkx."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import networkx as nx
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from seqopt.errors import InfeasibleError, ProblemError
+from seqopt.graph import Explorer, Graph, lexicographic
+from seqopt.graph.duality import lexicographic_bounds, sum_bound
+from seqopt.graph.explore import Moves
+from seqopt.graph.paths import distances, reached
+
+few = settings(max_examples=60, deadline=None, derandomize=True)
+
+
+@st.composite
+def graphs(draw, goals=2):
+    """A graph of up to six states, some moves of it side by side, with small whole amounts."""
+    states = draw(st.integers(2, 6))
+    move = st.tuples(st.integers(0, states - 1), st.integers(1, states - 1))
+    moves = draw(st.lists(move, min_size=1, max_size=14))
+    amount = st.tuples(*[st.integers(0, 3)] * goals)
+    amounts = draw(st.lists(amount, min_size=len(moves), max_size=len(moves)))
+    peaks = tuple(draw(st.lists(st.booleans(), min_size=goals, max_size=goals)))
+    ends = np.zeros(states, dtype=bool)
+    ends[draw(st.integers(1, states - 1))] = True
+    source, target = np.array(moves, dtype=np.int32).T
+    return Graph(source, target, np.array(amounts, dtype=float), peaks, ends)
+
+
+def simple_paths(graph):
+    """Every path that meets no state twice, as the places of its moves."""
+    work = [((0,), ())]
+    while work:
+        states, moves = work.pop()
+        if graph.ends[states[-1]]:
+            yield moves
+        for move in np.flatnonzero(graph.source == states[-1]).tolist():
+            if graph.target[move] not in states:
+                work.append(((*states, int(graph.target[move])), (*moves, move)))
+
+
+def values_of(graph, moves):
+    columns = graph.amounts[list(moves)]
+    joined = zip(graph.peaks, columns.T, strict=True)
+    return tuple(float(c.max(initial=0.0) if peak else c.sum()) for peak, c in joined)
+
+
+@given(graph=graphs())
+@few
+def test_the_best_path_and_its_bounds_equal_brute_force(graph):
+    found = sorted(values_of(graph, moves) for moves in simple_paths(graph))
+    if not found:
+        assert lexicographic_bounds(graph, (0.0, 0.0))[0] == np.inf
+        with pytest.raises(InfeasibleError):
+            lexicographic(graph)
+        return
+    best = lexicographic(graph)
+    assert best.values == pytest.approx(found[0])
+    assert lexicographic_bounds(graph, best.values) == pytest.approx(found[0])
+    fewest = min(len(m) for m in simple_paths(graph) if values_of(graph, m) == best.values)
+    assert len(best.path) == fewest
+
+
+@given(graph=graphs(), more=st.integers(1, 3))
+@few
+def test_of_a_worse_value_less_is_proven(graph, more):
+    found = sorted(values_of(graph, moves) for moves in simple_paths(graph))
+    if found:
+        bounds = lexicographic_bounds(graph, (found[0][0] + more, found[0][1]))
+        assert bounds[0] == pytest.approx(found[0][0])
+
+
+@given(graph=graphs(goals=1))
+@few
+def test_distances_are_those_of_networkx(graph):
+    outside = nx.DiGraph()
+    outside.add_nodes_from(range(graph.states))
+    moves = zip(graph.source.tolist(), graph.target.tolist(), graph.amounts[:, 0], strict=True)
+    for source, target, cost in moves:  # of moves side by side the least counts
+        known = outside.get_edge_data(source, target, {"weight": np.inf})["weight"]
+        outside.add_edge(source, target, weight=min(known, cost))
+    lengths = nx.single_source_dijkstra_path_length(outside, 0)
+    expected = [lengths.get(state, np.inf) for state in range(graph.states)]
+    assert distances(graph, graph.amounts[:, 0]).tolist() == expected
+    assert reached(graph).tolist() == [np.isfinite(length) for length in expected]
+
+
+def line():
+    """Two ways to the end: one takes 3, one 2 and 2."""
+    source, target = np.array([0, 0, 1]), np.array([2, 1, 2])
+    amounts = np.array([[3.0], [2.0], [2.0]])
+    return Graph(source, target, amounts, (False,), np.array([False, False, True]))
+
+
+def test_potentials_that_a_move_violates_prove_nothing():
+    graph = line()
+    right = distances(graph, graph.amounts[:, 0])
+    assert sum_bound(graph, 0, right) == 3.0
+    wrong = right.copy()
+    wrong[2] = 3.5  # more than the move from the start takes
+    assert sum_bound(graph, 0, wrong) == -np.inf
+    assert sum_bound(graph, 0, right + 1) == -np.inf  # the start has a potential of its own
+
+
+def test_amounts_that_pay_without_end_are_refused():
+    with pytest.raises(ProblemError, match="to repeat it would pay without end"):
+        replace(line(), amounts=-line().amounts)
+    with pytest.raises(ProblemError, match="an amount is no number"):
+        replace(line(), amounts=np.full((3, 1), np.nan))
+    replace(line(), amounts=-line().amounts, peaks=(True,))  # the largest of them is -3 or -2
+
+
+@dataclass(frozen=True)
+class Ladder:
+    """Places 0 to 3 on every level, with values from a table; steps sideways and straight on."""
+
+    table: np.ndarray
+    peaks: tuple[bool, ...] = (True, False)
+
+    @property
+    def levels(self):
+        return len(self.table) - 1
+
+    def start(self):
+        return 0, np.zeros((1, 1), dtype=np.int64)
+
+    def codes(self, part, states):
+        return states[:, 0]
+
+    def within(self, part, states):
+        beside = states + np.array([[-1, 1]])
+        row, step = np.nonzero((beside >= 0) & (beside < 4))
+        after = beside[row, step][:, None]
+        return Moves(row, after, np.zeros((len(row), 0)))
+
+    def onward(self, part, states):
+        yield part + 1, Moves(np.arange(len(states)), states, np.zeros((len(states), 0)))
+
+    def values(self, part, states, *, rough):
+        values = self.table[part, states[:, 0]] * (1 + 1e-7 * rough)
+        return np.column_stack([values, np.zeros(len(states))]), np.isfinite(values)
+
+    def amounts(self, values, taken):
+        return np.column_stack([values[:, 0], np.ones(len(values))])
+
+    def ended(self, part, states):
+        return np.ones(len(states), dtype=bool)
+
+
+tables = st.lists(
+    st.lists(st.sampled_from([1.0, 2.0, 3.0, np.inf]), min_size=4, max_size=4),
+    min_size=2,
+    max_size=5,
+)
+
+
+@given(table=tables, thresholds=st.lists(st.sampled_from([0.5, 1.0, 2.0]), max_size=3))
+@few
+def test_an_explorer_that_rises_visits_what_one_that_starts_high_does(table, thresholds):
+    """And nothing above its threshold, and values close to the best are exact in the end."""
+    space = Ladder(np.array(table))
+    slow, fast = Explorer(space), Explorer(space)
+    for threshold in [*thresholds, 2.0]:
+        slow.rise(threshold)
+    assert fast.rise(2.0) == slow.whole == fast.whole
+    assert slow.excluded == fast.excluded
+    (first, states), (second, others) = slow.graph(), fast.graph()
+    assert first == second
+    for (level, part, rows), other in zip(states, others, strict=True):
+        assert level == part == other[0]
+        assert rows.tolist() == other[2].tolist()
+        assert not level or (space.table[level, rows[:, 0]] <= 2).all()
+    if slow.whole:
+        best = lexicographic(first)
+        while slow.refine(best.values):
+            best = lexicographic(slow.graph().graph)
+        assert best.values[0] in (1.0, 2.0)
+        kept = np.array(table)
+        low = Explorer(Ladder(np.where(kept < best.values[0], kept, np.inf)))
+        assert not low.rise()  # below its worst value nothing connects both ends
+
+
+def test_what_is_closed_is_not_passed():
+    space = Ladder(np.array([[1.0] * 4, [1, 1, 3, 3], [1, 1, 1, 1]]))
+    found = Explorer(space)
+    assert found.rise(1.0)
+    assert len(lexicographic(found.graph().graph).path) == 2
+    found.close((1, 1), np.array([[0]]))
+    with pytest.raises(InfeasibleError):
+        lexicographic(found.graph().graph)
+
+
+def test_a_narrow_visit_keeps_the_best():
+    space = Ladder(np.array([[1.0] * 4, [3, 1, 2, 2], [1, 1, 1, 1]]))
+    narrow = Explorer(space, width=1)
+    assert narrow.rise()
+    assert len(narrow.graph().states[1][2]) == 4  # one of every round
