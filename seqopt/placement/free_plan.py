@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -245,7 +246,8 @@ def solve_free(
     try:
         selection = formulation.solve(problem, **options)
     except InfeasibleError:
-        raise InfeasibleError(why_impossible(problem)) from None
+        left = float(options.get("seconds", math.inf)) - (time.perf_counter() - start)
+        raise InfeasibleError(why_impossible(problem, left)) from None
     solved = time.perf_counter()
     if proof and "progress" in options:
         options["progress"]("proving that no plan is better")
