@@ -196,7 +196,7 @@ def _extensions(ground: _Ground, k: int, now: _Labels, limit: float) -> Iterator
         row, to = np.nonzero(whole + ground.rest[k + 1] < tight)
         at = part.at[row]
         taken = part.taken[row] + amounts[:, at, to].T
-        fits = (taken + ground.least[k + 1][:, to].T <= paths.caps + ROUNDING).all(axis=1)
+        fits = (taken + ground.least[k + 1][:, to].T <= paths.caps).all(axis=1)
         row, to, at, taken = row[fits], to[fits], at[fits], taken[fits]
         yield _Labels(to, whole[row, to], part.cost[row] + arc[at, to], taken, row + start)
 

@@ -4,7 +4,8 @@ Method: Cosmic Ray changes one operator, number, loop or decorator of a module a
 (`experiments.robustness.parts.mutants`), and the tests that are for the module run against it. A
 mutant that fails one is killed; one that loops is ended after ten times what the tests take, and
 counts as killed. Where a module has more mutants than ``--most``, as many are drawn, by a fixed
-seed. A mutant that no test could kill, since nothing that is promised changes, is named in
+seed. Modules that prove are a group of their own (``--only proofs``). A mutant that no test could
+kill, since nothing that is promised changes, is named in
 `experiments.robustness.parts.equivalents` with the reason; no other is taken off, and one that is
 named there and killed makes the claim fail. Controls, for every module: its own text survives, and
 a text with a line that raises is killed.
@@ -48,6 +49,23 @@ RIGID = (
 )
 CHOSEN = ("formulations/test_programs", "formulations/test_degenerate")
 STANDING = ("formulations/test_equilibrium", "validation/test_limit_analysis")
+PROOFS = {
+    "seqopt.placement.budget_proof": ("placement/test_proofs", "placement/test_budget_proof"),
+    "seqopt.placement.certificate": (
+        *("placement/test_certificate", "placement/test_values", "placement/test_proofs"),
+        "agreement/test_pair_search",
+    ),
+    "seqopt.placement.conflicts": ("placement/test_budget_proof", "placement/test_no_choice"),
+    "seqopt.graph.duality": ("graph/test_graph", "placement/test_free_proof"),
+    "seqopt.placement.free_proof": (
+        *("placement/test_proofs", "placement/test_free_proof", "placement/test_free_judge"),
+    ),
+    "seqopt.placement.free_passable": ("placement/test_proofs", "placement/test_free_proof"),
+    "seqopt.placement.free_tables": ("placement/test_free_proof", "placement/test_proofs"),
+    "seqopt.placement.order_bound": ("formulations/test_order_search",),
+    "seqopt.placement.order_proof": ("placement/test_proofs", "formulations/test_order_search"),
+    "seqopt.placement.partial_costs": ("placement/test_proofs", "agreement/test_pair_search"),
+}  # what says that nothing is better, or that there is nothing
 MODULES = {
     "seqopt.engines.rigid.compliance": (
         *("engines/test_compliance", "engines/test_operator", "engines/test_rigid_bricks"),
@@ -62,7 +80,7 @@ MODULES = {
     "seqopt.engines.rigid.grip_equations": RIGID,
     "seqopt.engines.rigid.growth": ("engines/test_operator", "engines/test_growth"),
     "seqopt.placement.costs": ("placement/test_costs", "placement/test_values"),
-    "seqopt.placement.certificate": ("placement/test_certificate", "placement/test_values"),
+    **PROOFS,
     "seqopt.placement.criteria": ("placement/test_criteria", "placement/test_problem"),
     "seqopt.placement.ranks": ("placement/test_criteria", "placement/test_problem"),
     "seqopt.placement.terms": ("placement/test_criteria", "placement/test_scales"),
@@ -87,6 +105,11 @@ BROKEN = "\nraise RuntimeError\n"
 CONTROLS = {"as_it_is": "survived", "with_a_broken_line": "killed"}
 STORE, SURVIVORS = RESULTS / "mutation_testing.csv", RESULTS / "mutation_survivors.csv"
 KEY = ["module", "operator", "before", "after"]
+
+
+def asked(text: str) -> list[str]:
+    """Return the modules with a text in their names, or those of proofs."""
+    return [*PROOFS] if text == "proofs" else [module for module in MODULES if text in module]
 
 
 def files(module: str) -> list[str]:
@@ -239,7 +262,7 @@ def experiment(options: Options) -> Finding:
     preload()
     most = QUICK_MOST if options.quick else int(options.most)
     found = []
-    for module in [QUICK] if options.quick else [m for m in MODULES if options.only in m]:
+    for module in [QUICK] if options.quick else asked(options.only):
         found.append(measured_again(module, most) if options.again else measured(module, most))
         print(found[-1][0].drop(columns="tests").to_string(index=False), flush=True)
         if not options.quick:
@@ -264,7 +287,7 @@ CLAIM = Claim(
     quick=f"{QUICK_MOST} mutants of one module, nothing written",
     options=(
         Option("--again", "try what survived the last run, and what --most has beyond it"),
-        Option("--only", "modules with this in their names; rows of others stay", ""),
+        Option("--only", "modules with this in their names, or proofs; rows of others stay", ""),
         Option("--most", "how many mutants of a module are tried", str(MOST)),
     ),
     needs=(Extra("cosmic_ray", 'pip install "seqopt[mutation]"'),),

@@ -22,7 +22,8 @@ from seqopt.placement.interface import PlacementProblem
 CLIMBS = 80  # prices that are tried
 PATIENCE = 4  # tries without a better bound after which steps are halved
 MOST = 5_000  # partial choices that are kept at a move
-SLACK = 1e-9  # of a budget or a cost: what sums are off by
+SLACK = 1e-9  # of a budget or a cost: what sums are off by; budgets have as much more
+EPS = float(np.finfo(float).eps)
 PAIRS = 1_000_000  # that are looked at together
 NEIGHBORS = (1, 2, 3, 5, 8, 13, 21, 34)  # with which a partial choice is compared
 
@@ -106,7 +107,7 @@ def _case(
     for k, arc in enumerate(arcs):
         parts = [(b.shared[k] + b.single[k]) / s for b, s in zip(budgets, sizes, strict=True)]
         takes.append(np.array(parts).reshape(len(parts), *arc.shape))
-    caps = np.array([b.bound / s for b, s in zip(budgets, sizes, strict=True)])
+    caps = np.array([b.bound / s for b, s in zip(budgets, sizes, strict=True)]) + SLACK
     prices = np.array([claimed.get(b.name, 0.0) * s for b, s in zip(budgets, sizes, strict=True)])
     usable = np.where(np.isfinite(prices), np.maximum(prices, 0.0), 0.0)
     return _Case(arcs, takes, caps, np.array(sizes), value, scale), usable
@@ -140,7 +141,8 @@ def _least(case: _Case, prices: Floats) -> tuple[float, Floats]:
         came.append(through.argmin(axis=0))
         reached = through.min(axis=0)
     at = int(reached.argmin())
-    least = float(reached[at] - prices @ case.caps)
+    rounding = EPS * (len(came) + 1) ** 2 * prices @ (1 + np.abs(case.caps))
+    least = float(reached[at] - prices @ case.caps - rounding)
     over = -case.caps.copy()
     for k in range(len(came) - 1, -1, -1):
         before = int(came[k][at])
@@ -165,7 +167,7 @@ def _laid_down(case: _Case, prices: Floats) -> float:
         taken = now.taken[row] + case.takes[k][:, to, end].T
         behind = now.behind[row] + arcs[k][to, end]
         now = _Parts(to, behind, now.cost[row] + case.arcs[k][to, end], taken, bound)
-        fits = taken + spared[k][:, to].T <= case.caps + SLACK
+        fits = taken + spared[k][:, to].T <= case.caps
         now = now.of(np.asarray(fits.all(axis=1)))
         now = now.of(_unbeaten(now.at, now.cost, now.taken))
         if len(now.at) > MOST:

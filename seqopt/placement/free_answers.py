@@ -9,10 +9,11 @@ from typing import NamedTuple
 import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
-from seqopt.engines.interface import Fields, Want
+from seqopt.engines.interface import Want
 from seqopt.errors import MechanismError
 from seqopt.placement.free_goals import LARGEST, Goal
 from seqopt.placement.free_problem import FreeProblem
+from seqopt.placement.requirements import state_costs
 from seqopt.responses.quantities import CHOSEN_BY, lengths
 
 BATCH = 2048  # grip sets whose fields are held at once
@@ -78,18 +79,15 @@ def _asked(problem: FreeProblem, bricks: int, grips: Ints) -> Answers:
     fit = np.ones(len(grips), dtype=bool)
     for limit in problem.limits:
         fit &= ~limit.exceeded(found.get(limit.response, np.zeros(len(grips))))
-    worth = np.column_stack(
-        [_costs(problem, goal, found, bricks, fields) for goal in problem.goals]
-    )
+    worth = np.column_stack([_costs(problem, goal, found, bricks, fit) for goal in problem.goals])
     return Answers(worth, forces, fit & np.isfinite(worth).all(axis=1))
 
 
 def _costs(
-    problem: FreeProblem, goal: Goal, found: dict[str, Floats], bricks: int, fields: Fields
+    problem: FreeProblem, goal: Goal, found: dict[str, Floats], bricks: int, fit: Bools
 ) -> Floats:
-    count = len(fields.grip_force)
     if goal.response and not goal.of_margins:
         return found[goal.response]
     if goal.of_states and not goal.of_margins:
-        return np.asarray(problem.criterion.costs(found, bricks, count))
-    return np.zeros(count)
+        return state_costs(problem.criterion, found, bricks, fit)
+    return np.zeros(len(fit))

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from seqopt.errors import InfeasibleError, SeqoptError, SolverError
+from seqopt.graph.explore import Explorer
 from seqopt.graph.paths import least_peak
 from seqopt.placement.free_goals import STATE_RESPONSES, Goal, Measure
 from seqopt.placement.free_problem import FreeProblem
@@ -19,9 +22,14 @@ from seqopt.sequence.free_rules import FreeRules, Payload
 
 STEPS = (Goal(Measure.STEPS),)
 STANDING = "no requirement to stand"
+Look = Callable[[FreeProblem], Explorer]
 
 
-def confirmed(problem: FreeProblem, name: str) -> SeqoptError:
+class _LateError(Exception):
+    """Time is over."""
+
+
+def confirmed(problem: FreeProblem, name: str, seconds: float = np.inf) -> SeqoptError:
     """Return the error that says why no plan is allowed, once it is proven that none is.
 
     Parameters
@@ -29,28 +37,41 @@ def confirmed(problem: FreeProblem, name: str) -> SeqoptError:
     problem : FreeProblem
     name : str
         Of the formulation that says so.
+    seconds : float, optional
+        After which what is not proven is called claimed, and no more help is sought.
 
     Returns
     -------
     InfeasibleError or SolverError
-        The latter where a plan is allowed. What is not proven is called claimed.
+        The latter where a plan is allowed.
     """
-    found = explore(replace(problem, goals=STEPS))
-    if found.whole:
-        return SolverError(f"formulation {name} says that no plan is allowed, and some are")
-    hint = {level: rows for level, _, rows in found.graph().states}
-    proven = Proof(replace(problem, goals=STEPS), hint).is_impossible()
-    why = why_impossible(problem)
+    end, steps = time.perf_counter() + seconds, replace(problem, goals=STEPS)
+    try:
+        found = explore(steps, tell=partial(_in_time, end))
+        if found.whole:
+            return SolverError(f"formulation {name} says that no plan is allowed, and some are")
+        hint = {level: rows for level, _, rows in found.graph().states}
+        proven = Proof(steps, hint).is_impossible()
+    except _LateError:
+        proven = False
+    why = why_impossible(problem, end - time.perf_counter())
     return InfeasibleError(why if proven else f"claimed by {name}, and not proven: {why}")
 
 
-def why_impossible(problem: FreeProblem) -> str:
+def _in_time(end: float, _: Explorer) -> None:
+    if time.perf_counter() > end:
+        raise _LateError
+
+
+def why_impossible(problem: FreeProblem, seconds: float = np.inf) -> str:
     """Return why no plan is allowed, in a line.
 
     Parameters
     ----------
     problem : FreeProblem
         Which has no plan.
+    seconds : float, optional
+        After which it says what it found by then.
 
     Returns
     -------
@@ -63,38 +84,49 @@ def why_impossible(problem: FreeProblem) -> str:
     for goal in problem.goals:
         if goal.of_margins:  # some margin is asked for, whichever it is
             problem = with_margin(problem, goal.response, WORST[goal.response])
-    graph = explore(replace(problem, goals=STEPS))
+    look = partial(explore, tell=partial(_in_time, time.perf_counter() + seconds))
+    where = "no plan is allowed"
+    try:
+        where = _where(problem, look)
+        return f"free schedule: {where}{_what_helps(problem, look)}"
+    except _LateError:
+        return f"free schedule: {where}; time was over before it was known what helps, give more"
+
+
+def _where(problem: FreeProblem, look: Look) -> str:
+    """Return where it stops."""
     placed = problem.network.scene.placed
-    stops = graph.reached
-    where = f"after brick {placed[-1].name} the build cannot end"
+    stops = look(replace(problem, goals=STEPS)).reached
     if stops < len(placed):
-        where = f"brick {placed[stops].name} ({stops + 1} of {len(placed)}) is never placed"
-    ways = list(_opening(problem))
-    if not ways:
-        ways = [both] if (both := _pair(problem)) else []
-    if not ways:
-        return (
-            f"free schedule: {where}, whatever two rules or limits are loosened; extend a reach or "
-            "add a robot"
-        )
-    ways = [_enough(problem, way) for way in ways]
-    return f"free schedule: {where}; it becomes possible with {' or '.join(ways)}"
+        return f"brick {placed[stops].name} ({stops + 1} of {len(placed)}) is never placed"
+    return f"after brick {placed[-1].name} the build cannot end"
 
 
-def _opening(problem: FreeProblem) -> Iterator[str]:
+def _what_helps(problem: FreeProblem, look: Look) -> str:
+    """Return what opens a way, as the end of a line."""
+    ways = list(_opening(problem, look))
+    if not ways:
+        ways = [both] if (both := _pair(problem, look)) else []
+    if not ways:
+        return ", whatever two rules or limits are loosened; extend a reach or add a robot"
+    ways = [_enough(problem, way, look) for way in ways]
+    return f"; it becomes possible with {' or '.join(ways)}"
+
+
+def _opening(problem: FreeProblem, look: Look) -> Iterator[str]:
     """Yield rules, each loosened as little as is enough alone, and limits that alone are enough."""
     problem = replace(problem, goals=STEPS)
     done: set[str] = set()
     for text, rules in _loosened(problem):
         rule = text.partition("=")[0]
-        if rule not in done and explore(replace(problem, rules=rules)).whole:
+        if rule not in done and look(replace(problem, rules=rules)).whole:
             done.add(rule)
             yield text
-    if problem.demands and explore(replace(problem, standing=None, settled=())).whole:
+    if problem.demands and look(replace(problem, standing=None, settled=())).whole:
         yield STANDING
     for limit in problem.limits:
         rest = tuple(other for other in problem.limits if other is not limit)
-        if explore(replace(problem, limits=rest)).whole:
+        if look(replace(problem, limits=rest)).whole:
             yield limit.response
 
 
@@ -105,30 +137,30 @@ def _loosened(problem: FreeProblem) -> Iterator[tuple[str, FreeRules]]:
             yield text, rules
 
 
-def _pair(problem: FreeProblem) -> str:
+def _pair(problem: FreeProblem, look: Look) -> str:
     """Return the first two that open a way together: rules, or a rule and a limit; or nothing."""
     for text, rules in _loosened(problem):
-        other = next(_opening(replace(problem, rules=rules)), "")
+        other = next(_opening(replace(problem, rules=rules), look), "")
         if other:
             return f"{text} together with {other}"
     return ""
 
 
-def _enough(problem: FreeProblem, way: str) -> str:
+def _enough(problem: FreeProblem, way: str, look: Look) -> str:
     """Return how far a limit has to be raised, where it is a limit that is loosened."""
     if way == STANDING and not any(demand.tilt for demand in problem.demands):
         strong = (problem.standing or Standing()).demanding("bond", WORST["bond"])
-        least = worst_least(replace(problem, standing=strong, settled=()), "bond")
+        least = worst_least(replace(problem, standing=strong, settled=()), "bond", look)
         return f"a bond of {least:.4g} Pa" if np.isfinite(least) else way
     found = [limit for limit in problem.limits if limit.response == way]
     if not found or way not in STATE_RESPONSES:
         return f"no limit on {way}" if found else way
     rest = tuple(limit for limit in problem.limits if limit.response != way)
-    least = worst_least(replace(problem, limits=rest), way)
+    least = worst_least(replace(problem, limits=rest), way, look)
     return f"{way}={least:.6g} instead of {found[0].bound:g}"
 
 
-def worst_least(problem: FreeProblem, response: str) -> float:
+def worst_least(problem: FreeProblem, response: str, look: Look = explore) -> float:
     """Return the least worst value of a response that a plan within the other limits reaches.
 
     Parameters
@@ -136,11 +168,13 @@ def worst_least(problem: FreeProblem, response: str) -> float:
     problem : FreeProblem
     response : str
         One of `seqopt.placement.free_goals.STATE_RESPONSES`, or ``bond``.
+    look : callable, optional
+        Returns the states that a problem's plans may pass.
 
     Returns
     -------
     float
         SI units; infinite if there is no plan.
     """
-    found = explore(replace(problem, goals=(Goal(Measure.PEAK, response),)))
+    found = look(replace(problem, goals=(Goal(Measure.PEAK, response),)))
     return least_peak(found.graph().graph, 0) if found.whole else np.inf

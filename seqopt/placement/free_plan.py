@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -259,7 +260,8 @@ def solve_free(
             name, lambda: problem, ScheduleSelection, lambda: formulation.solve(problem, **options)
         )
     except InfeasibleError:
-        raise confirmed(twin, name) from None
+        left = float(options.get("seconds", math.inf)) - (time.perf_counter() - start)
+        raise confirmed(twin, name, left) from None
     selection = with_numbers(name, selection, len(problem.goals))
     solved = time.perf_counter()
     if proof and "progress" in options:

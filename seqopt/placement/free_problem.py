@@ -15,7 +15,13 @@ from seqopt.errors import ProblemError
 from seqopt.network.network import Network
 from seqopt.placement.criteria import RankSum
 from seqopt.placement.free_goals import LARGEST, STATE_RESPONSES, Goal, Measure, parse_goals
-from seqopt.placement.requirements import LIMIT_TOLERANCE, Criterion, Limit, as_limits
+from seqopt.placement.requirements import (
+    LIMIT_TOLERANCE,
+    Criterion,
+    Limit,
+    as_limits,
+    state_costs,
+)
 from seqopt.placement.scales import SceneFacts
 from seqopt.placement.standing import Standing, StandingSets
 from seqopt.responses.grip_sets import GripSets
@@ -184,9 +190,10 @@ class FreeProblem(Shown):
         out = np.zeros((len(states), len(self.goals)))
         for column, goal in enumerate(self.goals):
             if goal.of_states and not goal.of_margins:
-                named = found[goal.response] if goal.response else None
-                costs = self.criterion.costs(found, bricks, len(states)) if named is None else named
-                out[:, column] = costs
+                if goal.response:
+                    out[:, column] = found[goal.response]
+                else:
+                    out[:, column] = state_costs(self.criterion, found, bricks, within)
         within &= np.isfinite(out).all(axis=1)
         out[~within] = np.inf
         return out, within

@@ -19,7 +19,8 @@ from seqopt.placement.costs import Budget
 from seqopt.placement.flow import within_each
 from seqopt.placement.interface import PlacementProblem
 
-ROUNDING = 1e-9  # of what is there of a budget, or of a cost: what sums are off by
+ROUNDING = 1e-9  # of a budget or a cost: within this, sums are equal; budgets have as much more
+EPS = float(np.finfo(float).eps)
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +34,7 @@ class Path:
     cost : float
         Scaled.
     over : (B,) float
-        What it takes of every budget, less what there is; scaled.
+        What it takes of every budget, less its cap; scaled.
     """
 
     choice: tuple[int, ...]
@@ -43,7 +44,7 @@ class Path:
     @property
     def within(self) -> bool:
         """Whether it keeps all budgets."""
-        return bool((self.over <= ROUNDING).all())
+        return bool((self.over <= 0).all())
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +58,7 @@ class PricedPaths:
     amounts : tuple of (B, C_{k-1}, C_k) float
         What it takes of every budget that has a bound, over the budget's unit.
     caps : (B,) float
-        How much there is of each, in its unit.
+        How much there is of each, in its unit, and what sums may be off by.
     scale : float
         By which costs are divided.
     units : (B,) float
@@ -130,13 +131,15 @@ class PricedPaths:
         -------
         path : Path
         bound : float
-            Scaled; no choice within the budgets costs less.
+            Scaled; no choice within the budgets costs less, however sums are rounded.
         """
         priced, rest = self.to_go(prices)
         choice: list[int] = []
         for arc, ahead in zip(priced, rest[1:], strict=True):
             choice.append(int(np.argmin(arc[choice[-1] if choice else 0] + ahead)))
-        return self.path(choice), float(rest[0][0] - prices @ self.caps)
+        bound = float(rest[0][0] - prices @ self.caps)
+        size = 1 + float(prices @ (1 + np.abs(self.caps)))  # of what is summed, per move
+        return self.path(choice), bound - EPS * (len(priced) + 1) ** 2 * size
 
     def named(self, prices: Floats) -> dict[str, float]:
         """Return prices by budget, in the unit of the criterion per unit of the budget.
@@ -184,7 +187,7 @@ def priced_paths(problem: PlacementProblem) -> PricedPaths:
     return PricedPaths(
         arcs=tuple(arc / scale for arc in arcs),
         amounts=tuple(_amounts(budgets, units, k, arc.shape) for k, arc in enumerate(arcs)),
-        caps=np.array([b.bound for b in budgets]) / units,
+        caps=np.array([b.bound for b in budgets]) / units + ROUNDING,
         scale=scale,
         units=units,
         names=tuple(budget.name for budget in budgets),

@@ -73,23 +73,18 @@ def best_prices(paths: PricedPaths, watch: Watch) -> Priced:
         if value > bound:
             best, bound = ask, value
         told = path.cost * paths.scale if path.within else np.inf
-        watch.tell(told, _lowered(bound) * paths.scale)
-        if bound > paths.loosest + ROUNDING:
+        watch.tell(told, bound * paths.scale)
+        if bound > paths.loosest:
             raise InfeasibleError("no choice is within all budgets; raise a bound")
         if watch.over or not len(ask):
             break
         highest, roof = _highest(list(found.values()), reach)
+        if max(best) < reach and roof - bound <= ROUNDING * max(abs(roof), 1.0):
+            break
         at_the_edge = bool((highest >= reach * (1 - ROUNDING)).any())
         reach *= 4.0 if at_the_edge and reach < WIDEST else 1.0
-        if not at_the_edge and roof - bound <= ROUNDING * max(abs(roof), 1.0):
-            break
         ask = highest if step % 2 == 0 or at_the_edge else 0.5 * (highest + best)
-    return Priced(best, _lowered(bound), tuple(found.values()))
-
-
-def _lowered(bound: float) -> float:
-    """Return a bound less what rounding may have added."""
-    return bound - 1e-12 * max(abs(bound), 1.0)
+    return Priced(best, bound, tuple(found.values()))
 
 
 def _highest(paths: Sequence[Path], reach: float) -> tuple[Floats, float]:

@@ -203,3 +203,36 @@ class ResponsesAsked(Terse):
         """
         named = {*self.criterion.wanted(bricks), *(limit.response for limit in self.limits)}
         return frozenset(named | {*self.also})
+
+
+def state_costs(
+    criterion: Criterion, found: Mapping[str, Floats], bricks: int, possible: Bools
+) -> Floats:
+    """Return what states cost; steps can be added to a plan, so none may cost less than nothing.
+
+    Parameters
+    ----------
+    criterion : Criterion
+    found : mapping of str to (n,) float
+        Responses of the states, SI units.
+    bricks : int
+    possible : (n,) bool
+        Which states count.
+
+    Returns
+    -------
+    (n,) float
+        Infinite where a state does not count.
+
+    Raises
+    ------
+    ProblemError
+        If a state that counts costs less than zero.
+    """
+    costs = np.where(possible, criterion.costs(found, bricks, len(possible)), np.inf)
+    if (costs < 0).any():
+        raise ProblemError(
+            f"criterion {criterion.name}: a step costs {costs.min():.6g} at {bricks} bricks; in a "
+            "free schedule none may cost less than zero: add a constant"
+        )
+    return costs

@@ -39,6 +39,7 @@ EXACT_SUMS = [
 ]
 HEURISTICS = [n for n, f in ALL.items() if f.kind is FormulationKind.HEURISTIC]
 every = pytest.mark.parametrize("name", ALL)
+timely = pytest.mark.parametrize("name", [n for n, f in ALL.items() if f.watched])
 takers = pytest.mark.parametrize("name", [n for n, f in ALL.items() if f.takes_budgets])
 
 
@@ -161,7 +162,7 @@ def test_budgets_are_kept_or_refused(name):
             solve(capped, name)
 
 
-@every
+@timely
 @given(problem=st.one_of(problems(), budgeted()), limit=st.integers(0, 60))
 @settings(max_examples=30)
 def test_an_answer_stopped_early_is_allowed_and_its_bound_holds(name, problem, limit):
@@ -199,7 +200,7 @@ def test_an_answer_stopped_early_is_allowed_and_its_bound_holds(name, problem, l
         assert worth == pytest.approx(best, abs=1e-6)
 
 
-@every
+@timely
 def test_no_time_is_enough_for_an_allowed_choice(name, problem25):
     plan = solve(problem25, ALL[name], time_limit=0)
     assert plan.selection.end is End.STOPPED
@@ -207,7 +208,7 @@ def test_no_time_is_enough_for_an_allowed_choice(name, problem25):
     assert plan.selection.bound <= plan.certificate.bound + 1e-6
 
 
-@every
+@timely
 def test_an_interrupt_leaves_an_allowed_choice_and_a_bound_that_holds(name, problem25):
     """It comes with the first finding; a second one would end the program."""
     formulation, best, came = ALL[name], ALL["overlap_dp"].solve(problem25).objective, []

@@ -364,6 +364,33 @@ def test_what_opens_a_way_is_asked_of_rigid_bricks(arch25):
     assert find_elastic_limits(engine.network, EPOXY).exceeded(far).all()
 
 
+class Clock:
+    """A clock that moves on by a million seconds whenever it is looked at."""
+
+    now = 0.0
+
+    def perf_counter(self):
+        self.now += 1e6
+        return self.now
+
+
+@pytest.mark.parametrize(
+    ("limit", "said"),
+    [
+        (0.5e6, "no plan is allowed; time was over before it was known what helps"),
+        (5.5e6, r"brick \d \(\d of 5\) is never placed; time was over before it was known"),
+        (np.inf, "is never placed; it becomes possible with F_largest="),
+    ],
+)
+def test_a_time_limit_holds_while_it_is_asked_what_helps(monkeypatch, limit, said):
+    """What is known by then is said."""
+    engine = ComplianceEngine(build_network(small_arch(5)))
+    problem = pose_free(engine, FreeRules(), ONES, "steps", [Limit("F_largest", 1.0)])
+    monkeypatch.setattr("seqopt.placement.free_infeasible.time", Clock())
+    with pytest.raises(InfeasibleError, match=said):
+        seqopt.solve(problem, "schedule_search", time_limit=limit)
+
+
 @pytest.mark.slow
 def test_refusals_name_the_brick_and_what_opens_a_way(arch, engine25):
     two = FreeRules(robots=("rob1", "rob2"))

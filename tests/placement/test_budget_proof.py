@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from fractions import Fraction
 from itertools import combinations, product
 
 import numpy as np
@@ -15,11 +16,14 @@ from seqopt.placement import budget_proof
 from seqopt.placement.budget_proof import least_within
 from seqopt.placement.budgets import steps_over, travel
 from seqopt.placement.conflicts import smallest_conflict
-from seqopt.placement.formulation import End
+from seqopt.placement.costs import Budget, LayeredCosts
+from seqopt.placement.formulation import End, FormulationKind, formulations
 from seqopt.placement.interface import CostProblem
 from seqopt.placement.price_curve import price_curve
 from seqopt.placement.solving import solve
 from tests.strategies import budgeted
+
+TAKERS = {name: found for name, found in formulations().items() if found.takes_budgets}
 
 
 def within(problem, budgets=None):
@@ -61,6 +65,87 @@ def test_the_smallest_conflict(problem):
     ]
     assert len(found) == (sizes[0] if sizes else 0)
     assert not found or not within(problem, found)
+
+
+def tied(rng):
+    """A problem of one to three moves with equal costs; a choice is exactly at its budgets.
+
+    Or just above them, so that none may be within.
+    """
+    sizes = rng.integers(1, 4, rng.integers(1, 4))
+
+    def parts(values):
+        pairs = zip((1, *sizes[:-1]), sizes, strict=True)
+        shared = tuple(rng.choice([0.0, *values], pair) for pair in pairs)
+        return tuple(rng.choice(values, size) for size in sizes), shared
+
+    chosen = tuple(int(rng.integers(size)) for size in sizes)
+    budgets = []
+    for name in ("one", "two")[: rng.integers(1, 3)]:
+        budget = Budget(name, *parts([0.1, 0.2, 0.3, 1.0, 2.0]), 0.0)
+        bound = budget.spent(chosen) - rng.choice([0.0, 0.0, 0.0, 0.05])
+        budgets.append(replace(budget, bound=bound))
+    return CostProblem(LayeredCosts(*parts([1.85, 3.7, 3.7, 1e-3])), tuple(budgets))
+
+
+def exactly_within(problem):
+    """The choices within all budgets, without rounding, and what they cost."""
+
+    def spent(budget, choice):
+        return sum(map(Fraction, LayeredCosts(budget.single, budget.shared).parts(choice)))
+
+    return {
+        choice: problem.sums.cost(choice)
+        for choice in product(*map(range, problem.sums.sizes))
+        if all(spent(budget, choice) <= Fraction(budget.bound) for budget in problem.budgets)
+    }
+
+
+@pytest.mark.parametrize("draws", [60, pytest.param(200, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("name", TAKERS)
+def test_none_is_within_only_where_enumeration_finds_none(name, draws):
+    """Prices may rise without end where costs tie; rounding must not decide what is possible."""
+    rng = np.random.default_rng(1)
+    refused = 0
+    for _ in range(draws):
+        problem = tied(rng)
+        found = exactly_within(problem)
+        try:
+            proof = solve(problem, name).certificate
+        except InfeasibleError:
+            assert not found, problem
+            refused += 1
+        except SolverError:
+            assert TAKERS[name].kind is FormulationKind.BOUND, problem
+        else:
+            best = min(found.values(), default=np.inf)
+            assert proof.bound <= best + 1e-6
+            if TAKERS[name].kind is FormulationKind.EXACT:
+                assert proof.objective <= best + 1e-6
+    assert refused
+
+
+def test_a_choice_exactly_at_its_budget_is_within():
+    none = (np.zeros((1, 2)),)
+    costs = LayeredCosts((np.array([3.7, 1.85]),), none)
+    problem = CostProblem(costs, (Budget("use", (np.array([1.0, 2.0]),), none, 1.0),))
+    for name in TAKERS:
+        assert solve(problem, name).selection.choice == (0,)
+
+
+def test_what_rounding_puts_above_a_bound_is_not_proven_to_exceed_it():
+    """0.1 + 1.1 is more than 1.2 in binary fractions; a choice that takes it counts as within."""
+    pairs = (np.zeros((1, 2)), np.zeros((2, 1)))
+    use = (np.array([0.1, 0.0]), np.array([1.1]))
+    costs = LayeredCosts((np.array([1.0, 2.0]), np.zeros(1)), pairs)
+    problem = CostProblem(costs, (Budget("use", use, pairs, 1.2),))
+    assert problem.budgets[0].spent((0, 0)) > 1.2
+    assert least_within(problem, 2.0, {}, 2.0) == pytest.approx(1.0)
+    assert least_within(problem, 2.0, {"use": 1e17}, 2.0) <= 1.0 + 1e-6
+    only = replace(problem.budgets[0], single=(np.array([0.1, 0.1]), np.array([1.1])))
+    assert smallest_conflict(replace(problem, budgets=(only,))) == ()
+    for name in ("labels", "overlap_mip"):
+        assert solve(problem, name).selection.choice == (0, 0)
 
 
 def test_budgets_that_conflict_are_named(problem25):
@@ -129,8 +214,6 @@ def test_the_bound_holds_where_costs_have_both_signs():
 
 
 def _random(rng, moves, size):
-    from seqopt.placement.costs import Budget, LayeredCosts  # noqa: PLC0415
-
     def parts():
         single = tuple(rng.normal(size=size) for _ in range(moves))
         shared = (

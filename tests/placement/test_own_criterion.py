@@ -14,11 +14,14 @@ import seqopt
 from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.placement.budgets import travel
 from seqopt.placement.criteria import WeightedSum
+from seqopt.placement.free_problem import pose_free
+from seqopt.placement.free_proof import Proof
 from seqopt.placement.in_order import solve_in_order
 from seqopt.placement.interface import Aim, CostProblem
 from seqopt.placement.own_criterion import StepCost
 from seqopt.placement.problem import pose
 from seqopt.placement.step_quantile import least_quantile
+from seqopt.sequence.free_rules import FreeRules
 from tests.builders import six_bricks, small_arch
 from tests.strategies import problems
 
@@ -96,6 +99,19 @@ def test_a_function_that_is_wrong_gets_one_line(function, said):
     with pytest.raises(ProblemError, match=said) as caught:
         seqopt.solve(posed(StepCost("wrong", NAMES, function)), "overlap_dp")
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("aim", ["minmax", "sum", "minmax,steps"])
+def test_a_cost_below_zero_is_refused_where_steps_can_be_added(aim):
+    """A sum would fall without end; where moves are given any sign is allowed."""
+    criterion = StepCost("gain", ("F_largest",), lambda r, bricks: r["F_largest"] - 60.0)
+    engine = seqopt.make_engine("compliance", small_arch(4))
+    free = pose_free(engine, FreeRules(), criterion, aim)
+    with pytest.raises(ProblemError, match=r"gain: a step costs -\d.* at \d bricks; .* constant"):
+        seqopt.solve(free, "schedule_search")
+    with pytest.raises(ProblemError, match="gain: a step costs -"):
+        Proof(free).finds_better((0.0,) * len(free.goals), 0)
+    assert seqopt.solve(posed(criterion), "overlap_dp").certificate.gap == 0
 
 
 def test_what_is_no_function_is_refused():
