@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import replace
-from math import isfinite
 
 from seqopt.cli.answer import Answer
 from seqopt.cli.asked import exceeded, level_notes, strictly
@@ -93,6 +92,4 @@ def _answer(options: argparse.Namespace, found: OrderPlan, name: str) -> Answer:
 
 def _said(found: OrderPlan) -> str:
     values = ", ".join(f"{name} {value:.6g}" for name, value in found.plan.objective.items())
-    bound = found.selection.bound
-    below = f"no order below {bound:.6g}" if isfinite(bound) else "others are not looked at yet"
-    return f"({found.status}): {values}, {below}; {len(found.plan.steps)} steps"
+    return f"({found.status}): {values}, {found.bound_said}; {len(found.plan.steps)} steps"

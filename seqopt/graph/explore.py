@@ -50,28 +50,97 @@ class Space(Protocol):
         """By goal, whether the largest amount on a path counts."""
 
     def start(self) -> tuple[Key, Ints]:
-        """Return the first part and its only state, (1, c)."""
+        """Return the first part and its only state.
+
+        Returns
+        -------
+        part : hashable
+        states : (1, c) int
+        """
 
     def codes(self, part: Key, states: Ints) -> Ints:
-        """Return a number for every state that no other one of its part has, (n,)."""
+        """Return a number for every state that no other one of its part has.
+
+        Parameters
+        ----------
+        part : hashable
+        states : (n, c) int
+
+        Returns
+        -------
+        (n,) int
+        """
 
     def within(self, part: Key, states: Ints) -> Moves:
-        """Return the moves that stay within the part."""
+        """Return the moves that stay within the part.
+
+        Parameters
+        ----------
+        part : hashable
+        states : (n, c) int
+
+        Returns
+        -------
+        Moves
+        """
 
     def onward(self, part: Key, states: Ints) -> Iterator[tuple[Key, Moves]]:
-        """Yield the moves that lead to the next level, by part."""
+        """Yield the moves that lead to the next level, by part.
+
+        Parameters
+        ----------
+        part : hashable
+        states : (n, c) int
+
+        Yields
+        ------
+        part : hashable
+        moves : Moves
+        """
 
     def values(self, part: Key, states: Ints, *, rough: bool) -> tuple[Floats, Bools]:
-        """Return what goals take of every state, (n, g), and which states are allowed, (n,).
+        """Return what goals take of states, and which of them are allowed.
 
-        Where rough values are enough six digits decide.
+        Parameters
+        ----------
+        part : hashable
+        states : (n, c) int
+        rough : bool
+            Whether six digits are enough.
+
+        Returns
+        -------
+        values : (n, g) float
+        allowed : (n,) bool
         """
 
     def amounts(self, values: Floats, taken: Floats) -> Floats:
-        """Return what goals take of moves (m, g), from values of targets and what moves take."""
+        """Return what goals take of moves.
+
+        Parameters
+        ----------
+        values : (m, g) float
+            What they take of the states that the moves lead to.
+        taken : (m, k) float
+            As of `Moves`.
+
+        Returns
+        -------
+        (m, g) float
+        """
 
     def ended(self, part: Key, states: Ints) -> Bools:
-        """Return in which states of the last level a build may end, (n,)."""
+        """Return in which states of the last level a build may end.
+
+        Parameters
+        ----------
+        part : hashable
+        states : (n, c) int
+
+        Returns
+        -------
+        (n,) bool
+        """
 
 
 class Explorer:

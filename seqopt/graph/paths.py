@@ -34,6 +34,14 @@ def lexicographic(graph: Graph) -> Best:
 
     Of equal ones it is the shortest, and of these the one whose states come first.
 
+    Parameters
+    ----------
+    graph : Graph
+
+    Returns
+    -------
+    Best
+
     Raises
     ------
     InfeasibleError

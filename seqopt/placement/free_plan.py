@@ -6,7 +6,7 @@ import math
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import pandas as pd
@@ -254,15 +254,7 @@ def solve_free(
     formulation = find_schedule_formulation(formulation)
     formulation.require_options(options)
     start, twin = time.perf_counter(), replace(problem)  # which no formulation can reach
-    name = formulation.name
-    try:
-        selection = called(
-            name, lambda: problem, ScheduleSelection, lambda: formulation.solve(problem, **options)
-        )
-    except InfeasibleError:
-        left = float(options.get("seconds", math.inf)) - (time.perf_counter() - start)
-        raise confirmed(twin, name, left) from None
-    selection = with_numbers(name, selection, len(problem.goals))
+    selection = _selected(formulation, problem, twin, options)
     solved = time.perf_counter()
     if proof and "progress" in options:
         options["progress"]("proving that no plan is better")
@@ -271,3 +263,20 @@ def solve_free(
     certificate = judge_schedule(twin, selection, steps, hint) if proof else None
     seconds = {"solve": solved - start, "verify": time.perf_counter() - solved}
     return FreePlan(problem, formulation, selection, certificate, steps, seconds)
+
+
+def _selected(
+    formulation: ScheduleFormulation,
+    problem: FreeProblem,
+    twin: FreeProblem,
+    options: Mapping[str, Any],
+) -> ScheduleSelection:
+    """Return what a formulation says, with numbers where numbers belong; or why there is none."""
+    start, name = time.perf_counter(), formulation.name
+    solve = partial(formulation.solve, problem, **options)
+    try:
+        selection = called(name, lambda: problem, ScheduleSelection, solve)
+    except InfeasibleError:
+        left = float(options.get("seconds", math.inf)) - (time.perf_counter() - start)
+        raise confirmed(twin, name, left) from None
+    return with_numbers(name, selection, len(problem.goals))

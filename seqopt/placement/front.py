@@ -178,10 +178,7 @@ def find_front(
     solve = partial(formulation.solve, problem, seconds=seconds, progress=progress)
     found = _with_numbers(name, called(name, lambda: twin, FrontSelection, solve), problem.names)
     solved, problem = time.perf_counter(), twin
-    if not len(found.points) and not found.stopped:
-        if not problem.is_empty_below(np.full(len(problem.names), np.inf)):
-            raise SolverError(f"formulation {name} found no plan, and some are allowed")
-        raise InfeasibleError("pareto: no plan is within the limits; relax one")
+    _require_some(name, found, problem)
     order = np.lexsort(found.points.T[::-1])
     points = found.points[order]
     with readable(name):
@@ -197,6 +194,15 @@ def find_front(
         _require_complete(problem, points, progress)
     spent = {"solve": solved - start, "verify": time.perf_counter() - solved}
     return Front(_table(problem, points, plans), plans, not found.stopped, spent)
+
+
+def _require_some(name: str, found: FrontSelection, problem: FrontProblem) -> None:
+    """Raise an error where no plan was found: that none is allowed, once that is proven."""
+    if len(found.points) or found.stopped:
+        return
+    if not problem.is_empty_below(np.full(len(problem.names), np.inf)):
+        raise SolverError(f"formulation {name} found no plan, and some are allowed")
+    raise InfeasibleError("pareto: no plan is within the limits; relax one")
 
 
 def _with_numbers(name: str, found: FrontSelection, names: Sequence[str]) -> FrontSelection:

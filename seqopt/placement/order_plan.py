@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import operator
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
-from math import isfinite, isnan
+from math import inf, isfinite
 from typing import Any
 
 import numpy as np
@@ -19,7 +19,7 @@ from seqopt.placement.free_judge import TOLERANCE
 from seqopt.placement.free_plan import FreePlan, solve_free
 from seqopt.placement.guard import called, readable
 from seqopt.placement.order_problem import OrderProblem, OrderSelection
-from seqopt.placement.order_proof import no_order_below
+from seqopt.placement.order_proof import finds_better_order
 from seqopt.placement.schedule_formulation import (
     Finds,
     ScheduleFormulation,
@@ -30,6 +30,8 @@ from seqopt.responses.resources import HERE, Resources
 from seqopt.scene.orders import Order, in_order
 from seqopt.sequence.steps import Step
 from seqopt.work.progress import Tell
+
+ENDED = ("time", "interrupt")  # searches that were told to end: nothing more is computed
 
 
 @dataclass(frozen=True, repr=False)
@@ -45,9 +47,9 @@ class OrderPlan(ShownBuild):
     plan : FreePlan
         The best of this order, with its own certificate.
     seconds : mapping of str to float
-        By stage, s: ``order``, those of the plan, ``prove_order``.
+        By stage, s: ``order``, those of the plan, ``order_proof``.
     proven : bool
-        Whether it is proven that no order stays below the bound.
+        Whether it is proven that no order stays below the bound; else it is claimed.
     """
 
     problem: OrderProblem
@@ -112,10 +114,21 @@ class OrderPlan(ShownBuild):
 
     @property
     def status(self) -> str:
-        """``optimal`` where no order is proven better, ``claimed``, or ``heuristic``."""
+        """``optimal`` where it is proven that no order is better, or ``claimed optimal``.
+
+        Else ``heuristic``: there is a bound alone.
+        """
         if self.gap > TOLERANCE:
             return "heuristic"
-        return "optimal" if self.proven else "claimed"
+        return "optimal" if self.proven else "claimed optimal"
+
+    @property
+    def bound_said(self) -> str:
+        """What no order stays below, and whether that is proven, in words."""
+        if not isfinite(self.selection.bound):
+            return "others are not looked at yet"
+        claimed = "" if self.proven else " (claimed, not proven)"
+        return f"no order below {self.selection.bound:.6g}{claimed}"
 
     def summary(self) -> dict[str, object]:
         """Return a summary, ready for JSON.
@@ -124,8 +137,8 @@ class OrderPlan(ShownBuild):
         -------
         dict
             That of the plan, and ``order``, ``orders`` (among which), ``order_status``,
-            ``order_bound`` (on the first aim, of any order), ``order_evaluated`` and
-            ``order_stopped``.
+            ``order_bound`` (on the first aim, of any order), ``order_bound_proven`` (else it is
+            claimed), ``order_evaluated`` and ``order_stopped``.
         """
         return {
             **self.plan.summary(),
@@ -133,6 +146,7 @@ class OrderPlan(ShownBuild):
             "orders": self.problem.among.value,
             "order_status": self.status,
             "order_bound": self.selection.bound if self.selection.bound > -float("inf") else None,
+            "order_bound_proven": self.proven,
             "order_evaluated": self.selection.evaluated,
             "order_stopped": self.selection.stopped,
             "seconds": dict(self.seconds),
@@ -157,7 +171,7 @@ def solve_order(
     problem : OrderProblem
     formulation : ScheduleFormulation or str
     proof : bool, optional
-        False leaves out the proof that the order has no better plan.
+        False leaves out the proofs that the order has no better plan, and that no order is better.
     progress : callable, optional
         Told in a few words how far it is.
     resources : Resources, optional
@@ -176,29 +190,56 @@ def solve_order(
     ProblemError
         If there is no such formulation or option.
     SolverError
-        If the order is none that was asked for, or is not worth what is claimed.
+        If the order is none that was asked for or not worth what is claimed, or another is better.
     """
     found = find_schedule_formulation(formulation, Finds.ORDER)
     found.require_options(options)
     means, start = replace(resources, progress=progress or resources.progress), time.perf_counter()
     twin = replace(problem, free=replace(problem.free))  # which no formulation can reach
-    solve = partial(found.solve, problem, resources=means, **options)
-    try:
-        selection = called(found.name, lambda: problem, OrderSelection, solve)
-    except InfeasibleError as error:
-        if no_order_below(twin, np.inf):
-            raise
-        why = f"claimed by {found.name}, and not proven: {error}"
-        raise InfeasibleError(why) from None
-    selection, problem = _with_numbers(found.name, selection), twin
+    ends = start + float(options.get("seconds", inf))
+    selection = _selected(
+        found, twin, ends, partial(found.solve, problem, resources=means, **options)
+    )
     seconds = {"order": time.perf_counter() - start}
-    _require_allowed(found.name, problem, selection.order)
-    plan = solve_free(problem.at(selection.order), "schedule_search", proof=proof)
+    _require_allowed(found.name, twin, selection.order)
+    plan = solve_free(twin.at(selection.order), "schedule_search", proof=proof)
     _require_worth(found.name, plan.selection.objective[0], selection)
     start = time.perf_counter()
-    proven = proof and no_order_below(problem, min(selection.bound, selection.objective))
-    seconds |= {**plan.seconds, "prove_order": time.perf_counter() - start}
-    return OrderPlan(problem, selection, plan, seconds, proven)
+    proven = proof and _proven(found.name, twin, selection, ends)
+    seconds |= {**plan.seconds, "order_proof": time.perf_counter() - start}
+    return OrderPlan(twin, selection, plan, seconds, proven)
+
+
+def _selected(
+    found: ScheduleFormulation, problem: OrderProblem, end: float, solve: Callable[[], object]
+) -> OrderSelection:
+    """Return what a formulation says, with numbers where numbers belong; or why there is none."""
+    try:
+        said = called(found.name, lambda: problem, OrderSelection, solve)
+    except InfeasibleError as error:
+        some = finds_better_order(problem, np.inf, end=end)
+        if some:
+            raise SolverError(
+                f"formulation {found.name} says that no order has a plan, and some have"
+            ) from None
+        if some is False:
+            raise
+        raise InfeasibleError(f"claimed by {found.name}, and not proven: {error}") from None
+    return _with_numbers(found.name, said)
+
+
+def _proven(name: str, problem: OrderProblem, selection: OrderSelection, end: float) -> bool:
+    """Return whether a bound on all orders is proven; raise an error if one is below it."""
+    if selection.stopped in ENDED or not isfinite(selection.bound):
+        return False
+    bound = min(selection.bound, selection.objective)
+    better = finds_better_order(problem, bound, end=end)
+    if better:
+        raise SolverError(
+            f"{name}: {selection.bound:.9g} is promised as a bound on all orders; one has a plan "
+            "with less"
+        )
+    return better is False
 
 
 def _with_numbers(name: str, found: OrderSelection) -> OrderSelection:
@@ -206,8 +247,6 @@ def _with_numbers(name: str, found: OrderSelection) -> OrderSelection:
     with readable(name):
         order = tuple(operator.index(brick) for brick in found.order)
         objective, bound = float(found.objective), float(found.bound)
-        if not isfinite(objective) or isnan(bound):
-            raise ValueError(f"value {objective}, bound {bound}")
         evaluated = operator.index(found.evaluated)
         return OrderSelection(order, objective, bound, evaluated, str(found.stopped))
 
@@ -223,7 +262,7 @@ def _require_worth(name: str, value: float, selection: OrderSelection) -> None:
     """Raise an error if an order is not worth what is claimed, or less than its bound."""
     claimed, bound = selection.objective, selection.bound
     most = TOLERANCE * max(abs(value), abs(claimed))
-    if not abs(value - claimed) <= most or bound > value + most:
+    if not (abs(value - claimed) <= most and bound <= value + most):  # NaN is no bound
         raise SolverError(
             f"{name}: the value of the order is {value:.9g}; claimed are {claimed:.9g} and "
             f"a bound of {bound:.9g}"

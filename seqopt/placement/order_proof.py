@@ -7,6 +7,7 @@ none of them ends the build no order stays below the value.
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
 
 import numpy as np
@@ -24,8 +25,10 @@ Key = tuple[frozenset[int], int]  # bricks that stand, and the newest
 MOST = 5000  # sets of bricks that are looked at
 
 
-def no_order_below(problem: OrderProblem, value: float, most: int = MOST) -> bool:
-    """Return whether it is proven that no order has a plan whose worst step is below a value.
+def finds_better_order(
+    problem: OrderProblem, value: float, *, most: int = MOST, end: float = np.inf
+) -> bool | None:
+    """Return whether some order has a plan whose worst step is below a value.
 
     Parameters
     ----------
@@ -33,11 +36,14 @@ def no_order_below(problem: OrderProblem, value: float, most: int = MOST) -> boo
     value : float
         Of the first goal.
     most : int, optional
-        Up to how many sets of bricks with a newest one are looked at; with more nothing is proven.
+        Up to how many sets of bricks with a newest one are looked at.
+    end : float, optional
+        Until when, as of `time.perf_counter`.
 
     Returns
     -------
-    bool
+    bool or None
+        None where it is not known, because there are more sets or time is over.
     """
     below = value - 4 * BELOW * abs(value)  # further than what is tied with it
     empty: Key = (frozenset(), 0)
@@ -47,15 +53,15 @@ def no_order_below(problem: OrderProblem, value: float, most: int = MOST) -> boo
         following: dict[Key, list[Ints]] = {}
         for key, parts in entries.items():
             looked += 1
-            if looked > most:
-                return False
+            if looked > most or time.perf_counter() > end:
+                return None
             states, tables = _closed(problem, key, parts, below)
             if tables.ends(bricks, states).any():
-                return False
+                return True
             for after, rows in _placed(problem, key, _nodes(tables, states)):
                 following.setdefault(after, []).append(rows)
         entries = following
-    return True
+    return False
 
 
 def _closed(

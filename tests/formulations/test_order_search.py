@@ -12,16 +12,19 @@ from hypothesis import given, settings
 
 import seqopt
 from formulations.order_search import FORMULATION
-from seqopt.errors import InfeasibleError, ProblemError, SolverError, TimeUpError
+from seqopt.contact.mortar import find_mortar
+from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.placement.criteria import WorstRatio
 from seqopt.placement.free_problem import pose_free
 from seqopt.placement.order_bound import whole_bound
 from seqopt.placement.order_plan import solve_order
-from seqopt.placement.order_problem import OrderProblem
+from seqopt.placement.order_problem import OrderProblem, OrderSelection
+from seqopt.placement.order_proof import finds_better_order
 from seqopt.placement.order_work import trying
 from seqopt.placement.own_criterion import StepCost
 from seqopt.placement.schedule_formulation import find_schedule_formulation
 from seqopt.placement.solving import solve
+from seqopt.placement.standing import Standing
 from seqopt.responses.resources import Resources
 from seqopt.scene.library.wall import WallShape, wall
 from seqopt.sequence.free_rules import FreeRules
@@ -67,6 +70,29 @@ def check_against_brute_force(scene, rules, aim="minmax"):
 @settings(max_examples=4, deadline=None)
 def test_it_equals_brute_force(build):
     check_against_brute_force(*build)
+
+
+@given(build=free_builds(most_bricks=4, most_robots=3))
+@settings(max_examples=4, deadline=None)
+def test_the_proof_knows_the_best_of_all_orders(build):
+    """It finds a plan below any value above the least one, and none below that, in any order."""
+    problem = posed(*build)
+    least = min(brute_force(problem).values(), default=np.inf)
+    for among in ("tied", "any"):
+        asked = replace(problem, among=among)
+        assert finds_better_order(asked, least * (1 - 1e-9)) is False
+        if np.isfinite(least):
+            assert finds_better_order(asked, least * (1 + 1e-6))
+
+
+def test_the_proof_of_orders_knows_what_must_stand():
+    """What is demanded of stability holds in every order, where bricks have other places."""
+    problem = posed(small_arch(4))
+    standing = OrderProblem(replace(problem.free, standing=Standing(find_mortar("dry"))))
+    worths = brute_force(standing)
+    least = min(worths.values())
+    assert finds_better_order(standing, least * (1 - 1e-9)) is False
+    assert finds_better_order(standing, least * (1 + 1e-6))
 
 
 @pytest.mark.slow
@@ -143,7 +169,7 @@ def test_time_leaves_an_order_and_a_bound():
     assert found.selection.stopped == "interrupt"
     assert found.status == "heuristic"
     assert found.selection.bound <= found.selection.objective
-    with pytest.raises(TimeUpError, match="no order with a plan was found yet; give more"):
+    with pytest.raises(ProblemError, match="no order was found with a plan; give more"):
         solve_order(problem, FORMULATION, seconds=0.0)
 
 
@@ -160,6 +186,44 @@ def test_an_order_that_the_check_refuses_is_seen():
         liar = replace(FORMULATION, solve=lambda *_, claimed=claimed, **more: claimed)
         with pytest.raises((SolverError, seqopt.SeqoptError), match=said):
             solve_order(problem, liar)
+
+
+@pytest.mark.parametrize(("least", "order", "said"), [
+    (True, "worst", "is promised as a bound on all orders; one has a plan with less"),
+    (False, "worst", ""),
+    (True, "best", ""),
+    (np.nan, "best", "and a bound of nan"),
+])  # fmt: skip
+def test_a_formulation_that_names_a_bad_order_is_not_believed(least, order, said):
+    """Only a bound that the judge proves makes an order optimal."""
+    problem = posed(small_arch(5), aim="F_largest")
+    worths = brute_force(problem)
+    named = (min if order == "best" else max)(worths, key=worths.__getitem__)
+    value = worths[named]
+    assert min(worths.values()) < 0.99 * max(worths.values())
+    bound = {True: value, False: -np.inf}.get(least, least)
+    claimed = OrderSelection(named, value, bound, 1)
+    fake = replace(FORMULATION, solve=lambda *_, **more: claimed)
+    if said:
+        with pytest.raises(SolverError, match=said):
+            solve_order(problem, fake)
+        return
+    found = solve_order(problem, fake)
+    assert found.status == ("optimal" if order == "best" else "heuristic")
+
+
+def test_a_bound_that_is_not_proven_is_claimed():
+    problem = posed(small_arch(5), aim="F_largest")
+    found = solve_order(problem, FORMULATION, proof=False)
+    assert (found.status, found.summary()["order_bound_proven"]) == ("claimed optimal", False)
+    assert "claimed, not proven" in found.bound_said
+    assert "claimed optimal" in repr(found)
+    value = found.selection.objective
+    assert finds_better_order(problem, value, most=3) is None
+    assert finds_better_order(problem, value, end=0.0) is None
+    proven = solve_order(problem, FORMULATION)
+    assert (proven.status, proven.summary()["order_bound_proven"]) == ("optimal", True)
+    assert "claimed" not in proven.bound_said
 
 
 def test_a_wall_is_as_bad_as_it_is_whole_in_any_order():

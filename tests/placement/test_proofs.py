@@ -24,7 +24,7 @@ from seqopt.placement.free_proof import Proof
 from seqopt.placement.interface import Aim, CostProblem
 from seqopt.placement.order_plan import solve_order
 from seqopt.placement.order_problem import OrderProblem
-from seqopt.placement.order_proof import no_order_below
+from seqopt.placement.order_proof import finds_better_order
 from seqopt.placement.order_states import OrderStates
 from seqopt.placement.partial_costs import PartialCosts
 from seqopt.placement.requirements import Limit
@@ -152,9 +152,9 @@ def test_what_was_left_out_for_a_threshold_bounds_all_orders():
         found = Explorer(OrderStates(problem, 5000))
         assert not found.rise(share * best)
         assert share * best < found.excluded <= best * (1 + 1e-6)
-    assert no_order_below(problem, best)
-    assert not no_order_below(problem, best * 1.01)
-    assert not no_order_below(problem, best, most=3)
+    assert finds_better_order(problem, best) is False
+    assert finds_better_order(problem, best * 1.01)
+    assert finds_better_order(problem, best, most=3) is None
 
 
 def test_a_plan_with_more_regrips_is_found_within_the_same_peak():
