@@ -15,6 +15,7 @@ from tests.builders import ROOT
 from tests.docs.site_links import broken
 from tests.docs.transcripts import DOCS, PAGES, blocks, furnish, run
 
+NUMBER = re.compile(r"(?<![\w.])\d+(?:\.\d+)?(?![\w])")
 PICTURE = re.compile(r"!\[([^\]]*)\]\(([^)]+)\)")
 SHOW = """
 import runpy, sys
@@ -55,12 +56,39 @@ def told():
 @pytest.mark.parametrize("name", PAGES)
 def test_pages_show_what_is_printed(name, tmp_path):
     furnish(tmp_path)
+    names = {}
     for block in blocks((DOCS / f"{name}.md").read_text(encoding="utf-8")):
-        printed, well = run(block, tmp_path)
+        printed, well = run(block, tmp_path, names)
         if block.printed is None:
             assert well, f"{block.code}\n{printed}"
         else:
             assert printed.strip() == block.printed.strip(), block.code
+
+
+def unprinted(text):
+    """Numbers in words, rounded as they are, that no command that is shown takes or prints."""
+    found = [*blocks(text)]
+    shown = " ".join([*(" ".join(b.commands) for b in found), *(b.printed or "" for b in found)])
+    printed = [float(number) for number in NUMBER.findall(shown)]
+    words = re.sub(r"`[^`]*`", " ", re.sub(r"```.*?```", " ", text, flags=re.DOTALL))
+    return [
+        number
+        for number in NUMBER.findall(words)
+        if not any(
+            round(value, len(number.partition(".")[2])) == float(number) for value in printed
+        )
+    ]
+
+
+def test_the_readmes_figures_stand_beside_the_command_that_prints_them():
+    """What the commands print is compared above."""
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    told = text.partition("## A minute in Python")[2].partition("## Speed against accuracy")[0]
+    free = told.partition("This is the [free schedule]")[2].partition("Three more tasks")[0]
+    assert len(NUMBER.findall(free)) > 20
+    assert unprinted(told) == []
+    assert unprinted(told.replace("0.84 times", "0.75 times")) == ["0.75"]  # the control
+    assert unprinted(free) == ["90"]  # of the loop, further up
 
 
 @pytest.mark.slow

@@ -23,6 +23,7 @@ from tests.builders import ROOT
 
 DOCS = ROOT / "docs"
 PAGES = (
+    "../README",
     "quickstart",
     "faq",
     "coming_from",
@@ -74,18 +75,22 @@ def furnish(folder: Path) -> None:
     shutil.copy(Path(found.origin).parent / "data" / "samples" / "bridge.json", folder)
 
 
-def run(block: Block, folder: Path) -> tuple[str, bool]:
-    """Run a block in a folder; return what it prints, and whether all of it ended well."""
+def run(block: Block, folder: Path, names: dict[str, object] | None = None) -> tuple[str, bool]:
+    """Run a block in a folder; return what it prints, and whether all of it ended well.
+
+    ``names`` are those that Python on the page has defined; they grow.
+    """
     if block.kind == "python":
-        return _python(block.code, folder), True
+        return _python(block.code, folder, {} if names is None else names), True
     done = [_command(line, folder) for line in block.commands]
     return "".join(text for text, _ in done), all(code == 0 for _, code in done)
 
 
-def _python(code: str, folder: Path) -> str:
+def _python(code: str, folder: Path, names: dict[str, object]) -> str:
     printed = io.StringIO()
     with contextlib.chdir(folder), contextlib.redirect_stdout(printed):
-        exec(compile(code, "page", "exec"), {"__name__": "__main__"})
+        names["__name__"] = "__main__"
+        exec(compile(code, "page", "exec"), names)
     return printed.getvalue()
 
 
@@ -111,12 +116,13 @@ def refresh(name: str) -> None:
     text = path.read_text(encoding="utf-8")
     with tempfile.TemporaryDirectory() as folder:
         furnish(Path(folder))
+        names: dict[str, object] = {}
 
         def renewed(found: re.Match[str]) -> str:
             block = Block(*found.groups())
             if block.kind == "sh" and not block.commands:
                 return found[0]
-            printed, _ = run(block, Path(folder))
+            printed, _ = run(block, Path(folder), names)
             shown = f"```{block.kind}\n{block.code}```"
             return shown if block.printed is None else f"{shown}\n\n```text\n{printed.strip()}\n```"
 

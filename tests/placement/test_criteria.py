@@ -156,9 +156,11 @@ def test_scales_are_given_or_the_scenes():
         ("M_sup", 1.0, 1.0),  # what every method keeps at zero
         ("T_max", 1.0, 5.0),
     )
-    worst = Worst("own", (("F_each", 8.0), ("M_sup", None), ("T_max", 0.0)))
-    limits = (("F_a", 8.0), ("F_b", 8.0), ("M_sup", 1.0), ("T_max", 0.0))
+    worst = Worst("own", (("F_each", 8.0), ("M_sup", None), ("T_max", 0.1)))
+    limits = (("F_a", 8.0), ("F_b", 8.0), ("M_sup", 1.0), ("T_max", 0.1))
     assert worst.for_scene(Facts()).limits == limits
+    with pytest.raises(ProblemError, match=r"T_max has the weight, scale or rounding 0\.0"):
+        Worst("own", (("T_max", 0.0),)).for_scene(Facts())  # not the scene's either
     with pytest.raises(ProblemError, match="F_move has no scale"):
         Worst("own", (("F_move", None),)).for_scene(Facts())
     assert [weight for _, weight, _ in OVER_METHODS.terms] == [1.0] * 4
