@@ -4,7 +4,8 @@ Method: Cosmic Ray changes one operator, number, loop or decorator of a module a
 (`experiments.robustness.parts.mutants`), and the tests that are for the module run against it. A
 mutant that fails one is killed; one that loops is ended after ten times what the tests take, and
 counts as killed. Where a module has more mutants than ``--most``, as many are drawn, by a fixed
-seed. Modules that prove are a group of their own (``--only proofs``). A mutant that no test could kill, since nothing that is promised changes, is named in
+seed. Modules that prove are a group of their own (``--only proofs``). A mutant that no test could
+kill, since nothing that is promised changes, is named in
 `experiments.robustness.parts.equivalents` with the reason; no other is taken off, and one that is
 named there and killed makes the claim fail. Controls, for every module: its own text survives, and
 a text with a line that raises is killed.
