@@ -45,7 +45,7 @@ def confirmed(problem: FreeProblem, name: str, seconds: float = np.inf) -> Seqop
     InfeasibleError or SolverError
         The latter where a plan is allowed.
     """
-    end, steps = time.perf_counter() + seconds, replace(problem, goals=STEPS)
+    end, steps = time.perf_counter() + seconds, replace(_with_any_margin(problem), goals=STEPS)
     try:
         found = explore(steps, tell=partial(_in_time, end))
         if found.whole:
@@ -56,6 +56,14 @@ def confirmed(problem: FreeProblem, name: str, seconds: float = np.inf) -> Seqop
         proven = False
     why = why_impossible(problem, end - time.perf_counter())
     return InfeasibleError(why if proven else f"claimed by {name}, and not proven: {why}")
+
+
+def _with_any_margin(problem: FreeProblem) -> FreeProblem:
+    """Return a problem in which states must have the margins that are asked for, however little."""
+    for goal in problem.goals:
+        if goal.of_margins:
+            problem = with_margin(problem, goal.response, WORST[goal.response])
+    return problem
 
 
 def _in_time(end: float, _: Explorer) -> None:
@@ -81,9 +89,7 @@ def why_impossible(problem: FreeProblem, seconds: float = np.inf) -> str:
         here may be far beyond what joints carry, where discrete elements take seconds a state.
     """
     problem = replace(problem, engine=getattr(problem.engine, "rigid", problem.engine))
-    for goal in problem.goals:
-        if goal.of_margins:  # some margin is asked for, whichever it is
-            problem = with_margin(problem, goal.response, WORST[goal.response])
+    problem = _with_any_margin(problem)
     look = partial(explore, tell=partial(_in_time, time.perf_counter() + seconds))
     where = "no plan is allowed"
     try:

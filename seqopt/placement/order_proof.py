@@ -9,20 +9,27 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
+from itertools import combinations
+from math import comb
 
 import numpy as np
 
 from seqopt.arrays import Ints
 from seqopt.network.build import build_network
+from seqopt.placement.free_answers import ask
 from seqopt.placement.free_passable import Asked, Passable
+from seqopt.placement.free_problem import FreeProblem
 from seqopt.placement.free_proof import BELOW
 from seqopt.placement.free_tables import RuleTables
 from seqopt.placement.order_problem import OrderProblem
 from seqopt.scene.orders import Order
 from seqopt.sequence.free_check import RuleBook
+from seqopt.sequence.free_rules import Ending
+from seqopt.sequence.free_team import node_numbers
 
 Key = tuple[frozenset[int], int]  # bricks that stand, and the newest
 MOST = 5000  # sets of bricks that are looked at
+MOST_SETS = 200_000  # grip sets of the whole structure that are looked at
 
 
 def finds_better_order(
@@ -45,6 +52,8 @@ def finds_better_order(
     bool or None
         None where it is not known, because there are more sets or time is over.
     """
+    if _of_the_whole(problem) >= value:
+        return False
     below = value - 4 * BELOW * abs(value)  # further than what is tied with it
     empty: Key = (frozenset(), 0)
     entries: dict[Key, list[Ints]] = {empty: []}
@@ -62,6 +71,27 @@ def finds_better_order(
                 following.setdefault(after, []).append(rows)
         entries = following
     return False
+
+
+def _of_the_whole(problem: OrderProblem) -> float:
+    """Return the least value with which all bricks stand, whoever holds them: every order ends so.
+
+    Minus infinity where there are too many grip sets to look at.
+    """
+    free = problem.judging(problem.scene.build_order)
+    nodes = [n for n in node_numbers(free.network) if n not in problem.scene.blocked_nodes]
+    held = range(max(1, free.rules.least_grips), free.space.robots + 1)
+    least = -np.inf
+    if sum(comb(len(nodes), count) for count in held) <= MOST_SETS:
+        least = min((_least(free, nodes, count) for count in held), default=np.inf)
+    return least if free.rules.ending is Ending.HELD else max(least, _least(free, nodes, 0))
+
+
+def _least(free: FreeProblem, nodes: list[int], count: int) -> float:
+    """Return the least that the goal takes of the whole with so many grips; infinite of none."""
+    grips = np.array([*combinations(nodes, count)], dtype=np.int64)
+    found = ask(free, len(free.network.inner), grips.reshape(comb(len(nodes), count), count))
+    return float(found.worth[found.fit, 0].min(initial=np.inf))
 
 
 def _closed(

@@ -88,7 +88,7 @@ def in_every_direction(angles: Floats, pulls: Floats) -> tuple[float, float]:
 
     Examples
     --------
-    >>> pull, angle = in_every_direction(np.pi / 2 * np.arange(4), np.ones(4))
+    >>> pull, angle = in_every_direction(np.pi / 2 * np.arange(4), np.array([1, 1, 3, 3]))
     >>> round(pull, 4), round(angle, 4)
     (0.7071, 0.7854)
     """

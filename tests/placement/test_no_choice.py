@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +13,9 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, MemoryShortError, ProblemError, SolverError
 from seqopt.network.build import build_network
 from seqopt.placement import formulation as registry
+from seqopt.placement.costs import Budget, LayeredCosts
 from seqopt.placement.formulation import Selection, find_formulation
+from seqopt.placement.interface import CostProblem
 from seqopt.placement.problem import pose
 from seqopt.placement.solving import solve
 from seqopt.responses import memory
@@ -109,12 +112,31 @@ def test_a_formulation_that_raises_has_failed(problem, error):
         solve(problem, made)
 
 
-def test_what_a_formulation_says_on_purpose_is_kept(problem):
-    def fails(_):
-        raise InfeasibleError("no choice is within all budgets")
+def says_so(_):
+    raise InfeasibleError("no choice is within all budgets")
 
-    with pytest.raises(InfeasibleError):
-        solve(problem, replace(find_formulation("overlap_dp"), solve=fails))
+
+def test_that_there_is_no_choice_is_not_believed(problem):
+    with pytest.raises(SolverError, match="no choice is allowed, and some are: no choice is with"):
+        solve(problem, replace(find_formulation("overlap_dp"), solve=says_so))
+
+
+def test_that_budgets_conflict_is_proven_or_claimed():
+    """Two moves of two candidates; a budget that one choice keeps, and one that none does."""
+    costs = LayeredCosts((np.ones(2),) * 2, (np.zeros((1, 2)), np.zeros((2, 2))))
+    formulation = replace(find_formulation("labels"), solve=says_so)
+    for bound, said in (
+        (0.5, "every choice uses at least 1 of 'b'"),
+        (1.5, "claimed by labels, an"),
+    ):
+        budget = Budget("b", (np.array([0.5, 2.0]),) * 2, costs.shared, bound)
+        with pytest.raises(InfeasibleError, match=said):
+            solve(CostProblem(costs, (budget,)), formulation)
+
+
+def test_an_exit_does_not_leave_through_solve(problem):
+    with pytest.raises(SolverError, match="overlap_dp failed: SystemExit: 3"):
+        solve(problem, replace(find_formulation("overlap_dp"), solve=lambda _: sys.exit(3)))
 
 
 class Entry:

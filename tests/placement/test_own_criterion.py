@@ -110,7 +110,7 @@ def test_a_cost_below_zero_is_refused_where_steps_can_be_added(aim):
     with pytest.raises(ProblemError, match=r"gain: a step costs -\d.* at \d bricks; .* constant"):
         seqopt.solve(free, "schedule_search")
     with pytest.raises(ProblemError, match="gain: a step costs -"):
-        Proof(free).finds_better((0.0,) * len(free.goals), 0)
+        Proof(free).bounds((0.0,) * len(free.goals))
     assert seqopt.solve(posed(criterion), "overlap_dp").certificate.gap == 0
 
 

@@ -67,6 +67,7 @@ class Posed:
 
     def __init__(self, layers, aim):
         self.layers, self.aim, self.seconds, self.costs = layers, aim, {}, layers
+        self.from_cache = ()  # nothing that a cache said
 
     def layered(self, aim):
         return self.layers
