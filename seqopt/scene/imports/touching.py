@@ -107,8 +107,7 @@ def find_touching(
         said.append(f"joints of the file between blocks without a face: {len(joints)}")
     everywhere = len(bricks) == len(solids)
     if everywhere and not any(GROUND in joint.blocks for joint in joints):
-        standing = [*_standing(bricks, facets, gap)]
-        faces += standing
+        faces += _standing(bricks, facets, gap)
         said.append("no supports are named: blocks with a face at the lowest level stand there")
     return Touching(tuple(faces), tuple(joints), tuple(said))
 

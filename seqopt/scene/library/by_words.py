@@ -100,8 +100,7 @@ def scene_by_words(words: str) -> Scene:
     <Scene wall 4 x 3: 12 bricks, 23 joints, 4 ground ends, 3 robots>
     """
     name, _, rest = words.partition(":")
-    kind = KINDS.get(name)
-    if kind is None:
+    if (kind := KINDS.get(name)) is None:
         raise SceneError(f"scene {words}: {name!r} is not known; give one of {', '.join(KINDS)}")
     hints = kind.hints()
     given: dict[str, Any] = {}
