@@ -179,8 +179,7 @@ def find_front(
     found = _with_numbers(name, called(name, lambda: twin, FrontSelection, solve), problem.names)
     solved, problem = time.perf_counter(), twin
     _require_some(name, found, problem)
-    order = np.lexsort(found.points.T[::-1])
-    points = found.points[order]
+    points = found.points[order := np.lexsort(found.points.T[::-1])]
     with readable(name):
         plans = tuple(problem.steps(found.plans[i]) for i in order)
     for point, steps in zip(points, plans, strict=True):

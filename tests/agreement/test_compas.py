@@ -6,14 +6,12 @@ The samples ship with compas_cra 0.8 (ETH Zurich, Block Research Group, MIT lice
 from __future__ import annotations
 
 from pathlib import Path
-from warnings import catch_warnings, simplefilter
 
 import pytest
 
 from experiments.stability.parts.witness_cra import SAMPLES, force_only, sample_scene
 from seqopt.contact.faces import bare_assembly
 from seqopt.contact.mortar import Mortar
-from seqopt.errors import SceneWarning
 from seqopt.network.build import build_network
 from seqopt.scene.face_joints import flat_face
 from seqopt.scene.imports.content import Given
@@ -22,6 +20,7 @@ from seqopt.sequence.exports.formats import export_plan
 from seqopt.sequence.two_robots import METHODS
 from seqopt.stability.assessment import Verdict, assess
 
+pytestmark = pytest.mark.filterwarnings("ignore:scene .* rest on the ground")  # shelves do
 compas = pytest.importorskip("compas")
 compas_cra = pytest.importorskip("compas_cra")
 FOLDER = Path(compas_cra.SAMPLE)
@@ -33,9 +32,7 @@ def imported(name, **more):
     supports = [str(i) for i in SAMPLES[name].supports] or None
     gap = SAMPLES[name].distance if name == "snake" else None
     given = Given(unit="m", density=2000.0, supports=supports, gap=gap, **more)
-    with catch_warnings():
-        simplefilter("ignore", SceneWarning)  # of shelves most blocks do rest on the ground
-        return import_scene(FOLDER / f"{name}.json", given=given)
+    return import_scene(FOLDER / f"{name}.json", given=given)
 
 
 def structure(scene):
