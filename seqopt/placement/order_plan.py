@@ -185,10 +185,8 @@ def solve_order(
 
     Raises
     ------
-    InfeasibleError
-        If no order has a plan.
-    ProblemError
-        If there is no such formulation or option.
+    InfeasibleError, ProblemError
+        If no order has a plan; there is no such formulation or option.
     SolverError
         If the order is none that was asked for or not worth what is claimed, or another is better.
     """
@@ -197,17 +195,24 @@ def solve_order(
     means, start = replace(resources, progress=progress or resources.progress), time.perf_counter()
     twin = replace(problem, free=replace(problem.free))  # which no formulation can reach
     ends = start + float(options.get("seconds", inf))
-    selection = _selected(
-        found, twin, ends, partial(found.solve, problem, resources=means, **options)
-    )
+    solve = partial(found.solve, problem, resources=means, **options)
+    selection = _selected(found, twin, ends, solve)
     seconds = {"order": time.perf_counter() - start}
-    _require_allowed(found.name, twin, selection.order)
-    plan = solve_free(twin.at(selection.order), "schedule_search", proof=proof)
-    _require_worth(found.name, plan.selection.objective[0], selection)
+    plan = _planned(found.name, twin, selection, proof=proof)
     start = time.perf_counter()
     proven = proof and _proven(found.name, twin, selection, ends)
     seconds |= {**plan.seconds, "order_proof": time.perf_counter() - start}
     return OrderPlan(twin, selection, plan, seconds, proven)
+
+
+def _planned(
+    name: str, problem: OrderProblem, selection: OrderSelection, *, proof: bool
+) -> FreePlan:
+    """Return the best plan of an order, which must be worth what is claimed."""
+    _require_allowed(name, problem, selection.order)
+    plan = solve_free(problem.at(selection.order), "schedule_search", proof=proof)
+    _require_worth(name, plan.selection.objective[0], selection)
+    return plan
 
 
 def _selected(

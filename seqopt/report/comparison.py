@@ -172,12 +172,20 @@ def compare(
         notes += idle_note(scene, f"{problem.schedule.method} loop", problem.schedule.steps)
     notes += _add_largest(scene, rows, tables)
     left = LinearRange(engine).of_builds(tables)
+    table = _table(rows, left)
     notes += [f"In the paper: {text}" for text in IRREGULARITIES if printed is not None]
+    known = (tuple(notes), refusal, left, _criteria(problem, free))
+    return Comparison(maxima, printed, table, tables, loop, *known)
+
+
+def _table(
+    rows: Mapping[str, dict[str, object]], left: Mapping[str, tuple[Departure, ...]]
+) -> pd.DataFrame:
+    """Return rows as a table, and which of them leave the linear range."""
     table = pd.DataFrame.from_dict(rows, orient="index").reindex(columns=COLUMNS)
     table[RANKS] = table[RANKS].astype(float)
     table["outside"] = [name in left for name in table.index]
-    known = (tuple(notes), refusal, left, _criteria(problem, free))
-    return Comparison(maxima, printed, table, tables, loop, *known)
+    return table
 
 
 def _add_largest(
