@@ -179,7 +179,7 @@ def compare(
 
 
 def _table(
-    rows: Mapping[str, dict[str, object]], left: Mapping[str, tuple[Departure, ...]]
+    rows: dict[str, dict[str, object]], left: Mapping[str, tuple[Departure, ...]]
 ) -> pd.DataFrame:
     """Return rows as a table, and which of them leave the linear range."""
     table = pd.DataFrame.from_dict(rows, orient="index").reindex(columns=COLUMNS)
