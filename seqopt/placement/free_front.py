@@ -9,13 +9,13 @@ from functools import cached_property
 import numpy as np
 
 from seqopt.arrays import Floats, Ints
-from seqopt.errors import InfeasibleError, ProblemError
+from seqopt.errors import ProblemError
 from seqopt.graph.graph import Graph
 from seqopt.graph.parts import Visited
 from seqopt.graph.paths import distances, fewest_moves, keep_best, reached
 from seqopt.placement.free_counts import steps_with, with_held
 from seqopt.placement.free_goals import Measure
-from seqopt.placement.free_infeasible import why_impossible
+from seqopt.placement.free_infeasible import confirmed
 from seqopt.placement.free_judge import plan_values
 from seqopt.placement.free_problem import FreeProblem
 from seqopt.placement.free_states import explore
@@ -73,7 +73,7 @@ class FreeFront:
     def _visited(self) -> Visited:
         found = explore(self._problem)
         if not found.whole:
-            raise InfeasibleError(why_impossible(self._problem))
+            raise confirmed(self._problem, "the search")
         found.refine()
         graph, states = found.graph()
         amounts = graph.amounts.copy()

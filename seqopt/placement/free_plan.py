@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property, partial
 from typing import Any
 
@@ -261,6 +261,7 @@ def solve_free(
     steps = steps_of(twin.space, selection.states)
     hint = dict(enumerate(selection.visited))
     certificate = judge_schedule(twin, selection, steps, hint) if proof else None
+    problem.certified.update(twin.certified)
     seconds = {"solve": solved - start, "verify": time.perf_counter() - solved}
     return FreePlan(problem, formulation, selection, certificate, steps, seconds)
 
@@ -279,4 +280,7 @@ def _selected(
     except InfeasibleError:
         left = float(options.get("seconds", math.inf)) - (time.perf_counter() - start)
         raise confirmed(twin, name, left) from None
+    for kept in [*vars(problem)]:  # whatever it left behind, but counts of what was computed
+        if kept not in (*(f.name for f in fields(problem)), "sets", "screened", "stability"):
+            del vars(problem)[kept]
     return with_numbers(name, selection, len(problem.goals))

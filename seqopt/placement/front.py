@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Protocol
@@ -13,7 +13,7 @@ import pandas as pd
 
 from seqopt.arrays import Floats, FrozenValue, Terse
 from seqopt.errors import InfeasibleError, ProblemError, SolverError, did_you_mean
-from seqopt.placement.guard import called, readable
+from seqopt.placement.guard import called, readable, text
 from seqopt.placement.schedule_formulation import (
     Finds,
     ScheduleFormulation,
@@ -176,9 +176,8 @@ def find_front(
     formulation = find_schedule_formulation(formulation, Finds.FRONT)
     twin, name = problem.anew(), formulation.name  # which no formulation can reach
     solve = partial(formulation.solve, problem, seconds=seconds, progress=progress)
-    found = _with_numbers(name, called(name, lambda: twin, FrontSelection, solve), problem.names)
+    found = _found(name, (problem, twin), solve)
     solved, problem = time.perf_counter(), twin
-    _require_some(name, found, problem)
     points = found.points[order := np.lexsort(found.points.T[::-1])]
     with readable(name):
         plans = tuple(problem.steps(found.plans[i]) for i in order)
@@ -195,11 +194,19 @@ def find_front(
     return Front(_table(problem, points, plans), plans, not found.stopped, spent)
 
 
-def _require_some(name: str, found: FrontSelection, problem: FrontProblem) -> None:
-    """Raise an error where no plan was found: that none is allowed, once that is proven."""
+def _found(
+    name: str, problems: tuple[FrontProblem, FrontProblem], solve: Callable[[], object]
+) -> FrontSelection:
+    """Return what a formulation says; an error that no plan is allowed, once that is proven."""
+    twin = problems[1]
+    try:
+        found = called(name, lambda: problems, FrontSelection, solve)
+    except InfeasibleError:
+        found = FrontSelection(np.zeros((0, len(twin.names))), ())
+    found = _with_numbers(name, found, twin.names)
     if len(found.points) or found.stopped:
-        return
-    if not problem.is_empty_below(np.full(len(problem.names), np.inf)):
+        return found
+    if not twin.is_empty_below(np.full(len(twin.names), np.inf)):
         raise SolverError(f"formulation {name} found no plan, and some are allowed")
     raise InfeasibleError("pareto: no plan is within the limits; relax one")
 
@@ -210,7 +217,7 @@ def _with_numbers(name: str, found: FrontSelection, names: Sequence[str]) -> Fro
         points = np.array(found.points, dtype=float).reshape(-1, len(names))
         if not np.isfinite(points).all() or len(points) != len(found.plans):
             raise ValueError(f"{len(points)} points, {len(found.plans)} plans, or one is no number")
-        return FrontSelection(points, tuple(found.plans), str(found.stopped))
+        return FrontSelection(points, tuple(found.plans), text(found.stopped))
 
 
 def _require_apart(points: Floats) -> None:

@@ -104,6 +104,13 @@ def readable(name: str) -> Iterator[None]:
         raise SolverError(f"formulation {name} returned nonsense: {said(error)}") from error
 
 
+def text(given: object) -> str:
+    """Return a text if it is one; a `TypeError` says that it is none."""
+    if not isinstance(given, str):
+        raise TypeError(f"{type(given).__name__} where a text belongs")
+    return given
+
+
 def checksum(value: object) -> bytes:
     """Return a checksum of a value: of its arrays, numbers, texts and fields, and of its methods.
 
@@ -138,7 +145,7 @@ def _add(digest: Any, value: object) -> None:
         digest.update(b"end")
     elif hasattr(value, "network") and not is_dataclass(value):
         digest.update(str(id(value)).encode())
-        _add(digest, value.network.scene)
+        _add(digest, [_shadowing(value), value.network.scene])
     elif callable(value) and not is_dataclass(value):
         digest.update(str(id(value)).encode())
     else:
@@ -153,9 +160,13 @@ def _parts(value: object) -> list[object]:
         own = {f.name for f in fields(value)}
     else:
         own = {n for n in held if not isinstance(getattr(type(value), n, None), cached_property)}
-    shadowing = [n for n in held if callable(getattr(type(value), n, None)) and n not in own]
     return [
         [pair for pair in methods if not pair[0].startswith("__")],
-        shadowing,
+        [name for name in _shadowing(value) if name not in own],
         *(getattr(value, name) for name in sorted(own)),
     ]
+
+
+def _shadowing(value: object) -> list[str]:
+    """Return the methods of a value's class that it has under the same names itself."""
+    return [n for n in getattr(value, "__dict__", {}) if callable(getattr(type(value), n, None))]

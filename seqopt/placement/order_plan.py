@@ -17,7 +17,7 @@ from seqopt.engines.interface import Engine
 from seqopt.errors import InfeasibleError, SolverError
 from seqopt.placement.free_judge import TOLERANCE
 from seqopt.placement.free_plan import FreePlan, solve_free
-from seqopt.placement.guard import called, readable
+from seqopt.placement.guard import called, readable, text
 from seqopt.placement.order_problem import OrderProblem, OrderSelection
 from seqopt.placement.order_proof import finds_better_order
 from seqopt.placement.schedule_formulation import (
@@ -196,7 +196,7 @@ def solve_order(
     twin = replace(problem, free=replace(problem.free))  # which no formulation can reach
     ends = start + float(options.get("seconds", inf))
     solve = partial(found.solve, problem, resources=means, **options)
-    selection = _selected(found, twin, ends, solve)
+    selection = _selected(found, (problem, twin), ends, solve)
     seconds = {"order": time.perf_counter() - start}
     plan = _planned(found.name, twin, selection, proof=proof)
     start = time.perf_counter()
@@ -216,11 +216,15 @@ def _planned(
 
 
 def _selected(
-    found: ScheduleFormulation, problem: OrderProblem, end: float, solve: Callable[[], object]
+    found: ScheduleFormulation,
+    problems: tuple[OrderProblem, OrderProblem],
+    end: float,
+    solve: Callable[[], object],
 ) -> OrderSelection:
     """Return what a formulation says, with numbers where numbers belong; or why there is none."""
+    asked, problem = problems
     try:
-        said = called(found.name, lambda: problem, OrderSelection, solve)
+        said = called(found.name, lambda: (asked, problem), OrderSelection, solve)
     except InfeasibleError as error:
         some = finds_better_order(problem, np.inf, end=end)
         if some:
@@ -253,7 +257,7 @@ def _with_numbers(name: str, found: OrderSelection) -> OrderSelection:
         order = tuple(operator.index(brick) for brick in found.order)
         objective, bound = float(found.objective), float(found.bound)
         evaluated = operator.index(found.evaluated)
-        return OrderSelection(order, objective, bound, evaluated, str(found.stopped))
+        return OrderSelection(order, objective, bound, evaluated, text(found.stopped))
 
 
 def _require_allowed(name: str, problem: OrderProblem, order: Order) -> None:

@@ -54,7 +54,9 @@ def finds_better_order(
     """
     if _of_the_whole(problem) >= value:
         return False
-    below = value - 4 * BELOW * abs(value)  # further than what is tied with it
+    below = value  # further below than what is tied with it
+    if np.isfinite(value):
+        below -= 4 * BELOW * abs(value)
     empty: Key = (frozenset(), 0)
     entries: dict[Key, list[Ints]] = {empty: []}
     looked = 0

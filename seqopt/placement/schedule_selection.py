@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import operator
 from dataclasses import dataclass, field
-from math import isnan
 
 import numpy as np
 
 from seqopt.arrays import FrozenValue, Ints
-from seqopt.placement.guard import readable
+from seqopt.placement.guard import readable, text
+
+CLOSE = 1e-6  # over a value: how far a bound may be above it by rounding
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -68,7 +69,7 @@ def with_numbers(name: str, found: ScheduleSelection, goals: int) -> ScheduleSel
                 f"{len(states)} states, {len(objective)} values and {len(bound)} bounds for "
                 f"{goals} goals"
             )
-        if any(map(isnan, (*objective, *bound))):
-            raise ValueError("a value or bound is NaN")
+        if not all(b <= v + CLOSE * abs(v) for v, b in zip(objective, bound, strict=True)):
+            raise ValueError("a value or bound is NaN, or a bound is above its value")
         visited = tuple(np.asarray(rows) for rows in found.visited)
-        return ScheduleSelection(states, objective, bound, visited, str(found.stopped))
+        return ScheduleSelection(states, objective, bound, visited, text(found.stopped))

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import operator
-from contextlib import nullcontext
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
 from typing import Any
 
 import numpy as np
 
-from seqopt.errors import SolverError
+from seqopt.errors import InfeasibleError, SolverError
 from seqopt.interrupts import answered
+from seqopt.placement.certificate import least_sum
+from seqopt.placement.conflicts import refusal
 from seqopt.placement.formulation import WATCH, End, Formulation, Selection
 from seqopt.placement.guard import called, readable
 from seqopt.placement.interface import PlacementProblem
@@ -46,7 +49,7 @@ def select(
     """
     watch = watch or Watch()
     ends = answered(watch.interrupt) if formulation.watched else nullcontext()
-    with ends:
+    with ends, _infeasible_confirmed(problem, formulation):
         return _with_numbers(formulation, _called(formulation, problem, watch, options), watch)
 
 
@@ -91,3 +94,19 @@ def _traced(watch: Watch, objective: float, bound: float) -> tuple[Finding, ...]
     """Return what was told, ending with what is claimed."""
     watch.tell(objective, bound)
     return watch.trace
+
+
+@contextmanager
+def _infeasible_confirmed(problem: PlacementProblem, formulation: Formulation) -> Iterator[None]:
+    """Say why there is no choice where a formulation says that there is none, if that is so."""
+    try:
+        yield
+    except InfeasibleError as error:
+        costs = formulation.aim.costs(problem)
+        if not np.isfinite(least_sum(costs)):
+            costs.continuable()  # names the move
+        if problem.budgets:
+            raise refusal(problem, formulation.name) from None
+        raise SolverError(
+            f"formulation {formulation.name} says that no choice is allowed, and some are: {error}"
+        ) from None

@@ -11,10 +11,9 @@ from typing import Any, overload
 
 import numpy as np
 
-from seqopt.errors import InfeasibleError, ProblemError, SolverError
+from seqopt.errors import ProblemError
 from seqopt.placement.anew import require_anew
-from seqopt.placement.certificate import certify_partial, judge, least_sum
-from seqopt.placement.conflicts import refusal
+from seqopt.placement.certificate import certify_partial, judge
 from seqopt.placement.fitting import require_fit, require_proof, require_time
 from seqopt.placement.formulation import (
     End,
@@ -200,7 +199,7 @@ def _solve_all(
     """Return the certified plan of a formulation that is given the costs of all choices."""
     seconds: dict[str, float] = {}
     stages = problem.seconds(formulation.aim)  # computes the costs: solving is timed alone
-    with _timed(seconds, "solve"), _infeasible_confirmed(problem, formulation):
+    with _timed(seconds, "solve"):
         selection = select(formulation, problem, Watch(run.time_limit, run.progress), **options)
     seconds["compile"] = selection.compile_seconds
     seconds["solve"] -= selection.compile_seconds
@@ -269,22 +268,6 @@ def _solve_lazily(
         found.along,
         found.models,
     )
-
-
-@contextmanager
-def _infeasible_confirmed(problem: PlacementProblem, formulation: Formulation) -> Iterator[None]:
-    """Say why there is no choice where a formulation says that there is none, if that is so."""
-    try:
-        yield
-    except InfeasibleError as error:
-        costs = formulation.aim.costs(problem)
-        if not np.isfinite(least_sum(costs)):
-            costs.continuable()  # names the move
-        if problem.budgets:
-            raise refusal(problem, formulation.name) from None
-        raise SolverError(
-            f"formulation {formulation.name} says that no choice is allowed, and some are: {error}"
-        ) from None
 
 
 @contextmanager
