@@ -32,7 +32,8 @@ import numpy as np
 
 from seqopt.errors import InfeasibleError, ProblemError, TimeUpError
 from seqopt.graph.explore import Explorer
-from seqopt.graph.paths import lexicographic
+from seqopt.graph.parts import Visited
+from seqopt.graph.paths import Best, lexicographic, reached, tied
 from seqopt.placement.formulation import FormulationKind
 from seqopt.placement.order_bound import whole_bound
 from seqopt.placement.order_problem import OrderProblem, OrderSelection
@@ -211,9 +212,17 @@ def _take_best(search: _Search, found: Explorer) -> None:
         if not found.refine(best.values):
             break
     if best.values[0] < search.value * (1 - BETTER):
-        keys = dict.fromkeys(part for _, part, _ in visited.of(best.path))
+        keys = dict.fromkeys(part for _, part, _ in visited.of(_first_ending(visited, best)))
         search.value = best.values[0]
         search.order = tuple(key[1] for key in keys)
+
+
+def _first_ending(visited: Visited, best: Best) -> tuple[int, ...]:
+    """Return the best path that ends with the first brick: many orders are equally good."""
+    graph, states = visited
+    ends = graph.ends & reached(graph, graph.amounts[:, 0] <= tied(best.values[0]))
+    number = np.repeat([part[1] for _, part, _ in states], [len(rows) for _, _, rows in states])
+    return lexicographic(replace(graph, ends=ends & (number == number[ends].min()))).path
 
 
 def _neighbors(search: _Search, tries: int, rng: np.random.Generator) -> None:

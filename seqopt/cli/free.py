@@ -79,7 +79,7 @@ def _said(plan: FreePlan, options: argparse.Namespace) -> str:
     """Return what a plan is worth, in a line."""
     return (
         f"{plan.formulation.name} ({plan.formulation.kind.value}): {plan.worth}; "
-        f"{len(plan.steps)} steps, {plan.regrips} regrips, {plan.problem.sets.solved} models; "
+        f"{len(plan.steps)} steps, {plan.regrips} regrips, {plan.problem.models} models; "
         f"{written_to(options.out)}"
     )
 

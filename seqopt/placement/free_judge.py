@@ -113,7 +113,7 @@ def _bounds(problem: FreeProblem, proof: Proof, values: tuple[float, ...]) -> tu
             out.append(bound)
     if len(out) < len(values):
         pairs = zip(proof.bounds(values), values, strict=True)
-        out += [min(bound, value) for bound, value in pairs][len(out) :]
+        out += [v if b >= v - BELOW * abs(v) else b for b, v in pairs][len(out) :]
     return tuple(out)
 
 

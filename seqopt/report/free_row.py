@@ -94,7 +94,7 @@ def free_row(plan: FreePlan) -> dict[str, object]:
         "problem": FREE,
         "objective": value,
         "gap": (value - bound) / (abs(value) or 1.0),  # without weight all responses are zero
-        "models": plan.problem.sets.solved,
+        "models": plan.problem.models,
         "seconds": sum(plan.seconds.values()),
         "solve_seconds": plan.seconds["solve"],
     }
