@@ -59,7 +59,7 @@ def met(problem25):
     values += [seqopt.DRY, seqopt.CRITERIA, seqopt.formulations(), seqopt.Limit("F_largest", 300.0)]
     values += [ArchForm(span=2.0, rise=0.8), DomeShape(courses=4, around=12), VaultShape(bricks=9)]
     values += [seqopt.StepCost("own", ("F_largest",), max), free.animate()]
-    values += [seqopt.Sphere(center=(0.0, 0.0, 0.0), radius=1.0)]
+    values += [network, seqopt.Sphere(center=(0.0, 0.0, 0.0), radius=1.0)]
     values += [seqopt.GivenSequence(problem25.engine, seqopt.sequential(network))]
     for each in (plan, free, robust):
         each.responses()
