@@ -51,10 +51,6 @@ def solve(problem: PlacementProblem, *, watch: Watch | None = None) -> Selection
     watch : Watch, optional
         Says when to stop, and is told what is found.
 
-    Returns
-    -------
-    Selection
-
     Raises
     ------
     InfeasibleError

@@ -33,10 +33,6 @@ def write(problem: PlacementProblem) -> WholeProgram:
     problem : PlacementProblem
         Its peaks are used.
 
-    Returns
-    -------
-    WholeProgram
-
     Raises
     ------
     InfeasibleError

@@ -129,10 +129,6 @@ def solve(
         Who is told how far it is, and who tries orders where not all are looked at; what is found
         does not depend on it.
 
-    Returns
-    -------
-    OrderSelection
-
     Raises
     ------
     InfeasibleError, ProblemError, TimeUpError

@@ -30,10 +30,6 @@ def write(problem: PlacementProblem) -> WholeProgram:
     problem : PlacementProblem
         Its sums and budgets are used.
 
-    Returns
-    -------
-    WholeProgram
-
     Raises
     ------
     InfeasibleError

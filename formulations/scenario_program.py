@@ -63,10 +63,6 @@ def solve_program(
     watch : Watch, optional
         Says when to stop.
 
-    Returns
-    -------
-    Reference
-
     Raises
     ------
     InfeasibleError

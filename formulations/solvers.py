@@ -60,12 +60,7 @@ class Optimum:
 
 @dataclass(frozen=True)
 class Size:
-    """How large a program is, as it is handed to a solver.
-
-    Attributes
-    ----------
-    rows, columns, nonzeros, binaries : int
-    """
+    """How large a program is, as it is handed to a solver."""
 
     rows: int
     columns: int
@@ -84,10 +79,6 @@ def minimize(program: cp.Problem, *, feasible: bool, time_limit: float = math.in
         Whether the program is known to have a solution.
     time_limit : float, optional
         After which it stops with nothing, s.
-
-    Returns
-    -------
-    Optimum
 
     Raises
     ------
@@ -132,10 +123,6 @@ def minimize_whole(
     told : callable, optional
         Turns a value of the program into the unit that the watch is told.
 
-    Returns
-    -------
-    Optimum
-
     Raises
     ------
     InfeasibleError, SolverError
@@ -166,15 +153,6 @@ def minimize_whole(
 
 def anatomy(program: cp.Problem) -> tuple[Size, float]:
     """Return how large an integer program is, and the bound of its linear relaxation.
-
-    Parameters
-    ----------
-    program : cvxpy.Problem
-
-    Returns
-    -------
-    size : Size
-    bound : float
 
     Raises
     ------

@@ -92,10 +92,6 @@ def largest_of_each(sizes: Sequence[int]) -> Callable[[Floats], Choice]:
     ----------
     sizes : sequence of int
         How many candidates every move has.
-
-    Returns
-    -------
-    callable
     """
     ends = np.cumsum(sizes)[:-1]
     return lambda picks: tuple(int(np.argmax(part)) for part in np.split(picks, ends))
@@ -110,20 +106,12 @@ def below(scale: float, least: float = 0.0) -> Callable[[float], float]:
         By which costs are divided.
     least : float, optional
         What was taken off them before.
-
-    Returns
-    -------
-    callable
     """
     return lambda value: least + scale * (value - ACCURACY * max(abs(value), 1.0))
 
 
 def worst_pairs(costs: LayeredCosts) -> tuple[list[Floats], float]:
     """Return the worst cost of every pair of every move, and the least of them if negative.
-
-    Parameters
-    ----------
-    costs : LayeredCosts
 
     Returns
     -------

@@ -30,30 +30,12 @@ def harmless(text: str) -> str:
 
 
 def plain(text: str) -> str:
-    """Return what a cell said before `harmless`.
-
-    Parameters
-    ----------
-    text : str
-
-    Returns
-    -------
-    str
-    """
+    """Return what a cell said before `harmless`."""
     return text[1:] if text.startswith(MARK) and harmless(text) != text else text
 
 
 def harmless_table(table: pd.DataFrame) -> pd.DataFrame:
-    """Return a table whose columns and texts are `harmless`; numbers stay as they are.
-
-    Parameters
-    ----------
-    table : pandas.DataFrame
-
-    Returns
-    -------
-    pandas.DataFrame
-    """
+    """Return a table whose columns and texts are `harmless`; numbers stay as they are."""
     texts = [k for k, kind in enumerate(table.dtypes) if not pd.api.types.is_numeric_dtype(kind)]
     columns = [table.iloc[:, k] for k in range(table.shape[1])]
     for k in texts:

@@ -21,14 +21,6 @@ HIDDEN = ".seqopt-"  # start of the names of what is not complete yet
 def read_text(path: Path) -> str:
     """Return the text of a UTF-8 file.
 
-    Parameters
-    ----------
-    path : pathlib.Path
-
-    Returns
-    -------
-    str
-
     Raises
     ------
     FileError
@@ -41,16 +33,7 @@ def read_text(path: Path) -> str:
 
 
 def read_bytes(path: Path) -> bytes:
-    """Return the content of a file; as `read_text`.
-
-    Parameters
-    ----------
-    path : pathlib.Path
-
-    Returns
-    -------
-    bytes
-    """
+    """Return the content of a file; as `read_text`."""
     try:
         if not stat.S_ISREG(Path(path).stat().st_mode):  # a pipe would be waited for
             raise FileError(f"cannot read {path}: it is not a regular file; name one")
@@ -69,11 +52,6 @@ def read_bytes(path: Path) -> bytes:
 def write_text(path: Path, text: str) -> None:
     """Write a UTF-8 file whole: it appears under its name only once complete.
 
-    Parameters
-    ----------
-    path : pathlib.Path
-    text : str
-
     Raises
     ------
     FileError
@@ -84,10 +62,6 @@ def write_text(path: Path, text: str) -> None:
 
 def csv_text(table: pd.DataFrame) -> str:
     """Return a table as CSV, without its index, numbers with six digits.
-
-    Parameters
-    ----------
-    table : pandas.DataFrame
 
     Returns
     -------
@@ -114,11 +88,6 @@ def write_bytes(path: Path, content: bytes) -> None:
     """Write a file whole: it appears under its name only once complete.
 
     A link is followed to its target; a file that is there keeps its mode.
-
-    Parameters
-    ----------
-    path : pathlib.Path
-    content : bytes
 
     Raises
     ------
@@ -167,11 +136,6 @@ def write_folder(folder: Path, files: Mapping[str, bytes | str]) -> None:
 def require_apart(outputs: Sequence[Path], inputs: Sequence[Path] = ()) -> None:
     """Raise an error if two outputs are one file, or one is an input.
 
-    Parameters
-    ----------
-    outputs : sequence of pathlib.Path
-    inputs : sequence of pathlib.Path, optional
-
     Raises
     ------
     FileError
@@ -209,10 +173,6 @@ def require_folder(path: Path) -> None:
 
 def make_folder(path: Path) -> None:
     """Make a folder, and those above it, unless it is there.
-
-    Parameters
-    ----------
-    path : pathlib.Path
 
     Raises
     ------

@@ -13,10 +13,6 @@ Places = tuple[tuple[str, int], ...]
 def plugins(group: str) -> dict[str, EntryPoint]:
     """Return the entry points of a group by name.
 
-    Parameters
-    ----------
-    group : str
-
     Returns
     -------
     dict of str to EntryPoint

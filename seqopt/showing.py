@@ -40,10 +40,6 @@ def display(name: str) -> Callable[..., Any]:
     name : str
         A key of `DISPLAYS`.
 
-    Returns
-    -------
-    callable
-
     Raises
     ------
     ExtraError
@@ -98,10 +94,6 @@ class Page:
 
     def save(self, path: str | Path) -> Path:
         """Write the page to a file.
-
-        Parameters
-        ----------
-        path : str or pathlib.Path
 
         Returns
         -------

@@ -63,16 +63,7 @@ class Defaults:
     aim: str = "minmax"
 
     def chosen_by(self, budgets: object) -> str:
-        """Return the formulation, which has to take budgets where there are any.
-
-        Parameters
-        ----------
-        budgets : sequence
-
-        Returns
-        -------
-        str
-        """
+        """Return the formulation, which has to take budgets where there are any."""
         return self.with_budgets if budgets else self.formulation
 
 
@@ -216,10 +207,6 @@ def posed(
         Caps on totals over the build, as of `seqopt.placement.asked_budgets.parse_budgets`.
     resources : Resources, optional
         What the computation may use.
-
-    Returns
-    -------
-    Problem
     """
     asked = parse_budgets(budgets)
     chosen = find_criterion(criterion or DEFAULTS["any other"].criterion)
@@ -249,10 +236,6 @@ def posed_free(
     rules : FreeRules, optional
     limits, stands : optional
         As of `seqopt.pose_free`.
-
-    Returns
-    -------
-    FreeProblem
     """
     usual = DEFAULTS[FREE]
     chosen = find_criterion(criterion or usual.criterion)

@@ -57,12 +57,7 @@ EXAMPLES = (
 
 
 def add_arguments(command: argparse.ArgumentParser) -> None:
-    """Add the arguments of ``analyze``.
-
-    Parameters
-    ----------
-    command : argparse.ArgumentParser
-    """
+    """Add the arguments of ``analyze``."""
     basic = group(command, "what is analyzed")
     scene_argument(basic)
     steps_arguments(basic)
@@ -98,10 +93,6 @@ def run(options: argparse.Namespace) -> Answer:
     ----------
     options : argparse.Namespace
         Of the command.
-
-    Returns
-    -------
-    Answer
     """
     keep_apart(options, options.out, options.fields)
     scene = asked_scene(options)

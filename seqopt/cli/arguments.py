@@ -37,12 +37,7 @@ class Command:
     module: str
 
     def load(self) -> ModuleType:
-        """Return the module.
-
-        Returns
-        -------
-        module
-        """
+        """Return the module."""
         return import_module(f"seqopt.cli.{self.module}")
 
 

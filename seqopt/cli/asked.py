@@ -40,10 +40,6 @@ def asked_scene(options: argparse.Namespace) -> Scene:
     ----------
     options : argparse.Namespace
         With ``scene`` and ``order``.
-
-    Returns
-    -------
-    Scene
     """
     if options.order == "search":
         raise ProblemError(
@@ -76,10 +72,6 @@ def asked_engine(options: argparse.Namespace, network: Network) -> Engine:
         With ``engine`` and ``mortar``.
     network : Network
 
-    Returns
-    -------
-    Engine
-
     Raises
     ------
     SceneError
@@ -94,10 +86,6 @@ def asked_engine(options: argparse.Namespace, network: Network) -> Engine:
 
 def level_notes(engine: Engine) -> tuple[str, ...]:
     """Return which levels an engine that picks them took, and why.
-
-    Parameters
-    ----------
-    engine : Engine
 
     Returns
     -------
@@ -114,16 +102,7 @@ def level_notes(engine: Engine) -> tuple[str, ...]:
 
 
 def posed_notes(problem: Problem | FreeProblem) -> tuple[str, ...]:
-    """Return which levels the engine took, and whether scales are not those of fixed methods.
-
-    Parameters
-    ----------
-    problem : Problem or FreeProblem
-
-    Returns
-    -------
-    tuple of str
-    """
+    """Return which levels the engine took, and whether scales are not those of fixed methods."""
     said, name = level_notes(problem.engine), problem.criterion.name
     if not name.endswith(OWN):
         return said
@@ -132,11 +111,6 @@ def posed_notes(problem: Problem | FreeProblem) -> tuple[str, ...]:
 
 def idle_notes(scene: Scene, steps: Sequence[AnyStep]) -> tuple[str, ...]:
     """Return the robots that never grip, in words.
-
-    Parameters
-    ----------
-    scene : Scene
-    steps : sequence of Step or OpenStep
 
     Returns
     -------
@@ -155,26 +129,12 @@ def exceeded(scene: Scene, *tables: pd.DataFrame) -> tuple[str, ...]:
     scene : Scene
     *tables : pandas.DataFrame
         Responses of steps.
-
-    Returns
-    -------
-    tuple of str
     """
     return tuple(str(excess) for table in tables for excess in overloads(scene, table))
 
 
 def marked(answer: Answer, outside: Sequence[object]) -> Answer:
-    """Return an answer that begins with how results leave the linear range, and what to do.
-
-    Parameters
-    ----------
-    answer : Answer
-    outside : sequence of Departure or str
-
-    Returns
-    -------
-    Answer
-    """
+    """Return an answer that begins with how results leave the linear range, and what to do."""
     left = [str(departure) for departure in outside]
     answer = replace(answer, facts={**answer.facts, "outside_linear_range": left})
     if not left:
@@ -202,10 +162,6 @@ def strictly(
         From `exceeded`.
     outside : sequence of Departure or str, optional
         How results leave the linear range.
-
-    Returns
-    -------
-    Answer
     """
     answer = marked(answer, outside)
     answer = replace(answer, facts={**answer.facts, "payloads_exceeded": list(over)})

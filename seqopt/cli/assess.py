@@ -37,12 +37,7 @@ EXAMPLES = (
 
 
 def add_arguments(command: argparse.ArgumentParser) -> None:
-    """Add the arguments of ``assess``.
-
-    Parameters
-    ----------
-    command : argparse.ArgumentParser
-    """
+    """Add the arguments of ``assess``."""
     basic = group(command, "what is assessed")
     scene_argument(basic)
     steps_arguments(basic)
@@ -76,10 +71,6 @@ def run(options: argparse.Namespace) -> Answer:
     ----------
     options : argparse.Namespace
         Of the command.
-
-    Returns
-    -------
-    Answer
     """
     keep_apart(options, options.out)
     scene = asked_scene(options)

@@ -25,21 +25,12 @@ def group(command: argparse.ArgumentParser, title: str, about: str | None = None
     title : str
     about : str, optional
         A sentence below it.
-
-    Returns
-    -------
-    argparse._ActionsContainer
     """
     return command.add_argument_group(title, about)
 
 
 def scene_argument(takes: Takes) -> None:
-    """Add the arguments that say what is built, and in which order.
-
-    Parameters
-    ----------
-    takes : argparse._ActionsContainer
-    """
+    """Add the arguments that say what is built, and in which order."""
     takes.add_argument(
         "scene",
         nargs="?",
@@ -58,12 +49,7 @@ def scene_argument(takes: Takes) -> None:
 
 
 def engine_arguments(takes: Takes) -> None:
-    """Add the arguments that say what computes responses.
-
-    Parameters
-    ----------
-    takes : argparse._ActionsContainer
-    """
+    """Add the arguments that say what computes responses."""
     takes.add_argument(
         "--engine",
         choices=tuple(ENGINES),
@@ -82,12 +68,7 @@ def engine_arguments(takes: Takes) -> None:
 
 
 def form_arguments(takes: Takes) -> None:
-    """Add the arguments that say in which form the answer is printed.
-
-    Parameters
-    ----------
-    takes : argparse._ActionsContainer
-    """
+    """Add the arguments that say in which form the answer is printed."""
     form = takes.add_mutually_exclusive_group()
     form.add_argument(
         "--quiet",
@@ -104,12 +85,7 @@ def form_arguments(takes: Takes) -> None:
 
 
 def strict_argument(takes: Takes) -> None:
-    """Add the argument that asks for a status where a payload is exceeded.
-
-    Parameters
-    ----------
-    takes : argparse._ActionsContainer
-    """
+    """Add the argument that asks for a status where a payload is exceeded."""
     takes.add_argument(
         "--strict",
         action="store_true",
@@ -149,12 +125,7 @@ def robots_argument(takes: Takes, whose: str) -> None:
 
 
 def criterion_arguments(takes: Takes) -> None:
-    """Add the arguments that say what a step costs.
-
-    Parameters
-    ----------
-    takes : argparse._ActionsContainer
-    """
+    """Add the arguments that say what a step costs."""
     takes.add_argument(
         "--criteria",
         metavar="NAME",
@@ -182,12 +153,7 @@ def criterion_arguments(takes: Takes) -> None:
 
 
 def limit_argument(takes: Takes) -> None:
-    """Add the argument that caps a response in every step.
-
-    Parameters
-    ----------
-    takes : argparse._ActionsContainer
-    """
+    """Add the argument that caps a response in every step."""
     takes.add_argument(
         "--limit",
         action="append",

@@ -47,12 +47,7 @@ EXAMPLES = (
 
 
 def add_arguments(command: argparse.ArgumentParser) -> None:
-    """Add the arguments of ``compare``.
-
-    Parameters
-    ----------
-    command : argparse.ArgumentParser
-    """
+    """Add the arguments of ``compare``."""
     basic = group(command, "what is compared")
     scene_argument(basic)
     robots_argument(basic, "all methods, each of which takes as many as it needs")
@@ -79,10 +74,6 @@ def run(options: argparse.Namespace) -> Answer:
     ----------
     options : argparse.Namespace
         Of the command.
-
-    Returns
-    -------
-    Answer
     """
     scene = asked_scene(options)
     engine = asked_engine(options, build_network(scene))

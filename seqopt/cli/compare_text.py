@@ -54,10 +54,6 @@ def tell_comparison(comparison: Comparison, scene: Scene, criterion: Criterion) 
         Which was compared.
     criterion : Criterion
         With which the formulations were compared.
-
-    Returns
-    -------
-    Told
     """
     blocks = [
         [f"{scene.name}: {len(scene.bricks)} bricks, {len(scene.robots)} robots"],
@@ -229,10 +225,6 @@ def title_of(problem: str) -> str:
     ----------
     problem : str
         Of a comparison's table.
-
-    Returns
-    -------
-    str
 
     Examples
     --------

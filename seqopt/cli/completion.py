@@ -44,12 +44,7 @@ SHORT = re.compile(r"[:;(]|, (?:as|if|or) ")  # where what matters of a help tex
 
 
 def add_arguments(command: argparse.ArgumentParser) -> None:
-    """Add the arguments of ``completion``.
-
-    Parameters
-    ----------
-    command : argparse.ArgumentParser
-    """
+    """Add the arguments of ``completion``."""
     command.add_argument("shell", choices=SHELLS, help="for which shell")
 
 
@@ -60,10 +55,6 @@ def run(options: argparse.Namespace) -> Answer:
     ----------
     options : argparse.Namespace
         Of the command.
-
-    Returns
-    -------
-    Answer
     """
     script = shtab.complete(completed(parser()), options.shell)
     return Answer(facts={"shell": options.shell, "script": script}, data=script + "\n")
@@ -76,10 +67,6 @@ def completed(whole: argparse.ArgumentParser) -> argparse.ArgumentParser:
     ----------
     whole : argparse.ArgumentParser
         Of all commands; it is changed.
-
-    Returns
-    -------
-    argparse.ArgumentParser
     """
     known = {name: words(names) for name, names in _names().items()}
     known |= {

@@ -25,10 +25,6 @@ def asked_criterion(options: argparse.Namespace) -> Criterion:
     ----------
     options : argparse.Namespace
         With ``criteria``, ``crown``, ``ranked`` and ``among``.
-
-    Returns
-    -------
-    Criterion
     """
     usual = DEFAULTS["any other"].criterion.name
     criterion = parse_criterion(options.criteria or usual, options.crown)
@@ -44,10 +40,6 @@ def parse_criterion(text: str, crown: str | None = None) -> Criterion:
         A name of `seqopt.CRITERIA`, or responses as ``T_max,M_sup=2``; a weight is 1 by default.
     crown : str, optional
         Bricks placed at the crown, or ``none``.
-
-    Returns
-    -------
-    Criterion
 
     Raises
     ------
@@ -79,10 +71,6 @@ def rank_otherwise(criterion: Criterion, ranked: str | None, among: str | None) 
     criterion : Criterion
     ranked, among : str, optional
         Values of `seqopt.placement.ranks.Ranked` and `seqopt.placement.ranks.Among`.
-
-    Returns
-    -------
-    Criterion
 
     Raises
     ------

@@ -19,12 +19,7 @@ EXAMPLES = ("seqopt export best --format csv --out blocks.csv",)
 
 
 def add_arguments(command: argparse.ArgumentParser) -> None:
-    """Add the arguments of ``export``.
-
-    Parameters
-    ----------
-    command : argparse.ArgumentParser
-    """
+    """Add the arguments of ``export``."""
     basic = group(command, "what is written")
     basic.add_argument("folder", type=Path, metavar="PLAN_DIR", help="folder of a plan")
     basic.add_argument("--format", choices=tuple(EXPORTS), required=True, help="what to write")
@@ -46,10 +41,6 @@ def run(options: argparse.Namespace) -> Answer:
     ----------
     options : argparse.Namespace
         Of the command.
-
-    Returns
-    -------
-    Answer
     """
     inputs = [options.folder / name for name in ("scene.json", "plan.csv")]
     require_apart([options.out], [*inputs, *filter(None, [options.source])])

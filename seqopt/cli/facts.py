@@ -11,10 +11,6 @@ from seqopt.scene.scene import Scene
 def scene_facts(scene: Scene) -> dict[str, object]:
     """Return what a scene is called, and how large it is.
 
-    Parameters
-    ----------
-    scene : Scene
-
     Returns
     -------
     dict of str to object
@@ -31,10 +27,6 @@ def scene_facts(scene: Scene) -> dict[str, object]:
 
 def network_facts(network: Network) -> dict[str, object]:
     """Return how large the network of a scene is, what it weighs, and what its robots can do.
-
-    Parameters
-    ----------
-    network : Network
 
     Returns
     -------

@@ -41,10 +41,6 @@ def optimize_free(options: argparse.Namespace) -> Answer:
     ----------
     options : argparse.Namespace
         Of the command ``optimize``.
-
-    Returns
-    -------
-    Answer
     """
     _require_free(options)
     if options.order == SEARCH:
@@ -121,11 +117,6 @@ def asked_free(options: argparse.Namespace) -> tuple[Scene, FreeProblem]:
     ----------
     options : argparse.Namespace
         Of the command ``optimize`` or ``pareto``.
-
-    Returns
-    -------
-    scene : Scene
-    problem : FreeProblem
     """
     scene = asked_scene(options)
     names = parse_robots(options.robots)

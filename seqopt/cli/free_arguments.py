@@ -13,12 +13,7 @@ RULES = (
 
 
 def add_rules(takes: Takes) -> None:
-    """Add what a free schedule takes.
-
-    Parameters
-    ----------
-    takes : argparse._ActionsContainer
-    """
+    """Add what a free schedule takes."""
     takes.add_argument(
         "--rule",
         action="append",

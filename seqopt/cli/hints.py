@@ -33,10 +33,6 @@ def nearest(message: str, options: Iterable[str]) -> str:
     options : iterable of str
         That its commands have.
 
-    Returns
-    -------
-    str
-
     Examples
     --------
     >>> nearest("unrecognized arguments: --formulaton=beam", ["--formulation", "--out"])
@@ -67,10 +63,6 @@ def first_wrong(message: str, given: Sequence[str], options: Sequence[str]) -> s
         The words that it was given.
     options : sequence of str
         That it has.
-
-    Returns
-    -------
-    str
 
     Examples
     --------

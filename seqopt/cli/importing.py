@@ -30,12 +30,7 @@ EXAMPLES = (
 
 
 def add_arguments(command: argparse.ArgumentParser) -> None:
-    """Add the arguments of ``import``.
-
-    Parameters
-    ----------
-    command : argparse.ArgumentParser
-    """
+    """Add the arguments of ``import``."""
     basic = group(command, "what is read and written")
     basic.add_argument("file", type=Path, metavar="FILE", help="what to read")
     basic.add_argument(
@@ -85,10 +80,6 @@ def run(options: argparse.Namespace) -> Answer:
     ----------
     options : argparse.Namespace
         Of the command.
-
-    Returns
-    -------
-    Answer
     """
     require_apart([options.out], [options.file])
     options.tell("reading the file")

@@ -56,16 +56,7 @@ def wrapped(text: str, width: int | None = None, first: str = "", rest: str | No
 
 
 def is_terminal(stream: TextIO | None) -> bool:
-    """Return whether a person looks at a stream.
-
-    Parameters
-    ----------
-    stream : file or None
-
-    Returns
-    -------
-    bool
-    """
+    """Return whether a person looks at a stream."""
     try:
         return stream is not None and stream.isatty()
     except ValueError:  # it is closed
@@ -74,10 +65,6 @@ def is_terminal(stream: TextIO | None) -> bool:
 
 def colored(stream: TextIO | None) -> bool:
     """Return whether a stream takes colors.
-
-    Parameters
-    ----------
-    stream : file or None
 
     Returns
     -------
@@ -102,10 +89,6 @@ def painted(text: str, style: str, stream: TextIO | None) -> str:
         A key of `STYLES`.
     stream : file or None
         To which it will be written.
-
-    Returns
-    -------
-    str
 
     Examples
     --------

@@ -24,10 +24,6 @@ def parse_resources(options: argparse.Namespace, progress: Tell | None = None) -
     progress : callable, optional
         Told how far it is.
 
-    Returns
-    -------
-    Resources
-
     Raises
     ------
     ProblemError
@@ -48,10 +44,6 @@ def parse_size(text: str) -> float:
     ----------
     text : str
         As ``2GB``, ``500 MB`` or ``1.5GiB``; bytes without a unit.
-
-    Returns
-    -------
-    float
 
     Raises
     ------

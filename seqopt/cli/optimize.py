@@ -56,10 +56,6 @@ def run(options: argparse.Namespace) -> Answer:
     ----------
     options : argparse.Namespace
         Of the command ``optimize``.
-
-    Returns
-    -------
-    Answer
     """
     if options.robust is not None:
         return optimize_robust(options)

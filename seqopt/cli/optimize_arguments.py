@@ -27,12 +27,7 @@ _USUAL = DEFAULTS["any other"]
 
 
 def add_arguments(command: argparse.ArgumentParser) -> None:
-    """Add the arguments of ``optimize``.
-
-    Parameters
-    ----------
-    command : argparse.ArgumentParser
-    """
+    """Add the arguments of ``optimize``."""
     _basic(group(command, "what is built, and how grips are chosen"))
     limits = group(command, "what is allowed")
     limit_argument(limits)

@@ -34,10 +34,6 @@ def optimize_order(options: argparse.Namespace, free: FreeProblem) -> Answer:
     free : FreeProblem
         In the scene's own order.
 
-    Returns
-    -------
-    Answer
-
     Raises
     ------
     ProblemError

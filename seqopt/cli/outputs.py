@@ -20,12 +20,7 @@ from seqopt.scene.scene_file import builtin_scenes, dump_scene
 
 
 def figure_notes() -> tuple[str, ...]:
-    """Return why figures are left out, if they are: what draws them is an extra.
-
-    Returns
-    -------
-    tuple of str
-    """
+    """Return why figures are left out, if they are: what draws them is an extra."""
     if find_spec("matplotlib") is not None:
         return ()
     return ("figures are left out, they need matplotlib: pip install 'seqopt[plot]'",)
@@ -33,10 +28,6 @@ def figure_notes() -> tuple[str, ...]:
 
 def comparison_files(result: Comparison) -> dict[str, bytes | str]:
     """Return the tables of a comparison by file name, and its figures if they can be drawn.
-
-    Parameters
-    ----------
-    result : Comparison
 
     Returns
     -------
@@ -87,16 +78,7 @@ def plan_files(plan: Plan, scene: Scene, report: Mapping[str, object]) -> dict[s
 
 
 def worth(plan: Plan) -> str:
-    """Return what a plan is worth, in words.
-
-    Parameters
-    ----------
-    plan : Plan
-
-    Returns
-    -------
-    str
-    """
+    """Return what a plan is worth, in words."""
     among = plan.summary()["candidates"]
     if plan.certificate is None:
         return "not compared with the optimum"
@@ -106,16 +88,7 @@ def worth(plan: Plan) -> str:
 
 
 def written_to(folder: Path | None) -> str:
-    """Return where a folder with a page was written, and what shows it, or how to have one.
-
-    Parameters
-    ----------
-    folder : pathlib.Path or None
-
-    Returns
-    -------
-    str
-    """
+    """Return where a folder with a page was written, and what shows it, or how to have one."""
     if folder is None:
         return "--out DIR writes the plan, its tables and a page that shows it step by step"
     return f"written to {folder}; {folder / PAGE} shows it step by step"
@@ -194,10 +167,6 @@ def inputs(options: argparse.Namespace) -> list[Path]:
     ----------
     options : argparse.Namespace
         Of the command.
-
-    Returns
-    -------
-    list of pathlib.Path
     """
     scene = None if options.scene in builtin_scenes() else options.scene
     named = (scene, getattr(options, "plan", None), getattr(options, "schedule", None))

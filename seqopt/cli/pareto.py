@@ -59,12 +59,7 @@ EXAMPLES = (
 
 
 def add_arguments(command: argparse.ArgumentParser) -> None:
-    """Add the arguments of ``pareto``.
-
-    Parameters
-    ----------
-    command : argparse.ArgumentParser
-    """
+    """Add the arguments of ``pareto``."""
     basic = group(command, "what is built, and what is to be small")
     scene_argument(basic)
     basic.add_argument(
@@ -129,10 +124,6 @@ def run(options: argparse.Namespace) -> Answer:
     ----------
     options : argparse.Namespace
         Of the command.
-
-    Returns
-    -------
-    Answer
     """
     require_folder(options.out)
     scene, free = asked_free(options)

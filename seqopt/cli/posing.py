@@ -24,10 +24,6 @@ def asked_problem(options: argparse.Namespace) -> Problem:
     ----------
     options : argparse.Namespace
         Of the command.
-
-    Returns
-    -------
-    Problem
     """
     criterion = asked_criterion(options)
     scene = asked_scene(options)

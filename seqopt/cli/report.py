@@ -27,12 +27,7 @@ EXAMPLES = (
 
 
 def add_arguments(command: argparse.ArgumentParser) -> None:
-    """Add the arguments of ``report``.
-
-    Parameters
-    ----------
-    command : argparse.ArgumentParser
-    """
+    """Add the arguments of ``report``."""
     basic = group(command, "what is shown")
     scene_argument(basic)
     basic.add_argument("folder", type=Path, metavar="DIR", help="folder that holds plans as CSV")
@@ -57,10 +52,6 @@ def run(options: argparse.Namespace) -> Answer:
     ----------
     options : argparse.Namespace
         Of the command.
-
-    Returns
-    -------
-    Answer
     """
     own = options.folder / "scene.json"
     if own.is_file():  # plans go with the scene that stands beside them

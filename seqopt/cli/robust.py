@@ -63,10 +63,6 @@ def optimize_robust(options: argparse.Namespace) -> Answer:
     ----------
     options : argparse.Namespace
         Of the command ``optimize``.
-
-    Returns
-    -------
-    Answer
     """
     aim = _asked_aim(options)
     limit = parse_time_limit(options.time_limit)

@@ -25,10 +25,6 @@ def parse_standing(options: argparse.Namespace) -> Standing | None:
     options : argparse.Namespace
         With ``stands``, ``tilt`` (degrees) and ``friction``.
 
-    Returns
-    -------
-    Standing or None
-
     Raises
     ------
     ProblemError, SceneError
@@ -56,10 +52,6 @@ def parse_rules(texts: Sequence[str], robots: tuple[str, ...]) -> FreeRules:
         Each ``NAME=VALUE``.
     robots : tuple of str
         Those that take part; none for all.
-
-    Returns
-    -------
-    FreeRules
 
     Raises
     ------

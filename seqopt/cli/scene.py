@@ -30,12 +30,7 @@ EXAMPLES = (
 
 
 def add_arguments(command: argparse.ArgumentParser) -> None:
-    """Add the arguments of ``scene``.
-
-    Parameters
-    ----------
-    command : argparse.ArgumentParser
-    """
+    """Add the arguments of ``scene``."""
     basic = group(command, "which scene")
     scene_argument(basic)
     what = basic.add_mutually_exclusive_group()
@@ -55,10 +50,6 @@ def run(options: argparse.Namespace) -> Answer:
     ----------
     options : argparse.Namespace
         Of the command.
-
-    Returns
-    -------
-    Answer
     """
     if options.list:
         return _list(options)

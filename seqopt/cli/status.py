@@ -33,10 +33,6 @@ def status_of(error: BaseException) -> Status:
     ----------
     error : BaseException
         An error of seqopt, of the system, of memory, or an interrupt.
-
-    Returns
-    -------
-    Status
     """
     if isinstance(error, KeyboardInterrupt):
         complain(f"seqopt: interrupted{f'; {error}' if str(error) else ''}")

@@ -17,12 +17,7 @@ from seqopt.study.published import PUBLISHED, is_reference_arch, published_plan
 
 
 def steps_arguments(takes: Takes) -> None:
-    """Add the arguments that name a closed sequence of steps.
-
-    Parameters
-    ----------
-    takes : argparse._ActionsContainer
-    """
+    """Add the arguments that name a closed sequence of steps."""
     steps = takes.add_mutually_exclusive_group(required=True)
     steps.add_argument(
         "--method",
@@ -47,10 +42,6 @@ def asked_steps(scene: Scene, options: argparse.Namespace) -> tuple[Step, ...]:
     scene : Scene
     options : argparse.Namespace
         With ``method``, ``plan`` and ``robots``.
-
-    Returns
-    -------
-    tuple of Step
 
     Raises
     ------

@@ -33,10 +33,6 @@ def harmless(text: str, kept: str = "") -> str:
     kept : str, optional
         Controls that stay.
 
-    Returns
-    -------
-    str
-
     Examples
     --------
     >>> harmless("rob" + chr(27) + "[2J")
@@ -105,12 +101,7 @@ def complain(text: str) -> None:
 
 
 def note(text: str) -> None:
-    """Print what is worth knowing on standard error; else as `complain`.
-
-    Parameters
-    ----------
-    text : str
-    """
+    """Print what is worth knowing on standard error; else as `complain`."""
     _write_line(text, "doubt")
 
 
@@ -153,12 +144,7 @@ def flush() -> None:
 
 
 def silence(stream: TextIO) -> None:
-    """Let a stream that failed lead nowhere, so that the end of the program is quiet.
-
-    Parameters
-    ----------
-    stream : file
-    """
+    """Let a stream that failed lead nowhere, so that the end of the program is quiet."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 

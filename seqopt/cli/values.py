@@ -31,10 +31,6 @@ def parse_robots(text: str) -> tuple[str, ...]:
     ----------
     text : str
         Names with commas between them; nothing for none.
-
-    Returns
-    -------
-    tuple of str
     """
     return tuple(name.strip() for name in text.split(",")) if text else ()
 
@@ -48,10 +44,6 @@ def parse_limits(texts: Sequence[str], scene: Scene) -> tuple[Limit, ...]:
         Each ``payload`` or ``RESPONSE=VALUE``, SI units.
     scene : Scene
         Whose robots have the payloads.
-
-    Returns
-    -------
-    tuple of Limit
 
     Raises
     ------
@@ -70,10 +62,6 @@ def parse_limits(texts: Sequence[str], scene: Scene) -> tuple[Limit, ...]:
 
 def parse_time_limit(text: str | None) -> float:
     """Return seconds from words.
-
-    Parameters
-    ----------
-    text : str, optional
 
     Returns
     -------
@@ -101,10 +89,6 @@ def parse_numbers(
         Each ``NAME=VALUE``.
     known : mapping of str to object, optional
         Names that there are; any by default.
-
-    Returns
-    -------
-    dict of str to float
 
     Raises
     ------
@@ -169,10 +153,6 @@ def parse_mortar(options: argparse.Namespace) -> Mortar:
         With ``mortar``, and ``friction`` (no unit), ``tensile_strength`` and ``cohesion`` (Pa) as
         text, or None.
 
-    Returns
-    -------
-    Mortar
-
     Raises
     ------
     ProblemError
@@ -213,10 +193,6 @@ def response_word(name: str, where: str) -> str:
     where : str
         The argument, for messages.
 
-    Returns
-    -------
-    str
-
     Raises
     ------
     ProblemError
@@ -239,10 +215,6 @@ def number_word(text: str, where: str, zero: str = "") -> float:
         The word; the argument, for messages.
     zero : str, optional
         Anything where zero is a number too.
-
-    Returns
-    -------
-    float
 
     Raises
     ------

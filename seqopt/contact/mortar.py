@@ -72,10 +72,6 @@ def bond_mortar(strength: float, friction: float = FRICTION) -> Mortar:
         Pa.
     friction : float, optional
 
-    Returns
-    -------
-    Mortar
-
     Raises
     ------
     SceneError
@@ -96,10 +92,6 @@ def find_mortar(mortar: Mortar | str) -> Mortar:
     ----------
     mortar : Mortar or str
         A mortar, a name of `MORTARS`, or ``bond=STRENGTH`` with a strength in Pa.
-
-    Returns
-    -------
-    Mortar
 
     Raises
     ------

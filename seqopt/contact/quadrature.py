@@ -37,11 +37,6 @@ def face_quadrature(assembly: Assembly, cuts: int = CUTS) -> Quadrature:
     Faces are cut into triangles, each into four ``cuts`` times; the middles of a triangle's edges
     with a third of its area each integrate squares exactly.
 
-    Parameters
-    ----------
-    assembly : Assembly
-    cuts : int, optional
-
     Returns
     -------
     Quadrature

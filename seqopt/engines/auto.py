@@ -115,10 +115,6 @@ class AutoEngine(NamedEngine):
             Node numbers.
         want : Want, optional
 
-        Returns
-        -------
-        Fields
-
         Raises
         ------
         GripError, MechanismError, SolverError

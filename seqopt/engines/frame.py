@@ -70,10 +70,6 @@ class FrameEngine(NamedEngine):
             Node numbers.
         want : Want, optional
 
-        Returns
-        -------
-        Fields
-
         Raises
         ------
         GripError, MechanismError

@@ -127,31 +127,12 @@ SHAPES: dict[str, tuple[int, ...]] = {
 
 @cache
 def names_wanted(want: Want) -> frozenset[str]:
-    """Return the names of the fields that are asked for, grip forces aside.
-
-    Parameters
-    ----------
-    want : Want
-
-    Returns
-    -------
-    frozenset of str
-    """
+    """Return the names of the fields that are asked for, grip forces aside."""
     return frozenset(name for name, flag in FLAGS.items() if want & flag)
 
 
 def keep_wanted(answer: Fields, want: Want) -> Fields:
-    """Return fields without what is not asked for.
-
-    Parameters
-    ----------
-    answer : Fields
-    want : Want
-
-    Returns
-    -------
-    Fields
-    """
+    """Return fields without what is not asked for."""
     dropped = FLAGS.keys() - names_wanted(want)
     return replace(answer, **{name: getattr(answer, name)[:, :0] for name in dropped})
 

@@ -44,10 +44,6 @@ def select_sets(answer: Fields, which: Bools | Ints) -> Fields:
     ----------
     answer : Fields
     which : (S,) bool or (s,) int
-
-    Returns
-    -------
-    Fields
     """
     return Fields(**{name: getattr(answer, name)[which] for name in NAMES})
 
@@ -62,10 +58,6 @@ def join_sets(parts: Sequence[Fields], which: Sequence[Bools | slice] | None = N
     which : sequence of ((S,) bool or slice), optional
         Which of all sets are those of each part, in their order; by default one part's come after
         another's.
-
-    Returns
-    -------
-    Fields
     """
     after = np.cumsum([len(part.grip_force) for part in parts])
     total = int(after[-1])
@@ -86,9 +78,5 @@ def merge_sets(which: Bools, inside: Fields, outside: Fields) -> Fields:
     which : (S,) bool
         The sets that the first answer is about, in their order.
     inside, outside : Fields
-
-    Returns
-    -------
-    Fields
     """
     return join_sets([inside, outside], [which, ~which])

@@ -61,10 +61,6 @@ class PlanarEngine(NamedEngine):
             Node numbers.
         want : Want, optional
 
-        Returns
-        -------
-        Fields
-
         Raises
         ------
         GripError

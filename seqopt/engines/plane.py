@@ -68,14 +68,6 @@ def find_plane(network: Network) -> Plane | NoPlane:
     """Return the plane of a structure: bricks, springs and gravity lie in it, springs along it.
 
     Bricks may be of any width: their nodes need not lie in the plane, their centroids must.
-
-    Parameters
-    ----------
-    network : Network
-
-    Returns
-    -------
-    Plane or NoPlane
     """
     springs = network.springs
     points = np.vstack([network.centroid, springs.position, springs.anchor])

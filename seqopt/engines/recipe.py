@@ -60,12 +60,7 @@ class Recipe:
 
 @cache
 def arithmetic() -> str:
-    """Return a mark of the code that answers come from: its text, NumPy and SciPy.
-
-    Returns
-    -------
-    str
-    """
+    """Return a mark of the code that answers come from: its text, NumPy and SciPy."""
     home = Path(__file__).parents[1]
     found = (home / name for name in ARITHMETIC)
     files = [
@@ -79,10 +74,6 @@ def arithmetic() -> str:
 
 def recipe_of(engine: object) -> Recipe | None:
     """Return how an engine was made.
-
-    Parameters
-    ----------
-    engine : Engine
 
     Returns
     -------

@@ -56,10 +56,6 @@ def residual(network: Network, bricks: int, columns: Ints, fields: Fields) -> Re
         Grips as indices into ``network.inner.ravel()``.
     fields : Fields
         With joint wrenches and brick twists.
-
-    Returns
-    -------
-    Residuals
     """
     springs, center = network.springs, network.centroid[:bricks]
     acting = springs.acting(bricks)

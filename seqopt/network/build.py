@@ -97,14 +97,6 @@ def _of_bricks(scene: Scene) -> tuple[list[_Node], list[_Edge]]:
 def network_of(given: Network | Scene) -> Network:
     """Return a network, or that of a scene.
 
-    Parameters
-    ----------
-    given : Network or Scene
-
-    Returns
-    -------
-    Network
-
     Raises
     ------
     SceneError

@@ -220,10 +220,6 @@ class Network(Shown, FrozenValue):
         ----------
         bricks : int
             How many bricks stand.
-
-        Returns
-        -------
-        int
         """
         return int(np.searchsorted(self.node_since, bricks, side="right"))
 
@@ -234,10 +230,6 @@ class Network(Shown, FrozenValue):
         ----------
         bricks : int
             How many bricks stand.
-
-        Returns
-        -------
-        int
         """
         return int(np.searchsorted(self.edge_since, bricks, side="right"))
 

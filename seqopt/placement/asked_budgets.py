@@ -55,10 +55,6 @@ class AskedBudget:
         problem : Problem
         bound : float
             How much there is, in its unit.
-
-        Returns
-        -------
-        Budget
         """
         if not self.response:
             return travel(problem, bound)
@@ -75,10 +71,6 @@ def parse_budgets(texts: Sequence[str] | str) -> tuple[AskedBudget, ...]:
         ``robot_use:ROBOT=LEVEL:BOUND``, SI units. A bound of travel is a share of what the optimum
         without budgets travels, or in meters, as ``3.5m``; other bounds are numbers of steps, or
         shares, as ``0.8x``.
-
-    Returns
-    -------
-    tuple of AskedBudget
 
     Raises
     ------
@@ -127,10 +119,6 @@ def with_budgets(problem: Problem, asked: Sequence[AskedBudget]) -> Problem:
     problem : Problem
         Posed with the responses that the budgets name.
     asked : sequence of AskedBudget
-
-    Returns
-    -------
-    Problem
     """
     budgets: list[Budget] = []
     for each in asked:

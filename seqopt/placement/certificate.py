@@ -74,10 +74,6 @@ def certify(problem: PlacementProblem, selection: Selection, aim: Aim) -> Certif
     aim : Aim
         Whether the sum or the peak of the costs was minimized.
 
-    Returns
-    -------
-    Certificate
-
     Raises
     ------
     SolverError
@@ -124,10 +120,6 @@ def certify_partial(costs: PartialCosts, selection: Selection, objective: float)
         What is claimed.
     objective : float
         The costs of the steps that the selection meets, solved again.
-
-    Returns
-    -------
-    Certificate
 
     Raises
     ------
@@ -185,10 +177,6 @@ def least(costs: LayeredCosts, aim: Aim) -> float:
 def least_sum(costs: LayeredCosts) -> float:
     """Return the least sum that any choice reaches, budgets aside: forward, move by move.
 
-    Parameters
-    ----------
-    costs : LayeredCosts
-
     Returns
     -------
     float
@@ -205,10 +193,6 @@ def least_peak(costs: LayeredCosts) -> float:
 
     A value is reached if the choices whose costs do not exceed it connect the first move to the
     last.
-
-    Parameters
-    ----------
-    costs : LayeredCosts
 
     Returns
     -------
@@ -246,10 +230,6 @@ def judge(
         What the formulation claims.
     formulation : Formulation or str
         What made the selection.
-
-    Returns
-    -------
-    Certificate
 
     Raises
     ------

@@ -78,10 +78,6 @@ def refusal(problem: PlacementProblem, name: str) -> InfeasibleError:
         Some choice is allowed, and it is claimed that none is within all budgets.
     name : str
         Of the formulation that claims it.
-
-    Returns
-    -------
-    InfeasibleError
     """
     found = smallest_conflict(problem)
     if not found:

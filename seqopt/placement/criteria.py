@@ -90,10 +90,6 @@ class RankSum(Terse):
         ----------
         facts : SceneFacts
             Of the scene.
-
-        Returns
-        -------
-        RankSum
         """
         crown = self.crown
         if self.before == self.after:
@@ -185,10 +181,6 @@ class WeightedSum(Terse):
         ----------
         facts : SceneFacts
             Of the scene.
-
-        Returns
-        -------
-        WeightedSum
         """
         terms = spell_out(self.terms, facts.robots)
         scaled = tuple(
@@ -262,10 +254,6 @@ class WorstRatio(Terse):
         ----------
         facts : SceneFacts
             Of the scene.
-
-        Returns
-        -------
-        WorstRatio
         """
         limits = spell_out(self.limits, facts.robots)
         name = named(self.name, facts, [scale for _, scale in limits])

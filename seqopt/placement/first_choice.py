@@ -55,17 +55,7 @@ def stopped(
 
 
 def at_least(costs: LayeredCosts, aim: Aim) -> float:
-    """Return what each move costs at least, together: a bound that takes no search.
-
-    Parameters
-    ----------
-    costs : LayeredCosts
-    aim : Aim
-
-    Returns
-    -------
-    float
-    """
+    """Return what each move costs at least, together: a bound that takes no search."""
     if aim is Aim.SUM:
         arcs = (shared + single for shared, single in zip(costs.shared, costs.single, strict=True))
         return sum(float(arc.min()) for arc in arcs)

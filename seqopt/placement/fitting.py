@@ -18,12 +18,6 @@ def require_fit(
 ) -> None:
     """Raise an error unless a formulation can solve a problem and has the given options.
 
-    Parameters
-    ----------
-    problem : PlacementProblem
-    formulation : Formulation
-    options : mapping of str to object
-
     Raises
     ------
     ProblemError
@@ -64,10 +58,6 @@ def require_time(formulation: Formulation, time_limit: float) -> None:
 
 def require_proof(proof: object) -> None:
     """Raise an error where a lazy search is to leave out the proof, which is all it is for.
-
-    Parameters
-    ----------
-    proof : bool
 
     Raises
     ------

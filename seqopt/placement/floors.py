@@ -11,10 +11,6 @@ from seqopt.placement.requirements import Criterion
 def floor_of(criterion: Criterion) -> float | None:
     """Return what a step costs at least, from zero.
 
-    Parameters
-    ----------
-    criterion : Criterion
-
     Returns
     -------
     float or None

@@ -131,10 +131,6 @@ def layered_flow(problem: PlacementProblem) -> LayeredFlow:
     problem : PlacementProblem
         Its sums and budgets are used.
 
-    Returns
-    -------
-    LayeredFlow
-
     Raises
     ------
     InfeasibleError
@@ -168,14 +164,6 @@ def layered_flow(problem: PlacementProblem) -> LayeredFlow:
 
 def within_each(problem: PlacementProblem) -> bool:
     """Return whether a choice is known to be within all budgets; each is tried on its own.
-
-    Parameters
-    ----------
-    problem : PlacementProblem
-
-    Returns
-    -------
-    bool
 
     Raises
     ------

@@ -206,10 +206,6 @@ def find_formulation(name: str) -> Formulation:
     name : str
         One of `formulation_names`, or of an exhibit.
 
-    Returns
-    -------
-    Formulation
-
     Raises
     ------
     ProblemError
@@ -226,14 +222,6 @@ def find_formulation(name: str) -> Formulation:
 def as_formulation(given: Formulation | str) -> Formulation:
     """Return a formulation, by name or itself.
 
-    Parameters
-    ----------
-    given : Formulation or str
-
-    Returns
-    -------
-    Formulation
-
     Raises
     ------
     ProblemError
@@ -248,14 +236,5 @@ def as_formulation(given: Formulation | str) -> Formulation:
 
 
 def said(error: BaseException) -> str:
-    """Return the message of an error in one line.
-
-    Parameters
-    ----------
-    error : BaseException
-
-    Returns
-    -------
-    str
-    """
+    """Return the message of an error in one line."""
     return " ".join(f"{type(error).__name__}: {error}".split())

@@ -46,10 +46,6 @@ def ask(problem: FreeProblem, bricks: int, grips: Ints) -> Answers:
     bricks : int
     grips : (S, r) int
         Nodes held.
-
-    Returns
-    -------
-    Answers
     """
     parts = [_asked(problem, bricks, grips[:0])]
     for start in range(0, len(grips), BATCH):

@@ -46,10 +46,6 @@ def with_held(problem: FreeProblem, graph: Graph, held: Bools) -> Graph:
     graph : Graph
     held : (n,) bool
         Which states hold as many grips as wanted.
-
-    Returns
-    -------
-    Graph
     """
     if problem.rules.ending is Ending.HELD:
         return replace(graph, ends=graph.ends & held)

@@ -56,12 +56,7 @@ class FreeFront:
         return f"<FreeFront of {self._problem}>"
 
     def anew(self) -> FreeFront:
-        """Return the same problem with nothing known of it, for its judge.
-
-        Returns
-        -------
-        FreeFront
-        """
+        """Return the same problem with nothing known of it, for its judge."""
         return FreeFront(replace(self._problem), self._rounding)
 
     @property
@@ -146,10 +141,6 @@ class FreeFront:
         Parameters
         ----------
         bounds : (k,) float
-
-        Returns
-        -------
-        bool
         """
         graph = self._below(bounds)
         if not self._counted:
@@ -182,10 +173,6 @@ class FreeFront:
         ----------
         plan : tuple of tuple of int
             Its states.
-
-        Returns
-        -------
-        tuple of Step
         """
         return steps_of(self._problem.space, plan)  # type: ignore[arg-type]
 
@@ -209,11 +196,6 @@ class FreeFront:
 
 def rounding_steps(names: Sequence[str], rounding: Mapping[str, float] | None) -> Floats:
     """Return what every number is rounded up to multiples of; zero where it is not.
-
-    Parameters
-    ----------
-    names : sequence of str
-    rounding : mapping of str to float or None
 
     Returns
     -------

@@ -64,21 +64,12 @@ class Goal:
         ----------
         value : float
             SI units; of a tilt, how far it is from a right angle.
-
-        Returns
-        -------
-        float
         """
         return degrees(pi / 2 - value) if self.response == "tilt" else value
 
 
 def judged_by(goals: Sequence[Goal], criterion: Criterion) -> dict[str, object]:
     """Return the criterion with its numbers, for a summary.
-
-    Parameters
-    ----------
-    goals : sequence of Goal
-    criterion : Criterion
 
     Returns
     -------
@@ -100,10 +91,6 @@ def parse_goals(text: str) -> tuple[Goal, ...]:
         ``travel``, a response (its worst) or ``sum(RESPONSE)``, with commas between them; also
         ``bond`` and ``friction`` (the least with which every state stands) and ``tilt`` (the
         largest that every state survives).
-
-    Returns
-    -------
-    tuple of Goal
 
     Raises
     ------

@@ -75,10 +75,6 @@ def judge_schedule(
         States that a search visited, by brick count; only the time that the proof takes depends on
         them.
 
-    Returns
-    -------
-    ScheduleCertificate
-
     Raises
     ------
     SolverError
@@ -201,11 +197,6 @@ def state_columns(problem: FreeProblem, table: pd.DataFrame) -> Mapping[str, np.
 
 def travel_of(problem: FreeProblem, steps: Sequence[Step]) -> float:
     """Return how far robots go from one grip to the next.
-
-    Parameters
-    ----------
-    problem : FreeProblem
-    steps : sequence of Step
 
     Returns
     -------

@@ -58,10 +58,6 @@ class Closed(NamedTuple):
 class Passable:
     """Which states may be passed, with responses that the engine computes again.
 
-    Parameters
-    ----------
-    problem : FreeProblem
-
     Attributes
     ----------
     tables : RuleTables
@@ -94,10 +90,6 @@ class Passable:
             Some of them perhaps more than once.
         asked : Asked
             As of `valued`, which says which ones may be passed.
-
-        Returns
-        -------
-        Closed
         """
         seen, count, fresh = np.zeros(0, dtype=np.int64), 0, entries
         parts = [Closed(seen, entries[:0], np.zeros((0, len(self.problem.goals))), [])]

@@ -238,10 +238,6 @@ def solve_free(
     **options
         Of the formulation; ``progress`` is told in a few words how far it is.
 
-    Returns
-    -------
-    FreePlan
-
     Raises
     ------
     InfeasibleError

@@ -76,10 +76,6 @@ class Proof:
         ----------
         margins : sequence of float, optional
             Of the first goals.
-
-        Returns
-        -------
-        bool
         """
         graph = _Levels(self._passable, self._told, Asked((), margins)).graph()
         self.states = max(self.states, graph.states)

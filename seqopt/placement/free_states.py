@@ -125,10 +125,6 @@ def explore(
         From how many new states of a brick count the search goes on, and without regrips.
     tell : callable, optional
         Called after every level; may raise to end the search.
-
-    Returns
-    -------
-    Explorer
     """
     asked = bool(problem.demands) or any(goal.of_margins for goal in problem.goals)
     space = FreeStates(problem, regrips=width is None, standing=asked)

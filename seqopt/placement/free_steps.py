@@ -19,10 +19,6 @@ def steps_of(space: FreeSpace, states: Sequence[Sequence[int]]) -> tuple[Step, .
     states : sequence of sequence of int
         As of a `seqopt.placement.schedule_selection.ScheduleSelection`.
 
-    Returns
-    -------
-    tuple of Step
-
     Raises
     ------
     SolverError

@@ -161,10 +161,6 @@ def find_front(
     progress : callable, optional
         Told how far it is, in a few words or as a `seqopt.work.Stage`.
 
-    Returns
-    -------
-    Front
-
     Raises
     ------
     InfeasibleError

@@ -115,14 +115,6 @@ def checksum(value: object) -> bytes:
     """Return a checksum of a value: of its arrays, numbers, texts and fields, and of its methods.
 
     Engines count as themselves, with the scene that they are for: what they keep may grow.
-
-    Parameters
-    ----------
-    value : object
-
-    Returns
-    -------
-    bytes
     """
     digest = hashlib.blake2b(digest_size=16)
     _add(digest, value)

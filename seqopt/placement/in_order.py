@@ -45,10 +45,6 @@ def solve_in_order(goals: Sequence[tuple[PlacementProblem, Aim]]) -> InOrder:
         Problems of the same moves, each under its own criterion, and whether its sum or its peak is
         to minimize; the most important first.
 
-    Returns
-    -------
-    InOrder
-
     Raises
     ------
     InfeasibleError

@@ -28,10 +28,6 @@ class Aim(Enum):
     def costs(self, problem: PlacementProblem) -> LayeredCosts:
         """Return the costs of a problem that this aim is about.
 
-        Parameters
-        ----------
-        problem : PlacementProblem
-
         Returns
         -------
         LayeredCosts
@@ -156,10 +152,6 @@ class CostProblem(FrozenValue):
         ----------
         choice : sequence of int
             A candidate for every move.
-
-        Returns
-        -------
-        tuple of int
         """
         return tuple(choice)
 

@@ -55,10 +55,6 @@ class Joined:
     def single(self, move: int) -> Floats:
         """Return the costs of a move's candidates where it alone is open.
 
-        Parameters
-        ----------
-        move : int
-
         Returns
         -------
         (C_k,) float

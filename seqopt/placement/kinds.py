@@ -13,16 +13,6 @@ from seqopt.sequence.schedule import Schedule
 def robots_of(engine: Engine, schedule: Schedule, criterion: Criterion) -> list[str]:
     """Return the names of a schedule's robots if all is what it should be, and grips are open.
 
-    Parameters
-    ----------
-    engine : Engine
-    schedule : Schedule
-    criterion : Criterion
-
-    Returns
-    -------
-    list of str
-
     Raises
     ------
     ProblemError

@@ -58,12 +58,7 @@ class LoopFront:
         return f"<LoopFront of {self._problem.schedule}: {', '.join(self._names)}>"
 
     def anew(self) -> LoopFront:
-        """Return the same problem with nothing known of it, for its judge.
-
-        Returns
-        -------
-        LoopFront
-        """
+        """Return the same problem with nothing known of it, for its judge."""
         posed = self._problem
         return LoopFront(posed.engine, posed.schedule, self._names, posed.limits, self._rounding)
 
@@ -144,10 +139,6 @@ class LoopFront:
         Parameters
         ----------
         bounds : (k,) float
-
-        Returns
-        -------
-        bool
         """
         open_to = None
         for single, shared in zip(*(part[::-1] for part in self._costs), strict=True):
@@ -157,16 +148,7 @@ class LoopFront:
         return bool(open_to is not None and not open_to.any()) or not (self._floor < bounds).all()
 
     def steps(self, plan: object) -> tuple[Step, ...]:
-        """Return the checked steps of a choice.
-
-        Parameters
-        ----------
-        plan : tuple of int
-
-        Returns
-        -------
-        tuple of Step
-        """
+        """Return the checked steps of a choice."""
         return self._problem.steps(plan)  # type: ignore[arg-type]
 
     def values(self, steps: Sequence[Step], claimed: Floats) -> Floats:

@@ -21,10 +21,6 @@ def whole_bound(problem: OrderProblem) -> float:
 
     Every plan of every order passes such a state, and the one in which nobody holds if it ends so.
 
-    Parameters
-    ----------
-    problem : OrderProblem
-
     Returns
     -------
     float

@@ -179,10 +179,6 @@ def solve_order(
     **options
         Of the formulation.
 
-    Returns
-    -------
-    OrderPlan
-
     Raises
     ------
     InfeasibleError, ProblemError

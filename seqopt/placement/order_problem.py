@@ -91,10 +91,6 @@ class OrderProblem(Shown):
         ----------
         placed : frozenset of int
             Names of those that stand.
-
-        Returns
-        -------
-        tuple of int
         """
         left = [name for name in self.scene.build_order if name not in placed]
         if self.among is Orders.ANY:
@@ -112,37 +108,15 @@ class OrderProblem(Shown):
         ----------
         order : sequence of int
             Names of all bricks.
-
-        Returns
-        -------
-        bool
         """
         return all(b in self.next_bricks(frozenset(order[:k])) for k, b in enumerate(order))
 
     def judging(self, order: Order) -> FreeProblem:
-        """Return the free schedule of one order with the goal that orders are judged by alone.
-
-        Parameters
-        ----------
-        order : tuple of int
-
-        Returns
-        -------
-        FreeProblem
-        """
+        """Return the free schedule of one order with the goal that orders are judged by alone."""
         return replace(self.at(order), goals=self.free.goals[:1])
 
     def at(self, order: Order) -> FreeProblem:
-        """Return the free schedule of one order.
-
-        Parameters
-        ----------
-        order : tuple of int
-
-        Returns
-        -------
-        FreeProblem
-        """
+        """Return the free schedule of one order."""
         recipe = recipe_of(self.free.engine)
         assert recipe is not None
         network = build_network(self.scene, order)

@@ -39,11 +39,6 @@ class Trial:
 def worth(problem: OrderProblem, trial: Trial) -> float:
     """Return the first goal of the best plan of an order.
 
-    Parameters
-    ----------
-    problem : OrderProblem
-    trial : Trial
-
     Returns
     -------
     float

@@ -102,10 +102,6 @@ class StepCost:
         ----------
         facts : SceneFacts
             Of the scene.
-
-        Returns
-        -------
-        StepCost
         """
         terms = spell_out(tuple((name,) for name in self.responses), facts.robots)
         return replace(self, responses=tuple(name for (name,) in terms))

@@ -87,10 +87,6 @@ def search_pairs(problem: Problem, formulation: Formulation, watch: Watch) -> Pa
     watch : Watch
         Says when to stop, and is told every better choice and bound.
 
-    Returns
-    -------
-    PairSearch
-
     Raises
     ------
     InfeasibleError

@@ -113,10 +113,6 @@ class PartialCosts(FrozenValue):
     def worth_a_look(self, move: int, before: int) -> Bools:
         """Return which candidates of a move, after one of the move before, could still be better.
 
-        Parameters
-        ----------
-        move, before : int
-
         Returns
         -------
         (C_k,) bool
@@ -148,16 +144,7 @@ class PartialCosts(FrozenValue):
 
 
 def least_possible(costs: PartialCosts) -> float:
-    """Return a lower bound on the cost of any choice, over all pairs of one move at a time.
-
-    Parameters
-    ----------
-    costs : PartialCosts
-
-    Returns
-    -------
-    float
-    """
+    """Return a lower bound on the cost of any choice, over all pairs of one move at a time."""
     so_far = costs.single[0]
     for single, rows in zip(costs.single[1:], costs.rows[1:], strict=True):
         pairs = np.full((len(so_far), len(single)), costs.floor)

@@ -86,10 +86,6 @@ class PricedPaths:
         ----------
         choice : sequence of int
             A candidate for every move.
-
-        Returns
-        -------
-        Path
         """
         pairs = list(zip((0, *choice[:-1]), choice, strict=True))
         cost = sum(float(arc[pair]) for arc, pair in zip(self.arcs, pairs, strict=True))
@@ -148,10 +144,6 @@ class PricedPaths:
         ----------
         prices : (B,) float
             Scaled.
-
-        Returns
-        -------
-        dict of str to float
         """
         worth = self.scale * prices / self.units
         return {name: float(price) for name, price in zip(self.names, worth, strict=True)}
@@ -164,10 +156,6 @@ def priced_paths(problem: PlacementProblem) -> PricedPaths:
     ----------
     problem : PlacementProblem
         Its sums and budgets are used.
-
-    Returns
-    -------
-    PricedPaths
 
     Raises
     ------

@@ -54,10 +54,6 @@ def best_prices(paths: PricedPaths, watch: Watch) -> Priced:
     watch : Watch
         Is told bounds and choices.
 
-    Returns
-    -------
-    Priced
-
     Raises
     ------
     InfeasibleError

@@ -210,10 +210,6 @@ class Problem(Shown):
         ----------
         choice : sequence of int
             A candidate for every move.
-
-        Returns
-        -------
-        tuple of int
         """
         return tuple(m.candidates[c] for m, c in zip(self.schedule.moves, choice, strict=True))
 
@@ -224,10 +220,6 @@ class Problem(Shown):
         ----------
         choice : sequence of int
             A candidate for every move.
-
-        Returns
-        -------
-        tuple of Step
 
         Raises
         ------

@@ -130,10 +130,6 @@ def response_along(scene: Scene, table: pd.DataFrame, name: str) -> np.ndarray:
 def require_possible(problem: Problem) -> None:
     """Raise an error if a step without an open grip exceeds a limit: no choice can keep it.
 
-    Parameters
-    ----------
-    problem : Problem
-
     Raises
     ------
     InfeasibleError

@@ -56,10 +56,6 @@ def rank_of(costs: Floats, chosen: int) -> int:
         Equal if they differ by less than ``TIED`` of the largest.
     chosen : int
         Index of the candidate.
-
-    Returns
-    -------
-    int
     """
     return int((costs < costs[chosen] - _tie(costs)).sum()) + 1
 

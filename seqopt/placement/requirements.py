@@ -138,10 +138,6 @@ def as_limits(given: Sequence[Limit] | Limit) -> tuple[Limit, ...]:
     ----------
     given : sequence of Limit, or Limit
 
-    Returns
-    -------
-    tuple of Limit
-
     Raises
     ------
     ProblemError
@@ -158,10 +154,6 @@ def as_limits(given: Sequence[Limit] | Limit) -> tuple[Limit, ...]:
 
 def payload_limits(scene: Scene) -> tuple[Limit, ...]:
     """Return limits that keep every robot of a scene within its payload.
-
-    Parameters
-    ----------
-    scene : Scene
 
     Returns
     -------
@@ -196,10 +188,6 @@ class ResponsesAsked(Terse):
         ----------
         bricks : int
             Bricks placed when the move is made.
-
-        Returns
-        -------
-        frozenset of str
         """
         named = {*self.criterion.wanted(bricks), *(limit.response for limit in self.limits)}
         return frozenset(named | {*self.also})

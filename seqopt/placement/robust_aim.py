@@ -89,10 +89,6 @@ class RobustAim:
     def ordered_weights(self, count: int) -> Floats:
         """Return the weights of scenarios from the worst to the best.
 
-        Parameters
-        ----------
-        count : int
-
         Returns
         -------
         (count,) float
@@ -109,10 +105,6 @@ class RobustAim:
         ----------
         values : (S,) float
             A total or a peak for every scenario.
-
-        Returns
-        -------
-        float
         """
         return float(self.each(np.asarray(values, dtype=float)[None])[0])
 
@@ -146,10 +138,6 @@ def cvar(level: float) -> RobustAim:
     level : float
         Share of the scenarios that is left out, from 0 to below 1: 0.9 is the mean of the worst
         tenth.
-
-    Returns
-    -------
-    RobustAim
     """
     return RobustAim(RobustKind.CVAR, level)
 
@@ -161,10 +149,6 @@ def parse_robust(text: str) -> RobustAim:
     ----------
     text : str
         ``worst-peak``, ``worst-total`` or as ``cvar=0.9``.
-
-    Returns
-    -------
-    RobustAim
 
     Raises
     ------

@@ -218,17 +218,7 @@ def _least_total(
 
 
 def best_choice(costs: LayeredCosts, aim: Aim) -> Selection:
-    """Return the best choice of one scenario, not checked.
-
-    Parameters
-    ----------
-    costs : LayeredCosts
-    aim : Aim
-
-    Returns
-    -------
-    Selection
-    """
+    """Return the best choice of one scenario, not checked."""
     return select(find_formulation(CHOOSES[aim]), CostProblem(costs))
 
 

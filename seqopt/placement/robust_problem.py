@@ -70,16 +70,7 @@ class RobustProblem(Shown):
         return {"respond": self._found[1]}
 
     def under(self, aim: RobustAim) -> RobustProblem:
-        """Return the same problem with another aim; costs that are known stay known.
-
-        Parameters
-        ----------
-        aim : RobustAim
-
-        Returns
-        -------
-        RobustProblem
-        """
+        """Return the same problem with another aim; costs that are known stay known."""
         return self._kept(replace(self, aim=aim))
 
     def first(self, count: int) -> RobustProblem:
@@ -89,10 +80,6 @@ class RobustProblem(Shown):
         ----------
         count : int
             How many, from 1.
-
-        Returns
-        -------
-        RobustProblem
         """
         return self._kept(replace(self, scenes=self.scenes[: max(count, 1)]))
 
@@ -126,10 +113,6 @@ class RobustProblem(Shown):
         ----------
         aim : Aim
             Sums or peaks.
-
-        Returns
-        -------
-        tuple of LayeredCosts
         """
         return tuple(c.sums if aim is Aim.SUM else c.peaks for c in self.costs)
 
@@ -140,10 +123,6 @@ class RobustProblem(Shown):
         ----------
         choice : sequence of int
             A candidate for every move.
-
-        Returns
-        -------
-        tuple of Step
         """
         return self.nominal.steps(choice)
 
@@ -227,10 +206,6 @@ def largest_of(layers: Sequence[LayeredCosts]) -> LayeredCosts:
     ----------
     layers : sequence of LayeredCosts
         Of the same moves.
-
-    Returns
-    -------
-    LayeredCosts
 
     Raises
     ------

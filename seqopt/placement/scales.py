@@ -58,10 +58,6 @@ class Units:
     def of(self, response: str) -> float:
         """Return the unit of a response, by its first letter.
 
-        Parameters
-        ----------
-        response : str
-
         Returns
         -------
         float
@@ -80,10 +76,6 @@ class Units:
 def scene_units(network: Network) -> Units:
     """Return the units of a scene.
 
-    Parameters
-    ----------
-    network : Network
-
     Returns
     -------
     Units
@@ -98,10 +90,6 @@ def scene_units(network: Network) -> Units:
 
 def own_scales(network: Network) -> Mapping[str, float]:
     """Return scales that every scene has, for one that no fixed method builds.
-
-    Parameters
-    ----------
-    network : Network
 
     Returns
     -------
@@ -129,10 +117,6 @@ def crown(scene: Scene) -> float:
 
     The crown is the first of the highest bricks, by their centroids, if the build rises to it and
     comes down again after it.
-
-    Parameters
-    ----------
-    scene : Scene
 
     Returns
     -------

@@ -144,10 +144,6 @@ def scenario_arcs(layers: Sequence[LayeredCosts], aim: RobustAim) -> ScenarioArc
     layers : sequence of LayeredCosts
         One for every scenario, of the same moves.
     aim : RobustAim
-
-    Returns
-    -------
-    ScenarioArcs
     """
     arcs, shut = [], []
     for k in range(len(layers[0].single)):

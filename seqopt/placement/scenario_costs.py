@@ -74,12 +74,7 @@ class ScenarioTask:
     resources: Resources
 
     def problem(self) -> Problem:
-        """Return the placement problem of this scenario.
-
-        Returns
-        -------
-        Problem
-        """
+        """Return the placement problem of this scenario."""
         recipe = self.recipe
         engine = make_engine(recipe.engine, recipe.scene, **recipe.options)  # type: ignore[arg-type]
         asked = ResponsesAsked(self.criterion, self.limits, self.also)
@@ -95,10 +90,6 @@ def tasks_of(problem: Problem, scenes: Sequence[Scene]) -> tuple[ScenarioTask, .
     problem : Problem
         The nominal one.
     scenes : sequence of Scene
-
-    Returns
-    -------
-    tuple of ScenarioTask
 
     Raises
     ------

@@ -63,10 +63,6 @@ def close_gap(arcs: ScenarioArcs, weighed: Weighed, watch: Watch, width: int = W
         Says when to stop, and is told what is found.
     width : int, optional
         How many beginnings are kept after every move.
-
-    Returns
-    -------
-    Searched
     """
     choice, value = weighed.choice, weighed.value
     for start in sorted(weighed.met, key=lambda c: arcs.aim.value(arcs.totals(c)))[:IMPROVED]:

@@ -63,10 +63,6 @@ def best_weights(arcs: ScenarioArcs, watch: Watch) -> Weighed:
     watch : Watch
         Is told choices and bounds.
 
-    Returns
-    -------
-    Weighed
-
     Raises
     ------
     SolverError

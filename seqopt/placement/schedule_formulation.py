@@ -111,10 +111,6 @@ def find_schedule_formulation(
     finds : Finds, optional
         What it has to answer.
 
-    Returns
-    -------
-    ScheduleFormulation
-
     Raises
     ------
     ProblemError

@@ -52,10 +52,6 @@ def with_numbers(name: str, found: ScheduleSelection, goals: int) -> ScheduleSel
     goals : int
         How many goals there are.
 
-    Returns
-    -------
-    ScheduleSelection
-
     Raises
     ------
     SolverError

@@ -126,10 +126,6 @@ class ShownBuild(Shown):
         first, last : int, optional
             Numbers of the first and the last step that are drawn; by default all.
 
-        Returns
-        -------
-        matplotlib.figure.Figure
-
         Raises
         ------
         ExtraError

@@ -151,14 +151,6 @@ def _solve_free(
 def on_the_way(plan: Plan) -> Plan:
     """Return a plan, for whoever has more to do than to solve; an interrupt ends that too.
 
-    Parameters
-    ----------
-    plan : Plan
-
-    Returns
-    -------
-    Plan
-
     Raises
     ------
     KeyboardInterrupt

@@ -65,10 +65,6 @@ class Standing:
             One of `MARGINS`.
         value : float
             As goals count it.
-
-        Returns
-        -------
-        Standing
         """
         if name == "tilt":
             return Standing(self.mortar, max(0.0, pi / 2 - value))
@@ -99,16 +95,7 @@ class Standing:
 
 
 def without_implied(demands: Sequence[Standing]) -> tuple[Standing, ...]:
-    """Return demands without those that another one implies.
-
-    Parameters
-    ----------
-    demands : sequence of Standing
-
-    Returns
-    -------
-    tuple of Standing
-    """
+    """Return demands without those that another one implies."""
     out = set(demands)
     implied = {one for one in out if any(other._implies(one) for other in out - {one})}
     return tuple(demand for demand in dict.fromkeys(demands) if demand not in implied)
@@ -284,10 +271,6 @@ def slack(name: str, value: float) -> float:
     name : str
         One of `MARGINS`.
     value : float
-
-    Returns
-    -------
-    float
     """
     share, least = NARROW[name]
     return max(share * abs(value), least)

@@ -73,11 +73,6 @@ class StandingProof:
 def proven_margins(problem: FreeProblem, steps: Sequence[Step]) -> dict[str, float]:
     """Return the margins of a plan by the cone program, and require that every step stands.
 
-    Parameters
-    ----------
-    problem : FreeProblem
-    steps : sequence of Step
-
     Returns
     -------
     dict of str to float
@@ -101,17 +96,7 @@ def proven_margins(problem: FreeProblem, steps: Sequence[Step]) -> dict[str, flo
 
 
 def certified(problem: FreeProblem, steps: Sequence[Step]) -> tuple[Stability, ...]:
-    """Return verdict and margins of every step by the cone program; of equal ones once.
-
-    Parameters
-    ----------
-    problem : FreeProblem
-    steps : sequence of Step
-
-    Returns
-    -------
-    tuple of Stability
-    """
+    """Return verdict and margins of every step by the cone program; of equal ones once."""
     mortar = (problem.standing or Standing()).mortar
     for step in steps:
         if (step.bricks, step.grips) not in problem.certified:
@@ -122,10 +107,6 @@ def certified(problem: FreeProblem, steps: Sequence[Step]) -> tuple[Stability, .
 
 def worst_margins(results: Sequence[Stability]) -> dict[str, float]:
     """Return the worst margins of any step, as goals count them.
-
-    Parameters
-    ----------
-    results : sequence of Stability
 
     Returns
     -------

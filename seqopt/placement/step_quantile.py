@@ -61,10 +61,6 @@ def least_quantile(problem: Problem, share: float = 0.1) -> StepQuantile:
     share : float, optional
         Of the open steps, from 0 (the least peak) to below 1.
 
-    Returns
-    -------
-    StepQuantile
-
     Raises
     ------
     InfeasibleError

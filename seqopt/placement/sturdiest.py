@@ -78,10 +78,6 @@ def with_margin(problem: FreeProblem, name: str, value: float) -> FreeProblem:
         One of `seqopt.placement.standing.MARGINS`.
     value : float
         As goals count it.
-
-    Returns
-    -------
-    FreeProblem
     """
     demand = (problem.standing or Standing()).demanding(name, value)
     return replace(problem, settled=(*problem.settled, demand))

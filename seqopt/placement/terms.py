@@ -21,12 +21,6 @@ Number = TypeVar("Number")
 def scale_of(facts: SceneFacts, response: str, given: float | None) -> float:
     """Return the scale of a response: that which is given, or the scene's.
 
-    Parameters
-    ----------
-    facts : SceneFacts
-    response : str
-    given : float or None
-
     Returns
     -------
     float
@@ -54,10 +48,6 @@ def named(name: str, facts: SceneFacts, given: Sequence[float | None]) -> str:
     facts : SceneFacts
     given : sequence of float or None
         Its scales before it was posed, None where it takes them from the scene.
-
-    Returns
-    -------
-    str
     """
     return name + facts.basis if None in given else name
 
@@ -108,10 +98,6 @@ def spell_out(terms: tuple[Term, ...], robots: Sequence[str]) -> tuple[Term, ...
     terms : tuple of Term
     robots : sequence of str
         Their names.
-
-    Returns
-    -------
-    tuple of Term
 
     Raises
     ------

@@ -127,10 +127,6 @@ class Watch:
 def trace_rows(trace: Sequence[Finding]) -> list[dict[str, float]]:
     """Return a trace as rows of a table.
 
-    Parameters
-    ----------
-    trace : sequence of Finding
-
     Returns
     -------
     list of dict of str to float

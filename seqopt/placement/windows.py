@@ -97,16 +97,7 @@ def window_anew(evaluation: Evaluation, move: int, before: int) -> tuple[StepCho
 
 
 def by_move(steps: Sequence[StepChoices]) -> Mapping[int, Sequence[StepChoices]]:
-    """Return the steps that each move decides: those in which it is the last that is open.
-
-    Parameters
-    ----------
-    steps : sequence of StepChoices
-
-    Returns
-    -------
-    mapping of int to sequence of StepChoices
-    """
+    """Return the steps that each move decides: those in which it is the last that is open."""
     found: dict[int, list[StepChoices]] = {}
     for choices in steps:
         found.setdefault(choices.moves[-1], []).append(choices)
@@ -147,10 +138,6 @@ def pairs_as_moves(
         A move, and a candidate of the move before it.
     wanted : sequence of (c,) int
         The candidates of the move that are looked at.
-
-    Returns
-    -------
-    Schedule
     """
     moves, steps = [], []
     for n, ((k, before), some) in enumerate(zip(asked, wanted, strict=True)):

@@ -56,10 +56,6 @@ def ended(table: pd.DataFrame) -> pd.Series[float]:
     ----------
     table : pandas.DataFrame
         From `seqopt.analyze`.
-
-    Returns
-    -------
-    pandas.Series
     """
     count = table.groupby("bricks")["step"].transform("count")
     rank = table.groupby("bricks").cumcount()
@@ -84,10 +80,6 @@ def worst_steps(table: pd.DataFrame) -> pd.DataFrame:
 
 def merged(tables: Mapping[str, pd.DataFrame]) -> dict[str, tuple[str, ...]]:
     """Return the names of tables by the first one with the same numbers.
-
-    Parameters
-    ----------
-    tables : mapping of str to pandas.DataFrame
 
     Returns
     -------

@@ -17,10 +17,6 @@ def build_page(plan: ShownBuild, *others: ShownBuild) -> Page:
     *others : plan
         For the same scene.
 
-    Returns
-    -------
-    Page
-
     Raises
     ------
     ProblemError

@@ -30,11 +30,6 @@ def new_panels(
         Of the figure, inches.
     room : float, optional
         For a title above every row, inches.
-
-    Returns
-    -------
-    figure : matplotlib.figure.Figure
-    panels : list of matplotlib.axes.Axes
     """
     columns = min(count, 3)
     rows = -(-count // columns)
@@ -50,10 +45,6 @@ def new_panels(
 
 def seen_box(scene: Scene) -> tuple[Floats, Floats]:
     """Return the lower left and the upper right corner of a structure as it is seen, and some room.
-
-    Parameters
-    ----------
-    scene : Scene
 
     Returns
     -------

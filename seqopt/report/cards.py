@@ -81,10 +81,6 @@ def _images(value: object, title: str) -> str:
 def facts(value: object) -> tuple[str, Rows]:
     """Return what a value is, in a few words, and what there is to say about it.
 
-    Parameters
-    ----------
-    value : object
-
     Returns
     -------
     title : str

@@ -97,10 +97,6 @@ def responses_figure(builds: Mapping[str, pd.DataFrame]) -> Figure:
     ----------
     builds : mapping of str to pandas.DataFrame
         By name, as `seqopt.analyze` makes them; equal ones share a line.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
     """
     plans = merged(builds)
     tables = {_together(names): worst_steps(builds[one]) for one, names in plans.items()}

@@ -66,10 +66,6 @@ class Film:
         path : str or pathlib.Path
             Ends in ``.gif``.
 
-        Returns
-        -------
-        pathlib.Path
-
         Raises
         ------
         FileError

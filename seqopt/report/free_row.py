@@ -80,10 +80,6 @@ def free_plan(
 def free_row(plan: FreePlan) -> dict[str, object]:
     """Return what a free schedule is worth, for a row of the comparison.
 
-    Parameters
-    ----------
-    plan : FreePlan
-
     Returns
     -------
     dict of str to object

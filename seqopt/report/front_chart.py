@@ -46,10 +46,6 @@ def drawn(
         Of `seqopt.placement.front.Front`.
     methods, beside : mapping of str to pandas.DataFrame
         Tables of methods, and of other Pareto sets, by name.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
     """
     names = [str(name) for name in table.columns if name not in ("steps", "regrips")] + ["steps"]
     first, others = names[0], names[1:] or ["regrips"]

@@ -38,10 +38,6 @@ def shown(value: pd.Series[float] | float, name: str) -> pd.Series[float] | floa
         SI units.
     name : str
         Of the number.
-
-    Returns
-    -------
-    float or pandas.Series
     """
     if name == "tilt":
         return value * (-180.0 / np.pi) + 90.0

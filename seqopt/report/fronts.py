@@ -31,10 +31,6 @@ def front_figure(
         Tables of methods to mark, by name; see `seqopt.analyze`.
     beside : mapping of str to pandas.DataFrame, optional
         Tables of other Pareto sets, by name: hollow circles.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
     """
     from seqopt.report.front_chart import drawn  # noqa: PLC0415  # matplotlib is an extra
 

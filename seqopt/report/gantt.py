@@ -49,10 +49,6 @@ def gantt_picture(
     shown : tuple of (int, int or None), optional
         Numbers of the first and the last step that are drawn.
 
-    Returns
-    -------
-    matplotlib.figure.Figure
-
     Raises
     ------
     StepError

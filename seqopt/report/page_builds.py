@@ -45,10 +45,6 @@ def shown_build(
         Responses of its steps.
     departures, stands : optional
         As of `Build`.
-
-    Returns
-    -------
-    Build
     """
     payloads = {robot.payload for robot in scene.robots}
     over = len(payloads) == 1 and overloads(scene, table)
@@ -58,10 +54,6 @@ def shown_build(
 
 def outside_in_words(builds: Sequence[Build]) -> str:
     """Return which builds leave the linear range and what to do; of a single one by what.
-
-    Parameters
-    ----------
-    builds : sequence of Build
 
     Returns
     -------
@@ -76,11 +68,6 @@ def outside_in_words(builds: Sequence[Build]) -> str:
 
 def overloads_in_words(scene: Scene, build: Build) -> str:
     """Return in how many steps payloads are exceeded, and by how much.
-
-    Parameters
-    ----------
-    scene : Scene
-    build : Build
 
     Returns
     -------
@@ -101,11 +88,6 @@ def overloads_in_words(scene: Scene, build: Build) -> str:
 def count_overloads(scene: Scene, builds: Sequence[Build]) -> str:
     """Return how many builds ask a robot for more than its payload.
 
-    Parameters
-    ----------
-    scene : Scene
-    builds : sequence of Build
-
     Returns
     -------
     str
@@ -123,10 +105,6 @@ def worst_in_words(scene: Scene, table: pd.DataFrame) -> str:
     scene : Scene
     table : pandas.DataFrame
         Responses of the steps.
-
-    Returns
-    -------
-    str
     """
     values = largest(scene, table)
     said = {name: f"{number_text(values[name])} {LARGEST[name]}" for name in WORDS}
@@ -135,28 +113,13 @@ def worst_in_words(scene: Scene, table: pd.DataFrame) -> str:
 
 
 def with_legend(caption: str, table: pd.DataFrame) -> str:
-    """Return the caption of a table of builds, with a legend where it says what is wrong with them.
-
-    Parameters
-    ----------
-    caption : str
-    table : pandas.DataFrame
-
-    Returns
-    -------
-    str
-    """
+    """Return the caption of a table of builds, with a legend where it marks what is wrong."""
     said = "".join(f". {name.capitalize()}: {why}" for name, why in LEGEND.items() if name in table)
     return f"{caption}{said}. Such steps are marked in red" if said else caption
 
 
 def worst_table(scene: Scene, builds: Sequence[Build]) -> tuple[str, pd.DataFrame]:
     """Return the largest responses of builds, a row each, under their caption.
-
-    Parameters
-    ----------
-    scene : Scene
-    builds : sequence of Build
 
     Returns
     -------

@@ -60,16 +60,7 @@ class Build:
     departures: Sequence[Departure] = ()
 
     def overloads(self, scene: Scene) -> tuple[Excess, ...]:
-        """Return the payloads that steps exceed.
-
-        Parameters
-        ----------
-        scene : Scene
-
-        Returns
-        -------
-        tuple of Excess
-        """
+        """Return the payloads that steps exceed."""
         return overloads(scene, self.table)
 
 
@@ -111,26 +102,12 @@ class Scatter:
 
 
 def size_of(network: Network, build: Build) -> int:
-    """Return how many numbers the fields of a build are.
-
-    Parameters
-    ----------
-    network : Network
-    build : Build
-
-    Returns
-    -------
-    int
-    """
+    """Return how many numbers the fields of a build are."""
     return len(build.steps) * (6 * len(network.inner) + len(network.edge_nodes))
 
 
 def structure_data(network: Network) -> dict[str, object]:
     """Return a structure as lists, ready for JSON.
-
-    Parameters
-    ----------
-    network : Network
 
     Returns
     -------

@@ -27,10 +27,6 @@ def new_picture(width: float, height: float, *, constrained: bool = True) -> Fig
         Inches.
     constrained : bool, optional
         Whether matplotlib arranges what is drawn.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
     """
     layout = ConstrainedLayoutEngine(h_pad=0.08, w_pad=0.06) if constrained else None
     return _Picture(figsize=(width, height), layout=layout)
@@ -44,10 +40,6 @@ def png(figure: Figure, dpi: float = DPI) -> bytes:
     figure : matplotlib.figure.Figure
     dpi : float, optional
         Pixels per inch.
-
-    Returns
-    -------
-    bytes
     """
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", dpi=dpi)

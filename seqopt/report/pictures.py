@@ -30,10 +30,6 @@ def scene_picture(scene: Scene, bricks: int | None = None, width: float = WIDTH)
         How many, in build order; all by default. The others are drawn pale.
     width : float, optional
         Of the figure, inches.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
     """
     network = build_network(scene)
     count = _bricks(scene, bricks)

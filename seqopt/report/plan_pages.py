@@ -62,10 +62,6 @@ def plan_page(  # a plan, what there is to say about it, and what is beside it
         Of every step, whether it stands.
     others : mapping of str to pandas.DataFrame, optional
         Responses of the steps of other plans for the scene, by name.
-
-    Returns
-    -------
-    str
     """
     scene, within = engine.network.scene, LinearRange(engine)
     tables = {name: table, **(others or {})}
@@ -89,17 +85,7 @@ def plan_page(  # a plan, what there is to say about it, and what is beside it
 
 
 def comparison_page(engine: Engine, result: Comparison) -> str:
-    """Return the page of a comparison.
-
-    Parameters
-    ----------
-    engine : Engine
-    result : Comparison
-
-    Returns
-    -------
-    str
-    """
+    """Return the page of a comparison."""
     scene = engine.network.scene
     builds = [
         shown_build(scene, name, table, result.departures.get(name, ()))
@@ -125,15 +111,6 @@ def comparison_page(engine: Engine, result: Comparison) -> str:
 def folder_page(engine: Engine, folder: Path) -> str:
     """Return the page of the plans in a folder that a command has written.
 
-    Parameters
-    ----------
-    engine : Engine
-    folder : pathlib.Path
-
-    Returns
-    -------
-    str
-
     Raises
     ------
     FileError, StepError
@@ -149,15 +126,6 @@ def folder_page(engine: Engine, folder: Path) -> str:
 
 def folder_builds(engine: Engine, folder: Path) -> list[Build]:
     """Return the plans in a folder that a command has written, analyzed.
-
-    Parameters
-    ----------
-    engine : Engine
-    folder : pathlib.Path
-
-    Returns
-    -------
-    list of Build
 
     Raises
     ------
@@ -196,10 +164,6 @@ def front_page(
         Responses of the steps of each.
     departures : sequence of sequence of Departure
         The limits of the linear range that each leaves.
-
-    Returns
-    -------
-    str
     """
     scene = engine.network.scene
     names = [f"point {number}" for number in range(1, len(plans) + 1)]

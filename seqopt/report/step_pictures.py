@@ -65,10 +65,6 @@ def steps_picture(
     magnify : float, optional
         How many times larger displacements are drawn.
 
-    Returns
-    -------
-    matplotlib.figure.Figure
-
     Raises
     ------
     StepError
@@ -174,10 +170,6 @@ def caption(scene: Scene, step: Step, count: int) -> str:
     step : Step
     count : int
         How many steps the build has.
-
-    Returns
-    -------
-    str
     """
     newest = scene.placed[step.bricks - 1].name
     what = {

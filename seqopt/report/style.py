@@ -81,12 +81,7 @@ class Look:
     dashes: Any
 
     def line(self) -> dict[str, Any]:
-        """Return arguments of `matplotlib.axes.Axes.plot` for a line with marks.
-
-        Returns
-        -------
-        dict of str to object
-        """
+        """Return arguments of `matplotlib.axes.Axes.plot` for a line with marks."""
         return {"color": self.color, "marker": self.marker, "ls": self.dashes}
 
     def mark(self, *, filled: bool = True) -> dict[str, Any]:
@@ -96,10 +91,6 @@ class Look:
         ----------
         filled : bool, optional
             Whether the marks are filled.
-
-        Returns
-        -------
-        dict of str to object
         """
         face = self.color if filled else "white"
         return {"color": self.color, "marker": self.marker, "ls": "none", "mfc": face}
@@ -110,14 +101,6 @@ def look(number: int) -> Look:
 
     Two of them differ in color or in marker; of the first seven each color is one's own, of the
     first ten each marker.
-
-    Parameters
-    ----------
-    number : int
-
-    Returns
-    -------
-    Look
     """
     return Look(
         COLORS[number % len(COLORS)],
@@ -127,16 +110,7 @@ def look(number: int) -> Look:
 
 
 def looks(names: Iterable[str]) -> dict[str, Look]:
-    """Return the look of every series of a chart.
-
-    Parameters
-    ----------
-    names : iterable of str
-
-    Returns
-    -------
-    dict of str to Look
-    """
+    """Return the look of every series of a chart."""
     return {name: look(number) for number, name in enumerate(dict.fromkeys(names))}
 
 
@@ -149,10 +123,6 @@ def new_figure(height: float, width: float = WIDTH) -> Figure:
         Inches.
     width : float, optional
         Inches; as wide as the site shows it by default.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
     """
     figure = new_picture(width, height, constrained=False)
     figure.set_layout_engine("constrained")
@@ -160,12 +130,7 @@ def new_figure(height: float, width: float = WIDTH) -> Figure:
 
 
 def dress(*panels: Axes) -> None:
-    """Give charts their grid, and no frame where there is no axis.
-
-    Parameters
-    ----------
-    *panels : matplotlib.axes.Axes
-    """
+    """Give charts their grid, and no frame where there is no axis."""
     for axes in panels:
         axes.grid(visible=True, which="major", lw=0.4, color="#dddddd")
         axes.spines[["top", "right"]].set_visible(False)
@@ -200,12 +165,7 @@ def _in_full(value: float) -> str:
 
 
 def name_panels(*panels: Axes) -> None:
-    """Put a letter before the title of each panel, so that a text can name it.
-
-    Parameters
-    ----------
-    *panels : matplotlib.axes.Axes
-    """
+    """Put a letter before the title of each panel, so that a text can name it."""
     for letter, axes in zip("abcdefghijkl", panels, strict=False):
         axes.set_title(f"({letter}) {axes.get_title(loc='left')}", loc="left")
 

@@ -120,16 +120,7 @@ def _last(count: int) -> int:
 
 
 def small(figure: Figure) -> bytes:
-    """Return a figure as a small PNG of few colors.
-
-    Parameters
-    ----------
-    figure : matplotlib.figure.Figure
-
-    Returns
-    -------
-    bytes
-    """
+    """Return a figure as a small PNG of few colors."""
     picture = Image.open(io.BytesIO(png(figure, DPI))).convert("RGB")
     buffer = io.BytesIO()
     picture.quantize(COLORS, Image.Quantize.FASTOCTREE).save(buffer, format="png", optimize=True)

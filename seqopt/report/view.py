@@ -43,12 +43,7 @@ class View:
 
 
 def frame(axes: Axes) -> None:
-    """Fit axes to a picture, which has none.
-
-    Parameters
-    ----------
-    axes : matplotlib.axes.Axes
-    """
+    """Fit axes to a picture, which has none."""
     axes.set_aspect("equal")
     axes.autoscale_view()
     axes.set_axis_off()

@@ -37,10 +37,6 @@ def in_words(name: str) -> str:
     name : str
         As it is typed.
 
-    Returns
-    -------
-    str
-
     Examples
     --------
     >>> in_words("overlap_dp"), in_words("my_own")
@@ -56,10 +52,6 @@ def typed(name: str) -> str:
     ----------
     name : str
         As it is typed.
-
-    Returns
-    -------
-    str
 
     Examples
     --------

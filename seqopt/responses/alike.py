@@ -87,12 +87,7 @@ class Alike(FrozenValue):
     state: Ints
 
     def blocks(self) -> Iterator[Block]:
-        """Yield the states in blocks, one at least.
-
-        Yields
-        ------
-        Block
-        """
+        """Yield the states in blocks, one at least."""
         names = tuple(sorted(frozenset().union(*self.names) & CHOSEN_BY.keys()))
         for start in range(0, max(len(self.states), 1), BLOCK):
             yield Block(self.steps[0].bricks, self.states[start : start + BLOCK].copy(), names)
@@ -109,10 +104,6 @@ class Alike(FrozenValue):
         ----------
         answers : sequence of Answers
             To the blocks.
-
-        Returns
-        -------
-        list of StepChoices
         """
         values = {k: np.concatenate([a.values[k] for a in answers]) for k in answers[0].values}
         forces = np.concatenate([a.forces for a in answers])
@@ -135,10 +126,6 @@ class Alike(FrozenValue):
 def steps_alike(schedule: Schedule) -> list[list[list[OpenStep]]]:
     """Return the open steps of a schedule by brick count and, within it, by how many grips.
 
-    Parameters
-    ----------
-    schedule : Schedule
-
     Returns
     -------
     list of list of list of OpenStep
@@ -159,17 +146,7 @@ def steps_alike(schedule: Schedule) -> list[list[list[OpenStep]]]:
 
 
 def choices_of(schedule: Schedule, step: OpenStep) -> int:
-    """Return how many choices a step has, impossible ones among them.
-
-    Parameters
-    ----------
-    schedule : Schedule
-    step : OpenStep
-
-    Returns
-    -------
-    int
-    """
+    """Return how many choices a step has, impossible ones among them."""
     return math.prod(len(schedule.moves[m].candidates) for m in step.moves)
 
 
@@ -182,10 +159,6 @@ def alike(schedule: Schedule, steps: Sequence[OpenStep], wanted: Wanted) -> Alik
     steps : sequence of OpenStep
     wanted : Wanted
         Which responses every move needs.
-
-    Returns
-    -------
-    Alike
     """
     names = tuple(frozenset(wanted(schedule.moves[step.moves[-1]].bricks)) for step in steps)
     choices = [combinations(schedule, step) for step in steps]
@@ -227,26 +200,12 @@ def distinct(rows: Ints) -> tuple[Ints, Ints]:
 
 
 def robots_holding(step: OpenStep) -> list[int]:
-    """Return which of the scene's robots grip.
-
-    Parameters
-    ----------
-    step : OpenStep
-
-    Returns
-    -------
-    list of int
-    """
+    """Return which of the scene's robots grip."""
     return [i for i, grip in enumerate(step.grips) if grip is not None]
 
 
 def combinations(schedule: Schedule, step: OpenStep) -> Ints:
     """Return the nodes held for all combinations of the open moves of a step.
-
-    Parameters
-    ----------
-    schedule : Schedule
-    step : OpenStep
 
     Returns
     -------

@@ -104,10 +104,6 @@ class Evaluation(Terse):
             Whether there is much to do with each: several processes then work on the next ones
             together. Else each works on a part of the build of its own, which takes less time.
 
-        Yields
-        ------
-        sequence of StepChoices
-
         Raises
         ------
         MechanismError, SolverError, WorkerError
@@ -245,10 +241,6 @@ def window_models(schedule: Schedule, choice: Sequence[int]) -> int:
     schedule : Schedule
     choice : sequence of int
         The chosen candidate of every move.
-
-    Returns
-    -------
-    int
     """
     models = 0
     for level in steps_alike(schedule):

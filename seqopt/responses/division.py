@@ -74,10 +74,6 @@ def answer_blocks(
     apart : bool, optional
         Whether there is room for all answers, and no hurry for the next one.
 
-    Yields
-    ------
-    Answers
-
     Raises
     ------
     MechanismError, SolverError, WorkerError
@@ -112,11 +108,6 @@ def take_turns(portions: Sequence[Portion], lanes: int) -> tuple[Iterator[int], 
         Each gets neighboring ones. Later lanes get fewer, since they prepare all that comes before
         them too: with a share f of the work they end together where lane i ends at the share
         (1 - q^i) / (1 - q^n) with q = 1 / (1 + f).
-
-    Returns
-    -------
-    places : iterator of int
-    portions : iterator of Portion
     """
     before = 1 - (1 + PREPARED) ** -np.arange(1.0, lanes + 1)
     work = np.array([portion.work for portion in portions])
@@ -137,10 +128,6 @@ def in_places(places: Iterable[int], results: Iterable[Found]) -> Iterator[Found
     places : iterable of int
         From 0, each once, in the order of the results.
     results : iterable
-
-    Yields
-    ------
-    object
     """
     waiting: dict[int, Found] = {}
     following = 0
@@ -168,10 +155,6 @@ def share_out(
         About how much work they are.
     crew : Crew or None
         Without one each block is a portion.
-
-    Yields
-    ------
-    Portion
     """
     enough = 0.0 if crew is None else total / (PORTIONS * crew.workers)
     mine: list[Block] = []

@@ -10,14 +10,6 @@ LISTED = 12  # steps that are named one by one
 def number_text(value: float) -> str:
     """Return a number with at least four digits, and no power of ten where it can be read.
 
-    Parameters
-    ----------
-    value : float
-
-    Returns
-    -------
-    str
-
     Examples
     --------
     >>> number_text(27.88), number_text(116312.4)
@@ -33,10 +25,6 @@ def length_text(length: float) -> str:
     ----------
     length : float
         m.
-
-    Returns
-    -------
-    str
 
     Examples
     --------
@@ -56,10 +44,6 @@ def steps_in_words(steps: Sequence[int]) -> str:
     ----------
     steps : sequence of int
         Their numbers.
-
-    Returns
-    -------
-    str
 
     Examples
     --------

@@ -64,10 +64,6 @@ class Departure:
 class LinearRange:
     """Finds the steps of builds in which an engine's results leave the linear range.
 
-    Parameters
-    ----------
-    engine : Engine
-
     Attributes
     ----------
     unchecked : tuple of str
@@ -99,10 +95,6 @@ class LinearRange:
             Responses of the steps, from `seqopt.analyze`.
         fields : iterable of Fields, optional
             Of every step, with all fields; by default the engine computes them.
-
-        Returns
-        -------
-        tuple of Departure
 
         Examples
         --------
@@ -139,10 +131,6 @@ class LinearRange:
         ----------
         tables : mapping of str to pandas.DataFrame
             Responses of the steps of each, by name.
-
-        Returns
-        -------
-        dict of str to tuple of Departure
         """
         return {name: left for name, each in tables.items() if (left := self.departures(each))}
 

@@ -51,10 +51,6 @@ def bytes_of_choices(schedule: Schedule, wanted: Callable[[int], Set[str]]) -> i
 def bytes_of_costs(schedule: Schedule) -> int:
     """Return what the costs of all choices take, about, while responses come step by step.
 
-    Parameters
-    ----------
-    schedule : Schedule
-
     Returns
     -------
     int
@@ -82,10 +78,6 @@ def require_memory(
         Which responses every move needs.
     most : float, optional
         Bytes that may be used; by default `SHARE` of what is free.
-
-    Returns
-    -------
-    Keeping
 
     Raises
     ------

@@ -76,10 +76,6 @@ def robot_response(robot: str) -> str:
     robot : str
         Its name.
 
-    Returns
-    -------
-    str
-
     Examples
     --------
     >>> robot_response("rob1"), robot_response("sup"), robot_response("a,b")

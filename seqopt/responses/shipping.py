@@ -35,12 +35,7 @@ class Shipment:
     content: bytes
 
     def unpack(self) -> Engine:
-        """Return the engine, newly made.
-
-        Returns
-        -------
-        Engine
-        """
+        """Return the engine, newly made."""
         found: Recipe | Engine = pickle.loads(self.content)  # our own, from `pack`
         if isinstance(found, Recipe):
             return make_engine(found.engine, found.scene, **found.options)  # type: ignore[arg-type]
@@ -49,14 +44,6 @@ class Shipment:
 
 def pack(engine: Engine) -> Shipment:
     """Return an engine as it is sent.
-
-    Parameters
-    ----------
-    engine : Engine
-
-    Returns
-    -------
-    Shipment
 
     Raises
     ------
@@ -76,10 +63,6 @@ def pack(engine: Engine) -> Shipment:
 
 def known_recipe(engine: Engine) -> Recipe | None:
     """Return how an engine can be made again with the same answers.
-
-    Parameters
-    ----------
-    engine : Engine
 
     Returns
     -------
@@ -121,16 +104,7 @@ def _answer_sent(shipment: Shipment, blocks: Blocks) -> list[Answers]:
 
 
 def engine_of(shipment: Shipment) -> Engine:
-    """Return an engine that was sent; a worker keeps the last few that it made.
-
-    Parameters
-    ----------
-    shipment : Shipment
-
-    Returns
-    -------
-    Engine
-    """
+    """Return an engine that was sent; a worker keeps the last few that it made."""
     return _shelf.engine(shipment)
 
 

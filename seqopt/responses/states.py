@@ -61,10 +61,6 @@ def work(states: int, bricks: int) -> float:
     states : int
     bricks : int
         Of each.
-
-    Returns
-    -------
-    float
     """
     return float(states * (bricks + APART))
 
@@ -94,15 +90,6 @@ class Answers(FrozenValue):
 def answer(engine: Engine, block: Block) -> Answers:
     """Return the responses of a block of states.
 
-    Parameters
-    ----------
-    engine : Engine
-    block : Block
-
-    Returns
-    -------
-    Answers
-
     Raises
     ------
     MechanismError, SolverError
@@ -125,10 +112,6 @@ def answer(engine: Engine, block: Block) -> Answers:
 
 def tally_of(engine: Engine) -> dict[object, int]:
     """Return what an engine counts, empty if it does not.
-
-    Parameters
-    ----------
-    engine : Engine
 
     Returns
     -------

@@ -60,29 +60,11 @@ class Store:
         _tidy(self._folder)
 
     def path(self, block: Block) -> Path:
-        """Return the file of a block.
-
-        Parameters
-        ----------
-        block : Block
-
-        Returns
-        -------
-        pathlib.Path
-        """
+        """Return the file of a block."""
         return self._folder / f"{block.bricks}-{block.key[:48]}.answers"
 
     def find(self, block: Block) -> Answers | None:
-        """Return the answers to a block, if they are there and whole.
-
-        Parameters
-        ----------
-        block : Block
-
-        Returns
-        -------
-        Answers or None
-        """
+        """Return the answers to a block, if they are there and whole."""
         sets, columns = len(block.grips), len(block.names) + block.grips.shape[1]
         words = DIGEST + 8 * sets * columns
         try:
@@ -107,11 +89,6 @@ class Store:
     def keep(self, block: Block, answers: Answers) -> None:
         """Write the answers to a block.
 
-        Parameters
-        ----------
-        block : Block
-        answers : Answers
-
         Raises
         ------
         FileError
@@ -135,10 +112,6 @@ def open_store(folder: Path | str | None, engine: Engine) -> Store | None:
     folder : str or pathlib.Path or None
         None for none.
     engine : Engine
-
-    Returns
-    -------
-    Store or None
 
     Raises
     ------

@@ -79,10 +79,6 @@ def response_table(network: Network, answers: Iterable[tuple[Step, Fields]]) -> 
     answers : iterable of (Step, Fields)
         Steps with every grip given, and the full fields of one grip set each.
 
-    Returns
-    -------
-    pandas.DataFrame
-
     Raises
     ------
     SolverError
@@ -92,25 +88,12 @@ def response_table(network: Network, answers: Iterable[tuple[Step, Fields]]) -> 
 
 
 def force_column(robot: Robot) -> str:
-    """Return the column of a table that holds the force of a robot's grip, N.
-
-    Parameters
-    ----------
-    robot : Robot
-
-    Returns
-    -------
-    str
-    """
+    """Return the column of a table that holds the force of a robot's grip, N."""
     return f"{robot_response(robot.name)}_N"
 
 
 def support_columns(scene: Scene) -> list[tuple[str, str]]:
     """Return the columns of a table that hold what a scene's ground ends carry one by one.
-
-    Parameters
-    ----------
-    scene : Scene
 
     Returns
     -------
@@ -134,11 +117,6 @@ def support_columns(scene: Scene) -> list[tuple[str, str]]:
 
 def step_fields(engine: Engine, step: Step) -> Fields:
     """Return the full fields of one step.
-
-    Parameters
-    ----------
-    engine : Engine
-    step : Step
 
     Returns
     -------
@@ -165,11 +143,6 @@ def fields_archive(engine: Engine, steps: Sequence[Step]) -> bytes:
     ``step1_support`` and so on, as in `Fields` without its first axis; ``edge_nodes`` (E, 2),
     ``node_position`` (N, 3), ``node_name`` (N,), and of the ground ends ``support_brick`` (G,) and
     ``support_point`` (G, 3), the fixed points, say what they run over.
-
-    Parameters
-    ----------
-    engine : Engine
-    steps : sequence of Step
 
     Returns
     -------

@@ -168,10 +168,6 @@ def robots_beside(shape: ArchShape) -> tuple[Robot, ...]:
     Those beside it reach its line, but not the far ends of bricks that stick out to the other side.
     Each can bear the weight of the whole arch: give robots of your own to have payloads that bind.
 
-    Parameters
-    ----------
-    shape : ArchShape
-
     Returns
     -------
     tuple of 3 Robot

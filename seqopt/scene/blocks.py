@@ -84,20 +84,12 @@ def as_vectors(points: Floats) -> tuple[Vector, ...]:
     Parameters
     ----------
     points : (k, 3) float
-
-    Returns
-    -------
-    tuple of Vector
     """
     return tuple((x, y, z) for x, y, z in points.tolist())
 
 
 def vertices_of(brick: Brick) -> tuple[Floats, Sequence[Sequence[int]]]:
     """Return the vertices of a brick, box or not, and its faces.
-
-    Parameters
-    ----------
-    brick : Brick
 
     Returns
     -------

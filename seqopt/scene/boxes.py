@@ -52,16 +52,7 @@ class Boxes(FrozenValue):
 
 
 def boxes(bricks: Sequence[Brick]) -> Boxes:
-    """Return bricks as boxes.
-
-    Parameters
-    ----------
-    bricks : sequence of Brick
-
-    Returns
-    -------
-    Boxes
-    """
+    """Return bricks as boxes."""
     length = np.array([brick.length_axis for brick in bricks]).reshape(-1, 3)
     width = np.array([brick.width_axis for brick in bricks]).reshape(-1, 3)
     return Boxes(
@@ -73,10 +64,6 @@ def boxes(bricks: Sequence[Brick]) -> Boxes:
 
 def separations(bricks: Sequence[Brick]) -> tuple[Ints, Floats]:
     """Return how far bricks are apart that are near each other.
-
-    Parameters
-    ----------
-    bricks : sequence of Brick
 
     Returns
     -------

@@ -42,10 +42,6 @@ def printable(where: str, value: str) -> str:
         What it names, for the message.
     value : str
 
-    Returns
-    -------
-    str
-
     Raises
     ------
     SceneError
@@ -64,10 +60,6 @@ def whole(where: str, value: int) -> int:
     where : str
         What it is, for the message.
     value : int
-
-    Returns
-    -------
-    int
 
     Raises
     ------
@@ -94,10 +86,6 @@ def wholes(where: str, values: Iterable[int]) -> tuple[int, ...]:
         What they are, for the message.
     values : iterable of int
 
-    Returns
-    -------
-    tuple of int
-
     Raises
     ------
     SceneError
@@ -117,10 +105,6 @@ def parts(where: str, values: Iterable[Part], kind: type[Part]) -> tuple[Part, .
         What they are, for the message.
     values : iterable of object
     kind : type
-
-    Returns
-    -------
-    tuple of object
 
     Raises
     ------
@@ -142,10 +126,6 @@ def short(value: object, most: int = 60) -> str:
     value : object
     most : int, optional
         Characters.
-
-    Returns
-    -------
-    str
     """
     try:
         text = repr(value)
@@ -164,10 +144,6 @@ def vector(where: str, values: Iterable[float], at_least: float = -math.inf) -> 
     values : iterable of float
     at_least : float, optional
         The least value that is allowed.
-
-    Returns
-    -------
-    Vector
 
     Raises
     ------
@@ -194,10 +170,6 @@ def positive(where: str, value: float, unit: str) -> float:
     value : float
     unit : str
         Of the number, for the message.
-
-    Returns
-    -------
-    float
 
     Raises
     ------
@@ -238,16 +210,7 @@ def axes(where: str, first: Iterable[float], second: Iterable[float]) -> tuple[V
 
 
 def dot(a: Vector, b: Vector) -> float:
-    """Return the scalar product.
-
-    Parameters
-    ----------
-    a, b : Vector
-
-    Returns
-    -------
-    float
-    """
+    """Return the scalar product."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
@@ -259,10 +222,6 @@ def finite(where: str, value: float) -> float:
     where : str
         What the number is, for the message.
     value : float
-
-    Returns
-    -------
-    float
 
     Raises
     ------

@@ -19,10 +19,6 @@ GRAIN = 1e-9  # length to which corners are rounded, over the size of what overl
 def convex_pieces(polygons: Sequence[Any]) -> Iterator[Floats]:
     """Yield the convex pieces of a union of polygons.
 
-    Parameters
-    ----------
-    polygons : sequence of shapely.Polygon
-
     Yields
     ------
     (m, 2) float

@@ -23,10 +23,6 @@ PULL = 100.0  # m/s²; ten times that of the earth
 def doubts(scene: Scene) -> tuple[str, ...]:
     """Return what looks wrong in a scene, one line each.
 
-    Parameters
-    ----------
-    scene : Scene
-
     Returns
     -------
     tuple of str

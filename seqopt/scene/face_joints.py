@@ -52,10 +52,6 @@ def flat_face(corners: Floats, normal: Floats | None = None) -> FlatFace:
     normal : (3,) float, optional
         To which side the normal points; counterclockwise corners by default.
 
-    Returns
-    -------
-    FlatFace
-
     Raises
     ------
     SceneError
@@ -102,10 +98,6 @@ def face_joint(bricks: tuple[int, int], face: FlatFace, law: JointLaw) -> Joint:
         Names; the face's normal points from the first into the second.
     face : FlatFace
     law : JointLaw
-
-    Returns
-    -------
-    Joint
     """
     shift, turn = law.stiffness(face.area, face.moments)
     position, along, across = as_vectors(np.vstack([face.center, face.axes[:2]]))
@@ -131,10 +123,6 @@ def face_ground(brick: int, face: FlatFace, law: JointLaw, stub: float = STUB) -
     law : JointLaw
     stub : float, optional
         From the face to the fixed point behind it, m.
-
-    Returns
-    -------
-    Ground
     """
     shift, turn = law.stiffness(face.area, face.moments)
     position, along, across = as_vectors(np.vstack([face.center, face.axes[:2]]))

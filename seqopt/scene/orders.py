@@ -19,10 +19,6 @@ PART = re.compile(r"(-?\d+)(?:\.\.(-?\d+))?")
 def from_all_ends(scene: Scene) -> Order:
     """Return the order that builds from all ground ends at once.
 
-    Parameters
-    ----------
-    scene : Scene
-
     Returns
     -------
     tuple of int
@@ -63,10 +59,6 @@ def parse_order(scene: Scene, text: str) -> Order:
         A key of `ORDERS`, or names of bricks with commas between them, runs as ``1..12`` or
         ``25..13``.
 
-    Returns
-    -------
-    tuple of int
-
     Raises
     ------
     SceneError
@@ -105,10 +97,6 @@ def in_order(scene: Scene, order: Sequence[int] | str | None) -> Scene:
     scene : Scene
     order : sequence of int or str or None
         Names of all bricks, or words as `parse_order` takes them; None for the scene's own.
-
-    Returns
-    -------
-    Scene
 
     Raises
     ------

@@ -22,10 +22,6 @@ def rows(where: str, values: Iterable[Part]) -> tuple[Part, ...]:
         What it is, for the message.
     values : iterable
 
-    Returns
-    -------
-    tuple
-
     Raises
     ------
     SceneError

@@ -21,10 +21,6 @@ class Anywhere:
         ----------
         point : Vector
             m.
-
-        Returns
-        -------
-        bool
         """
         return True
 
@@ -62,10 +58,6 @@ class Side:
         ----------
         point : Vector
             m.
-
-        Returns
-        -------
-        bool
         """
         return dot(self.toward, point) >= dot(self.toward, self.point)
 
@@ -107,10 +99,6 @@ class Sphere:
         ----------
         point : Vector
             m.
-
-        Returns
-        -------
-        bool
         """
         return math.dist(self.center, point) <= self.radius
 
@@ -126,10 +114,6 @@ def as_reach(where: str, given: Reach | str) -> Reach:
     where : str
         What it is, for the message.
     given : Reach or str
-
-    Returns
-    -------
-    Reach
 
     Raises
     ------

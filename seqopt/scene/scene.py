@@ -142,10 +142,6 @@ class Scene(Shown):
     def within_reach(self, robot: Robot) -> tuple[tuple[int, ...], ...]:
         """Return the nodes that a robot may hold, by brick.
 
-        Parameters
-        ----------
-        robot : Robot
-
         Returns
         -------
         tuple of tuple of int
@@ -181,10 +177,6 @@ class Scene(Shown):
         ----------
         *robots : Robot
             All robots of the new scene.
-
-        Returns
-        -------
-        Scene
 
         Examples
         --------

@@ -30,12 +30,7 @@ REACHES: dict[str, type[Anywhere] | type[Side] | type[Sphere]] = {
 
 
 def schema() -> dict[str, Any]:
-    """Return the JSON Schema of a scene file.
-
-    Returns
-    -------
-    dict
-    """
+    """Return the JSON Schema of a scene file."""
     text = resources.files("seqopt").joinpath("data/scene.schema.json").read_text(encoding="utf-8")
     document: dict[str, Any] = json.loads(text)
     return document
@@ -147,10 +142,6 @@ def parse_scene(text: str, source: str = "text") -> Scene:
     source : str, optional
         Where it comes from, for messages.
 
-    Returns
-    -------
-    Scene
-
     Raises
     ------
     SceneError
@@ -188,10 +179,6 @@ def scene_from_dict(document: dict[str, Any]) -> Scene:
     document : dict
         As of `scene_to_dict`.
 
-    Returns
-    -------
-    Scene
-
     Raises
     ------
     SceneError
@@ -209,16 +196,7 @@ def scene_from_dict(document: dict[str, Any]) -> Scene:
 
 
 def scene_to_dict(scene: Scene) -> dict[str, Any]:
-    """Return a scene as a document that obeys the schema.
-
-    Parameters
-    ----------
-    scene : Scene
-
-    Returns
-    -------
-    dict
-    """
+    """Return a scene as a document that obeys the schema."""
     document = {"format": "seqopt-scene", "version": VERSION, **asdict(scene)}
     for part in (*document["bricks"], *document["joints"], *document["grounds"]):
         for key in UNSAID:
@@ -231,16 +209,7 @@ def scene_to_dict(scene: Scene) -> dict[str, Any]:
 
 
 def dump_scene(scene: Scene) -> str:
-    """Return a scene as JSON text, one brick, joint or robot a line.
-
-    Parameters
-    ----------
-    scene : Scene
-
-    Returns
-    -------
-    str
-    """
+    """Return a scene as JSON text, one brick, joint or robot a line."""
     document = scene_to_dict(scene)
     lines = []
     for key, value in document.items():

@@ -143,10 +143,6 @@ class Polyhedron:
         ----------
         point : (3,) float
             m.
-
-        Returns
-        -------
-        bool
         """
         a, b, c = np.moveaxis(self.triangles - point, 1, 0)
         lengths = [np.linalg.norm(side, axis=1) for side in (a, b, c)]
@@ -220,10 +216,6 @@ def with_shape(entry: dict[str, Any]) -> dict[str, Any]:
     ----------
     entry : dict
         With ``name`` and perhaps ``shape``.
-
-    Returns
-    -------
-    dict
 
     Raises
     ------

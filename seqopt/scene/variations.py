@@ -26,10 +26,6 @@ def stiffened(scene: Scene, translational: Floats, rotational: Floats) -> Scene:
     scene : Scene
     translational, rotational : (J + G,) float
         A factor for every joint, then for every ground end, for all three axes; no unit.
-
-    Returns
-    -------
-    Scene
     """
     pairs = [*zip(translational.tolist(), rotational.tolist(), strict=True)]
 
@@ -57,10 +53,6 @@ def weighed(scene: Scene, factors: Floats) -> Scene:
     scene : Scene
     factors : (B,) float
         For the density of every brick, in the scene's order; no unit.
-
-    Returns
-    -------
-    Scene
     """
     pairs = zip(scene.bricks, factors.tolist(), strict=True)
     return replace(scene, bricks=tuple(replace(b, density=b.density * f) for b, f in pairs))
@@ -77,10 +69,6 @@ def shifted(scene: Scene, size: float, rng: np.random.Generator) -> Scene:
     size : float
         m; every coordinate moves by a uniform draw between minus and plus this.
     rng : numpy.random.Generator
-
-    Returns
-    -------
-    Scene
     """
 
     def moved(point: Vector, step: Floats) -> Vector:

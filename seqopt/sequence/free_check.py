@@ -20,13 +20,7 @@ from seqopt.sequence.two_robots import placing_node
 
 @dataclass(frozen=True)
 class RuleBook:
-    """The rules of a free schedule in a scene.
-
-    Parameters
-    ----------
-    network : Network
-    rules : FreeRules
-    """
+    """The rules of a free schedule in a scene."""
 
     network: Network
     rules: FreeRules
@@ -154,10 +148,6 @@ class RuleBook:
         ----------
         bricks : int
         grips : tuple of (int or None)
-
-        Returns
-        -------
-        bool
         """
         if bricks < len(self.network.scene.placed):
             return False

@@ -83,10 +83,6 @@ def join_moves(parts: Sequence[Moves], states: Ints) -> Moves:
     parts : sequence of Moves
     states : (n, c) int
         That they lead from.
-
-    Returns
-    -------
-    Moves
     """
     none = np.zeros(0, dtype=np.int64)
     whole = [Moves(none, states[:0], np.zeros(0)), *parts]

@@ -91,10 +91,6 @@ class FreeRules:
     def team(self, scene: Scene) -> tuple[int, ...]:
         """Return which of a scene's robots take part.
 
-        Parameters
-        ----------
-        scene : Scene
-
         Returns
         -------
         tuple of int
@@ -132,10 +128,6 @@ class FreeRules:
     def described(self, scene: Scene) -> dict[str, object]:
         """Return the rules with their values, ready for JSON.
 
-        Parameters
-        ----------
-        scene : Scene
-
         Returns
         -------
         dict
@@ -153,13 +145,7 @@ class FreeRules:
         }
 
     def loosened(self) -> Iterator[tuple[str, FreeRules]]:
-        """Yield the rules with one of them loosened, and how a user says so.
-
-        Yields
-        ------
-        text : str
-        rules : FreeRules
-        """
+        """Yield the rules with one of them loosened, and how a user says so."""
         for least in range(self.least_grips - 1, -1, -1):
             yield f"least_grips={least}", replace(self, least_grips=least)
         if self.newest is Newest.PLACING:

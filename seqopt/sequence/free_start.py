@@ -29,10 +29,6 @@ def free_space(
     parks : bool, optional
         Whether free robots stay where they were, for their travel.
 
-    Returns
-    -------
-    FreeSpace
-
     Raises
     ------
     StepError

@@ -85,10 +85,6 @@ def sort_robots(
 def node_numbers(network: Network) -> list[int]:
     """Return the scene's numbers of all inner nodes, brick by brick in build order.
 
-    Parameters
-    ----------
-    network : Network
-
     Returns
     -------
     list of int
@@ -99,11 +95,6 @@ def node_numbers(network: Network) -> list[int]:
 
 def reached(network: Network, robot: Robot) -> Bools:
     """Return which nodes a robot may hold: within its reach and not blocked.
-
-    Parameters
-    ----------
-    network : Network
-    robot : Robot
 
     Returns
     -------

@@ -25,10 +25,6 @@ def open_schedule(method: str, network: Network, steps: Sequence[OpenStep]) -> S
     steps : sequence of OpenStep
         Moves numbered from 0 in the order in which they are made.
 
-    Returns
-    -------
-    Schedule
-
     Raises
     ------
     StepError

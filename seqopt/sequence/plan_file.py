@@ -145,12 +145,6 @@ def read_cells(row: Row, where: str) -> tuple[int, StepKind, int]:
     where : str
         What to call the row in messages.
 
-    Returns
-    -------
-    number : int
-    kind : StepKind
-    bricks : int
-
     Raises
     ------
     StepError
@@ -174,10 +168,6 @@ def read_grip(scene: Scene, robot: Robot, row: Row, where: str) -> int | None:
         Cells by column.
     where : str
         What to call the row in messages.
-
-    Returns
-    -------
-    int or None
 
     Raises
     ------

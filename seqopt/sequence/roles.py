@@ -69,10 +69,6 @@ def can_place(scene: Scene, robot: Robot, brick: Brick) -> bool:
         With the nodes that are blocked.
     robot : Robot
     brick : Brick
-
-    Returns
-    -------
-    bool
     """
     return any(
         node not in scene.blocked_nodes and robot.reach.covers(brick.node_position(node))
@@ -207,15 +203,6 @@ def _matched(fits: Sequence[Sequence[int]]) -> bool:
 
 
 def in_words(number: int) -> str:
-    """Return a small number in words, a larger one in digits.
-
-    Parameters
-    ----------
-    number : int
-
-    Returns
-    -------
-    str
-    """
+    """Return a small number in words, a larger one in digits."""
     words = ("no", "one", "two", "three", "four", "five", "six")
     return words[number] if number < len(words) else str(number)

@@ -177,10 +177,6 @@ class Schedule(Shown):
         first, last : int, optional
             Numbers of the first and the last step that are drawn; by default all.
 
-        Returns
-        -------
-        matplotlib.figure.Figure
-
         Raises
         ------
         ExtraError

@@ -81,10 +81,6 @@ def parse_schedule(where: Network | Scene, text: str, source: str) -> Schedule:
     source : str
         What to call the table in messages; its last part without suffix names the schedule.
 
-    Returns
-    -------
-    Schedule
-
     Raises
     ------
     StepError
@@ -107,10 +103,6 @@ def parse_schedule(where: Network | Scene, text: str, source: str) -> Schedule:
 
 def schedule_text(schedule: Schedule) -> str:
     """Return a schedule as the table that `parse_schedule` reads.
-
-    Parameters
-    ----------
-    schedule : Schedule
 
     Returns
     -------
@@ -150,10 +142,6 @@ def find_schedule(
         robots that are named, else of three, or of two where the scene has no third.
     robots : sequence of str, optional
         Of a loop or a schedule by name: robots in the order of their roles.
-
-    Returns
-    -------
-    Schedule
 
     Raises
     ------

@@ -109,10 +109,6 @@ def idle_robots(scene: Scene, steps: Iterable[AnyStep]) -> tuple[str, ...]:
 def require_steps(steps: Sequence[Step]) -> Sequence[Step]:
     """Return steps if that is what they are.
 
-    Parameters
-    ----------
-    steps : sequence of Step
-
     Returns
     -------
     sequence of Step

@@ -11,10 +11,6 @@ from seqopt.sequence.support import acting_bodies
 def lies_along(network: Network) -> frozenset[int]:
     """Return the bricks that lie along the structure: joints meet both of their inner nodes.
 
-    Parameters
-    ----------
-    network : Network
-
     Returns
     -------
     frozenset of int
@@ -33,10 +29,6 @@ def begins_elsewhere(network: Network) -> frozenset[int]:
 
     A stretch is a brick that is held while others are placed, and these others. A brick begins
     elsewhere if no joint ties it to the stretch that is being built; so does the first one.
-
-    Parameters
-    ----------
-    network : Network
 
     Returns
     -------

@@ -173,10 +173,6 @@ def make_schedule(name: str, network: Network | Scene, robots: Sequence[str] = (
     robots : sequence of str, optional
         Names of the robots in the order of their roles; found from their reach by default.
 
-    Returns
-    -------
-    Schedule
-
     Raises
     ------
     StepError

@@ -167,15 +167,6 @@ def bonded(assembly: Assembly, mortar: Mortar) -> Case:
 
     A bond of strength s carries a tension s and, at the same time, a shear stress s; in the terms
     of Mohr and Coulomb its cohesion is s (1 + friction).
-
-    Parameters
-    ----------
-    assembly : Assembly
-    mortar : Mortar
-
-    Returns
-    -------
-    Case
     """
     stress = assembly.stress_scale
     return Case(
@@ -190,14 +181,6 @@ def verdict_of(stand: Proven) -> Verdict:
     """Return the verdict where a number is proven that must be zero.
 
     It falls if the motion says so by itself: forces only show that no more is needed.
-
-    Parameters
-    ----------
-    stand : Proven
-
-    Returns
-    -------
-    Verdict
     """
     if np.isnan(stand.value):
         return Verdict.UNDECIDED
@@ -211,11 +194,6 @@ def least_friction(prove: Prover, mortar: Mortar) -> float:
 
     The lacking bond falls with the friction. A line through two points where some is lacking aims
     at where none is; where that does not help, the middle is tried.
-
-    Parameters
-    ----------
-    prove : Prover
-    mortar : Mortar
 
     Returns
     -------

@@ -34,16 +34,7 @@ class Directions(FrozenValue):
     unit: Floats
 
     def joined(self, other: Directions) -> Directions:
-        """Return these directions and others after them.
-
-        Parameters
-        ----------
-        other : Directions
-
-        Returns
-        -------
-        Directions
-        """
+        """Return these directions and others after them."""
         return Directions(
             np.concatenate([self.owner, other.owner]), np.concatenate([self.unit, other.unit])
         )
@@ -56,10 +47,6 @@ def first_directions(corners: int, grips: int) -> Directions:
     ----------
     corners, grips : int
         How many there are.
-
-    Returns
-    -------
-    Directions
 
     Examples
     --------
@@ -91,10 +78,6 @@ def better_directions(known: Directions, along: Floats, wanted: Bools) -> Direct
         are zero.
     wanted : (m,) bool
         Whose directions are asked for.
-
-    Returns
-    -------
-    Directions
     """
     best = np.zeros(len(along))
     np.maximum.at(best, known.owner, np.einsum("ij,ij->i", known.unit, along[known.owner]))

@@ -30,10 +30,6 @@ def compile_held(assembly: Assembly, case: Case) -> HeldProgram:
     assembly : Assembly
         Its grips are all that may ever be held.
     case : Case
-
-    Returns
-    -------
-    HeldProgram
     """
     entry = plugins("seqopt.limit_analysis")["lp"]
     compiled: CompileHeld = entry.load()

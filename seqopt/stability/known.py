@@ -127,10 +127,6 @@ class Known:
         ----------
         other : Known
             Of the same structure and case.
-
-        Returns
-        -------
-        Known
         """
         out = Known(self._assembly, self._case)
         out._forces = self._forces + other._forces
@@ -144,10 +140,6 @@ class Known:
         ----------
         motion : (B, 6) float
             As of `seqopt.stability.limit_analysis.Answer`.
-
-        Returns
-        -------
-        list of FallingMotion
         """
         assembly, case = self._assembly, self._case
         size = np.abs(motion).max(initial=0.0)

@@ -106,16 +106,7 @@ Compile = Callable[[Assembly], Program]
 
 
 def compile_equilibrium(assembly: Assembly) -> Program:
-    """Return the registered program of an assembly (entry points ``seqopt.limit_analysis``).
-
-    Parameters
-    ----------
-    assembly : Assembly
-
-    Returns
-    -------
-    Program
-    """
+    """Return the registered program of an assembly (entry points ``seqopt.limit_analysis``)."""
     entry = plugins("seqopt.limit_analysis")["socp"]
     compiled: Compile = entry.load()
     return compiled(assembly)
@@ -185,11 +176,6 @@ def violation(assembly: Assembly, case: Case, answer: Answer, own: Floats | None
 def is_finite(assembly: Assembly, answer: Answer) -> bool:
     """Return whether all numbers of an answer are finite, and as many as the assembly needs.
 
-    Parameters
-    ----------
-    assembly : Assembly
-    answer : Answer
-
     Returns
     -------
     bool
@@ -211,16 +197,6 @@ def bound(assembly: Assembly, case: Case, answer: Answer) -> float:
     A motion proves nothing, 0 or `CAP`, if the load does less work in it than is taken up, or if
     a corner closes by more than `CLOSING`. Less than that is charged with a corner force of
     `LARGEST_FORCE` times the sum of weights and payloads.
-
-    Parameters
-    ----------
-    assembly : Assembly
-    case : Case
-    answer : Answer
-
-    Returns
-    -------
-    float
     """
     nothing = 0.0 if case.sense is Sense.SMALLEST else CAP
     if not is_finite(assembly, answer):

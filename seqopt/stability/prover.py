@@ -76,16 +76,7 @@ class Prover:
         self._program = compiled(assembly)
 
     def __call__(self, case: Case) -> Proven:
-        """Return the proven answer of a case.
-
-        Parameters
-        ----------
-        case : Case
-
-        Returns
-        -------
-        Proven
-        """
+        """Return the proven answer of a case."""
         held = np.nan
         for attempt in range(ATTEMPTS):
             answer = self._program(case, attempt)
@@ -132,12 +123,6 @@ class Prover:
 def proven_value(assembly: Assembly, case: Case, answer: Answer) -> float:
     """Return the z of an answer if its forces and its motion prove it.
 
-    Parameters
-    ----------
-    assembly : Assembly
-    case : Case
-    answer : Answer
-
     Returns
     -------
     float
@@ -150,12 +135,6 @@ def proven_value(assembly: Assembly, case: Case, answer: Answer) -> float:
 
 def held_value(assembly: Assembly, case: Case, answer: Answer) -> float:
     """Return the z of an answer if its forces alone prove that it will do.
-
-    Parameters
-    ----------
-    assembly : Assembly
-    case : Case
-    answer : Answer
 
     Returns
     -------

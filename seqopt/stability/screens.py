@@ -146,10 +146,6 @@ def lacking(assembly: Assembly, mortar: Mortar, compiled: CompileHeld) -> HeldSt
     mortar : Mortar
     compiled : callable
         Makes the program to solve.
-
-    Returns
-    -------
-    HeldStates
     """
     case = bonded(assembly, mortar)
     fixed = replace(case, tension=(case.tension[0], 0.0), cohesion=(case.cohesion[0], 0.0))

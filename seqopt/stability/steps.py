@@ -104,10 +104,6 @@ def stability_table(steps: Sequence[Step], results: Sequence[Stability]) -> pd.D
 def format_verdicts(results: Sequence[Stability]) -> str:
     """Return how many steps stand, do not stand and are undecided, and how the solver ended.
 
-    Parameters
-    ----------
-    results : sequence of Stability
-
     Returns
     -------
     str

@@ -85,10 +85,6 @@ def find_criterion(criterion: Criterion | str) -> Criterion:
     criterion : Criterion or str
         A criterion, or a name of `seqopt.CRITERIA`.
 
-    Returns
-    -------
-    Criterion
-
     Raises
     ------
     ProblemError

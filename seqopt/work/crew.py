@@ -76,26 +76,11 @@ class Given:
     workers: int
 
     def submit(self, function: Callable[..., Any], *arguments: object) -> Future[Any]:
-        """Give a call out; see `Crew`.
-
-        Parameters
-        ----------
-        function : callable
-        *arguments : object
-
-        Returns
-        -------
-        concurrent.futures.Future
-        """
+        """Give a call out; see `Crew`."""
         return self.executor.submit(function, *arguments)
 
     def drop(self, calls: Iterable[Future[Any]]) -> None:
-        """Cancel calls; see `Crew`.
-
-        Parameters
-        ----------
-        calls : iterable of concurrent.futures.Future
-        """
+        """Cancel calls; see `Crew`."""
         for call in calls:
             call.cancel()
 
@@ -103,16 +88,7 @@ class Given:
         """Leave the workers to the executor; see `Crew`."""
 
     def replace(self, error: BaseException) -> bool:
-        """Say whether the executor still takes work; its workers are its own matter.
-
-        Parameters
-        ----------
-        error : BaseException
-
-        Returns
-        -------
-        bool
-        """
+        """Say whether the executor still takes work; its workers are its own matter."""
         try:
             self.executor.submit(_nothing)
         except Exception:  # whatever an executor of others may raise where it is broken

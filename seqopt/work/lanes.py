@@ -36,21 +36,12 @@ class Lanes:
         function : callable
         *arguments : object
             The last one has a ``lane``.
-
-        Returns
-        -------
-        concurrent.futures.Future
         """
         lane: int = arguments[-1].lane
         return self._lanes[lane].submit(function, *arguments)
 
     def drop(self, calls: Iterable[Future[Any]]) -> None:
-        """Leave calls to their processes; see `Crew`.
-
-        Parameters
-        ----------
-        calls : iterable of concurrent.futures.Future
-        """
+        """Leave calls to their processes; see `Crew`."""
 
     def look_after(self) -> None:
         """End processes if one has died while it sent an answer; see `Crew`."""
@@ -59,10 +50,6 @@ class Lanes:
 
     def replace(self, error: BaseException) -> bool:
         """Take new processes for those that died; see `Crew`.
-
-        Parameters
-        ----------
-        error : BaseException
 
         Returns
         -------

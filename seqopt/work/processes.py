@@ -35,17 +35,7 @@ class Processes:
         self._started: list[BaseProcess] = []
 
     def submit(self, function: Callable[..., Any], *arguments: object) -> Future[Any]:
-        """Give a call out; see `Crew`.
-
-        Parameters
-        ----------
-        function : callable
-        *arguments : object
-
-        Returns
-        -------
-        concurrent.futures.Future
-        """
+        """Give a call out; see `Crew`."""
         if self._pool is None:
             context = multiprocessing.get_context("spawn")  # threads and fork do not go together
             end, self._leash = context.Pipe(duplex=False)
@@ -62,10 +52,6 @@ class Processes:
 
         If its processes end before it has seen that a call was cancelled, its thread ends with an
         `InvalidStateError` (Python's issue gh-107219) and leaves other calls without an answer.
-
-        Parameters
-        ----------
-        calls : iterable of concurrent.futures.Future
         """
 
     def look_after(self) -> None:
@@ -84,10 +70,6 @@ class Processes:
 
     def replace(self, error: BaseException) -> bool:
         """Take new processes for those that died; see `Crew`.
-
-        Parameters
-        ----------
-        error : BaseException
 
         Returns
         -------

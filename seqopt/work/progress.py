@@ -123,10 +123,6 @@ def within(tell: Tell, seconds: float) -> Tell:
     seconds : float
         From now on; as they come where it is infinite.
 
-    Returns
-    -------
-    callable
-
     Examples
     --------
     >>> within(print, 60.0)("12 points")
@@ -148,14 +144,6 @@ def within(tell: Tell, seconds: float) -> Tell:
 
 def duration(seconds: float) -> str:
     """Return a time in words.
-
-    Parameters
-    ----------
-    seconds : float
-
-    Returns
-    -------
-    str
 
     Examples
     --------

@@ -82,10 +82,6 @@ class DiscreteEngine(NamedEngine):
             Node numbers.
         want : Want, optional
 
-        Returns
-        -------
-        Fields
-
         Raises
         ------
         GripError
@@ -144,10 +140,6 @@ def held_nodes(network: Network, system: System, columns: Ints, nodes: Floats) -
         Grips as indices into ``network.inner.ravel()``.
     nodes : (r, 3) float
         Where they hold, m.
-
-    Returns
-    -------
-    Held
     """
     blocks = [np.eye(6)] * (len(system.load) // 6)
     for body in np.unique(columns // 2):
@@ -169,10 +161,6 @@ def pinched(network: Network, system: System, columns: Ints, nodes: Floats, pinc
     nodes : (r, 3) float
         Where they hold, m.
     pinch : Pinch
-
-    Returns
-    -------
-    Held
     """
     blocks = [sparse.csr_array((6, 6))] * (len(system.load) // 6)
     for body, node in zip(columns // 2, nodes, strict=True):

@@ -100,16 +100,7 @@ class Held(FrozenValue):
         return frozen(sparse.csr_array(abs(self.system.layers) + abs(self.pads)))
 
     def gone(self, state: Settled) -> bool:
-        """Return whether a state has moved too far for the bricks to be where they were.
-
-        Parameters
-        ----------
-        state : Settled
-
-        Returns
-        -------
-        bool
-        """
+        """Return whether a state has moved too far for the bricks to be where they were."""
         return bool(np.abs(state.motion).max(initial=0.0) > FAR * self.system.length)
 
     @cached_property
@@ -154,10 +145,6 @@ class Settled(FrozenValue):
         held : Held
         broken : bool
             Whether all bonds are lost at once.
-
-        Returns
-        -------
-        Settled
         """
         points = len(held.system.points.area)
         none = np.zeros((points, 3))
@@ -175,10 +162,6 @@ def settle(held: Held) -> Settled:
 
     Where no bond breaks under the whole load at once, none would on the way to it: the limits are
     convex. Otherwise the load grows in steps, and a bond once broken stays so.
-
-    Parameters
-    ----------
-    held : Held
 
     Returns
     -------

@@ -155,10 +155,6 @@ def build_system(network: Network, bricks: int, mortar: Mortar, bed: BedStiffnes
     bed : BedStiffness or None
         The joints themselves; by default beds in series with layers are as stiff as the scene says.
 
-    Returns
-    -------
-    System
-
     Raises
     ------
     SceneError

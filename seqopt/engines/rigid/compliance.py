@@ -87,10 +87,6 @@ class ComplianceEngine(NamedEngine):
             Node numbers.
         want : Want, optional
 
-        Returns
-        -------
-        Fields
-
         Raises
         ------
         GripError, MechanismError, SolverError

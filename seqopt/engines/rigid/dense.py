@@ -32,10 +32,6 @@ def solve_dense(network: Network, bricks: int, columns: Ints) -> Fields:
     columns : (S, r) int
         Grips as indices into ``network.inner.ravel()``.
 
-    Returns
-    -------
-    Fields
-
     Raises
     ------
     MechanismError

@@ -53,16 +53,7 @@ class Pairs(NamedTuple):
     axis: Floats
 
     def within(self, start: int, end: int) -> Pairs:
-        """Return those of some sets, counted from the first of these.
-
-        Parameters
-        ----------
-        start, end : int
-
-        Returns
-        -------
-        Pairs
-        """
+        """Return those of some sets, counted from the first of these."""
         here = (self.sets >= start) & (self.sets < end)
         first, second, brick = self.first[here], self.second[here], self.brick[here]
         return Pairs(self.sets[here] - start, first, second, brick, self.axis[here])
@@ -76,10 +67,6 @@ def pairs_of(operator: ComplianceOperator, columns: Ints) -> Pairs:
     operator : ComplianceOperator
     columns : (S, r) int
         Grips as indices into ``network.inner.ravel()``.
-
-    Returns
-    -------
-    Pairs
     """
     first, second = couples(columns.shape[1])
     bricks = columns.T // 2
@@ -92,10 +79,6 @@ def pairs_of(operator: ComplianceOperator, columns: Ints) -> Pairs:
 @cache
 def couples(grips: int) -> Ints:
     """Return all couples of a number of grips.
-
-    Parameters
-    ----------
-    grips : int
 
     Returns
     -------
@@ -121,10 +104,6 @@ def grip_forces(
         The loads at the grips, from `ComplianceOperator.load_index`.
     pairs : Pairs, optional
         Of the sets, if they are known.
-
-    Returns
-    -------
-    GripForces
     """
     pairs = pairs_of(operator, columns) if pairs is None else pairs
     rows = np.ascontiguousarray(index.T)

@@ -25,10 +25,6 @@ TIED = 0.1  # most that what resists loose motions may be of the springs that th
 def held_operator(system: HeldSystem) -> ComplianceOperator:
     """Return the operator of a partial structure whose loose motions are unknowns of grip sets.
 
-    Parameters
-    ----------
-    system : HeldSystem
-
     Returns
     -------
     ComplianceOperator

@@ -20,26 +20,11 @@ class Kept:
         self._bytes: dict[int, int] = {}
 
     def take(self, bricks: int) -> ComplianceOperator | None:
-        """Return the operator of a brick count, if it is here, and give it away.
-
-        Parameters
-        ----------
-        bricks : int
-
-        Returns
-        -------
-        ComplianceOperator or None
-        """
+        """Return the operator of a brick count, if it is here, and give it away."""
         return self._operators.pop(bricks, None)
 
     def put(self, bricks: int, operator: ComplianceOperator) -> None:
-        """Keep an operator as the one that was asked last.
-
-        Parameters
-        ----------
-        bricks : int
-        operator : ComplianceOperator
-        """
+        """Keep an operator as the one that was asked last."""
         self._operators[bricks] = operator
 
     def make_room(self) -> None:

@@ -69,10 +69,6 @@ def loads_of(index: Ints, force: Floats, count: int, weight: float = 1.0) -> Loa
         How many rows there are, the weight's among them, which comes last.
     weight : float, optional
         Share of the weight.
-
-    Returns
-    -------
-    Loads
     """
     sets, loads = index.shape
     rows = np.full((sets, loads + 1), count - 1, dtype=np.int32)

@@ -79,10 +79,6 @@ def hold_loose(parts: Ungripped, *, tied: bool = False) -> HeldSystem:
     tied : bool, optional
         Whether springs are known to tie every brick to the ground, however softly.
 
-    Returns
-    -------
-    HeldSystem
-
     Raises
     ------
     SolverError

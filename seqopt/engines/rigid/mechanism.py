@@ -72,10 +72,6 @@ def rigid_structure(network: Network, bricks: int) -> RigidStructure:
     network : Network
     bricks : int
         How many bricks stand.
-
-    Returns
-    -------
-    RigidStructure
     """
     acting, gap, stiffness = spring_maps(network, bricks)
     matrix = np.einsum("sik,sij,sjl->kl", gap, stiffness, gap, optimize=True)
@@ -151,10 +147,6 @@ def lost_to_rounding(values: Floats) -> bool:
     ----------
     values : (m,) float
         Eigenvalues of a scaled stiffness, ascending.
-
-    Returns
-    -------
-    bool
     """
     return len(values) > 0 and not values[0] > ROUNDING * values[-1]  # all may be zero
 

@@ -38,10 +38,6 @@ def solve_mixed(network: Network, bricks: int, columns: Ints) -> Fields:
     columns : (S, r) int
         Grips as indices into ``network.inner.ravel()``.
 
-    Returns
-    -------
-    Fields
-
     Raises
     ------
     MechanismError

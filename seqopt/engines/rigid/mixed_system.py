@@ -49,10 +49,6 @@ def mixed_system(parts: Ungripped, grips: Ints, shift: Floats | None = None) -> 
         Indices into ``network.inner.ravel()``.
     shift : (6b,) float, optional
         Added to the diagonal of the scaled stiffness, so that a mechanism can be factored.
-
-    Returns
-    -------
-    MixedSystem
     """
     rows, force = _constraints(parts, grips)
     forbidden = sparse.csr_array(rows @ sparse.diags_array(parts.twist_unit))
@@ -69,14 +65,6 @@ def mixed_system(parts: Ungripped, grips: Ints, shift: Floats | None = None) -> 
 
 def factorize(system: MixedSystem) -> SuperLU:
     """Return the factors of a system.
-
-    Parameters
-    ----------
-    system : MixedSystem
-
-    Returns
-    -------
-    SuperLU
 
     Raises
     ------

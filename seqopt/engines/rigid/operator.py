@@ -116,10 +116,6 @@ class ComplianceOperator(FrozenValue):
         Parameters
         ----------
         bricks : (..) int
-
-        Returns
-        -------
-        bool
         """
         return len(self.held) == self.bricks or bool((self.place[bricks] >= 0).all())
 
@@ -156,10 +152,6 @@ class ComplianceOperator(FrozenValue):
             By how much, N.
         weight : float, optional
             Share of the weight.
-
-        Returns
-        -------
-        Loads
         """
         return loads_of(index, force, len(self.twist), weight)
 

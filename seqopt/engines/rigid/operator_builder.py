@@ -41,10 +41,6 @@ class OperatorBuilder:
             How many bricks stand, at most as many as the tree has.
         held : (h,) int, optional
             The bricks at whose nodes loads act, ascending; all by default.
-
-        Returns
-        -------
-        ComplianceOperator
         """
         self.growth.reach(bricks)
         held = np.arange(bricks) if held is None else held

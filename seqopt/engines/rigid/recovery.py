@@ -52,10 +52,6 @@ def respond(
     columns : (S, r) int
         Grips as indices into ``network.inner.ravel()``.
     solution : Solution
-
-    Returns
-    -------
-    Fields
     """
     twist, wrench, force = solution.twist, solution.wrench, solution.force.copy()
     sets, bricks = len(twist), twist.shape[1] // 6

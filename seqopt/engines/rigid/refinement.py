@@ -85,10 +85,6 @@ class Refinement:
         basis : Basis, optional
             The directions that the operator knows; in the others nothing may move.
 
-        Returns
-        -------
-        Fields
-
         Raises
         ------
         MechanismError, SolverError
@@ -134,10 +130,6 @@ class Corrector:
         ----------
         columns : (S, r) int
             Grips as indices into ``network.inner.ravel()``.
-
-        Returns
-        -------
-        Fields
         """
         operator, parts, bricks = self.operator, self.parts, self.bricks
         index = operator.load_index(columns)

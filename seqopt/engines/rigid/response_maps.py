@@ -53,10 +53,6 @@ def scene_maps(network: Network, basis: Basis = SPACE) -> SceneMaps:
     network : Network
     basis : Basis, optional
         All directions by default.
-
-    Returns
-    -------
-    SceneMaps
     """
     statics, springs = build_statics(network), network.springs
     pick = np.zeros((3, len(basis.wrench)))
@@ -116,16 +112,7 @@ class ResponseMaps(FrozenValue):
         return sum(array.nbytes for arrays in parts for array in arrays)
 
     def count(self, name: str) -> int:
-        """Return how many numbers a field has.
-
-        Parameters
-        ----------
-        name : str
-
-        Returns
-        -------
-        int
-        """
+        """Return how many numbers a field has."""
         network, bricks = self.scene.network, self.bricks
         return {
             "edge_force": network.count_edges(bricks),

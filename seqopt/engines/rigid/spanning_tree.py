@@ -34,10 +34,6 @@ def grow_tree(network: Network) -> SpanningTree:
     or that is placed without a spring to what stands: from there on a structure may have no
     compliance of its own.
 
-    Parameters
-    ----------
-    network : Network
-
     Returns
     -------
     SpanningTree

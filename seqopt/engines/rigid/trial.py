@@ -47,10 +47,6 @@ class Tried:
     def fields(self, want: Want) -> dict[str, Floats]:
         """Return the fields of all sets by name.
 
-        Parameters
-        ----------
-        want : Want
-
         Returns
         -------
         dict of str to array
@@ -90,10 +86,6 @@ def try_forces(
         Whether the joints are about equally stiff: where not, pivots do not tell the whole error.
     accuracy : float
         Largest error of fields, over the largest entry of each, that is accepted.
-
-    Returns
-    -------
-    Tried
     """
     sets, index, pairs = len(columns), operator.load_index(columns), pairs_of(operator, columns)
     force, good = np.empty(index.shape), np.empty(sets, dtype=bool)

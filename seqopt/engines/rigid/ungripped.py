@@ -80,16 +80,7 @@ class Ungripped(FrozenValue):
 
 
 def share(network: Network) -> Shared:
-    """Return what the systems of all brick counts are cut from.
-
-    Parameters
-    ----------
-    network : Network
-
-    Returns
-    -------
-    Shared
-    """
+    """Return what the systems of all brick counts are cut from."""
     springs, size = network.springs, network.inner.size
     brick = np.repeat(np.arange(len(network.inner)), 2)
     arm = network.node_position[network.inner.ravel()] - network.centroid[brick]
@@ -112,10 +103,6 @@ def ungripped_system(network: Network, bricks: int, shared: Shared | None = None
         How many bricks stand.
     shared : Shared, optional
         From `share`; made anew by default.
-
-    Returns
-    -------
-    Ungripped
     """
     shared = share(network) if shared is None else shared
     springs = network.springs

@@ -33,10 +33,6 @@ def read_boxes(text: str, source: str) -> Content:
     source : str
         What to call it in messages.
 
-    Returns
-    -------
-    Content
-
     Raises
     ------
     SceneError

@@ -169,10 +169,6 @@ def block_numbers(keys: Sequence[str]) -> list[int]:
     ----------
     keys : sequence of str
         Of all blocks of a file.
-
-    Returns
-    -------
-    list of int
     """
     if all(key.isascii() and key.isdigit() and len(key) < 10 for key in keys):
         found = [int(key) for key in keys]

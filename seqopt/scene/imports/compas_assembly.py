@@ -29,10 +29,6 @@ def read_assembly(document: Any, source: str) -> Content:
     source : str
         What to call it in messages.
 
-    Returns
-    -------
-    Content
-
     Raises
     ------
     SceneError
@@ -67,11 +63,6 @@ def assembly_graph(document: Any, source: str) -> tuple[Entry, dict[str, Any] | 
         A JSON document, of which they are parts.
     source : str
         What to call it in messages.
-
-    Returns
-    -------
-    graph : dict
-    meshes : dict or None
 
     Raises
     ------

@@ -19,10 +19,6 @@ Solid = tuple[Floats, list[list[int]]]
 def payload(value: Any) -> Any:
     """Return what a serialized object holds, under whichever key its version uses.
 
-    Parameters
-    ----------
-    value : object
-
     Returns
     -------
     object
@@ -40,10 +36,6 @@ def payload(value: Any) -> Any:
 
 def kind(value: Any) -> str:
     """Return the last part of what a serialized object says that it is, in small letters.
-
-    Parameters
-    ----------
-    value : object
 
     Returns
     -------

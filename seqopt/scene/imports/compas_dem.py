@@ -26,10 +26,6 @@ def read_model(document: Any, source: str) -> Content:
     source : str
         What to call it in messages.
 
-    Returns
-    -------
-    Content
-
     Raises
     ------
     SceneError

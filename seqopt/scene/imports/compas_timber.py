@@ -31,10 +31,6 @@ def read_timber(document: Any, source: str) -> Content:
     source : str
         What to call it in messages.
 
-    Returns
-    -------
-    Content
-
     Raises
     ------
     SceneError

@@ -88,11 +88,6 @@ def by_guid(where: str, found: Any) -> Iterator[tuple[str, Entry]]:
         What they are, for messages.
     found : object
 
-    Yields
-    ------
-    guid : str
-    item : dict
-
     Raises
     ------
     SceneError

@@ -113,16 +113,7 @@ class Content:
     said: tuple[str, ...] = field(default=())
 
     def scaled(self, factor: float) -> Content:
-        """Return the content with all lengths times a factor.
-
-        Parameters
-        ----------
-        factor : float
-
-        Returns
-        -------
-        Content
-        """
+        """Return the content with all lengths times a factor."""
         return replace(
             self,
             blocks=tuple(replace(b, vertices=factor * b.vertices) for b in self.blocks),
@@ -133,12 +124,7 @@ class Content:
         )
 
     def turned(self) -> Content:
-        """Return the content of a file whose y is up, with z up.
-
-        Returns
-        -------
-        Content
-        """
+        """Return the content of a file whose y is up, with z up."""
         return replace(
             self,
             blocks=tuple(replace(b, vertices=b.vertices @ Y_TO_Z) for b in self.blocks),
@@ -192,10 +178,6 @@ class Given:
 
 def mean_place(blocks: Sequence[FileBlock]) -> Floats:
     """Return the middles of blocks' vertices.
-
-    Parameters
-    ----------
-    blocks : sequence of FileBlock
 
     Returns
     -------

@@ -25,10 +25,6 @@ def parse_json(text: str, source: str) -> Any:
     source : str
         What to call it in messages.
 
-    Returns
-    -------
-    object
-
     Raises
     ------
     SceneError
@@ -59,10 +55,6 @@ def mapping(where: str, value: object) -> Entry:
         What it is, for the message.
     value : object
 
-    Returns
-    -------
-    dict
-
     Raises
     ------
     SceneError
@@ -82,10 +74,6 @@ def entry(where: str, holder: object, *keys: str) -> Any:
         What the holder is, for the message.
     holder : object
     *keys : str
-
-    Returns
-    -------
-    object
 
     Raises
     ------
@@ -110,10 +98,6 @@ def listing(where: str, value: object, most: int = 10**7) -> list[Any]:
     most : int, optional
         Entries that it may have.
 
-    Returns
-    -------
-    list
-
     Raises
     ------
     SceneError
@@ -134,10 +118,6 @@ def number(where: str, value: object) -> float:
     where : str
         What it is, for the message.
     value : object
-
-    Returns
-    -------
-    float
 
     Raises
     ------

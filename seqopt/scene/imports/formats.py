@@ -104,10 +104,6 @@ def read_content(path: Path, form: str | None = None) -> Content:
     form : str, optional
         One of `FORMATS`; by default what the file looks like.
 
-    Returns
-    -------
-    Content
-
     Raises
     ------
     FileError

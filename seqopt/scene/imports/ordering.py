@@ -27,10 +27,6 @@ def upward_order(
     keys : sequence of str
         What blocks are called, for the message.
 
-    Returns
-    -------
-    list of int
-
     Raises
     ------
     SceneError

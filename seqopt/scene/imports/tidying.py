@@ -54,10 +54,6 @@ def tidy_shape(block: FileBlock, *, may_be_open: bool = False) -> Tidied:
     may_be_open : bool, optional
         Whether it is a support, of which the surface alone counts.
 
-    Returns
-    -------
-    Tidied
-
     Raises
     ------
     SceneError

@@ -75,10 +75,6 @@ def find_touching(
     bricks : mapping of int to Brick
         Those that are built, by their places in the file; others are the ground.
 
-    Returns
-    -------
-    Touching
-
     Raises
     ------
     FileError

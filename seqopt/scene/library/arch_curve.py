@@ -22,10 +22,6 @@ def circular(span: float, rise: float) -> Line:
     span, rise : float
         m; at most a half circle.
 
-    Returns
-    -------
-    Line
-
     Raises
     ------
     SceneError
@@ -55,10 +51,6 @@ def catenary(span: float, rise: float) -> Line:
     ----------
     span, rise : float
         m.
-
-    Returns
-    -------
-    Line
     """
     from scipy.optimize import brentq  # noqa: PLC0415  # slow to import, for arches only
 
@@ -81,10 +73,6 @@ def pointed(span: float, rise: float) -> Line:
     ----------
     span, rise : float
         m; more than a half circle rises.
-
-    Returns
-    -------
-    Line
 
     Raises
     ------

@@ -96,10 +96,6 @@ class ArchForm:
     def lengths(self, bricks: int) -> Floats:
         """Return how much of the arch each brick covers, without joints.
 
-        Parameters
-        ----------
-        bricks : int
-
         Returns
         -------
         (n,) float
@@ -122,10 +118,6 @@ def arch(form: ArchForm, name: str = "", *, robots: Sequence[Robot] | None = Non
         By default the curve, the span and the rise.
     robots : sequence of Robot, optional
         By default two beside the arch and a mobile one; each can bear the whole weight.
-
-    Returns
-    -------
-    Scene
 
     Raises
     ------

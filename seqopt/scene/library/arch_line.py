@@ -72,16 +72,7 @@ class ArchLine:
         return np.asarray(self._curve(row))
 
     def share(self, row: float) -> float:
-        """Return which share of the span a row lies before the middle or behind it, from -½ to ½.
-
-        Parameters
-        ----------
-        row : float
-
-        Returns
-        -------
-        float
-        """
+        """Return by which share of the span a row lies before or behind the middle, -½ to ½."""
         start, end, here = self.point(np.array([0.0, self.rows, row]))[:, 0].tolist()
         return float((here - start) / (end - start) - 0.5)
 
@@ -116,14 +107,6 @@ class ArchLine:
 
 def arch_line(arch: Scene) -> ArchLine:
     """Return the line of an arch.
-
-    Parameters
-    ----------
-    arch : Scene
-
-    Returns
-    -------
-    ArchLine
 
     Raises
     ------

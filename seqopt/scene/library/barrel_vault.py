@@ -42,10 +42,6 @@ def barrel_vault(
     robots : sequence of Robot, optional
         By default two beside the vault and a mobile one.
 
-    Returns
-    -------
-    Scene
-
     Raises
     ------
     SceneError

@@ -35,10 +35,6 @@ def vault338(arch: Scene) -> Scene:
     ----------
     arch : Scene
         ``arch25``.
-
-    Returns
-    -------
-    Scene
     """
     shape = VaultShape(
         bricks=338,
@@ -51,12 +47,7 @@ def vault338(arch: Scene) -> Scene:
 
 
 def dome163() -> Scene:
-    """Return a dome of the size at which benchmarks of domes are taken.
-
-    Returns
-    -------
-    Scene
-    """
+    """Return a dome of the size at which benchmarks of domes are taken."""
     shape = DomeShape(courses=10, around=22, rise=0.7, opening=0.6, thickness=0.06)
     return dome(shape, "dome163")
 

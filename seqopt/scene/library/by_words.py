@@ -37,12 +37,7 @@ class Kind:
     shape: type | None = None
 
     def hints(self) -> dict[str, Any]:
-        """Return the numbers that it takes, by name, and what each is.
-
-        Returns
-        -------
-        dict of str to type
-        """
+        """Return the numbers that it takes, by name, and what each is."""
         names = (
             [field.name for field in fields(self.shape)]
             if self.shape is not None
@@ -84,10 +79,6 @@ def scene_by_words(words: str) -> Scene:
     words : str
         A key of `KINDS`, a colon, and ``name=value`` of its numbers, parted by commas; three
         lengths as ``0.2x0.1x0.06``. Lengths in m, angles in rad, densities in kg/m³.
-
-    Returns
-    -------
-    Scene
 
     Raises
     ------

@@ -46,10 +46,6 @@ def chain(
     robots : sequence of Robot, optional
         By default two beside the arch and a mobile one.
 
-    Returns
-    -------
-    Scene
-
     Raises
     ------
     SceneError

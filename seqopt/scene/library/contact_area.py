@@ -43,10 +43,6 @@ def contact_areas(first: Floats, second: Floats) -> ContactAreas:
     first, second : (P, m, 2) float
         Corners, counterclockwise, m.
 
-    Returns
-    -------
-    ContactAreas
-
     Examples
     --------
     >>> square = np.array([[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]])

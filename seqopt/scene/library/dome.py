@@ -57,10 +57,6 @@ def dome(shape: DomeShape, name: str = "", *, robots: Sequence[Robot] | None = N
     robots : sequence of Robot, optional
         Three that reach everything by default.
 
-    Returns
-    -------
-    Scene
-
     Raises
     ------
     SceneError

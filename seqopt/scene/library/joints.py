@@ -109,10 +109,6 @@ def as_vector(values: Floats) -> Vector:
     Parameters
     ----------
     values : (3,) float
-
-    Returns
-    -------
-    Vector
     """
     x, y, z = values.tolist()
     return x, y, z

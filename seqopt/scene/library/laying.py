@@ -18,11 +18,6 @@ MOST_BRICKS = 20_000  # of a generated scene
 def mobile_robots(bricks: Sequence[Brick], count: int = 3) -> tuple[Robot, ...]:
     """Return robots that reach everything, each of which can bear all bricks.
 
-    Parameters
-    ----------
-    bricks : sequence of Brick
-    count : int, optional
-
     Returns
     -------
     tuple of Robot
@@ -73,10 +68,6 @@ def whole_number(where: str, value: int, least: int) -> int:
     value : int
     least : int
 
-    Returns
-    -------
-    int
-
     Raises
     ------
     SceneError
@@ -117,10 +108,6 @@ def joint_width(where: str, value: float) -> float:
         What it is, for the message.
     value : float
         m.
-
-    Returns
-    -------
-    float
 
     Raises
     ------

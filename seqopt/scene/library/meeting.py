@@ -65,10 +65,6 @@ def meeting(shapes: Boxes, pairs: Pairs, normals: Floats | None = None) -> Meeti
     normals : (P, 3) float, optional
         About at right angles to the faces; by default these are the ones that look at each other
         most.
-
-    Returns
-    -------
-    Meeting
     """
     a, b = np.array(pairs, dtype=np.int64).T
     step = shapes.place[b] - shapes.place[a]
@@ -113,11 +109,6 @@ def shares(bricks: Sequence[Brick], pairs: Pairs, normals: Floats) -> Floats:
 
 def widths(shapes: Boxes, found: Meeting) -> tuple[Floats, Floats, Floats]:
     """Return where faces are along the normals, in the middle of their overlaps.
-
-    Parameters
-    ----------
-    shapes : Boxes
-    found : Meeting
 
     Returns
     -------

@@ -46,10 +46,6 @@ def herringbone_vault(
     robots : sequence of Robot, optional
         Three that reach everything by default, with the largest payload at the arch.
 
-    Returns
-    -------
-    Scene
-
     Raises
     ------
     SceneError

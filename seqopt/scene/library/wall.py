@@ -94,10 +94,6 @@ def wall(shape: WallShape, name: str = "", *, robots: Sequence[Robot] | None = N
     robots : sequence of Robot, optional
         Three that reach everything by default.
 
-    Returns
-    -------
-    Scene
-
     Raises
     ------
     SceneError

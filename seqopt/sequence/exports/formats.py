@@ -44,10 +44,6 @@ def export_plan(
         The file from which the scene was imported, of any format, for formats of COMPAS: the plan
         then names its elements, or is written into it if it is an assembly.
 
-    Returns
-    -------
-    str
-
     Raises
     ------
     StepError
@@ -82,11 +78,6 @@ def read_folder(folder: Path) -> tuple[Scene, tuple[Step, ...]]:
     ----------
     folder : pathlib.Path
         As ``seqopt optimize`` writes it, with ``scene.json`` and ``plan.csv``.
-
-    Returns
-    -------
-    scene : Scene
-    steps : tuple of Step
 
     Raises
     ------

@@ -17,11 +17,6 @@ from seqopt.sequence.steps import Step
 def sequencer_json(scene: Scene, steps: Sequence[Step]) -> str:
     """Return a plan as an ``assembly_sequence``.
 
-    Parameters
-    ----------
-    scene : Scene
-    steps : sequence of Step
-
     Returns
     -------
     str

@@ -36,15 +36,6 @@ class Source:
 def read_source(scene: Scene, path: Path) -> Source:
     """Return the file from which a scene was imported, in any format that ``import`` knows.
 
-    Parameters
-    ----------
-    scene : Scene
-    path : pathlib.Path
-
-    Returns
-    -------
-    Source
-
     Raises
     ------
     FileError

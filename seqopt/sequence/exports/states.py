@@ -48,10 +48,6 @@ def step_states(scene: Scene, steps: Sequence[Step]) -> Iterator[StepStates]:
     steps : sequence of Step
         Checked, of a plan for the scene.
 
-    Yields
-    ------
-    StepStates
-
     Examples
     --------
     >>> import seqopt

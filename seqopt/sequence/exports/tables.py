@@ -20,11 +20,6 @@ FORMAT, VERSION = "seqopt-plan", 1
 def plan_csv(scene: Scene, steps: Sequence[Step]) -> str:
     """Return a plan as CSV.
 
-    Parameters
-    ----------
-    scene : Scene
-    steps : sequence of Step
-
     Returns
     -------
     str
@@ -48,11 +43,6 @@ def plan_csv(scene: Scene, steps: Sequence[Step]) -> str:
 
 def plan_json(scene: Scene, steps: Sequence[Step]) -> str:
     """Return a plan as JSON.
-
-    Parameters
-    ----------
-    scene : Scene
-    steps : sequence of Step
 
     Returns
     -------
@@ -92,10 +82,6 @@ def parse_plan_json(scene: Scene, text: str) -> tuple[Step, ...]:
     scene : Scene
         In which every step must be possible.
     text : str
-
-    Returns
-    -------
-    tuple of Step
 
     Raises
     ------
