@@ -90,7 +90,7 @@ def test_readme_shows_two_commands_that_exist(capsys):
     commands = re.findall(r"```sh\n(.*?)\n```", text, flags=re.DOTALL)
     assert len(commands) >= 2
     assert commands[0].endswith("seqopt compare")
-    assert commands[1].endswith("-m pytest -n auto")
+    assert commands[1].endswith('-m pytest -n auto -m "not slow"')
     assert main(["compare"]) == 0
     assert "three-robot" in capsys.readouterr().out
 
