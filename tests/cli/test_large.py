@@ -147,7 +147,7 @@ def test_an_interrupt_names_what_was_chosen(tmp_path, workers):
     words = [*WORDS, "cascade", "--no-proof", "--engine", "frame", "--out", tmp_path / "out"]
     run = start(*words, "--cache", tmp_path / "answers", "--workers", workers)
     until = time.monotonic() + 60
-    while len(list(tmp_path.glob("answers/*/*.npz"))) < 6 and time.monotonic() < until:
+    while len(list(tmp_path.glob("answers/*/*.answers"))) < 6 and time.monotonic() < until:
         time.sleep(0.02)
     os.killpg(run.pid, signal.SIGINT)
     out, err = run.communicate(timeout=60)
@@ -174,7 +174,7 @@ def test_a_killed_worker_is_replaced(tmp_path):
     )
     try:
         until = time.monotonic() + 60
-        while not list(tmp_path.glob("answers/*/*.npz")) and time.monotonic() < until:
+        while not list(tmp_path.glob("answers/*/*.answers")) and time.monotonic() < until:
             time.sleep(0.002)
         shown = subprocess.run(
             ["ps", "-ww", "-o", "pid,args", "--ppid", str(run.pid)],

@@ -25,7 +25,10 @@ from seqopt.responses.quantities import RESPONSES, robot_response
 
 LONGEST = 60.0  # s; a case that takes longer hangs
 ENDS = {status.value for status in Status} - {Status.INTERRUPTED.value}
-STARTS = ("seqopt", "engine: ", "robots: ", "payload: ")  # of lines on standard error
+STARTS = (  # of lines on standard error
+    *("seqopt", "engine: ", "robots: ", "payload: ", "stresses in joints are not checked: "),
+    *("outside the linear range: ", "Do not rely on numbers outside the linear range. "),
+)
 ARCHIVE, IMAGE = b"PK", b"\x89PNG"  # how files of fields and of pictures begin
 SET = {"plan.csv", "selection.csv", "responses.csv", "summary.json"}
 
