@@ -12,8 +12,8 @@ grips; over the heaviest block's weight, lengths over the longest lever::
 
 with E and G from `seqopt.contact.assembly.Assembly`, a the share of a corner in the contact area,
 and the other letters from `seqopt.stability.limit_analysis.Case`. The multipliers of the first line
-are the motion in which the structure fails. One program per assembly: the cases differ in
-parameters only.
+are the motion in which the structure fails. It is handed to
+the solver as it stands: of an assembly's cases only a few numbers differ.
 
 Static theorem of limit analysis with corner forces: Livesley (1978), Int. J. Numer. Methods Eng.
 12; as a cone program: Portioli et al. (2014), Comput. Struct. 135.
@@ -21,18 +21,20 @@ Static theorem of limit analysis with corner forces: Livesley (1978), Int. J. Nu
 
 from __future__ import annotations
 
-import cvxpy as cp
+import clarabel
 import numpy as np
+from scipy import sparse
 
-from formulations.solvers import end_of
+from formulations.cones import solve_cones
+from seqopt.arrays import Floats
 from seqopt.contact.assembly import Assembly
-from seqopt.stability.limit_analysis import CAP, Answer, Case, Claim, Program
-
-AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+from seqopt.stability.limit_analysis import CAP, Answer, Case, Claim, Program, limits
 
 
 class Equilibrium:
     """The program of one assembly; call it with a case.
+
+    Its columns are z, three forces at every corner, and three at every grip.
 
     Parameters
     ----------
@@ -41,99 +43,66 @@ class Equilibrium:
     """
 
     def __init__(self, assembly: Assembly) -> None:
-        blocks, corners, grips = (
-            len(part) for part in (assembly.centroid, assembly.corner, assembly.payload)
-        )
         self._assembly = assembly
-        self._shape = (blocks, corners, grips)
-        self._z = cp.Variable()
-        self._force = cp.Variable((max(corners, 1), 3))
-        self._grip = cp.Variable((max(grips, 1), 3))
-        self._sense = cp.Parameter()
-        self._friction = cp.Parameter(nonneg=True)
-        self._strength = cp.Parameter(4)  # tension, its growth, cohesion, its growth
-        self._payload = cp.Parameter(2)
-        self._pull = cp.Parameter(3)
-        self._balance, constraints = self._pose()
-        self._program = cp.Problem(
-            cp.Minimize(self._sense * self._z),
-            [self._balance, *constraints, self._z >= 0, self._z <= CAP],
-        )
-
-    def _pose(self) -> tuple[cp.Zero, list[cp.Constraint]]:
-        _, corners, grips = self._shape
-        assembly = self._assembly
-        weight = assembly.load()
-        pulled = np.stack([assembly.load(axis) for axis in AXES], axis=1)
-        balance = weight + pulled @ (self._pull * self._z)
-        constraints: list[cp.Constraint] = []
-        if corners:
-            balance += assembly.contact_map @ self._force.flatten(order="C")
-            share = assembly.corner_area * assembly.stress_scale / assembly.scales[0]
-            normal = self._force[:, 0]
-            tension = self._strength[0] + self._strength[1] * self._z
-            cohesion = self._strength[2] + self._strength[3] * self._z
-            constraints += [
-                cp.NonNeg(normal + share * tension),
-                cp.SOC(self._friction * normal + share * cohesion, self._force[:, 1:], axis=1),
-            ]
-        if grips:
-            balance += assembly.grip_map @ self._grip.flatten(order="C")
-            own = assembly.payload / assembly.scales[0]
-            reach = own * self._payload[0] + np.ones(grips) * (self._payload[1] * self._z)
-            constraints.append(cp.SOC(reach, self._grip, axis=1))
-        return cp.Zero(balance), constraints
+        self._corners, self._grips = len(assembly.corner), len(assembly.payload)
+        columns = 3 * (self._corners + self._grips)
+        self._balance = sparse.hstack([assembly.contact_map, assembly.grip_map], format="csr")
+        normal = np.diag([1.0, 0.0, 0.0])
+        self._presses = _of_each(self._corners, normal[:1])
+        self._bears = _of_each(self._corners, normal)  # the first row of a cone, but for friction
+        self._slides = _of_each(self._corners, np.eye(3) - normal)
+        self._holds = _of_each(self._grips, np.eye(4)[:, 1:])
+        self._cones = [
+            clarabel.ZeroConeT(self._balance.shape[0]),
+            clarabel.NonnegativeConeT(2 + self._corners),
+            *[clarabel.SecondOrderConeT(3)] * self._corners,
+            *[clarabel.SecondOrderConeT(4)] * self._grips,
+        ]
+        self._cost = np.zeros(1 + columns)
 
     def __call__(self, case: Case, attempt: int = 0) -> Answer:
-        """Return the solver's answer to a case.
+        """Return the solver's answer to a case, claimed and not proven; attempts count from 0."""
+        blocks, corners = len(self._assembly.centroid), self._corners
+        matrix, right = self._program(case)
+        cost = self._cost.copy()
+        cost[0] = case.sense.value
+        claim, x, multipliers = solve_cones(cost, matrix, right, self._cones, attempt)
+        if claim in (Claim.STALLED, Claim.INFEASIBLE):
+            x, multipliers = np.zeros_like(x), np.zeros_like(multipliers)
+            x[0] = np.nan
+        forces = x[1:].reshape(-1, 3)
+        motion = multipliers[: 6 * blocks].reshape(blocks, 6)
+        return Answer(claim, float(x[0]), forces[:corners], forces[corners:], motion)
 
-        Parameters
-        ----------
-        case : Case
-            What is asked of the assembly.
-        attempt : int
-            Index of the solver's options to use, from 0.
-
-        Returns
-        -------
-        Answer
-            Claimed, not proven.
-        """
-        blocks, corners, grips = self._shape
-        self._sense.value = case.sense.value
-        self._friction.value = case.friction
-        self._strength.value = np.array([*case.tension, *case.cohesion])
-        self._payload.value = np.array(case.payload)
-        self._pull.value = np.array(case.pull)
-        claim = end_of(self._program, attempt)
-        if claim in (Claim.STALLED, Claim.INFEASIBLE) or self._z.value is None:
-            return Answer(
-                claim, np.nan, np.zeros((corners, 3)), np.zeros((grips, 3)), np.zeros((blocks, 6))
-            )
-        return Answer(
-            claim,
-            float(self._z.value),
-            _values(self._force, corners),
-            _values(self._grip, grips),
-            np.asarray(self._balance.dual_value).reshape(blocks, 6),
-        )
+    def _program(self, case: Case) -> tuple[sparse.csc_array, Floats]:
+        """Return the matrix and the right-hand side of a case: right - matrix x is in the cones."""
+        assembly, corners = self._assembly, self._corners
+        start, more = limits(assembly, case, 0.0), limits(assembly, case, 1.0)
+        growth = [after - before for before, after in zip(start, more, strict=True)]
+        widths = (1, 3, 4)  # of what tension, cohesion and payload bound
+        pulls = assembly.load(case.pull) if any(case.pull) else np.zeros(self._balance.shape[0])
+        grows = [-_first_of(more, rows) for more, rows in zip(growth, widths, strict=True)]
+        bounds = [_first_of(most, rows) for most, rows in zip(start, widths, strict=True)]
+        contact = sparse.vstack([self._presses, case.friction * self._bears + self._slides])
+        none = sparse.csr_array((2, 3 * (corners + self._grips)))
+        rest = sparse.vstack([self._balance, none, sparse.block_diag([-contact, -self._holds])])
+        z = np.concatenate([pulls, [-1.0, 1.0], *grows])
+        right = np.concatenate([-assembly.load(), [0.0, CAP], *bounds])
+        return sparse.csc_array(sparse.hstack([sparse.csc_array(z[:, None]), rest])), right
 
 
-def _values(variable: cp.Variable, count: int) -> np.ndarray:
-    return np.zeros((0, 3)) if variable.value is None else np.asarray(variable.value)[:count]
+def _of_each(count: int, block: Floats) -> sparse.csr_array:
+    """Return a matrix with a block for each of so many, from rows to columns of its own."""
+    return sparse.csr_array(sparse.kron(sparse.eye_array(count), sparse.csr_array(block)))
+
+
+def _first_of(values: Floats, rows: int) -> Floats:
+    """Return values (n,) each followed by zeros, (n * rows,)."""
+    out = np.zeros((len(values), rows))
+    out[:, 0] = values
+    return out.ravel()
 
 
 def compile_equilibrium(assembly: Assembly) -> Program:
-    """Return the program of an assembly.
-
-    Parameters
-    ----------
-    assembly : Assembly
-        Blocks, the faces at which they touch, and grips.
-
-    Returns
-    -------
-    Program
-        To be called with a case.
-    """
+    """Return the program of an assembly, to be called with a case."""
     return Equilibrium(assembly)

@@ -14,8 +14,9 @@ in their order,
    g(s_1, \dots, s_N) = \sum_i c(s_{i-1}, s_i),
 
 with :math:`v` the value of a state and :math:`c` the cost of a step. A narrow search without
-regrips, which keeps the best states of every brick count, gives a first plan. Then a threshold
-rises until states below it connect the empty site to an end; responses are computed only for states
+regrips, which keeps the best states of every brick count, gives a first plan; where states must
+stand, which is dear to ask of them all, only if time or memory is limited. Then a threshold rises
+until states below it connect the empty site to an end; responses are computed only for states
 next to those that are reached below it, and with six digits until their value is close to that of
 the plan. Among these every goal is a shortest path, with the maximum instead of the sum for a peak;
 what is not on a best path of one goal is left out before the next. Whether states stand is asked
@@ -111,7 +112,10 @@ def solve(
     _require_order(problem)
     reached: list[Explorer] = []
     tell = _watch(problem, (time.perf_counter() + seconds, max_memory), progress, reached)
-    return _search(problem, (width, growth), tell, reached)
+    limited = min(seconds, max_memory) < np.inf
+    return _search(
+        problem, (0 if problem.demands and not limited else width, growth), tell, reached
+    )
 
 
 def _watch(
@@ -158,7 +162,7 @@ def _search(
     found, proven = None, [-np.inf]
     wide = Explorer(FreeStates(problem), tell=tell)
     try:
-        found = _narrow(problem, options[0], tell)
+        found = _narrow(problem, options[0], tell) if options[0] else None
         reached.clear()  # of which nothing is proven
         ceiling = found.objective[0] if found else np.inf
         return _best(problem, wide, (ceiling, options[1]), proven)
@@ -210,10 +214,11 @@ def _best(
 
 def _standing(problem: FreeProblem, found: Explorer) -> ScheduleSelection:
     """Return the best path through visited states that stand as is demanded."""
+    known: set[tuple[int, ...]] = set()
     while True:
         visited, best = _exact(found)
         states = visited.of(best.path)
-        if not problem.demands or not _leave_out(problem, found, states):
+        if not problem.demands or not _leave_out(problem, found, states, known):
             rows = tuple((level, *state.tolist()) for level, _, state in states)
             hint = _passable(visited, best.values[0])
             return ScheduleSelection(rows, best.values, best.values, hint)
@@ -239,11 +244,24 @@ def _passable(visited: Visited, value: float) -> tuple[Ints, ...]:
     )
 
 
-def _leave_out(problem: FreeProblem, found: Explorer, states: list[tuple[int, Key, Ints]]) -> bool:
-    """Leave out states of a path that do not stand; return whether there were any."""
+def _leave_out(
+    problem: FreeProblem,
+    found: Explorer,
+    states: list[tuple[int, Key, Ints]],
+    known: set[tuple[int, ...]],
+) -> bool:
+    """Leave out states of a path that do not stand; return whether there were any.
+
+    Those that are known to stand are not asked again; what stands joins them.
+    """
     fallen = False
     for level, part, state in states:
-        if not problem.stand(level, state[None])[0]:
+        row = (level, *state.tolist())
+        if row in known:
+            continue
+        if problem.stand(level, state[None])[0]:
+            known.add(row)
+        else:
             found.close((level, part), state[None])
             fallen = True
     return fallen

@@ -15,22 +15,10 @@ import numpy as np
 
 from seqopt.errors import InfeasibleError, SolverError
 from seqopt.placement.watch import Watch
-from seqopt.stability.limit_analysis import Claim
 
 GAPS = {"mip_rel_gap": 1e-9, "mip_abs_gap": 1e-9}  # of integer programs
 HIGHS_ENDS = {"kOptimal": cp.OPTIMAL, "kInfeasible": cp.INFEASIBLE}
 STOPS = ("kTimeLimit", "kInterrupt")
-CONE_OPTIONS: tuple[dict[str, object], ...] = (
-    {"equilibrate_enable": False, "static_regularization_constant": 1e-7},
-    {"warm_start": False},  # a solver that is kept keeps its options
-)  # by attempt. A program scaled by its author stalls less without the solver's own scaling: on the
-# 98 steps of the two-robot methods with epoxy 0 of 1,174 cases, else 23 of 1,142
-SECONDS = 300.0  # a cone program that takes longer has stalled
-ENDS = {
-    cp.OPTIMAL: Claim.SOLVED,
-    cp.OPTIMAL_INACCURATE: Claim.ALMOST,
-    cp.INFEASIBLE: Claim.INFEASIBLE,
-}  # any other end, a limit reached among them, is a stall
 
 
 @dataclass(frozen=True)
@@ -237,29 +225,3 @@ def _end(solver: highspy.Highs, seconds: float) -> str:
         solver.setOptionValue("time_limit", seconds)
     solver.run()
     return str(solver.getModelStatus().name)
-
-
-def end_of(program: cp.Problem, attempt: int) -> Claim:
-    """Solve a cone program by Clarabel.
-
-    Parameters
-    ----------
-    program : cvxpy.Problem
-        Its variables and multipliers take the values of the answer, if there is one.
-    attempt : int
-        Index into `CONE_OPTIONS`.
-
-    Returns
-    -------
-    Claim
-        How that ended; a solver that fails has stalled.
-    """
-    with warnings.catch_warnings():  # an inaccurate end is claimed, counted and put to the proof
-        warnings.filterwarnings("ignore", "Solution may be inaccurate", UserWarning)
-        try:
-            program.solve(
-                solver=cp.CLARABEL, time_limit=SECONDS, max_threads=1, **CONE_OPTIONS[attempt]
-            )
-        except cp.SolverError:
-            return Claim.STALLED
-    return ENDS.get(program.status, Claim.STALLED)

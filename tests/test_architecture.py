@@ -34,7 +34,9 @@ ROOMS = (
 )  # a room imports from rooms above it in this list only
 SOLVERS = {"cvxpy", "clarabel", "highspy"}
 SOLVER_HOME = "formulations"
-SHARED = {"formulations.solvers", "formulations.whole_program"}  # what formulations may import
+SHARED = {  # what formulations may import
+    *("formulations.cones", "formulations.solvers", "formulations.whole_program")
+}
 MECHANICS = {"network.statics", "network.kinematics", "engines.rigid"}  # not for the frame
 LINES, LINES_OF_A_FUNCTION = 300, 50  # of code; imports, docstrings and comments aside
 NO_CODE = {COMMENT, NL, NEWLINE, INDENT, DEDENT, ENDMARKER}

@@ -16,8 +16,27 @@ from seqopt.scene.parts import Brick
 SLIVER = 1e-6  # smallest overlap of two faces, as a share of the smaller one
 
 
-def step_assembly(network: Network, bricks: int, grips: Sequence[int | None]) -> Assembly:
-    """Return a partial structure with the grips that hold it.
+class Contacts(dict[int, tuple[str, Floats, Floats]]):
+    """Contacts of a network by their springs, each found when it is first asked for.
+
+    A name, a normal (3,) and the corners (m, 3) of a face, m.
+    """
+
+    def __init__(self, network: Network) -> None:
+        self._network = network
+
+    def __missing__(self, spring: int) -> tuple[str, Floats, Floats]:
+        self[spring] = _contact(self._network, spring)
+        return self[spring]
+
+
+def step_assembly(
+    network: Network,
+    bricks: int,
+    grips: Sequence[int | None],
+    known: Contacts | None = None,
+) -> Assembly:
+    """Return a partial structure with the grips that hold it: blocks and their contacts.
 
     A joint is a contact over the face that it says. If it says none, its bricks are boxes, and the
     contact is the overlap of the two faces that look at each other, seen along the joint's normal;
@@ -27,9 +46,10 @@ def step_assembly(network: Network, bricks: int, grips: Sequence[int | None]) ->
     ----------
     network : Network
     bricks : int
-        How many bricks stand, in build order.
     grips : sequence of (int or None)
         Node that each of the scene's robots holds.
+    known : Contacts, optional
+        Those found for other steps; what is missing joins them.
 
     Returns
     -------
@@ -42,9 +62,10 @@ def step_assembly(network: Network, bricks: int, grips: Sequence[int | None]) ->
     """
     placed = network.scene.placed
     acting = network.springs.acting(bricks)
-    contacts = [_contact(network, s) for s in acting]
-    robots = network.scene.robots
-    held = [(node, r) for node, r in zip(grips, robots, strict=True) if node is not None]
+    known = Contacts(network) if known is None else known
+    contacts = [known[s] for s in acting.tolist()]
+    pairs = zip(grips, network.scene.robots, strict=True)
+    held = [(node, r) for node, r in pairs if node is not None]
     block = {node: i for i, brick in enumerate(placed) for node in brick.nodes}
     return Assembly(
         block_name=tuple(brick.name for brick in placed[:bricks]),
@@ -62,26 +83,22 @@ def step_assembly(network: Network, bricks: int, grips: Sequence[int | None]) ->
     )
 
 
-def bare_assembly(network: Network, bricks: int) -> Assembly:
+def bare_assembly(network: Network, bricks: int, known: Contacts | None = None) -> Assembly:
     """Return a partial structure that nobody holds.
 
     Parameters
     ----------
     network : Network
     bricks : int
-        How many bricks stand, in build order.
+    known : Contacts, optional
+        As of `step_assembly`.
 
     Returns
     -------
     Assembly
-
-    Raises
-    ------
-    SceneError
-        If the bricks of a joint do not touch there: see `seqopt.contact.joint_space`.
     """
     nobody = (None,) * len(network.scene.robots)
-    return step_assembly(network, bricks, nobody)
+    return step_assembly(network, bricks, nobody, known)
 
 
 def _contact(network: Network, spring: int) -> tuple[str, Floats, Floats]:

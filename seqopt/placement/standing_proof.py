@@ -13,7 +13,7 @@ from seqopt.placement.free_problem import FreeProblem
 from seqopt.placement.standing import Standing, StandingSets, slack
 from seqopt.sequence.steps import Step
 from seqopt.stability.assessment import Stability, Verdict
-from seqopt.stability.steps import assess_steps
+from seqopt.stability.steps import assess_steps, step_verdicts
 
 SURE = 1e-3  # rad, or as a share: how far the cone program may be from what forces prove
 
@@ -73,26 +73,28 @@ class StandingProof:
 def proven_margins(problem: FreeProblem, steps: Sequence[Step]) -> dict[str, float]:
     """Return the margins of a plan by the cone program, and require that every step stands.
 
-    Returns
-    -------
-    dict of str to float
-        The worst ``bond``, ``friction`` and ``tilt`` of any step, as goals count them.
-
-    Raises
-    ------
-    SolverError
-        Naming the step that is not proven to stand as is demanded.
+    Margins are found only where they are asked for: the worst ``bond``, ``friction`` and ``tilt``
+    of any step, as goals count them. A `SolverError` names the step that is not proven to stand as
+    is demanded.
     """
-    standing = problem.standing or Standing()
+    standing = problem.standing
+    if not (any(goal.of_margins for goal in problem.goals) or (standing and standing.tilt)):
+        demanded = standing or Standing()
+        verdicts = step_verdicts(problem.network, steps, demanded.mortar)
+        for step, verdict in zip(steps, verdicts, strict=True):
+            if verdict is not Verdict.STANDS:
+                raise _falls(step, verdict.value)
+        return {}
     results = certified(problem, steps)
-    if problem.standing is not None:
-        for step, result in zip(steps, results, strict=True):
-            if result.verdict is not Verdict.STANDS or result.tilt < standing.tilt - SURE:
-                raise SolverError(
-                    f"step {step.number} is not proven to stand as demanded: "
-                    f"{result.verdict.value}, tilt survived {result.tilt:.4g} rad"
-                )
+    for step, result in zip(steps if standing else (), results, strict=bool(standing)):
+        enough = standing is None or not result.tilt < standing.tilt - SURE
+        if not (result.verdict is Verdict.STANDS and enough):
+            raise _falls(step, f"{result.verdict.value}, tilt survived {result.tilt:.4g} rad")
     return worst_margins(results)
+
+
+def _falls(step: Step, what: str) -> SolverError:
+    return SolverError(f"step {step.number} is not proven to stand as demanded: {what}")
 
 
 def certified(problem: FreeProblem, steps: Sequence[Step]) -> tuple[Stability, ...]:

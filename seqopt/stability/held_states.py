@@ -9,7 +9,7 @@ import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.contact.assembly import Assembly
-from seqopt.contact.faces import bare_assembly
+from seqopt.contact.faces import Contacts, bare_assembly
 from seqopt.network.network import Network
 from seqopt.stability.held_program import CompileHeld, HeldProgram
 from seqopt.stability.known import Known
@@ -19,26 +19,12 @@ Settled = Callable[[Floats], Bools]
 """Says which brackets (S, 2) are narrow enough."""
 
 
-def node_assembly(network: Network, bricks: int) -> Assembly:
-    """Return a partial structure with a grip without payload at every inner node.
+def node_assembly(network: Network, bricks: int, known: Contacts | None = None) -> Assembly:
+    """Return a partial structure with a grip without payload at every inner node, in build order.
 
-    Parameters
-    ----------
-    network : Network
-    bricks : int
-        How many bricks stand, in build order.
-
-    Returns
-    -------
-    Assembly
-        Its grips brick by brick in build order.
-
-    Raises
-    ------
-    SceneError
-        If the bricks of a joint do not touch there: see `seqopt.contact.joint_space`.
+    As of `seqopt.contact.faces.step_assembly`.
     """
-    bare = bare_assembly(network, bricks)
+    bare = bare_assembly(network, bricks, known)
     nodes = network.inner[:bricks].ravel()
     return replace(
         bare,

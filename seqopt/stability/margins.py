@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.contact.assembly import Assembly
+from seqopt.contact.faces import Contacts
 from seqopt.contact.mortar import Mortar, find_mortar
 from seqopt.network.build import network_of
 from seqopt.network.network import Network
@@ -62,6 +63,7 @@ class Margins:
         self.network = network_of(network)
         self.mortar = find_mortar(mortar)
         self._compile = compiled
+        self._contacts = Contacts(self.network)
         self._levels: dict[tuple[str, int], tuple[HeldStates, ...]] = {}
         self.screens = {self.mortar.friction: Screen(self.network, self.mortar, 0.0, compiled)}
 
@@ -238,7 +240,7 @@ class Margins:
         """Return the brackets (S, 2) of z of every case."""
         places, loads = held_places(self.network, bricks, *grips)
         if (name, bricks) not in self._levels:
-            assembly = node_assembly(self.network, bricks)
+            assembly = node_assembly(self.network, bricks, self._contacts)
             self._levels[name, bricks] = tuple(
                 HeldStates(assembly, case, self._compile) for case in cases(assembly)
             )

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from seqopt.arrays import Bools, Floats, Ints, Vector
 from seqopt.contact.assembly import Assembly
+from seqopt.contact.faces import Contacts
 from seqopt.contact.mortar import Mortar, find_mortar
 from seqopt.errors import GripError
 from seqopt.network.build import network_of
@@ -63,6 +64,7 @@ class Screen:
         self.mortar = find_mortar(mortar)
         self.tilt = tilt
         self._compile = compiled
+        self._contacts = Contacts(self.network)
         self._levels: dict[tuple[int, int, bool], tuple[HeldStates, ...]] = {}
 
     @property
@@ -127,7 +129,7 @@ class Screen:
     def _level(self, level: tuple[int, int, bool]) -> tuple[HeldStates, ...]:
         if level not in self._levels:
             bricks, count, around = level
-            upright = node_assembly(self.network, bricks)
+            upright = node_assembly(self.network, bricks, self._contacts)
             pull = np.tan(self.tilt) / (np.cos(np.pi / count) if around else 1.0)
             self._levels[level] = tuple(
                 lacking(assembly, self.mortar, self._compile)

@@ -7,13 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
-from seqopt.contact.faces import step_assembly
+from seqopt.contact.faces import Contacts, step_assembly
 from seqopt.contact.mortar import Mortar, find_mortar
 from seqopt.network.build import network_of
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
-from seqopt.sequence.steps import Step, require_steps
-from seqopt.stability.assessment import Stability, Verdict, assess
+from seqopt.sequence.steps import Grips, Step, require_steps
+from seqopt.stability.assessment import Stability, Verdict, assess, verdict
 from seqopt.stability.limit_analysis import Claim
 from seqopt.work.progress import Tell, told
 
@@ -53,12 +53,21 @@ def assess_steps(
     ['stands', 'stands']
     """
     network, mortar = network_of(network), find_mortar(mortar)
-    out = []
+    known, up, out = Contacts(network), network.scene.up, []
     for step in told("assessing steps", require_steps(steps), progress):
-        out.append(
-            assess(step_assembly(network, step.bricks, step.grips), mortar, network.scene.up)
-        )
+        out.append(assess(step_assembly(network, step.bricks, step.grips, known), mortar, up))
     return tuple(out)
+
+
+def step_verdicts(network: Network, steps: Sequence[Step], mortar: Mortar) -> tuple[Verdict, ...]:
+    """Return the verdict of every step; of equal partial structures it is asked once."""
+    contacts = Contacts(network)
+    found: dict[tuple[int, Grips], Verdict] = {}
+    for step in steps:
+        if (step.bricks, step.grips) not in found:
+            assembly = step_assembly(network, step.bricks, step.grips, contacts)
+            found[step.bricks, step.grips] = verdict(assembly, mortar)
+    return tuple(found[step.bricks, step.grips] for step in steps)
 
 
 def stability_table(steps: Sequence[Step], results: Sequence[Stability]) -> pd.DataFrame:

@@ -6,22 +6,19 @@ Forces count in the cube's weight, strengths in that weight over its face, so th
 from __future__ import annotations
 
 from dataclasses import FrozenInstanceError, replace
+from types import SimpleNamespace
+from typing import ClassVar
 
+import clarabel
 import cvxpy as cp
 import numpy as np
 import pytest
 
+import formulations.limit_analysis
 from experiments.stability.parts.blocks import stack
+from formulations.cones import CONE_OPTIONS, ENDS, SECONDS, solve_cones
 from formulations.limit_analysis import compile_equilibrium
-from formulations.solvers import (
-    CONE_OPTIONS,
-    ENDS,
-    GAPS,
-    SECONDS,
-    end_of,
-    minimize,
-    minimize_whole,
-)
+from formulations.solvers import GAPS, minimize, minimize_whole
 from seqopt.stability.limit_analysis import CAP, Case, Claim, Sense, limits
 from tests.builders import held
 
@@ -165,33 +162,51 @@ def test_what_cannot_be_held_has_no_forces():
     assert fallen.grip_force.shape == (0, 3)
 
 
-@pytest.mark.parametrize("status", [*ENDS, cp.USER_LIMIT, cp.UNBOUNDED, None])
+class Ended:
+    """A solver that ends with a status, and keeps what it was given."""
+
+    given: ClassVar[list[object]] = []
+
+    def __init__(self, *given):
+        self.given.append(given[-1])
+
+    def solve(self):
+        if self.status == "fails":
+            raise RuntimeError("no")
+        return SimpleNamespace(status=self.status, x=[0.0], z=[0.0])
+
+
+@pytest.mark.parametrize("status", [*ENDS, "MaxTime", "NumericalError", "DualInfeasible", "fails"])
 def test_how_a_solver_says_that_it_ended(monkeypatch, status):
     """Nothing but an optimum and infeasibility is taken from it, and it gets its options."""
-    given = []
-    monkeypatch.setattr(cp.Problem, "solve", lambda *_, **options: given.append(options))
-    monkeypatch.setattr(cp.Problem, "status", status, raising=False)
+    monkeypatch.setattr(Ended, "status", status, raising=False)
+    monkeypatch.setattr(clarabel, "DefaultSolver", Ended)
+    program = np.zeros(1), np.zeros((1, 1)), np.zeros(1), []
     for attempt, own in enumerate(CONE_OPTIONS):
-        assert end_of(cp.Problem(cp.Minimize(0)), attempt) is ENDS.get(status, Claim.STALLED)
-        assert given[-1] == {"solver": cp.CLARABEL, "time_limit": SECONDS, "max_threads": 1} | own
+        assert solve_cones(*program, attempt)[0] is ENDS.get(status, Claim.STALLED)
+        given, usual = Ended.given[-1], clarabel.DefaultSettings()
+        assert (given.time_limit, given.max_threads, given.verbose) == (SECONDS, 1, False)
+        assert given.equilibrate_enable is own.get("equilibrate_enable", usual.equilibrate_enable)
     assert 60 <= SECONDS <= 3600
     assert len({str(options) for options in CONE_OPTIONS}) == len(CONE_OPTIONS)
 
 
-def test_the_first_attempt_is_the_first(monkeypatch):
+def test_the_first_attempt_is_the_first_and_has_its_authors_scaling(monkeypatch):
     given = []
-    monkeypatch.setattr("formulations.limit_analysis.end_of", lambda _, n: given.append(n))
+    solved = formulations.limit_analysis.solve_cones
+
+    def attempted(*words):
+        given.append(words[-1])
+        return solved(*words)
+
+    monkeypatch.setattr("formulations.limit_analysis.solve_cones", attempted)
     program = compile_equilibrium(CUBE)
     for attempts in ((), (0,), (1,)):
         program(case(Sense.LARGEST), *attempts)
     assert given == [0, 0, 1]
-
-
-def test_the_first_attempt_has_its_authors_scaling_the_next_starts_afresh_with_the_solvers():
     first, second = CONE_OPTIONS
     assert first["equilibrate_enable"] is False
     assert "equilibrate_enable" not in second  # the solver's own
-    assert second["warm_start"] is False  # which would keep the first one's
 
 
 @pytest.mark.parametrize("seconds", [None, 0.25])
@@ -213,11 +228,8 @@ def test_an_integer_optimum_is_sought_to_nine_digits():
 
 
 def test_a_solver_that_fails_has_stalled(monkeypatch):
-    def fails(*_, **__):
-        raise cp.SolverError("no")
-
-    monkeypatch.setattr(cp.Problem, "solve", fails)
-    assert end_of(cp.Problem(cp.Minimize(0)), 0) is Claim.STALLED
+    monkeypatch.setattr(Ended, "status", "fails", raising=False)
+    monkeypatch.setattr(clarabel, "DefaultSolver", Ended)
     answer = compile_equilibrium(CUBE)(case(Sense.LARGEST, pull=ASIDE))
     assert answer.claim is Claim.STALLED
     assert np.isnan(answer.value)
