@@ -62,8 +62,7 @@ def step_assembly(
     """
     placed = network.scene.placed
     acting = network.springs.acting(bricks)
-    known = Contacts(network) if known is None else known
-    contacts = [known[s] for s in acting.tolist()]
+    contacts = [*map((Contacts(network) if known is None else known).__getitem__, acting.tolist())]
     pairs = zip(grips, network.scene.robots, strict=True)
     held = [(node, r) for node, r in pairs if node is not None]
     block = {node: i for i, brick in enumerate(placed) for node in brick.nodes}
