@@ -127,7 +127,7 @@ def _watch(
     """Return what is told every level: it keeps the states and ends the search in time."""
 
     def tell(found: Explorer) -> None:
-        share = found.level / problem.space.bricks
+        share = found.level / problem.space.levels
         progress(Stage(f"free schedule, pass {found.passes}", share))
         reached[:] = [found]
         if time.perf_counter() > most[0]:

@@ -34,10 +34,12 @@ from seqopt.sequence.thinning import thin
 from seqopt.study.presets import EQUATIONS, find_criterion
 
 RULES = tuple(field.name for field in fields(FreeRules) if field.name != "robots")
-FREE_WORDS = ("aim", "rules", "stands", *RULES)
+FREE_WORDS = ("rules", *RULES)
 """Options that the free schedule alone has."""
-LOOP_WORDS = ("budgets", "candidates", "workers", "executor", "cache")
-"""Options that it does not have."""
+STATE_WORDS = ("aim", "stands")
+"""Options with which states of a build are chosen, of whatever schedule, and no candidates."""
+LOOP_WORDS = ("budgets", "workers", "executor", "cache")
+"""Options that go with costs of candidates alone."""
 
 
 @dataclass(frozen=True)
@@ -127,8 +129,9 @@ def optimize(
     limits : sequence of Limit
         Bounds that no step may exceed, whether or not a grip is open in it.
     **options
-        Of `seqopt.solve`, the formulation, `seqopt.responses.Resources`, if free of `FreeRules` and
-        `pose_free`; ``order``, ``mortar``, ``robots``; ``budgets``, ``candidates`` in words.
+        Of `seqopt.solve`, the formulation, `seqopt.responses.Resources`, if free of `FreeRules`;
+        ``aim`` and ``stands`` of `pose_free` with every schedule; ``order``, ``mortar``,
+        ``robots``; ``budgets``, ``candidates`` in words.
 
     Returns
     -------
@@ -145,7 +148,8 @@ def optimize(
     >>> seqopt.optimize("arch25", "free", "worst-ratio-published", aim="minmax,steps")
     FreePlan('arch25', 50 steps, minmax 0.840088, steps 50, optimal)
     """
-    usual = DEFAULTS[_kind(schedule)].chosen_by(options.get("budgets"))
+    kind = FREE if any(word in options for word in STATE_WORDS) else _kind(schedule)
+    usual = DEFAULTS[kind].chosen_by(options.get("budgets"))
     problem, assemble = _pose(scene, schedule, (criterion, engine), limits, options)
     plan = solve(problem, formulation or usual, **options)
     return replace(plan, seconds={"assemble": assemble, **plan.seconds})
@@ -167,16 +171,21 @@ def _pose(
     start = time.perf_counter()
     found = load_scene(scene) if isinstance(scene, str | Path) else scene
     made, free = in_order(found, options.pop("order", None)), _kind(schedule) == FREE
-    if free:
-        _refuse(options, LOOP_WORDS, "the free schedule has no such option; leave it out")
-        if isinstance(options.get("robots"), int):
-            made = with_robots(made, options.pop("robots"))
-    else:
+    states = free or any(word in options for word in STATE_WORDS)
+    if states:
+        what = "the free schedule has" if free else "aim and stands have"
+        loop = (*LOOP_WORDS, "candidates") if free else LOOP_WORDS
+        _refuse(options, loop, f"{what} no such option; leave it out")
+    if free and isinstance(options.get("robots"), int):
+        made = with_robots(made, options.pop("robots"))
+    if not free:
         _refuse(options, FREE_WORDS, f"only the free schedule has it; give schedule={FREE!r}")
     engine = make_engine(asked[1], build_network(made), options.pop("mortar", None))
     problem: Problem | FreeProblem
-    if free:
-        problem = posed_free(engine, asked[0], limits=limits, **_free_words(options))
+    if states:
+        rules = _free_rules(options) if free else _open(engine, schedule, options)
+        words = {name: options.pop(name, None) for name in STATE_WORDS}
+        problem = posed_free(engine, asked[0], limits=limits, rules=rules, **words)
     else:
         opened = _open(engine, schedule, options)
         problem = posed(engine, opened, asked[0], limits, *_means(options))
@@ -219,11 +228,11 @@ def posed_free(
     criterion: Criterion | str | None = None,
     aim: str | None = None,
     *,
-    rules: FreeRules | None = None,
+    rules: FreeRules | Schedule | None = None,
     limits: Sequence[Limit] = (),
     stands: Standing | Mortar | str | None = None,
 ) -> FreeProblem:
-    """Return the problem of a free schedule, by what people say of it.
+    """Return the problem of a free schedule, or of states of another, by what people say of it.
 
     Parameters
     ----------
@@ -233,7 +242,7 @@ def posed_free(
         As of `optimize`.
     aim : str, optional
         What is to be as small as possible.
-    rules : FreeRules, optional
+    rules : FreeRules or Schedule, optional
     limits, stands : optional
         As of `seqopt.pose_free`.
     """
@@ -259,14 +268,13 @@ def _means(options: dict[str, Any]) -> tuple[Sequence[str], Resources]:
     return options.pop("budgets", ()), Resources(**{name: options.pop(name) for name in given})
 
 
-def _free_words(options: dict[str, Any]) -> dict[str, Any]:
-    """Take out of options what they say of the problem of a free schedule."""
+def _free_rules(options: dict[str, Any]) -> FreeRules:
+    """Take out of options what they say of the rules of a free schedule."""
     rules = options.pop("rules", FreeRules())
     if not isinstance(rules, FreeRules):
         raise ProblemError(f"rules {short(rules)}: give a seqopt.FreeRules")
     given = {name: options.pop(name) for name in ("robots", *RULES) if name in options}
-    words = {name: options.pop(name, None) for name in ("aim", "stands")}
-    return {**words, "rules": replace(rules, **given)}
+    return replace(rules, **given)
 
 
 def _refuse(options: dict[str, Any], names: Sequence[str], why: str) -> None:

@@ -1,4 +1,4 @@
-"""The free schedule on the command line: what ``optimize --schedule free`` does."""
+"""Schedules by states on the command line: ``--schedule free``, ``--aim`` and ``--stands``."""
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ from seqopt.cli.free_files import free_files
 from seqopt.cli.means import parse_size
 from seqopt.cli.order import SEARCH, optimize_order
 from seqopt.cli.outputs import require_out, write_outputs, written_to
+from seqopt.cli.posing import asked_schedule
 from seqopt.cli.rules import parse_rules, parse_standing
 from seqopt.cli.status import Status
 from seqopt.cli.values import parse_limits, parse_numbers, parse_robots, parse_time_limit
@@ -30,7 +31,8 @@ from seqopt.placement.free_problem import FreeProblem
 from seqopt.placement.schedule_formulation import find_schedule_formulation
 from seqopt.placement.solving import solve
 from seqopt.scene.scene import Scene
-from seqopt.sequence.free_rules import FREE, with_robots
+from seqopt.sequence.free_rules import FREE, FreeRules, with_robots
+from seqopt.sequence.schedule import Schedule
 from seqopt.workflow import DEFAULTS, posed_free
 
 
@@ -58,7 +60,7 @@ def optimize_free(options: argparse.Namespace) -> Answer:
     plan = solve(problem, formulation, time_limit=limit, progress=options.tell, **how)
     table, report = plan.responses(), plan.summary()
     said = f"{', '.join(map(str, problem.goals))}; {plan.status}"
-    written = write_outputs(options, lambda: free_files(plan, report, "free schedule", said))
+    written = write_outputs(options, lambda: free_files(plan, report, plan.title, said))
     stopped = plan.selection.stopped == "interrupt"
     over = () if stopped else exceeded(scene, table)
     answer = Answer(
@@ -93,20 +95,24 @@ def require_loop(options: argparse.Namespace) -> None:
     ProblemError
         Naming the option.
     """
-    free = ("aim", "rule", "stands", "tilt", "friction")
-    for name, given in ((f"--{word}", getattr(options, word)) for word in free):
-        if given:
-            raise ProblemError(f"{name}: only the free schedule has it; give --schedule {FREE}")
+    for name in ("rule", "tilt", "friction"):
+        if getattr(options, name):
+            also = "" if name == "rule" else " --stands MORTAR, or"
+            raise ProblemError(f"--{name}: it needs more; give{also} --schedule {FREE}")
 
 
 def _require_free(options: argparse.Namespace) -> None:
     """Raise an error if options that the free schedule does not have are given with it."""
-    unknown = ("budget", "candidates", "cache", "ranked", "among")
+    free = options.schedule == FREE
+    unknown: tuple[str, ...] = ("budget", "cache", "ranked", "among")
+    unknown += ("candidates",) if free else ("rule",)
     given = [name for name in unknown if getattr(options, name)]
     given += ["workers"] if options.workers != "1" and options.order != SEARCH else []
     if given:
         raise ProblemError(
-            f"--{given[0].replace('_', '-')}: the free schedule has no such; leave it out"
+            f"--{given[0].replace('_', '-')}: "
+            + ("the free schedule has no such" if free else "aims and --stands have no such")
+            + "; leave it out"
         )
 
 
@@ -122,13 +128,16 @@ def asked_free(options: argparse.Namespace) -> tuple[Scene, FreeProblem]:
     names = parse_robots(options.robots)
     if options.robots.isdecimal():
         scene, names = with_robots(scene, int(options.robots)), ()
-    if options.schedule != FREE and (options.rule or options.robots.isdecimal()):
+    free = options.schedule == FREE
+    if not free and (options.rule or options.robots.isdecimal()):
         raise StepError(f"--schedule {options.schedule}: rules and a count of robots go with free")
-    rules = parse_rules(options.rule, names if options.schedule == FREE else ())
+    rules: FreeRules | Schedule = parse_rules(options.rule, names if free else ())
     criterion = None
     if options.criteria is not None:
         criterion = parse_criterion(options.criteria, options.crown)
     engine = asked_engine(options, build_network(scene))
+    if not free and options.command == "optimize":
+        rules = asked_schedule(options, engine.network)
     limits, stands = parse_limits(options.limit, scene), parse_standing(options)
     return scene, posed_free(
         engine, criterion, options.aim, rules=rules, limits=limits, stands=stands

@@ -60,7 +60,7 @@ def run(options: argparse.Namespace) -> Answer:
     if options.robust is not None:
         return optimize_robust(options)
     require_no_scenarios(options)
-    if options.schedule == FREE:
+    if options.schedule == FREE or options.aim or options.stands:
         return optimize_free(options)
     require_loop(options)
     formulation = find_formulation(

@@ -10,8 +10,10 @@ from seqopt.cli.means import parse_resources
 from seqopt.cli.outputs import require_out
 from seqopt.cli.values import parse_limits, parse_robots
 from seqopt.network.build import build_network
+from seqopt.network.network import Network
 from seqopt.placement.asked_budgets import parse_budgets
 from seqopt.placement.problem import Problem
+from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.schedule_file import find_schedule
 from seqopt.sequence.thinning import thin
 from seqopt.workflow import posed
@@ -32,7 +34,11 @@ def asked_problem(options: argparse.Namespace) -> Problem:
     parse_budgets(options.budget)  # what is wrong is said before anything is built
     require_out(options)
     engine = asked_engine(options, build_network(scene))
-    schedule = find_schedule(engine.network, options.schedule, parse_robots(options.robots))
-    if options.candidates is not None:
-        schedule = thin(schedule, options.candidates)
+    schedule = asked_schedule(options, engine.network)
     return posed(engine, schedule, criterion, limits, options.budget, resources)
+
+
+def asked_schedule(options: argparse.Namespace, network: Network) -> Schedule:
+    """Return the schedule with open grips that a command is asked for."""
+    schedule = find_schedule(network, options.schedule, parse_robots(options.robots))
+    return schedule if options.candidates is None else thin(schedule, options.candidates)

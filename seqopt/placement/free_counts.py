@@ -33,8 +33,8 @@ def steps_with(problem: FreeProblem, regrips: Floats, held: Ints) -> Floats:
     -------
     (n,) float
     """
-    released = problem.rules.ending is not Ending.HELD
-    return np.asarray(2 * problem.space.bricks + 2 * regrips - held + released)
+    released = problem.free_rules.ending is not Ending.HELD
+    return np.asarray(2 * problem.space.levels + 2 * regrips - held + released)
 
 
 def with_held(problem: FreeProblem, graph: Graph, held: Bools) -> Graph:
@@ -47,6 +47,6 @@ def with_held(problem: FreeProblem, graph: Graph, held: Bools) -> Graph:
     held : (n,) bool
         Which states hold as many grips as wanted.
     """
-    if problem.rules.ending is Ending.HELD:
+    if problem.free_rules.ending is Ending.HELD:
         return replace(graph, ends=graph.ends & held)
     return graph.only(~graph.ends[graph.target] | held[graph.source])

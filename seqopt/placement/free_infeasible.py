@@ -19,6 +19,7 @@ from seqopt.placement.free_states import explore
 from seqopt.placement.standing import Standing
 from seqopt.placement.sturdiest import WORST, with_margin
 from seqopt.sequence.free_rules import FreeRules, Payload
+from seqopt.sequence.schedule import Schedule
 
 STEPS = (Goal(Measure.STEPS),)
 STANDING = "no requirement to stand"
@@ -94,15 +95,17 @@ def why_impossible(problem: FreeProblem, seconds: float = np.inf) -> str:
     where = "no plan is allowed"
     try:
         where = _where(problem, look)
-        return f"free schedule: {where}{_what_helps(problem, look)}"
+        return f"{problem.title}: {where}{_what_helps(problem, look)}"
     except _LateError:
-        return f"free schedule: {where}; time was over before it was known what helps, give more"
+        return f"{problem.title}: {where}; time was over before it was known what helps, give more"
 
 
 def _where(problem: FreeProblem, look: Look) -> str:
     """Return where it stops."""
     placed = problem.network.scene.placed
     stops = look(replace(problem, goals=STEPS)).reached
+    if isinstance(problem.rules, Schedule):
+        return f"step {stops + 1} of {problem.space.levels} has no state that is allowed"
     if stops < len(placed):
         return f"brick {placed[stops].name} ({stops + 1} of {len(placed)}) is never placed"
     return f"after brick {placed[-1].name} the build cannot end"
@@ -138,7 +141,7 @@ def _opening(problem: FreeProblem, look: Look) -> Iterator[str]:
 
 def _loosened(problem: FreeProblem) -> Iterator[tuple[str, FreeRules]]:
     """Yield the rules that can be loosened: what stands is asked of robots with payloads."""
-    for text, rules in problem.rules.loosened():
+    for text, rules in problem.rules.loosened() if isinstance(problem.rules, FreeRules) else ():
         if not problem.demands or rules.payload is Payload.KEPT:
             yield text, rules
 

@@ -22,11 +22,13 @@ from seqopt.placement.free_goals import LARGEST, Goal, Measure
 from seqopt.placement.free_problem import FreeProblem
 from seqopt.placement.free_proof import BELOW, Hint, Proof
 from seqopt.placement.schedule_selection import ScheduleSelection
+from seqopt.placement.schedule_tables import check_scheduled
 from seqopt.placement.standing import slack
 from seqopt.placement.standing_proof import proven_margins, require_margin
 from seqopt.responses.quantities import CHOSEN_BY
 from seqopt.responses.table import analyze, force_column
 from seqopt.sequence.free_check import check_free
+from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import Step, StepKind
 
 TOLERANCE = 1e-6  # over the size of a value: how far a claim may be from what the engine says
@@ -82,7 +84,10 @@ def judge_schedule(
     StepError
         If a step breaks a rule.
     """
-    check_free(problem.network, problem.rules, steps)
+    if isinstance(problem.rules, Schedule):
+        check_scheduled(problem.rules, steps)
+    else:
+        check_free(problem.network, problem.rules, steps)
     values = plan_values(problem, steps, selection.objective)
     for goal, value, claimed in zip(problem.goals, values, selection.objective, strict=True):
         if not abs(value - claimed) <= TOLERANCE * max(abs(value), abs(claimed)):

@@ -1,9 +1,9 @@
-"""The states that a better free schedule could pass, by a second version of the rules."""
+"""The states that a better schedule could pass, by a second version of the rules."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -15,10 +15,15 @@ from seqopt.placement.free_problem import FreeProblem
 from seqopt.placement.free_states import move_amounts
 from seqopt.placement.free_tables import Follows, RuleTables
 from seqopt.placement.requirements import LIMIT_TOLERANCE
+from seqopt.placement.schedule_tables import ScheduleTables
 from seqopt.placement.standing_proof import StandingProof
 from seqopt.responses.known_rows import KnownRows
 from seqopt.sequence.free_check import RuleBook
 from seqopt.sequence.free_rules import Payload
+from seqopt.sequence.schedule import Schedule
+
+Tables: TypeAlias = RuleTables | ScheduleTables
+"""What rules or a schedule allow, level by level."""
 
 
 class Asked(NamedTuple):
@@ -37,7 +42,7 @@ class Asked(NamedTuple):
 
 
 class Closed(NamedTuple):
-    """States of one brick count that may be passed.
+    """States of one level that may be passed.
 
     Attributes
     ----------
@@ -70,22 +75,21 @@ class Passable:
 
     def __init__(self, problem: FreeProblem) -> None:
         self.problem = problem
-        book = RuleBook(problem.network, problem.rules)
-        most = _loads(problem, book)
-        parks = any(goal.measure is Measure.TRAVEL for goal in problem.goals)
-        self.tables = RuleTables(book, _alike(book, most), parks=parks)
+        most, own = _loads(problem, stand=False), _loads(problem, stand=True)
+        self.tables = _tables(problem, most)
         self.fallen: dict[int, Ints] = {}
-        self.stands = StandingProof(problem, most)
-        self._payload = np.array([most[r] for r in book.team])
+        self.stands = StandingProof(problem, own)
+        self._most = np.array([most[r] for r in self.tables.team])
+        self._payload = np.array([own[r] for r in self.tables.team])
         self._known = KnownRows()
         self.margins = sum(goal.of_margins for goal in problem.goals)
 
-    def closed(self, bricks: int, entries: Ints, asked: Asked) -> Closed:
+    def closed(self, level: int, entries: Ints, asked: Asked) -> Closed:
         """Return the states that are reached from some without placing a brick.
 
         Parameters
         ----------
-        bricks : int
+        level : int
         entries : (n, c) int
             Some of them perhaps more than once.
         asked : Asked
@@ -97,14 +101,14 @@ class Passable:
             own, at = np.unique(self.tables.codes(fresh), return_index=True)
             new = ~np.isin(own, seen, assume_unique=True)
             seen, rows = np.concatenate([seen, own[new]]), fresh[at[new]]
-            values, ok = self.valued(bricks, rows, asked)
+            values, ok = self.valued(level, rows, asked)
             follows = [
                 move._replace(source=move.source + count)
-                for move in self.tables.follow(bricks, rows[ok])
+                for move in self.tables.follow(level, rows[ok])
             ]
             parts.append(Closed(own[new][ok], rows[ok], values[ok], follows))
             count += int(ok.sum())
-            inner = [move.states for move in follows if move.bricks == bricks]
+            inner = [move.states for move in follows if move.level == level]
             fresh = np.concatenate([entries[:0], *inner])
         return Closed(
             np.concatenate([part.codes for part in parts]),
@@ -113,12 +117,12 @@ class Passable:
             [move for part in parts for move in part.follows],
         )
 
-    def valued(self, bricks: int, states: Ints, asked: Asked) -> tuple[Floats, Bools]:
+    def valued(self, level: int, states: Ints, asked: Asked) -> tuple[Floats, Bools]:
         """Return what goals take of states, and which ones a better plan could pass.
 
         Parameters
         ----------
-        bricks : int
+        level : int
         states : (n, c) int
         asked : Asked
 
@@ -128,30 +132,31 @@ class Passable:
         ok : (n,) bool
         """
         goals = self.problem.goals
-        if not bricks:
+        if not level:
             return np.zeros((len(states), len(goals))), np.ones(len(states), dtype=bool)
-        held, payload = self._held(states)
-        values, forces, ok = self._answers(bricks, held)
+        held, payload = self._held(states, self._most)
+        values, forces, ok = self._answers(self.tables.bricks_at(level), held)
         ok &= (forces <= payload).all(axis=1)
         most, margins = asked
         k = self.margins
         if len(most) > k and goals[k].measure is Measure.PEAK:
             ok &= values[:, k] <= tied(most[k])
-        if bricks in self.fallen:
-            ok &= ~np.isin(self.tables.codes(states), self.fallen[bricks])
+        if level in self.fallen:
+            ok &= ~np.isin(self.tables.codes(states), self.fallen[level])
         if margins is not None:
-            ok[ok] = self.may_stand(bricks, states[ok], margins)
+            ok[ok] = self.may_stand(level, states[ok], margins)
         return values, ok
 
-    def _held(self, states: Ints) -> tuple[Ints, Floats]:
-        """Return nodes held, ascending, and the payloads of those who hold them, (n, r)."""
+    def _held(self, states: Ints, most: Floats) -> tuple[Ints, Floats]:
+        """Return nodes held, ascending, and the most that those may carry who hold them, (n, r)."""
         grips = states[:, : self.tables.robots].clip(min=0)
         order = np.argsort(grips, axis=1, kind="stable")
-        return np.take_along_axis(grips, order, axis=1), self._payload[order]
+        return np.take_along_axis(grips, order, axis=1), most[order]
 
-    def may_stand(self, bricks: int, states: Ints, margins: Sequence[float]) -> Bools:
+    def may_stand(self, level: int, states: Ints, margins: Sequence[float]) -> Bools:
         """Return which states (n, c) are not proven to fall, or to lack margins of first goals."""
-        return self.stands.allows_rows(bricks, *self._held(states), margins)
+        held = self._held(states, self._payload)
+        return self.stands.allows_rows(self.tables.bricks_at(level), *held, margins)
 
     def _answers(self, bricks: int, held: Ints) -> tuple[Floats, Floats, Bools]:
         """Return values, forces of grips and what is within limits, of rows of nodes held."""
@@ -190,11 +195,20 @@ def _alike(book: RuleBook, most: Mapping[int, float]) -> list[tuple[int, ...]]:
     return [tuple(group) for group in groups.values() if len(group) > 1]
 
 
-def _loads(problem: FreeProblem, book: RuleBook) -> dict[int, float]:
-    """Return the most that every robot of the scene may carry, N."""
-    out = {}
+def _tables(problem: FreeProblem, most: Mapping[int, float]) -> Tables:
+    """Return what rules or a schedule allow."""
+    parks = any(goal.measure is Measure.TRAVEL for goal in problem.goals)
+    if isinstance(problem.rules, Schedule):
+        return ScheduleTables(problem.rules, problem.network, parks=parks)
+    book = RuleBook(problem.network, problem.rules)
+    return RuleTables(book, _alike(book, most), parks=parks)
+
+
+def _loads(problem: FreeProblem, *, stand: bool) -> dict[int, float]:
+    """Return the most that every robot of the scene may carry, or has to hold with, N."""
+    out, rules = {}, problem.rules
+    kept = stand if isinstance(rules, Schedule) else rules.payload is Payload.KEPT
     for r, robot in enumerate(problem.network.scene.robots):
-        kept = book.rules.payload is Payload.KEPT
         cap = min(robot.payload if kept else np.inf, problem.caps.get(robot.name, np.inf))
         out[r] = cap * (1 + LIMIT_TOLERANCE)
     return out

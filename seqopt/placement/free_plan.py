@@ -28,7 +28,8 @@ from seqopt.placement.schedule_selection import ScheduleSelection, with_numbers
 from seqopt.placement.shown_build import ShownBuild
 from seqopt.placement.standing_proof import certified
 from seqopt.responses.table import analyze
-from seqopt.sequence.free_rules import Ending
+from seqopt.sequence.free_rules import FREE, Ending
+from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import Step, StepKind, idle_robots
 from seqopt.stability.steps import stability_table
 
@@ -72,7 +73,7 @@ class FreePlan(ShownBuild):
     @property
     def title(self) -> str:
         """The name of the plan where it is shown next to others."""
-        return "free schedule"
+        return self.problem.title
 
     @property
     def worth(self) -> str:
@@ -172,13 +173,13 @@ class FreePlan(ShownBuild):
         )
         return {
             "scene": problem.network.scene.name,
-            "schedule": "free",
+            "schedule": _named(problem),
             "formulation": self.formulation.name,
             "kind": self.formulation.kind.value,
             "aims": goals,
             **judged_by(problem.goals, problem.criterion),
             "limits": {limit.response: limit.bound for limit in problem.limits},
-            "rules": problem.rules.described(problem.network.scene),
+            "rules": _rules(problem),
             "status": self.status,
             "stopped": chosen.stopped,
             "objective": self.objective,
@@ -209,14 +210,24 @@ class FreePlan(ShownBuild):
     @property
     def _letting_go(self) -> int:
         """How many steps at the end only let go."""
-        if self.problem.rules.ending is Ending.HELD:
+        rules = self.problem.rules
+        if isinstance(rules, Schedule) or rules.ending is Ending.HELD:
             return 0
         kinds = [step.kind is StepKind.RELEASE for step in reversed(self.steps)]
-        least = self.problem.rules.least_grips
+        least = rules.least_grips
         count = 0
         while kinds[count] and len(self.steps[-1 - count].held) < least:
             count += 1
         return count
+
+
+def _named(problem: FreeProblem) -> str:
+    return problem.rules.method if isinstance(problem.rules, Schedule) else FREE
+
+
+def _rules(problem: FreeProblem) -> dict[str, object]:
+    rules = problem.rules
+    return {} if isinstance(rules, Schedule) else rules.described(problem.network.scene)
 
 
 def solve_free(

@@ -30,10 +30,13 @@ from seqopt.scene.checks import short
 from seqopt.sequence.free_rules import FreeRules
 from seqopt.sequence.free_space import FreeSpace
 from seqopt.sequence.free_start import free_space
+from seqopt.sequence.schedule import Schedule
+from seqopt.sequence.schedule_space import ScheduleSpace
 from seqopt.sequence.steps import Grips
 from seqopt.showing import Shown
 from seqopt.stability.assessment import Stability
 
+FREE_TITLE = "free schedule"
 BAND = 1e-5  # share of a value within which six digits do not decide
 
 
@@ -45,8 +48,9 @@ class FreeProblem(Shown):
     ----------
     engine : Engine
         What computes responses.
-    rules : FreeRules
-        Which moves are possible.
+    rules : FreeRules or Schedule
+        Which moves are possible: those that rules allow, or those that choose the open grips of a
+        schedule, however many are open in a step.
     criterion : Criterion
         What a step costs, for the goals that name no response.
     goals : tuple of Goal
@@ -60,7 +64,7 @@ class FreeProblem(Shown):
     """
 
     engine: Engine
-    rules: FreeRules
+    rules: FreeRules | Schedule
     criterion: Criterion
     goals: tuple[Goal, ...]
     limits: tuple[Limit, ...] = ()
@@ -69,17 +73,37 @@ class FreeProblem(Shown):
 
     def __repr__(self) -> str:
         goals = ", ".join(map(str, self.goals))
-        return f"FreeProblem({self.network.scene.name!r}, {goals}, {len(self.limits)} limits)"
+        where = f"{self.network.scene.name!r}"
+        if isinstance(self.rules, Schedule):
+            where += f", {self.rules.method!r}"
+        return f"FreeProblem({where}, {goals}, {len(self.limits)} limits)"
 
     @property
     def network(self) -> Network:
         """Of the scene that is built."""
         return self.engine.network
 
+    @property
+    def free_rules(self) -> FreeRules:
+        """Its rules, if moves follow from any; a `ProblemError` says where they do not."""
+        if isinstance(self.rules, Schedule):
+            raise ProblemError(
+                f"schedule {self.rules.method}: its steps are given; orders, and steps or regrips "
+                "in a Pareto set, go with the free schedule"
+            )
+        return self.rules
+
+    @property
+    def title(self) -> str:
+        """What it is about, where plans stand beside each other."""
+        return f"{self.rules.method} schedule" if isinstance(self.rules, Schedule) else FREE_TITLE
+
     @cached_property
-    def space(self) -> FreeSpace:
+    def space(self) -> FreeSpace | ScheduleSpace:
         """Its states and moves."""
         parks = any(goal.measure is Measure.TRAVEL for goal in self.goals)
+        if isinstance(self.rules, Schedule):
+            return ScheduleSpace(self.network, self.rules, self.caps, parks)
         return free_space(self.network, self.rules, self.caps, parks=parks)
 
     @cached_property
@@ -125,13 +149,13 @@ class FreeProblem(Shown):
         return self.sets.solved + self.screened.solved * (self.screened is not self.sets)
 
     def responses(
-        self, bricks: int, states: Ints, *, rough: bool = False
+        self, level: int, states: Ints, *, rough: bool = False
     ) -> tuple[Mapping[str, Floats], Bools]:
         """Return the named responses of states, and which states are within all limits.
 
         Parameters
         ----------
-        bricks : int
+        level : int
         states : (n, c) int
             As in `seqopt.sequence.free_space`.
         rough : bool, optional
@@ -143,7 +167,7 @@ class FreeProblem(Shown):
             SI units.
         within : (n,) bool
         """
-        held = self.space.held(states)
+        held, bricks = self.space.held(states), self.space.bricks_at(level)
         answers, forces = (self.screened if rough else self.sets).answers(bricks, held)
         if rough and self.screened is not self.sets:
             close = self._close(answers, forces, states)
@@ -170,12 +194,12 @@ class FreeProblem(Shown):
                 close |= _near(found[limit.response], limit.bound)
         return np.asarray(close)
 
-    def values(self, bricks: int, states: Ints, *, rough: bool = False) -> tuple[Floats, Bools]:
+    def values(self, level: int, states: Ints, *, rough: bool = False) -> tuple[Floats, Bools]:
         """Return what goals take of states, and which states are within all limits.
 
         Parameters
         ----------
-        bricks : int
+        level : int
         states : (n, c) int
         rough : bool, optional
             Whether six digits are enough.
@@ -186,7 +210,8 @@ class FreeProblem(Shown):
             A column for every goal; zero for one that is about moves, or about margins.
         within : (n,) bool
         """
-        found, within = self.responses(bricks, states, rough=rough)
+        found, within = self.responses(level, states, rough=rough)
+        bricks = self.space.bricks_at(level)
         out = np.zeros((len(states), len(self.goals)))
         for column, goal in enumerate(self.goals):
             if goal.of_states and not goal.of_margins:
@@ -198,14 +223,14 @@ class FreeProblem(Shown):
         out[~within] = np.inf
         return out, within
 
-    def standing_values(self, bricks: int, states: Ints) -> tuple[Floats, Bools]:
+    def standing_values(self, level: int, states: Ints) -> tuple[Floats, Bools]:
         """Return the same where states must also stand as is demanded, margins among the goals.
 
         What stands, and by what margin, is asked only of states that nothing else rules out.
 
         Parameters
         ----------
-        bricks : int
+        level : int
         states : (n, c) int
 
         Returns
@@ -213,36 +238,39 @@ class FreeProblem(Shown):
         values : (n, g) float
         within : (n,) bool
         """
-        out, within = self.values(bricks, states)
+        out, within = self.values(level, states)
         if self.demands:
             rows = np.flatnonzero(within)
-            within[rows] = self.stand(bricks, states[rows])
+            within[rows] = self.stand(level, states[rows])
         for column, goal in enumerate(self.goals):
             if goal.of_margins:
                 rows = np.flatnonzero(within)
-                ends = self.stability.margins(goal.response, bricks, *self._grips(states[rows]))
+                bricks, grips = self.space.bricks_at(level), self._grips(states[rows], stand=True)
+                ends = self.stability.margins(goal.response, bricks, *grips)
                 out[rows, column] = ends[:, 1]
         within &= np.isfinite(out).all(axis=1)
         return out, within
 
-    def stand(self, bricks: int, states: Ints) -> Bools:
+    def stand(self, level: int, states: Ints) -> Bools:
         """Return which states are proven to stand as is demanded.
 
         Parameters
         ----------
-        bricks : int
+        level : int
         states : (n, c) int
 
         Returns
         -------
         (n,) bool
         """
-        return self.stability.stand(bricks, *self._grips(states))
+        bricks = self.space.bricks_at(level)
+        return np.asarray(self.stability.stand(bricks, *self._grips(states, stand=True)))
 
     @cached_property
     def stability(self) -> StandingSets:
         """What is known of how grip sets stand."""
-        return StandingSets(self.network, self.standing or Standing(), self._caps, self.demands)
+        mortar = self.standing or Standing()
+        return StandingSets(self.network, mortar, self._payloads, self.demands)
 
     @property
     def demands(self) -> tuple[Standing, ...]:
@@ -260,11 +288,20 @@ class FreeProblem(Shown):
         kinds = self.space.kinds
         return np.concatenate([np.full(len(kind.robots), kind.cap) for kind in kinds])
 
-    def _grips(self, states: Ints) -> tuple[Ints, Floats]:
+    @cached_property
+    def _payloads(self) -> Floats:
+        """What the robot of every column may carry where states must stand, N."""
+        if isinstance(self.rules, FreeRules):
+            return self._caps
+        payloads = np.array([robot.payload for robot in self.network.scene.robots])
+        return np.asarray(np.minimum(payloads, self._caps))
+
+    def _grips(self, states: Ints, *, stand: bool = False) -> tuple[Ints, Floats]:
         """Return the nodes held, ascending, and the largest force at each, (n, r)."""
         held = states[:, : len(self._caps)].clip(min=0)
         order = np.argsort(held, axis=1, kind="stable")
-        return np.take_along_axis(held, order, axis=1), self._caps[order]
+        most: Floats = self._payloads if stand else self._caps
+        return np.take_along_axis(held, order, axis=1), np.asarray(most[order])
 
     def _carried(self, states: Ints, forces: Floats) -> Bools:
         """Return in which states no grip exceeds what its robot may carry."""
@@ -280,7 +317,7 @@ def _near(values: Floats, bound: Floats | float) -> Bools:
 
 def pose_free(
     engine: Engine,
-    rules: FreeRules,
+    rules: FreeRules | Schedule,
     criterion: Criterion,
     goals: Sequence[Goal] | str = "minmax",
     limits: Sequence[Limit] = (),
@@ -292,8 +329,9 @@ def pose_free(
     ----------
     engine : Engine
         What computes responses.
-    rules : FreeRules
-        Which moves are possible.
+    rules : FreeRules or Schedule
+        Which moves are possible: what rules allow, or the open grips of a schedule, however many
+        are open in a step; where its states must stand, robots keep their payloads.
     criterion : Criterion
         What a step costs; ranks among choices cannot be used.
     goals : sequence of Goal or str
@@ -356,8 +394,8 @@ def _of_states(engine: Engine, criterion: Criterion) -> Criterion:
     """Return a criterion posed for a scene, if it is about states alone."""
     if isinstance(criterion, RankSum):
         raise ProblemError(
-            f"criterion {criterion.name}: it ranks the choices of a move, and a free schedule "
-            "has none; take worst-ratio, weighted or another one of responses"
+            f"criterion {criterion.name}: it ranks the choices of a move, and states of a "
+            "schedule are none; take worst-ratio, weighted or another one of responses"
         )
     for name in criterion.wanted(1):
         _require(name, {*STATE_RESPONSES}, f"criterion {criterion.name}")

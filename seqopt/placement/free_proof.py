@@ -99,11 +99,11 @@ class Proof:
         except InfeasibleError:
             return False
         first, found = 0, False
-        for bricks, rows in enumerate(levels.states):
+        for level, rows in enumerate(levels.states):
             own = rows[path[(path >= first) & (path < first + len(rows))] - first]
-            fall = own[~passable.may_stand(bricks, own, margins)] if bricks else own[:0]
-            before = passable.fallen.get(bricks, np.zeros(0, dtype=np.int64))
-            passable.fallen[bricks] = np.concatenate([before, passable.tables.codes(fall)])
+            fall = own[~passable.may_stand(level, own, margins)] if level else own[:0]
+            before = passable.fallen.get(level, np.zeros(0, dtype=np.int64))
+            passable.fallen[level] = np.concatenate([before, passable.tables.codes(fall)])
             first, found = first + len(rows), found or len(fall) > 0
         return found
 
@@ -119,19 +119,19 @@ class _Levels:
         self._count = 0
         coming: list[tuple[Ints, Follows]] = []
         fresh = start = passable.tables.start()
-        for bricks in range(passable.tables.last + 1):
-            entries = np.concatenate([fresh, told.get(bricks, start[:0])])
-            coming = self._close(bricks, entries, coming)
+        for level in range(passable.tables.last + 1):
+            entries = np.concatenate([fresh, told.get(level, start[:0])])
+            coming = self._close(level, entries, coming)
             fresh = np.concatenate([start[:0], *(move.states for _, move in coming)])
 
     def _close(
-        self, bricks: int, entries: Ints, coming: list[tuple[Ints, Follows]]
+        self, level: int, entries: Ints, coming: list[tuple[Ints, Follows]]
     ) -> list[tuple[Ints, Follows]]:
-        """Add the states of a brick count; return the moves that place the next one."""
-        part, tables = self._passable.closed(bricks, entries, self._asked), self._passable.tables
+        """Add the states of a level; return the moves that place the next one."""
+        part, tables = self._passable.closed(level, entries, self._asked), self._passable.tables
         moves = [(follows.source + self._count, follows) for follows in part.follows]
         order = np.argsort(part.codes, kind="stable")
-        for source, move in [*coming, *(pair for pair in moves if pair[1].bricks == bricks)]:
+        for source, move in [*coming, *(pair for pair in moves if pair[1].level == level)]:
             wanted = tables.codes(move.states)
             at = np.searchsorted(part.codes, wanted, sorter=order)
             kept = at < len(part.codes)
@@ -142,8 +142,8 @@ class _Levels:
             self._moves.append((source[kept], self._count + target, amounts))
         self._count += len(part.states)
         self.states.append(part.states)
-        self._ends.append(tables.ends(bricks, part.states))
-        return [pair for pair in moves if pair[1].bricks > bricks]
+        self._ends.append(tables.ends(level, part.states))
+        return [pair for pair in moves if pair[1].level > level]
 
     def graph(self) -> Graph:
         """Return them as a graph; the moves are then used up."""

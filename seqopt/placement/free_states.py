@@ -1,8 +1,8 @@
-"""The states and moves of a free schedule, as an `seqopt.graph.Explorer` visits them."""
+"""The states and moves of a schedule, as an `seqopt.graph.Explorer` visits them."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,8 +35,8 @@ class FreeStates:
 
     @property
     def levels(self) -> int:
-        """How many bricks there are."""
-        return self.problem.space.bricks
+        """How many bricks there are, or steps of a schedule."""
+        return self.problem.space.levels
 
     @property
     def peaks(self) -> tuple[bool, ...]:
@@ -53,19 +53,15 @@ class FreeStates:
 
     def within(self, part: int, states: Ints) -> Moves:
         """Return the moves that place no brick."""
-        space = self.problem.space
-        moves = [_moves(space.releases(part, states), regrip=False)]
-        if self.regrips:
-            moves.append(_moves(space.holds(part, states), regrip=True))
-        return Moves(*map(np.concatenate, zip(*moves, strict=True)))
+        return _joined(self.problem.space.within(part, states), states, regrips=self.regrips)
 
     def onward(self, part: int, states: Ints) -> Iterator[tuple[int, Moves]]:
-        """Yield the moves that place the next brick."""
+        """Yield the moves that place the next brick, or take the next step of a schedule."""
         yield part + 1, self.placed(part, states)
 
-    def placed(self, bricks: int, states: Ints) -> Moves:
-        """Return the moves that place the next brick after some."""
-        return _moves(self.problem.space.places(bricks, states), regrip=False)
+    def placed(self, level: int, states: Ints) -> Moves:
+        """Return the moves from a level to the next."""
+        return _joined(self.problem.space.onward(level, states), states)
 
     def values(self, part: int, states: Ints, *, rough: bool) -> tuple[Floats, Bools]:
         """Return what goals take of states, and which are allowed."""
@@ -133,6 +129,13 @@ def explore(
     return found
 
 
-def _moves(found: free_moves.Moves, *, regrip: bool) -> Moves:
-    taken = np.column_stack([np.full(len(found.way), float(regrip)), found.way])
-    return Moves(found.source, found.states, taken)
+def _joined(
+    found: Sequence[tuple[free_moves.Moves, bool]], states: Ints, *, regrips: bool = True
+) -> Moves:
+    """Return moves together, those that are regrips only if these are wanted."""
+    parts = [Moves(np.zeros(0, dtype=np.int64), states[:0], np.zeros((0, 2)))]
+    for moves, regrip in found:
+        if regrips or not regrip:
+            taken = np.column_stack([np.full(len(moves.way), float(regrip)), moves.way])
+            parts.append(Moves(moves.source, moves.states, taken))
+    return Moves(*map(np.concatenate, zip(*parts, strict=True)))

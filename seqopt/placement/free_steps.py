@@ -4,18 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from seqopt.errors import SolverError
 from seqopt.sequence.free_space import FreeSpace
 from seqopt.sequence.free_team import node_numbers
+from seqopt.sequence.schedule_space import ScheduleSpace
 from seqopt.sequence.steps import Step, StepKind, check_sequence
 
 
-def steps_of(space: FreeSpace, states: Sequence[Sequence[int]]) -> tuple[Step, ...]:
+def steps_of(space: FreeSpace | ScheduleSpace, states: Sequence[Sequence[int]]) -> tuple[Step, ...]:
     """Return the checked steps that lead from one state to the next.
 
     Parameters
     ----------
-    space : FreeSpace
+    space : FreeSpace or ScheduleSpace
     states : sequence of sequence of int
         As of a `seqopt.placement.schedule_selection.ScheduleSelection`.
 
@@ -26,6 +29,8 @@ def steps_of(space: FreeSpace, states: Sequence[Sequence[int]]) -> tuple[Step, .
     StepError
         If no single step leads from one state to the next.
     """
+    if isinstance(space, ScheduleSpace):
+        return scheduled_steps(space, states)
     numbers = [None, *node_numbers(space.network)]
     grips: list[int | None] = [None] * len(space.network.scene.robots)
     stays: dict[int, int] = {}  # where a robot was last, as a place from 1
@@ -41,6 +46,16 @@ def steps_of(space: FreeSpace, states: Sequence[Sequence[int]]) -> tuple[Step, .
         out.append(Step(len(out) + 1, step if took else StepKind.RELEASE, bricks, tuple(grips)))
         before = bricks
     return check_sequence(space.network.scene, out)
+
+
+def scheduled_steps(space: ScheduleSpace, states: Sequence[Sequence[int]]) -> tuple[Step, ...]:
+    """Return the checked steps of states of a schedule, one for each of its steps."""
+    rows = np.array([row[1:] for row in states if len(row) == space.robots + 1], dtype=np.int64)
+    if len(rows) != space.levels or [row[0] for row in states] != [*range(1, space.levels + 1)]:
+        raise SolverError("the states are none of this schedule: it has one for every step")
+    if np.abs(rows).max() > 2 * len(space.network.inner):
+        raise SolverError("a state of a schedule holds a node that does not exist")
+    return space.steps(rows)
 
 
 def _follow(

@@ -26,8 +26,8 @@ class Follows(NamedTuple):
 
     Attributes
     ----------
-    bricks : int
-        How many stand then.
+    level : int
+        How many bricks stand then, or steps of a schedule were taken.
     source : (m,) int
         The row of the state before.
     states : (m, c) int
@@ -38,7 +38,7 @@ class Follows(NamedTuple):
         How far the robot goes that takes a grip, m.
     """
 
-    bricks: int
+    level: int
     source: Ints
     states: Ints
     regrip: bool
@@ -119,6 +119,10 @@ class RuleTables:
         """
         columns = self.robots + (self._rules.regrips is not None)
         return np.zeros((1, columns), dtype=np.int32)
+
+    def bricks_at(self, level: int) -> int:
+        """Return how many bricks stand on a level."""
+        return level
 
     def follow(self, bricks: int, states: Ints) -> Iterator[Follows]:
         """Yield what follows from states (n, c) by one step each, of those that the rules allow."""

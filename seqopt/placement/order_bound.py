@@ -30,10 +30,10 @@ def whole_bound(problem: OrderProblem) -> float:
     numbers = node_numbers(free.network)
     places = [i for i, n in enumerate(numbers, 1) if n not in problem.scene.blocked_nodes]
     least = -np.inf
-    sets = _sets(places, max(1, free.rules.least_grips), free.space.robots)
+    sets = _sets(places, max(1, free.free_rules.least_grips), free.space.robots)
     if len(sets):
         least = float(_values(free, sets).min())
-    if free.rules.ending is not Ending.HELD:
+    if free.free_rules.ending is not Ending.HELD:
         least = max(least, float(_values(free, np.zeros((1, free.space.robots), int))[0]))
     return least
 

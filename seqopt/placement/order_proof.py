@@ -17,7 +17,7 @@ import numpy as np
 from seqopt.arrays import Ints
 from seqopt.network.build import build_network
 from seqopt.placement.free_answers import ask
-from seqopt.placement.free_passable import Asked, Passable
+from seqopt.placement.free_passable import Asked, Passable, Tables
 from seqopt.placement.free_problem import FreeProblem
 from seqopt.placement.free_proof import BELOW
 from seqopt.placement.free_tables import RuleTables
@@ -82,11 +82,11 @@ def _of_the_whole(problem: OrderProblem) -> float:
     """
     free = problem.judging(problem.scene.build_order)
     nodes = [n for n in node_numbers(free.network) if n not in problem.scene.blocked_nodes]
-    held = range(max(1, free.rules.least_grips), free.space.robots + 1)
+    held = range(max(1, free.free_rules.least_grips), free.space.robots + 1)
     least = -np.inf
     if sum(comb(len(nodes), count) for count in held) <= MOST_SETS:
         least = min((_least(free, nodes, count) for count in held), default=np.inf)
-    return least if free.rules.ending is Ending.HELD else max(least, _least(free, nodes, 0))
+    return least if free.free_rules.ending is Ending.HELD else max(least, _least(free, nodes, 0))
 
 
 def _least(free: FreeProblem, nodes: list[int], count: int) -> float:
@@ -98,7 +98,7 @@ def _least(free: FreeProblem, nodes: list[int], count: int) -> float:
 
 def _closed(
     problem: OrderProblem, key: Key, parts: list[Ints], below: float
-) -> tuple[Ints, RuleTables]:
+) -> tuple[Ints, Tables]:
     """Return the states with a set of bricks that are reached below a value."""
     passable = Passable(problem.judging(_order(problem, key)))
     tables = passable.tables
@@ -112,9 +112,9 @@ def _placed(problem: OrderProblem, key: Key, nodes: Ints) -> Iterator[tuple[Key,
     """Yield what follows by placing a brick, as nodes that are held: some more than once."""
     for brick in problem.next_bricks(key[0]) if len(nodes) else ():
         network = build_network(problem.scene, _order(problem, key, brick))
-        tables = RuleTables(RuleBook(network, problem.free.rules), [])
+        tables = RuleTables(RuleBook(network, problem.free.free_rules), [])
         for move in tables.follow(len(key[0]), _places(tables, nodes)):
-            if move.bricks > len(key[0]) and len(move.states):
+            if move.level > len(key[0]) and len(move.states):
                 yield (key[0] | {brick}, brick), _nodes(tables, move.states)
 
 
@@ -127,14 +127,14 @@ def _order(problem: OrderProblem, key: Key, following: int | None = None) -> Ord
     return (*first, *last, *(name for name in own if name not in stand and name != following))
 
 
-def _nodes(tables: RuleTables, states: Ints) -> Ints:
+def _nodes(tables: Tables, states: Ints) -> Ints:
     """Return states with the nodes themselves for places in build order."""
     out = states.astype(np.int64)
     out[:, : tables.robots] = tables.nodes[states[:, : tables.robots]]
     return out
 
 
-def _places(tables: RuleTables, states: Ints) -> Ints:
+def _places(tables: Tables, states: Ints) -> Ints:
     """Return states of nodes as rows of tables of any order."""
     place = np.zeros(tables.nodes.max() + 2, dtype=np.int64)  # -1, who holds none, is the last
     place[tables.nodes] = np.arange(len(tables.nodes))

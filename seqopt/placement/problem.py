@@ -272,6 +272,7 @@ def pose(
     >>> seqopt.pose(engine, schedule, seqopt.CRITERIA["equations-2-3"])  # doctest: +ELLIPSIS
     Problem('arch25', 'three-robot': 90 steps, 22 moves, criterion 'equations-2-3', ...
     """
+    schedule.require_pairs()
     known = {*CHOICE_RESPONSES, *map(robot_response, robots_of(engine, schedule, criterion))}
     posed = criterion.for_scene(SceneFacts(engine))
     asked = ResponsesAsked(posed, as_limits(limits), tuple(also))

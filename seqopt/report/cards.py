@@ -164,11 +164,12 @@ def _robust_problem(value: RobustProblem) -> tuple[str, Rows]:
 
 @facts.register
 def _free_problem(value: FreeProblem) -> tuple[str, Rows]:
-    scene = value.network.scene
-    return "Problem of the free schedule: who does what next, and where", {
+    scene, columns = value.network.scene, value.space.kinds
+    team = sorted(robot for kind in columns for robot in kind.robots)
+    return f"Problem of the {value.title}: who does what next, and where", {
         "scene": scene.name,
         "bricks": len(scene.bricks),
-        "robots": ", ".join(scene.robots[i].name for i in value.rules.team(scene)),
+        "robots": ", ".join(scene.robots[robot].name for robot in team),
         "to be least, in this order": ", ".join(map(str, value.goals)),
         "criterion": value.criterion.name,
         "limits": _limits(value.limits),

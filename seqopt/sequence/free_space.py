@@ -60,6 +60,23 @@ class FreeSpace(Terse):
         """How many bricks there are."""
         return len(self.network.inner)
 
+    @property
+    def levels(self) -> int:
+        """How many bricks there are: states of one brick count are a level."""
+        return self.bricks
+
+    def bricks_at(self, level: int) -> int:
+        """Return how many bricks stand on a level."""
+        return level
+
+    def within(self, level: int, states: Ints) -> tuple[tuple[Moves, bool], ...]:
+        """Return the moves that place no brick, and whether they are regrips."""
+        return (self.releases(level, states), False), (self.holds(level, states), True)
+
+    def onward(self, level: int, states: Ints) -> tuple[tuple[Moves, bool], ...]:
+        """Return the moves that place the next brick: none of them is a regrip."""
+        return ((self.places(level, states), False),)
+
     @cached_property
     def slots(self) -> tuple[tuple[int, int], ...]:
         """First column of every kind, and the one after its last."""

@@ -90,7 +90,7 @@ class Move(Terse):
 
 @dataclass(frozen=True, repr=False)
 class Schedule(Shown):
-    """A sequence with open moves; at most two neighboring moves are open in one step.
+    """A sequence with open moves.
 
     Parameters
     ----------
@@ -104,11 +104,6 @@ class Schedule(Shown):
         In the order in which they are made.
     left_out : str, optional
         How candidates were left out, in words; empty if all are open.
-
-    Raises
-    ------
-    StepError
-        If more than two moves are open in one step, or two that are not neighbors.
 
     Examples
     --------
@@ -127,12 +122,16 @@ class Schedule(Shown):
     moves: tuple[Move, ...]
     left_out: str = ""
 
-    def __post_init__(self) -> None:
+    def require_pairs(self) -> None:
+        """Raise a `StepError` if more than two moves, or two not neighboring, share a step.
+
+        What ranks or compares candidates of moves needs that; what chooses states does not.
+        """
         for step in self.steps:
             if len(step.moves) > 2 or (len(step.moves) == 2 and step.moves[1] != step.moves[0] + 1):
                 raise StepError(
                     f"step {step.number}: moves {[m + 1 for m in step.moves]} are open at once; "
-                    "at most two neighboring ones can be"
+                    "for costs of moves at most two neighboring ones can be; give an aim"
                 )
 
     def __repr__(self) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 
 import pandas as pd
 import pytest
@@ -115,10 +116,27 @@ def test_what_is_wrong_gets_one_line(capsys, tmp_path, arch, words, status, said
 
 def test_what_only_the_free_schedule_has(capsys, tmp_path, arch):
     out = ["--out", str(tmp_path / "out")]
-    for words in (["--aim", "steps"], ["--rule", "regrips=0"]):
+    for words in (
+        ["--rule", "regrips=0"],
+        ["--tilt", "3"],
+        ["--aim", "sum", "--rule", "regrips=0"],
+    ):
         status, _, error = run(capsys, "optimize", arch, *words, *out)
         assert status == 2
-        assert "only the free schedule has it; give --schedule free" in error
+        assert re.search("give .*--schedule free|aims and --stands have no such", error)
+
+
+def test_a_loop_by_its_states(capsys, tmp_path, arch):
+    """Aims, limits and standing go with schedules of open grips too."""
+    out = tmp_path / "out"
+    words = ("--aim", "minmax,travel", "--stands", "bond=1e5", "--candidates", "near:4")
+    status, text, error = run(capsys, "optimize", arch, *words, "--out", str(out))
+    assert (status, error) == (0, "")
+    assert ", optimal; " in text
+    summary = json.loads((out / "summary.json").read_text())
+    assert summary["aims"] == ["minmax", "travel"]
+    assert summary["stands"]["tensile_strength_Pa"] == 1e5
+    assert (pd.read_csv(out / "stability.csv")["verdict"] == "stands").all()
 
 
 def test_pareto_writes_table_plans_and_chart(capsys, tmp_path, arch):

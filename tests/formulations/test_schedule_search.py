@@ -469,7 +469,7 @@ def test_the_short_cut_does_what_the_long_way_does():
         ({"robots": 9}, "9 robots: the free schedule takes two to 5"),
         ({"robots": "rob9"}, "robot 'rob9' does not exist; give some of rob1"),
         ({"width": 3, "depth": 1}, "option depth: schedule_search has width"),
-        ({"schedule": "loop", "aim": "steps"}, "option aim: only the free schedule has it"),
+        ({"schedule": "loop", "newest": "free"}, "option newest: only the free schedule has it"),
     ],
 )
 def test_the_short_cut_says_in_a_line_what_does_not_fit(words, said):

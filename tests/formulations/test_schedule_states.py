@@ -1,0 +1,191 @@
+"""States of schedules with open grips, one to four a step: all aims against brute force."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise, product
+
+import numpy as np
+import pytest
+
+import seqopt
+from seqopt.contact.faces import step_assembly
+from seqopt.contact.mortar import DRY, find_mortar
+from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.errors import InfeasibleError, ProblemError, SolverError, StepError
+from seqopt.network.build import build_network
+from seqopt.placement.criteria import WorstRatio
+from seqopt.placement.free_judge import judge_schedule
+from seqopt.placement.free_problem import pose_free
+from seqopt.placement.requirements import Limit
+from seqopt.responses.quantities import CHOSEN_BY
+from seqopt.sequence.free_rules import with_robots
+from seqopt.sequence.schedule_file import parse_schedule
+from seqopt.sequence.three_robots import modified_sequential, three_robot_loop
+from seqopt.stability.assessment import Verdict, verdict
+from tests.builders import small_arch
+
+ONES = WorstRatio("ones", (("F_largest", 100.0), ("M_sup", 10.0), ("T_max", 30.0), ("D_max", 1e-5)))
+FOUR_OPEN = """step,type,bricks,rob1_node,rob2_node,rob3_node,rob4_node
+1,place,1,?,,,
+2,place,2,?,?,,
+3,place,3,?,?,?,
+4,place,4,?,?,?,?
+5,release,4,?,?,?,
+6,reposition,4,?,?,?,?
+"""
+
+
+def built(name):
+    """An engine and a schedule: how many grips are open at once."""
+    if name == "four":
+        engine = ComplianceEngine(build_network(with_robots(small_arch(4), 4)))
+        return engine, parse_schedule(engine.network, FOUR_OPEN, "four")
+    engine = ComplianceEngine(build_network(small_arch(6)))
+    loop = three_robot_loop if name == "three-robot" else modified_sequential
+    return engine, loop(engine.network)
+
+
+def every_plan(engine, schedule):
+    """All sequences that the schedule allows, with the responses of their steps."""
+    for nodes in product(*(move.candidates for move in schedule.moves)):
+        try:
+            steps = schedule.fill(nodes)
+        except StepError:
+            continue
+        yield steps, seqopt.analyze(engine, steps)
+
+
+def costs(table, scene):
+    """What the criterion takes of every step, and the raw responses, SI."""
+    forces = table[[f"F_{robot.name}_N" for robot in scene.robots]].abs().max(axis=1).fillna(0.0)
+    raw = {"F_largest": forces.to_numpy(float)}
+    for name in ("M_sup", "T_max", "D_max"):
+        raw[name] = table[CHOSEN_BY[name].column].to_numpy(float) / CHOSEN_BY[name].scale
+    return np.max([raw[name] / limit for name, limit in ONES.limits], axis=0), raw
+
+
+def travel(scene, steps):
+    total = 0.0
+    for robot in range(len(scene.robots)):
+        held = [s.grips[robot] for s in steps if s.grips[robot] is not None]
+        for a, b in pairwise(held):
+            gone = np.subtract(scene.node_position(a), scene.node_position(b))
+            total += float(np.linalg.norm(gone))
+    return total
+
+
+def goals(aim, scene, steps, table):
+    worst, raw = costs(table, scene)
+    known = {
+        "minmax": worst.max(),
+        "sum": worst.sum(),
+        "steps": float(len(steps)),
+        "T_max": raw["T_max"].max(),
+        "sum(M_sup)": raw["M_sup"].sum(),
+        "travel": travel(scene, steps),
+    }
+    return tuple(known[word] for word in aim.split(","))
+
+
+@pytest.mark.parametrize("name", ["three-robot", "modified", "four"])
+def test_every_aim_equals_brute_force(name):
+    engine, schedule = built(name)
+    plans = list(every_plan(engine, schedule))
+    scene = engine.network.scene
+    assert len(plans) > 10
+    for aim in ("minmax", "sum", "minmax,travel", "travel,sum(M_sup)", "T_max,steps", "steps,sum"):
+        plan = seqopt.solve(pose_free(engine, schedule, ONES, aim), "schedule_search")
+        best = list(plan.selection.objective)
+        left = [goals(aim, scene, *each) for each in plans]
+        for k, value in enumerate(best):
+            least = min(each[k] for each in left)
+            assert value == pytest.approx(least, rel=1e-7)
+            left = [each for each in left if each[k] <= least * (1 + 1e-9)]
+        assert plan.certificate.bound == pytest.approx(best, rel=1e-6)
+        assert plan.status == "optimal"
+        assert plan.summary()["schedule"] == schedule.method
+
+
+@pytest.mark.parametrize("name", ["three-robot", "four"])
+def test_limits_equal_brute_force(name):
+    engine, schedule = built(name)
+    plans = list(every_plan(engine, schedule))
+    scene = engine.network.scene
+    worst = sorted({goals("T_max,sum", scene, *each) for each in plans})
+    bound = worst[len(worst) // 3][0]
+    least = min(total for tension, total in worst if tension <= bound)
+    limited = pose_free(engine, schedule, ONES, "sum", [Limit("T_max", bound)])
+    found = seqopt.solve(limited, "schedule_search")
+    assert found.selection.objective[0] == pytest.approx(least, rel=1e-7)
+    none = pose_free(engine, schedule, ONES, "sum", [Limit("T_max", 0.999 * worst[0][0])])
+    with pytest.raises(InfeasibleError, match=r"it becomes possible with T_max="):
+        seqopt.solve(none, "schedule_search")
+
+
+@pytest.mark.parametrize("mortar", ["dry", "bond=2e3", "bond=2e4"])
+@pytest.mark.parametrize("name", ["three-robot", "four"])
+def test_what_stands_equals_brute_force(name, mortar):
+    """Standing is asked of every state by the cone program; where no plan stands, none is found."""
+    engine, schedule = built(name)
+    network, known = engine.network, {}
+
+    def stands(step):
+        key = step.bricks, step.grips
+        if key not in known:
+            assembly = step_assembly(network, *key)
+            known[key] = verdict(assembly, find_mortar(mortar)) is Verdict.STANDS
+        return known[key]
+
+    able = [
+        goals("minmax,sum", network.scene, steps, table)
+        for steps, table in every_plan(engine, schedule)
+        if all(map(stands, steps))
+    ]
+    problem = pose_free(engine, schedule, ONES, "minmax,sum", stands=mortar)
+    assert bool(able) == (mortar == "bond=2e4" or name == "four")
+    if able:
+        found = seqopt.solve(problem, "schedule_search")
+        assert found.selection.objective == pytest.approx(min(able), rel=1e-6)
+        assert (found.stability(DRY if mortar == "dry" else None)["verdict"] == "stands").all()
+    else:
+        with pytest.raises(
+            InfeasibleError, match=r"becomes possible with a bond of|no requirement"
+        ):
+            seqopt.solve(problem, "schedule_search")
+
+
+def test_one_call_and_loops_of_costs_agree_where_both_are_asked():
+    """With costs of moves, only steps in which a grip is open count; here all of them do."""
+    scene = small_arch(6)
+    plan = seqopt.optimize(scene, "three-robot", ONES, aim="minmax", candidates="near:4")
+    loop = seqopt.optimize(scene, "three-robot", ONES, "minimax", candidates="near:4")
+    rows = loop.responses()
+    assert costs(rows, scene)[0].max() == pytest.approx(plan.selection.objective[0], rel=1e-7)
+
+
+def test_the_judge_sees_a_worse_plan_and_one_of_another_schedule():
+    """The control: the second best is refused, and so are steps that the schedule has not."""
+    engine, schedule = built("three-robot")
+    problem = pose_free(engine, schedule, ONES, "sum")
+    found = seqopt.solve(problem, "schedule_search")
+    scene = engine.network.scene
+    plans = [(goals("sum", scene, *each)[0], each[0]) for each in every_plan(engine, schedule)]
+    value, steps = sorted(plans, key=lambda each: each[0])[1]
+    worse = replace(found.selection, objective=(value,), bound=(value,))
+    with pytest.raises(SolverError, match="promised as the least; a plan has less"):
+        judge_schedule(problem, worse, steps)
+    other = list(found.steps)
+    other[0] = replace(other[0], grips=(*other[0].grips[1:], other[0].grips[0]))
+    with pytest.raises(StepError, match="step 1 is none of schedule three-robot"):
+        judge_schedule(problem, found.selection, other)
+
+
+def test_what_does_not_go_together_is_said_in_a_line():
+    engine, schedule = built("four")
+    with pytest.raises(StepError, match=r"open at once; .* give an aim"):
+        seqopt.pose(engine, schedule, ONES)
+    with pytest.raises(ProblemError, match="ranks the choices of a move"):
+        pose_free(engine, schedule, seqopt.CRITERIA["equations-2-3"], "sum")
+    with pytest.raises(ProblemError, match="option workers: aim and stands have no such option"):
+        seqopt.optimize(small_arch(4), "three-robot", ONES, aim="sum", workers=2)
