@@ -15,7 +15,8 @@ in their order,
 
 with :math:`v` the value of a state and :math:`c` the cost of a step. A narrow search without
 regrips, which keeps the best states of every brick count, gives a first plan; where states must
-stand, which is dear to ask of them all, only if time or memory is limited. Then a threshold rises
+stand or be good in scenarios, which is dear to ask of them all, only if time or memory is limited;
+what the best plan of the first scenario takes in all is then where the threshold starts. It rises
 until states below it connect the empty site to an end; responses are computed only for states
 next to those that are reached below it, and with six digits until their value is close to that of
 the plan. Among these every goal is a shortest path, with the maximum instead of the sum for a peak;
@@ -51,6 +52,7 @@ from seqopt.work.memory import free_memory
 from seqopt.work.progress import Stage, Tell
 
 FAR_BELOW = 4.0  # what the narrow search finds, over the first threshold
+ONE_WIDTH = 50  # states of a brick count from which the narrow search of one scenario goes on
 COPIES = 2.0  # of what is kept, that are needed at once while it grows
 
 Watching = Callable[[Explorer], None]
@@ -112,10 +114,8 @@ def solve(
     _require_order(problem)
     reached: list[Explorer] = []
     tell = _watch(problem, (time.perf_counter() + seconds, max_memory), progress, reached)
-    limited = min(seconds, max_memory) < np.inf
-    return _search(
-        problem, (0 if problem.demands and not limited else width, growth), tell, reached
-    )
+    dear = bool(problem.demands or problem.each) and min(seconds, max_memory) == np.inf
+    return _search(problem, (0 if dear else width, growth), tell, reached)
 
 
 def _watch(
@@ -133,7 +133,7 @@ def _watch(
         if time.perf_counter() > most[0]:
             raise _StopError("time")
         room = min(most[1], free_memory() + found.nbytes)
-        if COPIES * (found.nbytes + problem.sets.nbytes + problem.screened.nbytes) > room:
+        if COPIES * (found.nbytes + problem.nbytes) > room:
             raise _StopError("memory")
 
     return tell
@@ -199,6 +199,8 @@ def _best(
     threshold, (ceiling, growth) = -np.inf, options
     if np.isfinite(ceiling) or problem.goals[0].measure is not Measure.PEAK:
         threshold = ceiling / FAR_BELOW
+    if problem.each and problem.goals[0].measure is Measure.PEAK:
+        threshold = _of_one(problem, options)
     while True:
         if wide.rise(threshold):
             try:
@@ -210,6 +212,24 @@ def _best(
         proven.append(wide.excluded)  # of a state that every plan would have to pass, or a larger
         grown = threshold * growth if np.isfinite(threshold) else -np.inf
         threshold = max(wide.excluded, min(ceiling, grown))
+
+
+def _of_one(problem: FreeProblem, options: tuple[float, float]) -> float:
+    """Return what the plan that is best in the first scenario takes in all; at least in that one.
+
+    What is below the former is enough to be looked at, where that plan is allowed in all.
+    """
+    first = problem.each[0]
+    narrow = _narrow(first, ONE_WIDTH, lambda _: None)
+    ceiling = np.inf if narrow is None else narrow.objective[0]
+    one = _best(first, Explorer(FreeStates(first)), (ceiling, options[1]), [])
+    worst = -np.inf
+    for level, *state in one.states:
+        values, allowed = problem.values(level, np.array([state]))
+        if not allowed[0]:
+            return one.objective[0]
+        worst = max(worst, float(values[0, 0]))
+    return worst
 
 
 def _standing(problem: FreeProblem, found: Explorer) -> ScheduleSelection:

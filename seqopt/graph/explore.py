@@ -98,7 +98,11 @@ class Space(Protocol):
         moves : Moves
         """
 
-    def values(self, part: Key, states: Ints, *, rough: bool) -> tuple[Floats, Bools]:
+    @property
+    def floors(self) -> bool:
+        """Whether values above those that count may be less than they are."""
+
+    def values(self, part: Key, states: Ints, *, rough: bool, most: float) -> tuple[Floats, Bools]:
         """Return what goals take of states, and which of them are allowed.
 
         Parameters
@@ -107,6 +111,9 @@ class Space(Protocol):
         states : (n, c) int
         rough : bool
             Whether six digits are enough.
+        most : float
+            Where there are floors: a state of which the first goal takes more need not have values
+            that are larger than this.
 
         Returns
         -------
@@ -181,7 +188,7 @@ class Explorer:
         self._first = key
         part = self._part(0, key)
         part.add(space.codes(key, states), states)
-        part.value(lambda some: (np.zeros((len(some), len(space.peaks))), np.ones(1, dtype=bool)))
+        part.value(lambda _: (np.zeros((1, len(space.peaks))), np.ones(1, dtype=bool), np.inf))
         self.threshold = -np.inf
         self.reached = self.level = self.passes = 0
 
@@ -233,8 +240,10 @@ class Explorer:
         """Visit states below the threshold and what they lead to within a part; return which."""
         visited = [np.zeros(0, dtype=np.int64)]
         while True:
-            part.value(lambda states: self._space.values(key, states, rough=True))
+            part.value(lambda states: self._values(key, states))
             fresh = np.flatnonzero((part.mark == PENDING) & self._below(part.values))
+            if self._space.floors and part.raise_floors(fresh, lambda s: self._values(key, s)):
+                continue
             if self._width is not None:
                 fresh = fresh[np.argsort(part.values[fresh, 0], kind="stable")[: self._width]]
                 part.mark[part.mark == PENDING] = CLOSED
@@ -263,9 +272,12 @@ class Explorer:
                         near |= gap <= BAND * abs(values[column])
                 rows = np.flatnonzero(close & near)
                 if len(rows):
-                    part.values[rows] = self._space.values(key, part.states[rows], rough=False)[0]
+                    part.values[rows] = self._exact(key, part.states[rows])
                     part.exact[rows] = found = True
         return found
+
+    def _exact(self, key: Key, states: Ints) -> Floats:
+        return self._space.values(key, states, rough=False, most=np.inf)[0]
 
     def close(self, part: tuple[int, Key], states: Ints) -> None:
         """Leave out visited states of a part, given by its level and key, from now on."""
@@ -273,11 +285,20 @@ class Explorer:
         found = self._parts[level][key]
         found.mark[found.add(self._space.codes(key, states), states)] = CLOSED
 
-    def _below(self, values: Floats) -> Bools:
+    def _values(self, key: Key, states: Ints) -> tuple[Floats, Bools, float]:
+        """Return six digits of values, which states are allowed, and the most that counts."""
+        values, allowed = self._space.values(key, states, rough=True, most=self._most)
+        return values, allowed, self._most
+
+    @property
+    def _most(self) -> float:
+        """What the first goal may take of a visited state, for all that six digits say."""
         if not self._space.peaks[0]:
-            return np.ones(len(values), dtype=bool)
-        band = BAND * abs(self.threshold) if np.isfinite(self.threshold) else 0.0
-        return np.asarray(values[:, 0] <= self.threshold + band)
+            return np.inf
+        return self.threshold + (BAND * abs(self.threshold) if np.isfinite(self.threshold) else 0.0)
+
+    def _below(self, values: Floats) -> Bools:
+        return np.asarray(values[:, 0] <= self._most)
 
     def _go_on(self, level: int, key: Key, part: Part, fresh: Ints) -> None:
         """Add what visited states lead to on the next level."""

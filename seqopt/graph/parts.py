@@ -15,6 +15,10 @@ PENDING, OPEN, CLOSED = 0, 1, 2  # of a state: above the threshold, visited, not
 Key: TypeAlias = Any  # which part, whatever a space calls it; it can be hashed
 
 
+Valued = Callable[[Ints], tuple[Floats, Bools, float]]
+"""Returns values of states, which are allowed, and above which the first goal's are floors."""
+
+
 class Part:
     """The states of one part that were met so far, in the order in which they were."""
 
@@ -23,6 +27,7 @@ class Part:
         self.values = np.zeros((0, goals))
         self.mark = np.zeros(0, dtype=np.int8)
         self.exact = np.zeros(0, dtype=bool)
+        self.floor = np.zeros(0, dtype=bool)  # of values: whether they may be too small
         self._codes = np.zeros(0, dtype=np.int64)
         self._rows = np.zeros(0, dtype=np.int32)
 
@@ -44,14 +49,24 @@ class Part:
             self._rows = np.insert(self._rows, at[new], rows[new])
         return rows[back]
 
-    def value(self, valued: Callable[[Ints], tuple[Floats, Bools]]) -> None:
+    def value(self, valued: Valued) -> None:
         """Value the states that were added since the last time."""
         known = len(self.values)
         if known == len(self.states):
             return
-        values, allowed = valued(self.states[known:])
+        values, allowed, most = valued(self.states[known:])
         self.values = np.concatenate([self.values, values])
+        self.floor = np.concatenate([self.floor, values[:, 0] > most])
         self.mark[known:][~allowed] = CLOSED
+
+    def raise_floors(self, rows: Ints, valued: Valued) -> bool:
+        """Value those of some rows again whose values are floors; return if there are any."""
+        rows = rows[self.floor[rows]]
+        if len(rows):
+            self.values[rows], allowed, most = valued(self.states[rows])
+            self.floor[rows] = self.values[rows, 0] > most
+            self.mark[rows[~allowed]] = CLOSED
+        return len(rows) > 0
 
     def order(self) -> Ints:
         """Return the rows of visited states, by their codes."""

@@ -37,7 +37,7 @@ class Answers(NamedTuple):
     fit: Bools
 
 
-def ask(problem: FreeProblem, bricks: int, grips: Ints) -> Answers:
+def ask(problem: FreeProblem, bricks: int, grips: Ints, most: float = np.inf) -> Answers:
     """Return what is known about grip sets, computed again by the engine.
 
     Parameters
@@ -46,11 +46,27 @@ def ask(problem: FreeProblem, bricks: int, grips: Ints) -> Answers:
     bricks : int
     grips : (S, r) int
         Nodes held.
+    most : float, optional
+        Over scenarios, what the first goal takes more of in one is not asked of the next.
     """
+    if problem.each:
+        return _worst(problem, bricks, grips, most)
     parts = [_asked(problem, bricks, grips[:0])]
     for start in range(0, len(grips), BATCH):
         parts.append(_asked(problem, bricks, grips[start : start + BATCH]))
     return Answers(*map(np.concatenate, zip(*parts, strict=True)))
+
+
+def _worst(problem: FreeProblem, bricks: int, grips: Ints, most: float) -> Answers:
+    """Return the largest of all scenarios, of what is passed by those before."""
+    out = np.zeros((len(grips), len(problem.goals)))
+    forces, fit = np.zeros(grips.shape), np.ones(len(grips), dtype=bool)
+    for each in problem.each:
+        rows = np.flatnonzero(fit & (out[:, 0] <= most))
+        found = ask(each, bricks, grips[rows])
+        out[rows] = np.maximum(out[rows], found.worth)
+        forces[rows], fit[rows] = np.maximum(forces[rows], found.forces), found.fit
+    return Answers(out, forces, fit)
 
 
 def _asked(problem: FreeProblem, bricks: int, grips: Ints) -> Answers:

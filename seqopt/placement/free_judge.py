@@ -146,12 +146,12 @@ def plan_values(
     SolverError
         If a step exceeds a limit, does not stand as is demanded, or has less of a margin.
     """
+    if problem.each:
+        worth = [plan_values(each, steps, claimed) for each in problem.each]
+        return tuple(np.max(worth, axis=0).tolist())
     table = analyze(problem.engine, steps)
     columns = state_columns(problem, table)
-    for limit in problem.limits:
-        if limit.response in columns and limit.exceeded(columns[limit.response]).any():
-            at = int(np.argmax(columns[limit.response])) + 1
-            raise SolverError(f"step {at} exceeds the limit on {limit.response}")
+    _require_limits(problem, columns)
     margins = _margins(problem, steps)
     out = []
     for k, goal in enumerate(problem.goals):
@@ -168,6 +168,14 @@ def plan_values(
             costs = _costs(problem, goal, columns, len(steps))
             out.append(float(costs.max() if goal.measure is Measure.PEAK else costs.sum()))
     return tuple(out)
+
+
+def _require_limits(problem: FreeProblem, columns: Mapping[str, np.ndarray]) -> None:
+    """Raise a `SolverError` if a step exceeds a limit."""
+    for limit in problem.limits:
+        if limit.response in columns and limit.exceeded(columns[limit.response]).any():
+            at = int(np.argmax(columns[limit.response])) + 1
+            raise SolverError(f"step {at} exceeds the limit on {limit.response}")
 
 
 def _margins(problem: FreeProblem, steps: Sequence[Step]) -> Mapping[str, float]:

@@ -135,12 +135,13 @@ class Passable:
         if not level:
             return np.zeros((len(states), len(goals))), np.ones(len(states), dtype=bool)
         held, payload = self._held(states, self._most)
-        values, forces, ok = self._answers(self.tables.bricks_at(level), held)
-        ok &= (forces <= payload).all(axis=1)
         most, margins = asked
         k = self.margins
+        below = np.inf
         if len(most) > k and goals[k].measure is Measure.PEAK:
-            ok &= values[:, k] <= tied(most[k])
+            below = tied(most[k])
+        values, forces, ok = self._answers(self.tables.bricks_at(level), held, below)
+        ok &= (forces <= payload).all(axis=1) & (values[:, k : k + 1] <= below).all(axis=1)
         if level in self.fallen:
             ok &= ~np.isin(self.tables.codes(states), self.fallen[level])
         if margins is not None:
@@ -158,8 +159,12 @@ class Passable:
         held = self._held(states, self._payload)
         return self.stands.allows_rows(self.tables.bricks_at(level), *held, margins)
 
-    def _answers(self, bricks: int, held: Ints) -> tuple[Floats, Floats, Bools]:
-        """Return values, forces of grips and what is within limits, of rows of nodes held."""
+    def _answers(self, bricks: int, held: Ints, below: float) -> tuple[Floats, Floats, Bools]:
+        """Return values, forces of grips and what is within limits, of rows of nodes held.
+
+        Over scenarios they are those of the first that exceeds a value of the first goal.
+        """
+        below = np.inf if self.margins else below
         goals, robots = len(self.problem.goals), held.shape[1]
         out = np.zeros((len(held), goals + robots + 1))
         count = np.count_nonzero(held, axis=1)
@@ -169,10 +174,10 @@ class Passable:
             codes = nodes @ len(self.tables.nodes) ** np.arange(taken)
 
             def compute(new: Ints, nodes: Ints = nodes) -> Floats:
-                found = ask(self.problem, bricks, self.tables.nodes[nodes[new]])
+                found = ask(self.problem, bricks, self.tables.nodes[nodes[new]], below)
                 return np.column_stack([found.worth, found.forces, found.fit])
 
-            found = self._known.of((bricks, taken), codes, compute)
+            found = self._known.of((bricks, taken, below), codes, compute)
             out[rows, :goals] = found[:, :goals]
             out[rows, goals + robots - taken :] = found[:, goals:]
         return out[:, :goals], out[:, goals:-1], out[:, -1] > 0

@@ -33,6 +33,8 @@ from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import Step, StepKind, idle_robots
 from seqopt.stability.steps import stability_table
 
+COUNTED = ("each", "sets", "screened", "stability")  # of a problem: they know what was computed
+
 
 @dataclass(frozen=True, repr=False)
 class FreePlan(ShownBuild):
@@ -178,6 +180,7 @@ class FreePlan(ShownBuild):
             "kind": self.formulation.kind.value,
             "aims": goals,
             **judged_by(problem.goals, problem.criterion),
+            "scenarios": len(problem.scenarios),
             "limits": {limit.response: limit.bound for limit in problem.limits},
             "rules": _rules(problem),
             "status": self.status,
@@ -288,6 +291,6 @@ def _selected(
         left = float(options.get("seconds", math.inf)) - (time.perf_counter() - start)
         raise confirmed(twin, name, left) from None
     for kept in [*vars(problem)]:  # whatever it left behind, but counts of what was computed
-        if kept not in (*(f.name for f in fields(problem)), "sets", "screened", "stability"):
+        if kept not in (*(f.name for f in fields(problem)), *COUNTED):
             del vars(problem)[kept]
     return with_numbers(name, selection, len(problem.goals))

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -23,10 +23,12 @@ from seqopt.placement.requirements import (
     state_costs,
 )
 from seqopt.placement.scales import SceneFacts
+from seqopt.placement.scenario_engines import engine_for, require_alike
 from seqopt.placement.standing import Standing, StandingSets
 from seqopt.responses.grip_sets import GripSets
 from seqopt.responses.quantities import robot_response
 from seqopt.scene.checks import short
+from seqopt.scene.scene import Scene
 from seqopt.sequence.free_rules import FreeRules
 from seqopt.sequence.free_space import FreeSpace
 from seqopt.sequence.free_start import free_space
@@ -61,6 +63,9 @@ class FreeProblem(Shown):
         That every state must stand, if it is demanded.
     settled : tuple of Standing
         Margins that every state must have as well.
+    scenarios : tuple of Engine
+        Of the same scene in other states of the world: what is largest in any of them counts, and
+        limits and standing hold in all. By default that of ``engine`` alone.
     """
 
     engine: Engine
@@ -70,13 +75,21 @@ class FreeProblem(Shown):
     limits: tuple[Limit, ...] = ()
     standing: Standing | None = None
     settled: tuple[Standing, ...] = ()
+    scenarios: tuple[Engine, ...] = ()
 
     def __repr__(self) -> str:
         goals = ", ".join(map(str, self.goals))
         where = f"{self.network.scene.name!r}"
         if isinstance(self.rules, Schedule):
             where += f", {self.rules.method!r}"
+        if self.scenarios:
+            where += f", {len(self.scenarios)} scenarios"
         return f"FreeProblem({where}, {goals}, {len(self.limits)} limits)"
+
+    @cached_property
+    def each(self) -> tuple[FreeProblem, ...]:
+        """The same problem in every scenario by itself; none where there are no scenarios."""
+        return tuple(replace(self, engine=engine, scenarios=()) for engine in self.scenarios)
 
     @property
     def network(self) -> Network:
@@ -146,7 +159,16 @@ class FreeProblem(Shown):
     @property
     def models(self) -> int:
         """How many grip sets were solved."""
+        if self.each:
+            return sum(problem.models for problem in self.each)
         return self.sets.solved + self.screened.solved * (self.screened is not self.sets)
+
+    @property
+    def nbytes(self) -> int:
+        """How much memory the responses of grip sets take."""
+        if self.each:
+            return sum(problem.nbytes for problem in self.each)
+        return self.sets.nbytes + self.screened.nbytes
 
     def responses(
         self, level: int, states: Ints, *, rough: bool = False
@@ -194,7 +216,9 @@ class FreeProblem(Shown):
                 close |= _near(found[limit.response], limit.bound)
         return np.asarray(close)
 
-    def values(self, level: int, states: Ints, *, rough: bool = False) -> tuple[Floats, Bools]:
+    def values(
+        self, level: int, states: Ints, *, rough: bool = False, most: float = np.inf
+    ) -> tuple[Floats, Bools]:
         """Return what goals take of states, and which states are within all limits.
 
         Parameters
@@ -203,6 +227,9 @@ class FreeProblem(Shown):
         states : (n, c) int
         rough : bool, optional
             Whether six digits are enough.
+        most : float, optional
+            Over scenarios, a state of which the first goal takes more is not asked further: its
+            values are then those of some scenarios.
 
         Returns
         -------
@@ -210,6 +237,9 @@ class FreeProblem(Shown):
             A column for every goal; zero for one that is about moves, or about margins.
         within : (n,) bool
         """
+        if self.each:
+            asked = [partial(p.values, level, rough=rough) for p in self.each]
+            return self._worst(asked, states, most)
         found, within = self.responses(level, states, rough=rough)
         bricks = self.space.bricks_at(level)
         out = np.zeros((len(states), len(self.goals)))
@@ -223,7 +253,9 @@ class FreeProblem(Shown):
         out[~within] = np.inf
         return out, within
 
-    def standing_values(self, level: int, states: Ints) -> tuple[Floats, Bools]:
+    def standing_values(
+        self, level: int, states: Ints, *, most: float = np.inf
+    ) -> tuple[Floats, Bools]:
         """Return the same where states must also stand as is demanded, margins among the goals.
 
         What stands, and by what margin, is asked only of states that nothing else rules out.
@@ -232,12 +264,17 @@ class FreeProblem(Shown):
         ----------
         level : int
         states : (n, c) int
+        most : float, optional
+            As of `values`.
 
         Returns
         -------
         values : (n, g) float
         within : (n,) bool
         """
+        if self.each:
+            asked = [partial(p.standing_values, level) for p in self.each]
+            return self._worst(asked, states, most)
         out, within = self.values(level, states)
         if self.demands:
             rows = np.flatnonzero(within)
@@ -263,8 +300,26 @@ class FreeProblem(Shown):
         -------
         (n,) bool
         """
+        if self.each:
+            return np.asarray(np.all([p.stand(level, states) for p in self.each], axis=0))
         bricks = self.space.bricks_at(level)
         return np.asarray(self.stability.stand(bricks, *self._grips(states, stand=True)))
+
+    def _worst(
+        self,
+        valued: Sequence[Callable[[Ints], tuple[Floats, Bools]]],
+        states: Ints,
+        most: float,
+    ) -> tuple[Floats, Bools]:
+        """Return the largest values in all scenarios; what one rules out the next is not asked."""
+        out = np.zeros((len(states), len(self.goals)))
+        within = np.ones(len(states), dtype=bool)
+        for values in valued:
+            rows = np.flatnonzero(within & (out[:, 0] <= most))
+            found, ok = values(states[rows])
+            out[rows], within[rows] = np.maximum(out[rows], found), ok
+        out[~within] = np.inf
+        return out, within
 
     @cached_property
     def stability(self) -> StandingSets:
@@ -364,6 +419,25 @@ def pose_free(
         criterion = _of_states(engine, criterion)
     standing = stands if isinstance(stands, Standing | None) else Standing(find_mortar(stands))
     return _asked(FreeProblem(engine, rules, criterion, named, limits, standing))
+
+
+def over_scenarios(problem: FreeProblem, scenes: Sequence[Scene]) -> FreeProblem:
+    """Return a problem whose worst values count in any of some scenarios.
+
+    Limits and standing hold in all of them. The criterion keeps the numbers of the scene that it
+    was posed for. A `ProblemError` names a goal that adds up responses: the worst total of any
+    scenario is no total of worst states.
+    """
+    for goal in problem.goals:
+        if goal.measure is Measure.SUM:
+            raise ProblemError(
+                f"aim {goal}: the worst total of scenarios is no total of worst states; take worst "
+                "values, or a schedule with open grips without an aim of its own"
+            )
+    for number, scene in enumerate(scenes, start=1):
+        require_alike(problem.network.scene, scene, number)
+    engines = tuple(engine_for(problem.engine, scene) for scene in scenes)
+    return replace(problem, scenarios=engines)
 
 
 def _goals(given: Sequence[Goal] | str) -> tuple[Goal, ...]:

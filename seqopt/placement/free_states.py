@@ -63,11 +63,18 @@ class FreeStates:
         """Return the moves from a level to the next."""
         return _joined(self.problem.space.onward(level, states), states)
 
-    def values(self, part: int, states: Ints, *, rough: bool) -> tuple[Floats, Bools]:
+    @property
+    def floors(self) -> bool:
+        """Whether a state that one scenario rules out is not asked of the next."""
+        return bool(self.problem.each)
+
+    def values(
+        self, part: int, states: Ints, *, rough: bool, most: float = np.inf
+    ) -> tuple[Floats, Bools]:
         """Return what goals take of states, and which are allowed."""
         if self.standing:
-            return self.problem.standing_values(part, states)
-        return self.problem.values(part, states, rough=rough)
+            return self.problem.standing_values(part, states, most=most)
+        return self.problem.values(part, states, rough=rough, most=most)
 
     def amounts(self, values: Floats, taken: Floats) -> Floats:
         """Return what goals take of moves."""

@@ -75,9 +75,14 @@ class OrderStates:
             new = self._of(key)
             yield key, new.placed(len(part[0]), _renumbered(old, new.problem, states))
 
-    def values(self, part: Key, states: Ints, *, rough: bool) -> tuple[Floats, Bools]:
+    @property
+    def floors(self) -> bool:
+        """Whether there are scenarios."""
+        return bool(self.problem.free.each)
+
+    def values(self, part: Key, states: Ints, *, rough: bool, most: float) -> tuple[Floats, Bools]:
         """Return what the first goal takes of states, and which are allowed."""
-        return self._of(part).values(len(part[0]), states, rough=rough)
+        return self._of(part).values(len(part[0]), states, rough=rough, most=most)
 
     def amounts(self, values: Floats, taken: Floats) -> Floats:
         """Return what the first goal takes of moves: that of the states that they lead to."""

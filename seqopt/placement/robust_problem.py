@@ -5,16 +5,19 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import overload
 
 import numpy as np
 
 from seqopt.arrays import Floats
 from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.placement.costs import LayeredCosts
+from seqopt.placement.free_problem import FreeProblem, over_scenarios
 from seqopt.placement.interface import Aim
 from seqopt.placement.problem import Problem
-from seqopt.placement.robust_aim import RobustAim, parse_robust
+from seqopt.placement.robust_aim import WORST_PEAK, RobustAim, parse_robust
 from seqopt.placement.scenario_costs import ScenarioCosts, scenario_costs, tasks_of
+from seqopt.placement.scenario_engines import require_alike
 from seqopt.scene.checks import short
 from seqopt.scene.scenarios import Scenarios
 from seqopt.scene.scene import Scene
@@ -127,24 +130,38 @@ class RobustProblem(Shown):
         return self.nominal.steps(choice)
 
 
+@overload
 def robust(
     problem: Problem, scenes: Scenarios | Sequence[Scene], aim: RobustAim | str
-) -> RobustProblem:
+) -> RobustProblem: ...
+
+
+@overload
+def robust(
+    problem: FreeProblem, scenes: Scenarios | Sequence[Scene], aim: RobustAim | str
+) -> FreeProblem: ...
+
+
+def robust(
+    problem: Problem | FreeProblem, scenes: Scenarios | Sequence[Scene], aim: RobustAim | str
+) -> RobustProblem | FreeProblem:
     """Return the problem of a plan that is good in many scenarios at once.
 
     Parameters
     ----------
-    problem : Problem
-        The nominal one, of `seqopt.pose`; with an engine of `seqopt.make_engine`.
+    problem : Problem or FreeProblem
+        The nominal one, of `seqopt.pose` or `seqopt.pose_free`; with an engine of
+        `seqopt.make_engine`.
     scenes : Scenarios or sequence of Scene
         Of `seqopt.scenarios`, or scenes of one's own with the same bricks and nodes.
     aim : RobustAim or str
-        Or in words: ``worst-peak``, ``worst-total`` or ``cvar=0.9``.
+        Or in words: ``worst-peak``, ``worst-total`` or ``cvar=0.9``; of states the first alone.
 
     Returns
     -------
-    RobustProblem
-        Nothing is computed yet.
+    RobustProblem or FreeProblem
+        As the nominal one; `solve_robust` solves the former, `seqopt.solve` the latter. Nothing
+        is computed yet.
 
     Raises
     ------
@@ -160,41 +177,38 @@ def robust(
     RobustProblem('arch25', 'three-robot', 5 scenarios, ... worst-peak)
     """
     aim = parse_robust(aim) if isinstance(aim, str) else aim
+    if isinstance(problem, FreeProblem):
+        return over_scenarios(problem, _worst_of(scenes, aim))
     if not isinstance(problem, Problem) or not isinstance(aim, RobustAim):
         raise ProblemError(
             f"{short(aim if isinstance(problem, Problem) else problem)}: give a problem of "
             "seqopt.pose, scenarios, and an aim as WORST_PEAK, WORST_TOTAL or cvar(0.9)"
         )
-    found = scenes.scenes if isinstance(scenes, Scenarios) else tuple(scenes)
-    if not found:
-        raise ProblemError("there is no scenario; give at least one")
+    found = _scenes(scenes)
     if problem.budgets:
         raise ProblemError(
             f"budget {problem.budgets[0].name!r}: aims over scenarios take no budgets; leave it out"
         )
     for i, scene in enumerate(found, start=1):
-        _require_alike(problem.schedule.scene, scene, i)
+        require_alike(problem.schedule.scene, scene, i)
     tasks_of(problem, found[:1])  # says if engines for other scenes cannot be made
     return RobustProblem(problem, found, aim)
 
 
-def _require_alike(nominal: Scene, scene: Scene, number: int) -> None:
-    """Raise an error if the choices of a schedule do not mean the same in a scenario."""
-    if not isinstance(scene, Scene):
-        raise ProblemError(f"scenario {number}: {short(scene)} is not a scene")
+def _scenes(scenes: Scenarios | Sequence[Scene]) -> tuple[Scene, ...]:
+    found = scenes.scenes if isinstance(scenes, Scenarios) else tuple(scenes)
+    if not found:
+        raise ProblemError("there is no scenario; give at least one")
+    return found
 
-    def meant(it: Scene) -> tuple[object, ...]:
-        joints = tuple(joint.bricks for joint in it.joints)
-        ends = tuple((ground.brick, ground.closes_with) for ground in it.grounds)
-        nodes = tuple((brick.name, brick.nodes) for brick in it.placed)
-        robots = tuple(robot.name for robot in it.robots)
-        return joints, ends, nodes, robots, it.blocked_nodes
 
-    if meant(nominal) != meant(scene):
+def _worst_of(scenes: Scenarios | Sequence[Scene], aim: object) -> tuple[Scene, ...]:
+    """Return scenarios whose worst states count, as they do where states are chosen."""
+    if aim != WORST_PEAK:
         raise ProblemError(
-            f"scenario {number}: it has other bricks, nodes, joints, robots or another build order "
-            f"than {nominal.name}; vary stiffnesses, densities and positions alone"
+            f"robust aim {short(aim)}: where states are chosen, worst steps count; give worst-peak"
         )
+    return _scenes(scenes)
 
 
 def largest_of(layers: Sequence[LayeredCosts]) -> LayeredCosts:

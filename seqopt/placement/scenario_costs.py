@@ -9,13 +9,14 @@ from contextlib import closing
 from dataclasses import dataclass
 
 from seqopt.arrays import FrozenValue
-from seqopt.engines.recipe import Recipe, recipe_of
+from seqopt.engines.recipe import Recipe
 from seqopt.engines.registry import make_engine
 from seqopt.errors import MechanismError, ProblemError, SolverError
 from seqopt.placement.costs import LayeredCosts
 from seqopt.placement.problem import Problem
 from seqopt.placement.promises import require_possible
 from seqopt.placement.requirements import Criterion, Limit, ResponsesAsked
+from seqopt.placement.scenario_engines import recipe_for
 from seqopt.responses.choices import Evaluation
 from seqopt.responses.resources import Resources
 from seqopt.scene.scene import Scene
@@ -96,19 +97,13 @@ def tasks_of(problem: Problem, scenes: Sequence[Scene]) -> tuple[ScenarioTask, .
     ProblemError
         If the engine was not made by name, so that nobody knows how to make it for another scene.
     """
-    recipe = recipe_of(problem.engine)
-    if recipe is None:
-        raise ProblemError(
-            f"engine {type(problem.engine).__name__}: scenarios need engines of their own; take "
-            "one of seqopt.make_engine"
-        )
     asked = problem.evaluation.wanted
     also = asked.also if isinstance(asked, ResponsesAsked) else ()
     alone = problem.evaluation.resources.alone()
     return tuple(
         ScenarioTask(
             f"scenario {i}",
-            Recipe(recipe.engine, scene, recipe.options),
+            recipe_for(problem.engine, scene),
             problem.schedule,
             problem.criterion,
             problem.limits,

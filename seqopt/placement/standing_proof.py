@@ -30,7 +30,7 @@ class StandingProof:
 
     def __init__(self, problem: FreeProblem, payload: dict[int, float]) -> None:
         self._problem, self._payload = problem, payload
-        self._sets: dict[Standing, StandingSets] = {}
+        self._sets: dict[Standing, tuple[StandingSets, ...]] = {}
 
     def asked(self, margins: Sequence[float]) -> tuple[Standing, ...]:
         """Return what is demanded of states where the first goals, margins, have values."""
@@ -60,13 +60,16 @@ class StandingProof:
         """
         out = np.ones(len(held), dtype=bool)
         for demand in self.asked(margins):
-            out[out] = self._known(demand).may_stand(bricks, held[out], payload[out])
+            for known in self._known(demand):
+                out[out] = known.may_stand(bricks, held[out], payload[out])
         return out
 
-    def _known(self, asked: Standing) -> StandingSets:
+    def _known(self, asked: Standing) -> tuple[StandingSets, ...]:
+        """Return what is known of a demand in every scenario."""
         if asked not in self._sets:
             loads = np.array(list(self._payload.values()))
-            self._sets[asked] = StandingSets(self._problem.network, asked, loads)
+            problems = self._problem.each or (self._problem,)
+            self._sets[asked] = tuple(StandingSets(p.network, asked, loads) for p in problems)
         return self._sets[asked]
 
 
