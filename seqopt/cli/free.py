@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from typing import Any
 
 from seqopt.cli.answer import Answer
@@ -21,15 +22,19 @@ from seqopt.cli.means import parse_size
 from seqopt.cli.order import SEARCH, optimize_order
 from seqopt.cli.outputs import require_out, write_outputs, written_to
 from seqopt.cli.posing import asked_schedule
+from seqopt.cli.robust import asked_aim, asked_scenarios
 from seqopt.cli.rules import parse_rules, parse_standing
 from seqopt.cli.status import Status
 from seqopt.cli.values import parse_limits, parse_numbers, parse_robots, parse_time_limit
 from seqopt.errors import ProblemError, StepError
 from seqopt.network.build import build_network
+from seqopt.placement.free_judge import plan_values
 from seqopt.placement.free_plan import FreePlan
 from seqopt.placement.free_problem import FreeProblem
+from seqopt.placement.robust_problem import robust
 from seqopt.placement.schedule_formulation import find_schedule_formulation
 from seqopt.placement.solving import solve
+from seqopt.scene.scenarios import Scenarios
 from seqopt.scene.scene import Scene
 from seqopt.sequence.free_rules import FREE, FreeRules, with_robots
 from seqopt.sequence.schedule import Schedule
@@ -50,7 +55,12 @@ def optimize_free(options: argparse.Namespace) -> Answer:
         return optimize_order(options, asked_free(options)[1])
     formulation = find_schedule_formulation(options.formulation or DEFAULTS[FREE].formulation)
     numbers = parse_numbers("--option", options.option, formulation.options)
+    aim = None if options.robust is None else asked_aim(options, ())
     scene, problem = asked_free(options)
+    unseen = None
+    if aim is not None:
+        known, unseen = asked_scenarios(options, scene)
+        problem = robust(problem, known, aim)
     require_out(options)
     whole = {name: type(formulation.options[name])(value) for name, value in numbers.items()}
     limit = parse_time_limit(options.time_limit)
@@ -59,6 +69,8 @@ def optimize_free(options: argparse.Namespace) -> Answer:
     how: dict[str, Any] = {"proof": not options.no_proof, "lazy": options.lazy, **whole}
     plan = solve(problem, formulation, time_limit=limit, progress=options.tell, **how)
     table, report = plan.responses(), plan.summary()
+    if unseen is not None:
+        report |= {"robust": str(aim), "unseen": _out_of_sample(plan, unseen)}
     said = f"{', '.join(map(str, problem.goals))}; {plan.status}"
     written = write_outputs(options, lambda: free_files(plan, report, plan.title, said))
     stopped = plan.selection.stopped == "interrupt"
@@ -71,6 +83,16 @@ def optimize_free(options: argparse.Namespace) -> Answer:
         status=Status.INTERRUPTED if stopped else Status.DONE,
     )
     return strictly(answer, options, over, plan.departures)
+
+
+def _out_of_sample(plan: FreePlan, unseen: Scenarios) -> dict[str, object]:
+    """Return the worst values of a plan in scenarios that it was not chosen by."""
+    judged = robust(replace(plan.problem, scenarios=(), limits=()), unseen, "worst-peak")
+    judged = replace(judged, standing=None, settled=())
+    goals = tuple(goal for goal in judged.goals if not goal.of_margins)
+    values = plan_values(replace(judged, goals=goals), plan.steps) if goals else ()
+    worst = {str(goal): value for goal, value in zip(goals, values, strict=True)}
+    return {**unseen.settings, "worst": worst}
 
 
 def _said(plan: FreePlan, options: argparse.Namespace) -> str:

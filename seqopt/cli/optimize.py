@@ -57,11 +57,12 @@ def run(options: argparse.Namespace) -> Answer:
     options : argparse.Namespace
         Of the command ``optimize``.
     """
-    if options.robust is not None:
-        return optimize_robust(options)
-    require_no_scenarios(options)
+    if options.robust is None:
+        require_no_scenarios(options)
     if options.schedule == FREE or options.aim or options.stands:
         return optimize_free(options)
+    if options.robust is not None:
+        return optimize_robust(options)
     require_loop(options)
     formulation = find_formulation(
         options.formulation or DEFAULTS["any other"].chosen_by(options.budget)

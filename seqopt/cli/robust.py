@@ -6,7 +6,7 @@ import argparse
 import json
 import math
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import pandas as pd
 
@@ -64,15 +64,14 @@ def optimize_robust(options: argparse.Namespace) -> Answer:
     options : argparse.Namespace
         Of the command ``optimize``.
     """
-    aim = _asked_aim(options)
+    aim = asked_aim(options, NOT_WITH)
     limit = parse_time_limit(options.time_limit)
-    count = _count("--scenarios", options.scenarios, COUNT)
-    other = _count("--unseen", options.unseen, count)
-    seed = _count("--seed", options.seed, 0, least=0)
+    _counts(options)
     start = time.perf_counter()
     problem = asked_problem(options)
     scene = problem.schedule.scene
-    known, unseen = (_drawn(scene, options, n, s) for n, s in ((count, seed), (other, seed + 1)))
+    known, unseen = asked_scenarios(options, scene)
+    count, other = len(known.scenes), len(unseen.scenes)
     assemble = time.perf_counter() - start
     plan = solve_robust(
         robust(problem, known, aim), time_limit=limit, progress=within(options.tell, limit)
@@ -110,14 +109,26 @@ def _files(
     }
 
 
-def _asked_aim(options: argparse.Namespace) -> RobustAim:
+def asked_scenarios(options: argparse.Namespace, scene: Scene) -> tuple[Scenarios, Scenarios]:
+    """Return the scenarios to choose by, and those that judge."""
+    (count, other), seed = _counts(options)
+    return _drawn(scene, options, count, seed), _drawn(scene, options, other, seed + 1)
+
+
+def _counts(options: argparse.Namespace) -> tuple[tuple[int, int], int]:
+    """Return how many scenarios are asked for, known and unseen, and the seed of the former."""
+    count = _count("--scenarios", options.scenarios, COUNT)
+    other = _count("--unseen", options.unseen, count)
+    return (count, other), _count("--seed", options.seed, 0, least=0)
+
+
+def asked_aim(options: argparse.Namespace, unknown: Sequence[str]) -> RobustAim:
     """Return the aim over scenarios if nothing is asked for that does not go with it."""
     try:
         aim = parse_robust(options.robust)
     except ProblemError as error:
         raise ProblemError(f"--robust: {error}") from error
-    given = [name for name in NOT_WITH if getattr(options, name)]
-    given += ["schedule free"] if options.schedule == "free" else []
+    given = [name for name in unknown if getattr(options, name)]
     if given:
         name = given[0].replace("_", "-")
         raise ProblemError(f"--{name}: it does not go with --robust {options.robust}; leave it out")

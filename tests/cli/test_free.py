@@ -126,6 +126,21 @@ def test_what_only_the_free_schedule_has(capsys, tmp_path, arch):
         assert re.search("give .*--schedule free|aims and --stands have no such", error)
 
 
+def test_a_free_schedule_over_scenarios(capsys, tmp_path, arch):
+    out = tmp_path / "out"
+    words = ("--schedule", "free", "--robust", "worst-peak", "--scenarios", "3", "--unseen", "4")
+    status, text, error = run(capsys, "optimize", arch, *words, "--out", str(out))
+    assert (status, error) == (0, "")
+    assert ", optimal; " in text
+    summary = json.loads((out / "summary.json").read_text())
+    assert (summary["scenarios"], summary["unseen"]["count"]) == (3, 4)
+    assert summary["unseen"]["worst"]["minmax"] > 0
+    words = ("--schedule", "free", "--robust", "worst-peak", "--aim", "sum")
+    status, _, error = run(capsys, "optimize", arch, *words, "--out", str(tmp_path / "no"))
+    assert status == 2
+    assert "no total of worst states" in error
+
+
 def test_a_loop_by_its_states(capsys, tmp_path, arch):
     """Aims, limits and standing go with schedules of open grips too."""
     out = tmp_path / "out"

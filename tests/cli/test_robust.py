@@ -71,7 +71,7 @@ def test_a_plan_over_scenarios_is_written(capsys, tmp_path, scene, aim):
         (["--robust", "worst-peak", "--formulation", "minimax"], "--formulation: it does not go"),
         (["--robust", "worst-peak", "--budget", "travel=0.8"], "--budget: it does not go with"),
         (["--robust", "worst-peak", "--no-proof"], "--no-proof: it does not go with"),
-        (["--robust", "worst-total", "--schedule", "free"], "--schedule free: it does not go"),
+        (["--robust", "worst-total", "--schedule", "free"], "worst steps count; give worst-peak"),
         (["--scenarios", "3", "--formulation", "minimax"], "--scenarios: plans over scenarios"),
         (["--seed", "3", "--schedule", "free"], "--seed: plans over scenarios alone"),
         (["--robust", "worst-peak", "--scenarios", "x"], "--scenarios x: give a whole number"),

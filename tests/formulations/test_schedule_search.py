@@ -17,12 +17,13 @@ from seqopt.contact.mortar import EPOXY
 from seqopt.engines.auto import AutoEngine, Level
 from seqopt.engines.interface import Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.errors import InfeasibleError, MechanismError, ProblemError, TimeUpError
+from seqopt.errors import InfeasibleError, MechanismError, ProblemError, SolverError, TimeUpError
 from seqopt.graph.paths import fewest_moves, keep_best, reached
 from seqopt.network.build import build_network
 from seqopt.placement.criteria import WorstRatio
 from seqopt.placement.free_counts import steps_with, with_held
 from seqopt.placement.free_front import FreeFront
+from seqopt.placement.free_judge import judge_schedule, plan_values
 from seqopt.placement.free_problem import pose_free
 from seqopt.placement.free_states import explore
 from seqopt.placement.front import find_front, pick, upper_bounds
@@ -150,6 +151,36 @@ def check_against_brute_force(scene, rules):
 @settings(max_examples=10, deadline=None)
 def test_it_equals_brute_force(build):
     check_against_brute_force(*build)
+
+
+@given(build=free_builds(most_bricks=4, most_robots=3))
+@settings(max_examples=6, deadline=None)
+def test_over_scenarios_it_equals_brute_force(build):
+    """A state is what it is in its worst scenario, and is allowed in all; so says the judge."""
+    scene, rules = build
+    scenes = seqopt.scenarios(scene, stiffness=(0.3, 3.0), count=3, seed=1).scenes
+    graphs = [whole_graph(ComplianceEngine(build_network(each)), rules) for each in scenes]
+    common = graphs[0][0].copy()
+    common.remove_nodes_from([n for n in graphs[0][0] if any(n not in g for g, _ in graphs)])
+    costs = {n: max(peaks(g)[n] for g, _ in graphs) for n in common if n != "end"}
+    best = least_peak(common, graphs[0][1], costs) if "end" in common else None
+    engine = seqopt.make_engine("compliance", build_network(scene))
+    problem = seqopt.robust(pose_free(engine, rules, ONES, "minmax,steps"), scenes, "worst-peak")
+    if best is None:
+        with pytest.raises(InfeasibleError, match="free schedule: "):
+            seqopt.solve(problem, "schedule_search")
+        return
+    plan = seqopt.solve(problem, "schedule_search")
+    steps = nx.shortest_path_length(best[1], graphs[0][1], "end") - 1
+    assert plan.certificate.objective == pytest.approx((best[0], steps))
+    assert plan.certificate.gap == 0
+    assert plan.summary()["scenarios"] == 3
+    values = [plan_values(each, plan.steps)[0] for each in problem.each]
+    assert max(values) == pytest.approx(best[0])
+    milder = [e for e, v in zip(problem.scenarios, values, strict=True) if v < 0.999 * best[0]]
+    if milder:  # the control: what is worst is seen to be missing
+        with pytest.raises(SolverError, match=r"minmax is .*, not .* as claimed"):
+            judge_schedule(replace(problem, scenarios=tuple(milder)), plan.selection, plan.steps)
 
 
 @pytest.mark.slow
