@@ -38,6 +38,7 @@ import numpy as np
 
 from seqopt.arrays import Ints
 from seqopt.errors import InfeasibleError, ProblemError, SeqoptError, TimeUpError
+from seqopt.graph.budgets import Within, within_budgets
 from seqopt.graph.explore import Explorer
 from seqopt.graph.parts import Key, Visited
 from seqopt.graph.paths import Best, distances, lexicographic, reached, tied
@@ -236,19 +237,24 @@ def _standing(problem: FreeProblem, found: Explorer) -> ScheduleSelection:
     """Return the best path through visited states that stand as is demanded."""
     known: set[tuple[int, ...]] = set()
     while True:
-        visited, best = _exact(found)
+        visited, best = _exact(problem, found)
         states = visited.of(best.path)
         if not problem.demands or not _leave_out(problem, found, states, known):
             rows = tuple((level, *state.tolist()) for level, _, state in states)
             hint = _passable(visited, best.values[0])
+            if isinstance(best, Within):
+                return ScheduleSelection(rows, best.values, best.bounds, hint, best.prices)
             return ScheduleSelection(rows, best.values, best.values, hint)
 
 
-def _exact(found: Explorer) -> tuple[Visited, Best]:
+def _exact(problem: FreeProblem, found: Explorer) -> tuple[Visited, Best | Within]:
     """Return the best path through visited states, values close to its own being exact."""
     while True:
         visited = found.graph()
-        best = lexicographic(visited.graph)
+        if problem.budgets:
+            best: Best | Within = within_budgets(visited.graph, problem.budgets)
+        else:
+            best = lexicographic(visited.graph)
         if not found.refine(best.values):
             return visited, best
 

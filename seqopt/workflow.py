@@ -13,10 +13,10 @@ from seqopt.engines.interface import Engine
 from seqopt.engines.registry import USUAL, make_engine
 from seqopt.errors import ProblemError
 from seqopt.network.build import build_network
-from seqopt.placement.asked_budgets import parse_budgets, with_budgets
+from seqopt.placement.asked_budgets import parse_budgets, parse_caps, with_budgets
 from seqopt.placement.criteria import WORST_OVER_METHODS
 from seqopt.placement.free_plan import FreePlan
-from seqopt.placement.free_problem import FreeProblem, pose_free
+from seqopt.placement.free_problem import FreeProblem, pose_free, within
 from seqopt.placement.plan import Plan
 from seqopt.placement.problem import Problem, pose
 from seqopt.placement.requirements import Criterion, Limit
@@ -38,7 +38,7 @@ FREE_WORDS = ("rules", *RULES)
 """Options that the free schedule alone has."""
 STATE_WORDS = ("aim", "stands")
 """Options with which states of a build are chosen, of whatever schedule, and no candidates."""
-LOOP_WORDS = ("budgets", "workers", "executor", "cache")
+LOOP_WORDS = ("workers", "executor", "cache")
 """Options that go with costs of candidates alone."""
 
 
@@ -149,7 +149,7 @@ def optimize(
     FreePlan('arch25', 50 steps, minmax 0.840088, steps 50, optimal)
     """
     kind = FREE if any(word in options for word in STATE_WORDS) else _kind(schedule)
-    usual = DEFAULTS[kind].chosen_by(options.get("budgets"))
+    usual = DEFAULTS[kind].chosen_by(options.get("budgets") if kind != FREE else None)
     problem, assemble = _pose(scene, schedule, (criterion, engine), limits, options)
     plan = solve(problem, formulation or usual, **options)
     return replace(plan, seconds={"assemble": assemble, **plan.seconds})
@@ -186,6 +186,8 @@ def _pose(
         rules = _free_rules(options) if free else _open(engine, schedule, options)
         words = {name: options.pop(name, None) for name in STATE_WORDS}
         problem = posed_free(engine, asked[0], limits=limits, rules=rules, **words)
+        if caps := parse_caps(options.pop("budgets", ())):
+            problem = within(problem, caps)
     else:
         opened = _open(engine, schedule, options)
         problem = posed(engine, opened, asked[0], limits, *_means(options))

@@ -28,9 +28,10 @@ from seqopt.cli.status import Status
 from seqopt.cli.values import parse_limits, parse_numbers, parse_robots, parse_time_limit
 from seqopt.errors import ProblemError, StepError
 from seqopt.network.build import build_network
+from seqopt.placement.asked_budgets import parse_caps
 from seqopt.placement.free_judge import plan_values
 from seqopt.placement.free_plan import FreePlan
-from seqopt.placement.free_problem import FreeProblem
+from seqopt.placement.free_problem import FreeProblem, within
 from seqopt.placement.robust_problem import robust
 from seqopt.placement.schedule_formulation import find_schedule_formulation
 from seqopt.placement.solving import solve
@@ -126,7 +127,7 @@ def require_loop(options: argparse.Namespace) -> None:
 def _require_free(options: argparse.Namespace) -> None:
     """Raise an error if options that the free schedule does not have are given with it."""
     free = options.schedule == FREE
-    unknown: tuple[str, ...] = ("budget", "cache", "ranked", "among")
+    unknown: tuple[str, ...] = ("cache", "ranked", "among")
     unknown += ("candidates",) if free else ("rule",)
     given = [name for name in unknown if getattr(options, name)]
     given += ["workers"] if options.workers != "1" and options.order != SEARCH else []
@@ -161,6 +162,6 @@ def asked_free(options: argparse.Namespace) -> tuple[Scene, FreeProblem]:
     if not free and options.command == "optimize":
         rules = asked_schedule(options, engine.network)
     limits, stands = parse_limits(options.limit, scene), parse_standing(options)
-    return scene, posed_free(
-        engine, criterion, options.aim, rules=rules, limits=limits, stands=stands
-    )
+    problem = posed_free(engine, criterion, options.aim, rules=rules, limits=limits, stands=stands)
+    caps = parse_caps(getattr(options, "budget", ()))
+    return scene, within(problem, caps) if caps else problem

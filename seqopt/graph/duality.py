@@ -64,6 +64,17 @@ def sum_bound(graph: Graph, goal: int, before: Floats) -> float:
     return float(before[graph.ends].min(initial=np.inf))
 
 
+def least_sum(graph: Graph, costs: Floats) -> float:
+    """Return what a sum of costs (m,) from 0 is at least on any path, by potentials.
+
+    Infinite where no path leads to an end, minus infinity where an inequality does not hold.
+    """
+    before = distances(graph, costs)
+    if before[0] > 0 or not _hold(before, costs, graph):
+        return -np.inf
+    return float(before[graph.ends].min(initial=np.inf))
+
+
 def _hold(least: Floats, costs: Floats, graph: Graph, *, back: bool = False) -> bool:
     """Return whether no move leads from a state to another by less than their difference."""
     ends = (graph.target, graph.source) if back else (graph.source, graph.target)

@@ -21,6 +21,8 @@ SHAPE = re.compile(
     r"(?P<kind>travel|steps_over:(?P<response>.+)|robot_use:(?P<robot>.+))"
     r"=((?P<level>[^:=]+):)?(?P<bound>[^:=]+?)(?P<unit>m|x|)"
 )
+CAP = re.compile(r"(?P<name>[^=]+)=(?P<bound>[^:=]+?)(?P<unit>m?)")
+CAPS = "travel=3.5m, regrips=2, steps=50 or sum(T_max)=900, say"
 FORMS = "travel=0.8, travel=3.5m, steps_over:F_largest=250:10 or robot_use:rob1=100:5"
 
 
@@ -99,6 +101,25 @@ def _parse(text: str) -> AskedBudget:
     level = 0.0 if is_travel else _positive(found["level"], text)
     share = found["unit"] == "x" or (is_travel and not found["unit"])
     return AskedBudget(text, response, level, _positive(found["bound"], text), share)
+
+
+def parse_caps(texts: Sequence[str] | str) -> dict[str, float]:
+    """Return caps on totals of states from words: ``travel=3.5m``, ``regrips=2``, ``sum(T_max)=9``.
+
+    Raises
+    ------
+    ProblemError
+        If one has another form, or stands there twice.
+    """
+    out: dict[str, float] = {}
+    for text in (texts,) if isinstance(texts, str) else texts:
+        found = CAP.fullmatch(text) if isinstance(text, str) else None
+        if found is None or (found["name"] == "travel") != bool(found["unit"]):
+            raise ProblemError(f"budget {short(text)} of states does not exist; give {CAPS}")
+        if found["name"] in out:
+            raise ProblemError(f"budget {text}: it stands there twice; give one bound")
+        out[found["name"]] = _positive(found["bound"], text)
+    return out
 
 
 def _positive(text: str, words: str) -> float:

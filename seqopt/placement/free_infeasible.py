@@ -11,7 +11,7 @@ import numpy as np
 
 from seqopt.errors import InfeasibleError, SeqoptError, SolverError
 from seqopt.graph.explore import Explorer
-from seqopt.graph.paths import least_peak
+from seqopt.graph.paths import distances, least_peak
 from seqopt.placement.free_goals import STATE_RESPONSES, Goal, Measure
 from seqopt.placement.free_problem import FreeProblem
 from seqopt.placement.free_proof import Proof
@@ -46,17 +46,36 @@ def confirmed(problem: FreeProblem, name: str, seconds: float = np.inf) -> Seqop
     InfeasibleError or SolverError
         The latter where a plan is allowed.
     """
-    end, steps = time.perf_counter() + seconds, replace(_with_any_margin(problem), goals=STEPS)
+    end, capped = time.perf_counter() + seconds, problem.goals[len(problem.aims) :]
+    steps = replace(_with_any_margin(problem), goals=(*STEPS, *capped))
     try:
         found = explore(steps, tell=partial(_in_time, end))
+        if found.whole and capped:
+            return _over_budget(steps, found, name)
         if found.whole:
             return SolverError(f"formulation {name} says that no plan is allowed, and some are")
         hint = {level: rows for level, _, rows in found.graph().states}
         proven = Proof(steps, hint).is_impossible()
     except _LateError:
         proven = False
-    why = why_impossible(problem, end - time.perf_counter())
+    bare = replace(problem, goals=problem.aims, budgets=())
+    why = why_impossible(bare, end - time.perf_counter())
     return InfeasibleError(why if proven else f"claimed by {name}, and not proven: {why}")
+
+
+def _over_budget(problem: FreeProblem, found: Explorer, name: str) -> SeqoptError:
+    """Return the error that names what each budget needs at least, where plans exist without."""
+    graph, states = found.graph()
+    first = len(problem.goals) - len(problem.budgets)
+    words = []
+    for k, cap in enumerate(problem.budgets, start=first):
+        least = distances(graph, graph.amounts[:, k])[graph.ends].min()
+        words.append(f"{problem.goals[k]} is at least {least:.6g}, and {cap:g} is allowed")
+    proven = Proof(problem, {level: rows for level, _, rows in states}).is_impossible()
+    claim = "" if proven else f"claimed by {name}, and not proven: "
+    return InfeasibleError(
+        f"{claim}{problem.title}: no plan is within all budgets; {', '.join(words)}"
+    )
 
 
 def _with_any_margin(problem: FreeProblem) -> FreeProblem:

@@ -95,6 +95,8 @@ def judge_schedule(
     if selection.stopped:
         return _stopped(values)
     proof = Proof(problem, hint)
+    if problem.budgets:
+        return _within_budgets(problem, selection, values, proof)
     bounds = _bounds(problem, proof, values)
     for goal, value, bound in zip(problem.goals, values, bounds, strict=True):
         if not goal.of_margins and not bound >= value - BELOW * abs(value):
@@ -116,6 +118,31 @@ def _bounds(problem: FreeProblem, proof: Proof, values: tuple[float, ...]) -> tu
         pairs = zip(proof.bounds(values), values, strict=True)
         out += [v if b >= v - BELOW * abs(v) else b for b, v in pairs][len(out) :]
     return tuple(out)
+
+
+def _within_budgets(
+    problem: FreeProblem,
+    selection: ScheduleSelection,
+    values: tuple[float, ...],
+    proof: Proof,
+) -> ScheduleCertificate:
+    """Return the certificate of a plan within budgets: what prices leave open is its gap."""
+    aims = len(problem.aims)
+    pairs = zip(problem.goals[aims:], values[aims:], problem.budgets, strict=True)
+    for goal, spent, cap in pairs:
+        if not spent <= cap + TOLERANCE * cap:
+            raise SolverError(f"{goal} is {spent:.9g}, more than the {cap:g} that are allowed")
+    claimed, prices = selection.bound, selection.prices
+    fits = [aims <= len(prices), *(len(each) >= len(problem.budgets) for each in prices)]
+    if not all(fits):
+        raise SolverError("there is no price for every budget and goal")
+    bounds = proof.budget_bounds(values, claimed, prices)
+    for goal, bound, said in zip(problem.aims, bounds, claimed, strict=False):
+        if not bound >= said - TOLERANCE * abs(said):
+            raise SolverError(f"{goal}: no plan within budgets is promised below {said:.9g}")
+    bounds = tuple(min(b, v) for b, v in zip(bounds, values, strict=False))
+    gaps = [(v - b) / (abs(v) or 1.0) for v, b in zip(values, bounds, strict=False)]
+    return ScheduleCertificate(values, (*bounds, *values[aims:]), max(gaps), proof.states)
 
 
 def _stopped(values: tuple[float, ...]) -> ScheduleCertificate:

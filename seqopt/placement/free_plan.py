@@ -164,14 +164,15 @@ class FreePlan(ShownBuild):
             `Plan.summary`.
         """
         problem, chosen = self.problem, self.selection
-        goals = [str(goal) for goal in problem.goals]
+        goals = [str(goal) for goal in problem.aims]
+        budgets = zip(problem.goals[len(goals) :], problem.budgets, strict=True)
         proof = self.certificate
         bound = chosen.bound if proof is None else proof.bound
         if chosen.stopped:
             bound = chosen.bound
         finite = (
             None if abs(value) == float("inf") else goal.shown(value)
-            for goal, value in zip(problem.goals, bound, strict=True)
+            for goal, value in zip(problem.aims, bound, strict=False)
         )
         return {
             "scene": problem.network.scene.name,
@@ -181,6 +182,7 @@ class FreePlan(ShownBuild):
             "aims": goals,
             **judged_by(problem.goals, problem.criterion),
             "scenarios": len(problem.scenarios),
+            "budgets": {str(goal): cap for goal, cap in budgets},
             "limits": {limit.response: limit.bound for limit in problem.limits},
             "rules": _rules(problem),
             "status": self.status,

@@ -63,6 +63,8 @@ class FreeProblem(Shown):
         That every state must stand, if it is demanded.
     settled : tuple of Standing
         Margins that every state must have as well.
+    budgets : tuple of float
+        Caps on the sums of as many last goals, which are not to be made small but kept within.
     scenarios : tuple of Engine
         Of the same scene in other states of the world: what is largest in any of them counts, and
         limits and standing hold in all. By default that of ``engine`` alone.
@@ -75,10 +77,13 @@ class FreeProblem(Shown):
     limits: tuple[Limit, ...] = ()
     standing: Standing | None = None
     settled: tuple[Standing, ...] = ()
+    budgets: tuple[float, ...] = ()
     scenarios: tuple[Engine, ...] = ()
 
     def __repr__(self) -> str:
-        goals = ", ".join(map(str, self.goals))
+        caps = zip(self.goals[len(self.aims) :], self.budgets, strict=True)
+        capped = [f"{goal} <= {cap:g}" for goal, cap in caps]
+        goals = ", ".join([*map(str, self.aims), *capped])
         where = f"{self.network.scene.name!r}"
         if isinstance(self.rules, Schedule):
             where += f", {self.rules.method!r}"
@@ -138,6 +143,11 @@ class FreeProblem(Shown):
             names += self.criterion.wanted(1)
         names += [limit.response for limit in self.limits]
         return tuple(name for name in STATE_RESPONSES if name in names)
+
+    @property
+    def aims(self) -> tuple[Goal, ...]:
+        """The goals that are to be made small."""
+        return self.goals[: len(self.goals) - len(self.budgets)]
 
     @property
     def leading(self) -> int:
@@ -419,6 +429,43 @@ def pose_free(
         criterion = _of_states(engine, criterion)
     standing = stands if isinstance(stands, Standing | None) else Standing(find_mortar(stands))
     return _asked(FreeProblem(engine, rules, criterion, named, limits, standing))
+
+
+def within(problem: FreeProblem, caps: Mapping[str, float]) -> FreeProblem:
+    """Return a problem whose plans keep totals over the build within caps.
+
+    Parameters
+    ----------
+    problem : FreeProblem
+    caps : mapping of str to float
+        ``steps``, ``regrips``, ``travel`` (m) or ``sum(RESPONSE)``, and how much each may be.
+
+    Raises
+    ------
+    ProblemError
+        If something is no total, or a cap is no number from 0.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> engine = seqopt.make_engine("compliance", seqopt.load_scene("arch25"))
+    >>> problem = pose_free(engine, FreeRules(), seqopt.CRITERIA["worst-ratio"])
+    >>> within(problem, {"regrips": 3})
+    FreeProblem('arch25', minmax, regrips <= 3, 0 limits)
+    """
+    goals = [_goals(name)[0] for name in caps]
+    for goal, cap in zip(goals, caps.values(), strict=True):
+        if goal.measure is Measure.PEAK or (goal.of_states and not goal.response):
+            raise ProblemError(
+                f"budget {goal}: it is no total of moves or of a response; give steps, regrips, "
+                "travel or sum(RESPONSE), or set a limit"
+            )
+        if not (isinstance(cap, int | float) and 0 <= cap < np.inf):
+            raise ProblemError(f"budget {goal}={short(cap)}: give a number from 0")
+    if problem.budgets:
+        raise ProblemError("the problem has budgets already; give all of them at once")
+    caps_of = tuple(float(cap) for cap in caps.values())
+    return replace(problem, goals=(*problem.goals, *goals), budgets=caps_of)
 
 
 def over_scenarios(problem: FreeProblem, scenes: Sequence[Scene]) -> FreeProblem:

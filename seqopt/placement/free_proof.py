@@ -13,6 +13,7 @@ import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.errors import InfeasibleError
+from seqopt.graph.budgets import budget_bounds, is_beyond
 from seqopt.graph.duality import lexicographic_bounds
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import lexicographic, reached
@@ -67,6 +68,18 @@ class Proof:
             if self._is_better(values, out) is None or not self._fall(levels, graph, values):
                 return out
 
+    def budget_bounds(
+        self,
+        values: Sequence[float],
+        claimed: Sequence[float],
+        prices: Sequence[Sequence[float]],
+    ) -> tuple[float, ...]:
+        """Return the same for plans within budgets, by prices that a formulation gives."""
+        caps = self._passable.problem.budgets
+        levels = _Levels(self._passable, self._told, Asked(values))
+        self.states = sum(map(len, levels.states))
+        return budget_bounds(levels.graph(), values, claimed, (caps, prices))
+
     def is_impossible(self, margins: Sequence[float] = ()) -> bool:
         """Return whether no plan is allowed, or none in which all states have such margins.
 
@@ -79,7 +92,8 @@ class Proof:
         """
         graph = _Levels(self._passable, self._told, Asked((), margins)).graph()
         self.states = max(self.states, graph.states)
-        return not graph.ends[reached(graph)].any()
+        caps = self._passable.problem.budgets
+        return is_beyond(graph, caps) if caps else not graph.ends[reached(graph)].any()
 
     def _is_better(self, values: Sequence[float], bounds: Sequence[float]) -> int | None:
         """Return the first goal whose bound leaves room for a better plan; None if none does."""

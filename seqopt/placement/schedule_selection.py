@@ -29,6 +29,9 @@ class ScheduleSelection(FrozenValue):
     visited : tuple of (n, c) int
         States that a better plan could pass, by brick count, if the formulation knows them: the
         proof looks at these together, and depends on them in nothing but its time.
+    prices : tuple of tuple of float
+        By goal, what a unit of every budget and of every sum before it is worth: they prove the
+        bounds where there are budgets.
     stopped : str
         Why the search ended before all was proven: ``time``, ``memory`` or ``interrupt``; empty if
         it did not.
@@ -38,6 +41,7 @@ class ScheduleSelection(FrozenValue):
     objective: tuple[float, ...]
     bound: tuple[float, ...]
     visited: tuple[Ints, ...] = field(default=(), repr=False)
+    prices: tuple[tuple[float, ...], ...] = ()
     stopped: str = ""
 
 
@@ -68,4 +72,5 @@ def with_numbers(name: str, found: ScheduleSelection, goals: int) -> ScheduleSel
         if not all(b <= v + CLOSE * abs(v) for v, b in zip(objective, bound, strict=True)):
             raise ValueError("a value or bound is NaN, or a bound is above its value")
         visited = tuple(np.asarray(rows) for rows in found.visited)
-        return ScheduleSelection(states, objective, bound, visited, text(found.stopped))
+        prices = tuple(tuple(map(float, each)) for each in found.prices)
+        return ScheduleSelection(states, objective, bound, visited, prices, text(found.stopped))

@@ -126,6 +126,26 @@ def test_what_only_the_free_schedule_has(capsys, tmp_path, arch):
         assert re.search("give .*--schedule free|aims and --stands have no such", error)
 
 
+def test_a_free_schedule_within_a_budget(capsys, tmp_path, arch):
+    out = tmp_path / "out"
+    words = ("--schedule", "free", "--budget", "regrips=0", "--budget", "travel=9m")
+    status, text, error = run(capsys, "optimize", arch, *words, "--out", str(out))
+    assert (status, error) == (0, "")
+    assert ", optimal" in text
+    summary = json.loads((out / "summary.json").read_text())
+    assert summary["budgets"] == {"regrips": 0, "travel": 9}
+    assert summary["objective"]["travel"] <= 9
+    for word, status, said in (
+        ("travel=0.8", 2, "give travel=3.5m, regrips=2"),
+        ("tilt=3", 2, "it is no total of moves or of a response"),
+        ("sum(T_max)=0", 3, "no plan is within all budgets; sum(T_max) is at least"),
+    ):
+        words = ("--schedule", "free", "--budget", word, "--out", str(tmp_path / "no"))
+        found, _, error = run(capsys, "optimize", arch, *words)
+        assert (found, error.count("\n")) == (status, 1)
+        assert said in error
+
+
 def test_a_free_schedule_over_scenarios(capsys, tmp_path, arch):
     out = tmp_path / "out"
     words = ("--schedule", "free", "--robust", "worst-peak", "--scenarios", "3", "--unseen", "4")

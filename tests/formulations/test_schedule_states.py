@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from itertools import pairwise, product
 
@@ -16,7 +17,7 @@ from seqopt.errors import InfeasibleError, ProblemError, SolverError, StepError
 from seqopt.network.build import build_network
 from seqopt.placement.criteria import WorstRatio
 from seqopt.placement.free_judge import judge_schedule
-from seqopt.placement.free_problem import pose_free
+from seqopt.placement.free_problem import pose_free, within
 from seqopt.placement.requirements import Limit
 from seqopt.responses.quantities import CHOSEN_BY
 from seqopt.sequence.free_rules import with_robots
@@ -25,6 +26,7 @@ from seqopt.sequence.three_robots import modified_sequential, three_robot_loop
 from seqopt.stability.assessment import Verdict, verdict
 from tests.builders import small_arch
 
+SEARCH = "schedule_search"
 ONES = WorstRatio("ones", (("F_largest", 100.0), ("M_sup", 10.0), ("T_max", 30.0), ("D_max", 1e-5)))
 FOUR_OPEN = """step,type,bricks,rob1_node,rob2_node,rob3_node,rob4_node
 1,place,1,?,,,
@@ -121,6 +123,57 @@ def test_limits_equal_brute_force(name):
     none = pose_free(engine, schedule, ONES, "sum", [Limit("T_max", 0.999 * worst[0][0])])
     with pytest.raises(InfeasibleError, match=r"it becomes possible with T_max="):
         seqopt.solve(none, "schedule_search")
+
+
+@pytest.mark.parametrize("name", ["three-robot", "four"])
+def test_budgets_equal_brute_force(name):
+    """A worst value within one budget is exact; of sums a bound holds, and the gap is said."""
+    engine, schedule = built(name)
+    plans = list(every_plan(engine, schedule))
+    scene = engine.network.scene
+    known = np.array([goals("minmax,sum,travel,sum(M_sup)", scene, *each) for each in plans])
+    for cap in np.quantile(known[:, 2], [0.05, 0.4]):
+        able = known[known[:, 2] <= cap]
+        problem = within(pose_free(engine, schedule, ONES, "minmax,sum"), {"travel": cap})
+        plan = seqopt.solve(problem, "schedule_search")
+        value, total, travelled = plan.selection.objective
+        assert value == pytest.approx(able[:, 0].min(), rel=1e-7)
+        assert travelled <= cap * (1 + 1e-9)
+        least = able[able[:, 0] <= value * (1 + 1e-9), 1].min()
+        bound = plan.certificate.bound[1]
+        assert bound <= least * (1 + 1e-9)
+        assert total >= least * (1 - 1e-9)
+        assert plan.certificate.gap == pytest.approx(1 - bound / total, abs=1e-9)
+        both = {"travel": cap, "sum(M_sup)": np.median(able[:, 3])}
+        plan = seqopt.solve(within(pose_free(engine, schedule, ONES, "minmax"), both), SEARCH)
+        within_both = able[able[:, 3] <= both["sum(M_sup)"]]
+        assert plan.certificate.bound[0] <= within_both[:, 0].min() * (1 + 1e-9)
+        assert plan.selection.objective[0] >= within_both[:, 0].min() * (1 - 1e-9)
+        spent = dict(zip(map(str, plan.problem.goals), plan.selection.objective, strict=True))
+        assert all(spent[word] <= cap * (1 + 1e-9) for word, cap in both.items())
+    fewest = known[:, 3].min()
+    few = within(pose_free(engine, schedule, ONES, "minmax"), {"sum(M_sup)": 0.9 * fewest})
+    least = re.escape(f"sum(M_sup) is at least {fewest:.6g}, and")
+    with pytest.raises(InfeasibleError, match=least):
+        seqopt.solve(few, SEARCH)
+
+
+def test_the_judge_of_budgets_has_prices_of_its_own_to_check():
+    """The control: no prices, wrong prices and a bound that is too high are seen."""
+    engine, schedule = built("four")
+    problem = within(pose_free(engine, schedule, ONES, "sum"), {"travel": 3.0})
+    plan = seqopt.solve(problem, SEARCH)
+    judge_schedule(problem, plan.selection, plan.steps)
+    for wrong, said in (
+        (replace(plan.selection, prices=()), "no price for every budget"),
+        (replace(plan.selection, prices=((1e3,),)), "no plan within budgets is promised below"),
+        (replace(plan.selection, bound=(2 * plan.selection.bound[0], 0.0)), "is promised below"),
+    ):
+        with pytest.raises(SolverError, match=said):
+            judge_schedule(problem, wrong, plan.steps)
+    tight = replace(problem, budgets=(0.5 * plan.selection.objective[1],))
+    with pytest.raises(SolverError, match=r"travel is .*, more than the"):
+        judge_schedule(tight, plan.selection, plan.steps)
 
 
 @pytest.mark.parametrize("mortar", ["dry", "bond=2e3", "bond=2e4"])

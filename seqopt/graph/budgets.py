@@ -1,0 +1,212 @@
+"""Best paths within budgets: sums of some amounts are capped, and prices say what that costs.
+
+A price for every budget turns its amounts into costs; the cheapest path then bounds what any path
+within the budgets takes, by weak duality. Prices are found by cutting planes: every path that was
+met is a plane, and the next prices are best for all of them. What no prices decide stays open as a
+gap between a path and its bound, except that one budget alone is decided exactly for worst amounts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.optimize import linprog
+from scipy.sparse.csgraph import dijkstra
+
+from seqopt.arrays import Floats, Ints
+from seqopt.errors import InfeasibleError
+from seqopt.graph.duality import ROUNDING, least_sum
+from seqopt.graph.graph import Graph
+from seqopt.graph.paths import distances, tied
+
+ROUNDS = 60  # of cutting planes
+CLOSED = 1e-9  # share of a value to which prices are the best
+DEAREST = 1e6  # largest price, over what a path takes per unit of the budget
+
+
+class Within(NamedTuple):
+    """A path within budgets.
+
+    Attributes
+    ----------
+    path : tuple of int
+        Its states, the start left out.
+    values : tuple of float
+        What every column takes of it, the budgets' last.
+    bounds : tuple of float
+        What no path within them stays below, goals before it being at their values.
+    prices : tuple of tuple of float
+        By goal, of the budgets and of the sums before it, that prove its bound.
+    """
+
+    path: tuple[int, ...]
+    values: tuple[float, ...]
+    bounds: tuple[float, ...]
+    prices: tuple[tuple[float, ...], ...]
+
+
+class _Found(NamedTuple):
+    moves: Ints | None  # of the best path within all caps
+    bound: float
+    prices: Floats
+
+
+def within_budgets(graph: Graph, caps: Sequence[float]) -> Within:
+    """Return a path that is good in one goal after the other, its last columns within caps.
+
+    Raises
+    ------
+    InfeasibleError
+        If no path is found.
+    """
+    goals = len(graph.peaks) - len(caps)
+    limited = [*zip(range(goals, len(graph.peaks)), caps, strict=True)]
+    bounds, prices = [], []
+    for goal in range(goals):
+        if graph.peaks[goal]:
+            graph, bound, price = _least_worst(graph, goal, limited)
+        else:
+            found = _least_sum(graph, graph.amounts[:, goal], limited)
+            if found.moves is None:
+                raise InfeasibleError("no path is within all budgets")
+            bound, price = found.bound, found.prices
+            limited.append((goal, float(graph.amounts[found.moves, goal].sum())))
+        bounds.append(bound)
+        prices.append(tuple(price.tolist()))
+    moves = _least_sum(graph, np.ones(len(graph.source)), limited).moves
+    if moves is None:
+        raise InfeasibleError("no path is within all budgets")
+    taken = graph.amounts[moves]
+    values = np.where(graph.peaks, taken.max(axis=0, initial=0.0), taken.sum(axis=0)).tolist()
+    least = [min(b, v) for b, v in zip(bounds, values, strict=False)]
+    path = tuple(graph.target[moves].tolist())
+    return Within(path, tuple(values), (*least, *values[goals:]), tuple(prices))
+
+
+def _least_worst(
+    graph: Graph, goal: int, limited: Sequence[tuple[int, float]]
+) -> tuple[Graph, float, Floats]:
+    """Return the moves below the least worst amount of a path within caps, and its bound."""
+    amounts = graph.amounts[:, goal]
+    levels = np.unique(amounts)
+    low, high, proven, prices = 0, len(levels), 0, np.ones(len(limited))
+    while low < high:
+        middle = (low + high) // 2
+        part = graph.only(amounts <= levels[middle])
+        found = _least_sum(part, np.zeros(len(part.source)), limited)
+        if found.moves is not None:
+            high = middle
+            continue
+        low = middle + 1
+        if found.bound > 0:
+            proven, prices = low, found.prices
+    if low == len(levels):
+        raise InfeasibleError("no path is within all budgets")
+    return graph.only(amounts <= tied(float(levels[low]))), float(levels[proven]), prices
+
+
+def _least_sum(graph: Graph, costs: Floats, limited: Sequence[tuple[int, float]]) -> _Found:
+    """Return the cheapest path within caps that prices lead to, and what they prove.
+
+    Where no path is within them, a bound above that of any path says so: infinite, or positive
+    where costs are zero.
+    """
+    columns, caps = [c for c, _ in limited], np.array([tied(cap) for _, cap in limited])
+    amounts = graph.amounts[:, columns]
+    prices, best, proven = np.zeros(len(caps)), np.inf, _Found(None, -np.inf, np.zeros(len(caps)))
+    planes: list[tuple[float, Floats]] = []
+    moves: Ints | None = None
+    for _ in range(ROUNDS):
+        way = _cheapest(graph, costs + amounts @ prices)
+        if way is None:
+            return _Found(None, np.inf, prices)
+        cost, over = float(costs[way].sum()), amounts[way].sum(axis=0) - caps
+        bound = cost + float(prices @ over)
+        if bound > proven.bound:
+            proven = proven._replace(bound=bound, prices=prices)
+        if (over <= 0).all() and cost < best:
+            best, moves = cost, way
+        planes.append((cost, over))
+        prices, highest = _next_prices(planes, caps)
+        if highest <= proven.bound + CLOSED * abs(proven.bound) or best <= tied(proven.bound):
+            break
+    return proven._replace(moves=moves)
+
+
+def _next_prices(planes: Sequence[tuple[float, Floats]], caps: Floats) -> tuple[Floats, float]:
+    """Return the prices under which the cheapest of the paths met is dearest, and what it takes."""
+    costs, over = np.array([c for c, _ in planes]), np.array([o for _, o in planes])
+    size = np.maximum(np.abs(caps), np.abs(over).max(axis=0, initial=0.0))
+    size[size == 0] = 1.0
+    largest = DEAREST * (np.abs(costs).max(initial=0.0) or 1.0)
+    matrix = np.column_stack([-over / size, np.ones(len(costs))])
+    free = [(0.0, largest)] * len(caps) + [(None, None)]
+    objective = np.array([0.0] * len(caps) + [-1.0])
+    found = linprog(objective, A_ub=matrix, b_ub=costs, bounds=free, method="highs")
+    if found.x is None or found.fun is None:
+        return np.zeros(len(caps)), -np.inf
+    return np.maximum(found.x[:-1], 0.0) / size, float(-found.fun)
+
+
+def _cheapest(graph: Graph, costs: Floats) -> Ints | None:
+    """Return the moves of a cheapest path to an end; None if no path leads to any."""
+    matrix: Any = graph.matrix(costs)
+    (least,), (before,) = dijkstra(matrix, indices=[0], return_predecessors=True)
+    ends = np.flatnonzero(graph.ends)
+    if not len(ends) or not np.isfinite(least[ends]).any():
+        return None
+    state, moves = int(ends[np.argmin(least[ends])]), list[int]()
+    while state != 0:
+        source = int(before[state])
+        first, last = np.searchsorted(graph.source, [source, source + 1])
+        own = first + np.flatnonzero(graph.target[first:last] == state)
+        moves.append(int(own[np.argmin(costs[own])]))
+        state = source
+    return np.array(moves[::-1], dtype=np.int64)
+
+
+def budget_bounds(
+    graph: Graph,
+    values: Sequence[float],
+    claimed: Sequence[float],
+    priced: tuple[Sequence[float], Sequence[Sequence[float]]],
+) -> tuple[float, ...]:
+    """Return what no path within budgets stays below, by prices: checked with arithmetic alone.
+
+    Parameters
+    ----------
+    graph : Graph
+        Its last columns are limited.
+    values, claimed : sequence of float
+        Of a path, and the bounds that are claimed for worst amounts.
+    priced : tuple
+        Caps of the last columns; by goal, prices of these and of the sums before it.
+    """
+    caps, prices = priced
+    goals = len(graph.peaks) - len(caps)
+    limited, out = [*zip(range(goals, len(graph.peaks)), caps, strict=True)], []
+    for goal in range(goals):
+        amounts, price = graph.amounts[:, goal], np.maximum(prices[goal], 0.0)
+        taken = np.array([cap for _, cap in limited])
+        paid = graph.amounts[:, [c for c, _ in limited]] @ price
+        rounding = ROUNDING * len(graph.source) * float(price @ np.abs(taken))
+        if graph.peaks[goal]:
+            part = graph.only(amounts < claimed[goal])
+            least = least_sum(part, paid[amounts < claimed[goal]])
+            no_path = least == np.inf or least > price @ taken + rounding
+            out.append(claimed[goal] if no_path else -np.inf)
+            graph = graph.only(amounts <= tied(values[goal]))
+        else:
+            out.append(least_sum(graph, amounts + paid) - float(price @ taken) - rounding)
+            limited.append((goal, values[goal]))
+    return tuple(out)
+
+
+def is_beyond(graph: Graph, caps: Sequence[float]) -> bool:
+    """Return whether potentials prove that every path exceeds one of the caps on last columns."""
+    for column, cap in zip(range(-len(caps), 0), caps, strict=True):
+        if least_sum(graph, graph.amounts[:, column]) > tied(cap):
+            return True
+    return not np.isfinite(distances(graph, np.zeros(len(graph.source)))[graph.ends]).any()
