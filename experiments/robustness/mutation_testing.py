@@ -88,6 +88,7 @@ MODULES = {
     "formulations.beam": CHOSEN,
     "formulations.cascade": CHOSEN,
     "formulations.limit_analysis": STANDING,
+    "formulations.cones": STANDING,
     "formulations.minimax": CHOSEN,
     "formulations.overlap_dp": CHOSEN,
     "formulations.overlap_lp": CHOSEN,

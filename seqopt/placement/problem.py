@@ -272,11 +272,10 @@ def pose(
     >>> seqopt.pose(engine, schedule, seqopt.CRITERIA["equations-2-3"])  # doctest: +ELLIPSIS
     Problem('arch25', 'three-robot': 90 steps, 22 moves, criterion 'equations-2-3', ...
     """
-    schedule.require_pairs()
     known = {*CHOICE_RESPONSES, *map(robot_response, robots_of(engine, schedule, criterion))}
-    posed = criterion.for_scene(SceneFacts(engine))
-    asked = ResponsesAsked(posed, as_limits(limits), tuple(also))
+    asked = ResponsesAsked(criterion.for_scene(SceneFacts(engine)), as_limits(limits), tuple(also))
     if unknown := {name for move in schedule.moves for name in asked(move.bricks)} - known:
         why = f"does not exist{did_you_mean(min(unknown), known)}"
         raise ProblemError(f"response {min(unknown)} {why}; give {', '.join(sorted(known))}")
+    schedule.require_pairs()
     return Problem(asked.criterion, asked.limits, Evaluation(engine, schedule, asked, resources))

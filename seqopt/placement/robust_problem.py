@@ -160,8 +160,7 @@ def robust(
     Returns
     -------
     RobustProblem or FreeProblem
-        As the nominal one; `solve_robust` solves the former, `seqopt.solve` the latter. Nothing
-        is computed yet.
+        As the nominal one, for `solve_robust` and `seqopt.solve`; nothing is computed yet.
 
     Raises
     ------

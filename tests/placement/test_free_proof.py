@@ -51,7 +51,7 @@ def test_tables_say_what_the_book_says(build, data):
         expected = {*told(book, tables, bricks, row)}
         states = np.array([row], dtype=np.int32)
         found = {
-            (follows.bricks, tuple(after), follows.regrip)
+            (follows.level, tuple(after), follows.regrip)
             for follows in tables.follow(bricks, states)
             for after in follows.states.tolist()
         }

@@ -97,11 +97,6 @@ def test_spaces_and_other_columns_do_not_matter(arch25):
         ),
         (START + "3,release,2,1,2,?\n", "line 4: step 3 .*: it takes grips \\[\\?1\\]"),
         (
-            START + "3,place,3,1,2,?\n4,release,3,,2,?\n5,reposition,3,?,2,?\n"
-            "6,release,3,?,,?\n7,reposition,3,?,?,?\n",
-            "schedule s.csv: step 7: moves \\[1, 2, 3\\] are open at once",
-        ),
-        (
             START + "3,release,2,,2,\n4,place,3,1,2,\n",
             "line 5: step 4 .*: its new grip is on node 1; hold brick 3 at one of",
         ),

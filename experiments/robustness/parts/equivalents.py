@@ -49,7 +49,6 @@ GROWTH = "seqopt.engines.rigid.growth"
 GRIPS = "seqopt.engines.rigid.grip_equations"
 COSTS, CERTIFICATE = "seqopt.placement.costs", "seqopt.placement.certificate"
 CRITERIA, RANKS = "seqopt.placement.criteria", "seqopt.placement.ranks"
-UNUSED = "without any no constraint has this variable, and faces have three corners or more"
 LENGTHS = "both have a length: costs that have not are refused when they are made"
 EQUIVALENT = (
     *(
@@ -106,11 +105,7 @@ EQUIVALENT = (
     ),
     Equivalent("seqopt.placement.flow", "known and", "== 1", "<= 1", "there is this one at least"),
     *(
-        Equivalent("formulations.limit_analysis", "cp.Variable", f"{old}1", f"{old}{size}", UNUSED)
-        for old, size in (("corners,", 0), ("corners,", 2), ("grips,", 0))
-    ),
-    *(
-        Equivalent("formulations.solvers", "SECONDS", "300.0", size, "when a solver has stalled")
+        Equivalent("formulations.cones", "SECONDS", "300.0", size, "when a solver has stalled")
         for size in ("299.0", "301.0")
     ),
     Equivalent(
