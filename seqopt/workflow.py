@@ -144,8 +144,7 @@ def optimize(
 
     Examples
     --------
-    >>> import seqopt
-    >>> seqopt.optimize("arch25", "free", "worst-ratio-published", aim="minmax,steps")
+    >>> optimize("arch25", "free", "worst-ratio-published", aim="minmax,steps")
     FreePlan('arch25', 50 steps, minmax 0.840088, steps 50, optimal)
     """
     kind = FREE if any(word in options for word in STATE_WORDS) else _kind(schedule)
