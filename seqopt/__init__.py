@@ -43,8 +43,7 @@ if TYPE_CHECKING:
     from seqopt.placement.solving import solve
     from seqopt.responses.table import analyze
     from seqopt.scene.arch import ArchShape, arch_scene
-    from seqopt.scene.parts import Robot
-    from seqopt.scene.reach import Sphere
+    from seqopt.scene.parts import Robot, Sphere
     from seqopt.scene.scenarios import scenarios
     from seqopt.scene.scene import Scene
     from seqopt.scene.scene_file import load_scene, save_scene
@@ -80,8 +79,7 @@ _HOMES = {
     "placement.solving": ("solve",),
     "responses.table": ("analyze",),
     "scene.arch": ("ArchShape", "arch_scene"),
-    "scene.parts": ("Robot",),
-    "scene.reach": ("Sphere",),
+    "scene.parts": ("Robot", "Sphere"),
     "scene.scenarios": ("scenarios",),
     "scene.scene": ("Scene",),
     "scene.scene_file": ("load_scene", "save_scene"),

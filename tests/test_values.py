@@ -33,9 +33,9 @@ from seqopt.engines.rigid.ungripped import share, ungripped_system
 from seqopt.network.build import build_network
 from seqopt.network.statics import build_statics
 from seqopt.scene.boxes import boxes
-from seqopt.scene.detection import Surface, touching_faces
-from seqopt.scene.face_joints import flat_face
-from seqopt.scene.library.meeting import meeting
+from seqopt.scene.imports.contacts import flat_face
+from seqopt.scene.imports.detection import Surface, touching_faces
+from seqopt.scene.library.joints import meeting
 from seqopt.stability.assessment import assess, bonded
 from seqopt.stability.directions import first_directions
 from seqopt.stability.known import HoldingForces, Known

@@ -12,8 +12,7 @@ import numpy as np
 from seqopt.arrays import Floats, Terse, Vector
 from seqopt.errors import SceneError, SceneWarning
 from seqopt.scene.checks import short
-from seqopt.scene.parts import THICKEST, Brick, Ground, Joint, Robot
-from seqopt.scene.reach import Anywhere, Reach, Side
+from seqopt.scene.parts import THICKEST, Anywhere, Brick, Ground, Joint, Reach, Robot, Side
 from seqopt.scene.scene import Scene
 
 LEFT = np.array([0.0, 1.0, 0.0])

@@ -11,8 +11,7 @@ from seqopt.arrays import Floats, Vector
 from seqopt.errors import SceneError
 from seqopt.scene.checks import short, vector, whole
 from seqopt.scene.parts import Brick
-from seqopt.scene.polygon import rows
-from seqopt.scene.shape import Polyhedron
+from seqopt.scene.shape import Polyhedron, rows
 
 Numbers = tuple[int, int] | None
 Places = tuple[Vector, Vector] | None

@@ -1,18 +1,84 @@
-"""Blocks of any shape: closed polyhedra, their volume, centroid and longest axis."""
+"""Convex polygons and closed polyhedra, checked: volume, centroid and longest axis of any block."""
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from seqopt.arrays import Floats, Vector, frozen
 from seqopt.errors import SceneError
 from seqopt.scene.checks import short, vector, wholes
+
+Part = TypeVar("Part")
+STRAIGHT = 1e-9  # by how much a convex polygon may turn back, over the square of its longest edge
+
+
+def rows(where: str, values: Iterable[Part]) -> tuple[Part, ...]:
+    """Return what there is to go through.
+
+    Parameters
+    ----------
+    where : str
+        What it is, for the message.
+    values : iterable
+
+    Raises
+    ------
+    SceneError
+        If it is no list.
+    """
+    if isinstance(values, str) or not isinstance(values, Iterable):
+        raise SceneError(f"{where} is {short(values)}; give a list")
+    return tuple(values)
+
+
+def convex_polygon(
+    where: str, corners: Iterable[Iterable[float]]
+) -> tuple[tuple[float, float], ...]:
+    """Return the corners of a convex polygon, counterclockwise.
+
+    Parameters
+    ----------
+    where : str
+        What it is, for the message.
+    corners : iterable of iterable of float
+        Two coordinates each, once around, m.
+
+    Returns
+    -------
+    tuple of tuple of 2 float
+
+    Raises
+    ------
+    SceneError
+        If there are fewer than three, one is not finite, or they are no convex polygon with an
+        area.
+    """
+    points = []
+    for corner in rows(where, corners):
+        x, y, _ = vector(f"{where}: a corner", (*rows(f"{where}: a corner", corner), 0.0))
+        points.append((x, y))
+    edges = [(u - x, v - y) for (x, y), (u, v) in zip(points, points[1:] + points[:1], strict=True)]
+    turns = [a * d - b * c for (a, b), (c, d) in zip(edges, edges[1:] + edges[:1], strict=True)]
+    size = max((a * a + b * b for a, b in edges), default=0.0)
+    slack = STRAIGHT * size
+    angle = math.fsum(
+        math.atan2(turn, a * c + b * d)
+        for turn, (a, b), (c, d) in zip(turns, edges, edges[1:] + edges[:1], strict=True)
+    )
+    if len(points) < 3 or not max(turns) > slack or min(turns) < -slack or angle > 3 * math.pi:
+        raise SceneError(
+            f"{where} is {short(points)}; give three corners or more of a convex polygon, "
+            "counterclockwise"
+        )
+    return tuple(points)
+
 
 FLAT = 1e-4  # by how much a face may leave its plane, over the size of the block
 EVEN = 1e-12  # share of the second moments by which axes of equal length are told apart
@@ -258,3 +324,67 @@ def _require_closed(faces: tuple[tuple[int, ...], ...]) -> None:
                 f"shape: at edge {a}-{b} faces do not agree which side is outside, or more than "
                 "two meet; list vertices counterclockwise as seen from outside"
             )
+
+
+SAME_PLACE = 1e-6  # distance treated as zero, over the size of a block
+
+
+def two_points(where: str, given: tuple[Vector, Vector]) -> tuple[Vector, Vector]:
+    """Return where the nodes of a block are if they are two places.
+
+    Parameters
+    ----------
+    where : str
+        The block, for messages.
+    given : tuple of 2 Vector
+        m.
+
+    Returns
+    -------
+    tuple of 2 Vector
+
+    Raises
+    ------
+    SceneError
+        If they are not two different points.
+    """
+    found = [vector(f"{where}: node_offsets", row) for row in rows(f"{where}: node_offsets", given)]
+    if len(found) != 2 or found[0] == found[1]:
+        raise SceneError(f"{where}: node_offsets are {short(given)}; give two different points")
+    return found[0], found[1]
+
+
+def check_shape(where: str, shape: object, dimensions: Vector, axes: tuple[Vector, Vector]) -> None:
+    """Require a shape about the centroid that extends as far as the dimensions say.
+
+    Parameters
+    ----------
+    where : str
+        The block, for messages.
+    shape : Polyhedron
+    dimensions : Vector
+        m.
+    axes : tuple of 2 Vector
+        Unit vectors along length and width.
+
+    Raises
+    ------
+    SceneError
+        If it is not such a shape.
+    """
+    size = max(dimensions)
+    if not isinstance(shape, Polyhedron):
+        raise SceneError(f"{where}: shape is {short(shape)}; give a Polyhedron")
+    off = math.hypot(*shape.centroid.tolist())
+    if not off <= SAME_PLACE * size:
+        raise SceneError(
+            f"{where}: the centroid of its shape is {off:.3g} m from its position; give vertices "
+            "from the centroid"
+        )
+    length, width = np.array(axes[0]), np.array(axes[1])
+    extents = shape.extents(np.stack([length, width, np.cross(length, width)]))
+    if not np.allclose(extents, dimensions, rtol=0.0, atol=SAME_PLACE * size):
+        raise SceneError(
+            f"{where}: dimensions are {list(dimensions)}, and its shape extends "
+            f"{[float(f'{e:.6g}') for e in extents]} along its axes; give these"
+        )

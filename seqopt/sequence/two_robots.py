@@ -10,8 +10,7 @@ import numpy as np
 from seqopt.errors import StepError
 from seqopt.network.build import network_of
 from seqopt.network.network import Network
-from seqopt.scene.parts import Brick, Robot
-from seqopt.scene.reach import Side
+from seqopt.scene.parts import Brick, Robot, Side
 from seqopt.scene.scene import Scene
 from seqopt.sequence.roles import Pair, find_robots, take_turns
 from seqopt.sequence.steps import Step, StepKind, check_sequence

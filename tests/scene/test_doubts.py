@@ -15,8 +15,7 @@ from experiments.harness.walls import running_bond
 from seqopt.cli.main import main
 from seqopt.errors import SceneWarning
 from seqopt.scene.arch import ArchShape, arch_scene
-from seqopt.scene.doubts import doubts
-from seqopt.scene.scene_file import dump_scene, load_scene, save_scene
+from seqopt.scene.scene_file import doubts, dump_scene, load_scene, save_scene
 from tests.builders import block, six_bricks, small_arch
 from tests.strategies import arches, flat_arches, walls
 

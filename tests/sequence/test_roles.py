@@ -9,8 +9,7 @@ import pytest
 
 from seqopt.errors import StepError
 from seqopt.network.build import build_network
-from seqopt.scene.parts import Robot
-from seqopt.scene.reach import Sphere
+from seqopt.scene.parts import Robot, Sphere
 from seqopt.sequence.loops import robot_loop, two_robot_loop
 from seqopt.sequence.roles import cast, take_turns
 from seqopt.sequence.steps import StepKind, idle_robots

@@ -13,7 +13,7 @@ from seqopt.errors import SceneError
 from seqopt.scene.blocks import BOX_CORNERS, BOX_FACES
 from seqopt.scene.checks import short
 from seqopt.scene.imports.content import MOST_BLOCKS, Content, FileBlock
-from seqopt.scene.imports.documents import LARGEST
+from seqopt.scene.imports.json_reading import LARGEST
 
 NEEDED = ("x", "y", "z", "length", "width", "height")
 TURNS = ("roll", "pitch", "yaw")

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from seqopt.arrays import Floats
-from seqopt.scene.library.law import JointLaw
+from seqopt.scene.library.common import JointLaw
 from seqopt.work.progress import Tell
 
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254, "ft": 0.3048}  # m

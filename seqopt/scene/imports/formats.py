@@ -10,18 +10,16 @@ from typing import Any
 from seqopt.errors import SceneError, SceneWarning
 from seqopt.files import read_bytes, read_text
 from seqopt.scene.checks import printable, short
-from seqopt.scene.doubts import warn_of
 from seqopt.scene.imports.boxes_csv import read_boxes
 from seqopt.scene.imports.building import build_scene
-from seqopt.scene.imports.compas_assembly import read_assembly
 from seqopt.scene.imports.compas_data import kind
-from seqopt.scene.imports.compas_dem import read_model
-from seqopt.scene.imports.compas_timber import read_timber
+from seqopt.scene.imports.compas_models import read_assembly, read_model, read_timber
 from seqopt.scene.imports.content import Content, Given
-from seqopt.scene.imports.documents import parse_json
 from seqopt.scene.imports.frames import read_frame
+from seqopt.scene.imports.json_reading import parse_json
 from seqopt.scene.imports.meshes import read_mesh, read_obj
 from seqopt.scene.scene import Scene
+from seqopt.scene.scene_file import warn_of
 
 DOCUMENTS: dict[str, Callable[[Any, str], Content]] = {
     "compas_assembly": read_assembly,
@@ -60,7 +58,7 @@ def import_scene(path: str | Path, form: str | None = None, given: Given | None 
     Warns
     -----
     SceneWarning
-        If something is probably a mistake; see `seqopt.scene.doubts`.
+        If something is probably a mistake; see `seqopt.scene.scene_file`.
 
     Examples
     --------

@@ -18,7 +18,7 @@ from seqopt.scene.arch import STANDARD_GRAVITY
 from seqopt.scene.blocks import BOX_CORNERS, BOX_FACES
 from seqopt.scene.checks import short
 from seqopt.scene.imports.content import Content, FileBlock, FileJoint
-from seqopt.scene.imports.documents import Entry, entry, listing, mapping, number, point
+from seqopt.scene.imports.json_reading import Entry, entry, listing, mapping, number, point
 
 UNITS = {"meter": "m", "m": "m", "centimeter": "cm", "cm": "cm", "millimeter": "mm", "mm": "mm"}
 MEASURES = {

@@ -16,7 +16,7 @@ from seqopt.errors import SceneError
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.boxes import require_apart
 from seqopt.scene.checks import short
-from seqopt.scene.library.law import MASONRY, JointLaw
+from seqopt.scene.library.common import MASONRY, JointLaw
 from seqopt.scene.parts import Robot
 from seqopt.scene.scene import Scene
 

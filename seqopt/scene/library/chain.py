@@ -11,7 +11,7 @@ from seqopt.errors import SceneError
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.boxes import require_apart
 from seqopt.scene.checks import positive
-from seqopt.scene.library.laying import whole_number
+from seqopt.scene.library.common import whole_number
 from seqopt.scene.parts import Robot
 from seqopt.scene.scene import Scene
 

@@ -11,19 +11,278 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from seqopt.arrays import Floats
 from seqopt.errors import SceneError
 from seqopt.scene.boxes import require_apart
-from seqopt.scene.library.arch_line import ArchLine, arch_line
+from seqopt.scene.checks import finite, positive
+from seqopt.scene.library.common import JointLaw, mobile_robots, touching_order, whole_number
 from seqopt.scene.library.herringbone import Tile, neighbors, tiles
 from seqopt.scene.library.joints import as_vector, ground_under, joints_between
-from seqopt.scene.library.laying import mobile_robots, touching_order
-from seqopt.scene.library.vault_surface import VaultShape, poses
 from seqopt.scene.parts import Brick, Ground, Joint, Robot
 from seqopt.scene.scene import Scene
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline
+
+
+TILES = ((2, 0, True), (1, 0, False), (1, -1, False))  # rows, column, along: the pattern VLR
+
+
+@dataclass(frozen=True)
+class ArchLine:
+    """The bricks of an arch, the tiles of a herringbone that they cover, and its line.
+
+    Parameters
+    ----------
+    bricks : tuple of Brick
+        In build order.
+    joints : tuple of Joint
+    grounds : tuple of 2 Ground
+        Under the first brick and the last.
+    tiles : tuple of Tile
+        Of every brick.
+    """
+
+    bricks: tuple[Brick, ...]
+    joints: tuple[Joint, ...]
+    grounds: tuple[Ground, ...]
+    tiles: tuple[Tile, ...]
+
+    @property
+    def rows(self) -> int:
+        """Rows from foot to foot."""
+        return self.tiles[-1].row + TILES[0][0]
+
+    @cached_property
+    def _curve(self) -> CubicSpline:
+        from scipy.interpolate import CubicSpline  # noqa: PLC0415  # slow to import, for vaults only
+
+        points = [self.grounds[0], *self.joints, self.grounds[1]]
+        row = [tile.row for tile in self.tiles]
+        return CubicSpline([*row, self.rows], [point.position for point in points])
+
+    def point(self, row: Floats) -> Floats:
+        """Return points of the line.
+
+        Parameters
+        ----------
+        row : (n,) float
+            From 0 at the first ground end; a joint lies at every row where a brick begins.
+
+        Returns
+        -------
+        (n, 3) float
+            m.
+        """
+        return np.asarray(self._curve(row))
+
+    def share(self, row: float) -> float:
+        """Return by which share of the span a row lies before or behind the middle, -½ to ½."""
+        start, end, here = self.point(np.array([0.0, self.rows, row]))[:, 0].tolist()
+        return float((here - start) / (end - start) - 0.5)
+
+    def speed(self, row: Floats) -> Floats:
+        """Return the derivatives of the line.
+
+        Parameters
+        ----------
+        row : (n,) float
+
+        Returns
+        -------
+        (n, 3) float
+            m per row.
+        """
+        return np.asarray(self._curve(row, 1))
+
+    @property
+    def law(self) -> JointLaw:
+        """The stiffness of the arch's first joint over the area of a brick's end."""
+        _, width, thickness = self.bricks[0].dimensions
+        joint, area = self.joints[0], width * thickness
+        shift = np.array(joint.translational_stiffness) / area
+        turn = np.array(joint.rotational_stiffness) / area
+        return JointLaw(translational=shift.tolist(), rotational=turn.tolist())
+
+    @property
+    def stub(self) -> float:
+        """Length of the stub behind the arch's first ground end, m."""
+        return math.dist(self.grounds[0].anchor, self.grounds[0].position)
+
+
+def arch_line(arch: Scene) -> ArchLine:
+    """Return the line of an arch.
+
+    Raises
+    ------
+    SceneError
+        If it is no closed chain of equal bricks along, to the left, to the right and so on, whose
+        first and last lie along.
+    """
+    if not isinstance(arch, Scene):
+        raise SceneError(f"vault: a {type(arch).__name__} is not an arch; give a Scene")
+    bricks = arch.placed
+    names = [brick.name for brick in bricks]
+    linked = [joint.bricks for joint in arch.joints] == [*pairwise(names)]
+    stands = [ground.brick for ground in arch.grounds] == [names[0], names[-1]]
+    alike = len({(brick.dimensions, brick.density) for brick in bricks}) == 1
+    if len(bricks) < 4 or len(bricks) % 3 != 1 or not (linked and stands and alike):
+        raise SceneError(
+            f"vault: scene {arch.name} is not an arch to start from; give a closed chain of equal "
+            "bricks in the pattern VLR, 3n + 1 of them, in the order in which they are built"
+        )
+    covered, row = [], 0
+    for i, brick in enumerate(bricks):
+        rows, column, along = TILES[i % 3]
+        covered.append(Tile(row, column, along))
+        left = brick.length_axis[1]
+        if (abs(left) < math.sqrt(0.5)) != along or (not along and (left > 0) != (column == 0)):
+            letter = "VLR"[i % 3]
+            raise SceneError(
+                f"vault: brick {brick.name} of {arch.name} does not lie as {letter} in the pattern "
+                "VLR; give an arch along x, of this pattern"
+            )
+        row += rows
+    return ArchLine(bricks, arch.joints, arch.grounds, tuple(covered))
+
+
+@dataclass(frozen=True, kw_only=True)
+class VaultShape:
+    """The numbers that shape a herringbone vault; lengths in m, angles in rad.
+
+    Parameters
+    ----------
+    bricks : int
+        How many, those of the arch included.
+    spacing : float
+        Distance of the columns from each other.
+    plan_angle : float
+        From the left of the arch to the rulings, seen from above; positive turns their left ends
+        forward.
+    skew : float
+        How far the middle of the second foot lies to the left of that of the first.
+    widening : float
+        By which share the span grows, over the square of the distance from the arch, 1/m².
+    drift : float
+        Over how many columns beside the arch its rows keep at right angles to it; farther out they
+        follow the rulings.
+
+    Raises
+    ------
+    SceneError
+        Naming the number that cannot be.
+
+    Examples
+    --------
+    >>> VaultShape(bricks=100).spacing
+    0.1327
+    """
+
+    bricks: int
+    spacing: float = 0.1327
+    plan_angle: float = 0.0
+    skew: float = 0.0
+    widening: float = 0.0
+    drift: float = 1.3
+
+    def __post_init__(self) -> None:
+        _set(self, "bricks", whole_number("vault: bricks", self.bricks, 1))
+        positive("vault: spacing", self.spacing, "m")
+        for name in ("plan_angle", "skew", "widening", "drift"):
+            _set(self, name, finite(f"vault: {name}", getattr(self, name)))
+        if abs(self.plan_angle) > 0.25 * math.pi:
+            raise SceneError(
+                f"vault: plan_angle is {self.plan_angle:g} rad; give at most 0.785, half a right "
+                "angle"
+            )
+
+
+class Pose(NamedTuple):
+    """Where a brick lies; three arrays (3,): its middle, m, and two unit vectors."""
+
+    center: Floats
+    forward: Floats
+    left: Floats
+
+
+def poses(line: ArchLine, shape: VaultShape, places: Sequence[Tile]) -> list[Pose]:
+    """Return where bricks lie.
+
+    Parameters
+    ----------
+    line : ArchLine
+        Of the arch in the middle.
+    shape : VaultShape
+    places : sequence of Tile
+
+    Returns
+    -------
+    list of Pose
+        One for every tile.
+    """
+    if not places:
+        return []
+    row, column = np.array([tile.middle for tile in places]).T
+    along = np.array([tile.along for tile in places])
+    beside = column * shape.spacing
+    half = np.where(along, 1.0, 0.5)
+    start, end, middle = (
+        _surface(line, shape, row + step, beside) for step in (-half, half, 0.0 * half)
+    )
+    step = 1e-3 * shape.spacing
+    turned = row + _drift(line, shape, row, beside)
+    ruling = _moved(line, shape, turned, beside + step) - _moved(line, shape, turned, beside - step)
+    forward = _unit(end - start)
+    left = _unit(ruling)
+    flush = along[:, None]  # a brick along keeps to its column, one across to the ruling
+    forward, left = (
+        np.where(flush, forward, _unit(forward - left * _dot(forward, left))),
+        np.where(flush, _unit(left - forward * _dot(forward, left)), left),
+    )
+    center = np.where(flush, middle, 0.5 * (start + end))
+    return [Pose(*pose) for pose in zip(center, forward, left, strict=True)]
+
+
+def _surface(line: ArchLine, shape: VaultShape, row: Floats, beside: Floats) -> Floats:
+    """Return points (n, 3) of the surface at rows of columns."""
+    return _moved(line, shape, row + _drift(line, shape, row, beside), beside)
+
+
+def _moved(line: ArchLine, shape: VaultShape, row: Floats, beside: Floats) -> Floats:
+    """Return points (n, 3) of the arch's line, moved along the rulings."""
+    point = line.point(row)
+    middle = line.point(np.array([0.0, float(line.rows)]))[:, 0].mean()
+    wider = (point[:, 0] - middle) * shape.widening * beside**2
+    ahead = math.tan(shape.plan_angle) * beside
+    return np.asarray(point + np.stack([wider + ahead, beside, np.zeros_like(beside)], axis=1))
+
+
+def _drift(line: ArchLine, shape: VaultShape, row: Floats, beside: Floats) -> Floats:
+    """Return by how many rows columns lag, so that rows leave the arch at right angles."""
+    speed = line.speed(row)
+    size = np.linalg.norm(speed, axis=1)
+    columns = np.clip(beside / shape.spacing, -shape.drift, shape.drift)
+    shift = columns * shape.spacing * math.tan(shape.plan_angle) * speed[:, 0] / size
+    return np.asarray(-shift / size)
+
+
+def _unit(vectors: Floats) -> Floats:
+    return np.asarray(vectors / np.linalg.norm(vectors, axis=1, keepdims=True))
+
+
+def _dot(first: Floats, second: Floats) -> Floats:
+    return np.asarray((first * second).sum(axis=1, keepdims=True))
+
+
+def _set(value: object, name: str, content: object) -> None:
+    object.__setattr__(value, name, content)
 
 
 def herringbone_vault(

@@ -10,9 +10,15 @@ import numpy as np
 from seqopt.arrays import Vector
 from seqopt.errors import SceneError
 from seqopt.scene.checks import finite, positive, vector
+from seqopt.scene.library.common import (
+    MASONRY,
+    JointLaw,
+    few_enough,
+    joint_width,
+    mobile_robots,
+    whole_number,
+)
 from seqopt.scene.library.joints import ground_under, joints_between
-from seqopt.scene.library.law import MASONRY, JointLaw
-from seqopt.scene.library.laying import few_enough, joint_width, mobile_robots, whole_number
 from seqopt.scene.parts import Brick, Robot
 from seqopt.scene.scene import Scene
 

@@ -14,8 +14,8 @@ import numpy as np
 
 from seqopt.arrays import Floats
 from seqopt.scene.blocks import vertices_of
-from seqopt.scene.imports.compas_assembly import assembly_graph
-from seqopt.scene.imports.documents import entry
+from seqopt.scene.imports.compas_models import assembly_graph
+from seqopt.scene.imports.json_reading import entry
 from seqopt.scene.parts import Brick
 from seqopt.scene.scene import Scene
 from seqopt.sequence.exports.sources import Source

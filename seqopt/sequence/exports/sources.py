@@ -10,10 +10,9 @@ from typing import Any
 from seqopt.errors import StepError
 from seqopt.files import read_text
 from seqopt.scene.imports.building import block_numbers
-from seqopt.scene.imports.compas_data import kind, payload
-from seqopt.scene.imports.compas_tree import by_guid
-from seqopt.scene.imports.documents import parse_json
+from seqopt.scene.imports.compas_data import by_guid, kind, payload
 from seqopt.scene.imports.formats import read_content, sniffed
+from seqopt.scene.imports.json_reading import parse_json
 from seqopt.scene.scene import Scene
 
 

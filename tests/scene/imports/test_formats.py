@@ -12,7 +12,7 @@ from seqopt.errors import FileError, SceneError
 from seqopt.scene.arch import STANDARD_GRAVITY
 from seqopt.scene.imports.content import Given
 from seqopt.scene.imports.formats import import_scene
-from seqopt.scene.library.law import JointLaw
+from seqopt.scene.library.common import JointLaw
 from seqopt.scene.scene_file import dump_scene, parse_scene
 from tests.blocks import box
 from tests.documents import BOXES, DOCUMENTS, HIGH, LOW, TOP, model, obj

@@ -14,7 +14,7 @@ from seqopt.scene.blocks import as_vectors
 from seqopt.scene.imports.content import Given
 from seqopt.scene.imports.formats import import_scene, read_content
 from seqopt.scene.imports.meshes import read_obj
-from seqopt.scene.imports.tidying import tidy_shape
+from seqopt.scene.imports.repair import tidy_shape
 from seqopt.scene.scene_file import load_scene
 from seqopt.scene.shape import Polyhedron
 from tests.blocks import box

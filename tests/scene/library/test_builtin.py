@@ -16,8 +16,14 @@ from seqopt.engines.rigid.dense import solve_dense
 from seqopt.errors import SceneError
 from seqopt.network.build import build_network
 from seqopt.scene.boxes import boxes, separations
-from seqopt.scene.doubts import doubts
-from seqopt.scene.scene_file import about, builtin_scenes, dump_scene, load_scene, parse_scene
+from seqopt.scene.scene_file import (
+    about,
+    builtin_scenes,
+    doubts,
+    dump_scene,
+    load_scene,
+    parse_scene,
+)
 from seqopt.sequence.support import islands
 from tests.builders import first, largest_difference
 

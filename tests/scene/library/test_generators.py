@@ -18,7 +18,6 @@ from seqopt.errors import SceneError
 from seqopt.network.build import build_network
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.boxes import separations
-from seqopt.scene.doubts import doubts
 from seqopt.scene.library import (
     ArchForm,
     DomeShape,
@@ -33,7 +32,7 @@ from seqopt.scene.library import (
 )
 from seqopt.scene.library.by_words import scene_by_words
 from seqopt.scene.library.joints import joints_between
-from seqopt.scene.scene_file import load_scene
+from seqopt.scene.scene_file import doubts, load_scene
 from seqopt.sequence.support import islands
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.sequence.two_robots import cantilever, sequential

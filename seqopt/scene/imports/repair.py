@@ -11,8 +11,8 @@ import numpy as np
 from seqopt.arrays import Floats
 from seqopt.errors import SceneError
 from seqopt.scene.blocks import as_vectors
-from seqopt.scene.detection import Surface
 from seqopt.scene.imports.content import FileBlock
+from seqopt.scene.imports.detection import Surface
 from seqopt.scene.shape import FLAT, Polyhedron, bend
 
 WELD = 1e-6  # distance of vertices that are one, over the size of the block
