@@ -54,8 +54,7 @@ if TYPE_CHECKING:
     from seqopt.sequence.steps import Step
     from seqopt.sequence.three_robots import modified_sequential, three_robot_loop
     from seqopt.sequence.two_robots import cantilever, sequential
-    from seqopt.stability.assessment import Stability
-    from seqopt.stability.steps import assess_steps
+    from seqopt.stability.assessment import Stability, assess_steps
     from seqopt.study.presets import CRITERIA
     from seqopt.workflow import optimize
 
@@ -90,8 +89,7 @@ _HOMES = {
     "sequence.steps": ("Step",),
     "sequence.three_robots": ("modified_sequential", "three_robot_loop"),
     "sequence.two_robots": ("cantilever", "sequential"),
-    "stability.assessment": ("Stability",),
-    "stability.steps": ("assess_steps",),
+    "stability.assessment": ("Stability", "assess_steps"),
     "study.presets": ("CRITERIA",),
     "workflow": ("optimize",),
 }

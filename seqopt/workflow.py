@@ -28,9 +28,8 @@ from seqopt.scene.orders import in_order
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.free_rules import FREE, FreeRules, with_robots
-from seqopt.sequence.schedule import Schedule
+from seqopt.sequence.schedule import Schedule, thin
 from seqopt.sequence.schedule_file import find_schedule
-from seqopt.sequence.thinning import thin
 from seqopt.study.presets import EQUATIONS, find_criterion
 
 RULES = tuple(field.name for field in fields(FreeRules) if field.name != "robots")

@@ -20,7 +20,7 @@ from seqopt.placement.order_problem import OrderProblem
 from seqopt.placement.unseen import judge_unseen
 from seqopt.report.comparison import compare
 from seqopt.scene.library import ArchForm, DomeShape, VaultShape
-from seqopt.stability.steps import assess_steps
+from seqopt.stability.assessment import assess_steps
 
 MOST = 300  # letters
 OURS = ("seqopt.", "formulations.")

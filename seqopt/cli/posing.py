@@ -12,8 +12,8 @@ from seqopt.cli.values import parse_limits, parse_robots
 from seqopt.network.build import build_network
 from seqopt.placement.asked_budgets import parse_budgets
 from seqopt.placement.problem import Problem
+from seqopt.sequence.schedule import thin
 from seqopt.sequence.schedule_file import find_schedule
-from seqopt.sequence.thinning import thin
 from seqopt.workflow import posed
 
 

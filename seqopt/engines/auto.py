@@ -18,11 +18,16 @@ from seqopt.arrays import Bools, Ints
 from seqopt.contact.elastic_limits import ElasticLimits, find_elastic_limits
 from seqopt.contact.mortar import EPOXY, Mortar
 from seqopt.engines.discrete.engine import DiscreteEngine
-from seqopt.engines.interface import Fields, Want, grip_columns, keep_wanted
-from seqopt.engines.joined_fields import merge_sets, select_sets
-from seqopt.engines.named import NamedEngine
-from seqopt.engines.planar import PlanarEngine
-from seqopt.engines.plane import NoPlane, find_plane, off_plane
+from seqopt.engines.interface import (
+    Fields,
+    NamedEngine,
+    Want,
+    grip_columns,
+    keep_wanted,
+    merge_sets,
+    select_sets,
+)
+from seqopt.engines.planar import NoPlane, PlanarEngine, find_plane, off_plane
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import SceneError
 from seqopt.network.build import network_of

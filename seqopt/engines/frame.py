@@ -19,10 +19,16 @@ from scipy import sparse
 from scipy.sparse.linalg import SuperLU, splu
 
 from seqopt.arrays import Floats, Ints
-from seqopt.engines.failures import failing_in_a_line
-from seqopt.engines.interface import Fields, Want, grip_columns, require_finite
-from seqopt.engines.joined_fields import join_sets, no_sets
-from seqopt.engines.named import NamedEngine
+from seqopt.engines.interface import (
+    Fields,
+    NamedEngine,
+    Want,
+    failing_in_a_line,
+    grip_columns,
+    join_sets,
+    no_sets,
+    require_finite,
+)
 from seqopt.engines.rigid.mechanism import require_resistance
 from seqopt.errors import SolverError
 from seqopt.network.build import network_of

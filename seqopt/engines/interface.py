@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from enum import Flag, auto
-from functools import cache
+from functools import cache, wraps
 from itertools import combinations
-from typing import Protocol
+from typing import TYPE_CHECKING, ParamSpec, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from seqopt.arrays import Floats, FrozenValue, Ints
+from seqopt.arrays import Bools, Floats, FrozenValue, Ints
 from seqopt.errors import GripError, SolverError
 from seqopt.network.network import Network
 
@@ -228,3 +229,122 @@ def _require_different(columns: Ints, numbers: Ints) -> None:
             raise GripError(
                 f"grip set {numbers[twice][0].tolist()}: a node is held twice; name it once"
             )
+
+
+Asked = ParamSpec("Asked")
+Answer = TypeVar("Answer")
+NOT_FINITE = "infs or NaNs"  # what SciPy says of arrays that it does not take
+
+
+def failing_in_a_line(solve: Callable[Asked, Answer]) -> Callable[Asked, Answer]:
+    """Return a function whose numerical failures are a `SolverError`.
+
+    Parameters
+    ----------
+    solve : callable
+        That of an engine.
+
+    Returns
+    -------
+    callable
+        The same, but for what it raises.
+    """
+
+    @wraps(solve)
+    def solved(*arguments: Asked.args, **named: Asked.kwargs) -> Answer:
+        try:
+            return solve(*arguments, **named)
+        except (np.linalg.LinAlgError, ValueError) as error:
+            if not isinstance(error, np.linalg.LinAlgError) and NOT_FINITE not in str(error):
+                raise
+            raise SolverError(
+                f"the equations have no answer in numbers ({error}); correct lengths, masses or "
+                "stiffnesses beyond all bounds in the scene"
+            ) from error
+
+    return solved
+
+
+def no_sets(network: Network, bricks: int, held: int) -> Fields:
+    """Return the fields of no grip set at all: their shapes.
+
+    Parameters
+    ----------
+    network : Network
+    bricks : int
+        How many bricks stand.
+    held : int
+        How many nodes each set would hold.
+
+    Returns
+    -------
+    Fields
+        Arrays with a first axis of length zero.
+    """
+    return Fields(
+        edge_force=np.empty((0, network.count_edges(bricks))),
+        displacement=np.empty((0, network.count_nodes(bricks), 3)),
+        grip_force=np.empty((0, held, 3)),
+        support=np.empty((0, len(network.springs.support), 6)),
+        joint_wrench=np.empty((0, len(network.springs.since), 6)),
+        brick_twist=np.empty((0, bricks, 6)),
+    )
+
+
+def select_sets(answer: Fields, which: Bools | Ints) -> Fields:
+    """Return the fields of some grip sets.
+
+    Parameters
+    ----------
+    answer : Fields
+    which : (S,) bool or (s,) int
+    """
+    return Fields(**{name: getattr(answer, name)[which] for name in NAMES})
+
+
+def join_sets(parts: Sequence[Fields], which: Sequence[Bools | slice] | None = None) -> Fields:
+    """Return the fields of the grip sets of several answers.
+
+    Parameters
+    ----------
+    parts : sequence of Fields
+        Alike in everything but the number of sets.
+    which : sequence of ((S,) bool or slice), optional
+        Which of all sets are those of each part, in their order; by default one part's come after
+        another's.
+    """
+    after = np.cumsum([len(part.grip_force) for part in parts])
+    total = int(after[-1])
+    if which is None:
+        which = [slice(b - len(a.grip_force), b) for a, b in zip(parts, after, strict=True)]
+    whole = {name: np.empty((total, *getattr(parts[0], name).shape[1:])) for name in NAMES}
+    for part, mine in zip(parts, which, strict=True):
+        for name in NAMES:
+            whole[name][mine] = getattr(part, name)
+    return Fields(**whole)
+
+
+def merge_sets(which: Bools, inside: Fields, outside: Fields) -> Fields:
+    """Return the fields of grip sets, some from one answer and the rest from another.
+
+    Parameters
+    ----------
+    which : (S,) bool
+        The sets that the first answer is about, in their order.
+    inside, outside : Fields
+    """
+    return join_sets([inside, outside], [which, ~which])
+
+
+class NamedEngine:
+    """Base of engines: they say what they are and which structure they compute."""
+
+    if TYPE_CHECKING:
+
+        @property
+        def network(self) -> Network:
+            """The network whose nodes and edges the fields follow."""
+
+    def __repr__(self) -> str:
+        scene = self.network.scene
+        return f"<{type(self).__name__} of {scene.name}: {len(scene.bricks)} bricks>"

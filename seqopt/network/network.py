@@ -19,13 +19,50 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from seqopt.arrays import Floats, FrozenValue, Ints, frozen
-from seqopt.network.weight import shared_weight
+from seqopt.errors import SceneError
+from seqopt.scene.parts import Brick
 from seqopt.scene.scene import Scene
 from seqopt.showing import Shown, display
 
 if TYPE_CHECKING:
     import networkx as nx
     from matplotlib.figure import Figure
+
+OFF_PLANE = 1e-9  # lever of a weight about the line of its nodes treated as zero, over the brick
+
+
+def shared_weight(brick: Brick, weight: Floats) -> Floats:
+    """Return forces at a brick's two inner nodes that act on it as its weight does.
+
+    Parameters
+    ----------
+    brick : Brick
+        With nodes of its own.
+    weight : (3,) float
+        At the centroid, N.
+
+    Returns
+    -------
+    (2, 3) float
+        N.
+
+    Raises
+    ------
+    SceneError
+        If the weight turns the brick about the line through its nodes: two forces there cannot.
+    """
+    first, second = (np.subtract(brick.node_position(node), brick.position) for node in brick.nodes)
+    span, middle = 0.5 * (second - first), 0.5 * (first + second)
+    moment = -np.cross(middle, weight)  # of the weight about the middle between the nodes
+    along = abs(float(moment @ span)) / float(np.linalg.norm(span))
+    if along > OFF_PLANE * max(brick.dimensions) * float(np.linalg.norm(weight)):
+        raise SceneError(
+            f"brick {brick.name}: its weight turns it about the line through its nodes "
+            f"{list(brick.nodes)}; give nodes above, below or on either side of the centroid"
+        )
+    shift = np.cross(moment, span) / (2 * span @ span)
+    return np.stack([0.5 * weight - shift, 0.5 * weight + shift])
+
 
 GROUND = -1  # stands for the ground where a brick's index in build order is expected
 

@@ -13,7 +13,7 @@ import pandas as pd
 
 from seqopt.contact.mortar import Mortar
 from seqopt.engines.interface import Engine
-from seqopt.engines.provenance import provenance
+from seqopt.engines.registry import provenance
 from seqopt.errors import InfeasibleError
 from seqopt.placement.formulation import Formulation
 from seqopt.placement.free_goals import judged_by
@@ -30,7 +30,7 @@ from seqopt.placement.standing_proof import certified
 from seqopt.responses.table import analyze
 from seqopt.sequence.free_rules import Ending
 from seqopt.sequence.steps import Step, StepKind, idle_robots
-from seqopt.stability.steps import stability_table
+from seqopt.stability.assessment import stability_table
 
 
 @dataclass(frozen=True, repr=False)
@@ -143,7 +143,7 @@ class FreePlan(ShownBuild):
         Returns
         -------
         pandas.DataFrame
-            As of `seqopt.stability.steps.stability_table`.
+            As of `seqopt.stability.assessment.stability_table`.
         """
         if mortar is not None:
             return super().stability(mortar)

@@ -28,8 +28,7 @@ from seqopt.responses.grip_sets import GripSets
 from seqopt.responses.quantities import robot_response
 from seqopt.scene.checks import short
 from seqopt.sequence.free_rules import FreeRules
-from seqopt.sequence.free_space import FreeSpace
-from seqopt.sequence.free_start import free_space
+from seqopt.sequence.free_space import FreeSpace, free_space
 from seqopt.sequence.steps import Grips
 from seqopt.showing import Shown
 from seqopt.stability.assessment import Stability

@@ -11,7 +11,7 @@ from seqopt.arrays import Bools, Floats, Ints
 from seqopt.graph.explore import Explorer, Moves
 from seqopt.placement.free_goals import Measure
 from seqopt.placement.free_problem import FreeProblem
-from seqopt.sequence import free_moves
+from seqopt.sequence import free_space
 
 
 @dataclass(frozen=True)
@@ -133,6 +133,6 @@ def explore(
     return found
 
 
-def _moves(found: free_moves.Moves, *, regrip: bool) -> Moves:
+def _moves(found: free_space.Moves, *, regrip: bool) -> Moves:
     taken = np.column_stack([np.full(len(found.way), float(regrip)), found.way])
     return Moves(found.source, found.states, taken)

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from seqopt.errors import SolverError
-from seqopt.sequence.free_space import FreeSpace
-from seqopt.sequence.free_team import node_numbers
+from seqopt.sequence.free_space import FreeSpace, node_numbers
 from seqopt.sequence.steps import Step, StepKind, check_sequence
 
 

@@ -22,8 +22,9 @@ import numpy as np
 from seqopt.arrays import Terse
 from seqopt.engines.interface import Engine
 from seqopt.errors import MemoryShortError
-from seqopt.responses.alike import (
+from seqopt.responses.batches import (
     Alike,
+    Keeping,
     StepChoices,
     Wanted,
     alike,
@@ -31,12 +32,12 @@ from seqopt.responses.alike import (
     combinations,
     distinct,
     no_node_twice,
+    require_memory,
     steps_alike,
 )
+from seqopt.responses.blocks import Answers, Block, work
 from seqopt.responses.division import answer_blocks
-from seqopt.responses.memory import Keeping, require_memory
 from seqopt.responses.resources import HERE, Resources
-from seqopt.responses.states import Answers, Block, work
 from seqopt.sequence.schedule import OpenGrip, OpenStep, Schedule
 
 CHOICE_RESPONSES = ("T_max", "M_sup", "D_max", "C_max", "F_move", "F_largest")  # and one per robot

@@ -12,14 +12,10 @@ from typing import TypeVar
 import numpy as np
 
 from seqopt.engines.interface import Engine
+from seqopt.responses.blocks import Answers, Block, Blocks, Store, open_store, tally_of, worker_for
 from seqopt.responses.resources import Resources
-from seqopt.responses.shipping import Blocks, worker_for
-from seqopt.responses.states import Answers, Block, tally_of
-from seqopt.responses.store import Store, open_store
-from seqopt.work.crew import Crew, hire
-from seqopt.work.lanes import Lanes
-from seqopt.work.ordered import map_ordered
 from seqopt.work.progress import Progress
+from seqopt.work.workers import Crew, Lanes, hire, map_ordered
 
 Found = TypeVar("Found")
 SEVERAL = 4  # portions' work that states of one brick count may be before they are parted

@@ -21,8 +21,7 @@ from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.discrete.equilibrium_path import FAR
 from seqopt.engines.interface import Engine, Fields, Want
 from seqopt.errors import SceneError
-from seqopt.responses.in_words import length_text, steps_in_words
-from seqopt.responses.quantities import RESPONSES, lengths
+from seqopt.responses.quantities import RESPONSES, length_text, lengths, steps_in_words
 
 TURN = 0.1  # rad; sine and angle differ by 0.2 %, cosine and one by 0.5 %
 STRAIN = 0.1  # of a joint, over its thickness; true strain differs by 5 %

@@ -25,7 +25,7 @@ from seqopt.engines.rigid.recovery import edge_forces, reactions, split_pairs
 from seqopt.engines.rigid.ungripped import Ungripped, ungripped_system
 from seqopt.errors import MechanismError, SolverError, StepError
 from seqopt.network.build import network_of
-from seqopt.network.kinematics import spring_maps
+from seqopt.network.mechanics import spring_maps
 from seqopt.network.network import Network
 from seqopt.responses.table import response_table
 from seqopt.scene.checks import short

@@ -10,23 +10,232 @@ the node that it held last, -n.
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
-from seqopt.arrays import Bools, Floats, Ints, Terse, frozen
+from seqopt.arrays import Bools, Floats, FrozenValue, Ints, Terse, frozen
+from seqopt.errors import StepError
 from seqopt.network.network import Network
-from seqopt.sequence.free_moves import (
-    Moves,
-    grip_pairs,
-    join_moves,
-    number_rows,
-    sort_entries,
-)
-from seqopt.sequence.free_rules import Ending, FreeRules, Newest
-from seqopt.sequence.free_team import RobotKind
+from seqopt.scene.parts import Robot
+from seqopt.sequence.free_rules import Ending, FreeRules, Newest, Payload
 from seqopt.sequence.support import islands
+from seqopt.sequence.two_robots import placing_node
+
+
+class Moves(NamedTuple):
+    """Moves from states of one brick count.
+
+    Attributes
+    ----------
+    source : (m,) int
+        Row of the state that each leads from.
+    states : (m, c) int
+        The states that they lead to.
+    way : (m,) float
+        How far the robot goes that takes a grip, m; zero where ways do not count.
+    """
+
+    source: Ints
+    states: Ints
+    way: Floats
+
+
+def grip_pairs(
+    states: Ints, slot: int, nodes: Ints, robots_and_ways: tuple[int, Floats | None]
+) -> Moves:
+    """Return the moves in which the robot of a column takes one of some nodes that nobody holds.
+
+    Parameters
+    ----------
+    states : (n, c) int
+        In which that robot is free.
+    slot : int
+        Its column.
+    nodes : (m,) int
+        From 0.
+    robots_and_ways : tuple
+        How many columns are robots; distances between nodes, (2B + 1, 2B + 1), m, or None where
+        ways do not count.
+
+    Returns
+    -------
+    Moves
+        The entries of a kind are not sorted.
+    """
+    robots, distance = robots_and_ways
+    taken = np.zeros((len(states), int(max(nodes.max() + 1, states[:, :robots].max())) + 1), bool)
+    for column in range(robots):
+        taken[np.arange(len(states)), states[:, column].clip(min=0)] = True
+    source, node = np.nonzero(~taken[:, nodes + 1])
+    number = nodes[node] + 1
+    new = states[source]
+    way = np.zeros(len(new)) if distance is None else distance[-new[:, slot], number]
+    new[:, slot] = number
+    return Moves(source, new, way)
+
+
+def sort_entries(states: Ints, first: int, end: int) -> None:
+    """Sort the entries of the robots of a kind, largest first, in place.
+
+    Parameters
+    ----------
+    states : (n, c) int
+    first, end : int
+        Its first column, and the one after its last.
+    """
+    if end - first > 1:
+        states[:, first:end] = -np.sort(-states[:, first:end], axis=1)
+
+
+def join_moves(parts: Sequence[Moves], states: Ints) -> Moves:
+    """Return several moves as one.
+
+    Parameters
+    ----------
+    parts : sequence of Moves
+    states : (n, c) int
+        That they lead from.
+    """
+    none = np.zeros(0, dtype=np.int64)
+    whole = [Moves(none, states[:0], np.zeros(0)), *parts]
+    return Moves(*map(np.concatenate, zip(*whole, strict=True)))
+
+
+def number_rows(states: Ints, robots: int, least: int, most: int) -> Ints:
+    """Return a number for every state that no other one has.
+
+    Parameters
+    ----------
+    states : (n, c) int
+        Columns after those of robots count first.
+    robots : int
+        How many columns are robots.
+    least, most : int
+        Between which their entries are.
+
+    Returns
+    -------
+    (n,) int
+    """
+    further = states.shape[1] > robots
+    out = np.zeros(len(states), dtype=np.int64)
+    out += states[:, -1] if further else 0
+    for column in range(robots):
+        out *= 1 + most - least
+        out += states[:, column]
+        out -= least
+    return np.asarray(out)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class RobotKind(FrozenValue):
+    """Robots that reach the same nodes, may carry as much, and may place or not.
+
+    Nodes are counted as in ``network.inner.ravel()``: brick by brick in build order.
+
+    Attributes
+    ----------
+    robots : tuple of int
+        Indices of the scene's robots.
+    reach : (2B,) bool
+        Nodes that they may hold: within reach and not blocked.
+    newest : (2B,) bool
+        Nodes at which they hold a brick when they place it, and as the newest one.
+    places : bool
+        Whether they may place.
+    cap : float
+        Largest force of a grip, N.
+    """
+
+    robots: tuple[int, ...]
+    reach: Bools
+    newest: Bools
+    places: bool
+    cap: float
+
+
+def sort_robots(
+    network: Network, rules: FreeRules, caps: Mapping[str, float] | None = None
+) -> tuple[RobotKind, ...]:
+    """Return the robots that take part, sorted by kind.
+
+    Parameters
+    ----------
+    network : Network
+    rules : FreeRules
+    caps : mapping of str to float, optional
+        Largest force of a robot's grip beside its payload, by its name, N.
+
+    Returns
+    -------
+    tuple of RobotKind
+        In the order of their first robots.
+
+    Raises
+    ------
+    StepError
+        As `FreeRules.team` does.
+    """
+    alike: dict[tuple[object, ...], list[int]] = {}
+    parts: dict[tuple[object, ...], RobotKind] = {}
+    for i in rules.team(network.scene):
+        robot = network.scene.robots[i]
+        reach = reached(network, robot)
+        newest = reach if rules.newest is not Newest.PLACING else _placing(network, robot, reach)
+        places = not rules.placers or robot.name in rules.placers
+        cap = robot.payload if rules.payload is Payload.KEPT else np.inf
+        cap = min(cap, (caps or {}).get(robot.name, np.inf))
+        key = (reach.tobytes(), newest.tobytes(), places, cap)
+        alike.setdefault(key, []).append(i)
+        parts.setdefault(key, RobotKind((), reach, newest, places, cap))
+    return tuple(
+        RobotKind(tuple(robots), parts[key].reach, parts[key].newest, parts[key].places, key[3])  # type: ignore[arg-type]
+        for key, robots in alike.items()
+    )
+
+
+def node_numbers(network: Network) -> list[int]:
+    """Return the scene's numbers of all inner nodes, brick by brick in build order.
+
+    Returns
+    -------
+    list of int
+        (2B,)
+    """
+    return [node for brick in network.scene.placed for node in brick.nodes]
+
+
+def reached(network: Network, robot: Robot) -> Bools:
+    """Return which nodes a robot may hold: within its reach and not blocked.
+
+    Returns
+    -------
+    (2B,) bool
+    """
+    scene = network.scene
+    return np.array(
+        [
+            node not in scene.blocked_nodes and robot.reach.covers(brick.node_position(node))
+            for brick in scene.placed
+            for node in brick.nodes
+        ]
+    )
+
+
+def _placing(network: Network, robot: Robot, reach: Bools) -> Bools:
+    """Return at which node a robot places every brick."""
+    out = np.zeros_like(reach)
+    for k, brick in enumerate(network.scene.placed):
+        try:
+            out[2 * k + brick.nodes.index(placing_node(network, robot, brick))] = True
+        except StepError:  # it reaches none
+            continue
+    return out
+
 
 PAIRS = 4_000_000  # of states and nodes that are looked at together
 
@@ -292,3 +501,44 @@ class FreeSpace(Terse):
     def _lawful_only(self, bricks: int, moves: Moves) -> Moves:
         ok = self.lawful(bricks, moves.states)
         return Moves(moves.source[ok], moves.states[ok], moves.way[ok])
+
+
+def free_space(
+    network: Network,
+    rules: FreeRules,
+    caps: Mapping[str, float] | None = None,
+    *,
+    parks: bool = False,
+) -> FreeSpace:
+    """Return the states of a free schedule in a scene.
+
+    Parameters
+    ----------
+    network : Network
+    rules : FreeRules
+    caps : mapping of str to float, optional
+        Largest force of a robot's grip beside its payload, by its name, N.
+    parks : bool, optional
+        Whether free robots stay where they were, for their travel.
+
+    Raises
+    ------
+    StepError
+        If robots do not fit the rules, or states cannot be numbered.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> network = seqopt.build_network(seqopt.load_scene("arch25"))
+    >>> space = free_space(network, FreeRules())
+    >>> space.places(0, space.start()).states.tolist()  # node 0 of its first brick is blocked
+    [[2, 0, 0], [0, 2, 0], [0, 0, 2]]
+    """
+    space = FreeSpace(network, rules, sort_robots(network, rules, caps), parks)
+    base = 1 + (2 if parks else 1) * 2 * space.bricks
+    if base**space.robots * (1 + (rules.regrips or 0)) >= 2**62:
+        raise StepError(
+            f"scene {network.scene.name}: {space.bricks} bricks and {space.robots} robots have "
+            "more states than can be numbered; let fewer robots take part"
+        )
+    return space

@@ -6,9 +6,8 @@ import csv
 import io
 from pathlib import Path
 
-from seqopt.cells import plain
 from seqopt.errors import StepError
-from seqopt.files import read_text
+from seqopt.files import plain, read_text
 from seqopt.scene.checks import short, whole
 from seqopt.scene.parts import Robot
 from seqopt.scene.scene import Scene

@@ -8,20 +8,17 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
-from seqopt.cells import harmless, plain
 from seqopt.errors import StepError, did_you_mean
-from seqopt.files import read_text
+from seqopt.files import harmless, plain, read_text
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.scene.checks import short
 from seqopt.scene.scene import Scene
 from seqopt.sequence.free_rules import FREE
-from seqopt.sequence.loops import robot_loop
-from seqopt.sequence.moves import open_schedule
 from seqopt.sequence.plan_file import Row, read_cells, read_grip, read_rows
 from seqopt.sequence.schedule import OpenGrip, OpenStep, Schedule, ScheduledGrips
 from seqopt.sequence.steps import check_step
-from seqopt.sequence.three_robots import SCHEDULES, make_schedule
+from seqopt.sequence.three_robots import SCHEDULES, make_schedule, open_schedule, robot_loop
 
 MARK = re.compile(r"\?\s*(\d*)")  # an open grip, and the number of its move if it is given
 MOST = 3  # robots that take part where nobody says who: as many as in the loop of Bruun et al.

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 
 import numpy as np
+import pandas as pd
 
 from seqopt.arrays import Floats, FrozenValue, Vector
 from seqopt.contact.assembly import Assembly
-from seqopt.contact.mortar import Mortar
+from seqopt.contact.faces import step_assembly
+from seqopt.contact.mortar import Mortar, find_mortar
+from seqopt.network.build import network_of
+from seqopt.network.network import Network
+from seqopt.scene.scene import Scene
+from seqopt.sequence.steps import Step, require_steps
 from seqopt.showing import Shown
-from seqopt.stability.failure import first_to_fail
 from seqopt.stability.limit_analysis import (
     CAP,
     EXACT,
@@ -23,8 +28,36 @@ from seqopt.stability.limit_analysis import (
     Sense,
     compile_equilibrium,
 )
-from seqopt.stability.prover import Proven, Prover
-from seqopt.stability.tilts import DIRECTIONS, safe_pull
+from seqopt.stability.prover import DIRECTIONS, Proven, Prover, safe_pull
+from seqopt.work.progress import Tell, told
+
+STILL = 1e-6  # motion slower than this, beside the fastest, is none
+
+
+def first_to_fail(assembly: Assembly, motion: Floats) -> tuple[str, str]:
+    """Return what goes first in a motion.
+
+    Parameters
+    ----------
+    assembly : Assembly
+    motion : (B, 6) float
+        As of `seqopt.stability.limit_analysis.Answer`.
+
+    Returns
+    -------
+    block, contact : str
+        The fastest block and the contact that parts fastest; empty where nothing moves.
+    """
+    speed = np.linalg.norm(motion, axis=1)
+    if not speed.max(initial=0.0) > 0:
+        return "", ""
+    block = str(assembly.block_name[int(speed.argmax())])
+    parting = (assembly.contact_map.T @ motion.ravel()).reshape(-1, 3)
+    apart = np.linalg.norm(parting, axis=1)
+    if not apart.max(initial=0.0) > STILL:
+        return block, ""
+    return block, assembly.contact_name[int(assembly.contact[int(apart.argmax())])]
+
 
 ROUGHEST = 10.0  # largest coefficient of friction that is tried
 LITTLE = 1e-3  # friction that holds nothing but what is jammed
@@ -58,7 +91,7 @@ class Stability(Shown, FrozenValue):
     tilt : float
         Tilt survived in every direction, rad: a safe bound by forces; NaN if it does not stand.
         Gravity turned by atan(a) mixes no load with gravity and a sideways a, all survived. It is
-        less than the largest such tilt by what `seqopt.stability.tilts.safe_pull` leaves, and
+        less than the largest such tilt by what `seqopt.stability.prover.safe_pull` leaves, and
         for bonds and for grips at their payload by what weighs less once it is turned.
     grip : float
         The largest grip force, made as small as equilibrium with the mortar allows, N; inf if no
@@ -261,3 +294,115 @@ def _grip(prove: Prover, fixed: Case) -> float:
     if not len(prove.assembly.payload):
         return 0.0
     return prove(replace(fixed, sense=Sense.SMALLEST, payload=(0.0, 1.0))).value
+
+
+def assess_steps(
+    network: Network | Scene,
+    steps: Sequence[Step],
+    mortar: Mortar | str,
+    progress: Tell | None = None,
+) -> tuple[Stability, ...]:
+    """Return verdict and margins of every step.
+
+    Parameters
+    ----------
+    network : Network or Scene
+    steps : sequence of Step
+    mortar : Mortar or str
+        The mortar of all joints, or its name.
+    progress : callable, optional
+        Told as a `seqopt.work.Stage` how far it is, step by step.
+
+    Returns
+    -------
+    tuple of Stability
+
+    Raises
+    ------
+    SceneError
+        If bricks that share a joint do not touch.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> network = seqopt.build_network(seqopt.load_scene("arch25"))
+    >>> steps = seqopt.sequential(network)[:2]
+    >>> [stability.verdict.value for stability in seqopt.assess_steps(network, steps, seqopt.EPOXY)]
+    ['stands', 'stands']
+    """
+    network, mortar = network_of(network), find_mortar(mortar)
+    out = []
+    for step in told("assessing steps", require_steps(steps), progress):
+        out.append(
+            assess(step_assembly(network, step.bricks, step.grips), mortar, network.scene.up)
+        )
+    return tuple(out)
+
+
+def stability_table(steps: Sequence[Step], results: Sequence[Stability]) -> pd.DataFrame:
+    """Return one row per step; an empty cell is a number that is not proven.
+
+    Parameters
+    ----------
+    steps : sequence of Step
+    results : sequence of Stability
+        Of the steps.
+
+    Returns
+    -------
+    pandas.DataFrame
+        ``step``, ``type``, ``bricks``, ``verdict``, ``bond_needed_Pa``, ``friction_needed``,
+        ``tilt_survived_deg``, ``largest_grip_force_N``, ``first_brick``, ``first_joint`` and
+        ``jammed``, as in `seqopt.stability.assessment.Stability`; ``almost_solved``, ``stalled``
+        and ``unproven`` count cases.
+    """
+    rows = []
+    for step, result in zip(steps, results, strict=True):
+        rows.append(
+            {
+                "step": step.number,
+                "type": step.kind.value,
+                "bricks": step.bricks,
+                "verdict": result.verdict.value,
+                "bond_needed_Pa": result.bond,
+                "friction_needed": result.friction,
+                "tilt_survived_deg": np.degrees(result.tilt),
+                "largest_grip_force_N": result.grip,
+                "first_brick": result.first_block,
+                "first_joint": result.first_contact,
+                "jammed": result.jammed,
+                "almost_solved": result.claims.get(Claim.ALMOST, 0),
+                "stalled": result.claims.get(Claim.STALLED, 0),
+                "unproven": result.unproven,
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def format_verdicts(results: Sequence[Stability]) -> str:
+    """Return how many steps stand, do not stand and are undecided, and how the solver ended.
+
+    Returns
+    -------
+    str
+        One line.
+    """
+    words = {
+        Verdict.STANDS: "stand",
+        Verdict.FALLS: "do not stand",
+        Verdict.UNDECIDED: "are undecided",
+    }
+    verdicts = ", ".join(
+        f"{sum(result.verdict is verdict for result in results)} {word}"
+        for verdict, word in words.items()
+    )
+    jammed = sum(result.jammed for result in results)
+    verdicts += f" ({jammed} only jammed: do not trust these)" if jammed else ""
+    claims = {
+        claim: sum(result.claims.get(claim, 0) for result in results)
+        for claim in (Claim.ALMOST, Claim.STALLED)
+    }
+    cases = sum(sum(result.claims.values()) for result in results)
+    ends = ", ".join(f"{count} {claim.value}" for claim, count in claims.items())
+    unproven = sum(result.unproven for result in results)
+    return f"{len(results)} steps: {verdicts}; {cases} cases: {ends}, {unproven} unproven"

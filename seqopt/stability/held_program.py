@@ -1,10 +1,18 @@
-"""Linear programs of one structure whose grips change: what is asked of a solver."""
+"""Linear programs of one structure whose grips change: what is asked of a solver.
+
+Forces of an assembly are those of its corners, then those of its grips. A corner has directions
+along its face, in which friction acts, a grip has directions in space; all are unit vectors.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import product
 
-from seqopt.arrays import Floats
+import numpy as np
+
+from seqopt.arrays import Bools, Floats, FrozenValue, Ints
 from seqopt.contact.assembly import Assembly
 from seqopt.plugins import plugins
 from seqopt.stability.limit_analysis import Answer, Case
@@ -34,3 +42,76 @@ def compile_held(assembly: Assembly, case: Case) -> HeldProgram:
     entry = plugins("seqopt.limit_analysis")["lp"]
     compiled: CompileHeld = entry.load()
     return compiled(assembly, case)
+
+
+SIDES = 8  # of a cone to start with, the axes of its contact among them
+SPREAD = np.array([p for p in product((-1.0, 0.0, 1.0), repeat=3) if any(p)])
+GAIN = 1e-7  # least gain for which a direction joins, over the largest entry of the motion
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Directions(FrozenValue):
+    """Directions in which corners and grips act.
+
+    Parameters
+    ----------
+    owner : (n,) int
+        Corner, or grip counted on after the corners.
+    unit : (n, 3) float
+        Unit vectors; those of a corner have no normal part.
+    """
+
+    owner: Ints
+    unit: Floats
+
+    def joined(self, other: Directions) -> Directions:
+        """Return these directions and others after them."""
+        return Directions(
+            np.concatenate([self.owner, other.owner]), np.concatenate([self.unit, other.unit])
+        )
+
+
+def first_directions(corners: int, grips: int) -> Directions:
+    """Return directions to start with, the same ones for every corner and for every grip.
+
+    Parameters
+    ----------
+    corners, grips : int
+        How many there are.
+
+    Examples
+    --------
+    >>> len(first_directions(4, 1).owner)
+    58
+    """
+    angle = 2 * np.pi * np.arange(SIDES) / SIDES
+    flat = np.stack([np.zeros(SIDES), np.cos(angle), np.sin(angle)], axis=1)
+    space = SPREAD / np.linalg.norm(SPREAD, axis=1, keepdims=True)
+    owner = np.concatenate(
+        [
+            np.repeat(np.arange(corners), SIDES),
+            corners + np.repeat(np.arange(grips), len(space)),
+        ]
+    )
+    return Directions(
+        owner, np.concatenate([np.tile(flat, (corners, 1)), np.tile(space, (grips, 1))])
+    )
+
+
+def better_directions(known: Directions, along: Floats, wanted: Bools) -> Directions:
+    """Return the best directions of corners and grips where those known are not as good.
+
+    Parameters
+    ----------
+    known : Directions
+    along : (m, 3) float
+        What a force of every corner or grip is worth, per component; the normal parts of corners
+        are zero.
+    wanted : (m,) bool
+        Whose directions are asked for.
+    """
+    best = np.zeros(len(along))
+    np.maximum.at(best, known.owner, np.einsum("ij,ij->i", known.unit, along[known.owner]))
+    size = np.linalg.norm(along, axis=1)
+    which = np.flatnonzero(wanted & (size - best > GAIN))
+    return Directions(which, along[which] / size[which, None])

@@ -1,7 +1,8 @@
 """Margins of grip sets, many at a time: least bond, least friction, tilt survived, least payload.
 
 Every margin is a bracket: what forces prove on one side, a motion on the other, as in
-`seqopt.stability.known`. Where the solver's answers leave it wide it is wide, and still proven.
+`seqopt.stability.held_states`. Where the solver's answers leave it wide it is wide, and still
+proven.
 """
 
 from __future__ import annotations
@@ -22,8 +23,8 @@ from seqopt.stability.assessment import ROUGHEST, bonded
 from seqopt.stability.held_program import CompileHeld, compile_held
 from seqopt.stability.held_states import HeldStates, node_assembly
 from seqopt.stability.limit_analysis import CAP, GAP, Case
+from seqopt.stability.prover import DIRECTIONS, FINE, NEAR, in_every_direction, sideways
 from seqopt.stability.screens import FALLS, STANDS, Screen, held_places
-from seqopt.stability.tilts import DIRECTIONS, FINE, NEAR, in_every_direction, sideways
 
 Cases = Callable[[Assembly], list[Case]]
 

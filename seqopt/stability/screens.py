@@ -1,9 +1,9 @@
 """Which grip sets of a partial structure stand: many at a time, most without a solver.
 
 A set stands if forces are found that hold it, and falls if a motion is found in which it falls:
-either is checked by the structure's own data (`seqopt.stability.known`), with the friction cone and
-the payloads as they are. What one set proves decides many others, so that a linear program, whose
-cones are inscribed polyhedra, is solved for few of them.
+either is checked by the structure's own data (`seqopt.stability.held_states`), with the friction
+cone and the payloads as they are. What one set proves decides many others, so that a linear
+program, whose cones are inscribed polyhedra, is solved for few of them.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from seqopt.stability.assessment import bonded
 from seqopt.stability.held_program import CompileHeld, compile_held
 from seqopt.stability.held_states import HeldStates, node_assembly
 from seqopt.stability.limit_analysis import EXACT
-from seqopt.stability.tilts import DIRECTIONS, FINE, sideways
+from seqopt.stability.prover import DIRECTIONS, FINE, sideways
 
 STANDS, FALLS, OPEN = 1, -1, 0
 

@@ -14,11 +14,11 @@ from seqopt.engines.interface import NAMES, Want, grip_columns
 from seqopt.engines.planar import PlanarEngine
 from seqopt.engines.rigid import compliance, trial
 from seqopt.engines.rigid.compliance import EVEN, ComplianceEngine
-from seqopt.engines.rigid.loads import loads_of
+from seqopt.engines.rigid.growth import grow_tree
 from seqopt.engines.rigid.mixed import solve_mixed
-from seqopt.engines.rigid.operator_builder import OperatorBuilder
+from seqopt.engines.rigid.operator import OperatorBuilder
 from seqopt.engines.rigid.refinement import Corrector
-from seqopt.engines.rigid.spanning_tree import grow_tree
+from seqopt.engines.rigid.response_maps import loads_of
 from seqopt.engines.rigid.trial import CANCEL, cancels, solve_batch
 from seqopt.network.build import build_network
 from tests.builders import from_both_sides, six_bricks, small_arch

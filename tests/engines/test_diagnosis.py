@@ -10,14 +10,19 @@ import pytest
 from experiments.engines.parts.limit_scenes import HELD, LOOSE_AT, chain, loosened, without_joint
 from experiments.engines.parts.reference_chain import solve_exactly
 from experiments.harness.walls import running_bond
-from seqopt.engines.diagnosis import WELL, Finding, diagnose
-from seqopt.engines.eigenvalues import LEAST_DIAGONAL, UNRESISTED, spectrum
+from seqopt.engines.diagnosis import (
+    LEAST_DIAGONAL,
+    UNRESISTED,
+    WELL,
+    Finding,
+    diagnose,
+    residual,
+    spectrum,
+)
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import Want, grip_columns
-from seqopt.engines.residuals import residual
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.engines.rigid.dense import solve_dense
-from seqopt.engines.rigid.mixed import mixed_system, ungripped_system
+from seqopt.engines.rigid.mixed import mixed_system, solve_dense, ungripped_system
 from seqopt.network.build import build_network
 
 

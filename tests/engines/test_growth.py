@@ -12,12 +12,11 @@ from experiments.harness.arches import half_circle
 from experiments.harness.walls import running_bond
 from seqopt.engines.interface import NAMES, Want, grip_columns
 from seqopt.engines.rigid import compliance, growth, trial
-from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.engines.rigid.kept import Kept
+from seqopt.engines.rigid.compliance import ComplianceEngine, Kept
+from seqopt.engines.rigid.growth import grow_tree
 from seqopt.engines.rigid.mixed import solve_mixed
-from seqopt.engines.rigid.operator_builder import OperatorBuilder
+from seqopt.engines.rigid.operator import OperatorBuilder
 from seqopt.engines.rigid.refinement import Refinement
-from seqopt.engines.rigid.spanning_tree import grow_tree
 from seqopt.engines.rigid.trial import solve_batch
 from seqopt.network.build import build_network
 from tests.strategies import arches, both_sided, walls

@@ -18,15 +18,12 @@ from seqopt.engines.interface import NAMES, Want, grip_columns
 from seqopt.engines.planar import PlanarEngine
 from seqopt.engines.rigid import compliance, refinement
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.engines.rigid.dense import solve_dense
-from seqopt.engines.rigid.held_operator import held_operator
-from seqopt.engines.rigid.ldlt import solve_positive
-from seqopt.engines.rigid.loose import hold_loose
+from seqopt.engines.rigid.grip_equations import solve_positive
+from seqopt.engines.rigid.growth import grow_tree
 from seqopt.engines.rigid.mechanism import require_resistance
-from seqopt.engines.rigid.mixed import solve_mixed
-from seqopt.engines.rigid.operator_builder import OperatorBuilder
-from seqopt.engines.rigid.refinement import Corrector, Refinement
-from seqopt.engines.rigid.spanning_tree import grow_tree
+from seqopt.engines.rigid.mixed import solve_dense, solve_mixed
+from seqopt.engines.rigid.operator import OperatorBuilder
+from seqopt.engines.rigid.refinement import Corrector, Refinement, held_operator, hold_loose
 from seqopt.engines.rigid.trial import solve_batch
 from seqopt.engines.rigid.ungripped import ungripped_system
 from seqopt.errors import MechanismError, SolverError

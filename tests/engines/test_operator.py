@@ -12,7 +12,6 @@ from seqopt.engines.basis import SPACE
 from seqopt.engines.interface import FLAGS, NAMES, Want, grip_columns
 from seqopt.engines.planar import PlanarEngine
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.engines.rigid.dense import solve_dense
 from seqopt.engines.rigid.grip_equations import (
     doubts,
     grip_forces,
@@ -20,11 +19,11 @@ from seqopt.engines.rigid.grip_equations import (
     still_forces,
     trusted,
 )
-from seqopt.engines.rigid.held_operator import held_operator
-from seqopt.engines.rigid.loads import GATHERED, loads_of
-from seqopt.engines.rigid.loose import hold_loose
-from seqopt.engines.rigid.operator_builder import OperatorBuilder
-from seqopt.engines.rigid.spanning_tree import grow_tree
+from seqopt.engines.rigid.growth import grow_tree
+from seqopt.engines.rigid.mixed import solve_dense
+from seqopt.engines.rigid.operator import OperatorBuilder
+from seqopt.engines.rigid.refinement import held_operator, hold_loose
+from seqopt.engines.rigid.response_maps import GATHERED, loads_of
 from seqopt.engines.rigid.trial import solve_batch
 from seqopt.engines.rigid.ungripped import ungripped_system
 from seqopt.network.build import build_network

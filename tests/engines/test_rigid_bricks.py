@@ -12,9 +12,9 @@ from experiments.engines.parts.reference_chain import solve_exactly
 from seqopt.engines.interface import Want, grip_columns
 from seqopt.engines.rigid import trial
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.engines.rigid.ldlt import solve_positive
-from seqopt.engines.rigid.operator_builder import OperatorBuilder
-from seqopt.engines.rigid.spanning_tree import grow_tree
+from seqopt.engines.rigid.grip_equations import solve_positive
+from seqopt.engines.rigid.growth import grow_tree
+from seqopt.engines.rigid.operator import OperatorBuilder
 from seqopt.engines.rigid.trial import solve_batch
 from seqopt.errors import MechanismError, SolverError
 from seqopt.network.build import build_network

@@ -11,9 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seqopt.cells import FORMULA, harmless, plain
 from seqopt.engines.registry import make_engine
-from seqopt.files import csv_text
+from seqopt.files import FORMULA, csv_text, harmless, plain
 from seqopt.network.build import build_network
 from seqopt.responses.table import analyze
 from seqopt.sequence.exports.tables import plan_csv

@@ -14,7 +14,7 @@ from seqopt.engines.interface import NAMES, Want
 from seqopt.engines.registry import make_engine
 from seqopt.errors import MechanismError, StepError
 from seqopt.network.build import build_network
-from seqopt.network.kinematics import node_motion, spring_maps
+from seqopt.network.mechanics import node_motion, spring_maps
 from seqopt.responses.staged import Placing, analyze_staged, staged_fields
 from seqopt.responses.table import analyze
 from seqopt.scene.parts import Joint

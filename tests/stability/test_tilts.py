@@ -15,9 +15,15 @@ from seqopt.network.build import build_network
 from seqopt.scene.scene_file import load_scene
 from seqopt.stability.assessment import Verdict, assess, bonded
 from seqopt.stability.margins import Margins
-from seqopt.stability.prover import Prover
+from seqopt.stability.prover import (
+    DIRECTIONS,
+    MORE,
+    Prover,
+    in_every_direction,
+    safe_pull,
+    sideways,
+)
 from seqopt.stability.screens import FALLS, STANDS, Screen
-from seqopt.stability.tilts import DIRECTIONS, MORE, in_every_direction, safe_pull, sideways
 
 UP = (0.0, 0.0, 1.0)
 

@@ -44,7 +44,6 @@ class Equivalent:
 COMPLIANCE = "seqopt.engines.rigid.compliance"
 TRIAL = "seqopt.engines.rigid.trial"
 OPERATOR = "seqopt.engines.rigid.operator"
-BUILDER = "seqopt.engines.rigid.operator_builder"
 GROWTH = "seqopt.engines.rigid.growth"
 GRIPS = "seqopt.engines.rigid.grip_equations"
 COSTS, CERTIFICATE = "seqopt.placement.costs", "seqopt.placement.certificate"
@@ -176,7 +175,7 @@ EQUIVALENT = (
     ),
     Equivalent(OPERATOR, "loss.max", "initial=1.0", "initial=0.0", "every loss is one at least"),
     *(
-        Equivalent(BUILDER, "slice(bricks)", "==", new, "a slice of all bricks is all of them")
+        Equivalent(OPERATOR, "slice(bricks)", "==", new, "a slice of all bricks is all of them")
         for new in (">", ">=")
     ),
     Equivalent(GRIPS, "worst_doubt", ">=", ">", "no doubt is it to the last bit"),

@@ -1,8 +1,8 @@
-r"""The discrete-element engine: rigid bricks on beds of springs that open, slip and break.
+"""The discrete-element engine: rigid bricks on beds of springs that open, slip and break.
 
 A joint is its own elastic spring in series with a bed of points over the face between its bricks,
 so that within the elastic limits the answer is that of exactly rigid bricks; the bed takes over
-where tension or shear exceeds what the mortar holds (`seqopt.engines.discrete.friction_law`). With
+where tension or shear exceeds what the mortar holds (`seqopt.engines.discrete.system`). With
 a `BedStiffness` the bed alone is the joint, as in the discrete-element models of Bruun et al.
 (section 3.2.3). Every grip holds its node, or pinches its brick between two pads.
 
@@ -13,6 +13,9 @@ react. `seqopt.stability` asks less: that forces exist, whatever brings them abo
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from enum import IntEnum
+
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy import linalg, sparse
@@ -20,20 +23,84 @@ from scipy import linalg, sparse
 from seqopt.arrays import Floats, Ints
 from seqopt.contact.mortar import EPOXY, Mortar
 from seqopt.engines.discrete.equilibrium_path import Held, Settled, settle
-from seqopt.engines.discrete.pads import Pinch, pad_stiffness
 from seqopt.engines.discrete.system import BedStiffness, System, build_system
-from seqopt.engines.failures import failing_in_a_line
-from seqopt.engines.interface import Fields, Want, grip_columns, require_finite
-from seqopt.engines.joined_fields import join_sets, no_sets
-from seqopt.engines.named import NamedEngine
+from seqopt.engines.interface import (
+    Fields,
+    NamedEngine,
+    Want,
+    failing_in_a_line,
+    grip_columns,
+    join_sets,
+    no_sets,
+    require_finite,
+)
 from seqopt.engines.rigid.mechanism import mechanism_error, require_resistance
 from seqopt.engines.rigid.recovery import Solution, respond
 from seqopt.errors import SeqoptError, SolverError
 from seqopt.network.build import network_of
-from seqopt.network.kinematics import node_motion, point_motion
+from seqopt.network.mechanics import build_statics, node_motion, point_motion
 from seqopt.network.network import Network
-from seqopt.network.statics import build_statics
 from seqopt.scene.scene import Scene
+
+
+class Across(IntEnum):
+    """Which way two pads press on a brick: along its width or its thickness."""
+
+    WIDTH = 1
+    THICKNESS = 2
+
+
+@dataclass(frozen=True)
+class Pinch:
+    """Two square pads that hold a brick on either side of its node and do not slip.
+
+    Parameters
+    ----------
+    across : Across
+    stiffness : BedStiffness
+        Of the pads.
+    side : float
+        Of a pad, m.
+    """
+
+    across: Across
+    stiffness: BedStiffness
+    side: float
+
+
+def pad_stiffness(network: Network, index: int, node: Floats, pinch: Pinch) -> Floats:
+    """Return the stiffness with which two pads beside a node hold a brick's twists.
+
+    Parameters
+    ----------
+    network : Network
+    index : int
+        Of the brick in build order.
+    node : (3,) float
+        m.
+    pinch : Pinch
+
+    Returns
+    -------
+    (6, 6) float
+        N/m and N m/rad.
+    """
+    brick = network.scene.placed[index]
+    length, width = np.array(brick.length_axis), np.array(brick.width_axis)
+    axes = np.stack([length, width, np.cross(length, width)])
+    out = axes[pinch.across]
+    sides = np.delete(axes, pinch.across, axis=0)
+    moduli = pinch.stiffness.tangential * np.eye(3)
+    moduli += (pinch.stiffness.normal - pinch.stiffness.tangential) * np.outer(out, out)
+    total = np.zeros((6, 6))
+    reach = pinch.side / np.sqrt(12)  # four points here have a square's second moments
+    for sign in (-0.5, 0.5):
+        for a, b in ((-reach, -reach), (-reach, reach), (reach, -reach), (reach, reach)):
+            point = node + sign * brick.dimensions[pinch.across] * out + a * sides[0] + b * sides[1]
+            moved = point_motion(point - network.centroid[index])
+            total += pinch.side**2 / 4 * moved.T @ moduli @ moved
+    return total
+
 
 GONE = "joints open or slip and brick {brick} becomes unstable; add a grip, a bond or friction"
 

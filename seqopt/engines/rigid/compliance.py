@@ -19,27 +19,60 @@ from numpy.typing import ArrayLike
 
 from seqopt.arrays import Ints
 from seqopt.engines.basis import SPACE, Basis
-from seqopt.engines.failures import failing_in_a_line
 from seqopt.engines.interface import (
     Fields,
+    NamedEngine,
     Want,
+    failing_in_a_line,
     grip_columns,
     keep_wanted,
     require_finite,
 )
-from seqopt.engines.named import NamedEngine
-from seqopt.engines.rigid.kept import Kept
+from seqopt.engines.rigid.growth import grow_tree
 from seqopt.engines.rigid.mixed import LAST_CORRECTION
-from seqopt.engines.rigid.operator import ComplianceOperator
-from seqopt.engines.rigid.operator_builder import OperatorBuilder
+from seqopt.engines.rigid.operator import ComplianceOperator, OperatorBuilder
 from seqopt.engines.rigid.refinement import Refinement
-from seqopt.engines.rigid.spanning_tree import grow_tree
 from seqopt.engines.rigid.trial import ACCURACY, Tried, try_forces
 from seqopt.engines.rigid.ungripped import Shared, share
 from seqopt.engines.threads import one_thread
 from seqopt.network.build import network_of
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
+
+
+class Kept:
+    """The operators that were asked for last, by brick count.
+
+    Parameters
+    ----------
+    most : float
+        Bytes that they may take when a further one is to be made.
+    """
+
+    def __init__(self, most: float) -> None:
+        self._most = most
+        self._operators: dict[int, ComplianceOperator] = {}  # the one asked last comes last
+        self._bytes: dict[int, int] = {}
+
+    def take(self, bricks: int) -> ComplianceOperator | None:
+        """Return the operator of a brick count, if it is here, and give it away."""
+        return self._operators.pop(bricks, None)
+
+    def put(self, bricks: int, operator: ComplianceOperator) -> None:
+        """Keep an operator as the one that was asked last."""
+        self._operators[bricks] = operator
+
+    def make_room(self) -> None:
+        """Drop those that were not asked for longest, until the rest takes little memory."""
+        if self._operators:
+            last = next(reversed(self._operators))
+            self._bytes[last] = self._operators[last].nbytes  # it grows while it is asked
+        total = sum(self._bytes.get(bricks, 0) for bricks in self._operators)
+        while total > self._most:
+            first = next(iter(self._operators))
+            del self._operators[first]
+            total -= self._bytes.get(first, 0)
+
 
 KEPT = 32e6  # bytes of operators that may stay when another is made
 SCREEN = 1e-6  # the same, of what is only to be compared

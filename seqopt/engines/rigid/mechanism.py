@@ -11,9 +11,8 @@ from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.engines.rigid.ungripped import ungripped_system
 from seqopt.engines.threads import one_thread
 from seqopt.errors import MechanismError
-from seqopt.network.kinematics import node_motion, spring_maps
+from seqopt.network.mechanics import Statics, build_statics, node_motion, spring_maps
 from seqopt.network.network import Network
-from seqopt.network.statics import Statics, build_statics
 
 ROUNDING = 1e-13  # a smaller eigenvalue of the assembled stiffness may be rounding alone
 UNTIED = 1e-13  # share of the largest deformation of ties that is rounding: nothing is tied

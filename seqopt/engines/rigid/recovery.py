@@ -10,8 +10,8 @@ from scipy import sparse
 
 from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.engines.interface import Fields
+from seqopt.network.mechanics import Statics
 from seqopt.network.network import Network
-from seqopt.network.statics import Statics
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -48,7 +48,7 @@ def respond(
     statics : Statics
         Of the network.
     motion : (3n, 6b) float
-        Displacements of the nodes for unit twists; see `seqopt.network.kinematics.node_motion`.
+        Displacements of the nodes for unit twists; see `seqopt.network.mechanics.node_motion`.
     columns : (S, r) int
         Grips as indices into ``network.inner.ravel()``.
     solution : Solution

@@ -9,9 +9,8 @@ import numpy as np
 from scipy import sparse
 
 from seqopt.arrays import Floats, FrozenValue, Ints, frozen
-from seqopt.network.kinematics import deformation, node_motion, point_motion
+from seqopt.network.mechanics import Statics, build_statics, deformation, node_motion, point_motion
 from seqopt.network.network import Network
-from seqopt.network.statics import Statics, build_statics
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -6,21 +6,76 @@ Both are JSON as `compas.json_load` reads it, written without COMPAS.
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from seqopt.arrays import Floats
+from seqopt.errors import StepError
+from seqopt.files import read_text
 from seqopt.scene.blocks import vertices_of
+from seqopt.scene.imports.building import block_numbers
+from seqopt.scene.imports.compas_data import by_guid, kind, payload
 from seqopt.scene.imports.compas_models import assembly_graph
-from seqopt.scene.imports.json_reading import entry
+from seqopt.scene.imports.formats import read_content, sniffed
+from seqopt.scene.imports.json_reading import entry, parse_json
 from seqopt.scene.parts import Brick
 from seqopt.scene.scene import Scene
-from seqopt.sequence.exports.sources import Source
-from seqopt.sequence.exports.states import StepStates, step_states
+from seqopt.sequence.exports.tables import StepStates, step_states
 from seqopt.sequence.steps import Step
+
+
+@dataclass(frozen=True)
+class Source:
+    """A file from which a scene was imported.
+
+    Attributes
+    ----------
+    names : dict of int to str
+        What it calls bricks, by their names: identifiers of elements of a COMPAS model, else keys.
+    graph : object
+        Its document if it is a graph of compas_assembly, else None.
+    """
+
+    names: Mapping[int, str]
+    graph: Any = None
+
+
+def read_source(scene: Scene, path: Path) -> Source:
+    """Return the file from which a scene was imported, in any format that ``import`` knows.
+
+    Raises
+    ------
+    FileError
+        If it cannot be read.
+    SceneError
+        If it is no such file.
+    StepError
+        If it lacks a brick of the scene.
+    """
+    content, graph = read_content(path), None
+    keys = names = [block.key for block in content.blocks]
+    if path.suffix.lower() == ".json":
+        document = parse_json(read_text(path), str(path))
+        form = sniffed(document, str(path))
+        graph = document if form == "compas_assembly" and isinstance(document, dict) else None
+        if form in ("compas_dem", "compas_timber"):
+            held = payload(document)
+            held = payload(held["model"]) if "model" in held else held
+            rows = [*by_guid(f"{path}: element", held["elements"])]
+            if form == "compas_timber":  # its blocks are counted among its beams
+                rows = [(guid, item) for guid, item in rows if kind(item) == "beam"]
+            names = [rows[int(key)][0] for key in keys]
+    found = dict(zip(block_numbers(keys), names, strict=True))
+    lost = [brick.name for brick in scene.bricks if brick.name not in found]
+    if lost:
+        raise StepError(f"the source has no block {lost[0]}; give the file that was imported")
+    return Source(found, graph)
+
 
 Document = dict[str, Any]
 

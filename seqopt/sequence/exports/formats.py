@@ -9,10 +9,8 @@ from seqopt.errors import FileError, StepError
 from seqopt.scene.checks import short
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import load_scene
-from seqopt.sequence.exports.compas_plans import compas_assembly, timber_plan
-from seqopt.sequence.exports.sequencer import sequencer_json
-from seqopt.sequence.exports.sources import Source, read_source
-from seqopt.sequence.exports.tables import plan_csv, plan_json
+from seqopt.sequence.exports.compas_plans import Source, compas_assembly, read_source, timber_plan
+from seqopt.sequence.exports.tables import plan_csv, plan_json, sequencer_json
 from seqopt.sequence.plan_file import read_plan
 from seqopt.sequence.steps import Step
 

@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 
 import seqopt
-from seqopt.contact.faces import bare_assembly
-from seqopt.contact.joint_space import face_distance
+from seqopt.contact.faces import bare_assembly, face_distance
 from seqopt.engines.interface import Want, grip_columns
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.engines.rigid.dense import solve_dense
+from seqopt.engines.rigid.mixed import solve_dense
 from seqopt.errors import SceneError
 from seqopt.network.build import build_network
 from seqopt.scene.boxes import boxes, separations

@@ -13,7 +13,7 @@ from seqopt.contact.faces import bare_assembly
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import Want, grip_columns
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.engines.rigid.dense import solve_dense
+from seqopt.engines.rigid.mixed import solve_dense
 from seqopt.errors import SceneError
 from seqopt.network.build import build_network
 from seqopt.scene.arch import ArchShape, arch_scene

@@ -1,22 +1,27 @@
 """Open steps with as many bricks and as many grips: their choices, and the states in them, once.
 
 Different choices in different steps are often one state: a brick count and the nodes held.
+
+Before computing, it is checked whether there is enough memory for the responses of all choices.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence, Set
+from collections.abc import Callable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass
+from enum import Enum
 from itertools import groupby
 from typing import Protocol
 
 import numpy as np
 
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints
+from seqopt.errors import MemoryShortError
+from seqopt.responses.blocks import Answers, Block
 from seqopt.responses.quantities import CHOSEN_BY, robot_response
-from seqopt.responses.states import Answers, Block
 from seqopt.sequence.schedule import OpenGrip, OpenStep, Schedule
+from seqopt.work.memory import free_memory
 
 BLOCK = 2048  # grip sets whose fields are held at once: few enough to stay in the cache
 
@@ -244,3 +249,90 @@ def _robot_forces(schedule: Schedule, step: OpenStep, forces: Floats) -> dict[st
     out["F_move"] = out[robot_response(schedule.moves[step.moves[-1]].robot)]
     out["F_largest"] = forces.max(axis=1)
     return out
+
+
+NUMBER = 8  # bytes
+BESIDE = 6  # numbers per choice beside its responses: nodes, order, costs
+COSTS = 4  # numbers per choice where costs alone are kept: as found, posed, handed over, solved
+AT_ONCE = 24  # numbers per choice of the brick count that is being evaluated
+SHARE = 0.8  # of the free memory that responses and costs may take
+
+
+class Keeping(Enum):
+    """What is kept of the choices of a schedule."""
+
+    RESPONSES = "responses"
+    COSTS = "costs"  # responses come step by step, and go
+
+
+def bytes_of_choices(schedule: Schedule, wanted: Callable[[int], Set[str]]) -> int:
+    """Return what the responses of all choices of a schedule take, about.
+
+    Parameters
+    ----------
+    schedule : Schedule
+    wanted : callable
+        Which responses every move needs.
+
+    Returns
+    -------
+    int
+        Bytes.
+    """
+    total = 0
+    for step in schedule.steps:
+        moves = [schedule.moves[m] for m in step.moves]
+        if moves:
+            kept = len(wanted(moves[-1].bricks)) + BESIDE
+            total += NUMBER * kept * math.prod(len(move.candidates) for move in moves)
+    return total
+
+
+def bytes_of_costs(schedule: Schedule) -> int:
+    """Return what the costs of all choices take, about, while responses come step by step.
+
+    Returns
+    -------
+    int
+        Bytes.
+    """
+    of_moves: dict[tuple[int, ...], int] = {}
+    of_bricks: dict[int, int] = {}
+    for step in schedule.steps:
+        if step.moves:
+            choices = choices_of(schedule, step)
+            of_moves[step.moves] = choices
+            of_bricks[step.bricks] = of_bricks.get(step.bricks, 0) + choices
+    return NUMBER * (COSTS * sum(of_moves.values()) + AT_ONCE * max(of_bricks.values(), default=0))
+
+
+def require_memory(
+    schedule: Schedule, wanted: Callable[[int], Set[str]], most: float | None = None
+) -> Keeping:
+    """Return what can be kept of all choices; raise an error if not even their costs can be.
+
+    Parameters
+    ----------
+    schedule : Schedule
+    wanted : callable
+        Which responses every move needs.
+    most : float, optional
+        Bytes that may be used; by default `SHARE` of what is free.
+
+    Raises
+    ------
+    MemoryShortError
+        Saying what would be needed.
+    """
+    most = SHARE * free_memory() if most is None else most
+    if bytes_of_choices(schedule, wanted) <= most:
+        return Keeping.RESPONSES
+    needed = bytes_of_costs(schedule)
+    if needed <= most:
+        return Keeping.COSTS
+    largest = max(len(move.candidates) for move in schedule.moves)
+    raise MemoryShortError(
+        f"the costs of all choices take about {needed / 1e9:.3g} GB, and {most / 1e9:.3g} GB may "
+        f"be used; let robots reach less (a move has up to {largest} candidates), block nodes, "
+        "take near candidates only, or search without proof"
+    )
