@@ -25,13 +25,7 @@ _COMPRESSED = (sparse.csr_array, sparse.csc_array)
 def skew(vectors: Floats) -> Floats:
     """Return the matrices that take the cross product with vectors from the left.
 
-    Parameters
-    ----------
-    vectors : (..., 3) float
-
-    Returns
-    -------
-    (..., 3, 3) float
+    ``vectors`` (..., 3). Result (..., 3, 3).
 
     Examples
     --------
@@ -101,15 +95,7 @@ class FrozenValue(Terse):
 def frozen(content: Content) -> Content:
     """Return read-only arrays and sparse arrays, also within tuples and mappings.
 
-    Parameters
-    ----------
-    content : object
-        Other contents are returned as they are.
-
-    Returns
-    -------
-    object
-        The same object.
+    ``content``: other contents are returned as they are. Result: the same object.
     """
     if isinstance(content, np.ndarray):
         content.flags.writeable = False

@@ -49,10 +49,7 @@ def answered(told: Callable[[], object]) -> Iterator[None]:
 
     Signals that somebody else answers in a way of his own are left to him.
 
-    Parameters
-    ----------
-    told : callable
-        Called between two instructions of the main thread: it only takes note.
+    ``told``: called between two instructions of the main thread: it only takes note.
     """
     mine = threading.current_thread() is threading.main_thread()
     numbers = [n for n in ENDS if mine and signal.getsignal(n) is signal.default_int_handler]
@@ -79,15 +76,8 @@ def ending(seconds: float) -> Iterator[None]:
 
     In the main thread alone, which is interrupted; elsewhere a block takes as long as it takes.
 
-    Parameters
-    ----------
-    seconds : float
-        Infinite for no end.
-
-    Raises
-    ------
-    TimeoutError
-        Between two instructions of the block; before the first one where no time is left.
+    ``seconds``: infinite for no end. Raises `TimeoutError`: between two instructions of the block;
+    before the first one where no time is left.
     """
     if seconds <= 0:
         raise TimeoutError

@@ -13,10 +13,7 @@ Places = tuple[tuple[str, int], ...]
 def plugins(group: str) -> dict[str, EntryPoint]:
     """Return the entry points of a group by name.
 
-    Returns
-    -------
-    dict of str to EntryPoint
-        Also of packages that were installed since Python started.
+    Result: also of packages that were installed since Python started.
 
     Examples
     --------

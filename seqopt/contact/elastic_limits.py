@@ -25,20 +25,11 @@ CUTS = 2  # times that each triangle of a face is cut into four
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Quadrature(FrozenValue):
-    """Points that stand for faces; a face is a contact of an assembly.
+    """Points that stand for faces; a face is a contact of an assembly."""
 
-    Attributes
-    ----------
-    point : (P, 3) float
-        m.
-    face : (P,) int
-    area : (P,) float
-        Share of its face that a point stands for, m².
-    """
-
-    point: Floats
-    face: Ints
-    area: Floats
+    point: Floats  # (P, 3); m
+    face: Ints  # (P,)
+    area: Floats  # (P,); share of its face that a point stands for, m²
 
 
 def face_quadrature(assembly: Assembly, cuts: int = CUTS) -> Quadrature:
@@ -47,10 +38,7 @@ def face_quadrature(assembly: Assembly, cuts: int = CUTS) -> Quadrature:
     Faces are cut into triangles, each into four ``cuts`` times; the middles of a triangle's edges
     with a third of its area each integrate squares exactly.
 
-    Returns
-    -------
-    Quadrature
-        Faces in ascending order.
+    Result: faces in ascending order.
     """
     triangles, face = [], []
     for c in range(len(assembly.bodies)):
@@ -78,20 +66,9 @@ def _quarters(triangle: Floats) -> list[Floats]:
 def opening_maps(assembly: Assembly, points: Floats, face: Ints, center: Floats) -> Floats:
     """Return the motions of points for unit twists of their faces' second bodies.
 
-    Parameters
-    ----------
-    assembly : Assembly
-    points : (P, 3) float
-        m.
-    face : (P,) int
-        The contact of every point.
-    center : (C, 3) float
-        Where the twists of the C faces are taken, m; their axes are the scene's.
-
-    Returns
-    -------
-    (P, 3, 6) float
-        Normal part first, then two tangential ones (`Assembly.axes`).
+    ``points`` (P, 3). ``face`` (P,): the contact of every point. ``center`` (C, 3): where the
+    twists of the C faces are taken, m; their axes are the scene's. Result (P, 3, 6): normal part
+    first, then two tangential ones (`Assembly.axes`).
     """
     axes = assembly.axes[face]
     return np.asarray(axes @ point_motion(points - center[face]))
@@ -100,19 +77,8 @@ def opening_maps(assembly: Assembly, points: Floats, face: Ints, center: Floats)
 def quadrature_stiffness(bed: Quadrature, maps: Floats, moduli: Floats) -> Floats:
     """Return the stiffness of the beds of C faces at their centers.
 
-    Parameters
-    ----------
-    bed : Quadrature
-        Its faces in ascending order.
-    maps : (P, 3, 6) float
-        From `opening_maps`.
-    moduli : (C, 2) float
-        Normal and tangential, N/m³.
-
-    Returns
-    -------
-    (C, 6, 6) float
-        N/m and N m/rad.
+    ``bed``: its faces in ascending order; ``maps`` (P, 3, 6): from `opening_maps`; ``moduli`` (C,
+    2): normal and tangential, N/m³. Result (C, 6, 6): N/m and N m/rad.
     """
     slope = bed.area[:, None] * moduli[bed.face][:, [0, 1, 1]]
     each = np.einsum("pij,pi,pik->pjk", maps, slope, maps)
@@ -122,16 +88,8 @@ def quadrature_stiffness(bed: Quadrature, maps: Floats, moduli: Floats) -> Float
 def first_points(face: Ints, faces: int) -> Ints:
     """Return the first point of every face.
 
-    Parameters
-    ----------
-    face : (P,) int
-        The face of every point, ascending.
-    faces : int
-        How many there are.
-
-    Returns
-    -------
-    (faces,) int
+    ``face`` (P,): the face of every point, ascending; ``faces``: how many there are. Result
+    (faces,).
     """
     return np.searchsorted(face, np.arange(faces))
 
@@ -158,15 +116,8 @@ class ElasticLimits(FrozenValue):
     def excess(self, wrench: Floats) -> Floats:
         """Return by how much wrenches exceed the limits of the joints.
 
-        Parameters
-        ----------
-        wrench : (S, J, 6) float
-            As of `seqopt.engines.interface.Fields`, N and N m.
-
-        Returns
-        -------
-        (S, J) float
-            Pa; negative is within.
+        ``wrench`` (S, J, 6): as of `seqopt.engines.interface.Fields`, N and N m. Result (S, J): Pa;
+        negative is within.
         """
         face, mortar = self.assembly.contact, self.mortar
         stress = np.einsum("kij,skj->ski", self.stress, wrench[:, face])
@@ -181,14 +132,7 @@ class ElasticLimits(FrozenValue):
     def exceeded(self, wrench: Floats) -> Bools:
         """Return which grip sets leave the elastic limits anywhere, beyond rounding.
 
-        Parameters
-        ----------
-        wrench : (S, J, 6) float
-            As of `excess`.
-
-        Returns
-        -------
-        (S,) bool
+        ``wrench`` (S, J, 6): as of `excess`. Result (S,).
         """
         margin = STRESS_MARGIN * self.assembly.stress_scale
         if self._bound(wrench) <= margin:  # as a rule, and a tenth of the work

@@ -28,18 +28,10 @@ BESIDE = 0.5  # by which a joint's position may lie beside the faces, over the s
 class JointSpace:
     """Where a joint lies between the faces of its bricks.
 
-    Attributes
-    ----------
-    name : str
-    bricks : tuple of Brick
-        One on the ground, or two.
-    ends : tuple of 2 float
-        Where the faces of the first body and of the last are along the joint's normal, from its
-        plane and in the middle of the overlap, m.
-    beside : float
-        How far its position lies outside the overlap, m; negative inside.
-    thickness : float
-        What the scene says, m; NaN if it does not.
+    ``bricks``: one on the ground, or two. ``ends``: where the faces of the first body and of the
+    last are along the joint's normal, from its plane and in the middle of the overlap, m.
+    ``beside``: how far its position lies outside the overlap, m; negative inside. ``thickness``:
+    what the scene says, m; NaN if it does not.
     """
 
     name: str
@@ -51,10 +43,7 @@ class JointSpace:
     def require_touching(self) -> None:
         """Raise an error unless the bricks touch through the joint.
 
-        Raises
-        ------
-        SceneError
-            If they are too far apart, interpenetrate, or the joint lies elsewhere.
+        Raises `SceneError` if they are too far apart, interpenetrate, or the joint lies elsewhere.
         """
         size = min(min(brick.dimensions) for brick in self.bricks)
         apart, slack = self.ends[1] - self.ends[0], OVERLAP * size
@@ -85,18 +74,8 @@ class JointSpace:
 def face_distance(brick: Brick, normal: Floats, point: Floats) -> float:
     """Return how far along a normal the face of a brick lies that looks against it.
 
-    Parameters
-    ----------
-    brick : Brick
-    normal : (3,) float
-        Unit vector that points into the brick.
-    point : (3,) float
-        From where, m.
-
-    Returns
-    -------
-    float
-        m; negative if the point lies inside.
+    ``normal`` (3,): unit vector that points into the brick; ``point`` (3,): from where, m. Result:
+    m; negative if the point lies inside.
     """
     length, width = np.array(brick.length_axis), np.array(brick.width_axis)
     frame = np.stack([length, width, np.cross(length, width)])
@@ -109,15 +88,8 @@ def face_distance(brick: Brick, normal: Floats, point: Floats) -> float:
 def distance_beside(polygon: Floats) -> float:
     """Return how far the origin lies outside a convex polygon.
 
-    Parameters
-    ----------
-    polygon : (m, 2) float
-        Corners counterclockwise, m.
-
-    Returns
-    -------
-    float
-        m; negative inside. Of the lines of its edges: beside a corner it is somewhat farther.
+    ``polygon`` (m, 2): corners counterclockwise, m. Result: m; negative inside. Of the lines of its
+    edges: beside a corner it is somewhat farther.
     """
     edge = np.roll(polygon, -1, axis=0) - polygon
     size = np.linalg.norm(edge, axis=1)

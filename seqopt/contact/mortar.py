@@ -66,16 +66,7 @@ MORTARS = {"epoxy": EPOXY, "dry": DRY}
 def bond_mortar(strength: float, friction: float = FRICTION) -> Mortar:
     """Return the mortar of a bond with the same strength in tension and in shear.
 
-    Parameters
-    ----------
-    strength : float
-        Pa.
-    friction : float, optional
-
-    Raises
-    ------
-    SceneError
-        If a number is negative or not finite.
+    ``strength``: Pa. Raises `SceneError` if a number is negative or not finite.
 
     Examples
     --------
@@ -88,15 +79,7 @@ def bond_mortar(strength: float, friction: float = FRICTION) -> Mortar:
 def find_mortar(mortar: Mortar | str) -> Mortar:
     """Return a mortar, by name or itself.
 
-    Parameters
-    ----------
-    mortar : Mortar or str
-        A mortar, a name of `MORTARS`, or ``bond=STRENGTH`` with a strength in Pa.
-
-    Raises
-    ------
-    SceneError
-        If it is neither.
+    ``mortar``: a mortar, a name of `MORTARS`, or ``bond=STRENGTH`` with a strength in Pa.
     """
     if isinstance(mortar, Mortar):
         return mortar

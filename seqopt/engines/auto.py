@@ -45,17 +45,10 @@ class Level(Enum):
 
 @dataclass(frozen=True)
 class LevelChoice:
-    """A level and why it was taken.
-
-    Attributes
-    ----------
-    level : Level
-    reason : str
-        A clause that goes into a sentence.
-    """
+    """A level and why it was taken."""
 
     level: Level
-    reason: str
+    reason: str  # a clause that goes into a sentence
 
 
 IN_PLANE = LevelChoice(Level.PLANAR, "bricks, springs, gravity and grips lie in one plane")
@@ -66,18 +59,9 @@ BEYOND = LevelChoice(Level.DISCRETE, "a joint would leave its elastic limits")
 class AutoEngine(NamedEngine):
     """Computes every grip set at the cheapest level whose condition it meets.
 
-    Parameters
-    ----------
-    network : Network or Scene
-    mortar : Mortar, optional
-        What the joints hold; the epoxy of Bruun et al. by default.
-
-    Attributes
-    ----------
-    tally : dict of LevelChoice to int
-        How many grip sets of all calls were answered at which level, and why.
-    unchecked : str
-        Why elastic limits are not checked; empty if they are.
+    ``mortar``: what the joints hold; the epoxy of Bruun et al. by default. ``tally``: how many grip
+    sets of all calls were answered at which level, and why. ``unchecked``: why elastic limits are
+    not checked; empty if they are.
     """
 
     def __init__(self, network: Network | Scene, mortar: Mortar = EPOXY) -> None:
@@ -112,19 +96,7 @@ class AutoEngine(NamedEngine):
     def solve(self, bricks: int, grips: ArrayLike, want: Want = Want.RESPONSES) -> Fields:
         """Return the fields of a partial structure for many grip sets.
 
-        Parameters
-        ----------
-        bricks : int
-            How many bricks stand.
-        grips : (S, r) int
-            Node numbers.
-        want : Want, optional
-
-        Raises
-        ------
-        GripError, MechanismError, SolverError
-            As of `seqopt.engines.interface.Engine` and, beyond elastic limits, of
-            `seqopt.engines.discrete.engine.DiscreteEngine`.
+        ``grips`` (S, r): node numbers.
         """
         columns = grip_columns(self.network, bricks, grips)
         sets = np.asarray(grips).reshape(columns.shape)

@@ -40,23 +40,10 @@ def spectrum(network: Network, bricks: int, columns: Ints) -> tuple[float, float
     The inverse is applied by the mixed system, which keeps small eigenvalues that the stiffness
     matrix has lost to rounding; a mechanism is shifted.
 
-    Parameters
-    ----------
-    network : Network
-    bricks : int
-        How many bricks stand.
-    columns : (r,) int
-        Grips as indices into ``network.inner.ravel()``.
-
-    Returns
-    -------
-    lowest : float
-        Smallest eigenvalue, without unit.
-    condition : float
-        Largest eigenvalue over smallest.
-    mode : (b, 6) float
-        The motion that is resisted least, its largest component 1, as in
-        `seqopt.engines.diagnosis.Diagnosis`.
+    ``columns`` (r,): grips as indices into ``network.inner.ravel()``. Results: ``lowest``: smallest
+    eigenvalue, without unit; ``condition``: largest eigenvalue over smallest; ``mode`` (b, 6): the
+    motion that is resisted least, its largest component 1, as in
+    `seqopt.engines.diagnosis.Diagnosis`.
     """
     parts = ungripped_system(network, bricks)
     root = np.sqrt(parts.stiffness)[:, None]
@@ -107,18 +94,12 @@ def _start(like: Floats | sparse.csr_array) -> Floats:
 class Residuals:
     """What is left of the equations when fields are put in, without unit.
 
-    Attributes
-    ----------
-    equilibrium : float
-        Force or moment left on a brick over the largest sum of magnitudes on one.
-    joints : float
-        Wrench of a joint less stiffness times deformation, over the sum of the magnitudes in it, or
-        over the weight of a brick where they are smaller.
-    grips : float
-        Motion of a held node over the largest motion of any brick, or over what the weight of a
-        brick does to the stiffest joint where all are smaller.
-    plain : float
-        Stiffness times motions less load, over the load: no measure of quality, shown to compare.
+    ``equilibrium``: force or moment left on a brick over the largest sum of magnitudes on one;
+    ``joints``: wrench of a joint less stiffness times deformation, over the sum of the magnitudes
+    in it, or over the weight of a brick where they are smaller; ``grips``: motion of a held node
+    over the largest motion of any brick, or over what the weight of a brick does to the stiffest
+    joint where all are smaller; ``plain``: stiffness times motions less load, over the load: no
+    measure of quality, shown to compare.
     """
 
     equilibrium: float
@@ -135,15 +116,8 @@ class Residuals:
 def residual(network: Network, bricks: int, columns: Ints, fields: Fields) -> Residuals:
     """Return the residuals of the first grip set's fields, from the network alone.
 
-    Parameters
-    ----------
-    network : Network
-    bricks : int
-        How many bricks stand.
-    columns : (r,) int
-        Grips as indices into ``network.inner.ravel()``.
-    fields : Fields
-        With joint wrenches and brick twists.
+    ``columns`` (r,): grips as indices into ``network.inner.ravel()``; ``fields``: with joint
+    wrenches and brick twists.
     """
     springs, center = network.springs, network.centroid[:bricks]
     acting = springs.acting(bricks)

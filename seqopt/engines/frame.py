@@ -45,12 +45,8 @@ LOOSE = 1e-12  # stiffness of a spring that has none, over the stiffest: holds i
 class FrameEngine(NamedEngine):
     """Solves each grip set as a frame of its own.
 
-    Parameters
-    ----------
-    network : Network or Scene
-    contrast : float, optional
-        Stiffness of the bars over that of the stiffest joint, in stretching and in bending. Low
-        values bend the bars, high ones spoil the conditioning.
+    ``contrast``: stiffness of the bars over that of the stiffest joint, in stretching and in
+    bending. Low values bend the bars, high ones spoil the conditioning.
     """
 
     def __init__(self, network: Network | Scene, contrast: float = CONTRAST) -> None:
@@ -68,20 +64,8 @@ class FrameEngine(NamedEngine):
 
         All fields are evaluated whatever is asked: the factorization dominates the cost.
 
-        Parameters
-        ----------
-        bricks : int
-            How many bricks stand.
-        grips : (S, r) int
-            Node numbers.
-        want : Want, optional
-
-        Raises
-        ------
-        GripError, MechanismError
-            As of `seqopt.engines.interface.Engine`.
-        SolverError
-            If corrections do not settle, which a lower contrast may help.
+        ``grips`` (S, r): node numbers. Raises `SolverError` if corrections do not settle, which a
+        lower contrast may help.
         """
         network = self._network
         columns = grip_columns(network, bricks, grips)

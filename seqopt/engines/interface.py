@@ -141,23 +141,8 @@ def keep_wanted(answer: Fields, want: Want) -> Fields:
 def require_finite(answer: Fields, bricks: int, grips: ArrayLike) -> Fields:
     """Return fields if all of their numbers are finite.
 
-    Parameters
-    ----------
-    answer : Fields
-    bricks : int
-        How many bricks stand.
-    grips : (S, r) int
-        Node numbers, for the message.
-
-    Returns
-    -------
-    Fields
-        The same.
-
-    Raises
-    ------
-    SolverError
-        If one is not: NaN elsewhere means that a robot holds nothing.
+    ``grips`` (S, r). Raises `SolverError` if one is not: NaN elsewhere means that a robot holds
+    nothing.
     """
     for name in NAMES:
         values = getattr(answer, name)
@@ -174,23 +159,8 @@ def require_finite(answer: Fields, bricks: int, grips: ArrayLike) -> Fields:
 def grip_columns(network: Network, bricks: int, grips: ArrayLike) -> Ints:
     """Return grip sets as indices into ``network.inner.ravel()``, checked.
 
-    Parameters
-    ----------
-    network : Network
-    bricks : int
-        How many bricks stand.
-    grips : (S, r) int
-        Node numbers.
-
-    Returns
-    -------
-    (S, r) int
-
-    Raises
-    ------
-    GripError
-        If there are fewer bricks, the shape is another, or a set names an unknown, blocked,
-        unplaced or repeated node.
+    ``grips`` (S, r): node numbers. Result (S, r). Raises `GripError` if there are fewer bricks, the
+    shape is another, or a set names an unknown, blocked, unplaced or repeated node.
     """
     total = len(network.inner)
     if not 1 <= bricks <= total:
@@ -239,15 +209,7 @@ NOT_FINITE = "infs or NaNs"  # what SciPy says of arrays that it does not take
 def failing_in_a_line(solve: Callable[Asked, Answer]) -> Callable[Asked, Answer]:
     """Return a function whose numerical failures are a `SolverError`.
 
-    Parameters
-    ----------
-    solve : callable
-        That of an engine.
-
-    Returns
-    -------
-    callable
-        The same, but for what it raises.
+    ``solve``: that of an engine. Result: the same, but for what it raises.
     """
 
     @wraps(solve)
@@ -268,18 +230,7 @@ def failing_in_a_line(solve: Callable[Asked, Answer]) -> Callable[Asked, Answer]
 def no_sets(network: Network, bricks: int, held: int) -> Fields:
     """Return the fields of no grip set at all: their shapes.
 
-    Parameters
-    ----------
-    network : Network
-    bricks : int
-        How many bricks stand.
-    held : int
-        How many nodes each set would hold.
-
-    Returns
-    -------
-    Fields
-        Arrays with a first axis of length zero.
+    ``held``: how many nodes each set would hold. Result: arrays with a first axis of length zero.
     """
     return Fields(
         edge_force=np.empty((0, network.count_edges(bricks))),
@@ -292,26 +243,15 @@ def no_sets(network: Network, bricks: int, held: int) -> Fields:
 
 
 def select_sets(answer: Fields, which: Bools | Ints) -> Fields:
-    """Return the fields of some grip sets.
-
-    Parameters
-    ----------
-    answer : Fields
-    which : (S,) bool or (s,) int
-    """
+    """Return the fields of some grip sets. ``which`` (S,), (s,)."""
     return Fields(**{name: getattr(answer, name)[which] for name in NAMES})
 
 
 def join_sets(parts: Sequence[Fields], which: Sequence[Bools | slice] | None = None) -> Fields:
     """Return the fields of the grip sets of several answers.
 
-    Parameters
-    ----------
-    parts : sequence of Fields
-        Alike in everything but the number of sets.
-    which : sequence of ((S,) bool or slice), optional
-        Which of all sets are those of each part, in their order; by default one part's come after
-        another's.
+    ``parts``: alike in everything but the number of sets. ``which`` (S,): which of all sets are
+    those of each part, in their order; by default one part's come after another's.
     """
     after = np.cumsum([len(part.grip_force) for part in parts])
     total = int(after[-1])
@@ -327,11 +267,7 @@ def join_sets(parts: Sequence[Fields], which: Sequence[Bools | slice] | None = N
 def merge_sets(which: Bools, inside: Fields, outside: Fields) -> Fields:
     """Return the fields of grip sets, some from one answer and the rest from another.
 
-    Parameters
-    ----------
-    which : (S,) bool
-        The sets that the first answer is about, in their order.
-    inside, outside : Fields
+    ``which`` (S,): the sets that the first answer is about, in their order.
     """
     return join_sets([inside, outside], [which, ~which])
 

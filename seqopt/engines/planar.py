@@ -26,20 +26,11 @@ FLAT = 1e-9  # distance from the plane that counts as none, over the size of the
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Plane(FrozenValue):
-    """A plane that mirrors a structure onto itself, as far as forces in it are concerned.
+    """A plane that mirrors a structure onto itself, as far as forces in it are concerned."""
 
-    Attributes
-    ----------
-    point : (3,) float
-        m.
-    normal : (3,) float
-    axes : (2, 3) float
-        Unit vectors in the plane.
-    """
-
-    point: Floats
-    normal: Floats
-    axes: Floats
+    point: Floats  # (3,); m
+    normal: Floats  # (3,)
+    axes: Floats  # (2, 3); unit vectors in the plane
 
     @property
     def basis(self) -> Basis:
@@ -47,32 +38,15 @@ class Plane(FrozenValue):
         return Basis(self.axes, self.normal[None])
 
     def distance(self, points: Floats) -> Floats:
-        """Return how far points lie from the plane.
-
-        Parameters
-        ----------
-        points : (..., 3) float
-            m.
-
-        Returns
-        -------
-        (...) float
-            m.
-        """
+        """Return how far points lie from the plane. ``points`` (..., 3). Result (...): m."""
         return np.asarray(np.abs((points - self.point) @ self.normal))
 
 
 @dataclass(frozen=True)
 class NoPlane:
-    """That a structure lies in no plane.
+    """That a structure lies in no plane."""
 
-    Attributes
-    ----------
-    reason : str
-        What lies outside, a clause that goes into a sentence.
-    """
-
-    reason: str
+    reason: str  # what lies outside, a clause that goes into a sentence
 
 
 def find_plane(network: Network) -> Plane | NoPlane:
@@ -91,17 +65,8 @@ def find_plane(network: Network) -> Plane | NoPlane:
 def off_plane(network: Network, plane: Plane, columns: Ints) -> Floats:
     """Return how far grips lie from a plane.
 
-    Parameters
-    ----------
-    network : Network
-    plane : Plane
-    columns : (S, r) int
-        Grips as indices into ``network.inner.ravel()``.
-
-    Returns
-    -------
-    (S, r) float
-        m; zero where a grip lies in the plane to within rounding.
+    ``columns`` (S, r): grips as indices into ``network.inner.ravel()``. Result (S, r): m; zero
+    where a grip lies in the plane to within rounding.
     """
     inner = network.node_position[network.inner.ravel()]
     away = plane.distance(inner)
@@ -176,16 +141,8 @@ ELSE = "use the compliance engine"
 class PlanarEngine(NamedEngine):
     """Computes any batch of grip sets on any partial structure of a planar scene.
 
-    Parameters
-    ----------
-    network : Network or Scene
-    plane : Plane, optional
-        The structure's, if it is known; by default it is found.
-
-    Raises
-    ------
-    SceneError
-        If bricks, springs or gravity leave the scene's plane.
+    ``plane``: the structure's, if it is known; by default it is found. Raises `SceneError` if
+    bricks, springs or gravity leave the scene's plane.
     """
 
     def __init__(self, network: Network | Scene, plane: Plane | None = None) -> None:
@@ -204,20 +161,7 @@ class PlanarEngine(NamedEngine):
     def solve(self, bricks: int, grips: ArrayLike, want: Want = Want.RESPONSES) -> Fields:
         """Return the fields of a partial structure for many grip sets.
 
-        Parameters
-        ----------
-        bricks : int
-            How many bricks stand.
-        grips : (S, r) int
-            Node numbers.
-        want : Want, optional
-
-        Raises
-        ------
-        GripError
-            As of `seqopt.engines.interface.Engine`, and if a grip lies outside the plane.
-        MechanismError, SolverError
-            As of `seqopt.engines.interface.Engine`.
+        ``grips`` (S, r): node numbers.
         """
         away = off_plane(self.network, self.plane, grip_columns(self.network, bricks, grips))
         if away.any():

@@ -40,12 +40,7 @@ WITHOUT_EFFECT = ("name", "provenance", "robots")  # of a scene, on answers to g
 class Recipe:
     """An engine's name, scene and options, as `seqopt.engines.registry.make_engine` takes them.
 
-    Attributes
-    ----------
-    engine : str
-    scene : Scene
-    options : mapping of str to object
-        Values whose representation says all of them.
+    ``options``: values whose representation says all of them.
     """
 
     engine: str
@@ -89,10 +84,8 @@ def arithmetic() -> str:
 def recipe_of(engine: object) -> Recipe | None:
     """Return how an engine was made.
 
-    Returns
-    -------
-    Recipe or None
-        None where it was not made by name; an engine of one's own may have an attribute ``recipe``.
+    Result: None where it was not made by name; an engine of one's own may have an attribute
+    ``recipe``.
     """
     found = getattr(engine, "recipe", None)
     return found if isinstance(found, Recipe) else None
@@ -166,17 +159,9 @@ def _known_by(engine: Engine, recipe: Recipe) -> Engine:
 def provenance(engine: Engine) -> dict[str, object]:
     """Return what a summary says of the engine that computed it, and of packages.
 
-    Parameters
-    ----------
-    engine : Engine
-        After it computed.
-
-    Returns
-    -------
-    dict of str to object
-        ``engine`` with its ``name``, the ``reason`` for it, the ``mortar`` if one was given, and of
-        an automatic one the ``levels`` that it took, for how many grip ``sets``, and why each;
-        ``versions`` as of `versions`.
+    ``engine``: after it computed. Result: ``engine`` with its ``name``, the ``reason`` for it, the
+    ``mortar`` if one was given, and of an automatic one the ``levels`` that it took, for how many
+    grip ``sets``, and why each; ``versions`` as of `versions`.
     """
     recipe = recipe_of(engine)
     said: dict[str, object] = {"name": type(engine).__name__, "reason": "given as an object"}
@@ -197,10 +182,7 @@ def provenance(engine: Engine) -> dict[str, object]:
 def versions() -> Mapping[str, str]:
     """Return the versions of Python, of seqopt and of the packages that it needs.
 
-    Returns
-    -------
-    mapping of str to str
-        By name.
+    Result: by name.
     """
     lines = (line for line in requires("seqopt") or () if "extra ==" not in line)
     names = ["seqopt", *(re.split(r"[^\w.-]", line)[0] for line in lines)]

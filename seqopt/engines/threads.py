@@ -22,10 +22,7 @@ def one_thread() -> AbstractContextManager[object]:
     The matrices of a partial structure are small enough for one core. Threads that share them spend
     their time waiting, without end where another process wants the second core.
 
-    Returns
-    -------
-    context manager
-        Entered for a whole operator or pass of grip sets, it costs some 10 µs.
+    Result: entered for a whole operator or pass of grip sets, it costs some 10 µs.
     """
     limited: AbstractContextManager[object] = _libraries().limit(limits=1, user_api="blas")
     return limited

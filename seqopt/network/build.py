@@ -95,13 +95,7 @@ def _of_bricks(scene: Scene) -> tuple[list[_Node], list[_Edge]]:
 
 
 def network_of(given: Network | Scene) -> Network:
-    """Return a network, or that of a scene.
-
-    Raises
-    ------
-    SceneError
-        If it is neither.
-    """
+    """Return a network, or that of a scene."""
     if isinstance(given, Network | Scene):
         return given if isinstance(given, Network) else build_network(given)
     kind = type(given).__name__

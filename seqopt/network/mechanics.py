@@ -18,15 +18,8 @@ from seqopt.network.network import GROUND, Network, PartKind
 def point_motion(arm: Floats) -> Floats:
     """Return the displacements of points of a body for its unit twists.
 
-    Parameters
-    ----------
-    arm : (..., 3) float
-        From the body's reference point to the point, m.
-
-    Returns
-    -------
-    (..., 3, 6) float
-        ``[I, -skew(arm)]``; its transpose takes forces at the points to wrenches.
+    ``arm`` (..., 3): from the body's reference point to the point, m. Result (..., 3, 6): ``[I,
+    -skew(arm)]``; its transpose takes forces at the points to wrenches.
     """
     shift = np.broadcast_to(np.eye(3), (*arm.shape, 3))
     return np.concatenate([shift, -skew(arm)], axis=-1)
@@ -80,20 +73,10 @@ def deformation(
 ) -> sparse.csr_array:
     """Return the twists of second bodies against first ones for unit twists of all bodies.
 
-    Parameters
-    ----------
-    bodies : (s, 2) int
-        First and second body of every spring; `GROUND` does not move.
-    at : (s, 3) float
-        The point at which each twist is taken, m.
-    center : (n, 3) float
-        Reference points of the bodies, m.
-    axes : (s, 3, 3) float, optional
-        Rows are the axes in which each twist is given; by default those of the scene.
-
-    Returns
-    -------
-    (6s, 6n) sparse
+    ``bodies`` (s, 2): first and second body of every spring; `GROUND` does not move. ``at`` (s, 3):
+    the point at which each twist is taken, m. ``center`` (n, 3): reference points of the bodies, m.
+    ``axes`` (s, 3, 3): rows are the axes in which each twist is given; by default those of the
+    scene. Result (6s, 6n).
     """
     spring, side = np.nonzero(bodies != GROUND)
     body = bodies[spring, side]
@@ -110,16 +93,7 @@ def deformation(
 def spring_stiffness(network: Network, which: Ints) -> Floats:
     """Return the stiffness of springs in the scene's axes.
 
-    Parameters
-    ----------
-    network : Network
-    which : (s,) int
-        Springs of the network.
-
-    Returns
-    -------
-    (s, 6, 6) float
-        N/m and N m/rad.
+    ``which`` (s,): springs of the network. Result (s, 6, 6): N/m and N m/rad.
     """
     springs = network.springs
     stiffness = np.zeros((len(which), 6, 6))
@@ -133,20 +107,8 @@ def spring_stiffness(network: Network, which: Ints) -> Floats:
 def spring_maps(network: Network, bricks: int) -> tuple[Ints, Floats, Floats]:
     """Return what stiffness matrices are assembled from, dense and spring by spring.
 
-    Parameters
-    ----------
-    network : Network
-    bricks : int
-        How many bricks stand.
-
-    Returns
-    -------
-    acting : (s,) int
-        The springs that act.
-    gap : (s, 6, 6b) float
-        Their `deformation` for unit twists of the bricks, in the scene's axes.
-    stiffness : (s, 6, 6) float
-        N/m and N m/rad.
+    Results: ``acting`` (s,): the springs that act; ``gap`` (s, 6, 6b): their `deformation` for unit
+    twists of the bricks, in the scene's axes; ``stiffness`` (s, 6, 6): N/m and N m/rad.
     """
     springs = network.springs
     acting = springs.acting(bricks)

@@ -34,22 +34,9 @@ OFF_PLANE = 1e-9  # lever of a weight about the line of its nodes treated as zer
 def shared_weight(brick: Brick, weight: Floats) -> Floats:
     """Return forces at a brick's two inner nodes that act on it as its weight does.
 
-    Parameters
-    ----------
-    brick : Brick
-        With nodes of its own.
-    weight : (3,) float
-        At the centroid, N.
-
-    Returns
-    -------
-    (2, 3) float
-        N.
-
-    Raises
-    ------
-    SceneError
-        If the weight turns the brick about the line through its nodes: two forces there cannot.
+    ``brick``: with nodes of its own; ``weight`` (3,): at the centroid, N. Result (2, 3): N. Raises
+    `SceneError` if the weight turns the brick about the line through its nodes: two forces there
+    cannot.
     """
     first, second = (np.subtract(brick.node_position(node), brick.position) for node in brick.nodes)
     span, middle = 0.5 * (second - first), 0.5 * (first + second)
@@ -119,18 +106,7 @@ class Springs(FrozenValue):
     face: tuple[Floats, ...]
 
     def acting(self, bricks: int) -> Ints:
-        """Return the springs that act on a partial structure.
-
-        Parameters
-        ----------
-        bricks : int
-            How many bricks stand.
-
-        Returns
-        -------
-        (s,) int
-            Ascending.
-        """
+        """Return the springs that act on a partial structure. Result (s,): ascending."""
         return np.flatnonzero(self.since <= bricks)
 
     @cached_property
@@ -251,42 +227,19 @@ class Network(Shown, FrozenValue):
         return frozen((numbers[order], np.where(blocked, len(numbers), order)))
 
     def count_nodes(self, bricks: int) -> int:
-        """Return how many nodes a partial structure has.
-
-        Parameters
-        ----------
-        bricks : int
-            How many bricks stand.
-        """
+        """Return how many nodes a partial structure has."""
         return int(np.searchsorted(self.node_since, bricks, side="right"))
 
     def count_edges(self, bricks: int) -> int:
-        """Return how many edges a partial structure has.
-
-        Parameters
-        ----------
-        bricks : int
-            How many bricks stand.
-        """
+        """Return how many edges a partial structure has."""
         return int(np.searchsorted(self.edge_since, bricks, side="right"))
 
     def plot(self, bricks: int | None = None) -> Figure:
         """Draw the network, or its part of the first bricks.
 
-        Parameters
-        ----------
-        bricks : int, optional
-            How many, in build order; all by default.
-
-        Returns
-        -------
-        matplotlib.figure.Figure
-            A notebook shows it; ``savefig`` writes it to a file.
-
-        Raises
-        ------
-        ExtraError
-            If matplotlib is not installed (extra ``plot``).
+        ``bricks``: how many, in build order; all by default. Result: a notebook shows it;
+        ``savefig`` writes it to a file. Raises `ExtraError` if matplotlib is not installed (extra
+        ``plot``).
         """
         figure: Figure = display("network_picture")(self, bricks)
         return figure
@@ -294,16 +247,8 @@ class Network(Shown, FrozenValue):
     def graph(self, bricks: int) -> nx.Graph[object]:
         """Return a partial structure as a graph.
 
-        Parameters
-        ----------
-        bricks : int
-            How many bricks stand.
-
-        Returns
-        -------
-        networkx.Graph
-            Nodes carry ``kind`` and ``position`` (m), edges ``number`` (from 1), ``kind`` and
-            ``length`` (m).
+        Result: nodes carry ``kind`` and ``position`` (m), edges ``number`` (from 1), ``kind`` and
+        ``length`` (m).
         """
         import networkx as nx  # noqa: PLC0415  # slow to import, and needed nowhere else
 

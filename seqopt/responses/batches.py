@@ -65,31 +65,15 @@ class Wanted(Protocol):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Alike(FrozenValue):
-    """Open steps with as many bricks and as many grips.
-
-    Attributes
-    ----------
-    schedule : Schedule
-    steps : tuple of OpenStep
-    names : tuple of frozenset of str
-        Responses that each step needs.
-    rows : (P, r) int
-        Nodes held, for all possible choices of one step after the other.
-    possible : tuple of (C,) bool
-        Which choices of each step leave no node held twice.
-    states : (S, r) int
-        The different sets of nodes in them, ascending.
-    state : (P,) int
-        Which of these each choice leads to.
-    """
+    """Open steps with as many bricks and as many grips."""
 
     schedule: Schedule
     steps: tuple[OpenStep, ...]
-    names: tuple[frozenset[str], ...]
-    rows: Ints
-    possible: tuple[Bools, ...]
-    states: Ints
-    state: Ints
+    names: tuple[frozenset[str], ...]  # responses that each step needs
+    rows: Ints  # (P, r); nodes held, for all possible choices of one step after the other
+    possible: tuple[Bools, ...]  # (C,); which choices of each step leave no node held twice
+    states: Ints  # (S, r); the different sets of nodes in them, ascending
+    state: Ints  # (P,); which of these each choice leads to
 
     def blocks(self) -> Iterator[Block]:
         """Yield the states in blocks, one at least."""
@@ -103,13 +87,7 @@ class Alike(FrozenValue):
         return max(-(-len(self.states) // BLOCK), 1)
 
     def choices(self, answers: Sequence[Answers]) -> list[StepChoices]:
-        """Return the responses of every step's choices.
-
-        Parameters
-        ----------
-        answers : sequence of Answers
-            To the blocks.
-        """
+        """Return the responses of every step's choices. ``answers``: to the blocks."""
         values = {k: np.concatenate([a.values[k] for a in answers]) for k in answers[0].values}
         forces = np.concatenate([a.forces for a in answers])
         ends = np.cumsum([ok.sum() for ok in self.possible])
@@ -131,10 +109,7 @@ class Alike(FrozenValue):
 def steps_alike(schedule: Schedule) -> list[list[list[OpenStep]]]:
     """Return the open steps of a schedule by brick count and, within it, by how many grips.
 
-    Returns
-    -------
-    list of list of list of OpenStep
-        Ascending.
+    Result: ascending.
     """
     keyed = sorted(
         (
@@ -158,12 +133,7 @@ def choices_of(schedule: Schedule, step: OpenStep) -> int:
 def alike(schedule: Schedule, steps: Sequence[OpenStep], wanted: Wanted) -> Alike:
     """Return what open steps with as many bricks and as many grips have in common.
 
-    Parameters
-    ----------
-    schedule : Schedule
-    steps : sequence of OpenStep
-    wanted : Wanted
-        Which responses every move needs.
+    ``wanted``: which responses every move needs.
     """
     names = tuple(frozenset(wanted(schedule.moves[step.moves[-1]].bricks)) for step in steps)
     choices = [combinations(schedule, step) for step in steps]
@@ -186,14 +156,7 @@ def distinct(rows: Ints) -> tuple[Ints, Ints]:
 
     Four times as fast as ``numpy.unique``, which sorts rows as if they were text.
 
-    Parameters
-    ----------
-    rows : (P, r) int
-
-    Returns
-    -------
-    rows : (S, r) int
-    which : (P,) int
+    ``rows`` (P, r). Results: ``rows`` (S, r); ``which`` (P,).
     """
     order = np.lexsort(rows.T[::-1])
     ranked = rows[order]
@@ -212,9 +175,7 @@ def robots_holding(step: OpenStep) -> list[int]:
 def combinations(schedule: Schedule, step: OpenStep) -> Ints:
     """Return the nodes held for all combinations of the open moves of a step.
 
-    Returns
-    -------
-    (choices, grips) int
+    Result (choices, grips).
     """
     candidates = [np.array(schedule.moves[m].candidates, dtype=np.int64) for m in step.moves]
     grid = np.meshgrid(*candidates, indexing="ij")
@@ -229,16 +190,7 @@ def combinations(schedule: Schedule, step: OpenStep) -> Ints:
 
 
 def no_node_twice(rows: Ints) -> Bools:
-    """Return which rows name no node twice.
-
-    Parameters
-    ----------
-    rows : (P, r) int
-
-    Returns
-    -------
-    (P,) bool
-    """
+    """Return which rows name no node twice. ``rows`` (P, r). Result (P,)."""
     return np.asarray((np.diff(np.sort(rows, axis=1), axis=1) > 0).all(axis=1))
 
 
@@ -268,16 +220,7 @@ class Keeping(Enum):
 def bytes_of_choices(schedule: Schedule, wanted: Callable[[int], Set[str]]) -> int:
     """Return what the responses of all choices of a schedule take, about.
 
-    Parameters
-    ----------
-    schedule : Schedule
-    wanted : callable
-        Which responses every move needs.
-
-    Returns
-    -------
-    int
-        Bytes.
+    ``wanted``: which responses every move needs. Result: bytes.
     """
     total = 0
     for step in schedule.steps:
@@ -291,10 +234,7 @@ def bytes_of_choices(schedule: Schedule, wanted: Callable[[int], Set[str]]) -> i
 def bytes_of_costs(schedule: Schedule) -> int:
     """Return what the costs of all choices take, about, while responses come step by step.
 
-    Returns
-    -------
-    int
-        Bytes.
+    Result: bytes.
     """
     of_moves: dict[tuple[int, ...], int] = {}
     of_bricks: dict[int, int] = {}
@@ -311,18 +251,8 @@ def require_memory(
 ) -> Keeping:
     """Return what can be kept of all choices; raise an error if not even their costs can be.
 
-    Parameters
-    ----------
-    schedule : Schedule
-    wanted : callable
-        Which responses every move needs.
-    most : float, optional
-        Bytes that may be used; by default `SHARE` of what is free.
-
-    Raises
-    ------
-    MemoryShortError
-        Saying what would be needed.
+    ``wanted``: which responses every move needs. ``most``: bytes that may be used; by default
+    `SHARE` of what is free.
     """
     most = SHARE * free_memory() if most is None else most
     if bytes_of_choices(schedule, wanted) <= most:

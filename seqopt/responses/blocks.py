@@ -43,21 +43,11 @@ Tally = tuple[tuple[object, int], ...]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Block(FrozenValue):
-    """States with one brick count, and what is to be known of them.
+    """States with one brick count, and what is to be known of them."""
 
-    Attributes
-    ----------
-    bricks : int
-        How many bricks stand.
-    grips : (S, r) int
-        Nodes held.
-    names : tuple of str
-        Responses of `seqopt.responses.quantities.CHOSEN_BY`.
-    """
-
-    bricks: int
-    grips: Ints
-    names: tuple[str, ...]
+    bricks: int  # how many bricks stand
+    grips: Ints  # (S, r); nodes held
+    names: tuple[str, ...]  # responses of `seqopt.responses.quantities.CHOSEN_BY`
 
     @cached_property
     def key(self) -> str:
@@ -73,14 +63,7 @@ class Block(FrozenValue):
 
 
 def work(states: int, bricks: int) -> float:
-    """Return about how long states take, in no unit.
-
-    Parameters
-    ----------
-    states : int
-    bricks : int
-        Of each.
-    """
+    """Return about how long states take, in no unit."""
     return float(states * (bricks + APART))
 
 
@@ -91,14 +74,9 @@ APART = 20  # bricks whose share of the work is what every state costs, however 
 class Answers(FrozenValue):
     """What an engine answers for a block.
 
-    Attributes
-    ----------
-    values : mapping of str to (S,) float
-        The responses asked for, SI units.
-    forces : (S, r) float
-        Sizes of the forces of the grips, N.
-    tally : tuple of (object, int)
-        What the engine counted meanwhile, if it counts: `seqopt.engines.auto.AutoEngine`.
+    ``values`` (S,): the responses asked for, SI units; ``forces`` (S, r): sizes of the forces of
+    the grips, N; ``tally`` (object, int): what the engine counted meanwhile, if it counts:
+    `seqopt.engines.auto.AutoEngine`.
     """
 
     values: Mapping[str, Floats]
@@ -109,10 +87,7 @@ class Answers(FrozenValue):
 def answer(engine: Engine, block: Block) -> Answers:
     """Return the responses of a block of states.
 
-    Raises
-    ------
-    MechanismError, SolverError
-        As the engine does.
+    Raises `MechanismError`, `SolverError` as the engine does.
     """
     asked = [CHOSEN_BY[name] for name in block.names]
     want = reduce(or_, (response.needs for response in asked), Want.SCREEN)
@@ -130,13 +105,7 @@ def answer(engine: Engine, block: Block) -> Answers:
 
 
 def tally_of(engine: Engine) -> dict[object, int]:
-    """Return what an engine counts, empty if it does not.
-
-    Returns
-    -------
-    dict of object to int
-        Its own: adding to it counts.
-    """
+    """Return what an engine counts, empty if it does not. Result: its own: adding to it counts."""
     found = getattr(engine, "tally", None)
     return found if isinstance(found, dict) else {}
 
@@ -147,16 +116,9 @@ Blocks = Sequence[Block]
 
 @dataclass(frozen=True)
 class Shipment:
-    """An engine as it is sent: how to make it, or itself where nobody knows.
+    """An engine as it is sent: how to make it, or itself where nobody knows."""
 
-    Attributes
-    ----------
-    key : str
-        Its content, condensed.
-    content : bytes
-    """
-
-    key: str
+    key: str  # its content, condensed
     content: bytes
 
     def unpack(self) -> Engine:
@@ -170,10 +132,7 @@ class Shipment:
 def pack(engine: Engine) -> Shipment:
     """Return an engine as it is sent.
 
-    Raises
-    ------
-    SceneError
-        If it is an engine of one's own that cannot be sent.
+    Raises `SceneError` if it is an engine of one's own that cannot be sent.
     """
     recipe = known_recipe(engine)
     try:
@@ -189,10 +148,8 @@ def pack(engine: Engine) -> Shipment:
 def known_recipe(engine: Engine) -> Recipe | None:
     """Return how an engine can be made again with the same answers.
 
-    Returns
-    -------
-    Recipe or None
-        None for an engine that is not made by name, or of a network that its scene does not have.
+    Result: None for an engine that is not made by name, or of a network that its scene does not
+    have.
     """
     recipe = recipe_of(engine)
     return recipe if recipe is not None and recipe.network == engine.network else None
@@ -201,21 +158,8 @@ def known_recipe(engine: Engine) -> Recipe | None:
 def worker_for(engine: Engine, *, elsewhere: bool) -> Callable[[Blocks], list[Answers]]:
     """Return the function that answers blocks of states.
 
-    Parameters
-    ----------
-    engine : Engine
-    elsewhere : bool
-        Whether it is to be sent to other processes.
-
-    Returns
-    -------
-    callable
-        Takes blocks, returns their answers.
-
-    Raises
-    ------
-    SceneError
-        As of `pack`.
+    ``elsewhere``: whether it is to be sent to other processes. Result: takes blocks, returns their
+    answers.
     """
     return partial(_answer_sent, pack(engine)) if elsewhere else partial(_answer_here, engine)
 
@@ -263,19 +207,8 @@ WORDS = 2**16  # bytes that what an engine counted takes at most
 class Store:
     """The answers of one engine in a folder.
 
-    Parameters
-    ----------
-    folder : pathlib.Path
-        Made if it is not there.
-    engine : Engine
-        Made by name.
-
-    Raises
-    ------
-    FileError
-        If the folder cannot be written.
-    SceneError
-        If nobody can say what the engine's answers depend on.
+    ``folder``: made if it is not there; ``engine``: made by name. Raises `FileError` if the folder
+    cannot be written; `SceneError` if nobody can say what the engine's answers depend on.
     """
 
     def __init__(self, folder: Path, engine: Engine) -> None:
@@ -319,13 +252,7 @@ class Store:
         return Answers(values, numbers[len(values) :].T.copy(), tally)
 
     def keep(self, block: Block, answers: Answers) -> None:
-        """Write the answers to a block.
-
-        Raises
-        ------
-        FileError
-            If the file cannot be written.
-        """
+        """Write the answers to a block. Raises `FileError` if the file cannot be written."""
         numbers = np.array([*(answers.values[name] for name in block.names), *answers.forces.T])
         words = json.dumps([_words(what, count) for what, count in answers.tally])
         content = numbers.astype("<f8").tobytes() + words.encode()
@@ -337,19 +264,7 @@ class Store:
 
 
 def open_store(folder: Path | str | None, engine: Engine) -> Store | None:
-    """Return the store of an engine's answers in a folder.
-
-    Parameters
-    ----------
-    folder : str or pathlib.Path or None
-        None for none.
-    engine : Engine
-
-    Raises
-    ------
-    FileError, SceneError
-        As of `Store`.
-    """
+    """Return the store of an engine's answers in a folder. ``folder``: None for none."""
     return None if folder is None else Store(Path(folder), engine)
 
 

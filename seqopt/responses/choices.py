@@ -70,10 +70,7 @@ class Evaluation(Terse):
     def streams(self) -> bool:
         """Whether there is memory for costs alone: responses then come, and go, step by step.
 
-        Raises
-        ------
-        MemoryShortError
-            If there is not even that.
+        Raises `MemoryShortError` if there is not even that.
         """
         most = self.resources.max_memory
         return require_memory(self.schedule, self.wanted, most) is Keeping.COSTS
@@ -82,10 +79,7 @@ class Evaluation(Terse):
     def steps(self) -> tuple[StepChoices, ...]:
         """All open steps, in order.
 
-        Raises
-        ------
-        MemoryShortError
-            If there is not the memory to keep them.
+        Raises `MemoryShortError` if there is not the memory to keep them.
         """
         if self.streams:
             raise MemoryShortError(
@@ -99,18 +93,10 @@ class Evaluation(Terse):
 
         They are computed as they are taken, and kept for the next time where there is memory.
 
-        Parameters
-        ----------
-        soon : bool, optional
-            Whether there is much to do with each: several processes then work on the next ones
-            together. Else each works on a part of the build of its own, which takes less time.
-
-        Raises
-        ------
-        MechanismError, SolverError, WorkerError
-            As the engine does, and the workers.
-        MemoryShortError
-            If there is not the memory.
+        ``soon``: whether there is much to do with each: several processes then work on the next
+        ones together. Else each works on a part of the build of its own, which takes less time.
+        Raises `MechanismError`, `SolverError`, `WorkerError` as the engine does, and the workers;
+        `MemoryShortError` if there is not the memory.
         """
         keep, known = not self.streams, vars(self).get("_found")
         if known is not None and keep:
@@ -159,29 +145,11 @@ def evaluate_choices(
 ) -> tuple[tuple[StepChoices, ...], int]:
     """Solve every distinct model that the open steps of a schedule contain, once.
 
-    Parameters
-    ----------
-    engine : Engine
-        What solves them.
-    schedule : Schedule
-        Whose open steps are evaluated.
-    wanted : Wanted
-        Which responses every move needs.
-    resources : Resources, optional
-
-    Returns
-    -------
-    steps : tuple of StepChoices
-        All open steps, in order.
-    models : int
-        How many different models there were: a model is a brick count and the nodes held.
-
-    Raises
-    ------
-    MechanismError, SolverError, WorkerError
-        As the engine does, and the workers.
-    MemoryShortError
-        If there is not the memory for them.
+    ``engine``: what solves them; ``schedule``: whose open steps are evaluated; ``wanted``: which
+    responses every move needs. Results: ``steps``: all open steps, in order; ``models``: how many
+    different models there were: a model is a brick count and the nodes held. Raises
+    `MechanismError`, `SolverError`, `WorkerError` as the engine does, and the workers;
+    `MemoryShortError` if there is not the memory for them.
     """
     evaluation = Evaluation(engine, schedule, wanted, resources)
     return evaluation.steps, evaluation.models
@@ -237,11 +205,7 @@ def window_models(schedule: Schedule, choice: Sequence[int]) -> int:
     A step that two moves share is then solved for the later one's candidates only, the earlier
     choice being made.
 
-    Parameters
-    ----------
-    schedule : Schedule
-    choice : sequence of int
-        The chosen candidate of every move.
+    ``choice``: the chosen candidate of every move.
     """
     models = 0
     for level in steps_alike(schedule):

@@ -25,20 +25,11 @@ PORTIONS = 32  # tasks for every worker: one that is slow, or dies, leaves littl
 
 @dataclass(frozen=True)
 class Portion:
-    """Blocks that are answered together.
-
-    Attributes
-    ----------
-    blocks : tuple of Block
-    stored : list of Answers or None
-        Their answers, if they are known.
-    lane : int
-        Which of several processes is to answer them.
-    """
+    """Blocks that are answered together."""
 
     blocks: tuple[Block, ...]
-    stored: list[Answers] | None = None
-    lane: int = 0
+    stored: list[Answers] | None = None  # their answers, if they are known
+    lane: int = 0  # which of several processes is to answer them
 
     @property
     def work(self) -> float:
@@ -59,21 +50,9 @@ def answer_blocks(
     Each process of our own prepares every brick count up to the last that it is asked for. Apart,
     it gets neighboring ones only, and answers to later ones wait for those to earlier ones.
 
-    Parameters
-    ----------
-    engine : Engine
-    blocks : iterable of Block
-        Taken as they are needed.
-    total : float
-        About how much work they are.
-    resources : Resources
-    apart : bool, optional
-        Whether there is room for all answers, and no hurry for the next one.
-
-    Raises
-    ------
-    MechanismError, SolverError, WorkerError
-        As the engine does, and the workers.
+    ``blocks``: taken as they are needed; ``total``: about how much work they are; ``apart``:
+    whether there is room for all answers, and no hurry for the next one. Raises `MechanismError`,
+    `SolverError`, `WorkerError` as the engine does, and the workers.
     """
     store = open_store(resources.cache, engine)
     progress = Progress("responses", total, resources.progress)
@@ -97,13 +76,9 @@ def answer_blocks(
 def take_turns(portions: Sequence[Portion], lanes: int) -> tuple[Iterator[int], Iterator[Portion]]:
     """Return portions with their lanes, which take turns, and the places where they stood.
 
-    Parameters
-    ----------
-    portions : sequence of Portion
-    lanes : int
-        Each gets neighboring ones. Later lanes get fewer, since they prepare all that comes before
-        them too: with a share f of the work they end together where lane i ends at the share
-        (1 - q^i) / (1 - q^n) with q = 1 / (1 + f).
+    ``lanes``: each gets neighboring ones. Later lanes get fewer, since they prepare all that comes
+    before them too: with a share f of the work they end together where lane i ends at the share (1
+    - q^i) / (1 - q^n) with q = 1 / (1 + f).
     """
     before = 1 - (1 + PREPARED) ** -np.arange(1.0, lanes + 1)
     work = np.array([portion.work for portion in portions])
@@ -119,11 +94,7 @@ def take_turns(portions: Sequence[Portion], lanes: int) -> tuple[Iterator[int], 
 def in_places(places: Iterable[int], results: Iterable[Found]) -> Iterator[Found]:
     """Yield results in the order of their places, each as soon as those before it are there.
 
-    Parameters
-    ----------
-    places : iterable of int
-        From 0, each once, in the order of the results.
-    results : iterable
+    ``places``: from 0, each once, in the order of the results.
     """
     waiting: dict[int, Found] = {}
     following = 0
@@ -143,14 +114,7 @@ def share_out(
     one share they prepare once: portions keep the order of the blocks, and end between brick counts
     unless one has several portions' work.
 
-    Parameters
-    ----------
-    blocks : iterable of Block
-    store : Store or None
-    total : float
-        About how much work they are.
-    crew : Crew or None
-        Without one each block is a portion.
+    ``total``: about how much work they are; ``crew``: without one each block is a portion.
     """
     enough = 0.0 if crew is None else total / (PORTIONS * crew.workers)
     mine: list[Block] = []

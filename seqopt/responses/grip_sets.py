@@ -23,10 +23,7 @@ from seqopt.responses.quantities import CHOSEN_BY, lengths, require_finite
 class KnownRows:
     """Rows of values by a key and a code, each computed once.
 
-    Attributes
-    ----------
-    count : int
-        How many rows were computed.
+    ``count``: how many rows were computed.
 
     Examples
     --------
@@ -53,18 +50,9 @@ class KnownRows:
     def of(self, key: object, codes: Ints, compute: Callable[[Ints], Floats]) -> Floats:
         """Return the rows of codes, those that are new computed now, all together.
 
-        Parameters
-        ----------
-        key : object
-            Codes of other keys are others.
-        codes : (n,) int
-        compute : callable
-            Returns the rows (m, k) of distinct codes, given the places (m,) where they first stand
-            among those asked for.
-
-        Returns
-        -------
-        (n, k) float
+        ``key``: codes of other keys are others; ``codes`` (n,); ``compute``: returns the rows (m,
+        k) of distinct codes, given the places (m,) where they first stand among those asked for.
+        Result (n, k).
         """
         distinct, first = np.unique(codes, return_index=True)
         known, values = self._known.get(key, (distinct[:0], None))
@@ -83,14 +71,8 @@ class KnownRows:
 class GripSets:
     """The responses of grip sets of one scene.
 
-    Parameters
-    ----------
-    engine : Engine
-        What solves them.
-    names : sequence of str
-        Responses of `seqopt.responses.quantities.CHOSEN_BY` that are wanted.
-    screen : bool, optional
-        Whether six digits are enough, to choose by.
+    ``engine``: what solves them; ``names``: responses of `seqopt.responses.quantities.CHOSEN_BY`
+    that are wanted; ``screen``: whether six digits are enough, to choose by.
 
     Examples
     --------
@@ -133,20 +115,10 @@ class GripSets:
     def answers(self, bricks: int, held: Ints) -> tuple[Floats, Floats]:
         """Return the responses of grip sets and the forces of their grips.
 
-        Parameters
-        ----------
-        bricks : int
-            How many bricks stand.
-        held : (S, r) int
-            Nodes held, ascending in every row, as places in build order counted from 1; zeros for
-            robots that hold none.
-
-        Returns
-        -------
-        responses : (S, R) float
-            In the order of the names, SI units; infinite where something would be loose.
-        forces : (S, r) float
-            N; zero for a robot that holds none.
+        ``held`` (S, r): nodes held, ascending in every row, as places in build order counted from
+        1; zeros for robots that hold none. Results: ``responses`` (S, R): in the order of the
+        names, SI units; infinite where something would be loose. ``forces`` (S, r): N; zero for a
+        robot that holds none.
         """
         held = np.asarray(held)
         out = np.zeros((len(held), len(self._names) + held.shape[1]))

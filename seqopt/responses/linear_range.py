@@ -40,21 +40,11 @@ REMEDY = (
 
 @dataclass(frozen=True)
 class Departure:
-    """A limit of the linear range that some steps leave.
+    """A limit of the linear range that some steps leave."""
 
-    Attributes
-    ----------
-    what : str
-        What is too large, in a word or two.
-    said : str
-        The largest value, the limit, and why it is one.
-    steps : tuple of int
-        Numbers of the steps.
-    """
-
-    what: str
-    said: str
-    steps: tuple[int, ...]
+    what: str  # what is too large, in a word or two
+    said: str  # the largest value, the limit, and why it is one
+    steps: tuple[int, ...]  # numbers of the steps
 
     def __str__(self) -> str:
         return f"{self.what} of up to {self.said} ({steps_in_words(self.steps)})"
@@ -63,10 +53,7 @@ class Departure:
 class LinearRange:
     """Finds the steps of builds in which an engine's results leave the linear range.
 
-    Attributes
-    ----------
-    unchecked : tuple of str
-        Why stresses in joints are not checked, if they should be: in a line, or none.
+    ``unchecked``: why stresses in joints are not checked, if they should be: in a line, or none.
     """
 
     def __init__(self, engine: Engine) -> None:
@@ -88,12 +75,8 @@ class LinearRange:
     ) -> tuple[Departure, ...]:
         """Return the limits that the steps of a build leave.
 
-        Parameters
-        ----------
-        table : pandas.DataFrame
-            Responses of the steps, from `seqopt.analyze`.
-        fields : iterable of Fields, optional
-            Of every step, with all fields; by default the engine computes them.
+        ``table``: responses of the steps, from `seqopt.analyze`. ``fields``: of every step, with
+        all fields; by default the engine computes them.
 
         Examples
         --------
@@ -126,10 +109,7 @@ class LinearRange:
     def of_builds(self, tables: Mapping[str, pd.DataFrame]) -> dict[str, tuple[Departure, ...]]:
         """Return the limits that builds leave, for those that leave any.
 
-        Parameters
-        ----------
-        tables : mapping of str to pandas.DataFrame
-            Responses of the steps of each, by name.
+        ``tables``: responses of the steps of each, by name.
         """
         return {name: left for name, each in tables.items() if (left := self.departures(each))}
 
@@ -169,15 +149,7 @@ class LinearRange:
 def builds_in_words(departures: Mapping[str, Sequence[Departure]]) -> tuple[str, ...]:
     """Return which builds leave the linear range, and by what.
 
-    Parameters
-    ----------
-    departures : mapping of str to sequence of Departure
-        By the name of the build.
-
-    Returns
-    -------
-    tuple of str
-        Of one line, or none.
+    ``departures``: by the name of the build. Result: of one line, or none.
 
     Examples
     --------

@@ -33,11 +33,6 @@ def number_text(value: float) -> str:
 def length_text(length: float) -> str:
     """Return a length in words, in the unit that suits it.
 
-    Parameters
-    ----------
-    length : float
-        m.
-
     Examples
     --------
     >>> length_text(2.79e-5), length_text(0.1163), length_text(0.0)
@@ -52,10 +47,7 @@ def length_text(length: float) -> str:
 def steps_in_words(steps: Sequence[int]) -> str:
     """Return which steps these are; of many the first.
 
-    Parameters
-    ----------
-    steps : sequence of int
-        Their numbers.
+    ``steps``: their numbers.
 
     Examples
     --------
@@ -99,14 +91,7 @@ class Response:
 def lengths(vectors: Floats) -> Floats:
     """Return the lengths of vectors.
 
-    Parameters
-    ----------
-    vectors : (..., 3) float
-
-    Returns
-    -------
-    (...) float
-        In the unit of the vectors.
+    ``vectors`` (..., 3). Result (...): in the unit of the vectors.
     """
     return np.asarray(np.sqrt(_squared(vectors)))
 
@@ -121,10 +106,7 @@ def robot_response(robot: str) -> str:
     It is ``F_`` and the robot's name; where that means something else already, or cannot be read
     back from a list, the name stands in brackets.
 
-    Parameters
-    ----------
-    robot : str
-        Its name.
+    ``robot``: its name.
 
     Examples
     --------
@@ -139,23 +121,8 @@ def robot_response(robot: str) -> str:
 def require_finite(name: str, values: Floats, bricks: int) -> Floats:
     """Return values of a response if all are finite.
 
-    Parameters
-    ----------
-    name : str
-        Of the response, for the message.
-    values : (...) float
-    bricks : int
-        How many bricks stand, for the message.
-
-    Returns
-    -------
-    (...) float
-        The same.
-
-    Raises
-    ------
-    SolverError
-        If one is not: NaN elsewhere means that a robot holds nothing.
+    ``values`` (...). Result (...). Raises `SolverError` if one is not: NaN elsewhere means that a
+    robot holds nothing.
     """
     if not np.isfinite(values).all():
         raise SolverError(
@@ -168,17 +135,8 @@ def require_finite(name: str, values: Floats, bricks: int) -> Floats:
 def grip_forces(network: Network, fields: Fields) -> Floats:
     """Return the size of every grip force, negative where it points down.
 
-    Parameters
-    ----------
-    network : Network
-        Of a scene that says where up is.
-    fields : Fields
-        Of S grip sets with r grips each.
-
-    Returns
-    -------
-    (S, r) float
-        N; F_rob of Bruun et al.
+    ``network``: of a scene that says where up is; ``fields``: of S grip sets with r grips each.
+    Result (S, r): N; F_rob of Bruun et al.
     """
     return _signed(network, fields.grip_force)
 
@@ -186,17 +144,8 @@ def grip_forces(network: Network, fields: Fields) -> Floats:
 def support_forces(network: Network, fields: Fields) -> Floats:
     """Return the size of the reaction at every ground end, negative where it points down.
 
-    Parameters
-    ----------
-    network : Network
-        Of a scene that says where up is.
-    fields : Fields
-        Of S grip sets, with the supports.
-
-    Returns
-    -------
-    (S, G) float
-        N; zero where the end does not act yet. Ends in the scene's order.
+    ``network``: of a scene that says where up is; ``fields``: of S grip sets, with the supports.
+    Result (S, G): N; zero where the end does not act yet. Ends in the scene's order.
     """
     return _signed(network, fields.support[..., :3])
 
@@ -204,15 +153,8 @@ def support_forces(network: Network, fields: Fields) -> Floats:
 def support_moments(fields: Fields) -> Floats:
     """Return the size of the moment at every ground end about its fixed point.
 
-    Parameters
-    ----------
-    fields : Fields
-        Of S grip sets, with the supports.
-
-    Returns
-    -------
-    (S, G) float
-        N m; zero where the end does not act yet. Ends in the scene's order.
+    ``fields``: of S grip sets, with the supports. Result (S, G): N m; zero where the end does not
+    act yet. Ends in the scene's order.
     """
     return lengths(fields.support[..., 3:])
 

@@ -77,16 +77,8 @@ def analyze(engine: Engine, steps: Sequence[Step]) -> pd.DataFrame:
 def response_table(network: Network, answers: Iterable[tuple[Step, Fields]]) -> pd.DataFrame:
     """Return a row of responses for every step, as `analyze` does, from the fields of each.
 
-    Parameters
-    ----------
-    network : Network
-    answers : iterable of (Step, Fields)
-        Steps with every grip given, and the full fields of one grip set each.
-
-    Raises
-    ------
-    SolverError
-        If a response is not finite.
+    ``answers`` (Step, Fields): steps with every grip given, and the full fields of one grip set
+    each. Raises `SolverError` if a response is not finite.
     """
     return pd.DataFrame([_row(network, step, fields) for step, fields in answers])
 
@@ -99,11 +91,9 @@ def force_column(robot: Robot) -> str:
 def support_columns(scene: Scene) -> list[tuple[str, str]]:
     """Return the columns of a table that hold what a scene's ground ends carry one by one.
 
-    Returns
-    -------
-    list of (str, str)
-        Of the force, N, and the moment, N m, of every ground end in the scene's order, named after
-        the end's brick, and counted from its second end on; none where the scene has one end.
+    Result (str, str): of the force, N, and the moment, N m, of every ground end in the scene's
+    order, named after the end's brick, and counted from its second end on; none where the scene has
+    one end.
 
     Examples
     --------
@@ -122,15 +112,8 @@ def support_columns(scene: Scene) -> list[tuple[str, str]]:
 def step_fields(engine: Engine, step: Step) -> Fields:
     """Return the full fields of one step.
 
-    Returns
-    -------
-    Fields
-        Of one grip set, S = 1.
-
-    Raises
-    ------
-    MechanismError, SolverError
-        As the engine does, the step named.
+    Result: of one grip set, S = 1. Raises `MechanismError`, `SolverError` as the engine does, the
+    step named.
     """
     try:
         return engine.solve(step.bricks, np.array([step.held], dtype=np.int64).reshape(1, -1))
@@ -148,15 +131,8 @@ def fields_archive(engine: Engine, steps: Sequence[Step]) -> bytes:
     ``node_position`` (N, 3), ``node_name`` (N,), and of the ground ends ``support_brick`` (G,) and
     ``support_point`` (G, 3), the fixed points, say what they run over.
 
-    Returns
-    -------
-    bytes
-        The content of the archive; SI units.
-
-    Raises
-    ------
-    MechanismError, SolverError
-        As the engine does, the step named.
+    Result: the content of the archive; SI units. Raises `MechanismError`, `SolverError` as the
+    engine does, the step named.
     """
     return archive(engine.network, [(step, step_fields(engine, step)) for step in steps])
 
@@ -164,16 +140,8 @@ def fields_archive(engine: Engine, steps: Sequence[Step]) -> bytes:
 def archive(network: Network, answers: Iterable[tuple[Step, Fields]]) -> bytes:
     """Return the full fields of steps as `fields_archive` does.
 
-    Parameters
-    ----------
-    network : Network
-    answers : iterable of (Step, Fields)
-        Steps and the full fields of one grip set each.
-
-    Returns
-    -------
-    bytes
-        The content of the archive; SI units.
+    ``answers`` (Step, Fields): steps and the full fields of one grip set each. Result: the content
+    of the archive; SI units.
     """
     arrays: dict[str, np.ndarray] = {
         "edge_nodes": network.edge_nodes,
@@ -220,19 +188,10 @@ def _supports(network: Network, step: Step, fields: Fields) -> dict[str, float]:
 def grips_table(scene: Scene, steps: Sequence[Step], responses: pd.DataFrame) -> pd.DataFrame:
     """Return every grip of a build, for as long as it lasts.
 
-    Parameters
-    ----------
-    scene : Scene
-    steps : sequence of Step
-    responses : pandas.DataFrame
-        Of these steps, as `seqopt.analyze` makes them.
-
-    Returns
-    -------
-    pandas.DataFrame
-        A row per grip, by first step. Columns: ``robot``, ``from_step``, ``to_step``, ``brick``,
-        ``node``, ``places`` (whether the robot places the brick with it), ``largest_force_N`` and
-        ``at_step``, the step of that force.
+    ``responses``: of these steps, as `seqopt.analyze` makes them. Result: a row per grip, by first
+    step. Columns: ``robot``, ``from_step``, ``to_step``, ``brick``, ``node``, ``places`` (whether
+    the robot places the brick with it), ``largest_force_N`` and ``at_step``, the step of that
+    force.
 
     Examples
     --------

@@ -166,10 +166,6 @@ def robots_beside(shape: ArchShape) -> tuple[Robot, ...]:
 
     Those beside it reach its line, but not the far ends of bricks that stick out to the other side.
     Each can bear the weight of the whole arch: give robots of your own to have payloads that bind.
-
-    Returns
-    -------
-    tuple of 3 Robot
     """
     beyond = shape.overhang + 0.25 * shape.dimensions[1]
     weight = math.prod(shape.dimensions) * shape.density * STANDARD_GRAVITY * len(shape.pitch)

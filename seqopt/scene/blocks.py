@@ -22,22 +22,9 @@ def block_brick(
 ) -> Brick:
     """Return a brick of any shape.
 
-    Parameters
-    ----------
-    name : int
-    shape : Polyhedron
-        Where it is in the scene, m.
-    density : float
-        kg/m³.
-    nodes : tuple of 2 int, optional
-        Numbers of its nodes; twice the name, and one more, by default.
-    grips : tuple of 2 Vector, optional
-        Where these are, in the scene, m; `Polyhedron.nodes` by default.
-
-    Returns
-    -------
-    Brick
-        Placed by its second node.
+    ``shape``: where it is in the scene, m. ``density``: kg/m³. ``nodes``: numbers of its nodes;
+    twice the name, and one more, by default. ``grips``: where these are, in the scene, m;
+    `Polyhedron.nodes` by default. Result: placed by its second node.
 
     Examples
     --------
@@ -78,24 +65,15 @@ def _from(center: Floats, name: int, grips: Places) -> tuple[Vector, Vector]:
 
 
 def as_vectors(points: Floats) -> tuple[Vector, ...]:
-    """Return the rows of an array as tuples.
-
-    Parameters
-    ----------
-    points : (k, 3) float
-    """
+    """Return the rows of an array as tuples. ``points`` (k, 3)."""
     return tuple((x, y, z) for x, y, z in points.tolist())
 
 
 def vertices_of(brick: Brick) -> tuple[Floats, Sequence[Sequence[int]]]:
     """Return the vertices of a brick, box or not, and its faces.
 
-    Returns
-    -------
-    vertices : (V, 3) float
-        In the scene, m.
-    faces : sequence of sequence of int
-        Places among them, counterclockwise from outside.
+    Results: ``vertices`` (V, 3): in the scene, m; ``faces``: places among them, counterclockwise
+    from outside.
     """
     if brick.shape is not None:
         return np.asarray(brick.shape.points + np.array(brick.position)), brick.shape.faces

@@ -23,30 +23,14 @@ DEEPEST = 1e-6  # depth that is rounding, over the smallest dimension
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Boxes(FrozenValue):
-    """Where bricks are and how large, as arrays.
+    """Where bricks are and how large, as arrays."""
 
-    Attributes
-    ----------
-    place : (n, 3) float
-        Centroids, m.
-    frame : (n, 3, 3) float
-        Rows are unit vectors along length, width and thickness.
-    half : (n, 3) float
-        Half of each dimension, m.
-    """
-
-    place: Floats
-    frame: Floats
-    half: Floats
+    place: Floats  # (n, 3); centroids, m
+    frame: Floats  # (n, 3, 3); rows are unit vectors along length, width and thickness
+    half: Floats  # (n, 3); half of each dimension, m
 
     def corners(self) -> Floats:
-        """Return where the corners are.
-
-        Returns
-        -------
-        (n, 8, 3) float
-            m.
-        """
+        """Return where the corners are. Result (n, 8, 3): m."""
         signs = np.array(list(product((-1.0, 1.0), repeat=3)))
         return np.asarray(self.place[:, None] + (signs * self.half[:, None]) @ self.frame)
 
@@ -65,13 +49,10 @@ def boxes(bricks: Sequence[Brick]) -> Boxes:
 def separations(bricks: Sequence[Brick]) -> tuple[Ints, Floats]:
     """Return how far bricks are apart that are near each other.
 
-    Returns
-    -------
-    pairs : (P, 2) int
-        Indices of the bricks whose centroids are no farther apart than the longest diagonal.
-    distance : (P,) float
-        m, along the direction in which they are farthest apart: no more than their distance, and
-        the same where faces look at each other; negative where they interpenetrate.
+    Results: ``pairs`` (P, 2): indices of the bricks whose centroids are no farther apart than the
+    longest diagonal. ``distance`` (P,): m, along the direction in which they are farthest apart: no
+    more than their distance, and the same where faces look at each other; negative where they
+    interpenetrate.
 
     Examples
     --------
@@ -103,20 +84,7 @@ def require_apart(
 ) -> None:
     """Require bricks of which no two interpenetrate.
 
-    Parameters
-    ----------
-    where : str
-        What they make, for the message.
-    bricks : sequence of Brick
-    remedy : str
-        What to change, for the message.
-    deepest : float, optional
-        By how much they may, over the smallest dimension.
-
-    Raises
-    ------
-    SceneError
-        Naming the two that interpenetrate most.
+    ``deepest``: by how much they may, over the smallest dimension.
     """
     pairs, distance = separations(bricks)
     thin = min(min(brick.dimensions) for brick in bricks)

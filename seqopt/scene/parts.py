@@ -32,13 +32,7 @@ class Anywhere:
     """A mobile robot: every node is within reach."""
 
     def covers(self, point: Vector) -> bool:
-        """Return whether a point is within reach.
-
-        Parameters
-        ----------
-        point : Vector
-            m.
-        """
+        """Return whether a point is within reach."""
         return True
 
 
@@ -46,17 +40,9 @@ class Anywhere:
 class Side:
     """A robot beside the structure reaches every point of a half-space.
 
-    Parameters
-    ----------
-    toward : Vector
-        Unit vector that points to the robot's side.
-    point : Vector
-        A point of the plane that bounds the reach, m.
-
-    Raises
-    ------
-    SceneError
-        If ``toward`` is not a unit vector or a number is not finite.
+    ``toward``: unit vector that points to the robot's side; ``point``: a point of the plane that
+    bounds the reach, m. Raises `SceneError` if ``toward`` is not a unit vector or a number is not
+    finite.
     """
 
     toward: Vector
@@ -69,13 +55,7 @@ class Side:
             raise SceneError(f"reach: toward is {list(self.toward)}; give a unit vector")
 
     def covers(self, point: Vector) -> bool:
-        """Return whether a point is within reach.
-
-        Parameters
-        ----------
-        point : Vector
-            m.
-        """
+        """Return whether a point is within reach."""
         return dot(self.toward, point) >= dot(self.toward, self.point)
 
 
@@ -110,13 +90,7 @@ class Sphere:
         object.__setattr__(self, "radius", positive("reach: radius", self.radius, "m"))
 
     def covers(self, point: Vector) -> bool:
-        """Return whether a point is within reach.
-
-        Parameters
-        ----------
-        point : Vector
-            m.
-        """
+        """Return whether a point is within reach."""
         return math.dist(self.center, point) <= self.radius
 
 
@@ -124,19 +98,7 @@ Reach = Anywhere | Side | Sphere
 
 
 def as_reach(where: str, given: Reach | str) -> Reach:
-    """Return a reach; ``"anywhere"`` is one too.
-
-    Parameters
-    ----------
-    where : str
-        What it is, for the message.
-    given : Reach or str
-
-    Raises
-    ------
-    SceneError
-        If it is something else.
-    """
+    """Return a reach; ``"anywhere"`` is one too."""
     if isinstance(given, str) and given == "anywhere":
         return Anywhere()
     if not isinstance(given, Anywhere | Side | Sphere):
@@ -228,18 +190,7 @@ class Brick(Terse):
         return self.volume * self.density
 
     def node_position(self, node: int) -> Vector:
-        """Return where one of the brick's inner nodes lies.
-
-        Parameters
-        ----------
-        node : int
-            One of ``nodes``.
-
-        Returns
-        -------
-        Vector
-            m.
-        """
+        """Return where one of the brick's inner nodes lies. ``node``: one of ``nodes``."""
         if self.node_offsets is not None:
             away = self.node_offsets[self.nodes.index(node)]
             x, y, z = (p + d for p, d in zip(self.position, away, strict=True))
@@ -254,24 +205,15 @@ class Brick(Terse):
 class Spring(Terse):
     """Where a joint acts and how stiff it is, in its own axes.
 
-    Parameters
-    ----------
-    position : Vector
-        The point where the springs act, m.
-    along, across : Vector
-        Unit vectors along the joint's normal and across it, at right angles; the third axis is
-        their cross product.
-    translational_stiffness : Vector
-        N/m along the three axes, zero allowed.
-    rotational_stiffness : Vector
-        N m/rad about the three axes, zero allowed.
-    thickness : float, optional
-        Of what lies between the faces, m: to be given where it is more than `THICKEST` of the
-        smallest dimension of the bricks; faces farther apart do not touch.
-    face : tuple of tuple of 2 float, optional
-        Corners of the convex face over which the bodies touch, once around: from ``position`` along
-        ``across`` and along the third axis, m. ``along`` then points from the first brick into the
-        second, or from the ground into its brick. By default faces follow from the boxes.
+    ``position``: the point where the springs act, m. ``along``, ``across``: unit vectors along the
+    joint's normal and across it, at right angles; the third axis is their cross product.
+    ``translational_stiffness``: N/m along the three axes, zero allowed. ``rotational_stiffness``: N
+    m/rad about the three axes, zero allowed. ``thickness``: of what lies between the faces, m: to
+    be given where it is more than `THICKEST` of the smallest dimension of the bricks; faces farther
+    apart do not touch. ``face``: corners of the convex face over which the bodies touch, once
+    around: from ``position`` along ``across`` and along the third axis, m. ``along`` then points
+    from the first brick into the second, or from the ground into its brick. By default faces follow
+    from the boxes.
     """
 
     position: Vector

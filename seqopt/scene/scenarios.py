@@ -28,11 +28,8 @@ End = TypeVar("End", Joint, Ground)
 def stiffened(scene: Scene, translational: Floats, rotational: Floats) -> Scene:
     """Return a scene whose joints and ground ends are stiffer by factors.
 
-    Parameters
-    ----------
-    scene : Scene
-    translational, rotational : (J + G,) float
-        A factor for every joint, then for every ground end, for all three axes; no unit.
+    ``translational``, ``rotational`` (J + G,): a factor for every joint, then for every ground end,
+    for all three axes; no unit.
     """
     pairs = [*zip(translational.tolist(), rotational.tolist(), strict=True)]
 
@@ -55,11 +52,7 @@ def stiffened(scene: Scene, translational: Floats, rotational: Floats) -> Scene:
 def weighed(scene: Scene, factors: Floats) -> Scene:
     """Return a scene whose bricks are heavier by factors.
 
-    Parameters
-    ----------
-    scene : Scene
-    factors : (B,) float
-        For the density of every brick, in the scene's order; no unit.
+    ``factors`` (B,): for the density of every brick, in the scene's order; no unit.
     """
     pairs = zip(scene.bricks, factors.tolist(), strict=True)
     return replace(scene, bricks=tuple(replace(b, density=b.density * f) for b, f in pairs))
@@ -70,12 +63,7 @@ def shifted(scene: Scene, size: float, rng: np.random.Generator) -> Scene:
 
     A brick takes its nodes with it, a ground end its fixed point.
 
-    Parameters
-    ----------
-    scene : Scene
-    size : float
-        m; every coordinate moves by a uniform draw between minus and plus this.
-    rng : numpy.random.Generator
+    ``size``: m; every coordinate moves by a uniform draw between minus and plus this.
     """
 
     def moved(point: Vector, step: Floats) -> Vector:
@@ -109,18 +97,9 @@ LARGEST_FACTOR = 1e6
 class Scenarios:
     """Samples of a scene, and how they were drawn.
 
-    Attributes
-    ----------
-    nominal : Scene
-        What they are samples of.
-    stiffness : (float, float)
-        Least and largest factor of a joint's stiffness.
-    density : float
-        Largest relative change of a brick's density.
-    position : float
-        Largest shift along every axis, m.
-    seed : int
-    scenes : tuple of Scene
+    ``nominal``: what they are samples of; ``stiffness`` (float, float): least and largest factor of
+    a joint's stiffness; ``density``: largest relative change of a brick's density; ``position``:
+    largest shift along every axis, m.
     """
 
     nominal: Scene

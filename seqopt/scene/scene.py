@@ -25,19 +25,7 @@ HEAVY = 1e100  # N, N/m, N m/rad; squares of what is beyond overflow, of its inv
 
 
 def check_bricks(bricks: Sequence[Brick], gravity: Vector) -> None:
-    """Require bricks that have a size, a place and a weight.
-
-    Parameters
-    ----------
-    bricks : sequence of Brick
-    gravity : Vector
-        m/s².
-
-    Raises
-    ------
-    SceneError
-        Naming the brick.
-    """
+    """Require bricks that have a size, a place and a weight. ``gravity``: m/s²."""
     pull = math.hypot(*gravity)
     for brick in bricks:
         where, smallest = f"brick {brick.name}", min(brick.dimensions)
@@ -59,19 +47,7 @@ def check_bricks(bricks: Sequence[Brick], gravity: Vector) -> None:
 
 
 def check_springs(springs: Sequence[Joint | Ground], bricks: Mapping[int, Brick]) -> None:
-    """Require joints and ground ends whose edges have a length.
-
-    Parameters
-    ----------
-    springs : sequence of Joint or Ground
-    bricks : mapping of int to Brick
-        By name.
-
-    Raises
-    ------
-    SceneError
-        Naming the joint or ground end.
-    """
+    """Require joints and ground ends whose edges have a length. ``bricks``: by name."""
     farthest = FAR * max(max(brick.dimensions) for brick in bricks.values())
     for spring in springs:
         ends = spring.bricks if isinstance(spring, Joint) else (spring.brick,)
@@ -216,27 +192,13 @@ class Scene(Shown):
         return {node: brick for brick in self.bricks for node in brick.nodes}
 
     def node_position(self, node: int) -> Vector:
-        """Return where an inner node lies.
-
-        Parameters
-        ----------
-        node : int
-            Its number.
-
-        Returns
-        -------
-        Vector
-            m.
-        """
+        """Return where an inner node lies. ``node``: its number."""
         return self.brick_of_node[node].node_position(node)
 
     def within_reach(self, robot: Robot) -> tuple[tuple[int, ...], ...]:
         """Return the nodes that a robot may hold, by brick.
 
-        Returns
-        -------
-        tuple of tuple of int
-            Bricks in build order; nodes neither blocked nor out of reach.
+        Result: bricks in build order; nodes neither blocked nor out of reach.
         """
         if robot.reach not in self._within_reach:
             blocked, covers = {*self.blocked_nodes}, robot.reach.covers
@@ -264,10 +226,7 @@ class Scene(Shown):
     def with_robots(self, *robots: Robot) -> Scene:
         """Return the same scene with other robots.
 
-        Parameters
-        ----------
-        *robots : Robot
-            All robots of the new scene.
+        ``*robots``: all robots of the new scene.
 
         Examples
         --------
@@ -281,20 +240,9 @@ class Scene(Shown):
     def plot(self, bricks: int | None = None) -> Figure:
         """Draw the scene, or its first bricks.
 
-        Parameters
-        ----------
-        bricks : int, optional
-            How many, in build order; the others are drawn pale. All by default.
-
-        Returns
-        -------
-        matplotlib.figure.Figure
-            A notebook shows it; ``savefig`` writes it to a file.
-
-        Raises
-        ------
-        ExtraError
-            If matplotlib is not installed (extra ``plot``).
+        ``bricks``: how many, in build order; the others are drawn pale. All by default. Result: a
+        notebook shows it; ``savefig`` writes it to a file. Raises `ExtraError` if matplotlib is not
+        installed (extra ``plot``).
         """
         figure: Figure = display("scene_picture")(self, bricks)
         return figure

@@ -36,10 +36,7 @@ PULL = 100.0  # m/s²; ten times that of the earth
 def doubts(scene: Scene) -> tuple[str, ...]:
     """Return what looks wrong in a scene, one line each.
 
-    Returns
-    -------
-    tuple of str
-        Each names the object, its value and what may be meant; empty for most scenes.
+    Result: each names the object, its value and what may be meant; empty for most scenes.
 
     Examples
     --------
@@ -57,11 +54,7 @@ def doubts(scene: Scene) -> tuple[str, ...]:
 def warn_of(scene: Scene, name: str) -> None:
     """Warn of what looks wrong in a scene.
 
-    Parameters
-    ----------
-    scene : Scene
-    name : str
-        What to call it.
+    ``name``: what to call it.
 
     Warns
     -----
@@ -147,29 +140,12 @@ def schema() -> dict[str, Any]:
 
 
 def builtin_scenes() -> tuple[str, ...]:
-    """Return the names of the scenes that ship with the package.
-
-    Returns
-    -------
-    tuple of str
-        In alphabetical order.
-    """
+    """Return the names of the scenes that ship with the package. Result: in alphabetical order."""
     return tuple(sorted({*_stored(), *GENERATED}))
 
 
 def about(name: str) -> str:
-    """Return what a built-in scene is.
-
-    Parameters
-    ----------
-    name : str
-        One of `builtin_scenes`.
-
-    Returns
-    -------
-    str
-        A line.
-    """
+    """Return what a built-in scene is. ``name``: one of `builtin_scenes`. Result: a line."""
     return ABOUT[name]
 
 
@@ -245,17 +221,8 @@ def _no_such(name: str) -> str:
 def parse_scene(text: str, source: str = "text") -> Scene:
     """Return the scene that a JSON document describes.
 
-    Parameters
-    ----------
-    text : str
-        The document.
-    source : str, optional
-        Where it comes from, for messages.
-
-    Raises
-    ------
-    SceneError
-        If the text is not JSON, breaks the schema or describes no scene that can be.
+    ``text``: the document. Raises `SceneError` if the text is not JSON, breaks the schema or
+    describes no scene that can be.
     """
     try:
         document = json.loads(text, object_pairs_hook=partial(_entries, source))
@@ -284,15 +251,7 @@ def _entries(source: str, pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 def scene_from_dict(document: dict[str, Any]) -> Scene:
     """Return the scene of a document that obeys the schema.
 
-    Parameters
-    ----------
-    document : dict
-        As of `scene_to_dict`.
-
-    Raises
-    ------
-    SceneError
-        If its parts do not fit together.
+    ``document``: as of `scene_to_dict`. Raises `SceneError` if its parts do not fit together.
     """
     content = {key: value for key, value in document.items() if key not in ("format", "version")}
     content["bricks"] = [Brick(**with_shape(brick)) for brick in content["bricks"]]

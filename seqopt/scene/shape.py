@@ -20,19 +20,7 @@ STRAIGHT = 1e-9  # by how much a convex polygon may turn back, over the square o
 
 
 def rows(where: str, values: Iterable[Part]) -> tuple[Part, ...]:
-    """Return what there is to go through.
-
-    Parameters
-    ----------
-    where : str
-        What it is, for the message.
-    values : iterable
-
-    Raises
-    ------
-    SceneError
-        If it is no list.
-    """
+    """Return what there is to go through. Raises `SceneError` if it is no list."""
     if isinstance(values, str) or not isinstance(values, Iterable):
         raise SceneError(f"{where} is {short(values)}; give a list")
     return tuple(values)
@@ -43,22 +31,8 @@ def convex_polygon(
 ) -> tuple[tuple[float, float], ...]:
     """Return the corners of a convex polygon, counterclockwise.
 
-    Parameters
-    ----------
-    where : str
-        What it is, for the message.
-    corners : iterable of iterable of float
-        Two coordinates each, once around, m.
-
-    Returns
-    -------
-    tuple of tuple of 2 float
-
-    Raises
-    ------
-    SceneError
-        If there are fewer than three, one is not finite, or they are no convex polygon with an
-        area.
+    ``corners``: two coordinates each, once around, m. Raises `SceneError` if there are fewer than
+    three, one is not finite, or they are no convex polygon with an area.
     """
     points = []
     for corner in rows(where, corners):
@@ -89,18 +63,10 @@ NEAR = (1.0, 0.75, 0.5, 0.25, 0.1)  # of a quarter of the extent: where a node i
 class Polyhedron:
     """A closed polyhedron, convex or not.
 
-    Parameters
-    ----------
-    vertices : tuple of Vector
-        From the block's centroid, in the scene's axes, m.
-    faces : tuple of tuple of int
-        Places among the vertices, once around each face, counterclockwise from outside.
-
-    Raises
-    ------
-    SceneError
-        If it is not closed, its faces are not flat or do not agree which side is outside, or its
-        volume is not positive.
+    ``vertices``: from the block's centroid, in the scene's axes, m; ``faces``: places among the
+    vertices, once around each face, counterclockwise from outside. Raises `SceneError` if it is not
+    closed, its faces are not flat or do not agree which side is outside, or its volume is not
+    positive.
 
     Examples
     --------
@@ -189,27 +155,11 @@ class Polyhedron:
         return frozen(found)
 
     def extents(self, axes: Floats) -> Floats:
-        """Return how far it extends along unit vectors.
-
-        Parameters
-        ----------
-        axes : (k, 3) float
-
-        Returns
-        -------
-        (k,) float
-            m.
-        """
+        """Return how far it extends along unit vectors. ``axes`` (k, 3). Result (k,): m."""
         return np.asarray(np.ptp(self.points @ axes.T, axis=0))
 
     def contains(self, point: Floats) -> bool:
-        """Return whether a point lies inside: its faces surround it once.
-
-        Parameters
-        ----------
-        point : (3,) float
-            m.
-        """
+        """Return whether a point lies inside: its faces surround it once. ``point`` (3,)."""
         a, b, c = np.moveaxis(self.triangles - point, 1, 0)
         lengths = [np.linalg.norm(side, axis=1) for side in (a, b, c)]
         above = np.einsum("ti,ti->t", a, np.cross(b, c))
@@ -221,11 +171,8 @@ class Polyhedron:
     def nodes(self) -> tuple[Vector, Vector]:
         """Return where its two inner nodes lie if nobody says: on either side of the centroid.
 
-        Returns
-        -------
-        tuple of 2 Vector
-            From the centroid, m: a quarter of the extent away along the longest principal axis;
-            nearer, or along another axis, where that is outside; outside if all are.
+        Result: from the centroid, m: a quarter of the extent away along the longest principal axis;
+        nearer, or along another axis, where that is outside; outside if all are.
         """
         reach = 0.25 * self.extents(self.axes)
         tries = [(share * reach[i], i) for i in range(3) for share in NEAR]
@@ -241,15 +188,7 @@ class Polyhedron:
 def normal_of(corners: Floats) -> Floats:
     """Return the normal of a polygon, as long as twice its area.
 
-    Parameters
-    ----------
-    corners : (m, 3) float
-        Once around, m.
-
-    Returns
-    -------
-    (3,) float
-        m².
+    ``corners`` (m, 3): once around, m. Result (3,): m².
     """
     spokes = corners - corners[0]
     return np.asarray(np.cross(spokes[1:-1], spokes[2:]).sum(axis=0))
@@ -258,15 +197,7 @@ def normal_of(corners: Floats) -> Floats:
 def bend(corners: Floats) -> float:
     """Return how far corners of a polygon lie from its plane.
 
-    Parameters
-    ----------
-    corners : (m, 3) float
-        Once around, m.
-
-    Returns
-    -------
-    float
-        m; infinite if it has no area.
+    ``corners`` (m, 3): once around, m. Result: m; infinite if it has no area.
     """
     normal = normal_of(corners)
     size = float(np.linalg.norm(normal))
@@ -278,15 +209,7 @@ def bend(corners: Floats) -> float:
 def with_shape(entry: dict[str, Any]) -> dict[str, Any]:
     """Return the entry of a brick in a document with its shape, if it has one, as a value.
 
-    Parameters
-    ----------
-    entry : dict
-        With ``name`` and perhaps ``shape``.
-
-    Raises
-    ------
-    SceneError
-        Naming the brick, if its shape is no polyhedron.
+    ``entry``: with ``name`` and perhaps ``shape``.
     """
     if entry.get("shape") is None:
         return entry
@@ -332,21 +255,7 @@ SAME_PLACE = 1e-6  # distance treated as zero, over the size of a block
 def two_points(where: str, given: tuple[Vector, Vector]) -> tuple[Vector, Vector]:
     """Return where the nodes of a block are if they are two places.
 
-    Parameters
-    ----------
-    where : str
-        The block, for messages.
-    given : tuple of 2 Vector
-        m.
-
-    Returns
-    -------
-    tuple of 2 Vector
-
-    Raises
-    ------
-    SceneError
-        If they are not two different points.
+    Raises `SceneError` if they are not two different points.
     """
     found = [vector(f"{where}: node_offsets", row) for row in rows(f"{where}: node_offsets", given)]
     if len(found) != 2 or found[0] == found[1]:
@@ -357,20 +266,7 @@ def two_points(where: str, given: tuple[Vector, Vector]) -> tuple[Vector, Vector
 def check_shape(where: str, shape: object, dimensions: Vector, axes: tuple[Vector, Vector]) -> None:
     """Require a shape about the centroid that extends as far as the dimensions say.
 
-    Parameters
-    ----------
-    where : str
-        The block, for messages.
-    shape : Polyhedron
-    dimensions : Vector
-        m.
-    axes : tuple of 2 Vector
-        Unit vectors along length and width.
-
-    Raises
-    ------
-    SceneError
-        If it is not such a shape.
+    ``axes``: unit vectors along length and width. Raises `SceneError` if it is not such a shape.
     """
     size = max(dimensions)
     if not isinstance(shape, Polyhedron):

@@ -91,15 +91,8 @@ class FreeRules:
     def team(self, scene: Scene) -> tuple[int, ...]:
         """Return which of a scene's robots take part.
 
-        Returns
-        -------
-        tuple of int
-            Indices of its robots, ascending.
-
-        Raises
-        ------
-        StepError
-            If a robot is not in the scene, too few or too many take part, or fewer than must hold.
+        Result: indices of its robots, ascending. Raises `StepError` if a robot is not in the scene,
+        too few or too many take part, or fewer than must hold.
         """
         known = [robot.name for robot in scene.robots]
         for name in (*self.robots, *self.placers):
@@ -126,13 +119,7 @@ class FreeRules:
         return team
 
     def described(self, scene: Scene) -> dict[str, object]:
-        """Return the rules with their values, ready for JSON.
-
-        Returns
-        -------
-        dict
-            By name.
-        """
+        """Return the rules with their values, ready for JSON. Result: by name."""
         names = [scene.robots[i].name for i in self.team(scene)]
         return {
             "robots": names,
@@ -166,21 +153,8 @@ class FreeRules:
 def with_robots(scene: Scene, count: int) -> Scene:
     """Return a scene with a number of robots: its own first, then mobile ones that reach all.
 
-    Parameters
-    ----------
-    scene : Scene
-    count : int
-        From two to five.
-
-    Returns
-    -------
-    Scene
-        Further robots reach every node and have the largest payload of the scene's own.
-
-    Raises
-    ------
-    StepError
-        If there would be fewer or more.
+    ``count``: from two to five. Result: further robots reach every node and have the largest
+    payload of the scene's own. Raises `StepError` if there would be fewer or more.
 
     Examples
     --------

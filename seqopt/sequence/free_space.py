@@ -27,21 +27,11 @@ from seqopt.sequence.two_robots import placing_node
 
 
 class Moves(NamedTuple):
-    """Moves from states of one brick count.
+    """Moves from states of one brick count."""
 
-    Attributes
-    ----------
-    source : (m,) int
-        Row of the state that each leads from.
-    states : (m, c) int
-        The states that they lead to.
-    way : (m,) float
-        How far the robot goes that takes a grip, m; zero where ways do not count.
-    """
-
-    source: Ints
-    states: Ints
-    way: Floats
+    source: Ints  # (m,); row of the state that each leads from
+    states: Ints  # (m, c); the states that they lead to
+    way: Floats  # (m,); how far the robot goes that takes a grip, m; zero where ways do not count
 
 
 def grip_pairs(
@@ -49,22 +39,9 @@ def grip_pairs(
 ) -> Moves:
     """Return the moves in which the robot of a column takes one of some nodes that nobody holds.
 
-    Parameters
-    ----------
-    states : (n, c) int
-        In which that robot is free.
-    slot : int
-        Its column.
-    nodes : (m,) int
-        From 0.
-    robots_and_ways : tuple
-        How many columns are robots; distances between nodes, (2B + 1, 2B + 1), m, or None where
-        ways do not count.
-
-    Returns
-    -------
-    Moves
-        The entries of a kind are not sorted.
+    ``states`` (n, c): in which that robot is free. ``slot``: its column. ``nodes`` (m,): from 0.
+    ``robots_and_ways``: how many columns are robots; distances between nodes, (2B + 1, 2B + 1), m,
+    or None where ways do not count. Result: the entries of a kind are not sorted.
     """
     robots, distance = robots_and_ways
     taken = np.zeros((len(states), int(max(nodes.max() + 1, states[:, :robots].max())) + 1), bool)
@@ -81,25 +58,14 @@ def grip_pairs(
 def sort_entries(states: Ints, first: int, end: int) -> None:
     """Sort the entries of the robots of a kind, largest first, in place.
 
-    Parameters
-    ----------
-    states : (n, c) int
-    first, end : int
-        Its first column, and the one after its last.
+    ``states`` (n, c); ``first``, ``end``: its first column, and the one after its last.
     """
     if end - first > 1:
         states[:, first:end] = -np.sort(-states[:, first:end], axis=1)
 
 
 def join_moves(parts: Sequence[Moves], states: Ints) -> Moves:
-    """Return several moves as one.
-
-    Parameters
-    ----------
-    parts : sequence of Moves
-    states : (n, c) int
-        That they lead from.
-    """
+    """Return several moves as one. ``states`` (n, c): that they lead from."""
     none = np.zeros(0, dtype=np.int64)
     whole = [Moves(none, states[:0], np.zeros(0)), *parts]
     return Moves(*map(np.concatenate, zip(*whole, strict=True)))
@@ -108,18 +74,8 @@ def join_moves(parts: Sequence[Moves], states: Ints) -> Moves:
 def number_rows(states: Ints, robots: int, least: int, most: int) -> Ints:
     """Return a number for every state that no other one has.
 
-    Parameters
-    ----------
-    states : (n, c) int
-        Columns after those of robots count first.
-    robots : int
-        How many columns are robots.
-    least, most : int
-        Between which their entries are.
-
-    Returns
-    -------
-    (n,) int
+    ``states`` (n, c): columns after those of robots count first; ``robots``: how many columns are
+    robots; ``least``, ``most``: between which their entries are. Result (n,).
     """
     further = states.shape[1] > robots
     out = np.zeros(len(states), dtype=np.int64)
@@ -137,18 +93,9 @@ class RobotKind(FrozenValue):
 
     Nodes are counted as in ``network.inner.ravel()``: brick by brick in build order.
 
-    Attributes
-    ----------
-    robots : tuple of int
-        Indices of the scene's robots.
-    reach : (2B,) bool
-        Nodes that they may hold: within reach and not blocked.
-    newest : (2B,) bool
-        Nodes at which they hold a brick when they place it, and as the newest one.
-    places : bool
-        Whether they may place.
-    cap : float
-        Largest force of a grip, N.
+    ``robots``: indices of the scene's robots; ``reach`` (2B,): nodes that they may hold: within
+    reach and not blocked; ``newest`` (2B,): nodes at which they hold a brick when they place it,
+    and as the newest one; ``places``: whether they may place; ``cap``: largest force of a grip, N.
     """
 
     robots: tuple[int, ...]
@@ -163,22 +110,8 @@ def sort_robots(
 ) -> tuple[RobotKind, ...]:
     """Return the robots that take part, sorted by kind.
 
-    Parameters
-    ----------
-    network : Network
-    rules : FreeRules
-    caps : mapping of str to float, optional
-        Largest force of a robot's grip beside its payload, by its name, N.
-
-    Returns
-    -------
-    tuple of RobotKind
-        In the order of their first robots.
-
-    Raises
-    ------
-    StepError
-        As `FreeRules.team` does.
+    ``caps``: largest force of a robot's grip beside its payload, by its name, N. Result: in the
+    order of their first robots.
     """
     alike: dict[tuple[object, ...], list[int]] = {}
     parts: dict[tuple[object, ...], RobotKind] = {}
@@ -201,21 +134,13 @@ def sort_robots(
 def node_numbers(network: Network) -> list[int]:
     """Return the scene's numbers of all inner nodes, brick by brick in build order.
 
-    Returns
-    -------
-    list of int
-        (2B,)
+    Result: (2B,).
     """
     return [node for brick in network.scene.placed for node in brick.nodes]
 
 
 def reached(network: Network, robot: Robot) -> Bools:
-    """Return which nodes a robot may hold: within its reach and not blocked.
-
-    Returns
-    -------
-    (2B,) bool
-    """
+    """Return which nodes a robot may hold: within its reach and not blocked. Result (2B,)."""
     scene = network.scene
     return np.array(
         [
@@ -244,14 +169,8 @@ PAIRS = 4_000_000  # of states and nodes that are looked at together
 class FreeSpace(Terse):
     """The states of a free schedule and the moves between them.
 
-    Parameters
-    ----------
-    network : Network
-    rules : FreeRules
-    kinds : tuple of RobotKind
-        The robots that take part.
-    parks : bool
-        Whether free robots stay where they were, for their travel.
+    ``kinds``: the robots that take part; ``parks``: whether free robots stay where they were, for
+    their travel.
     """
 
     network: Network
@@ -290,10 +209,8 @@ class FreeSpace(Terse):
     def start(self) -> Ints:
         """Return the one state before the first brick.
 
-        Returns
-        -------
-        (1, c) int
-            Of the smallest type that holds every node: there may be tens of millions of states.
+        Result (1, c): of the smallest type that holds every node: there may be tens of millions of
+        states.
         """
         kind = np.min_scalar_type(-max(2 * self.bricks, self.rules.regrips or 0) - 1)
         return np.zeros((1, self.robots + self._counts), dtype=kind)
@@ -301,13 +218,7 @@ class FreeSpace(Terse):
     def codes(self, states: Ints) -> Ints:
         """Return a number for every state that no other one of its brick count has.
 
-        Parameters
-        ----------
-        states : (n, c) int
-
-        Returns
-        -------
-        (n,) int
+        ``states`` (n, c). Result (n,).
         """
         last = 2 * self.bricks
         return number_rows(states, self.robots, -last if self.parks else 0, last)
@@ -315,42 +226,18 @@ class FreeSpace(Terse):
     def held(self, states: Ints) -> Ints:
         """Return which nodes are held, sorted, zeros for robots that are free first.
 
-        Parameters
-        ----------
-        states : (n, c) int
-
-        Returns
-        -------
-        (n, robots) int
+        ``states`` (n, c). Result (n, robots).
         """
         return np.sort(states[:, : self.robots].clip(min=0), axis=1)
 
     def grips(self, states: Ints) -> Ints:
-        """Return how many grips are held.
-
-        Parameters
-        ----------
-        states : (n, c) int
-
-        Returns
-        -------
-        (n,) int
-        """
+        """Return how many grips are held. ``states`` (n, c). Result (n,)."""
         return np.asarray((states[:, : self.robots] > 0).sum(axis=1))
 
     def places(self, bricks: int, states: Ints) -> Moves:
         """Return the moves that place the next brick; a free robot then holds it.
 
-        Parameters
-        ----------
-        bricks : int
-            How many bricks stand before.
-        states : (n, c) int
-
-        Returns
-        -------
-        Moves
-            To lawful states.
+        ``bricks``: how many bricks stand before; ``states`` (n, c). Result: to lawful states.
         """
         nodes = np.array([2 * bricks, 2 * bricks + 1])
         parts = []
@@ -365,15 +252,7 @@ class FreeSpace(Terse):
     def holds(self, bricks: int, states: Ints) -> Moves:
         """Return the moves in which a free robot takes a grip on a brick that stands.
 
-        Parameters
-        ----------
-        bricks : int
-        states : (n, c) int
-
-        Returns
-        -------
-        Moves
-            To lawful states, as many of them as rules allow.
+        ``states`` (n, c). Result: to lawful states, as many of them as rules allow.
         """
         able = self.lawful(bricks, states)
         if self.rules.regrips is not None:
@@ -390,15 +269,8 @@ class FreeSpace(Terse):
     def releases(self, bricks: int, states: Ints) -> Moves:
         """Return the moves in which one robot lets go, or at the end all do.
 
-        Parameters
-        ----------
-        bricks : int
-        states : (n, c) int
-
-        Returns
-        -------
-        Moves
-            To lawful states, and at the last brick to those that the rules' ending allows.
+        ``states`` (n, c). Result: to lawful states, and at the last brick to those that the rules'
+        ending allows.
         """
         parts = []
         for first, end in self.slots:
@@ -418,14 +290,7 @@ class FreeSpace(Terse):
     def lawful(self, bricks: int, states: Ints) -> Bools:
         """Return which states keep the rules as long as the build goes on.
 
-        Parameters
-        ----------
-        bricks : int
-        states : (n, c) int
-
-        Returns
-        -------
-        (n,) bool
+        ``states`` (n, c). Result (n,).
         """
         held = states[:, : self.robots]
         ok = np.asarray(self.grips(states) >= (self.rules.least_grips if bricks > 1 else 0))
@@ -441,16 +306,7 @@ class FreeSpace(Terse):
         return ok
 
     def ended(self, states: Ints) -> Bools:
-        """Return which states with all bricks end the build.
-
-        Parameters
-        ----------
-        states : (n, c) int
-
-        Returns
-        -------
-        (n,) bool
-        """
+        """Return which states with all bricks end the build. ``states`` (n, c). Result (n,)."""
         if self.rules.ending is Ending.HELD:
             return self.lawful(self.bricks, states)
         return np.asarray((states[:, : self.robots] <= 0).all(axis=1))
@@ -512,19 +368,9 @@ def free_space(
 ) -> FreeSpace:
     """Return the states of a free schedule in a scene.
 
-    Parameters
-    ----------
-    network : Network
-    rules : FreeRules
-    caps : mapping of str to float, optional
-        Largest force of a robot's grip beside its payload, by its name, N.
-    parks : bool, optional
-        Whether free robots stay where they were, for their travel.
-
-    Raises
-    ------
-    StepError
-        If robots do not fit the rules, or states cannot be numbered.
+    ``caps``: largest force of a robot's grip beside its payload, by its name, N; ``parks``: whether
+    free robots stay where they were, for their travel. Raises `StepError` if robots do not fit the
+    rules, or states cannot be numbered.
 
     Examples
     --------

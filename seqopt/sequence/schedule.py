@@ -32,18 +32,10 @@ if TYPE_CHECKING:
 class Hold:
     """One grip, for as long as it lasts.
 
-    Attributes
-    ----------
-    robot : int
-        Index among the scene's robots.
-    first, last : int
-        Numbers of the first and the last step in which it is held.
-    node : int or None
-        That is held; None where it is still to be chosen.
-    move : int or None
-        Index of the move that chooses it, from 0; None where it is given.
-    places : int or None
-        Name of the brick that is placed with it in its first step; None if none is.
+    ``robot``: index among the scene's robots. ``first``, ``last``: numbers of the first and the
+    last step in which it is held. ``node``: that is held; None where it is still to be chosen.
+    ``move``: index of the move that chooses it, from 0; None where it is given. ``places``: name of
+    the brick that is placed with it in its first step; None if none is.
     """
 
     robot: int
@@ -57,16 +49,7 @@ class Hold:
 def holds(scene: Scene, steps: Sequence[AnyStep]) -> tuple[Hold, ...]:
     """Return every grip of a sequence or schedule, for as long as it lasts.
 
-    Parameters
-    ----------
-    scene : Scene
-    steps : sequence of AnyStep
-        Of a method, a plan or a schedule, in order.
-
-    Returns
-    -------
-    tuple of Hold
-        By robot, then by first step.
+    ``steps``: of a method, a plan or a schedule, in order. Result: by robot, then by first step.
 
     Examples
     --------
@@ -103,13 +86,7 @@ def _hold(scene: Scene, robot: int, first: AnyStep, last: int) -> Hold:
 
 @dataclass(frozen=True)
 class OpenGrip:
-    """A grip to be chosen.
-
-    Parameters
-    ----------
-    move : int
-        Index of its move among the moves of the schedule, from 0.
-    """
+    """A grip to be chosen. ``move``: index of its move among the moves of the schedule, from 0."""
 
     move: int
 
@@ -124,16 +101,9 @@ ScheduledGrips = tuple[int | OpenGrip | None, ...]
 class OpenStep:
     """A step whose grips are nodes, open moves, or none.
 
-    Parameters
-    ----------
-    number : int
-        From 1.
-    kind : StepKind
-        What the step does.
-    bricks : int
-        How many bricks stand, in build order.
-    grips : tuple of (int, OpenGrip or None)
-        What each of the scene's robots holds: a node, a grip to be chosen, or nothing.
+    ``number``: from 1; ``kind``: what the step does; ``bricks``: how many bricks stand, in build
+    order; ``grips`` (int, OpenGrip or None): what each of the scene's robots holds: a node, a grip
+    to be chosen, or nothing.
     """
 
     number: int
@@ -151,16 +121,9 @@ class OpenStep:
 class Move(Terse):
     """One repositioning to be decided.
 
-    Parameters
-    ----------
-    robot : str
-        Name of the robot that moves.
-    step : int
-        Number of the step in which it takes its grip.
-    bricks : int
-        Bricks placed at that step.
-    candidates : tuple of int
-        Nodes open to it: within reach, and held by no other robot while it stays.
+    ``robot``: name of the robot that moves; ``step``: number of the step in which it takes its
+    grip; ``bricks``: bricks placed at that step; ``candidates``: nodes open to it: within reach,
+    and held by no other robot while it stays.
     """
 
     robot: str
@@ -225,13 +188,10 @@ class Schedule(Shown):
     def table(self) -> pd.DataFrame:
         """Return what is to be chosen.
 
-        Returns
-        -------
-        pandas.DataFrame
-            A row per open grip. Columns: ``move`` (from 1), ``robot``, ``step`` in which it takes
-            the grip, ``to_step``, the last before it lets go, ``bricks`` that stand, ``newest``,
-            the brick placed last, ``places``, whether the robot places it with this grip,
-            ``candidates``, how many nodes it may take, and these ``nodes``.
+        Result: a row per open grip. Columns: ``move`` (from 1), ``robot``, ``step`` in which it
+        takes the grip, ``to_step``, the last before it lets go, ``bricks`` that stand, ``newest``,
+        the brick placed last, ``places``, whether the robot places it with this grip,
+        ``candidates``, how many nodes it may take, and these ``nodes``.
         """
         open_holds = {hold.move: hold for hold in holds(self.scene, self.steps)}
         rows = [
@@ -253,17 +213,9 @@ class Schedule(Shown):
     def gantt(self, first: int = 1, last: int | None = None) -> Figure:
         """Draw the grips over the steps, a lane per robot; those to be chosen are hatched.
 
-        Parameters
-        ----------
-        first, last : int, optional
-            Numbers of the first and the last step that are drawn; by default all.
-
-        Raises
-        ------
-        ExtraError
-            If matplotlib is not installed (extra ``plot``).
-        StepError
-            If there are no such steps.
+        ``first``, ``last``: numbers of the first and the last step that are drawn; by default all.
+        Raises `ExtraError` if matplotlib is not installed (extra ``plot``); `StepError` if there
+        are no such steps.
         """
         figure: Figure = display("gantt_picture")(self.scene, self.steps, None, (first, last))
         return figure
@@ -279,20 +231,8 @@ class Schedule(Shown):
     def fill(self, nodes: Sequence[int]) -> tuple[Step, ...]:
         """Return the checked sequence in which every move takes the node chosen for it.
 
-        Parameters
-        ----------
-        nodes : sequence of int
-            A node for every move.
-
-        Returns
-        -------
-        tuple of Step
-            As many as the schedule has.
-
-        Raises
-        ------
-        StepError
-            If there is not one node per move, or a step is impossible with them.
+        ``nodes``: a node for every move. Result: as many as the schedule has. Raises `StepError` if
+        there is not one node per move, or a step is impossible with them.
         """
         if len(nodes) != len(self.moves):
             raise StepError(f"{len(nodes)} nodes for {len(self.moves)} moves; give one each")
@@ -316,23 +256,10 @@ Distance = Callable[[Scene, int], dict[int, float]]
 def thin(schedule: Schedule, rule: str) -> Schedule:
     """Return a schedule with the candidates near the working end alone.
 
-    Parameters
-    ----------
-    schedule : Schedule
-    rule : str
-        ``near:12`` keeps the nodes of bricks that at most 12 joints part from the bricks placed
-        last, ``within:1.5`` the nodes at most 1.5 m from these bricks' centroids. Where a rule
-        keeps none, the nearest stay.
-
-    Returns
-    -------
-    Schedule
-        That says what was left out; the same where nothing is.
-
-    Raises
-    ------
-    StepError
-        If there is no such rule.
+    ``rule``: ``near:12`` keeps the nodes of bricks that at most 12 joints part from the bricks
+    placed last, ``within:1.5`` the nodes at most 1.5 m from these bricks' centroids. Where a rule
+    keeps none, the nearest stay. Result: that says what was left out; the same where nothing is.
+    Raises `StepError` if there is no such rule.
 
     Examples
     --------

@@ -31,19 +31,9 @@ def open_schedule(method: str, network: Network, steps: Sequence[OpenStep]) -> S
     Open to a move is every free node within reach when it is made that no given grip holds while
     it lasts; to a move that places a brick, the nodes of this brick alone.
 
-    Parameters
-    ----------
-    method : str
-        Name of the schedule.
-    network : Network
-    steps : sequence of OpenStep
-        Moves numbered from 0 in the order in which they are made.
-
-    Raises
-    ------
-    StepError
-        If more than two moves are open at once, nothing is open to a move, or an island is not sure
-        to be held.
+    ``method``: name of the schedule; ``steps``: moves numbered from 0 in the order in which they
+    are made. Raises `StepError` if more than two moves are open at once, nothing is open to a move,
+    or an island is not sure to be held.
     """
     moves = tuple(_move(network, steps, k) for k in range(1 + max(_numbers(steps), default=-1)))
     schedule = Schedule(method, network.scene, tuple(steps), moves)
@@ -84,22 +74,8 @@ def two_robot_loop(network: Network | Scene, robots: Sequence[str] = ()) -> Sche
     shares that placing with the move after it. At least one robot grips, and the newest brick is
     held, at every step before the last.
 
-    Parameters
-    ----------
-    network : Network
-        Of a scene with at least two robots.
-    robots : sequence of str, optional
-        As in `seqopt.sequential`.
-
-    Returns
-    -------
-    Schedule
-        With one move for every brick. Filled with the nodes of the sequential method, it is this.
-
-    Raises
-    ------
-    StepError
-        As `seqopt.sequential` does.
+    ``network``: of a scene with at least two robots; ``robots``: as in `seqopt.sequential`. Result:
+    with one move for every brick. Filled with the nodes of the sequential method, it is this.
 
     Examples
     --------
@@ -130,23 +106,11 @@ def robot_loop(network: Network | Scene, robots: int | Sequence[str] = ()) -> Sc
     they placed, the newest among them, and one holds where it was chosen. With three robots this is
     the loop of Bruun et al.; with two it is `two_robot_loop`.
 
-    Parameters
-    ----------
-    network : Network
-        Of a scene with at least one brick more than robots take part.
-    robots : int or sequence of str, optional
-        How many robots take part, or their names in the order in which they place the first bricks;
-        by default all robots of the scene. Which of them takes which role follows from reach.
-
-    Returns
-    -------
-    Schedule
-        With one move for every brick except the last n; with two robots for every brick.
-
-    Raises
-    ------
-    StepError
-        If there are fewer robots or bricks, or none is left that reaches all bricks of a role.
+    ``network``: of a scene with at least one brick more than robots take part. ``robots``: how many
+    robots take part, or their names in the order in which they place the first bricks; by default
+    all robots of the scene. Which of them takes which role follows from reach. Result: with one
+    move for every brick except the last n; with two robots for every brick. Raises `StepError` if
+    there are fewer robots or bricks, or none is left that reaches all bricks of a role.
 
     Examples
     --------
@@ -376,18 +340,9 @@ SCHEDULES: dict[str, ScheduleMethod] = {
 def make_schedule(name: str, network: Network | Scene, robots: Sequence[str] = ()) -> Schedule:
     """Return a schedule by name.
 
-    Parameters
-    ----------
-    name : str
-        A key of `SCHEDULES`; ``"loop"`` is the loop of all robots of the scene.
-    network : Network or Scene
-    robots : sequence of str, optional
-        Names of the robots in the order of their roles; found from their reach by default.
-
-    Raises
-    ------
-    StepError
-        If there is none of that name, or the scene cannot be built by it.
+    ``name``: a key of `SCHEDULES`; ``"loop"`` is the loop of all robots of the scene. ``robots``:
+    names of the robots in the order of their roles; found from their reach by default. Raises
+    `StepError` if there is none of that name, or the scene cannot be built by it.
     """
     if name not in SCHEDULES:
         why = f"does not exist{did_you_mean(name, SCHEDULES)}; give one of {', '.join(SCHEDULES)}"

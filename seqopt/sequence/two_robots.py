@@ -28,25 +28,9 @@ _Ways = dict[Pair, tuple[int, tuple[Pair, ...]]]  # by pair: changes so far, pai
 def find_robots(scene: Scene, names: Sequence[str], method: str, roles: int) -> list[int]:
     """Return which robots a method may use, in the order of its roles.
 
-    Parameters
-    ----------
-    scene : Scene
-    names : sequence of str
-        Of robots, in the order of the roles; none for all robots of the scene.
-    method : str
-        Whose roles they are, for the message.
-    roles : int
-        How many roles the method has.
-
-    Returns
-    -------
-    list of int
-        Indices of the scene's robots.
-
-    Raises
-    ------
-    StepError
-        If there are not as many as roles, or one is not in the scene or named twice.
+    ``names``: of robots, in the order of the roles; none for all robots of the scene. ``roles``:
+    how many roles the method has. Result: indices of the scene's robots. Raises `StepError` if
+    there are not as many as roles, or one is not in the scene or named twice.
     """
     known = [robot.name for robot in scene.robots]
     if not names:
@@ -70,12 +54,7 @@ def find_robots(scene: Scene, names: Sequence[str], method: str, roles: int) -> 
 def can_place(scene: Scene, robot: Robot, brick: Brick) -> bool:
     """Return whether a robot reaches a node by which it can place a brick.
 
-    Parameters
-    ----------
-    scene : Scene
-        With the nodes that are blocked.
-    robot : Robot
-    brick : Brick
+    ``scene``: with the nodes that are blocked.
     """
     return any(
         node not in scene.blocked_nodes and robot.reach.covers(brick.node_position(node))
@@ -92,25 +71,9 @@ def take_turns(
     two are the same all along where their reach allows it; otherwise a third robot takes the place
     of the one that is free, as seldom as possible. Ties go to the order of the robots.
 
-    Parameters
-    ----------
-    network : Network
-    swap_after : set of int
-        Names of the bricks after which who placed stays.
-    robots : sequence of int
-        Indices of the robots that may take part.
-    starts : sequence of (int, int), optional
-        Who may place the first brick, and who is its partner; by default any two.
-
-    Returns
-    -------
-    list of (int, int)
-        For every brick in build order.
-
-    Raises
-    ------
-    StepError
-        Naming the first brick that nobody can place who does not hold.
+    ``swap_after``: names of the bricks after which who placed stays. ``robots``: indices of the
+    robots that may take part. ``starts`` (int, int): who may place the first brick, and who is its
+    partner; by default any two. Result (int, int): for every brick in build order.
     """
     scene = network.scene
     rank = {robot: i for i, robot in enumerate(robots)}
@@ -155,23 +118,9 @@ def _nobody(scene: Scene, free: Sequence[int], able: Set[int], k: int) -> StepEr
 def cast(scene: Scene, roles: Sequence[Set[int]], robots: Sequence[int]) -> list[int]:
     """Return a different robot for every role that reaches all bricks which the role places.
 
-    Parameters
-    ----------
-    scene : Scene
-    roles : sequence of set of int
-        By role, which bricks it places: indices in build order.
-    robots : sequence of int
-        Who may take a role; of all ways the first in this order is taken, role by role.
-
-    Returns
-    -------
-    list of int
-        Indices of the scene's robots.
-
-    Raises
-    ------
-    StepError
-        Naming the role for which nobody is left, and its bricks.
+    ``roles``: by role, which bricks it places: indices in build order. ``robots``: who may take a
+    role; of all ways the first in this order is taken, role by role. Result: indices of the scene's
+    robots.
     """
     fits = [
         [r for r in robots if all(can_place(scene, scene.robots[r], scene.placed[b]) for b in role)]
@@ -218,10 +167,7 @@ def in_words(number: int) -> str:
 def lies_along(network: Network) -> frozenset[int]:
     """Return the bricks that lie along the structure: joints meet both of their inner nodes.
 
-    Returns
-    -------
-    frozenset of int
-        Names of the bricks.
+    Result: names of the bricks.
     """
     half = network.edge_kind == PartKind.JOINT.value
     touched = np.zeros(len(network.node_kind), dtype=bool)
@@ -237,10 +183,7 @@ def begins_elsewhere(network: Network) -> frozenset[int]:
     A stretch is a brick that is held while others are placed, and these others. A brick begins
     elsewhere if no joint ties it to the stretch that is being built; so does the first one.
 
-    Returns
-    -------
-    frozenset of int
-        Names of the bricks.
+    Result: names of the bricks.
     """
     placed = network.scene.placed
     along, stretch, out = lies_along(network), set[int](), set[int]()
@@ -259,16 +202,8 @@ def begins_elsewhere(network: Network) -> frozenset[int]:
 def degeneration(network: Network, method: str) -> str:
     """Return why a method becomes another one on a structure, or nothing.
 
-    Parameters
-    ----------
-    network : Network
-    method : str
-        A key of `seqopt.sequence.two_robots.METHODS`.
-
-    Returns
-    -------
-    str
-        A sentence; empty if the method is what its name says.
+    ``method``: a key of `seqopt.sequence.two_robots.METHODS`. Result: a sentence; empty if the
+    method is what its name says.
 
     Examples
     --------
@@ -324,23 +259,8 @@ def placing_node(network: Network, robot: Robot, brick: Brick) -> int:
     A robot on one side takes the node nearer to its side of a brick that lies across; any other
     case takes the brick's own placing node where it is within reach.
 
-    Parameters
-    ----------
-    network : Network
-    robot : Robot
-        One of the scene's.
-    brick : Brick
-        The one to be placed.
-
-    Returns
-    -------
-    int
-        One of the brick's two nodes.
-
-    Raises
-    ------
-    StepError
-        If the robot reaches no free node of the brick.
+    ``robot``: one of the scene's; ``brick``: the one to be placed. Result: one of the brick's two
+    nodes. Raises `StepError` if the robot reaches no free node of the brick.
     """
     free = [
         node
@@ -446,22 +366,10 @@ def alternate(
 
     After each brick one of the two releases, if it holds anything; after the last one both do.
 
-    Parameters
-    ----------
-    network : Network
-    swap_after : set of int
-        Names of the bricks after which who placed stays and holds.
-    pairs : sequence of (int, int)
-        Who places and who holds, for every brick; see `seqopt.sequence.two_robots.take_turns`.
-    grip : callable
-        What a robot holds of the brick that it places, from the robot's index and the brick count.
-
-    Yields
-    ------
-    kind : StepKind
-    bricks : int
-    grips : tuple
-        By robot of the scene.
+    ``swap_after``: names of the bricks after which who placed stays and holds. ``pairs`` (int,
+    int): who places and who holds, for every brick; see `seqopt.sequence.two_robots.take_turns`.
+    ``grip``: what a robot holds of the brick that it places, from the robot's index and the brick
+    count. Results: ``grips``: by robot of the scene.
     """
     scene = network.scene
     grips: list[Grip | None] = [None] * len(scene.robots)

@@ -37,16 +37,8 @@ STILL = 1e-6  # motion slower than this, beside the fastest, is none
 def first_to_fail(assembly: Assembly, motion: Floats) -> tuple[str, str]:
     """Return what goes first in a motion.
 
-    Parameters
-    ----------
-    assembly : Assembly
-    motion : (B, 6) float
-        As of `seqopt.stability.limit_analysis.Answer`.
-
-    Returns
-    -------
-    block, contact : str
-        The fastest block and the contact that parts fastest; empty where nothing moves.
+    ``motion`` (B, 6): as of `seqopt.stability.limit_analysis.Answer`. Results: ``block``,
+    ``contact``: the fastest block and the contact that parts fastest; empty where nothing moves.
     """
     speed = np.linalg.norm(motion, axis=1)
     if not speed.max(initial=0.0) > 0:
@@ -228,10 +220,7 @@ def least_friction(prove: Prover, mortar: Mortar) -> float:
     The lacking bond falls with the friction. A line through two points where some is lacking aims
     at where none is; where that does not help, the middle is tried.
 
-    Returns
-    -------
-    float
-        Infinite if none up to `ROUGHEST` is enough, NaN if nothing is proven.
+    Result: infinite if none up to `ROUGHEST` is enough, NaN if nothing is proven.
     """
 
     def lacking(friction: float) -> float:
@@ -266,16 +255,8 @@ def least_friction(prove: Prover, mortar: Mortar) -> float:
 def is_jammed(prove: Prover, mortar: Mortar) -> bool:
     """Return whether hardly any friction is enough, by contact forces far above all loads.
 
-    Parameters
-    ----------
-    prove : Prover
-        Of an assembly that stands with the mortar, and not without friction.
-    mortar : Mortar
-
-    Returns
-    -------
-    bool
-        Only where that is proven by forces.
+    ``prove``: of an assembly that stands with the mortar, and not without friction. Result: only
+    where that is proven by forces.
     """
     assembly, case = prove.assembly, bonded(prove.assembly, mortar)
     proven = prove(replace(case, friction=min(LITTLE, mortar.friction)))
@@ -382,10 +363,7 @@ def stability_table(steps: Sequence[Step], results: Sequence[Stability]) -> pd.D
 def format_verdicts(results: Sequence[Stability]) -> str:
     """Return how many steps stand, do not stand and are undecided, and how the solver ended.
 
-    Returns
-    -------
-    str
-        One line.
+    Result: one line.
     """
     words = {
         Verdict.STANDS: "stand",

@@ -33,11 +33,7 @@ CompileHeld = Callable[[Assembly, Case], HeldProgram]
 def compile_held(assembly: Assembly, case: Case) -> HeldProgram:
     """Return the registered linear program (entry points ``seqopt.limit_analysis``).
 
-    Parameters
-    ----------
-    assembly : Assembly
-        Its grips are all that may ever be held.
-    case : Case
+    ``assembly``: its grips are all that may ever be held.
     """
     entry = plugins("seqopt.limit_analysis")["lp"]
     compiled: CompileHeld = entry.load()
@@ -53,12 +49,8 @@ GAIN = 1e-7  # least gain for which a direction joins, over the largest entry of
 class Directions(FrozenValue):
     """Directions in which corners and grips act.
 
-    Parameters
-    ----------
-    owner : (n,) int
-        Corner, or grip counted on after the corners.
-    unit : (n, 3) float
-        Unit vectors; those of a corner have no normal part.
+    ``owner`` (n,): corner, or grip counted on after the corners. ``unit`` (n, 3): unit vectors;
+    those of a corner have no normal part.
     """
 
     owner: Ints
@@ -74,10 +66,7 @@ class Directions(FrozenValue):
 def first_directions(corners: int, grips: int) -> Directions:
     """Return directions to start with, the same ones for every corner and for every grip.
 
-    Parameters
-    ----------
-    corners, grips : int
-        How many there are.
+    ``corners``, ``grips``: how many there are.
 
     Examples
     --------
@@ -101,14 +90,8 @@ def first_directions(corners: int, grips: int) -> Directions:
 def better_directions(known: Directions, along: Floats, wanted: Bools) -> Directions:
     """Return the best directions of corners and grips where those known are not as good.
 
-    Parameters
-    ----------
-    known : Directions
-    along : (m, 3) float
-        What a force of every corner or grip is worth, per component; the normal parts of corners
-        are zero.
-    wanted : (m,) bool
-        Whose directions are asked for.
+    ``along`` (m, 3): what a force of every corner or grip is worth, per component; the normal parts
+    of corners are zero. ``wanted`` (m,): whose directions are asked for.
     """
     best = np.zeros(len(along))
     np.maximum.at(best, known.owner, np.einsum("ij,ij->i", known.unit, along[known.owner]))

@@ -35,32 +35,19 @@ IDLE = 1e-10  # a grip's force treated as zero, over the force scale
 
 @dataclass(frozen=True, eq=False, repr=False)
 class HoldingForces(FrozenValue):
-    """Forces with which a structure is in equilibrium.
+    """Forces with which a structure is in equilibrium."""
 
-    Attributes
-    ----------
-    value : float
-        Their z.
-    needed : (G,) float
-        What every grip exerts, over the force scale.
-    """
-
-    value: float
-    needed: Floats
+    value: float  # their z
+    needed: Floats  # (G,); what every grip exerts, over the force scale
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FallingMotion(FrozenValue):
     """A motion of the blocks, and what counts for any grips.
 
-    Attributes
-    ----------
-    work, growth : float
-        Of the loads, less what contacts take up, and its growth with z.
-    closing : float
-        By which contacts close, priced by the largest corner force.
-    speed : (G,) float
-        Of every node.
+    ``work``, ``growth``: of the loads, less what contacts take up, and its growth with z;
+    ``closing``: by which contacts close, priced by the largest corner force; ``speed`` (G,): of
+    every node.
     """
 
     work: float
@@ -72,11 +59,7 @@ class FallingMotion(FrozenValue):
 class Known:
     """What is proven of one structure and case, whoever holds it.
 
-    Parameters
-    ----------
-    assembly : Assembly
-        Its grips are all that may ever be held.
-    case : Case
+    ``assembly``: its grips are all that may ever be held.
     """
 
     def __init__(self, assembly: Assembly, case: Case) -> None:
@@ -87,18 +70,10 @@ class Known:
     def bracket(self, places: Ints, payload: Floats) -> Floats:
         """Return between which values z is proven to lie.
 
-        Parameters
-        ----------
-        places : (S, r) int
-            Grips of the assembly that are held, from 0; as many as it has for none.
-        payload : (S, r) float
-            Of those that hold them, N; zero for none.
-
-        Returns
-        -------
-        (S, 2) float
-            The least z that suffices is no smaller and no larger; of a largest z, the one proven
-            to be survived (less than none, if nothing is) and the one that is not exceeded.
+        ``places`` (S, r): grips of the assembly that are held, from 0; as many as it has for none.
+        ``payload`` (S, r): of those that hold them, N; zero for none. Result (S, 2): the least z
+        that suffices is no smaller and no larger; of a largest z, the one proven to be survived
+        (less than none, if nothing is) and the one that is not exceeded.
         """
         out = self._nothing(len(places))
         return self._tightened(out, self._forces, self._motions, places, payload)
@@ -106,16 +81,8 @@ class Known:
     def learn(self, answer: Answer, held: Floats) -> Known:
         """Keep what an answer proves by itself; a solver's claim is not believed.
 
-        Parameters
-        ----------
-        answer : Answer
-        held : (G,) float
-            Payload of every grip for which it was found, N; zero for one not held.
-
-        Returns
-        -------
-        Known
-            Of this answer alone.
+        ``held`` (G,): payload of every grip for which it was found, N; zero for one not held.
+        Result: of this answer alone.
         """
         new = Known(self._assembly, self._case)
         new._forces += self._proven_forces(answer, held)
@@ -125,13 +92,7 @@ class Known:
         return new
 
     def joined(self, other: Known) -> Known:
-        """Return what is known by either.
-
-        Parameters
-        ----------
-        other : Known
-            Of the same structure and case.
-        """
+        """Return what is known by either. ``other``: of the same structure and case."""
         out = Known(self._assembly, self._case)
         out._forces = self._forces + other._forces
         out._motions = self._motions + other._motions
@@ -140,10 +101,7 @@ class Known:
     def motions_of(self, motion: Floats) -> list[FallingMotion]:
         """Return what counts of a motion, at most one; none if it is not finite or none.
 
-        Parameters
-        ----------
-        motion : (B, 6) float
-            As of `seqopt.stability.limit_analysis.Answer`.
+        ``motion`` (B, 6): as of `seqopt.stability.limit_analysis.Answer`.
         """
         assembly, case = self._assembly, self._case
         size = np.abs(motion).max(initial=0.0)
@@ -174,16 +132,7 @@ class Known:
     def tightened(self, bracket: Floats, places: Ints, payload: Floats) -> Floats:
         """Return brackets no wider than others, by what is known here.
 
-        Parameters
-        ----------
-        bracket : (S, 2) float
-        places : (S, r) int
-        payload : (S, r) float
-            As of `bracket`.
-
-        Returns
-        -------
-        (S, 2) float
+        ``bracket`` (S, 2); ``places`` (S, r); ``payload`` (S, r): as of `bracket`. Result (S, 2).
         """
         return self._tightened(bracket.copy(), self._forces, self._motions, places, payload)
 
@@ -266,21 +215,9 @@ Settled = Callable[[Floats], Bools]
 def node_assembly(network: Network, bricks: int) -> Assembly:
     """Return a partial structure with a grip without payload at every inner node.
 
-    Parameters
-    ----------
-    network : Network
-    bricks : int
-        How many bricks stand, in build order.
-
-    Returns
-    -------
-    Assembly
-        Its grips brick by brick in build order.
-
-    Raises
-    ------
-    SceneError
-        If the bricks of a joint do not touch there: see `seqopt.contact.faces`.
+    ``bricks``: how many bricks stand, in build order. Result: its grips brick by brick in build
+    order. Raises `SceneError` if the bricks of a joint do not touch there: see
+    `seqopt.contact.faces`.
     """
     bare = bare_assembly(network, bricks)
     nodes = network.inner[:bricks].ravel()
@@ -295,23 +232,10 @@ def node_assembly(network: Network, bricks: int) -> Assembly:
 class HeldStates:
     """One question about one structure, asked of any number of grip sets.
 
-    Parameters
-    ----------
-    assembly : Assembly
-        Its grips are all that may ever be held.
-    case : Case
-        What is bracketed.
-    compiled : callable
-        Makes the program to solve.
-    easier : Case, optional
-        What a program is asked before that, as forces for a z of zero.
-
-    Attributes
-    ----------
-    assembly : Assembly
-        Whose grips are all that may ever be held.
-    solved : int
-        How many times the program was called.
+    ``assembly``: its grips are all that may ever be held; ``case``: what is bracketed;
+    ``compiled``: makes the program to solve; ``easier``: what a program is asked before that, as
+    forces for a z of zero. ``assembly``: whose grips are all that may ever be held; ``solved``: how
+    many times the program was called.
     """
 
     def __init__(
@@ -333,19 +257,10 @@ class HeldStates:
     def bracket(self, places: Ints, payload: Floats, settled: Settled) -> Floats:
         """Return proven brackets of z, as narrow as needed where the solver's answers allow it.
 
-        Parameters
-        ----------
-        places : (S, r) int
-            Grips of the assembly that are held, from 0; as many as it has for none.
-        payload : (S, r) float
-            Of those that hold them, N; zero for none.
-        settled : callable
-            Says which brackets are narrow enough.
-
-        Returns
-        -------
-        (S, 2) float
-            As of `seqopt.stability.held_states.Known.bracket`.
+        ``places`` (S, r): grips of the assembly that are held, from 0; as many as it has for none.
+        ``payload`` (S, r): of those that hold them, N; zero for none. ``settled``: says which
+        brackets are narrow enough. Result (S, 2): as of
+        `seqopt.stability.held_states.Known.bracket`.
         """
         out = self._known.bracket(places, payload)
         open_ = ~settled(out)

@@ -75,20 +75,10 @@ class Margins:
     def bond(self, bricks: int, held: ArrayLike, payload: ArrayLike | None = None) -> Floats:
         """Return the least bond of grip sets at the mortar's friction.
 
-        Parameters
-        ----------
-        bricks : int
-            How many bricks stand, in build order.
-        held : (S, r) int
-            Nodes held, as places in build order counted from 1; zero for none.
-        payload : float or (r,) or (S, r) float, optional
-            N.
-
-        Returns
-        -------
-        (S, 2) float
-            Between which values the strength lies, Pa, in tension and at once in shear; infinite if
-            none is enough.
+        ``bricks``: how many bricks stand, in build order. ``held`` (S, r): nodes held, as places in
+        build order counted from 1; zero for none. ``payload`` (r,), (S, r): N. Result (S, 2):
+        between which values the strength lies, Pa, in tension and at once in shear; infinite if
+        none is enough.
         """
         bare = Mortar(friction=self.mortar.friction)
 
@@ -102,19 +92,10 @@ class Margins:
     def grip(self, bricks: int, held: ArrayLike, payload: ArrayLike | None = None) -> Floats:
         """Return the least payload, the same for all who hold, with the mortar.
 
-        Parameters
-        ----------
-        bricks : int
-            How many bricks stand, in build order.
-        held : (S, r) int
-            Nodes held, as places in build order counted from 1; zero for none.
-        payload : float or (r,) or (S, r) float, optional
-            N; counts only in what a motion's rounding is charged with.
-
-        Returns
-        -------
-        (S, 2) float
-            Between which values it lies, N; infinite if none is enough.
+        ``bricks``: how many bricks stand, in build order. ``held`` (S, r): nodes held, as places in
+        build order counted from 1; zero for none. ``payload`` (r,), (S, r): N; counts only in what
+        a motion's rounding is charged with. Result (S, 2): between which values it lies, N;
+        infinite if none is enough.
         """
 
         def cases(assembly: Assembly) -> list[Case]:
@@ -127,20 +108,10 @@ class Margins:
     def tilt(self, bricks: int, held: ArrayLike, payload: ArrayLike | None = None) -> Floats:
         """Return the tilt that grip sets survive in every direction.
 
-        Parameters
-        ----------
-        bricks : int
-            How many bricks stand, in build order.
-        held : (S, r) int
-            Nodes held, as places in build order counted from 1; zero for none.
-        payload : float or (r,) or (S, r) float, optional
-            N.
-
-        Returns
-        -------
-        (S, 2) float
-            Between which values it lies, rad; NaN where it is not proven that the structure stands.
-            As `seqopt.stability.assessment.Stability.tilt`.
+        ``bricks``: how many bricks stand, in build order. ``held`` (S, r): nodes held, as places in
+        build order counted from 1; zero for none. ``payload`` (r,), (S, r): N. Result (S, 2):
+        between which values it lies, rad; NaN where it is not proven that the structure stands. As
+        `seqopt.stability.assessment.Stability.tilt`.
         """
         screen = self.screens[self.mortar.friction]
         out = np.full((len(np.asarray(held)), 2), np.nan)
@@ -177,22 +148,10 @@ class Margins:
     ) -> Floats:
         """Return the least coefficient of friction at the mortar's bond, by halving intervals.
 
-        Parameters
-        ----------
-        bricks : int
-            How many bricks stand, in build order.
-        held : (S, r) int
-            Nodes held, as places in build order counted from 1; zero for none.
-        payload : float or (r,) or (S, r) float, optional
-            N.
-        step : float, optional
-            How narrow the brackets shall be.
-
-        Returns
-        -------
-        (S, 2) float
-            Between which values it lies; infinite above where none up to `ROUGHEST` is proven to be
-            enough.
+        ``bricks``: how many bricks stand, in build order. ``held`` (S, r): nodes held, as places in
+        build order counted from 1; zero for none. ``payload`` (r,), (S, r): N. ``step``: how narrow
+        the brackets shall be. Result (S, 2): between which values it lies; infinite above where
+        none up to `ROUGHEST` is proven to be enough.
         """
         sets = np.asarray(held)
         out = np.tile([0.0, np.inf], (len(sets), 1))
@@ -250,13 +209,7 @@ class Margins:
 def narrow(bracket: Floats) -> Bools:
     """Return which brackets are as narrow as proofs of a margin have to be.
 
-    Parameters
-    ----------
-    bracket : (S, 2) float
-
-    Returns
-    -------
-    (S,) bool
+    ``bracket`` (S, 2). Result (S,).
     """
     scale = np.maximum(1.0, np.where(np.isfinite(bracket[:, 0]), np.abs(bracket[:, 0]), 0.0))
     gap = bracket[:, 1] - bracket[:, 0] <= GAP * scale

@@ -37,17 +37,11 @@ HANDS = frozen(np.vstack([np.eye(3), -np.ones(3)]))
 class Proven(FrozenValue):
     """A number with its two proofs.
 
-    Attributes
-    ----------
-    value : float
-        z of the case; inf if it is proven that none up to
-        `seqopt.stability.limit_analysis.CAP` will do, NaN if nothing is proven.
-    bound : float
-        What the motion alone proves: no smaller z will do, or of a largest z no larger one.
-    held : float
-        What forces alone prove: a z that will do; NaN if nothing.
-    answer : Answer
-        What it rests on: forces and motion.
+    ``value``: z of the case; inf if it is proven that none up to
+    `seqopt.stability.limit_analysis.CAP` will do, NaN if nothing is proven. ``bound``: what the
+    motion alone proves: no smaller z will do, or of a largest z no larger one. ``held``: what
+    forces alone prove: a z that will do; NaN if nothing. ``answer``: what it rests on: forces and
+    motion.
     """
 
     value: float
@@ -59,18 +53,8 @@ class Proven(FrozenValue):
 class Prover:
     """Solves cases of one assembly and proves the answers; counts what the solver claims.
 
-    Parameters
-    ----------
-    assembly : Assembly
-    compiled : callable
-        Makes the program to solve.
-
-    Attributes
-    ----------
-    claims : collections.Counter of Claim
-        How the solver said it ended, over all cases.
-    unproven : int
-        Cases of which nothing was proven.
+    ``compiled``: makes the program to solve. ``claims``: how the solver said it ended, over all
+    cases; ``unproven``: cases of which nothing was proven.
     """
 
     def __init__(self, assembly: Assembly, compiled: Compile) -> None:
@@ -128,10 +112,7 @@ class Prover:
 def proven_value(assembly: Assembly, case: Case, answer: Answer) -> float:
     """Return the z of an answer if its forces and its motion prove it.
 
-    Returns
-    -------
-    float
-        NaN if they do not, or a number of the answer is not finite.
+    Result: naN if they do not, or a number of the answer is not finite.
     """
     gap = abs(answer.value - bound(assembly, case, answer))
     small = gap <= GAP * max(1.0, abs(answer.value))
@@ -141,10 +122,7 @@ def proven_value(assembly: Assembly, case: Case, answer: Answer) -> float:
 def held_value(assembly: Assembly, case: Case, answer: Answer) -> float:
     """Return the z of an answer if its forces alone prove that it will do.
 
-    Returns
-    -------
-    float
-        NaN if they do not, or a number of the answer is not finite.
+    Result: naN if they do not, or a number of the answer is not finite.
     """
     if not is_finite(assembly, answer):
         return np.nan
@@ -161,19 +139,8 @@ NEAR = 5e-3  # share of the least pull by which the bound may fall short before 
 def sideways(fixed: Case, up: Vector, count: int = DIRECTIONS) -> list[Case]:
     """Return the cases of the largest sideways acceleration.
 
-    Parameters
-    ----------
-    fixed : Case
-        Whose strengths do not grow with z.
-    up : Vector
-        Unit vector against gravity.
-    count : int, optional
-        Of directions, evenly spread.
-
-    Returns
-    -------
-    list of Case
-        One per direction.
+    ``fixed``: whose strengths do not grow with z; ``up``: unit vector against gravity; ``count``:
+    of directions, evenly spread. Result: one per direction.
     """
     return [_pulled(fixed, up, angle) for angle in 2 * np.pi * np.arange(count) / count]
 
@@ -184,20 +151,8 @@ def safe_pull(prove: Prover, fixed: Case, up: Vector) -> tuple[list[Proven], flo
     Where the bound is least a direction is added, until it falls short of the least pull found by
     no more than `NEAR`, or `MORE` have been.
 
-    Parameters
-    ----------
-    prove : Prover
-    fixed : Case
-        Whose strengths do not grow with z.
-    up : Vector
-        Unit vector against gravity.
-
-    Returns
-    -------
-    pulls : list of Proven
-        Of `sideways`, then of the directions added.
-    worst : float
-        NaN if forces prove too few.
+    ``fixed``: whose strengths do not grow with z; ``up``: unit vector against gravity. Results:
+    ``pulls``: of `sideways`, then of the directions added; ``worst``: naN if forces prove too few.
     """
     angles = 2 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
     pulls = [prove(case) for case in sideways(fixed, up)]
@@ -214,15 +169,9 @@ def safe_pull(prove: Prover, fixed: Case, up: Vector) -> tuple[list[Proven], flo
 def in_every_direction(angles: Floats, pulls: Floats) -> tuple[float, float]:
     """Return the pull that is survived in every direction, by what is in some.
 
-    Parameters
-    ----------
-    angles, pulls : (n,) float
-        Directions, rad, and what is survived there; NaN where that is not known.
-
-    Returns
-    -------
-    pull, angle : float
-        The least and where it is; NaN if those known leave half of all directions out.
+    ``angles``, ``pulls`` (n,): directions, rad, and what is survived there; NaN where that is not
+    known. Results: ``pull``, ``angle``: the least and where it is; NaN if those known leave half of
+    all directions out.
 
     Examples
     --------

@@ -75,26 +75,12 @@ class Screen:
     ) -> NDArray[np.int8]:
         """Return which grip sets stand.
 
-        Parameters
-        ----------
-        bricks : int
-            How many bricks stand, in build order.
-        held : (S, r) int
-            Nodes held, as places in build order counted from 1; zero for a robot that holds none.
-        payload : float or (r,) or (S, r) float, optional
-            Largest force of those that hold them, N; by default of the scene's robots, if all have
-            the same.
-
-        Returns
-        -------
-        (S,) int8
-            1 where it is proven that the structure stands, -1 where it is proven that it falls, and
-            0 where neither is.
-
-        Raises
-        ------
-        GripError
-            If there are no such nodes, or payloads are missing or not numbers.
+        ``bricks``: how many bricks stand, in build order. ``held`` (S, r): nodes held, as places in
+        build order counted from 1; zero for a robot that holds none. ``payload`` (r,), (S, r):
+        largest force of those that hold them, N; by default of the scene's robots, if all have the
+        same. Result (S,): 1 where it is proven that the structure stands, -1 where it is proven
+        that it falls, and 0 where neither is. Raises `GripError` if there are no such nodes, or
+        payloads are missing or not numbers.
         """
         places, loads = held_places(self.network, bricks, held, payload)
         out = self._verdicts((bricks, DIRECTIONS, True), places, loads)
@@ -139,13 +125,7 @@ class Screen:
 def lacking(assembly: Assembly, mortar: Mortar, compiled: CompileHeld) -> HeldStates:
     """Return the question whether a structure stands: whether it lacks any bond.
 
-    Parameters
-    ----------
-    assembly : Assembly
-        Its grips are all that may ever be held.
-    mortar : Mortar
-    compiled : callable
-        Makes the program to solve.
+    ``assembly``: its grips are all that may ever be held; ``compiled``: makes the program to solve.
     """
     case = bonded(assembly, mortar)
     fixed = replace(case, tension=(case.tension[0], 0.0), cohesion=(case.cohesion[0], 0.0))
@@ -155,14 +135,7 @@ def lacking(assembly: Assembly, mortar: Mortar, compiled: CompileHeld) -> HeldSt
 def decided(bracket: Floats) -> Bools:
     """Return where it is proven that no bond is lacking, or that some is.
 
-    Parameters
-    ----------
-    bracket : (S, 2) float
-        Of the bond that is lacking.
-
-    Returns
-    -------
-    (S,) bool
+    ``bracket`` (S, 2): of the bond that is lacking. Result (S,).
     """
     return np.asarray((bracket[:, 1] <= EXACT) | (bracket[:, 0] > EXACT))
 
@@ -170,20 +143,8 @@ def decided(bracket: Floats) -> Bools:
 def pulled(assembly: Assembly, pull: float, up: Vector, count: int) -> tuple[Assembly, ...]:
     """Return the assemblies to which sideways pulls turn one.
 
-    Parameters
-    ----------
-    assembly : Assembly
-    pull : float
-        Over gravity; for none it is the assembly itself.
-    up : Vector
-        Unit vector against gravity.
-    count : int
-        Of directions, evenly spread.
-
-    Returns
-    -------
-    tuple of Assembly
-        One per direction.
+    ``pull``: over gravity; for none it is the assembly itself. ``up``: unit vector against gravity.
+    ``count``: of directions, evenly spread. Result: one per direction.
     """
     if not pull:
         return (assembly,)
@@ -198,27 +159,10 @@ def held_places(
 ) -> tuple[Ints, Floats]:
     """Return grip sets as grips of `seqopt.stability.held_states.node_assembly`.
 
-    Parameters
-    ----------
-    network : Network
-    bricks : int
-        How many bricks stand.
-    held : (S, r) int
-        Nodes held, as places in build order counted from 1; zero for a robot that holds none.
-    payload : float or (r,) or (S, r) float, optional
-        N; by default of the scene's robots, if all have the same.
-
-    Returns
-    -------
-    places : (S, r) int
-        From 0; the number of nodes for none.
-    payload : (S, r) float
-        N; zero for none.
-
-    Raises
-    ------
-    GripError
-        If there are no such nodes, or payloads are missing or not numbers.
+    ``held`` (S, r): nodes held, as places in build order counted from 1; zero for a robot that
+    holds none. ``payload`` (r,), (S, r): N; by default of the scene's robots, if all have the same.
+    Results: ``places`` (S, r): from 0; the number of nodes for none. ``payload`` (S, r): N; zero
+    for none. Raises `GripError` if there are no such nodes, or payloads are missing or not numbers.
     """
     sets = np.asarray(held)
     most = 2 * bricks

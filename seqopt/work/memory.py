@@ -20,10 +20,7 @@ GROUPS = (
 def free_memory() -> float:
     """Return how much memory can still be had.
 
-    Returns
-    -------
-    float
-        Bytes; infinite where the system does not say.
+    Result: bytes; infinite where the system does not say.
     """
     return max(min(_free_at_all(), _free_in_group(), _free_within_limit()), 0.0)
 

@@ -67,13 +67,7 @@ class Progress:
         self._done = 0.0
 
     def add(self, work: float) -> None:
-        """Say that some work is done.
-
-        Parameters
-        ----------
-        work : float
-            In the unit of the total.
-        """
+        """Say that some work is done. ``work``: in the unit of the total."""
         self._done += work
         now = time.perf_counter()
         if self._tell is None or now - self._start < QUIET or now - self._told < PAUSE:
@@ -87,18 +81,8 @@ class Progress:
 def told(what: str, items: SizedIterable[Item_co], tell: Tell | None) -> Iterator[Item_co]:
     """Yield items one after the other, and tell how far that is.
 
-    Parameters
-    ----------
-    what : str
-        What is done with the items, in a few words.
-    items : sequence or other iterable with a length
-    tell : callable or None
-        Told a `Stage` before the work on each item.
-
-    Yields
-    ------
-    object
-        Each item.
+    ``what``: what is done with the items, in a few words; ``tell``: told a `Stage` before the work
+    on each item.
 
     Examples
     --------
@@ -116,12 +100,8 @@ def told(what: str, items: SizedIterable[Item_co], tell: Tell | None) -> Iterato
 def within(tell: Tell, seconds: float) -> Tell:
     """Return what shows words as a stage of a computation that may take so long.
 
-    Parameters
-    ----------
-    tell : callable
-        Told words as a `Stage` whose share is that of the time; a `Stage` as it is.
-    seconds : float
-        From now on; as they come where it is infinite.
+    ``tell``: told words as a `Stage` whose share is that of the time; a `Stage` as it is.
+    ``seconds``: from now on; as they come where it is infinite.
 
     Examples
     --------

@@ -33,10 +33,7 @@ class Lanes:
 
     For tasks of which neighbors share what a process prepares for one of them.
 
-    Parameters
-    ----------
-    workers : int
-        How many.
+    ``workers``: how many.
     """
 
     def __init__(self, workers: int) -> None:
@@ -48,14 +45,7 @@ class Lanes:
         return len(self._lanes)
 
     def submit(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
-        """Give a call out; see `Crew`.
-
-        Parameters
-        ----------
-        function : callable
-        *arguments : object
-            The last one has a ``lane``.
-        """
+        """Give a call out; see `Crew`. ``*arguments``: the last one has a ``lane``."""
         lane: int = arguments[-1].lane
         return self._lanes[lane].submit(function, *arguments)
 
@@ -68,23 +58,14 @@ class Lanes:
             lane.look_after()
 
     def replace(self, error: BaseException) -> bool:
-        """Take new processes for those that died; see `Crew`.
-
-        Returns
-        -------
-        bool
-            True.
-        """
+        """Take new processes for those that died; see `Crew`. Result: True."""
         self.end(now=True)
         return True
 
     def end(self, *, now: bool) -> None:
         """End the processes, and wait for their end.
 
-        Parameters
-        ----------
-        now : bool
-            Whether at once, or when all that was given out is done.
+        ``now``: whether at once, or when all that was given out is done.
         """
         for lane in self._lanes:
             lane.end(now=now)
@@ -95,10 +76,7 @@ class Processes:
 
     They end with the process that started them, however that ends.
 
-    Parameters
-    ----------
-    workers : int
-        How many.
+    ``workers``: how many.
     """
 
     def __init__(self, workers: int) -> None:
@@ -142,23 +120,14 @@ class Processes:
             writer.close()
 
     def replace(self, error: BaseException) -> bool:
-        """Take new processes for those that died; see `Crew`.
-
-        Returns
-        -------
-        bool
-            True.
-        """
+        """Take new processes for those that died; see `Crew`. Result: True."""
         self.end(now=True)
         return True
 
     def end(self, *, now: bool) -> None:
         """End the processes, and wait for their end.
 
-        Parameters
-        ----------
-        now : bool
-            Whether at once, or when all that was given out is done.
+        ``now``: whether at once, or when all that was given out is done.
         """
         if self._leash is not None and now:
             self._leash.close()
@@ -252,11 +221,7 @@ class Crew(Protocol):
 class Given:
     """An executor of the caller, who also ends it.
 
-    Parameters
-    ----------
-    executor : concurrent.futures.Executor
-    workers : int
-        How many tasks it works on at once.
+    ``workers``: how many tasks it works on at once.
     """
 
     executor: Executor

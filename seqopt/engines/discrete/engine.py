@@ -54,13 +54,7 @@ class Across(IntEnum):
 class Pinch:
     """Two square pads that hold a brick on either side of its node and do not slip.
 
-    Parameters
-    ----------
-    across : Across
-    stiffness : BedStiffness
-        Of the pads.
-    side : float
-        Of a pad, m.
+    ``stiffness``: of the pads; ``side``: of a pad, m.
     """
 
     across: Across
@@ -71,19 +65,7 @@ class Pinch:
 def pad_stiffness(network: Network, index: int, node: Floats, pinch: Pinch) -> Floats:
     """Return the stiffness with which two pads beside a node hold a brick's twists.
 
-    Parameters
-    ----------
-    network : Network
-    index : int
-        Of the brick in build order.
-    node : (3,) float
-        m.
-    pinch : Pinch
-
-    Returns
-    -------
-    (6, 6) float
-        N/m and N m/rad.
+    ``index``: of the brick in build order; ``node`` (3,). Result (6, 6): N/m and N m/rad.
     """
     brick = network.scene.placed[index]
     length, width = np.array(brick.length_axis), np.array(brick.width_axis)
@@ -108,15 +90,9 @@ GONE = "joints open or slip and brick {brick} becomes unstable; add a grip, a bo
 class DiscreteEngine(NamedEngine):
     """Solves each grip set by discrete elements.
 
-    Parameters
-    ----------
-    network : Network or Scene
-    mortar : Mortar, optional
-        What the joints hold; the epoxy of Bruun et al. by default.
-    bed : BedStiffness, optional
-        The joints themselves; by default they are as stiff as the scene says.
-    pinch : Pinch, optional
-        How robots hold; by default a grip holds its node and lets its brick turn.
+    ``mortar``: what the joints hold; the epoxy of Bruun et al. by default. ``bed``: the joints
+    themselves; by default they are as stiff as the scene says. ``pinch``: how robots hold; by
+    default a grip holds its node and lets its brick turn.
     """
 
     def __init__(
@@ -141,24 +117,9 @@ class DiscreteEngine(NamedEngine):
 
         All fields are evaluated whatever is asked: finding the equilibrium dominates the cost.
 
-        Parameters
-        ----------
-        bricks : int
-            How many bricks stand.
-        grips : (S, r) int
-            Node numbers.
-        want : Want, optional
-
-        Raises
-        ------
-        GripError
-            As of `seqopt.engines.interface.Engine`.
-        MechanismError
-            Also if the structure moves a tenth of a brick's length and is not stopped by then.
-        SolverError
-            Also if it neither comes to rest nor goes.
-        SceneError
-            If the faces of a joint do not overlap.
+        ``grips`` (S, r): node numbers. Raises `MechanismError`: also if the structure moves a tenth
+        of a brick's length and is not stopped by then; `SolverError`: also if it neither comes to
+        rest nor goes; `SceneError` if the faces of a joint do not overlap.
         """
         network = self._network
         columns = grip_columns(network, bricks, grips)
@@ -199,14 +160,8 @@ def _not_at_rest(network: Network, held: Held, found: Settled, nodes: Ints) -> S
 def held_nodes(network: Network, system: System, columns: Ints, nodes: Floats) -> Held:
     """Return a system whose held nodes stand still.
 
-    Parameters
-    ----------
-    network : Network
-    system : System
-    columns : (r,) int
-        Grips as indices into ``network.inner.ravel()``.
-    nodes : (r, 3) float
-        Where they hold, m.
+    ``columns`` (r,): grips as indices into ``network.inner.ravel()``; ``nodes`` (r, 3): where they
+    hold, m.
     """
     blocks = [np.eye(6)] * (len(system.load) // 6)
     for body in np.unique(columns // 2):
@@ -219,15 +174,8 @@ def held_nodes(network: Network, system: System, columns: Ints, nodes: Floats) -
 def pinched(network: Network, system: System, columns: Ints, nodes: Floats, pinch: Pinch) -> Held:
     """Return a system whose held bricks are pinched between pads beside their nodes.
 
-    Parameters
-    ----------
-    network : Network
-    system : System
-    columns : (r,) int
-        Grips as indices into ``network.inner.ravel()``.
-    nodes : (r, 3) float
-        Where they hold, m.
-    pinch : Pinch
+    ``columns`` (r,): grips as indices into ``network.inner.ravel()``; ``nodes`` (r, 3): where they
+    hold, m.
     """
     blocks = [sparse.csr_array((6, 6))] * (len(system.load) // 6)
     for body, node in zip(columns // 2, nodes, strict=True):

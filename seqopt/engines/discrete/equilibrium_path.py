@@ -27,52 +27,24 @@ LENT_STIFFNESS = (
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Held(FrozenValue):
-    """A system and what its grips do.
-
-    Attributes
-    ----------
-    system : System
-    free : (6n, m) sparse
-        Motions that the grips leave.
-    pads : (6n, 6n) sparse
-        Stiffness of grips that give way.
-    """
+    """A system and what its grips do."""
 
     system: System
-    free: sparse.csr_array
-    pads: sparse.csr_array
+    free: sparse.csr_array  # (6n, m); motions that the grips leave
+    pads: sparse.csr_array  # (6n, 6n); stiffness of grips that give way
 
     def left(self, motion: Floats, force: Floats, load: Floats) -> Floats:
         """Return what is not balanced in the free motions.
 
-        Parameters
-        ----------
-        motion, force, load
-            As of `reaction`.
-
-        Returns
-        -------
-        (m,) float
-            N.
+        ``motion``, ``force``, ``load``: as of `reaction`. Result (m,): N.
         """
         return np.asarray(self.free.T @ self.reaction(motion, force, load))
 
     def reaction(self, motion: Floats, force: Floats, load: Floats) -> Floats:
         """Return what is not balanced on the bodies: what the grips must take.
 
-        Parameters
-        ----------
-        motion : (m,) float
-            In the free motions.
-        force : (P, 3) float
-            Of the points, N.
-        load : (6n,) float
-            N.
-
-        Returns
-        -------
-        (6n,) float
-            N.
+        ``motion`` (m,): in the free motions; ``force`` (P, 3): of the points, N; ``load`` (6n,).
+        Result (6n,).
         """
         system = self.system
         carried = system.gap.T @ system.bed_wrenches(force).ravel()
@@ -81,16 +53,7 @@ class Held(FrozenValue):
     def rounding(self, motion: Floats, force: Floats) -> float:
         """Return what rounding leaves of a balance between large forces.
 
-        Parameters
-        ----------
-        motion : (m,) float
-        force : (P, 3) float
-            N.
-
-        Returns
-        -------
-        float
-            N.
+        ``motion`` (m,); ``force`` (P, 3): N. Result: N.
         """
         moved = np.abs(self.free @ motion)
         return ROUNDING * float((self._sizes @ moved).max() + np.abs(force).sum())
@@ -117,17 +80,9 @@ class Held(FrozenValue):
 class Settled(FrozenValue):
     """A state of the bodies.
 
-    Attributes
-    ----------
-    motion : (m,) float
-        In the free motions.
-    force : (P, 3) float
-        Of the points on second bodies, N.
-    slip : (P, 2) float
-        m.
-    broken : (P,) bool
-    left : float
-        Largest force not balanced, over the heaviest body's weight or what rounding makes of it.
+    ``motion`` (m,): in the free motions; ``force`` (P, 3): of the points on second bodies, N;
+    ``slip`` (P, 2); ``broken`` (P,); ``left``: largest force not balanced, over the heaviest body's
+    weight or what rounding makes of it.
     """
 
     motion: Floats
@@ -138,14 +93,7 @@ class Settled(FrozenValue):
 
     @classmethod
     def start(cls, held: Held, *, broken: bool) -> Settled:
-        """Return the state without load.
-
-        Parameters
-        ----------
-        held : Held
-        broken : bool
-            Whether all bonds are lost at once.
-        """
+        """Return the state without load. ``broken``: whether all bonds are lost at once."""
         points = len(held.system.points.area)
         none = np.zeros((points, 3))
         motion = np.zeros(held.free.shape[1])
@@ -163,10 +111,7 @@ def settle(held: Held) -> Settled:
     Where no bond breaks under the whole load at once, none would on the way to it: the limits are
     convex. Otherwise the load grows in steps, and a bond once broken stays so.
 
-    Returns
-    -------
-    Settled
-        An equilibrium if it rests.
+    Result: an equilibrium if it rests.
     """
     points = held.system.points
     dry = points.mortar.tensile_strength == 0 and points.mortar.cohesion == 0

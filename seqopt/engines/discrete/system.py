@@ -31,15 +31,7 @@ EXCESS = 1e-9  # stress above a limit that counts as none, over the stress scale
 class Points(FrozenValue):
     """The springs of P points of a bed.
 
-    Attributes
-    ----------
-    area : (P,) float
-        m².
-    normal, tangential : (P,) float
-        Stiffness, N/m.
-    mortar : Mortar
-    stress_scale : float
-        Pa.
+    ``area`` (P,): m²; ``normal``, ``tangential`` (P,): stiffness, N/m; ``stress_scale``: Pa.
     """
 
     area: Floats
@@ -51,17 +43,7 @@ class Points(FrozenValue):
     def trial(self, opening: Floats, slip: Floats) -> Floats:
         """Return the forces of unbroken springs that have slipped.
 
-        Parameters
-        ----------
-        opening : (P, 3) float
-            m.
-        slip : (P, 2) float
-            m.
-
-        Returns
-        -------
-        (P, 3) float
-            Compression first, N.
+        ``opening`` (P, 3); ``slip`` (P, 2). Result (P, 3): compression first, N.
         """
         stiffness = np.stack([self.normal, self.tangential, self.tangential], axis=1)
         force = -stiffness * opening
@@ -71,32 +53,12 @@ class Points(FrozenValue):
     def slipped(self, opening: Floats, force: Floats) -> Floats:
         """Return the slip that is left when points carry forces.
 
-        Parameters
-        ----------
-        opening : (P, 3) float
-            m.
-        force : (P, 3) float
-            N.
-
-        Returns
-        -------
-        (P, 2) float
-            m.
+        ``opening`` (P, 3); ``force`` (P, 3): N. Result (P, 2): m.
         """
         return np.asarray(opening[:, 1:] + force[:, 1:] / self.tangential[:, None])
 
     def exceeds(self, force: Floats) -> Bools:
-        """Return at which points bonds do not hold forces.
-
-        Parameters
-        ----------
-        force : (P, 3) float
-            N.
-
-        Returns
-        -------
-        (P,) bool
-        """
+        """Return at which points bonds do not hold forces. ``force`` (P, 3): N. Result (P,)."""
         mortar, margin = self.mortar, EXCESS * self.stress_scale
         normal, shear = force[:, 0] / self.area, np.linalg.norm(force[:, 1:], axis=1) / self.area
         return np.asarray(
@@ -107,21 +69,8 @@ class Points(FrozenValue):
     def forces(self, opening: Floats, slip: Floats, broken: Bools) -> tuple[Floats, Floats]:
         """Return forces on the second bodies, and how fast they fall.
 
-        Parameters
-        ----------
-        opening : (P, 3) float
-            m.
-        slip : (P, 2) float
-            m.
-        broken : (P,) bool
-            Where the bond is lost.
-
-        Returns
-        -------
-        force : (P, 3) float
-            N.
-        slope : (P, 3, 3) float
-            Minus its derivative by the opening, N/m.
+        ``opening`` (P, 3); ``slip`` (P, 2); ``broken`` (P,): where the bond is lost. Results:
+        ``force`` (P, 3): N; ``slope`` (P, 3, 3): minus its derivative by the opening, N/m.
         """
         force = self.trial(opening, slip)
         slope = np.zeros((len(force), 3, 3))
@@ -149,15 +98,7 @@ BED_OVER_JOINT = 10.0  # how much stiffer a bed is than its joint, whichever way
 class BedStiffness:
     """Stiffness of a joint or pad per area.
 
-    Parameters
-    ----------
-    normal, tangential : float
-        N/m³.
-
-    Raises
-    ------
-    SceneError
-        If one is not a positive number.
+    ``normal``, ``tangential``: N/m³. Raises `SceneError` if one is not a positive number.
     """
 
     normal: float
@@ -174,50 +115,23 @@ class System(FrozenValue):
     """Bodies, what holds them together, and what pulls at them; the bricks are the first bodies.
 
     Twists are in m and rad over ``unit``, wrenches in N and N m times it.
-
-    Attributes
-    ----------
-    bricks : int
-    acting : (J,) int
-        The springs whose joints these are.
-    points : Points
-    face : (P,) int
-        The joint of every point, in ascending order.
-    maps : (P, 3, 6) float
-        Openings for unit twists across a joint, taken at its spring.
-    gap : (6J, 6n) sparse
-        Twists across the beds for unit twists of the n bodies.
-    layers : (6n, 6n) sparse
-        Stiffness of the elastic layers.
-    load : (6n,) float
-    unit : (6n,) float
-    length : float
-        Of a brick, m.
     """
 
     bricks: int
-    acting: Ints
+    acting: Ints  # (J,); the springs whose joints these are
     points: Points
-    face: Ints
-    maps: Floats
-    gap: sparse.csr_array
-    layers: sparse.csr_array
-    load: Floats
-    unit: Floats
-    length: float
+    face: Ints  # (P,); the joint of every point, in ascending order
+    maps: Floats  # (P, 3, 6); openings for unit twists across a joint, taken at its spring
+    gap: sparse.csr_array  # (6J, 6n); twists across the beds for unit twists of the n bodies
+    layers: sparse.csr_array  # (6n, 6n); stiffness of the elastic layers
+    load: Floats  # (6n,)
+    unit: Floats  # (6n,)
+    length: float  # of a brick, m
 
     def bed_wrenches(self, force: Floats) -> Floats:
         """Return the wrenches of point forces on second bodies, about the springs.
 
-        Parameters
-        ----------
-        force : (P, 3) float
-            N.
-
-        Returns
-        -------
-        (J, 6) float
-            N and N m.
+        ``force`` (P, 3): N. Result (J, 6): N and N m.
         """
         each = np.einsum("pij,pi->pj", self.maps, force)
         return np.asarray(np.add.reduceat(each, self._starts, axis=0))
@@ -225,15 +139,8 @@ class System(FrozenValue):
     def stiffness(self, slope: Floats) -> sparse.csr_array:
         """Return the stiffness of layers and beds.
 
-        Parameters
-        ----------
-        slope : (P, 3, 3) float
-            How fast the forces of the points fall, from `Points.forces`, N/m.
-
-        Returns
-        -------
-        (6n, 6n) sparse
-            For twists over ``unit``.
+        ``slope`` (P, 3, 3): how fast the forces of the points fall, from `Points.forces`, N/m.
+        Result (6n, 6n): for twists over ``unit``.
         """
         each = self.maps.transpose(0, 2, 1) @ slope @ self.maps
         joints = _diagonal(np.add.reduceat(each, self._starts, axis=0))
@@ -242,15 +149,7 @@ class System(FrozenValue):
     def openings(self, twist: Floats) -> Floats:
         """Return the openings of the points for twists of the bodies.
 
-        Parameters
-        ----------
-        twist : (6n,) float
-            Over ``unit``.
-
-        Returns
-        -------
-        (P, 3) float
-            m.
+        ``twist`` (6n,): over ``unit``. Result (P, 3): m.
         """
         across = (self.gap @ twist).reshape(-1, 6)
         return np.asarray(np.einsum("pij,pj->pi", self.maps, across[self.face]))
@@ -268,20 +167,9 @@ class System(FrozenValue):
 def build_system(network: Network, bricks: int, mortar: Mortar, bed: BedStiffness | None) -> System:
     """Return the system of a partial structure.
 
-    Parameters
-    ----------
-    network : Network
-    bricks : int
-        How many bricks stand.
-    mortar : Mortar
-        What the beds hold.
-    bed : BedStiffness or None
-        The joints themselves; by default beds in series with layers are as stiff as the scene says.
-
-    Raises
-    ------
-    SceneError
-        If the faces of a joint do not overlap.
+    ``mortar``: what the beds hold. ``bed``: the joints themselves; by default beds in series with
+    layers are as stiff as the scene says. Raises `SceneError` if the faces of a joint do not
+    overlap.
     """
     assembly = bare_assembly(network, bricks)
     acting = network.springs.acting(bricks)

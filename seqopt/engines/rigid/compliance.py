@@ -43,10 +43,7 @@ from seqopt.scene.scene import Scene
 class Kept:
     """The operators that were asked for last, by brick count.
 
-    Parameters
-    ----------
-    most : float
-        Bytes that they may take when a further one is to be made.
+    ``most``: bytes that they may take when a further one is to be made.
     """
 
     def __init__(self, most: float) -> None:
@@ -82,14 +79,9 @@ EVEN = 5e-5  # softest over stiffest joint from which on pivots tell the whole e
 class ComplianceEngine(NamedEngine):
     """Computes any batch of grip sets on any partial structure of a scene.
 
-    Parameters
-    ----------
-    network : Network or Scene
-    basis : Basis, optional
-        The directions in which bricks are loaded and move; all by default, fewer in a plane.
-    accuracy : float, optional
-        Largest error of fields, over the largest entry of each, that is accepted; with
-        `Want.SCREEN`, `SCREEN` if that is larger. Sets that may err more are corrected.
+    ``basis``: the directions in which bricks are loaded and move; all by default, fewer in a plane.
+    ``accuracy``: largest error of fields, over the largest entry of each, that is accepted; with
+    `Want.SCREEN`, `SCREEN` if that is larger. Sets that may err more are corrected.
     """
 
     def __init__(
@@ -112,18 +104,7 @@ class ComplianceEngine(NamedEngine):
     def solve(self, bricks: int, grips: ArrayLike, want: Want = Want.RESPONSES) -> Fields:
         """Return the fields of a partial structure for many grip sets.
 
-        Parameters
-        ----------
-        bricks : int
-            How many bricks stand.
-        grips : (S, r) int
-            Node numbers.
-        want : Want, optional
-
-        Raises
-        ------
-        GripError, MechanismError, SolverError
-            As of `seqopt.engines.interface.Engine`.
+        ``grips`` (S, r): node numbers.
         """
         columns = grip_columns(self._network, bricks, grips)
         tried = self._tried(bricks, columns, want) if bricks <= len(self._tree.spring) else None

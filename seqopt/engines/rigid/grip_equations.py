@@ -21,22 +21,11 @@ def solve_positive(system: Floats, negative: int = 0, scale: float = 1.0) -> tup
     Up to three times as fast as ``numpy.linalg.solve`` for a thousand 9 x 9 systems, which calls
     LAPACK once for each.
 
-    Parameters
-    ----------
-    system : (k + 1, k, S) float
-        The matrices, of which only the lower triangles are read, and the loads as a last row.
-        Overwritten.
-    negative : int, optional
-        How many unknowns at the end belong to the negative definite part.
-    scale : float, optional
-        What their pivots are measured against.
-
-    Returns
-    -------
-    answer : (k, S) float
-        Not finite where a matrix is not positive definite.
-    pivot : (k, S) float
-        Pivots over their diagonal entries: small where equations nearly repeat those before them.
+    ``system`` (k + 1, k, S): the matrices, of which only the lower triangles are read, and the
+    loads as a last row. Overwritten; ``negative``: how many unknowns at the end belong to the
+    negative definite part; ``scale``: what their pivots are measured against. Results: ``answer``
+    (k, S): not finite where a matrix is not positive definite; ``pivot`` (k, S): pivots over their
+    diagonal entries: small where equations nearly repeat those before them.
     """
     size = system.shape[1]
     every = np.arange(size)
@@ -61,18 +50,10 @@ TINY = np.finfo(float).tiny
 
 
 class GripForces(NamedTuple):
-    """The forces of the grips of sets, and how well they are determined.
+    """The forces of the grips of sets, and how well they are determined."""
 
-    Attributes
-    ----------
-    force : (S, k) float
-        N.
-    pivot : (k, S) float
-        The scaled pivots of the equations.
-    """
-
-    force: Floats
-    pivot: Floats
+    force: Floats  # (S, k); N
+    pivot: Floats  # (k, S); the scaled pivots of the equations
 
     @property
     def lowest(self) -> Floats:
@@ -83,12 +64,8 @@ class GripForces(NamedTuple):
 class Pairs(NamedTuple):
     """Two grips on one brick.
 
-    Attributes
-    ----------
-    sets, first, second, brick : (p,) int
-        The grip set, which two of its grips, and the brick.
-    axis : (p, d) float
-        Unit vectors from the brick's first node to its second.
+    ``sets``, ``first``, ``second``, ``brick`` (p,): the grip set, which two of its grips, and the
+    brick; ``axis`` (p, d): unit vectors from the brick's first node to its second.
     """
 
     sets: Ints
@@ -107,11 +84,7 @@ class Pairs(NamedTuple):
 def pairs_of(operator: ComplianceOperator, columns: Ints) -> Pairs:
     """Return all pairs of grips of the sets that share a brick.
 
-    Parameters
-    ----------
-    operator : ComplianceOperator
-    columns : (S, r) int
-        Grips as indices into ``network.inner.ravel()``.
+    ``columns`` (S, r): grips as indices into ``network.inner.ravel()``.
     """
     first, second = couples(columns.shape[1])
     bricks = columns.T // 2
@@ -123,12 +96,7 @@ def pairs_of(operator: ComplianceOperator, columns: Ints) -> Pairs:
 
 @cache
 def couples(grips: int) -> Ints:
-    """Return all couples of a number of grips.
-
-    Returns
-    -------
-    (2, c) int
-    """
+    """Return all couples of a number of grips. Result (2, c)."""
     return frozen(np.array([*combinations(range(grips), 2)], dtype=np.int64).reshape(-1, 2).T)
 
 
@@ -140,15 +108,8 @@ def grip_forces(
     Two grips on one rigid brick leave the force between them along the brick undetermined:
     `share_pairs` says how they share it.
 
-    Parameters
-    ----------
-    operator : ComplianceOperator
-    columns : (S, r) int
-        Grips as indices into ``network.inner.ravel()``.
-    index : (S, k) int
-        The loads at the grips, from `ComplianceOperator.load_index`.
-    pairs : Pairs, optional
-        Of the sets, if they are known.
+    ``columns`` (S, r): grips as indices into ``network.inner.ravel()``; ``index`` (S, k): the loads
+    at the grips, from `ComplianceOperator.load_index`; ``pairs``: of the sets, if they are known.
     """
     pairs = pairs_of(operator, columns) if pairs is None else pairs
     rows = np.ascontiguousarray(index.T)
@@ -159,18 +120,8 @@ def grip_forces(
 def trusted(operator: ComplianceOperator, index: Ints, found: GripForces, most: float) -> Bools:
     """Return which sets' forces rounding changes little enough.
 
-    Parameters
-    ----------
-    operator : ComplianceOperator
-    index : (S, k) int
-        The loads at the grips.
-    found : GripForces
-    most : float
-        Largest of `doubts` that is accepted.
-
-    Returns
-    -------
-    (S,) bool
+    ``index`` (S, k): the loads at the grips; ``most``: largest of `doubts` that is accepted. Result
+    (S,).
     """
     lowest = found.lowest
     out = np.asarray(most * lowest >= len(found.pivot) * operator.worst_doubt)
@@ -187,17 +138,7 @@ def doubts(operator: ComplianceOperator, index: Ints, found: GripForces) -> Floa
     A displacement is known to a share of all that adds up in it; with ``|G_ij| ≤ √(G_ii G_jj)``
     that is read off the diagonal. Over its pivot it is the force that it leaves undetermined.
 
-    Parameters
-    ----------
-    operator : ComplianceOperator
-    index : (S, k) int
-        The loads at the grips.
-    found : GripForces
-        With positive pivots.
-
-    Returns
-    -------
-    (S,) float
+    ``index`` (S, k): the loads at the grips; ``found``: with positive pivots. Result (S,).
     """
     size = np.abs(found.force.T)
     root, own, scale = operator.shares.take(np.ascontiguousarray(index.T), axis=1)
@@ -212,18 +153,9 @@ def doubts(operator: ComplianceOperator, index: Ints, found: GripForces) -> Floa
 def still_forces(operator: ComplianceOperator, columns: Ints, index: Ints, moved: Floats) -> Floats:
     """Return the forces with which grips undo given displacements of their nodes.
 
-    Parameters
-    ----------
-    operator : ComplianceOperator
-    columns, index : (S, r), (S, k) int
-        As of `grip_forces`.
-    moved : (S, k) float
-        m; of loose motions, the force that pulls at them, N.
-
-    Returns
-    -------
-    (S, k) float
-        N; between two grips on one brick, none.
+    ``columns``, ``index`` (S, r), (S, k): as of `grip_forces`. ``moved`` (S, k): m; of loose
+    motions, the force that pulls at them, N. Result (S, k): N; between two grips on one brick,
+    none.
     """
     pairs, rows = pairs_of(operator, columns), np.ascontiguousarray(index.T)
     return _solved(operator, pairs, rows, np.ascontiguousarray(moved.T))[0].T
@@ -242,17 +174,9 @@ def share_pairs(
     Then the inner edge between them carries nothing: the limit of a stiff bar with both ends held.
     Nothing else in the structure changes.
 
-    Parameters
-    ----------
-    operator : ComplianceOperator
-    columns, index : (S, r), (S, k) int
-        As of `grip_forces`.
-    force : (S, k) float
-        Changed in place, N.
-    carried : (S, E) or (S, 0) float
-        By the edges, N; changed in place. Computed where they are needed if there are none.
-    pairs : Pairs, optional
-        Of the sets, if they are known.
+    ``columns``, ``index`` (S, r), (S, k): as of `grip_forces`. ``force`` (S, k): changed in place,
+    N. ``carried`` (S, E), (S, 0): by the edges, N; changed in place. Computed where they are needed
+    if there are none. ``pairs``: of the sets, if they are known.
     """
     pairs = pairs_of(operator, columns) if pairs is None else pairs
     if not len(pairs.sets):

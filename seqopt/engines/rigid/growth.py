@@ -28,18 +28,10 @@ from seqopt.network.network import GROUND, Network
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SpanningTree(FrozenValue):
-    """A tree in which every brick hangs on one spring; arrays run over the first bricks placed.
+    """A tree in which every brick hangs on one spring; arrays run over the first bricks placed."""
 
-    Attributes
-    ----------
-    spring : (B,) int
-        The spring that each brick hangs on.
-    parent : (B,) int
-        The brick at the spring's other end, or `GROUND`.
-    """
-
-    spring: Ints
-    parent: Ints
+    spring: Ints  # (B,); the spring that each brick hangs on
+    parent: Ints  # (B,); the brick at the spring's other end, or `GROUND`
 
 
 def grow_tree(network: Network) -> SpanningTree:
@@ -49,10 +41,7 @@ def grow_tree(network: Network) -> SpanningTree:
     or that is placed without a spring to what stands: from there on a structure may have no
     compliance of its own.
 
-    Returns
-    -------
-    SpanningTree
-        Of as many bricks as are tied in every direction when placed; maybe none.
+    Result: of as many bricks as are tied in every direction when placed; maybe none.
     """
     springs = network.springs
     count = _count_tied(network)
@@ -78,18 +67,8 @@ def _count_tied(network: Network) -> int:
 def compliances(network: Network, which: Ints, basis: Basis = SPACE) -> Floats:
     """Return the compliances of springs.
 
-    Parameters
-    ----------
-    network : Network
-    which : (s,) int
-        Springs of the network.
-    basis : Basis, optional
-        k directions; all of space by default.
-
-    Returns
-    -------
-    (s, k, k) float
-        m/N and rad/(N m).
+    ``which`` (s,): springs of the network. ``basis``: k directions; all of space by default. Result
+    (s, k, k): m/N and rad/(N m).
     """
     springs = network.springs
     axes = springs.axes[which]
@@ -120,25 +99,10 @@ class Growth:
     on brick b at its centroid. Of the arrays, which have room for all bricks of the tree, the rows
     and columns of bricks and springs that are there count.
 
-    Parameters
-    ----------
-    network : Network
-    tree : SpanningTree
-        On which the bricks hang.
-    basis : Basis, optional
-        k directions in which bricks are loaded and move; all by default.
-
-    Attributes
-    ----------
-    bricks : int
-        How many stand.
-    twist : (1 + kB, kB) float
-        Of the bricks, m and rad.
-    wrench : (1 + kB, kS) float
-        Of every spring on its second body, N and N m.
-    loss : (B,) float
-        How much more than the last digit of a brick's motions is rounding, as what moved it further
-        before is gone.
+    ``tree``: on which the bricks hang. ``basis``: k directions in which bricks are loaded and move;
+    all by default. ``twist`` (1 + kB, kB): of the bricks, m and rad; ``wrench`` (1 + kB, kS): of
+    every spring on its second body, N and N m; ``loss`` (B,): how much more than the last digit of
+    a brick's motions is rounding, as what moved it further before is gone.
     """
 
     def __init__(self, network: Network, tree: SpanningTree, basis: Basis = SPACE) -> None:
@@ -168,10 +132,7 @@ class Growth:
         More than stand are added. Fewer: if no loop was closed since, rows and columns of the
         others are left out; else all begins anew.
 
-        Parameters
-        ----------
-        bricks : int
-            At most as many as the tree has.
+        ``bricks``: at most as many as the tree has.
         """
         if bricks < self._closed:
             self._start()

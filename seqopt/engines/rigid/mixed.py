@@ -39,32 +39,18 @@ from seqopt.network.network import Network
 
 @dataclass(frozen=True, eq=False, repr=False)
 class MixedSystem(FrozenValue):
-    """The system of one grip set.
+    """The system of one grip set."""
 
-    Attributes
-    ----------
-    forbidden : (c, 6b) sparse
-        Scaled twists that the grips forbid.
-    matrix : (6s + 6b + c,) square sparse
-    force : (3r, c) float
-        Forces of the grips for unit multipliers.
-    """
-
-    forbidden: sparse.csr_array
-    matrix: sparse.csc_array
-    force: Floats
+    forbidden: sparse.csr_array  # (c, 6b); scaled twists that the grips forbid
+    matrix: sparse.csc_array  # (6s + 6b + c,)
+    force: Floats  # (3r, c); forces of the grips for unit multipliers
 
 
 def mixed_system(parts: Ungripped, grips: Ints, shift: Floats | None = None) -> MixedSystem:
     """Return the system of one grip set.
 
-    Parameters
-    ----------
-    parts : Ungripped
-    grips : (r,) int
-        Indices into ``network.inner.ravel()``.
-    shift : (6b,) float, optional
-        Added to the diagonal of the scaled stiffness, so that a mechanism can be factored.
+    ``grips`` (r,): indices into ``network.inner.ravel()``; ``shift`` (6b,): added to the diagonal
+    of the scaled stiffness, so that a mechanism can be factored.
     """
     rows, force = _constraints(parts, grips)
     forbidden = sparse.csr_array(rows @ sparse.diags_array(parts.twist_unit))
@@ -80,13 +66,7 @@ def mixed_system(parts: Ungripped, grips: Ints, shift: Floats | None = None) -> 
 
 
 def factorize(system: MixedSystem) -> SuperLU:
-    """Return the factors of a system.
-
-    Raises
-    ------
-    RuntimeError
-        If the matrix is exactly singular.
-    """
+    """Return the factors of a system. Raises `RuntimeError` if the matrix is exactly singular."""
     return splu(system.matrix)
 
 
@@ -112,17 +92,8 @@ def _constraints(parts: Ungripped, grips: Ints) -> tuple[sparse.csr_array, Float
 def unscaled(parts: Ungripped, states: Floats) -> tuple[Floats, Floats]:
     """Return the wrenches and twists that scaled unknowns stand for.
 
-    Parameters
-    ----------
-    parts : Ungripped
-    states : (S, 6s + 6b) float
-
-    Returns
-    -------
-    wrench : (S, J, 6) float
-        Of every spring of the network on its second body, N and N m; zero where it does not act.
-    twist : (S, 6b) float
-        Of the bricks, m and rad.
+    ``states`` (S, 6s + 6b). Results: ``wrench`` (S, J, 6): of every spring of the network on its
+    second body, N and N m; zero where it does not act. ``twist`` (S, 6b): of the bricks, m and rad.
     """
     springs, sets = parts.network.springs, len(states)
     joints = len(parts.wrench_unit)
@@ -136,17 +107,8 @@ def unscaled(parts: Ungripped, states: Floats) -> tuple[Floats, Floats]:
 def rescaled(parts: Ungripped, wrench: Floats, twist: Floats) -> Floats:
     """Return the scaled unknowns that stand for wrenches and twists.
 
-    Parameters
-    ----------
-    parts : Ungripped
-    wrench : (S, J, 6) float
-        Of every spring of the network on its second body, N and N m.
-    twist : (S, 6b) float
-        Of the bricks, m and rad.
-
-    Returns
-    -------
-    (S, 6s + 6b) float
+    ``wrench`` (S, J, 6): of every spring of the network on its second body, N and N m; ``twist``
+    (S, 6b): of the bricks, m and rad. Result (S, 6s + 6b).
     """
     joints = len(parts.wrench_unit)
     acting = wrench[:, parts.acting].reshape(len(wrench), len(parts.acting), 2, 3)
@@ -168,20 +130,9 @@ def solve_mixed(network: Network, bricks: int, columns: Ints) -> Fields:
     A mechanism that no load excites passes:
     `seqopt.engines.rigid.mechanism.require_resistance` finds it.
 
-    Parameters
-    ----------
-    network : Network
-    bricks : int
-        How many bricks stand.
-    columns : (S, r) int
-        Grips as indices into ``network.inner.ravel()``.
-
-    Raises
-    ------
-    MechanismError
-        If a motion that the load excites meets no resistance.
-    SolverError
-        If the answer still changes by more than `LAST_CORRECTION`.
+    ``columns`` (S, r): grips as indices into ``network.inner.ravel()``. Raises `MechanismError` if
+    a motion that the load excites meets no resistance; `SolverError` if the answer still changes by
+    more than `LAST_CORRECTION`.
     """
     parts = ungripped_system(network, bricks)
     answers = [_solve_one(parts, grips) for grips in columns]
@@ -198,25 +149,9 @@ def _solve_one(parts: Ungripped, grips: Ints) -> Fields:
 def solve_load(parts: Ungripped, grips: Ints, pull: Floats) -> Solution:
     """Return how a partial structure answers to a load while a grip set holds its nodes still.
 
-    Parameters
-    ----------
-    parts : Ungripped
-    grips : (r,) int
-        Indices into ``network.inner.ravel()``.
-    pull : (6b,) float
-        The load, scaled as ``parts.load``.
-
-    Returns
-    -------
-    Solution
-        Of one grip set.
-
-    Raises
-    ------
-    MechanismError
-        If a motion that the load excites meets no resistance.
-    SolverError
-        If the answer still changes by more than `LAST_CORRECTION`.
+    ``grips`` (r,): indices into ``network.inner.ravel()``; ``pull`` (6b,): the load, scaled as
+    ``parts.load``. Raises `MechanismError` if a motion that the load excites meets no resistance;
+    `SolverError` if the answer still changes by more than `LAST_CORRECTION`.
     """
     network, bricks = parts.network, parts.bricks
     system = mixed_system(parts, grips)
@@ -252,17 +187,8 @@ def unchanged(
     Where nothing moves, as where robots hold every brick at both nodes, what is left is rounding:
     it is measured against the weight.
 
-    Parameters
-    ----------
-    parts : Ungripped
-    states, corrections : (S, 6s + 6b) float
-        Scaled wrenches and twists.
-    largest : float, optional
-        That counts as small.
-
-    Returns
-    -------
-    (S,) bool
+    ``states``, ``corrections`` (S, 6s + 6b): scaled wrenches and twists; ``largest``: that counts
+    as small. Result (S,).
     """
     size, change = _sizes(parts, states), _sizes(parts, corrections)
     other = size.reshape(-1, 2, 2).max(axis=2).repeat(2, axis=1)
@@ -286,21 +212,9 @@ BACKWARD = 1e-10  # largest backward error of an accepted solution
 def solve_dense(network: Network, bricks: int, columns: Ints) -> Fields:
     """Return the fields of grip sets from the stiffness matrix of each.
 
-    Parameters
-    ----------
-    network : Network
-    bricks : int
-        How many bricks stand.
-    columns : (S, r) int
-        Grips as indices into ``network.inner.ravel()``.
-
-    Raises
-    ------
-    MechanismError
-        If nothing resists a motion.
-    SolverError
-        If a motion is resisted too little for the assembled stiffness to tell, or the backward
-        error of an answer is larger than `BACKWARD`.
+    ``columns`` (S, r): grips as indices into ``network.inner.ravel()``. Raises `MechanismError` if
+    nothing resists a motion; `SolverError` if a motion is resisted too little for the assembled
+    stiffness to tell, or the backward error of an answer is larger than `BACKWARD`.
     """
     parts = rigid_structure(network, bricks)
     answers = [_solve_one_dense(network, parts, grips) for grips in columns]

@@ -37,33 +37,15 @@ class ComplianceOperator(FrozenValue):
     (`Network.inner`) of the h bricks that are loaded, l = 2dh loads in all: d = 3 in space, 2 in a
     plane. One more row at the end of all but the first two arrays is the weight of the b bricks.
 
-    Attributes
-    ----------
-    held : (h,) int
-        The bricks that are loaded, ascending.
-    flexibility : (l, l) float
-        Displacements of their inner nodes, m/N.
-    dead_displacement : (l,) float
-        Displacements of these under the weight with no grip, m.
-    twist : (l + 1, kb) float
-        Of the bricks, in k directions.
-    wrench : (l + 1, ks) float
-        Of the s springs that act on their second bodies.
-    maps : ResponseMaps
-        What these mean.
-    at_second : (b,) float
-        Along every brick's inner edge, the weight at its second node, N.
-    axis : (b, d) float
-        Unit vectors along the inner edges, in the directions of the loads.
-    inner_edge : (b,) int
-        The inner edge of each brick.
-    loss : (l,) float
-        How many last digits of the flexibility of each load are rounding.
-    loose : int
-        How many loose motions come after the loads, as further rows and unknowns; see
-        `seqopt.engines.rigid.refinement`.
-    softness : float
-        Of the springs that they stand on, m/N.
+    ``held`` (h,): the bricks that are loaded, ascending. ``flexibility`` (l, l): displacements of
+    their inner nodes, m/N. ``dead_displacement`` (l,): displacements of these under the weight with
+    no grip, m. ``twist`` (l + 1, kb): of the bricks, in k directions. ``wrench`` (l + 1, ks): of
+    the s springs that act on their second bodies. ``maps``: what these mean. ``at_second`` (b,):
+    along every brick's inner edge, the weight at its second node, N. ``axis`` (b, d): unit vectors
+    along the inner edges, in the directions of the loads. ``inner_edge`` (b,): the inner edge of
+    each brick. ``loss`` (l,): how many last digits of the flexibility of each load are rounding.
+    ``loose``: how many loose motions come after the loads, as further rows and unknowns; see
+    `seqopt.engines.rigid.refinement`. ``softness``: of the springs that they stand on, m/N.
     """
 
     held: Ints
@@ -124,26 +106,14 @@ class ComplianceOperator(FrozenValue):
         return float(2 * own * self.shares[2].max(initial=0.0))
 
     def covers(self, bricks: Ints) -> bool:
-        """Return whether loads act at the nodes of bricks.
-
-        Parameters
-        ----------
-        bricks : (..) int
-        """
+        """Return whether loads act at the nodes of bricks."""
         return len(self.held) == self.bricks or bool((self.place[bricks] >= 0).all())
 
     def load_index(self, columns: Ints) -> Ints:
         """Return which loads act at every grip, and after them all loose motions.
 
-        Parameters
-        ----------
-        columns : (S, r) int
-            Grips as indices into ``network.inner.ravel()``.
-
-        Returns
-        -------
-        (S, rd + m) int
-            Rows of the operator.
+        ``columns`` (S, r): grips as indices into ``network.inner.ravel()``. Result (S, rd + m):
+        rows of the operator.
         """
         every = len(self.held) == self.bricks
         nodes = columns if every else 2 * self.place[columns // 2] + columns % 2
@@ -157,14 +127,8 @@ class ComplianceOperator(FrozenValue):
     def loads(self, index: Ints, force: Floats, weight: float = 1.0) -> Loads:
         """Return forces at loads, and the weight.
 
-        Parameters
-        ----------
-        index : (S, k) int
-            Loads that act.
-        force : (S, k) float
-            By how much, N.
-        weight : float, optional
-            Share of the weight.
+        ``index`` (S, k): loads that act; ``force`` (S, k): by how much, N; ``weight``: share of the
+        weight.
         """
         return loads_of(index, force, len(self.twist), weight)
 
@@ -175,20 +139,8 @@ class ComplianceOperator(FrozenValue):
         and mapped; else those of the loads are mapped, once, and then summed. So are reactions,
         which few of the wrenches tell.
 
-        Parameters
-        ----------
-        name : str
-            Of a field.
-        index : (S, k) int
-            Loads that act.
-        force : (S, k) float
-            By how much, N.
-        loads : Loads, optional
-            The same, if it was made before.
-
-        Returns
-        -------
-        (S, Q) float
+        ``name``: of a field; ``index`` (S, k): loads that act; ``force`` (S, k): by how much, N;
+        ``loads``: the same, if it was made before. Result (S, Q).
         """
         few = name == "support" or 2 * self.axis.size <= max(FEW, len(index))
         if few:  # whatever was asked before: answers do not depend on it
@@ -253,13 +205,8 @@ class ComplianceOperator(FrozenValue):
 class OperatorBuilder:
     """Makes the operator of any brick count of a tree from what grows with it.
 
-    Parameters
-    ----------
-    network : Network
-    tree : SpanningTree
-        On which the bricks hang.
-    basis : Basis, optional
-        The directions in which bricks are loaded and move; all by default.
+    ``tree``: on which the bricks hang. ``basis``: the directions in which bricks are loaded and
+    move; all by default.
     """
 
     def __init__(self, network: Network, tree: SpanningTree, basis: Basis = SPACE) -> None:
@@ -271,12 +218,8 @@ class OperatorBuilder:
     def operator(self, bricks: int, held: Ints | None = None) -> ComplianceOperator:
         """Return the operator of a partial structure.
 
-        Parameters
-        ----------
-        bricks : int
-            How many bricks stand, at most as many as the tree has.
-        held : (h,) int, optional
-            The bricks at whose nodes loads act, ascending; all by default.
+        ``bricks``: how many bricks stand, at most as many as the tree has. ``held`` (h,): the
+        bricks at whose nodes loads act, ascending; all by default.
         """
         self.growth.reach(bricks)
         held = np.arange(bricks) if held is None else held

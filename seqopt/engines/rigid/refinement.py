@@ -49,37 +49,18 @@ SOFT = 1e-7  # stiffness over the typical one below which a direction ties nothi
 
 @dataclass(frozen=True)
 class HeldSystem:
-    """The factored system of a partial structure whose loose motions are held.
-
-    Attributes
-    ----------
-    parts : Ungripped
-    loose : int
-        How many loose motions there are, m.
-    factors : SuperLU
-        Of the system of 6s wrenches, 6b twists and m forces that hold.
-    """
+    """The factored system of a partial structure whose loose motions are held."""
 
     parts: Ungripped
-    loose: int
-    factors: SuperLU
+    loose: int  # how many loose motions there are, m
+    factors: SuperLU  # of the system of 6s wrenches, 6b twists and m forces that hold
 
     def solve(self, loads: Floats, moved: Floats | None = None) -> tuple[Floats, Floats]:
         """Return the answers to right-hand sides.
 
-        Parameters
-        ----------
-        loads : (S, 6s + 6b) float
-            Scaled, of the springs' equations and of equilibrium.
-        moved : (S, m) float, optional
-            How far the loose motions are moved, m; nowhere by default.
-
-        Returns
-        -------
-        states : (S, 6s + 6b) float
-            Scaled.
-        force : (S, m) float
-            With which the loose motions must be pulled, N.
+        ``loads`` (S, 6s + 6b): scaled, of the springs' equations and of equilibrium. ``moved`` (S,
+        m): how far the loose motions are moved, m; nowhere by default. Results: ``states`` (S, 6s +
+        6b): scaled; ``force`` (S, m): with which the loose motions must be pulled, N.
         """
         whole = np.zeros((loads.shape[1] + self.loose, len(loads)), order="F")
         whole[: loads.shape[1]] = loads.T
@@ -93,16 +74,8 @@ class HeldSystem:
 def hold_loose(parts: Ungripped, *, tied: bool = False) -> HeldSystem:
     """Return the factored system of a partial structure with its loose motions held.
 
-    Parameters
-    ----------
-    parts : Ungripped
-    tied : bool, optional
-        Whether springs are known to tie every brick to the ground, however softly.
-
-    Raises
-    ------
-    SolverError
-        If it is exactly singular all the same.
+    ``tied``: whether springs are known to tie every brick to the ground, however softly. Raises
+    `SolverError` if it is exactly singular all the same.
     """
     matrix, rows = parts.matrix, _held_motions(parts, tied=tied)
     if rows.shape[0]:
@@ -182,10 +155,7 @@ TIED = 0.1  # most that what resists loose motions may be of the springs that th
 def held_operator(system: HeldSystem) -> ComplianceOperator:
     """Return the operator of a partial structure whose loose motions are unknowns of grip sets.
 
-    Returns
-    -------
-    ComplianceOperator
-        Of all directions of space, with a load for each loose motion after those of the nodes.
+    Result: of all directions of space, with a load for each loose motion after those of the nodes.
     """
     parts, loose = system.parts, system.loose
     joints, loads = len(parts.wrench_unit), 6 * parts.bricks
@@ -259,15 +229,8 @@ HARDLY_HELD = 1e-9  # a pivot of loose motions below which they are looked into 
 class Refinement:
     """Answers grip sets of one partial structure to rounding, whatever is loose in it.
 
-    Parameters
-    ----------
-    network : Network
-    bricks : int
-        How many bricks stand.
-    shared : Shared, optional
-        What the systems of all brick counts are cut from, if it is known.
-    tied : bool, optional
-        Whether springs are known to tie every brick to the ground.
+    ``shared``: what the systems of all brick counts are cut from, if it is known; ``tied``: whether
+    springs are known to tie every brick to the ground.
     """
 
     def __init__(
@@ -294,22 +257,10 @@ class Refinement:
     ) -> Fields:
         """Return all fields of grip sets.
 
-        Parameters
-        ----------
-        columns : (S, r) int
-            Grips as indices into ``network.inner.ravel()``.
-        operator : ComplianceOperator, optional
-            With wrenches and twists, if there is one for these grips; it serves if nothing is
-            loose.
-        largest : float, optional
-            Correction of a set after which it needs no other, over the largest of each kind.
-        basis : Basis, optional
-            The directions that the operator knows; in the others nothing may move.
-
-        Raises
-        ------
-        MechanismError, SolverError
-            As of `seqopt.engines.interface.Engine`.
+        ``columns`` (S, r): grips as indices into ``network.inner.ravel()``. ``operator``: with
+        wrenches and twists, if there is one for these grips; it serves if nothing is loose.
+        ``largest``: correction of a set after which it needs no other, over the largest of each
+        kind. ``basis``: the directions that the operator knows; in the others nothing may move.
         """
         empty = no_sets(self.network, self.bricks, columns.shape[1])
         starts = range(0, len(columns), TOGETHER)
@@ -323,14 +274,8 @@ class Refinement:
 class Corrector:
     """Corrects what an operator answers.
 
-    Parameters
-    ----------
-    system : Refinement
-    operator : ComplianceOperator
-    largest : float, optional
-        Correction of a set after which it needs no other.
-    basis : Basis, optional
-        The directions that the operator knows.
+    ``largest``: correction of a set after which it needs no other; ``basis``: the directions that
+    the operator knows.
     """
 
     def __init__(
@@ -347,10 +292,7 @@ class Corrector:
     def together(self, columns: Ints) -> Fields:
         """Return the fields of a few sets.
 
-        Parameters
-        ----------
-        columns : (S, r) int
-            Grips as indices into ``network.inner.ravel()``.
+        ``columns`` (S, r): grips as indices into ``network.inner.ravel()``.
         """
         operator, parts, bricks = self.operator, self.parts, self.bricks
         index = operator.load_index(columns)

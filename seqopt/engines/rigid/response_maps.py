@@ -20,20 +20,11 @@ AT_ONCE = 2**18  # numbers mapped at a time: they stay in the processor's cache
 class SceneMaps(FrozenValue):
     """What twists and wrenches of all bricks and springs of a scene mean, once all springs act.
 
-    Attributes
-    ----------
-    network : Network
-    basis : Basis
-        k directions of twists and wrenches.
-    edge : (E, kS) sparse
-        What edges carry of wrenches.
-    motion : (3N, kB) sparse
-        How twists move nodes.
-    since : (m,) int
-        Of the entries of ``motion``, from which brick count on they hold; before, where its spring
-        does not act yet, a joint node follows the brick that is there alone.
-    support : (G, k, 6) float
-        Force and moment at every ground end for the wrench of its spring.
+    ``basis``: k directions of twists and wrenches. ``edge`` (E, kS): what edges carry of wrenches.
+    ``motion`` (3N, kB): how twists move nodes. ``since`` (m,): of the entries of ``motion``, from
+    which brick count on they hold; before, where its spring does not act yet, a joint node follows
+    the brick that is there alone. ``support`` (G, k, 6): force and moment at every ground end for
+    the wrench of its spring.
     """
 
     network: Network
@@ -45,14 +36,7 @@ class SceneMaps(FrozenValue):
 
 
 def scene_maps(network: Network, basis: Basis = SPACE) -> SceneMaps:
-    """Return the maps of a scene.
-
-    Parameters
-    ----------
-    network : Network
-    basis : Basis, optional
-        All directions by default.
-    """
+    """Return the maps of a scene. ``basis``: all directions by default."""
     statics, springs = build_statics(network), network.springs
     pick = np.zeros((3, len(basis.wrench)))
     pick[:, : len(basis.force)] = basis.force.T
@@ -74,17 +58,10 @@ def scene_maps(network: Network, basis: Basis = SPACE) -> SceneMaps:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ResponseMaps(FrozenValue):
-    """What twists (.., kb) and wrenches (.., ks) of the first b bricks and s springs mean.
-
-    Attributes
-    ----------
-    scene : SceneMaps
-    bricks : int
-        How many stand.
-    """
+    """What twists (.., kb) and wrenches (.., ks) of the first b bricks and s springs mean."""
 
     scene: SceneMaps
-    bricks: int
+    bricks: int  # how many stand
 
     @cached_property
     def edge(self) -> sparse.csr_array:
@@ -124,19 +101,9 @@ class ResponseMaps(FrozenValue):
     def apply(self, name: str, states: Floats, out: Floats | None = None) -> Floats:
         """Return a field of states.
 
-        Parameters
-        ----------
-        name : str
-            Of the field.
-        states : (S, n) float
-            Wrenches; of displacements and brick twists, twists.
-        out : (S, Q) float, optional
-            Where to put it.
-
-        Returns
-        -------
-        (S, Q) float
-            Of edge forces, without what loads on the bricks' nodes add to the inner edges.
+        ``name``: of the field. ``states`` (S, n): wrenches; of displacements and brick twists,
+        twists. ``out`` (S, Q): where to put it. Result (S, Q): of edge forces, without what loads
+        on the bricks' nodes add to the inner edges.
         """
         out = np.empty((len(states), self.count(name))) if out is None else out
         if name == "support":
@@ -181,33 +148,14 @@ GATHERED = 2**16  # numbers up to which gathering rows takes less than making a 
 
 @dataclass(frozen=True)
 class Loads:
-    """Forces at the loads of an operator, and the weight: few of hundreds, for each of S sets.
+    """Forces at the loads of an operator, and the weight: few of hundreds, for each of S sets."""
 
-    Attributes
-    ----------
-    index : (S, k + 1) int
-        Rows of the operator that are loaded, the weight's last.
-    share : (S, k + 1) float
-        By how much, N; of the weight, which part.
-    count : int
-        How many rows there are, the weight's among them.
-    """
-
-    index: Ints
-    share: Floats
-    count: int
+    index: Ints  # (S, k + 1); rows of the operator that are loaded, the weight's last
+    share: Floats  # (S, k + 1); by how much, N; of the weight, which part
+    count: int  # how many rows there are, the weight's among them
 
     def sum(self, rows: Floats) -> Floats:
-        """Return the sums of what the loads mean.
-
-        Parameters
-        ----------
-        rows : (count, Q) float
-
-        Returns
-        -------
-        (S, Q) float
-        """
+        """Return the sums of what the loads mean. ``rows`` (count, Q). Result (S, Q)."""
         if self.index.size * rows.shape[1] <= GATHERED:  # in the order of the sparse product
             return np.asarray(np.einsum("sk,skq->sq", self.share, rows[self.index]))
         return np.asarray(self.matrix @ rows)
@@ -223,16 +171,9 @@ class Loads:
 def loads_of(index: Ints, force: Floats, count: int, weight: float = 1.0) -> Loads:
     """Return forces at the loads of an operator beside the weight.
 
-    Parameters
-    ----------
-    index : (S, k) int
-        Rows of the operator that are loaded.
-    force : (S, k) float
-        By how much, N.
-    count : int
-        How many rows there are, the weight's among them, which comes last.
-    weight : float, optional
-        Share of the weight.
+    ``index`` (S, k): rows of the operator that are loaded; ``force`` (S, k): by how much, N;
+    ``count``: how many rows there are, the weight's among them, which comes last; ``weight``: share
+    of the weight.
     """
     sets, loads = index.shape
     rows = np.full((sets, loads + 1), count - 1, dtype=np.int32)
@@ -245,19 +186,8 @@ def loads_of(index: Ints, force: Floats, count: int, weight: float = 1.0) -> Loa
 def inner_edges(network: Network, bricks: int) -> tuple[Ints, Floats, Floats]:
     """Return the inner edges of bricks, and what weighs on their second nodes.
 
-    Parameters
-    ----------
-    network : Network
-    bricks : int
-        How many stand.
-
-    Returns
-    -------
-    edge : (b,) int
-    axis : (b, 3) float
-        Unit vectors to the second nodes.
-    weight : (b,) float
-        There, along the edge, N.
+    Results: ``edge`` (b,); ``axis`` (b, 3): unit vectors to the second nodes; ``weight`` (b,):
+    there, along the edge, N.
     """
     edge = np.flatnonzero(network.edge_spring[: network.count_edges(bricks)] < 0)
     axis = network.edge_axis[edge]
@@ -267,15 +197,7 @@ def inner_edges(network: Network, bricks: int) -> tuple[Ints, Floats, Floats]:
 def inner_motions(network: Network, basis: Basis) -> Floats:
     """Return the displacements of the inner nodes of bricks for their unit twists.
 
-    Parameters
-    ----------
-    network : Network
-    basis : Basis
-        d directions of forces, k of twists.
-
-    Returns
-    -------
-    (n, 2d, k) float
+    ``basis``: d directions of forces, k of twists. Result (n, 2d, k).
     """
     count, forces = len(network.inner), len(basis.force)
     arms = network.node_position[network.inner] - network.centroid[:count, None]

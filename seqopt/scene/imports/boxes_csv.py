@@ -24,19 +24,10 @@ YES, NO = ("1", "true", "yes"), ("", "0", "false", "no")
 def read_boxes(text: str, source: str) -> Content:
     r"""Return the boxes of a table.
 
-    Parameters
-    ----------
-    text : str
-        CSV. Columns ``x``, ``y``, ``z`` (the centroid), ``length``, ``width`` and ``height`` (along
-        the box's own x, y and z) are needed; ``roll``, ``pitch``, ``yaw`` (degrees about x, then y,
-        then z), ``name``, ``support`` (1 or 0), ``density`` (kg/m³) and ``course`` may be there.
-    source : str
-        What to call it in messages.
-
-    Raises
-    ------
-    SceneError
-        If it is no such table.
+    ``text``: CSV. Columns ``x``, ``y``, ``z`` (the centroid), ``length``, ``width`` and ``height``
+    (along the box's own x, y and z) are needed; ``roll``, ``pitch``, ``yaw`` (degrees about x, then
+    y, then z), ``name``, ``support`` (1 or 0), ``density`` (kg/m³) and ``course`` may be there.
+    Raises `SceneError` if it is no such table.
 
     Examples
     --------

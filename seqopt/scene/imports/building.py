@@ -28,21 +28,9 @@ def upward_order(
 ) -> list[int]:
     """Return blocks in an order in which each touches the ground or what stands before it.
 
-    Parameters
-    ----------
-    rank : sequence of tuple of float
-        Of every block; of those that can be placed, the lowest is next.
-    pairs : iterable of tuple of 2 int
-        Which touch each other.
-    starts : iterable of int
-        Which touch the ground.
-    keys : sequence of str
-        What blocks are called, for the message.
-
-    Raises
-    ------
-    SceneError
-        If some touch nothing that leads to the ground.
+    ``rank``: of every block; of those that can be placed, the lowest is next. ``pairs``: which
+    touch each other. ``starts``: which touch the ground. Raises `SceneError` if some touch nothing
+    that leads to the ground.
 
     Examples
     --------
@@ -83,24 +71,10 @@ STUB = 0.1  # of a ground end, over the smallest dimension of its block
 def build_scene(content: Content, given: Given, source: str) -> Scene:
     """Return the scene of what a file and its user say.
 
-    Parameters
-    ----------
-    content : Content
-    given : Given
-    source : str
-        What the file is called, for messages and the provenance.
-
-    Returns
-    -------
-    Scene
-        What was read, mended and assumed stands in its provenance, a line each.
-
-    Raises
-    ------
-    SceneError
-        If the file lacks what the user did not give, or its assembly cannot be built.
-    FileError
-        If shapely is not installed.
+    ``source``: what the file is called, for messages and the provenance. Result: what was read,
+    mended and assumed stands in its provenance, a line each. Raises `SceneError` if the file lacks
+    what the user did not give, or its assembly cannot be built; `FileError` if shapely is not
+    installed.
     """
     try:
         said = list(content.said)
@@ -221,10 +195,7 @@ def _bricks(
 def block_numbers(keys: Sequence[str]) -> list[int]:
     """Return the names of bricks: the keys of their blocks where these are numbers, else from 1.
 
-    Parameters
-    ----------
-    keys : sequence of str
-        Of all blocks of a file.
+    ``keys``: of all blocks of a file.
     """
     if all(key.isascii() and key.isdigit() and len(key) < 10 for key in keys):
         found = [int(key) for key in keys]

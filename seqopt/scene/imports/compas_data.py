@@ -21,10 +21,7 @@ Solid = tuple[Floats, list[list[int]]]
 def payload(value: Any) -> Any:
     """Return what a serialized object holds, under whichever key its version uses.
 
-    Returns
-    -------
-    object
-        Itself, if it wraps nothing.
+    Result: itself, if it wraps nothing.
     """
     for _ in range(4):
         if not isinstance(value, dict):
@@ -39,10 +36,7 @@ def payload(value: Any) -> Any:
 def kind(value: Any) -> str:
     """Return the last part of what a serialized object says that it is, in small letters.
 
-    Returns
-    -------
-    str
-        Empty if it says nothing.
+    Result: empty if it says nothing.
     """
     name = value.get("dtype") if isinstance(value, dict) else None
     return name.rsplit("/", 1)[-1].lower() if isinstance(name, str) else ""
@@ -51,24 +45,9 @@ def kind(value: Any) -> str:
 def mesh(where: str, value: Any) -> Solid:
     """Return the vertices and faces of a mesh.
 
-    Parameters
-    ----------
-    where : str
-        What it is, for messages.
-    value : object
-        With ``vertex`` and ``face``, as `compas.datastructures.Mesh` writes them, or with
-        ``vertices`` and ``faces``, as `compas.geometry.Polyhedron` does; or a box.
-
-    Returns
-    -------
-    vertices : (V, 3) float
-    faces : list of list of int
-        Places among the vertices.
-
-    Raises
-    ------
-    SceneError
-        If it is none.
+    ``value``: with ``vertex`` and ``face``, as `compas.datastructures.Mesh` writes them, or with
+    ``vertices`` and ``faces``, as `compas.geometry.Polyhedron` does; or a box. Results:
+    ``vertices`` (V, 3); ``faces``: places among the vertices.
     """
     held = payload(value)
     if isinstance(held, dict) and {"xsize", "ysize", "zsize"} <= set(held):
@@ -116,23 +95,8 @@ def _box(where: str, held: dict[str, Any]) -> Solid:
 def frame(where: str, value: Any) -> tuple[Floats, Floats]:
     """Return a frame.
 
-    Parameters
-    ----------
-    where : str
-        What it is, for messages.
-    value : object
-        With ``point``, ``xaxis`` and ``yaxis``; the world's if None.
-
-    Returns
-    -------
-    origin : (3,) float
-    axes : (3, 3) float
-        Rows are unit vectors.
-
-    Raises
-    ------
-    SceneError
-        If it is none.
+    ``value``: with ``point``, ``xaxis`` and ``yaxis``; the world's if None. Results: ``origin``
+    (3,); ``axes`` (3, 3): rows are unit vectors.
     """
     if value is None:
         return np.zeros(3), np.eye(3)
@@ -151,21 +115,7 @@ def frame(where: str, value: Any) -> tuple[Floats, Floats]:
 def transformation(where: str, value: Any) -> Floats:
     """Return a transformation.
 
-    Parameters
-    ----------
-    where : str
-        What it is, for messages.
-    value : object
-        With a ``matrix``, or a matrix; none if None.
-
-    Returns
-    -------
-    (4, 4) float
-
-    Raises
-    ------
-    SceneError
-        If it is none.
+    ``value``: with a ``matrix``, or a matrix; none if None. Result (4, 4).
     """
     if value is None:
         return np.eye(4)
@@ -185,43 +135,19 @@ def transformation(where: str, value: Any) -> Floats:
 
 
 def moved(points: Floats, matrix: Floats) -> Floats:
-    """Return points after a transformation.
-
-    Parameters
-    ----------
-    points : (k, 3) float
-    matrix : (4, 4) float
-
-    Returns
-    -------
-    (k, 3) float
-    """
+    """Return points after a transformation. ``points`` (k, 3); ``matrix`` (4, 4). Result (k, 3)."""
     return np.asarray(points @ matrix[:3, :3].T + matrix[:3, 3])
 
 
 @dataclass(frozen=True)
 class Element:
-    """An element of a model.
+    """An element of a model."""
 
-    Attributes
-    ----------
-    where : str
-        What to call it in messages.
-    kind : str
-        The last part of what it says that it is, in small letters.
-    guid : str
-        Its identifier.
-    held : dict
-        What it holds.
-    matrix : (4, 4) float
-        From its own coordinates to those of the model's world.
-    """
-
-    where: str
-    kind: str
-    guid: str
-    held: Entry
-    matrix: Floats
+    where: str  # what to call it in messages
+    kind: str  # the last part of what it says that it is, in small letters
+    guid: str  # its identifier
+    held: Entry  # what it holds
+    matrix: Floats  # (4, 4); from its own coordinates to those of the model's world
 
 
 def read_elements(source: str, held: Entry) -> list[Element]:
@@ -230,22 +156,8 @@ def read_elements(source: str, held: Entry) -> list[Element]:
     An element's transformation is relative to its parent in the tree, and the first of them to the
     model's.
 
-    Parameters
-    ----------
-    source : str
-        What to call the file in messages.
-    held : dict
-        What the model holds.
-
-    Returns
-    -------
-    list of Element
-        Groups among them.
-
-    Raises
-    ------
-    SceneError
-        If it has no elements, or its tree is none.
+    ``held``: what the model holds. Result: groups among them. Raises `SceneError` if it has no
+    elements, or its tree is none.
     """
     rows = [*by_guid(f"{source}: elements", entry(source, held, "elements"))]
     named = {guid: f"{source}: element {i}" for i, (guid, _) in enumerate(rows)}
@@ -268,16 +180,7 @@ def read_elements(source: str, held: Entry) -> list[Element]:
 def by_guid(where: str, found: Any) -> Iterator[tuple[str, Entry]]:
     """Yield serialized objects, which stand by their identifiers or in a list, with these.
 
-    Parameters
-    ----------
-    where : str
-        What they are, for messages.
-    found : object
-
-    Raises
-    ------
-    SceneError
-        If they are neither.
+    Raises `SceneError` if they are neither.
     """
     listed = not isinstance(found, dict)
     for key, item in enumerate(listing(where, found)) if listed else found.items():

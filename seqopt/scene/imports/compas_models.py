@@ -39,20 +39,7 @@ from seqopt.scene.library.common import JointLaw
 
 
 def read_assembly(document: Any, source: str) -> Content:
-    """Return what an assembly says.
-
-    Parameters
-    ----------
-    document : object
-        A JSON document.
-    source : str
-        What to call it in messages.
-
-    Raises
-    ------
-    SceneError
-        If it is no such assembly.
-    """
+    """Return what an assembly says. Raises `SceneError` if it is no such assembly."""
     if isinstance(document, list):
         return _meshes(document, source)
     graph, meshes = assembly_graph(document, source)
@@ -78,17 +65,8 @@ def read_assembly(document: Any, source: str) -> Content:
 def assembly_graph(document: Any, source: str) -> tuple[Entry, dict[str, Any] | None]:
     """Return the graph of an assembly, and its meshes by key where they stand beside it.
 
-    Parameters
-    ----------
-    document : object
-        A JSON document, of which they are parts.
-    source : str
-        What to call it in messages.
-
-    Raises
-    ------
-    SceneError
-        If it is no such assembly.
+    ``document``: A JSON document, of which they are parts. Raises `SceneError` if it is no such
+    assembly.
     """
     held = mapping(source, payload(document))
     if "blocks" in held and "assembly" in held:
@@ -150,17 +128,7 @@ def _interfaces(where: str, held: Entry) -> Iterator[Floats]:
 def read_model(document: Any, source: str) -> Content:
     """Return what a block model, or a problem about one, says.
 
-    Parameters
-    ----------
-    document : object
-        A JSON document.
-    source : str
-        What to call it in messages.
-
-    Raises
-    ------
-    SceneError
-        If it is no such model.
+    Raises `SceneError` if it is no such model.
     """
     held = mapping(source, payload(document))
     law, said = None, list[str]()
@@ -254,20 +222,7 @@ def _law(source: str, held: Any) -> JointLaw | None:
 
 
 def read_timber(document: Any, source: str) -> Content:
-    """Return the beams of a model.
-
-    Parameters
-    ----------
-    document : object
-        A JSON document.
-    source : str
-        What to call it in messages.
-
-    Raises
-    ------
-    SceneError
-        If it is no such model, or has no beams.
-    """
+    """Return the beams of a model. Raises `SceneError` if it is no such model, or has no beams."""
     held = mapping(source, payload(document))
     elements = read_elements(source, held)
     beams = [element for element in elements if element.kind == "beam"]

@@ -33,18 +33,10 @@ STUB = 0.05  # m; from a face on the ground to the fixed point behind it
 class FlatFace(FrozenValue):
     """A convex face in its own plane.
 
-    Attributes
-    ----------
-    center : (3,) float
-        Centroid, m.
-    axes : (3, 3) float
-        Rows are unit vectors: the normal, and the two principal axes of the area.
-    corners : (m, 2) float
-        From the centroid along the principal axes, counterclockwise, m.
-    area : float
-        m².
-    moments : tuple of 2 float
-        Second moments of area about the principal axes, m⁴.
+    ``center`` (3,): centroid, m; ``axes`` (3, 3): rows are unit vectors: the normal, and the two
+    principal axes of the area; ``corners`` (m, 2): from the centroid along the principal axes,
+    counterclockwise, m; ``area``: m²; ``moments``: second moments of area about the principal axes,
+    m⁴.
     """
 
     center: Floats
@@ -57,17 +49,9 @@ class FlatFace(FrozenValue):
 def flat_face(corners: Floats, normal: Floats | None = None) -> FlatFace:
     """Return a face in its own plane.
 
-    Parameters
-    ----------
-    corners : (m, 3) float
-        Once around, m; what leaves their plane is projected onto it.
-    normal : (3,) float, optional
-        To which side the normal points; counterclockwise corners by default.
-
-    Raises
-    ------
-    SceneError
-        If it has no area, or crosses itself so much that it is none.
+    ``corners`` (m, 3): once around, m; what leaves their plane is projected onto it. ``normal``
+    (3,): to which side the normal points; counterclockwise corners by default. Raises `SceneError`
+    if it has no area, or crosses itself so much that it is none.
 
     Examples
     --------
@@ -104,12 +88,7 @@ def flat_face(corners: Floats, normal: Floats | None = None) -> FlatFace:
 def face_joint(bricks: tuple[int, int], face: FlatFace, law: JointLaw) -> Joint:
     """Return the joint of two bricks over a face.
 
-    Parameters
-    ----------
-    bricks : tuple of 2 int
-        Names; the face's normal points from the first into the second.
-    face : FlatFace
-    law : JointLaw
+    ``bricks``: names; the face's normal points from the first into the second.
     """
     shift, turn = law.stiffness(face.area, face.moments)
     position, along, across = as_vectors(np.vstack([face.center, face.axes[:2]]))
@@ -127,14 +106,8 @@ def face_joint(bricks: tuple[int, int], face: FlatFace, law: JointLaw) -> Joint:
 def face_ground(brick: int, face: FlatFace, law: JointLaw, stub: float = STUB) -> Ground:
     """Return the ground end of a brick over a face.
 
-    Parameters
-    ----------
-    brick : int
-        Name; the face's normal points into it.
-    face : FlatFace
-    law : JointLaw
-    stub : float, optional
-        From the face to the fixed point behind it, m.
+    ``brick``: name; the face's normal points into it. ``stub``: from the face to the fixed point
+    behind it, m.
     """
     shift, turn = law.stiffness(face.area, face.moments)
     position, along, across = as_vectors(np.vstack([face.center, face.axes[:2]]))
@@ -192,15 +165,8 @@ Held = tuple[tuple[int, int], FlatFace]
 class Touching:
     """Where blocks touch each other and the ground.
 
-    Attributes
-    ----------
-    faces : tuple of ((int, int), FlatFace)
-        Places of the blocks in the file, the ground is -1 and comes first; normals point into the
-        second.
-    joints : tuple of FileJoint
-        Those without a face.
-    said : tuple of str
-        Where they come from.
+    ``faces`` (int, int): places of the blocks in the file, the ground is -1 and comes first;
+    normals point into the second. ``joints``: those without a face. ``said``: where they come from.
     """
 
     faces: tuple[Held, ...]
@@ -218,22 +184,9 @@ def find_touching(
 ) -> Touching:
     """Return where blocks touch each other and the ground.
 
-    Parameters
-    ----------
-    content : Content
-        In m.
-    given : Given
-    blocks : sequence of Tidied
-        All of the file.
-    bricks : mapping of int to Brick
-        Those that are built, by their places in the file; others are the ground.
-
-    Raises
-    ------
-    FileError
-        If shapely is not installed.
-    SceneError
-        If a face of the file does not lie on a block that it joins.
+    ``content``: in m. ``blocks``: all of the file. ``bricks``: those that are built, by their
+    places in the file; others are the ground. Raises `FileError` if shapely is not installed;
+    `SceneError` if a face of the file does not lie on a block that it joins.
     """
     require_polygons("finding where blocks touch")
     solids, facets = [block.solid for block in blocks], [block.facets for block in blocks]

@@ -28,15 +28,8 @@ GRAIN = 1e-9  # length to which corners are rounded, over the size of what overl
 def convex_pieces(polygons: Sequence[Any]) -> Iterator[Floats]:
     """Yield the convex pieces of a union of polygons.
 
-    Yields
-    ------
-    (m, 2) float
-        Corners counterclockwise, m.
-
-    Raises
-    ------
-    SceneError
-        If polygons are too degenerate to be cut.
+    Result (m, 2): corners counterclockwise, m. Raises `SceneError` if polygons are too degenerate
+    to be cut.
     """
     try:
         yield from _pieces(import_module("shapely"), polygons)
@@ -97,21 +90,11 @@ Plane = tuple[Floats, Floats, list[Any]]  # origin, axes, and polygons in it
 
 @dataclass(frozen=True, eq=False, repr=False)
 class TouchingFace(FrozenValue):
-    """A convex face between two blocks.
+    """A convex face between two blocks."""
 
-    Attributes
-    ----------
-    blocks : tuple of 2 int
-        Places of the blocks, ascending.
-    corners : (m, 3) float
-        Once around, m.
-    normal : (3,) float
-        Unit vector from the first block into the second.
-    """
-
-    blocks: tuple[int, int]
-    corners: Floats
-    normal: Floats
+    blocks: tuple[int, int]  # places of the blocks, ascending
+    corners: Floats  # (m, 3); once around, m
+    normal: Floats  # (3,); unit vector from the first block into the second
 
 
 class Solid(Protocol):
@@ -128,18 +111,10 @@ class Solid(Protocol):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Surface(FrozenValue):
-    """A surface that is not closed, as of a support; both of its sides are faces.
+    """A surface that is not closed, as of a support; both of its sides are faces."""
 
-    Attributes
-    ----------
-    points : (V, 3) float
-        m.
-    faces : tuple of tuple of int
-        Places among the vertices.
-    """
-
-    points: Floats
-    faces: tuple[tuple[int, ...], ...]
+    points: Floats  # (V, 3); m
+    faces: tuple[tuple[int, ...], ...]  # places among the vertices
 
 
 @dataclass(frozen=True)
@@ -154,15 +129,7 @@ class _Facets:
 def require_polygons(what: str) -> None:
     """Raise an error unless polygons can be cut.
 
-    Parameters
-    ----------
-    what : str
-        What needs it, for the message.
-
-    Raises
-    ------
-    FileError
-        If the extra is not installed.
+    Raises `FileError` if the extra is not installed.
     """
     if find_spec("shapely") is None:
         raise FileError(f"{what} needs shapely; pip install 'seqopt[blocks]'")
@@ -173,26 +140,11 @@ def touching_faces(
 ) -> tuple[TouchingFace, ...]:
     """Return the faces over which blocks touch.
 
-    Parameters
-    ----------
-    shapes : sequence of Polyhedron or Surface
-        Where they are in the scene.
-    gap : float
-        Most that may lie between two faces, or by which they may interpenetrate, m.
-    progress : callable, optional
-        Told how far it is, once it takes longer than a second.
-
-    Returns
-    -------
-    tuple of TouchingFace
-        In the order of the blocks; halfway between the two faces.
-
-    Raises
-    ------
-    FileError
-        If shapely is not installed.
-    SceneError
-        If the gap is not positive, or more than `MOST_PAIRS` blocks are near each other.
+    ``shapes``: where they are in the scene; ``gap``: most that may lie between two faces, or by
+    which they may interpenetrate, m; ``progress``: told how far it is, once it takes longer than a
+    second. Result: in the order of the blocks; halfway between the two faces. Raises `FileError` if
+    shapely is not installed; `SceneError` if the gap is not positive, or more than `MOST_PAIRS`
+    blocks are near each other.
 
     Examples
     --------

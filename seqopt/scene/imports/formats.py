@@ -35,25 +35,10 @@ FORMATS = (*DOCUMENTS, "boxes", "obj", "ply", "stl")
 def import_scene(path: str | Path, form: str | None = None, given: Given | None = None) -> Scene:
     r"""Return the scene of a file that another program wrote.
 
-    Parameters
-    ----------
-    path : str or pathlib.Path
-    form : str, optional
-        One of `FORMATS`; by default what the file looks like.
-    given : Given, optional
-        What the file does not say: a unit of length, a density and more.
-
-    Returns
-    -------
-    Scene
-        Its provenance says what was read and what was assumed.
-
-    Raises
-    ------
-    FileError
-        If the file cannot be read, or what reads it is not installed.
-    SceneError
-        If it is no such file, or lacks what is not given.
+    ``form``: one of `FORMATS`; by default what the file looks like. ``given``: what the file does
+    not say: a unit of length, a density and more. Result: its provenance says what was read and
+    what was assumed. Raises `FileError` if the file cannot be read, or what reads it is not
+    installed; `SceneError` if it is no such file, or lacks what is not given.
 
     Warns
     -----
@@ -97,18 +82,8 @@ def _warn_of_lying(scene: Scene) -> None:
 def read_content(path: Path, form: str | None = None) -> Content:
     """Return what a file of others says.
 
-    Parameters
-    ----------
-    path : pathlib.Path
-    form : str, optional
-        One of `FORMATS`; by default what the file looks like.
-
-    Raises
-    ------
-    FileError
-        If the file cannot be read, or what reads it is not installed.
-    SceneError
-        If it is no such file.
+    ``form``: one of `FORMATS`; by default what the file looks like. Raises `FileError` if the file
+    cannot be read, or what reads it is not installed.
     """
     source = str(path)
     named = SUFFIXES.get(path.suffix.lower()) if form is None else form
@@ -127,21 +102,7 @@ def read_content(path: Path, form: str | None = None) -> Content:
 def sniffed(document: Any, source: str) -> str:
     """Return which format a JSON document has.
 
-    Parameters
-    ----------
-    document : object
-    source : str
-        What to call it in messages.
-
-    Returns
-    -------
-    str
-        One of `DOCUMENTS`.
-
-    Raises
-    ------
-    SceneError
-        If it has none of them.
+    Result: one of `DOCUMENTS`. Raises `SceneError` if it has none of them.
     """
     by_kind = {"blockmodel": "compas_dem", "problem": "compas_dem", "timbermodel": "compas_timber"}
     if kind(document) in by_kind:

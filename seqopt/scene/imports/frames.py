@@ -63,24 +63,9 @@ class _Bar:
 def read_frame(document: Any, source: str) -> Content:
     """Return the bars of a frame.
 
-    Parameters
-    ----------
-    document : object
-        A JSON document with ``nodes``, ``elements``, ``materials`` and ``cross_secs``. Where it
-        does not name the units of materials and cross-sections, they are kN and m. The density is a
-        weight per volume.
-    source : str
-        What to call it in messages.
-
-    Returns
-    -------
-    Content
-        In m.
-
-    Raises
-    ------
-    SceneError
-        If it is no such frame.
+    ``document``: A JSON document with ``nodes``, ``elements``, ``materials`` and ``cross_secs``.
+    Where it does not name the units of materials and cross-sections, they are kN and m. The density
+    is a weight per volume. Result: in m. Raises `SceneError` if it is no such frame.
     """
     held = mapping(source, document)
     nodes, grounded = _nodes(source, held)

@@ -36,16 +36,7 @@ def split_blocks(vertices: Floats, faces: Polygons) -> list[list[int]]:
     being one: so blocks may share vertices, and faces need not. If blocks are left open so, one is
     what shares vertices, where these say it.
 
-    Parameters
-    ----------
-    vertices : (V, 3) float
-    faces : sequence of sequence of int
-        Places among the vertices.
-
-    Returns
-    -------
-    list of list of int
-        Places among the faces.
+    ``vertices`` (V, 3); ``faces``: places among the vertices. Result: places among the faces.
 
     Examples
     --------
@@ -147,21 +138,7 @@ UNASKED = logging.NullHandler()  # else Python prints what no one listens to
 def read_obj(text: str, source: str) -> Content:
     """Return the blocks of a Wavefront OBJ file.
 
-    Parameters
-    ----------
-    text : str
-    source : str
-        What to call it in messages.
-
-    Returns
-    -------
-    Content
-        Its blocks, by the names of objects or groups, whichever are more.
-
-    Raises
-    ------
-    SceneError
-        If it is no such file.
+    Result: its blocks, by the names of objects or groups, whichever are more.
     """
     vertices: list[list[float]] = []
     faces: Faces = []
@@ -187,25 +164,7 @@ def read_obj(text: str, source: str) -> Content:
 def read_mesh(content: bytes, source: str, form: str) -> Content:
     """Return the blocks of a PLY or STL file.
 
-    Parameters
-    ----------
-    content : bytes
-    source : str
-        What to call it in messages.
-    form : str
-        ``ply`` or ``stl``.
-
-    Returns
-    -------
-    Content
-        Its blocks.
-
-    Raises
-    ------
-    FileError
-        If trimesh is not installed.
-    SceneError
-        If it is no such file.
+    ``form``: ``ply`` or ``stl``. Raises `FileError` if trimesh is not installed.
     """
     if find_spec("trimesh") is None:
         raise FileError(f"{source}: reading {form} needs trimesh; pip install 'seqopt[blocks]'")

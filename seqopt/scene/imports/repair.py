@@ -29,14 +29,9 @@ TURNED = "faces are turned so that all agree which side is outside"
 class Tidied:
     """A block whose faces are in order.
 
-    Attributes
-    ----------
-    solid : Polyhedron or Surface
-        A surface where a support is not closed.
-    facets : Surface
-        Its faces as the file has them, also those that are not flat: where it touches others.
-    mended : Counter of str
-        What was done, and to how many faces or vertices.
+    ``solid``: a surface where a support is not closed; ``facets``: its faces as the file has them,
+    also those that are not flat: where it touches others; ``mended``: what was done, and to how
+    many faces or vertices.
     """
 
     solid: Polyhedron | Surface
@@ -47,17 +42,7 @@ class Tidied:
 def tidy_shape(block: FileBlock, *, may_be_open: bool = False) -> Tidied:
     """Return a block as a polyhedron, or a support that is not closed as a surface.
 
-    Parameters
-    ----------
-    block : FileBlock
-        In m.
-    may_be_open : bool, optional
-        Whether it is a support, of which the surface alone counts.
-
-    Raises
-    ------
-    SceneError
-        Naming the block, if it is not closed.
+    ``block``: in m; ``may_be_open``: whether it is a support, of which the surface alone counts.
     """
     mended: Counter[str] = Counter()
     points, faces = block.vertices, [_plain(face) for face in block.faces]

@@ -24,15 +24,8 @@ Line = Callable[[float], Floats]
 def circular(span: float, rise: float) -> Line:
     """Return the arc of a circle through both springings and the crown.
 
-    Parameters
-    ----------
-    span, rise : float
-        m; at most a half circle.
-
-    Raises
-    ------
-    SceneError
-        If the rise is more than half of the span.
+    ``span``, ``rise``: m; at most a half circle. Raises `SceneError` if the rise is more than half
+    of the span.
     """
     if rise > 0.5 * span * (1 + 1e-12):
         raise SceneError(
@@ -52,13 +45,7 @@ def circular(span: float, rise: float) -> Line:
 
 
 def catenary(span: float, rise: float) -> Line:
-    """Return a hanging chain turned upside down: the line of thrust of an even arch.
-
-    Parameters
-    ----------
-    span, rise : float
-        m.
-    """
+    """Return a hanging chain turned upside down: the line of thrust of an even arch."""
     from scipy.optimize import brentq  # noqa: PLC0415  # slow to import, for arches only
 
     # with u = span / 2a: rise / span = (cosh u - 1) / 2u
@@ -76,15 +63,8 @@ def catenary(span: float, rise: float) -> Line:
 def pointed(span: float, rise: float) -> Line:
     """Return two arcs that leave the springings upright and meet in a point.
 
-    Parameters
-    ----------
-    span, rise : float
-        m; more than a half circle rises.
-
-    Raises
-    ------
-    SceneError
-        If the rise is half of the span or less.
+    ``span``, ``rise``: m; more than a half circle rises. Raises `SceneError` if the rise is half of
+    the span or less.
     """
     if rise <= 0.5 * span:
         raise SceneError(
@@ -113,16 +93,7 @@ CURVES: dict[str, Callable[[float, float], Line]] = {
 def chords(line: Line, lengths: Floats) -> Floats | None:
     """Return the points of a chain of rigid links laid along a line from its start.
 
-    Parameters
-    ----------
-    line : Line
-    lengths : (n,) float
-        Of the links, m.
-
-    Returns
-    -------
-    (n + 1, 2) float or None
-        m; none if the line is too short.
+    ``lengths`` (n,): of the links, m. Result (n + 1, 2): m; none if the line is too short.
     """
     from scipy.optimize import brentq  # noqa: PLC0415  # slow to import, for arches only
 
@@ -151,30 +122,12 @@ class ArchForm:
     The joints lie on the curve, the first and the last at its springings, which are level. They are
     as wide as it takes for the bricks to fill the curve.
 
-    Parameters
-    ----------
-    span, rise : float
-        Between the springings, and from there to the crown.
-    curve : str
-        ``circular``, ``catenary`` or ``pointed``.
-    bricks : int, optional
-        By default as many as make the joints most nearly as wide as ``gap``.
-    pattern : str
-        A letter per brick, repeated: ``V`` lies along the arch, ``L`` and ``R`` lie across it and
-        stick out to the left and to the right.
-    dimensions : Vector
-        Length, width and thickness of a brick.
-    gap : float
-        How wide joints are to be where the number of bricks is not given.
-    density : float
-        kg/m³.
-    law : JointLaw
-        How stiff joints are.
-
-    Raises
-    ------
-    SceneError
-        Naming the number that cannot be.
+    ``span``, ``rise``: between the springings, and from there to the crown; ``curve``:
+    ``circular``, ``catenary`` or ``pointed``; ``bricks``: by default as many as make the joints
+    most nearly as wide as ``gap``; ``pattern``: a letter per brick, repeated: ``V`` lies along the
+    arch, ``L`` and ``R`` lie across it and stick out to the left and to the right; ``dimensions``:
+    length, width and thickness of a brick; ``gap``: how wide joints are to be where the number of
+    bricks is not given; ``density``: kg/m³; ``law``: how stiff joints are.
 
     Examples
     --------
@@ -215,13 +168,7 @@ class ArchForm:
         return CURVES[self.curve](self.span, self.rise)
 
     def lengths(self, bricks: int) -> Floats:
-        """Return how much of the arch each brick covers, without joints.
-
-        Returns
-        -------
-        (n,) float
-            m.
-        """
+        """Return how much of the arch each brick covers, without joints. Result (n,): m."""
         along, across, _ = self.dimensions
         letters = (self.pattern * bricks)[:bricks]
         return np.array([along if letter == "V" else across for letter in letters])
@@ -232,18 +179,9 @@ def arch(form: ArchForm, name: str = "", *, robots: Sequence[Robot] | None = Non
 
     It stands on both, at z = 0, and runs towards +x in the plane y = 0.
 
-    Parameters
-    ----------
-    form : ArchForm
-    name : str, optional
-        By default the curve, the span and the rise.
-    robots : sequence of Robot, optional
-        By default two beside the arch and a mobile one; each can bear the whole weight.
-
-    Raises
-    ------
-    SceneError
-        If the bricks do not fill the curve, or interpenetrate.
+    ``name``: by default the curve, the span and the rise. ``robots``: by default two beside the
+    arch and a mobile one; each can bear the whole weight. Raises `SceneError` if the bricks do not
+    fill the curve, or interpenetrate.
 
     Examples
     --------

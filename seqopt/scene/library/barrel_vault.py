@@ -31,21 +31,9 @@ def barrel_vault(
     Bricks are boxes as long as the inner face lets them be: neighbors touch there, and joints widen
     outward.
 
-    Parameters
-    ----------
-    test : int
-        From 1 to 8.
-    law : JointLaw, optional
-        How stiff joints are.
-    name : str, optional
-        By default the number of the test.
-    robots : sequence of Robot, optional
-        By default two beside the vault and a mobile one.
-
-    Raises
-    ------
-    SceneError
-        If there is no such test.
+    ``test``: from 1 to 8; ``law``: how stiff joints are; ``name``: by default the number of the
+    test; ``robots``: by default two beside the vault and a mobile one. Raises `SceneError` if there
+    is no such test.
 
     Examples
     --------

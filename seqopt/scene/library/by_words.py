@@ -37,10 +37,7 @@ VAULT = (
 def vault338(arch: Scene) -> Scene:
     """Return the vault of Bruun et al. as we reconstruct it around their arch.
 
-    Parameters
-    ----------
-    arch : Scene
-        ``arch25``.
+    ``arch``: ``arch25``.
     """
     shape = VaultShape(
         bricks=338,
@@ -68,14 +65,8 @@ GENERATED: dict[str, Callable[[Callable[[str], Scene]], Scene]] = {
 class Kind:
     """A kind of scene that a few words describe.
 
-    Attributes
-    ----------
-    about : str
-        What it is, and an example.
-    make : callable
-        Makes the scene.
-    shape : type, optional
-        Of the numbers that it takes as one value; by default it takes them one by one.
+    ``about``: what it is, and an example. ``make``: makes the scene. ``shape``: of the numbers that
+    it takes as one value; by default it takes them one by one.
     """
 
     about: str
@@ -120,16 +111,9 @@ EXAMPLE = {int: "12", int | None: "12", float: "0.5", str: "a word", Vector: "0.
 def scene_by_words(words: str) -> Scene:
     """Return the scene that a few words describe.
 
-    Parameters
-    ----------
-    words : str
-        A key of `KINDS`, a colon, and ``name=value`` of its numbers, parted by commas; three
-        lengths as ``0.2x0.1x0.06``. Lengths in m, angles in rad, densities in kg/m³.
-
-    Raises
-    ------
-    SceneError
-        If there is no such kind or number, or it makes no scene.
+    ``words``: a key of `KINDS`, a colon, and ``name=value`` of its numbers, parted by commas; three
+    lengths as ``0.2x0.1x0.06``. Lengths in m, angles in rad, densities in kg/m³. Raises
+    `SceneError` if there is no such kind or number, or it makes no scene.
 
     Examples
     --------

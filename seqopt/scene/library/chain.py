@@ -33,23 +33,10 @@ def chain(
     Every brick is turned against the one before by the same angle. Arches of other shapes come from
     `seqopt.scene.arch.arch_scene`.
 
-    Parameters
-    ----------
-    bricks : int
-        At least two.
-    lean : float, optional
-        Angle of the first brick above the horizontal and of the last one below it, rad.
-    pattern : str, optional
-        As in `seqopt.scene.arch.ArchShape`.
-    name : str, optional
-        By default the kind and the size.
-    robots : sequence of Robot, optional
-        By default two beside the arch and a mobile one.
-
-    Raises
-    ------
-    SceneError
-        If the bricks are so few that they interpenetrate, or the numbers make no arch.
+    ``bricks``: at least two; ``lean``: angle of the first brick above the horizontal and of the
+    last one below it, rad; ``pattern``: as in `seqopt.scene.arch.ArchShape`; ``name``: by default
+    the kind and the size; ``robots``: by default two beside the arch and a mobile one. Raises
+    `SceneError` if the bricks are so few that they interpenetrate, or the numbers make no arch.
 
     Examples
     --------

@@ -18,18 +18,10 @@ from seqopt.scene.parts import Brick, Robot
 class JointLaw:
     """The stiffness of a joint per area of the face over which its bricks meet.
 
-    Parameters
-    ----------
-    translational : Vector
-        Along the joint's normal and across it twice, N/m per m².
-    rotational : Vector, optional
-        About the same axes, N m/rad per m². By default what a bed of the translational stiffness
-        over the face resists: it grows with the face's second moments of area.
-
-    Raises
-    ------
-    SceneError
-        If a number is not finite or negative.
+    ``translational``: along the joint's normal and across it twice, N/m per m²; ``rotational``:
+    about the same axes, N m/rad per m². By default what a bed of the translational stiffness over
+    the face resists: it grows with the face's second moments of area. Raises `SceneError` if a
+    number is not finite or negative.
 
     Examples
     --------
@@ -50,17 +42,8 @@ class JointLaw:
     def stiffness(self, area: float, moments: tuple[float, float]) -> tuple[Vector, Vector]:
         """Return the stiffness of a joint over a face.
 
-        Parameters
-        ----------
-        area : float
-            m².
-        moments : tuple of 2 float
-            Second moments of area about the two axes across the normal, m⁴.
-
-        Returns
-        -------
-        translational, rotational : Vector
-            N/m and N m/rad.
+        ``area``: m²; ``moments``: second moments of area about the two axes across the normal, m⁴.
+        Results: ``translational``, ``rotational``: N/m and N m/rad.
         """
         normal, one, other = self.translational
         first, second = moments
@@ -83,10 +66,7 @@ MOST_BRICKS = 20_000  # of a generated scene
 def mobile_robots(bricks: Sequence[Brick], count: int = 3) -> tuple[Robot, ...]:
     """Return robots that reach everything, each of which can bear all bricks.
 
-    Returns
-    -------
-    tuple of Robot
-        ``rob1``, ``rob2`` …
+    Result: ``rob1``, ``rob2`` ….
     """
     weight = STANDARD_GRAVITY * math.fsum(brick.mass for brick in bricks)
     return tuple(Robot(name=f"rob{i}", payload=weight) for i in range(1, count + 1))
@@ -97,19 +77,8 @@ def touching_order(
 ) -> list[int]:
     """Return an order in which everything touches what stands before it, or the ground.
 
-    Parameters
-    ----------
-    count : int
-        How many there are; their own order is kept where it can be.
-    pairs : iterable of (int, int)
-        Which touch each other.
-    starts : iterable of int
-        Which stand on the ground.
-
-    Returns
-    -------
-    list of int
-        All that can be reached.
+    ``count``: how many there are; their own order is kept where it can be. ``pairs`` (int, int):
+    which touch each other. ``starts``: which stand on the ground. Result: all that can be reached.
     """
     beside: list[set[int]] = [set() for _ in range(count)]
     for a, b in pairs:
@@ -124,20 +93,7 @@ def touching_order(
 
 
 def whole_number(where: str, value: int, least: int) -> int:
-    """Return a whole number that is large enough, and at most `MOST_BRICKS`.
-
-    Parameters
-    ----------
-    where : str
-        What it is, for the message.
-    value : int
-    least : int
-
-    Raises
-    ------
-    SceneError
-        If it is something else.
-    """
+    """Return a whole number that is large enough, and at most `MOST_BRICKS`."""
     whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
     if not whole or not least <= value <= MOST_BRICKS:
         raise SceneError(
@@ -147,19 +103,7 @@ def whole_number(where: str, value: int, least: int) -> int:
 
 
 def few_enough(where: str, bricks: int) -> None:
-    """Raise an error if a structure would have more than `MOST_BRICKS`.
-
-    Parameters
-    ----------
-    where : str
-        What it is, for the message.
-    bricks : int
-
-    Raises
-    ------
-    SceneError
-        Saying how many it would have.
-    """
+    """Raise an error if a structure would have more than `MOST_BRICKS`."""
     if bricks > MOST_BRICKS:
         raise SceneError(f"{where}: {bricks} bricks; give numbers that make at most {MOST_BRICKS}")
 
@@ -167,16 +111,6 @@ def few_enough(where: str, bricks: int) -> None:
 def joint_width(where: str, value: float) -> float:
     """Return the width of a joint, which may be none.
 
-    Parameters
-    ----------
-    where : str
-        What it is, for the message.
-    value : float
-        m.
-
-    Raises
-    ------
-    SceneError
-        If it is negative or not finite.
+    Raises `SceneError` if it is negative or not finite.
     """
     return 0.0 if value == 0 else positive(where, value, "m, or 0")

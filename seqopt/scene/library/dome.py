@@ -34,33 +34,14 @@ LENGTHS = ("span", "rise", "opening", "thickness")
 class DomeShape:
     """The numbers that shape a dome, a cap of a sphere with an opening; lengths in m.
 
-    Parameters
-    ----------
-    courses : int
-        Rows from the ground to the opening, equally high.
-    around : int
-        Bricks in the lowest course. In running bond courses have fewer the higher they are; in
-        herringbone all have as many cells, twice this number, and it must be even.
-    bond : str
-        ``running`` or ``herringbone``.
-    span, rise : float
-        Diameter at the ground and height over it, of the surface through the bricks' middles,
-        before the opening is cut.
-    opening : float
-        Diameter of the opening.
-    thickness : float
-        Of the bricks, at right angles to the surface.
-    gap : float
-        Least width of the joints, on the inside; boxes on a sphere leave more elsewhere.
-    density : float
-        kg/m³.
-    law : JointLaw
-        How stiff joints are.
-
-    Raises
-    ------
-    SceneError
-        Naming the number that cannot be.
+    ``courses``: rows from the ground to the opening, equally high. ``around``: bricks in the lowest
+    course. In running bond courses have fewer the higher they are; in herringbone all have as many
+    cells, twice this number, and it must be even. ``bond``: ``running`` or ``herringbone``.
+    ``span``, ``rise``: diameter at the ground and height over it, of the surface through the
+    bricks' middles, before the opening is cut. ``opening``: diameter of the opening. ``thickness``:
+    of the bricks, at right angles to the surface. ``gap``: least width of the joints, on the
+    inside; boxes on a sphere leave more elsewhere. ``density``: kg/m³. ``law``: how stiff joints
+    are.
 
     Examples
     --------
@@ -109,15 +90,7 @@ class DomeShape:
     def latitude(self, row: float) -> float:
         """Return the angle above the horizontal at which a row begins, seen from the center.
 
-        Parameters
-        ----------
-        row : float
-            From 0 at the ground.
-
-        Returns
-        -------
-        float
-            rad.
+        ``row``: from 0 at the ground. Result: rad.
         """
         first, last = (math.acos(0.5 * d / self.radius) for d in (self.span, self.opening))
         return first + (last - first) * row / self.courses
@@ -134,20 +107,12 @@ TURN = 2 * math.pi
 
 @dataclass(frozen=True)
 class _Place:
-    """The place of a brick: from one row to another, and how far around on either side.
+    """The place of a brick: from one row to another, and how far around on either side."""
 
-    Attributes
-    ----------
-    low, high : int
-        Rows.
-    azimuth, half : float
-        rad.
-    """
-
-    low: int
-    high: int
-    azimuth: float
-    half: float
+    low: int  # rows
+    high: int  # rows
+    azimuth: float  # rad
+    half: float  # rad
 
 
 def dome(shape: DomeShape, name: str = "", *, robots: Sequence[Robot] | None = None) -> Scene:
@@ -157,18 +122,8 @@ def dome(shape: DomeShape, name: str = "", *, robots: Sequence[Robot] | None = N
     boxes cut to the room that their place in the dome leaves: shorter the higher they are, unless a
     course has fewer of them.
 
-    Parameters
-    ----------
-    shape : DomeShape
-    name : str, optional
-        By default the kind and the number of bricks.
-    robots : sequence of Robot, optional
-        Three that reach everything by default.
-
-    Raises
-    ------
-    SceneError
-        If a place leaves no room for a brick, or bricks interpenetrate.
+    ``name``: by default the kind and the number of bricks; ``robots``: three that reach everything
+    by default. Raises `SceneError` if a place leaves no room for a brick, or bricks interpenetrate.
 
     Examples
     --------

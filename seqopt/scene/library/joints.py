@@ -19,30 +19,17 @@ PARALLEL = 1e-12  # sine of an angle between edges treated as zero
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ContactAreas(FrozenValue):
-    """The overlaps of P pairs of faces.
+    """The overlaps of P pairs of faces."""
 
-    Attributes
-    ----------
-    area : (P,) float
-        m²; 0 where faces do not overlap.
-    centroid : (P, 2) float
-        m.
-    moments : (P, 2) float
-        Second moments of area about the two axes through the centroid, m⁴.
-    """
-
-    area: Floats
-    centroid: Floats
-    moments: Floats
+    area: Floats  # (P,); m²; 0 where faces do not overlap
+    centroid: Floats  # (P, 2); m
+    moments: Floats  # (P, 2); second moments of area about the two axes through the centroid, m⁴
 
 
 def contact_areas(first: Floats, second: Floats) -> ContactAreas:
     """Return the overlaps of convex polygons.
 
-    Parameters
-    ----------
-    first, second : (P, m, 2) float
-        Corners, counterclockwise, m.
+    ``first``, ``second`` (P, m, 2): corners, counterclockwise, m.
 
     Examples
     --------
@@ -105,12 +92,8 @@ Pairs = Sequence[tuple[int, int]]
 class Faces(FrozenValue):
     """The faces of boxes that look at others.
 
-    Attributes
-    ----------
-    which, axis : (P,) int
-        Box, and the axis across its face.
-    out : (P, 3) float
-        Unit vectors outward.
+    ``which``, ``axis`` (P,): box, and the axis across its face; ``out`` (P, 3): unit vectors
+    outward.
     """
 
     which: Ints
@@ -122,16 +105,9 @@ class Faces(FrozenValue):
 class Meeting(FrozenValue):
     """Where pairs of boxes look at each other.
 
-    Attributes
-    ----------
-    faces : tuple of 2 Faces
-        Of the first boxes and of the second.
-    along : (P, 3) float
-        Mean normals, from the first box to the second.
-    sides : (P, 2, 3) float
-        Unit vectors across them; the first is most nearly an edge of the first box.
-    shared : ContactAreas
-        Overlaps of the faces, seen along the normals.
+    ``faces``: of the first boxes and of the second. ``along`` (P, 3): mean normals, from the first
+    box to the second. ``sides`` (P, 2, 3): unit vectors across them; the first is most nearly an
+    edge of the first box. ``shared``: overlaps of the faces, seen along the normals.
     """
 
     faces: tuple[Faces, Faces]
@@ -143,14 +119,8 @@ class Meeting(FrozenValue):
 def meeting(shapes: Boxes, pairs: Pairs, normals: Floats | None = None) -> Meeting:
     """Return where boxes look at each other.
 
-    Parameters
-    ----------
-    shapes : Boxes
-    pairs : sequence of (int, int)
-        At least one.
-    normals : (P, 3) float, optional
-        About at right angles to the faces; by default these are the ones that look at each other
-        most.
+    ``pairs`` (int, int): at least one. ``normals`` (P, 3): about at right angles to the faces; by
+    default these are the ones that look at each other most.
     """
     a, b = np.array(pairs, dtype=np.int64).T
     step = shapes.place[b] - shapes.place[a]
@@ -167,18 +137,8 @@ def meeting(shapes: Boxes, pairs: Pairs, normals: Floats | None = None) -> Meeti
 def shares(bricks: Sequence[Brick], pairs: Pairs, normals: Floats) -> Floats:
     """Return how much of the smaller of two faces the other one covers.
 
-    Parameters
-    ----------
-    bricks : sequence of Brick
-    pairs : sequence of (int, int)
-        Which of them may touch.
-    normals : (P, 3) float
-        About at right angles to the faces.
-
-    Returns
-    -------
-    (P,) float
-        From 0 to 1.
+    ``pairs`` (int, int): which of them may touch; ``normals`` (P, 3): about at right angles to the
+    faces. Result (P,): from 0 to 1.
     """
     if not pairs:
         return np.zeros(0)
@@ -196,12 +156,8 @@ def shares(bricks: Sequence[Brick], pairs: Pairs, normals: Floats) -> Floats:
 def widths(shapes: Boxes, found: Meeting) -> tuple[Floats, Floats, Floats]:
     """Return where faces are along the normals, in the middle of their overlaps.
 
-    Returns
-    -------
-    start, end : (P,) float
-        Of the first faces and of the second, m from the origin's plane.
-    taper : (P,) float
-        How much farther apart they are at the ends of the overlap, m, at most.
+    Results: ``start``, ``end`` (P,): of the first faces and of the second, m from the origin's
+    plane; ``taper`` (P,): how much farther apart they are at the ends of the overlap, m, at most.
     """
     middle = (found.shared.centroid[:, None, :] @ found.sides)[:, 0]
     start, end = (_height(shapes, face, found.along, middle) for face in found.faces)
@@ -282,28 +238,12 @@ def joints_between(
 ) -> tuple[Joint, ...]:
     """Return the joints of bricks, each where the faces that look at each other overlap.
 
-    Parameters
-    ----------
-    bricks : sequence of Brick
-    pairs : sequence of (int, int)
-        Which of them touch.
-    law : JointLaw
-    normals : (P, 3) float, optional
-        About at right angles to the faces; by default these are the ones that look at each other
-        most.
-
-    Returns
-    -------
-    tuple of Joint
-        Each in the middle of the overlap and halfway between the faces; its axes are the mean
-        normal of the faces, from the first brick to the second, and that edge of the first that is
-        most nearly at right angles to it. One that is thick where the faces are farthest apart says
-        so.
-
-    Raises
-    ------
-    SceneError
-        If faces do not overlap where they look at each other.
+    ``pairs`` (int, int): which of them touch. ``normals`` (P, 3): about at right angles to the
+    faces; by default these are the ones that look at each other most. Result: each in the middle of
+    the overlap and halfway between the faces; its axes are the mean normal of the faces, from the
+    first brick to the second, and that edge of the first that is most nearly at right angles to it.
+    One that is thick where the faces are farthest apart says so. Raises `SceneError` if faces do
+    not overlap where they look at each other.
     """
     if not pairs:
         return ()
@@ -331,19 +271,8 @@ def joints_between(
 def ground_under(brick: Brick, down: Floats, law: JointLaw, stub: float = STUB) -> Ground:
     """Return the ground end on the face of a brick that looks down most.
 
-    Parameters
-    ----------
-    brick : Brick
-    down : (3,) float
-        Direction to the ground.
-    law : JointLaw
-    stub : float, optional
-        Distance from the face to the fixed point behind it, m.
-
-    Returns
-    -------
-    Ground
-        In the middle of the face; its normal points into the brick.
+    ``down`` (3,): direction to the ground; ``stub``: distance from the face to the fixed point
+    behind it, m. Result: in the middle of the face; its normal points into the brick.
     """
     shapes = boxes([brick])
     frame, half = shapes.frame[0], shapes.half[0]
@@ -365,12 +294,7 @@ def ground_under(brick: Brick, down: Floats, law: JointLaw, stub: float = STUB) 
 
 
 def as_vector(values: Floats) -> Vector:
-    """Return three numbers of an array as a tuple.
-
-    Parameters
-    ----------
-    values : (3,) float
-    """
+    """Return three numbers of an array as a tuple. ``values`` (3,)."""
     x, y, z = values.tolist()
     return x, y, z
 

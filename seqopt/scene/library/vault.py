@@ -39,15 +39,8 @@ TILES = ((2, 0, True), (1, 0, False), (1, -1, False))  # rows, column, along: th
 class ArchLine:
     """The bricks of an arch, the tiles of a herringbone that they cover, and its line.
 
-    Parameters
-    ----------
-    bricks : tuple of Brick
-        In build order.
-    joints : tuple of Joint
-    grounds : tuple of 2 Ground
-        Under the first brick and the last.
-    tiles : tuple of Tile
-        Of every brick.
+    ``bricks``: in build order; ``grounds``: under the first brick and the last; ``tiles``: of every
+    brick.
     """
 
     bricks: tuple[Brick, ...]
@@ -71,15 +64,8 @@ class ArchLine:
     def point(self, row: Floats) -> Floats:
         """Return points of the line.
 
-        Parameters
-        ----------
-        row : (n,) float
-            From 0 at the first ground end; a joint lies at every row where a brick begins.
-
-        Returns
-        -------
-        (n, 3) float
-            m.
+        ``row`` (n,): from 0 at the first ground end; a joint lies at every row where a brick
+        begins. Result (n, 3): m.
         """
         return np.asarray(self._curve(row))
 
@@ -89,17 +75,7 @@ class ArchLine:
         return float((here - start) / (end - start) - 0.5)
 
     def speed(self, row: Floats) -> Floats:
-        """Return the derivatives of the line.
-
-        Parameters
-        ----------
-        row : (n,) float
-
-        Returns
-        -------
-        (n, 3) float
-            m per row.
-        """
+        """Return the derivatives of the line. ``row`` (n,). Result (n, 3): m per row."""
         return np.asarray(self._curve(row, 1))
 
     @property
@@ -120,11 +96,8 @@ class ArchLine:
 def arch_line(arch: Scene) -> ArchLine:
     """Return the line of an arch.
 
-    Raises
-    ------
-    SceneError
-        If it is no closed chain of equal bricks along, to the left, to the right and so on, whose
-        first and last lie along.
+    Raises `SceneError` if it is no closed chain of equal bricks along, to the left, to the right
+    and so on, whose first and last lie along.
     """
     if not isinstance(arch, Scene):
         raise SceneError(f"vault: a {type(arch).__name__} is not an arch; give a Scene")
@@ -157,27 +130,12 @@ def arch_line(arch: Scene) -> ArchLine:
 class VaultShape:
     """The numbers that shape a herringbone vault; lengths in m, angles in rad.
 
-    Parameters
-    ----------
-    bricks : int
-        How many, those of the arch included.
-    spacing : float
-        Distance of the columns from each other.
-    plan_angle : float
-        From the left of the arch to the rulings, seen from above; positive turns their left ends
-        forward.
-    skew : float
-        How far the middle of the second foot lies to the left of that of the first.
-    widening : float
-        By which share the span grows, over the square of the distance from the arch, 1/m².
-    drift : float
-        Over how many columns beside the arch its rows keep at right angles to it; farther out they
-        follow the rulings.
-
-    Raises
-    ------
-    SceneError
-        Naming the number that cannot be.
+    ``bricks``: how many, those of the arch included. ``spacing``: distance of the columns from each
+    other. ``plan_angle``: from the left of the arch to the rulings, seen from above; positive turns
+    their left ends forward. ``skew``: how far the middle of the second foot lies to the left of
+    that of the first. ``widening``: by which share the span grows, over the square of the distance
+    from the arch, 1/m². ``drift``: over how many columns beside the arch its rows keep at right
+    angles to it; farther out they follow the rulings.
 
     Examples
     --------
@@ -213,20 +171,7 @@ class Pose(NamedTuple):
 
 
 def poses(line: ArchLine, shape: VaultShape, places: Sequence[Tile]) -> list[Pose]:
-    """Return where bricks lie.
-
-    Parameters
-    ----------
-    line : ArchLine
-        Of the arch in the middle.
-    shape : VaultShape
-    places : sequence of Tile
-
-    Returns
-    -------
-    list of Pose
-        One for every tile.
-    """
+    """Return where bricks lie. ``line``: of the arch in the middle. Result: one for every tile."""
     if not places:
         return []
     row, column = np.array([tile.middle for tile in places]).T
@@ -294,21 +239,10 @@ def herringbone_vault(
     in turn: a column of bricks along, and those that reach from it into the next one, from the foot
     that the skew leaves on that side. Every brick touches what stands before it, or the ground.
 
-    Parameters
-    ----------
-    arch : Scene
-        A closed chain as `seqopt.scene.arch.arch_scene` makes it of the pattern ``VLR``, whose
-        first and last bricks lie along.
-    shape : VaultShape
-    name : str, optional
-        By default the kind and the number of bricks.
-    robots : sequence of Robot, optional
-        Three that reach everything by default, with the largest payload at the arch.
-
-    Raises
-    ------
-    SceneError
-        If the arch is of another kind, bricks interpenetrate, or do not touch.
+    ``arch``: a closed chain as `seqopt.scene.arch.arch_scene` makes it of the pattern ``VLR``,
+    whose first and last bricks lie along; ``name``: by default the kind and the number of bricks;
+    ``robots``: three that reach everything by default, with the largest payload at the arch. Raises
+    `SceneError` if the arch is of another kind, bricks interpenetrate, or do not touch.
 
     Examples
     --------

@@ -29,27 +29,10 @@ DOWN = np.array([0.0, 0.0, -1.0])
 class WallShape:
     """The numbers that shape a wall.
 
-    Parameters
-    ----------
-    columns : int
-        Bricks in a course.
-    courses : int
-        Every second one is shifted by half a brick.
-    dimensions : Vector
-        Length, width and height of a brick, m.
-    gap : float
-        Width of the joints, m; 0 where bricks are laid dry.
-    corbel : float
-        How far each course projects beyond the one below it, across the wall, m.
-    density : float
-        kg/m³.
-    law : JointLaw
-        How stiff joints are.
-
-    Raises
-    ------
-    SceneError
-        Naming the number that cannot be.
+    ``columns``: bricks in a course. ``courses``: every second one is shifted by half a brick.
+    ``dimensions``: length, width and height of a brick, m. ``gap``: width of the joints, m; 0 where
+    bricks are laid dry. ``corbel``: how far each course projects beyond the one below it, across
+    the wall, m. ``density``: kg/m³. ``law``: how stiff joints are.
 
     Examples
     --------
@@ -92,18 +75,8 @@ def wall(shape: WallShape, name: str = "", *, robots: Sequence[Robot] | None = N
     It runs towards +x from y = 0 and stands on z = 0. A brick has joints with those beside
     it and those that it lies on: nearly every one closes a loop.
 
-    Parameters
-    ----------
-    shape : WallShape
-    name : str, optional
-        By default the kind and the size.
-    robots : sequence of Robot, optional
-        Three that reach everything by default.
-
-    Raises
-    ------
-    SceneError
-        If the numbers make no scene.
+    ``name``: by default the kind and the size; ``robots``: three that reach everything by default.
+    Raises `SceneError` if the numbers make no scene.
 
     Examples
     --------

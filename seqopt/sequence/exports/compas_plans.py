@@ -33,12 +33,8 @@ from seqopt.sequence.steps import Step
 class Source:
     """A file from which a scene was imported.
 
-    Attributes
-    ----------
-    names : dict of int to str
-        What it calls bricks, by their names: identifiers of elements of a COMPAS model, else keys.
-    graph : object
-        Its document if it is a graph of compas_assembly, else None.
+    ``names``: what it calls bricks, by their names: identifiers of elements of a COMPAS model, else
+    keys; ``graph``: its document if it is a graph of compas_assembly, else None.
     """
 
     names: Mapping[int, str]
@@ -48,14 +44,7 @@ class Source:
 def read_source(scene: Scene, path: Path) -> Source:
     """Return the file from which a scene was imported, in any format that ``import`` knows.
 
-    Raises
-    ------
-    FileError
-        If it cannot be read.
-    SceneError
-        If it is no such file.
-    StepError
-        If it lacks a brick of the scene.
+    Raises `FileError` if it cannot be read; `StepError` if it lacks a brick of the scene.
     """
     content, graph = read_content(path), None
     keys = names = [block.key for block in content.blocks]
@@ -83,18 +72,9 @@ Document = dict[str, Any]
 def timber_plan(scene: Scene, steps: Sequence[Step], source: Source | None = None) -> str:
     """Return a plan as a ``BuildingPlan`` of compas_timber.
 
-    Parameters
-    ----------
-    scene : Scene
-    steps : sequence of Step
-    source : Source, optional
-        From which the scene was imported: elements are then named by its identifiers or keys.
-
-    Returns
-    -------
-    str
-        JSON. A step for every step of the plan: the elements that it places, and those that robots
-        hold meanwhile.
+    ``source``: from which the scene was imported: elements are then named by its identifiers or
+    keys. Result: JSON. A step for every step of the plan: the elements that it places, and those
+    that robots hold meanwhile.
     """
     names = source.names if source else {b.name: str(b.name) for b in scene.bricks}
     rows = []
@@ -131,21 +111,11 @@ def _frame(brick: Brick | None) -> Document:
 def compas_assembly(scene: Scene, steps: Sequence[Step], source: Source | None = None) -> str:
     """Return an assembly of compas_assembly with the plan as attributes.
 
-    Parameters
-    ----------
-    scene : Scene
-    steps : sequence of Step
-    source : Source, optional
-        From which the scene was imported. An assembly stays as it is, with attributes added;
-        otherwise blocks and faces are those of the scene, and ``name`` what the source calls them.
-
-    Returns
-    -------
-    str
-        JSON. Every node of a block that is built has ``order``, its place in the build,
-        ``place_step`` and ``held``, a list of step, robot and node; the graph has ``plan``, a list
-        of steps.
-
+    ``source``: from which the scene was imported. An assembly stays as it is, with attributes
+    added; otherwise blocks and faces are those of the scene, and ``name`` what the source calls
+    them. Result: JSON. Every node of a block that is built has ``order``, its place in the build,
+    ``place_step`` and ``held``, a list of step, robot and node; the graph has ``plan``, a list of
+    steps.
     """
     rows = [*step_states(scene, steps)]
     kept = None if source is None else source.graph

@@ -31,25 +31,11 @@ def export_plan(
 ) -> str:
     """Return a plan in the format of another program.
 
-    Parameters
-    ----------
-    scene : Scene
-    steps : sequence of Step
-        Of a plan for the scene.
-    form : str
-        One of `EXPORTS`.
-    source : str or pathlib.Path, optional
-        The file from which the scene was imported, of any format, for formats of COMPAS: the plan
-        then names its elements, or is written into it if it is an assembly.
-
-    Raises
-    ------
-    StepError
-        If there is no such format, or the source is not of this scene.
-    FileError
-        If the source cannot be read.
-    SceneError
-        If the source is no file of a known format.
+    ``steps``: of a plan for the scene; ``form``: one of `EXPORTS`; ``source``: the file from which
+    the scene was imported, of any format, for formats of COMPAS: the plan then names its elements,
+    or is written into it if it is an assembly. Raises `StepError` if there is no such format, or
+    the source is not of this scene; `FileError` if the source cannot be read; `SceneError` if the
+    source is no file of a known format.
 
     Examples
     --------
@@ -72,17 +58,8 @@ def export_plan(
 def read_folder(folder: Path) -> tuple[Scene, tuple[Step, ...]]:
     """Return the scene and the steps of a plan's folder.
 
-    Parameters
-    ----------
-    folder : pathlib.Path
-        As ``seqopt optimize`` writes it, with ``scene.json`` and ``plan.csv``.
-
-    Raises
-    ------
-    FileError
-        If a file is missing.
-    SceneError, StepError
-        If one is wrong.
+    ``folder``: as ``seqopt optimize`` writes it, with ``scene.json`` and ``plan.csv``. Raises
+    `FileError` if a file is missing; `SceneError`, `StepError` if one is wrong.
     """
     for name in ("scene.json", "plan.csv"):
         if not (folder / name).is_file():

@@ -33,15 +33,9 @@ class BlockState(Enum):
 class StepStates:
     """A step by its blocks.
 
-    Attributes
-    ----------
-    step : Step
-    new : tuple of int
-        Names of the bricks that this step places.
-    holds : dict of str to (int, int)
-        Node and brick that robots hold, by the robots' names.
-    states : dict of int to BlockState
-        By the names of all bricks of the scene, in build order.
+    ``new``: names of the bricks that this step places; ``holds`` (int, int): node and brick that
+    robots hold, by the robots' names; ``states``: by the names of all bricks of the scene, in build
+    order.
     """
 
     step: Step
@@ -53,11 +47,7 @@ class StepStates:
 def step_states(scene: Scene, steps: Sequence[Step]) -> Iterator[StepStates]:
     """Yield what becomes of every block in every step.
 
-    Parameters
-    ----------
-    scene : Scene
-    steps : sequence of Step
-        Checked, of a plan for the scene.
+    ``steps``: checked, of a plan for the scene.
 
     Examples
     --------
@@ -95,11 +85,8 @@ FORMAT, VERSION = "seqopt-plan", 1
 def plan_csv(scene: Scene, steps: Sequence[Step]) -> str:
     """Return a plan as CSV.
 
-    Returns
-    -------
-    str
-        A row per step: ``step``, ``type``, the ``placed`` bricks, what every robot holds as
-        ``NAME_node`` and ``NAME_brick``, and a column ``block_N`` for every brick in build order.
+    Result: a row per step: ``step``, ``type``, the ``placed`` bricks, what every robot holds as
+    ``NAME_node`` and ``NAME_brick``, and a column ``block_N`` for every brick in build order.
     """
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
@@ -119,12 +106,9 @@ def plan_csv(scene: Scene, steps: Sequence[Step]) -> str:
 def plan_json(scene: Scene, steps: Sequence[Step]) -> str:
     """Return a plan as JSON.
 
-    Returns
-    -------
-    str
-        ``blocks``, the names of all bricks in build order; and ``steps``, each with its ``type``,
-        the bricks that are ``placed``, what robots hold as ``holds``, and the ``states`` of all
-        blocks in their order.
+    Result: ``blocks``, the names of all bricks in build order; and ``steps``, each with its
+    ``type``, the bricks that are ``placed``, what robots hold as ``holds``, and the ``states`` of
+    all blocks in their order.
     """
     rows = [
         {
@@ -152,16 +136,8 @@ def plan_json(scene: Scene, steps: Sequence[Step]) -> str:
 def parse_plan_json(scene: Scene, text: str) -> tuple[Step, ...]:
     """Return the checked steps of a plan that `plan_json` wrote.
 
-    Parameters
-    ----------
-    scene : Scene
-        In which every step must be possible.
-    text : str
-
-    Raises
-    ------
-    StepError
-        If it is no such plan, or of other blocks or robots, or a step is impossible.
+    ``scene``: in which every step must be possible. Raises `StepError` if it is no such plan, or of
+    other blocks or robots, or a step is impossible.
     """
     try:
         whole = json.loads(text)
@@ -188,10 +164,7 @@ def parse_plan_json(scene: Scene, text: str) -> tuple[Step, ...]:
 def sequencer_json(scene: Scene, steps: Sequence[Step]) -> str:
     """Return a plan as an ``assembly_sequence``.
 
-    Returns
-    -------
-    str
-        JSON; which robot holds, and where, it does not say.
+    Result: JSON; which robot holds, and where, it does not say.
     """
     rows = [
         {
