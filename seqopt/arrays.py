@@ -16,7 +16,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 Vector = tuple[float, float, float]
-Content = TypeVar("Content")
+_Content = TypeVar("_Content")
 LONGEST = 240  # letters of what is shown of a value, its name aside
 
 _COMPRESSED = (sparse.csr_array, sparse.csc_array)
@@ -92,7 +92,7 @@ class FrozenValue(Terse):
         return hash((type(self), *map(_hashable, _parts(self))))
 
 
-def frozen(content: Content) -> Content:
+def frozen(content: _Content) -> _Content:
     """Return read-only arrays and sparse arrays, also within tuples and mappings.
 
     ``content``: other contents are returned as they are. Result: the same object.

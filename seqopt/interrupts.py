@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 
-ENDS = tuple(
+_ENDS = tuple(
     getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
 )
 
@@ -27,8 +27,8 @@ def undisturbed() -> Iterator[None]:
         came.append(number)
 
     masks = hasattr(signal, "pthread_sigmask")  # other threads may still take them: see note
-    mask = signal.pthread_sigmask(signal.SIG_BLOCK, ENDS) if masks else set()
-    answered = [(number, signal.getsignal(number)) for number in ENDS]
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, _ENDS) if masks else set()
+    answered = [(number, signal.getsignal(number)) for number in _ENDS]
     answers = [(number, answer) for number, answer in answered if callable(answer)]
     try:
         for number, _ in answers:
@@ -52,7 +52,7 @@ def answered(told: Callable[[], object]) -> Iterator[None]:
     ``told``: called between two instructions of the main thread: it only takes note.
     """
     mine = threading.current_thread() is threading.main_thread()
-    numbers = [n for n in ENDS if mine and signal.getsignal(n) is signal.default_int_handler]
+    numbers = [n for n in _ENDS if mine and signal.getsignal(n) is signal.default_int_handler]
 
     def give_back() -> None:
         for number in numbers:

@@ -20,7 +20,7 @@ from seqopt.contact.mortar import Mortar
 from seqopt.network.mechanics import point_motion
 from seqopt.network.network import Network
 
-CUTS = 2  # times that each triangle of a face is cut into four
+_CUTS = 2  # times that each triangle of a face is cut into four
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -32,7 +32,7 @@ class Quadrature(FrozenValue):
     area: Floats  # (P,); share of its face that a point stands for, m²
 
 
-def face_quadrature(assembly: Assembly, cuts: int = CUTS) -> Quadrature:
+def face_quadrature(assembly: Assembly, cuts: int = _CUTS) -> Quadrature:
     """Return the bed of all contacts.
 
     Faces are cut into triangles, each into four ``cuts`` times; the middles of a triangle's edges
@@ -94,7 +94,7 @@ def first_points(face: Ints, faces: int) -> Ints:
     return np.searchsorted(face, np.arange(faces))
 
 
-STRESS_MARGIN = 1e-6  # stress above a limit that counts as none, over the stress scale
+_STRESS_MARGIN = 1e-6  # stress above a limit that counts as none, over the stress scale
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -134,7 +134,7 @@ class ElasticLimits(FrozenValue):
 
         ``wrench`` (S, J, 6): as of `excess`. Result (S,).
         """
-        margin = STRESS_MARGIN * self.assembly.stress_scale
+        margin = _STRESS_MARGIN * self.assembly.stress_scale
         if self._bound(wrench) <= margin:  # as a rule, and a tenth of the work
             return np.zeros(len(wrench), dtype=bool)
         return np.asarray(self.excess(wrench).max(axis=1, initial=-np.inf) > margin)

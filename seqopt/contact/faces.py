@@ -20,12 +20,12 @@ from seqopt.errors import SceneError
 from seqopt.network.network import GROUND, Network
 from seqopt.scene.parts import THICKEST, Brick
 
-OVERLAP = 0.05  # by which bricks may interpenetrate, over their smallest dimension
-BESIDE = 0.5  # by which a joint's position may lie beside the faces, over the same
+_OVERLAP = 0.05  # by which bricks may interpenetrate, over their smallest dimension
+_BESIDE = 0.5  # by which a joint's position may lie beside the faces, over the same
 
 
 @dataclass(frozen=True)
-class JointSpace:
+class _JointSpace:
     """Where a joint lies between the faces of its bricks.
 
     ``bricks``: one on the ground, or two. ``ends``: where the faces of the first body and of the
@@ -46,7 +46,7 @@ class JointSpace:
         Raises `SceneError` if they are too far apart, interpenetrate, or the joint lies elsewhere.
         """
         size = min(min(brick.dimensions) for brick in self.bricks)
-        apart, slack = self.ends[1] - self.ends[0], OVERLAP * size
+        apart, slack = self.ends[1] - self.ends[0], _OVERLAP * size
         inside = max(self.ends[0], -self.ends[1])
         if apart < -slack:
             raise SceneError(
@@ -64,7 +64,7 @@ class JointSpace:
                 f"joint {self.name}: there are {1e3 * apart:.3g} mm between its faces, more than "
                 f"{1e3 * most:.3g} mm; move the bricks together or give the joint its thickness"
             )
-        if self.beside > BESIDE * size:
+        if self.beside > _BESIDE * size:
             raise SceneError(
                 f"joint {self.name}: its position lies {1e3 * self.beside:.3g} mm beside the faces "
                 "that it joins; move it between them"
@@ -98,7 +98,7 @@ def distance_beside(polygon: Floats) -> float:
     return float((out / size[real]).max())
 
 
-SLIVER = 1e-6  # smallest overlap of two faces, as a share of the smaller one
+_SLIVER = 1e-6  # smallest overlap of two faces, as a share of the smaller one
 
 
 def step_assembly(network: Network, bricks: int, grips: Sequence[int | None]) -> Assembly:
@@ -184,7 +184,7 @@ def _contact(network: Network, spring: int) -> tuple[str, Floats, Floats]:
     common = _overlap(axes, point, between, name)
     middle = point + _centroid(common) @ axes[1:]
     before = -face_distance(between[0], -axes[0], middle) if len(between) > 1 else 0.0
-    JointSpace(
+    _JointSpace(
         name=name,
         bricks=tuple(between),
         ends=(before, face_distance(between[-1], axes[0], middle)),
@@ -218,7 +218,7 @@ def _overlap(axes: Floats, point: Floats, between: list[Brick], name: str) -> Fl
     for other in flat[1:]:
         common = _clip(common, _ordered(other))
     size = min(_polygon_area(_ordered(face)) for face in flat)
-    if len(common) < 3 or not _polygon_area(common) > SLIVER * size:
+    if len(common) < 3 or not _polygon_area(common) > _SLIVER * size:
         raise SceneError(
             f"joint {name}: the faces of its bricks do not overlap along its normal; "
             "move the joint between them or correct its axis"

@@ -52,7 +52,7 @@ class LevelChoice:
 
 
 IN_PLANE = LevelChoice(Level.PLANAR, "bricks, springs, gravity and grips lie in one plane")
-OFF_PLANE = LevelChoice(Level.RIGID, "a grip lies outside the plane of the bricks")
+_OFF_PLANE = LevelChoice(Level.RIGID, "a grip lies outside the plane of the bricks")
 BEYOND = LevelChoice(Level.DISCRETE, "a joint would leave its elastic limits")
 
 
@@ -69,7 +69,7 @@ class AutoEngine(NamedEngine):
         self._rigid = ComplianceEngine(network)
         self._discrete = DiscreteEngine(network, mortar)
         self._planar: PlanarEngine | None = None
-        self._in_space = OFF_PLANE
+        self._in_space = _OFF_PLANE
         self._limits: ElasticLimits | None = None
         self.tally: dict[LevelChoice, int] = {}
         self.unchecked = ""

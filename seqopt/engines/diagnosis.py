@@ -30,8 +30,8 @@ from seqopt.network.network import GROUND, Network
 
 UNRESISTED = 1e-17  # a scaled eigenvalue below this is found by a shift
 LEAST_DIAGONAL = 1e-13  # over the largest: by it a motion without stiffness is scaled
-SHIFT = 1e-15  # added to the scaled stiffness of a mechanism to find its mode
-EIGENVALUE_TOLERANCE = 1e-6  # relative
+_SHIFT = 1e-15  # added to the scaled stiffness of a mechanism to find its mode
+_EIGENVALUE_TOLERANCE = 1e-6  # relative
 
 
 def spectrum(network: Network, bricks: int, columns: Ints) -> tuple[float, float, Floats]:
@@ -55,9 +55,9 @@ def spectrum(network: Network, bricks: int, columns: Ints) -> tuple[float, float
     except RuntimeError:  # exactly singular, or the iteration broke down
         lowest = 0.0
     if not lowest > UNRESISTED:
-        shifted = mixed_system(parts, columns, shift=SHIFT * scale**2)
+        shifted = mixed_system(parts, columns, shift=_SHIFT * scale**2)
         lowest, motion = _lowest(shifted, scale, len(root))
-        lowest = max(lowest - SHIFT, 0.0)
+        lowest = max(lowest - _SHIFT, 0.0)
     scaled = sparse.diags_array(root.ravel()) @ parts.deformation @ sparse.diags_array(1 / scale)
     condition = _highest(scaled) / lowest if lowest else np.inf
     return lowest, condition, (motion / motion[np.abs(motion).argmax()]).reshape(-1, 6)
@@ -82,7 +82,7 @@ def _lowest(system: MixedSystem, scale: Floats, before: int) -> tuple[float, Flo
         return np.asarray(scale * answer[before : before + moves])
 
     operator = LinearOperator((moves, moves), matvec=inverse, dtype=np.float64)
-    values, vectors = eigsh(operator, k=1, tol=EIGENVALUE_TOLERANCE, v0=_start(scale))
+    values, vectors = eigsh(operator, k=1, tol=_EIGENVALUE_TOLERANCE, v0=_start(scale))
     return float(1 / values[0]), vectors[:, 0] / scale
 
 
@@ -91,7 +91,7 @@ def _start(like: Floats | sparse.csr_array) -> Floats:
 
 
 @dataclass(frozen=True)
-class Residuals:
+class _Residuals:
     """What is left of the equations when fields are put in, without unit.
 
     ``equilibrium``: force or moment left on a brick over the largest sum of magnitudes on one;
@@ -113,7 +113,7 @@ class Residuals:
         return max(self.equilibrium, self.joints, self.grips)
 
 
-def residual(network: Network, bricks: int, columns: Ints, fields: Fields) -> Residuals:
+def residual(network: Network, bricks: int, columns: Ints, fields: Fields) -> _Residuals:
     """Return the residuals of the first grip set's fields, from the network alone.
 
     ``columns`` (r,): grips as indices into ``network.inner.ravel()``; ``fields``: with joint
@@ -146,7 +146,7 @@ def residual(network: Network, bricks: int, columns: Ints, fields: Fields) -> Re
     outside = [(np.arange(bricks), center, dead), (owner, node[columns], grip)]
     left = _balance(center, [*_both(bodies, at, wrench), *outside])
     plain = _balance(center, [*_both(bodies, at, -law), *outside])[0]
-    return Residuals(
+    return _Residuals(
         equilibrium=_ratio(left[0], left[1]),
         joints=float((apart / np.maximum(scale, heavy)).max()),
         grips=float(np.abs(still).max(initial=0.0) / max(motion, least)),
@@ -164,10 +164,10 @@ def _beside_weight(network: Network, bricks: int, stiffness: Floats) -> tuple[Fl
     return np.maximum([heavy, heavy * longest], tiny), max(moved, tiny)
 
 
-Pull = tuple[Ints, Floats, Floats]  # bricks, points and wrenches about them
+_Pull = tuple[Ints, Floats, Floats]  # bricks, points and wrenches about them
 
 
-def _both(bodies: Ints, at: Floats, wrench: Floats) -> list[Pull]:
+def _both(bodies: Ints, at: Floats, wrench: Floats) -> list[_Pull]:
     """Return the wrenches of springs on both of their bodies."""
     pulls = []
     for side, sign in ((0, -1.0), (1, 1.0)):
@@ -189,7 +189,7 @@ def _spring_force(axes: Floats, stiffness: Floats, gap: Floats) -> Floats:
     return np.asarray(np.einsum("sij,shi->shj", axes, own).reshape(-1, 6))
 
 
-def _balance(center: Floats, pulls: list[Pull]) -> tuple[Floats, Floats]:
+def _balance(center: Floats, pulls: list[_Pull]) -> tuple[Floats, Floats]:
     """Return the sums (b, 6) of wrenches on every brick about its centroid, and of magnitudes."""
     total, size = np.zeros((2, len(center), 6))
     for body, point, wrench in pulls:
@@ -205,7 +205,7 @@ def _ratio(total: Floats, size: Floats) -> float:
     return float((rest / np.maximum(most, np.finfo(float).tiny)).max())
 
 
-LOOKED_INTO = 1e-15  # a smallest scaled eigenvalue below which a motion may be free
+_LOOKED_INTO = 1e-15  # a smallest scaled eigenvalue below which a motion may be free
 WELL = 1e-9  # largest backward error of fields that keep the nine digits an engine promises
 
 
@@ -238,7 +238,7 @@ class Diagnosis(FrozenValue):
 
     finding: Finding
     reason: str
-    residuals: Residuals | None
+    residuals: _Residuals | None
     smallest_eigenvalue: float
     condition: float
     mode: Floats
@@ -274,7 +274,7 @@ def diagnose(source: Engine | Network, bricks: int, grips: ArrayLike) -> Diagnos
     numbers = np.array(grips, dtype=np.int64).reshape(1, -1)
     columns = grip_columns(network, bricks, numbers)
     lowest, condition, mode = spectrum(network, bricks, columns[0])
-    free = free_motion(network, bricks, columns[0]) if lowest < LOOKED_INTO else None
+    free = free_motion(network, bricks, columns[0]) if lowest < _LOOKED_INTO else None
     if free is not None:
         lowest, condition, mode = 0.0, np.inf, free
     residuals, refusal = None, None
@@ -293,7 +293,7 @@ def diagnose(source: Engine | Network, bricks: int, grips: ArrayLike) -> Diagnos
 def _judge(
     lowest: float,
     condition: float,
-    residuals: Residuals | None,
+    residuals: _Residuals | None,
     refusal: MechanismError | SolverError | None,
 ) -> tuple[Finding, str]:
     if not lowest:

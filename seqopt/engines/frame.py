@@ -36,10 +36,10 @@ from seqopt.network.network import Network, PartKind
 from seqopt.scene.scene import Scene
 
 CONTRAST = 1e7  # bar over joint stiffness; see experiments/engines/frame_contrast.py
-FRAME_CORRECTIONS = 3  # after which a solution is judged
-LAST_FRAME_CORRECTION = 1e-6  # the largest of an accepted solution, relative to it
-SUSPICIOUS = 1e-9  # a smallest scaled eigenvalue below this, over the contrast, is looked into
-LOOSE = 1e-12  # stiffness of a spring that has none, over the stiffest: holds its joint node
+_FRAME_CORRECTIONS = 3  # after which a solution is judged
+_LAST_FRAME_CORRECTION = 1e-6  # the largest of an accepted solution, relative to it
+_SUSPICIOUS = 1e-9  # a smallest scaled eigenvalue below this, over the contrast, is looked into
+_LOOSE = 1e-12  # stiffness of a spring that has none, over the stiffest: holds its joint node
 
 
 class FrameEngine(NamedEngine):
@@ -140,7 +140,7 @@ def _frame(network: Network, bricks: int, contrast: float) -> _Frame:
         (pairs, np.dstack([zero, -turn]), np.dstack([zero, turn])),
     ]
     own = [
-        2 * np.maximum(k[which], LOOSE * k.max()).ravel()
+        2 * np.maximum(k[which], _LOOSE * k.max()).ravel()
         for k in (springs.translational_stiffness, springs.rotational_stiffness)
     ]
     stiffness = np.concatenate([beam_stiffness, *own])
@@ -218,14 +218,17 @@ def _solve(
     except RuntimeError as error:  # SuperLU met an exactly zero pivot
         examine()
         raise failure from error
-    if _smallest_eigenvalue(factor, len(load)) < SUSPICIOUS / contrast:
+    if _smallest_eigenvalue(factor, len(load)) < _SUSPICIOUS / contrast:
         examine()
     answer = scale * factor.solve(scale * load)
-    for _ in range(FRAME_CORRECTIONS):
+    for _ in range(_FRAME_CORRECTIONS):
         residual = load - deformation.T @ (stiffness * (deformation @ answer))
         correction = scale * factor.solve(scale * residual)
         answer += correction
-    if not np.abs(correction / scale).max() <= LAST_FRAME_CORRECTION * np.abs(answer / scale).max():
+    if (
+        not np.abs(correction / scale).max()
+        <= _LAST_FRAME_CORRECTION * np.abs(answer / scale).max()
+    ):
         raise failure
     return np.asarray(answer)
 

@@ -201,23 +201,23 @@ def _require_different(columns: Ints, numbers: Ints) -> None:
             )
 
 
-Asked = ParamSpec("Asked")
-Answer = TypeVar("Answer")
-NOT_FINITE = "infs or NaNs"  # what SciPy says of arrays that it does not take
+_Asked = ParamSpec("_Asked")
+_Answer = TypeVar("_Answer")
+_NOT_FINITE = "infs or NaNs"  # what SciPy says of arrays that it does not take
 
 
-def failing_in_a_line(solve: Callable[Asked, Answer]) -> Callable[Asked, Answer]:
+def failing_in_a_line(solve: Callable[_Asked, _Answer]) -> Callable[_Asked, _Answer]:
     """Return a function whose numerical failures are a `SolverError`.
 
     ``solve``: that of an engine. Result: the same, but for what it raises.
     """
 
     @wraps(solve)
-    def solved(*arguments: Asked.args, **named: Asked.kwargs) -> Answer:
+    def solved(*arguments: _Asked.args, **named: _Asked.kwargs) -> _Answer:
         try:
             return solve(*arguments, **named)
         except (np.linalg.LinAlgError, ValueError) as error:
-            if not isinstance(error, np.linalg.LinAlgError) and NOT_FINITE not in str(error):
+            if not isinstance(error, np.linalg.LinAlgError) and _NOT_FINITE not in str(error):
                 raise
             raise SolverError(
                 f"the equations have no answer in numbers ({error}); correct lengths, masses or "

@@ -21,7 +21,7 @@ from seqopt.network.build import network_of
 from seqopt.network.network import GROUND, Network
 from seqopt.scene.scene import Scene
 
-FLAT = 1e-9  # distance from the plane that counts as none, over the size of the structure
+_FLAT = 1e-9  # distance from the plane that counts as none, over the size of the structure
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -70,7 +70,7 @@ def off_plane(network: Network, plane: Plane, columns: Ints) -> Floats:
     """
     inner = network.node_position[network.inner.ravel()]
     away = plane.distance(inner)
-    away[away <= FLAT * np.ptp(inner, axis=0).max()] = 0.0
+    away[away <= _FLAT * np.ptp(inner, axis=0).max()] = 0.0
     return np.asarray(away[columns])
 
 
@@ -81,7 +81,7 @@ def _normal(network: Network, spread: Floats) -> Floats:
     """
     up = np.array(network.scene.up)
     flat = spread - np.outer(spread @ up, up)
-    if np.abs(flat).max() <= FLAT * np.abs(spread).max():
+    if np.abs(flat).max() <= _FLAT * np.abs(spread).max():
         flat = network.springs.axes[0] - np.outer(network.springs.axes[0] @ up, up)
         flat = flat[np.linalg.norm(flat, axis=1).argmax()][None]
     longest = np.linalg.svd(flat, full_matrices=False)[2][0]
@@ -102,12 +102,12 @@ def _points_outside(network: Network, plane: Plane) -> str:
     size = float(np.ptp(network.centroid, axis=0).max()) or max(scene.placed[0].dimensions)
     away = plane.distance(network.centroid)
     outside = "outside the scene's middle plane"
-    if away.max() > FLAT * size:
+    if away.max() > _FLAT * size:
         brick = scene.placed[int(away.argmax())].name
         return f"brick {brick}: its centroid lies {1e3 * away.max():.3g} mm {outside}"
     springs = network.springs
     away = np.maximum(plane.distance(springs.position), plane.distance(springs.anchor))
-    if away.max() > FLAT * size:
+    if away.max() > _FLAT * size:
         name = _spring(network, int(away.argmax()))
         return f"{name}: it lies {1e3 * away.max():.3g} mm {outside}"
     return ""
@@ -119,7 +119,7 @@ def _turned_springs(network: Network, normal: Floats) -> str:
     for stiffness in (springs.translational_stiffness, springs.rotational_stiffness):
         pull = np.einsum("sij,si,si->sj", springs.axes, stiffness, springs.axes @ normal)
         across = pull - (pull @ normal)[:, None] * normal
-        turned = np.linalg.norm(across, axis=1) > FLAT * stiffness.max(axis=1)
+        turned = np.linalg.norm(across, axis=1) > _FLAT * stiffness.max(axis=1)
         if turned.any():
             name = _spring(network, int(turned.argmax()))
             return f"{name}: its axes are turned out of the scene's plane"
@@ -135,7 +135,7 @@ def _spring(network: Network, index: int) -> str:
     return f"joint {placed[first].name}-{placed[second].name}"
 
 
-ELSE = "use the compliance engine"
+_ELSE = "use the compliance engine"
 
 
 class PlanarEngine(NamedEngine):
@@ -149,7 +149,7 @@ class PlanarEngine(NamedEngine):
         network = network_of(network)
         found = find_plane(network) if plane is None else plane
         if isinstance(found, NoPlane):
-            raise SceneError(f"{found.reason}; {ELSE}")
+            raise SceneError(f"{found.reason}; {_ELSE}")
         self.plane = found
         self._engine = ComplianceEngine(network, found.basis)
 
@@ -168,6 +168,6 @@ class PlanarEngine(NamedEngine):
             node = np.asarray(grips).ravel()[away.argmax()]
             raise GripError(
                 f"grip on node {node}: it lies {1e3 * away.max():.3g} mm outside the scene's "
-                f"plane; {ELSE}"
+                f"plane; {_ELSE}"
             )
         return self._engine.solve(bricks, grips, want)

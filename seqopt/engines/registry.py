@@ -31,9 +31,9 @@ from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import scene_to_dict
 
-ARITHMETIC = ("arrays.py", "contact", "engines", "network", "responses/quantities.py")
+_ARITHMETIC = ("arrays.py", "contact", "engines", "network", "responses/quantities.py")
 """Files and folders of the package that answers depend on."""
-WITHOUT_EFFECT = ("name", "provenance", "robots")  # of a scene, on answers to given grips
+_WITHOUT_EFFECT = ("name", "provenance", "robots")  # of a scene, on answers to given grips
 
 
 @dataclass(frozen=True)
@@ -61,17 +61,17 @@ class Recipe:
 
         Names, provenance and robots of a scene change no answer and are left out.
         """
-        scene = {k: v for k, v in scene_to_dict(self.scene).items() if k not in WITHOUT_EFFECT}
+        scene = {k: v for k, v in scene_to_dict(self.scene).items() if k not in _WITHOUT_EFFECT}
         built = json.dumps(scene, sort_keys=True)
-        parts = (self.engine, repr(sorted(self.options.items())), built, arithmetic())
+        parts = (self.engine, repr(sorted(self.options.items())), built, _arithmetic())
         return hashlib.sha256("\0".join(parts).encode()).hexdigest()
 
 
 @cache
-def arithmetic() -> str:
+def _arithmetic() -> str:
     """Return a mark of the code that answers come from: its text, NumPy and SciPy."""
     home = Path(__file__).parents[1]
-    found = (home / name for name in ARITHMETIC)
+    found = (home / name for name in _ARITHMETIC)
     files = [
         f for path in found for f in ([path] if path.is_file() else sorted(path.rglob("*.py")))
     ]
@@ -99,7 +99,7 @@ ENGINES: dict[str, Callable[[Network], Engine]] = {
     "discrete": DiscreteEngine,
 }
 USUAL = "compliance"  # the engine where none is asked for
-LIMITED: dict[str, Callable[[Network, Mortar], Engine]] = {
+_LIMITED: dict[str, Callable[[Network, Mortar], Engine]] = {
     "auto": AutoEngine,
     "discrete": DiscreteEngine,
 }  # engines whose joints hold only what their mortar does
@@ -139,14 +139,14 @@ def make_engine(name: str, network: Network | Scene, mortar: Mortar | str | None
     network = network_of(network)
     if mortar is None:
         return _known_by(ENGINES[name](network), Recipe(name, network.scene))
-    if name not in LIMITED:
+    if name not in _LIMITED:
         raise SceneError(
             f"engine {name}: its joints never fail, so a mortar changes nothing; "
-            f"use the engine {' or '.join(LIMITED)}"
+            f"use the engine {' or '.join(_LIMITED)}"
         )
     mortar = find_mortar(mortar)
     return _known_by(
-        LIMITED[name](network, mortar), Recipe(name, network.scene, {"mortar": mortar})
+        _LIMITED[name](network, mortar), Recipe(name, network.scene, {"mortar": mortar})
     )
 
 

@@ -28,10 +28,10 @@ if TYPE_CHECKING:
     import networkx as nx
     from matplotlib.figure import Figure
 
-OFF_PLANE = 1e-9  # lever of a weight about the line of its nodes treated as zero, over the brick
+_OFF_PLANE = 1e-9  # lever of a weight about the line of its nodes treated as zero, over the brick
 
 
-def shared_weight(brick: Brick, weight: Floats) -> Floats:
+def _shared_weight(brick: Brick, weight: Floats) -> Floats:
     """Return forces at a brick's two inner nodes that act on it as its weight does.
 
     ``brick``: with nodes of its own; ``weight`` (3,): at the centroid, N. Result (2, 3): N. Raises
@@ -42,7 +42,7 @@ def shared_weight(brick: Brick, weight: Floats) -> Floats:
     span, middle = 0.5 * (second - first), 0.5 * (first + second)
     moment = -np.cross(middle, weight)  # of the weight about the middle between the nodes
     along = abs(float(moment @ span)) / float(np.linalg.norm(span))
-    if along > OFF_PLANE * max(brick.dimensions) * float(np.linalg.norm(weight)):
+    if along > _OFF_PLANE * max(brick.dimensions) * float(np.linalg.norm(weight)):
         raise SceneError(
             f"brick {brick.name}: its weight turns it about the line through its nodes "
             f"{list(brick.nodes)}; give nodes above, below or on either side of the centroid"
@@ -197,7 +197,7 @@ class Network(Shown, FrozenValue):
         half = np.repeat(0.5 * self.weight, 2, axis=0)
         for i, brick in enumerate(self.scene.placed):
             if brick.node_offsets is not None:
-                half[2 * i : 2 * i + 2] = shared_weight(brick, self.weight[i])
+                half[2 * i : 2 * i + 2] = _shared_weight(brick, self.weight[i])
         return frozen(half)
 
     @cached_property

@@ -16,7 +16,7 @@ from seqopt.engines.interface import Fields, Want
 from seqopt.errors import SolverError
 from seqopt.network.network import Network
 
-LISTED = 12  # steps that are named one by one
+_LISTED = 12  # steps that are named one by one
 
 
 def number_text(value: float) -> str:
@@ -54,12 +54,12 @@ def steps_in_words(steps: Sequence[int]) -> str:
     >>> steps_in_words([3]), steps_in_words(range(1, 20))
     ('step 3', 'steps 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12 and 7 more')
     """
-    more = f" and {len(steps) - LISTED} more" if len(steps) > LISTED else ""
-    return f"step{'s' * (len(steps) > 1)} {', '.join(map(str, steps[:LISTED]))}{more}"
+    more = f" and {len(steps) - _LISTED} more" if len(steps) > _LISTED else ""
+    return f"step{'s' * (len(steps) > 1)} {', '.join(map(str, steps[:_LISTED]))}{more}"
 
 
-SLACK = 1e-6  # an edge is in tension above this share of the mean weight of a brick
-LEVEL = 1e-9  # share of a force that may point down where it counts as level
+_SLACK = 1e-6  # an edge is in tension above this share of the mean weight of a brick
+_LEVEL = 1e-9  # share of a force that may point down where it counts as level
 TO_1E_3MM = 1e6  # from m to the tables' unit of length, 1e-3 mm
 
 
@@ -96,8 +96,8 @@ def lengths(vectors: Floats) -> Floats:
     return np.asarray(np.sqrt(_squared(vectors)))
 
 
-TAKEN = {"rob", "max", "move", "largest", "each"}  # beside RESPONSES: other meanings of F_
-MARKS = set("[]=,;")  # of the language of criteria, limits and tables
+_TAKEN = {"rob", "max", "move", "largest", "each"}  # beside RESPONSES: other meanings of F_
+_MARKS = set("[]=,;")  # of the language of criteria, limits and tables
 
 
 def robot_response(robot: str) -> str:
@@ -114,7 +114,7 @@ def robot_response(robot: str) -> str:
     ('F_rob1', 'F_[sup]', 'F_[a,b]')
     """
     of_an_end = robot.startswith("sup_")  # `seqopt.responses.table.support_columns`
-    means_more = robot in TAKEN or of_an_end or f"F_{robot}" in RESPONSES or MARKS & set(robot)
+    means_more = robot in _TAKEN or of_an_end or f"F_{robot}" in RESPONSES or _MARKS & set(robot)
     return f"F_[{robot}]" if means_more or not robot.strip() else f"F_{robot}"
 
 
@@ -167,7 +167,7 @@ def _squared(vectors: Floats) -> Floats:
 
 def _signed(network: Network, vectors: Floats) -> Floats:
     size = lengths(vectors)
-    return np.asarray(np.copysign(size, vectors @ np.array(network.scene.up) + LEVEL * size))
+    return np.asarray(np.copysign(size, vectors @ np.array(network.scene.up) + _LEVEL * size))
 
 
 def _largest_force(network: Network, fields: Fields) -> Floats:
@@ -179,7 +179,7 @@ def _largest_force(network: Network, fields: Fields) -> Floats:
 
 def _in_tension(network: Network, fields: Fields) -> Floats:
     weight = float(np.linalg.norm(network.weight, axis=1).mean())
-    return np.asarray(100 * (fields.edge_force > SLACK * weight).mean(axis=1))
+    return np.asarray(100 * (fields.edge_force > _SLACK * weight).mean(axis=1))
 
 
 _EDGES, _MOTION, _SUPPORT = Want.EDGES, Want.DISPLACEMENTS, Want.SUPPORT

@@ -123,7 +123,7 @@ def step_fields(engine: Engine, step: Step) -> Fields:
         raise SolverError(f"step {step.number}: {error}") from error
 
 
-def fields_archive(engine: Engine, steps: Sequence[Step]) -> bytes:
+def _fields_archive(engine: Engine, steps: Sequence[Step]) -> bytes:
     """Return the full fields of every step as a NumPy archive (``.npz``).
 
     Arrays are named ``step1_edge_force``, ``step1_displacement``, ``step1_grip_force``,
@@ -138,7 +138,7 @@ def fields_archive(engine: Engine, steps: Sequence[Step]) -> bytes:
 
 
 def archive(network: Network, answers: Iterable[tuple[Step, Fields]]) -> bytes:
-    """Return the full fields of steps as `fields_archive` does.
+    """Return the full fields of steps as `_fields_archive` does.
 
     ``answers`` (Step, Fields): steps and the full fields of one grip set each. Result: the content
     of the archive; SI units.

@@ -15,7 +15,7 @@ from seqopt.scene.checks import short
 from seqopt.scene.parts import THICKEST, Anywhere, Brick, Ground, Joint, Reach, Robot, Side
 from seqopt.scene.scene import Scene
 
-LEFT = np.array([0.0, 1.0, 0.0])
+_LEFT = np.array([0.0, 1.0, 0.0])
 LETTERS = "VLR"
 STANDARD_GRAVITY = 9.81  # m/s²
 
@@ -127,7 +127,7 @@ def arch_scene(
     shape : ArchShape
     name : str
     robots : sequence of Robot, optional
-        By default `robots_beside` the arch.
+        By default `_robots_beside` the arch.
     line_nodes : mapping of int to int, optional
         Per brick that lies across: which of its nodes is on the arch line; 2b-2 by default.
     provenance : str
@@ -156,12 +156,12 @@ def arch_scene(
         joints=tuple(joints),
         grounds=tuple(grounds),
         build_order=tuple(brick.name for brick in bricks),
-        robots=robots_beside(shape) if robots is None else tuple(robots),
+        robots=_robots_beside(shape) if robots is None else tuple(robots),
         blocked_nodes=(0,),
     )
 
 
-def robots_beside(shape: ArchShape) -> tuple[Robot, ...]:
+def _robots_beside(shape: ArchShape) -> tuple[Robot, ...]:
     """Return three robots for an arch: one on either side, and a mobile one that reaches all.
 
     Those beside it reach its line, but not the far ends of bricks that stick out to the other side.
@@ -202,7 +202,7 @@ def _axes(shape: ArchShape) -> tuple[Floats, Floats, Floats]:
     roll, yaw = (zero if a is None else np.asarray(a, float) for a in (shape.roll, shape.yaw))
     forward = np.stack([np.cos(pitch), zero, np.sin(pitch)], axis=1)
     normal = np.stack([-np.sin(pitch), zero, np.cos(pitch)], axis=1)
-    rolled = np.cos(roll)[:, None] * LEFT + np.sin(roll)[:, None] * normal
+    rolled = np.cos(roll)[:, None] * _LEFT + np.sin(roll)[:, None] * normal
     lies_along = np.array([letter == "V" for letter in _pattern(shape)])
     cos, sin = np.cos(yaw)[:, None], np.sin(yaw)[:, None]
     tangent = np.where(lies_along[:, None], cos * forward + sin * rolled, forward)
@@ -280,7 +280,7 @@ def _ground(shape: ArchShape, brick: int, end: Floats, tangent: Floats, sign: fl
 
 def _across(direction: Floats) -> Vector:
     """Return the unit vector to the left at right angles to a direction."""
-    rest = LEFT - direction * (direction @ LEFT) / (direction @ direction)
+    rest = _LEFT - direction * (direction @ _LEFT) / (direction @ direction)
     return _vector(rest / np.linalg.norm(rest))
 
 

@@ -13,12 +13,12 @@ from seqopt.scene.checks import short, vector, whole
 from seqopt.scene.parts import Brick
 from seqopt.scene.shape import Polyhedron, rows
 
-Numbers = tuple[int, int] | None
-Places = tuple[Vector, Vector] | None
+_Numbers = tuple[int, int] | None
+_Places = tuple[Vector, Vector] | None
 
 
 def block_brick(
-    name: int, shape: Polyhedron, density: float, *, nodes: Numbers = None, grips: Places = None
+    name: int, shape: Polyhedron, density: float, *, nodes: _Numbers = None, grips: _Places = None
 ) -> Brick:
     """Return a brick of any shape.
 
@@ -54,7 +54,7 @@ def block_brick(
     )
 
 
-def _from(center: Floats, name: int, grips: Places) -> tuple[Vector, Vector]:
+def _from(center: Floats, name: int, grips: _Places) -> tuple[Vector, Vector]:
     """Return where grips are from a center."""
     where = f"brick {name}: grips"
     found = [vector(where, row) for row in rows(where, grips or ())]

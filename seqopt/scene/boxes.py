@@ -17,8 +17,8 @@ from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.errors import SceneError
 from seqopt.scene.parts import Brick
 
-PARALLEL = 1e-9  # sine of an angle between edges treated as zero
-DEEPEST = 1e-6  # depth that is rounding, over the smallest dimension
+_PARALLEL = 1e-9  # sine of an angle between edges treated as zero
+_DEEPEST = 1e-6  # depth that is rounding, over the smallest dimension
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -75,12 +75,12 @@ def separations(bricks: Sequence[Brick]) -> tuple[Ints, Floats]:
     for which in (a, b):
         spread = np.abs(axes @ shapes.frame[which].transpose(0, 2, 1))
         apart -= (spread @ shapes.half[which][:, :, None])[:, :, 0]
-    real = np.linalg.norm(axes, axis=2) > PARALLEL
+    real = np.linalg.norm(axes, axis=2) > _PARALLEL
     return pairs, np.where(real, apart, -np.inf).max(axis=1, initial=-np.inf)
 
 
 def require_apart(
-    where: str, bricks: Sequence[Brick], remedy: str, deepest: float = DEEPEST
+    where: str, bricks: Sequence[Brick], remedy: str, deepest: float = _DEEPEST
 ) -> None:
     """Require bricks of which no two interpenetrate.
 
@@ -100,4 +100,4 @@ def _edge_normals(first: Floats, second: Floats) -> Floats:
     """Return unit vectors across an edge of each of two boxes, (P, 9, 3); zero if they agree."""
     normal = np.cross(first[:, :, None], second[:, None, :]).reshape(len(first), 9, 3)
     size = np.linalg.norm(normal, axis=2, keepdims=True)
-    return np.asarray(np.where(size > PARALLEL, normal / np.maximum(size, PARALLEL), 0.0))
+    return np.asarray(np.where(size > _PARALLEL, normal / np.maximum(size, _PARALLEL), 0.0))

@@ -10,9 +10,9 @@ from typing import TypeVar
 from seqopt.arrays import Vector
 from seqopt.errors import SceneError
 
-Part = TypeVar("Part")
+_Part = TypeVar("_Part")
 LARGEST_NUMBER = 10**15  # of a brick or node: what arrays of numbers hold without loss
-TURNS = {*range(0x202A, 0x202F), *range(0x2066, 0x206A), 0x2028, 0x2029}  # turn or break lines
+_TURNS = {*range(0x202A, 0x202F), *range(0x2066, 0x206A), 0x2028, 0x2029}  # turn or break lines
 UNIT_TOLERANCE = 1e-9  # how far a direction may be from unit length, or a pair from a right angle
 
 
@@ -23,7 +23,7 @@ def steers(sign: str) -> bool:
     breaks lines.
     """
     code = ord(sign)
-    return code < 0x20 or 0x7F <= code < 0xA0 or 0xD800 <= code < 0xE000 or code in TURNS
+    return code < 0x20 or 0x7F <= code < 0xA0 or 0xD800 <= code < 0xE000 or code in _TURNS
 
 
 def printable(where: str, value: str) -> str:
@@ -62,7 +62,7 @@ def wholes(where: str, values: Iterable[int]) -> tuple[int, ...]:
     return tuple(whole(where, value) for value in values)
 
 
-def parts(where: str, values: Iterable[Part], kind: type[Part]) -> tuple[Part, ...]:
+def parts(where: str, values: Iterable[_Part], kind: type[_Part]) -> tuple[_Part, ...]:
     """Return parts of a scene if all are of one kind.
 
     Raises `SceneError` if one is of another kind, or there is nothing to go through.

@@ -13,7 +13,7 @@ from seqopt.scene.checks import short, wholes
 from seqopt.scene.scene import Scene
 
 Order = tuple[int, ...]
-PART = re.compile(r"(-?\d+)(?:\.\.(-?\d+))?")
+_PART = re.compile(r"(-?\d+)(?:\.\.(-?\d+))?")
 
 
 def from_all_ends(scene: Scene) -> Order:
@@ -62,7 +62,7 @@ def parse_order(scene: Scene, text: str) -> Order:
         return ORDERS[text](scene)
     out: list[int] = []
     for part in text.split(","):
-        found = PART.fullmatch(part.strip())
+        found = _PART.fullmatch(part.strip())
         if found is None:
             hint = did_you_mean(text, (*ORDERS, "search"))
             raise SceneError(

@@ -97,7 +97,7 @@ class Sphere:
 Reach = Anywhere | Side | Sphere
 
 
-def as_reach(where: str, given: Reach | str) -> Reach:
+def _as_reach(where: str, given: Reach | str) -> Reach:
     """Return a reach; ``"anywhere"`` is one too."""
     if isinstance(given, str) and given == "anywhere":
         return Anywhere()
@@ -337,7 +337,7 @@ class Robot:
 
     def __post_init__(self) -> None:
         printable("robot", self.name)
-        _set(self, "reach", as_reach(f"robot {self.name}: reach", self.reach))
+        _set(self, "reach", _as_reach(f"robot {self.name}: reach", self.reach))
         _set(self, "payload", positive(f"robot {self.name}: payload", self.payload, "N"))
 
 

@@ -22,7 +22,7 @@ from seqopt.scene.checks import short
 from seqopt.scene.parts import Ground, Joint
 from seqopt.scene.scene import Scene
 
-End = TypeVar("End", Joint, Ground)
+_End = TypeVar("_End", Joint, Ground)
 
 
 def stiffened(scene: Scene, translational: Floats, rotational: Floats) -> Scene:
@@ -33,7 +33,7 @@ def stiffened(scene: Scene, translational: Floats, rotational: Floats) -> Scene:
     """
     pairs = [*zip(translational.tolist(), rotational.tolist(), strict=True)]
 
-    def stiffer(spring: End, factors: tuple[float, float]) -> End:
+    def stiffer(spring: _End, factors: tuple[float, float]) -> _End:
         (x, y, z), (a, b, c) = spring.translational_stiffness, spring.rotational_stiffness
         t, r = factors
         return replace(
@@ -90,7 +90,7 @@ def shifted(scene: Scene, size: float, rng: np.random.Generator) -> Scene:
 
 
 MOST = 100_000  # scenarios; more are a slip of the finger
-LARGEST_FACTOR = 1e6
+_LARGEST_FACTOR = 1e6
 
 
 @dataclass(frozen=True)
@@ -209,10 +209,10 @@ def _factors(given: Sequence[float]) -> tuple[float, float]:
         low, high = (float(value) for value in given)
     except (TypeError, ValueError):
         low, high = math.nan, math.nan
-    if not 1 / LARGEST_FACTOR <= low <= high <= LARGEST_FACTOR:
+    if not 1 / _LARGEST_FACTOR <= low <= high <= _LARGEST_FACTOR:
         raise SceneError(
             f"stiffness is {short(given)}; give the least and the largest factor, from "
-            f"{1 / LARGEST_FACTOR:g} to {LARGEST_FACTOR:g}"
+            f"{1 / _LARGEST_FACTOR:g} to {_LARGEST_FACTOR:g}"
         )
     return low, high
 

@@ -18,37 +18,37 @@ from seqopt.showing import Shown, display
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-AT_NODE = 1e-6  # distance treated as zero, over the length of the brick
-FAR = 1e9  # of a position from the origin, over the smallest dimension: digits are lost beyond
-SIZES = (1e-9, 1e9)  # m; dimensions that a brick may have
-HEAVY = 1e100  # N, N/m, N m/rad; squares of what is beyond overflow, of its inverse vanish
+_AT_NODE = 1e-6  # distance treated as zero, over the length of the brick
+_FAR = 1e9  # of a position from the origin, over the smallest dimension: digits are lost beyond
+_SIZES = (1e-9, 1e9)  # m; dimensions that a brick may have
+_HEAVY = 1e100  # N, N/m, N m/rad; squares of what is beyond overflow, of its inverse vanish
 
 
-def check_bricks(bricks: Sequence[Brick], gravity: Vector) -> None:
+def _check_bricks(bricks: Sequence[Brick], gravity: Vector) -> None:
     """Require bricks that have a size, a place and a weight. ``gravity``: m/s²."""
     pull = math.hypot(*gravity)
     for brick in bricks:
         where, smallest = f"brick {brick.name}", min(brick.dimensions)
-        if not SIZES[0] <= smallest <= max(brick.dimensions) <= SIZES[1]:
+        if not _SIZES[0] <= smallest <= max(brick.dimensions) <= _SIZES[1]:
             raise SceneError(
                 f"{where}: dimensions are {list(brick.dimensions)}; "
-                f"give meters, from {SIZES[0]:g} to {SIZES[1]:g}"
+                f"give meters, from {_SIZES[0]:g} to {_SIZES[1]:g}"
             )
-        if max(map(abs, brick.position)) > FAR * smallest:
+        if max(map(abs, brick.position)) > _FAR * smallest:
             raise SceneError(
                 f"{where}: position is {list(brick.position)}, so far out that its size is lost "
                 "to rounding; move the scene to the origin"
             )
-        if pull and not 1 / HEAVY <= brick.mass * pull <= HEAVY:
+        if pull and not 1 / _HEAVY <= brick.mass * pull <= _HEAVY:
             raise SceneError(
                 f"{where}: it weighs {brick.mass * pull:g} N; correct its density "
                 f"{brick.density:g} kg/m³ or the scene's gravity {pull:g} m/s²"
             )
 
 
-def check_springs(springs: Sequence[Joint | Ground], bricks: Mapping[int, Brick]) -> None:
+def _check_springs(springs: Sequence[Joint | Ground], bricks: Mapping[int, Brick]) -> None:
     """Require joints and ground ends whose edges have a length. ``bricks``: by name."""
-    farthest = FAR * max(max(brick.dimensions) for brick in bricks.values())
+    farthest = _FAR * max(max(brick.dimensions) for brick in bricks.values())
     for spring in springs:
         ends = spring.bricks if isinstance(spring, Joint) else (spring.brick,)
         where = (
@@ -65,10 +65,10 @@ def check_springs(springs: Sequence[Joint | Ground], bricks: Mapping[int, Brick]
         stiffness = (*spring.translational_stiffness, *spring.rotational_stiffness)
         stiffest = max(stiffness)
         softest = min(filter(None, stiffness), default=1.0)
-        if stiffest > HEAVY or softest < 1 / HEAVY:
-            wrong = stiffest if stiffest > HEAVY else softest
+        if stiffest > _HEAVY or softest < 1 / _HEAVY:
+            wrong = stiffest if stiffest > _HEAVY else softest
             raise SceneError(
-                f"{where}: a stiffness is {wrong:g}; give 0, or from {1 / HEAVY:g} to {HEAVY:g}"
+                f"{where}: a stiffness is {wrong:g}; give 0, or from {1 / _HEAVY:g} to {_HEAVY:g}"
             )
         for brick in (bricks[end] for end in ends):
             _check_edges(where, spring, brick)
@@ -76,7 +76,7 @@ def check_springs(springs: Sequence[Joint | Ground], bricks: Mapping[int, Brick]
 
 def _check_edges(where: str, spring: Joint | Ground, brick: Brick) -> None:
     """Require a joint off the nodes of a brick, and a stub with a length."""
-    near = AT_NODE * brick.dimensions[0]
+    near = _AT_NODE * brick.dimensions[0]
     for node in brick.nodes:
         if math.dist(brick.node_position(node), spring.position) <= near:
             raise SceneError(
@@ -87,7 +87,7 @@ def _check_edges(where: str, spring: Joint | Ground, brick: Brick) -> None:
         raise SceneError(f"{where}: anchor and position are one point; give the stub a length")
 
 
-KINDS = {"bricks": Brick, "joints": Joint, "grounds": Ground, "robots": Robot}
+_KINDS = {"bricks": Brick, "joints": Joint, "grounds": Ground, "robots": Robot}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -136,7 +136,7 @@ class Scene(Shown):
     provenance: str = ""
 
     def __post_init__(self) -> None:
-        for name, kind in KINDS.items():
+        for name, kind in _KINDS.items():
             _set(self, name, parts(f"scene: {name}", getattr(self, name), kind))
         printable("scene", self.name)
         for name in ("build_order", "blocked_nodes"):
@@ -150,8 +150,8 @@ class Scene(Shown):
         _unique(f"scene {self.name}: node", (n for brick in self.bricks for n in brick.nodes))
         _unique(f"scene {self.name}: robot", (robot.name for robot in self.robots))
         self._check_references()
-        check_bricks(self.bricks, self.gravity)
-        check_springs((*self.joints, *self.grounds), {brick.name: brick for brick in self.bricks})
+        _check_bricks(self.bricks, self.gravity)
+        _check_springs((*self.joints, *self.grounds), {brick.name: brick for brick in self.bricks})
 
     def __repr__(self) -> str:
         counts = (

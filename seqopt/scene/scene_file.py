@@ -26,11 +26,11 @@ from seqopt.scene.parts import Anywhere, Brick, Ground, Joint, Reach, Robot, Sid
 from seqopt.scene.scene import Scene
 from seqopt.scene.shape import with_shape
 
-ONE_PLACE = 0.25  # distance of centroids treated as zero, over the smallest dimension
-FAR_AWAY = 1.0  # of a joint from a brick, over the brick's largest dimension
-THICK_BRICK = 5.0  # m; the smallest dimension of a brick whose lengths may be meant in mm
-DENSITIES = (10.0, 30_000.0)  # kg/m³; from aerogel to the heaviest metals
-PULL = 100.0  # m/s²; ten times that of the earth
+_ONE_PLACE = 0.25  # distance of centroids treated as zero, over the smallest dimension
+_FAR_AWAY = 1.0  # of a joint from a brick, over the brick's largest dimension
+_THICK_BRICK = 5.0  # m; the smallest dimension of a brick whose lengths may be meant in mm
+_DENSITIES = (10.0, 30_000.0)  # kg/m³; from aerogel to the heaviest metals
+_PULL = 100.0  # m/s²; ten times that of the earth
 
 
 def doubts(scene: Scene) -> tuple[str, ...]:
@@ -67,15 +67,15 @@ def warn_of(scene: Scene, name: str) -> None:
 
 def _of_units(scene: Scene) -> Iterator[str]:
     pull = math.hypot(*scene.gravity)
-    if pull > PULL:
+    if pull > _PULL:
         yield f"gravity is {pull:g} m/s²: give it in meters, if it is meant in millimeters"
-    thick = [brick for brick in scene.bricks if min(brick.dimensions) > THICK_BRICK]
+    thick = [brick for brick in scene.bricks if min(brick.dimensions) > _THICK_BRICK]
     if thick:
         yield (
             f"{_named(thick)}: dimensions of {list(thick[0].dimensions)} m look like millimeters; "
             "give meters"
         )
-    odd = [brick for brick in scene.bricks if not DENSITIES[0] <= brick.density <= DENSITIES[1]]
+    odd = [brick for brick in scene.bricks if not _DENSITIES[0] <= brick.density <= _DENSITIES[1]]
     if odd:
         yield f"{_named(odd)}: a density of {odd[0].density:g} kg/m³ is odd; check its unit"
 
@@ -84,7 +84,7 @@ def _of_places(scene: Scene) -> Iterator[str]:
     """Yield bricks that stand where others do."""
     from scipy.spatial import KDTree  # noqa: PLC0415  # for scenes from files only
 
-    near = ONE_PLACE * np.array([min(brick.dimensions) for brick in scene.bricks])
+    near = _ONE_PLACE * np.array([min(brick.dimensions) for brick in scene.bricks])
     place = np.array([brick.position for brick in scene.bricks])
     for i, j in sorted(KDTree(place).query_pairs(float(near.max()))):
         if math.dist(place[i], place[j]) <= min(near[i], near[j]):
@@ -100,7 +100,7 @@ def _of_joints(scene: Scene) -> Iterator[str]:
         ends = spring.bricks if isinstance(spring, Joint) else (spring.brick,)
         for brick in (bricks[end] for end in ends):
             away = _distance(brick, spring.position)
-            if away > FAR_AWAY * max(brick.dimensions):
+            if away > _FAR_AWAY * max(brick.dimensions):
                 yield f"{_called(spring)}: it lies {away:.4g} m from brick {brick.name}"
 
 
@@ -123,9 +123,9 @@ def _named(bricks: list[Brick]) -> str:
     return f"brick {bricks[0].name}{more}"
 
 
-VERSION = 1
-UNSAID = ("thickness", "face", "shape", "node_offsets")  # left out of a file where there is none
-REACHES: dict[str, type[Anywhere] | type[Side] | type[Sphere]] = {
+_VERSION = 1
+_UNSAID = ("thickness", "face", "shape", "node_offsets")  # left out of a file where there is none
+_REACHES: dict[str, type[Anywhere] | type[Side] | type[Sphere]] = {
     "anywhere": Anywhere,
     "side": Side,
     "sphere": Sphere,
@@ -235,7 +235,7 @@ def parse_scene(text: str, source: str = "text") -> Scene:
         raise
     except ValueError as error:  # an integer of thousands of digits
         raise SceneError(f"scene {source}: a number has too many digits; give fewer") from error
-    return scene_from_dict(document)
+    return _scene_from_dict(document)
 
 
 def _entries(source: str, pairs: list[tuple[str, Any]]) -> dict[str, Any]:
@@ -248,7 +248,7 @@ def _entries(source: str, pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     return out
 
 
-def scene_from_dict(document: dict[str, Any]) -> Scene:
+def _scene_from_dict(document: dict[str, Any]) -> Scene:
     """Return the scene of a document that obeys the schema.
 
     ``document``: as of `scene_to_dict`. Raises `SceneError` if its parts do not fit together.
@@ -266,12 +266,12 @@ def scene_from_dict(document: dict[str, Any]) -> Scene:
 
 def scene_to_dict(scene: Scene) -> dict[str, Any]:
     """Return a scene as a document that obeys the schema."""
-    document = {"format": "seqopt-scene", "version": VERSION, **asdict(scene)}
+    document = {"format": "seqopt-scene", "version": _VERSION, **asdict(scene)}
     for part in (*document["bricks"], *document["joints"], *document["grounds"]):
-        for key in UNSAID:
+        for key in _UNSAID:
             if part.get(key, "") is None:
                 del part[key]
-    names = {cls: kind for kind, cls in REACHES.items()}
+    names = {cls: kind for kind, cls in _REACHES.items()}
     for entry, robot in zip(document["robots"], scene.robots, strict=True):
         entry["reach"] = {"kind": names[type(robot.reach)], **entry["reach"]}
     return document
@@ -316,7 +316,7 @@ def save_scene(scene: Scene, path: Path) -> None:
 
 
 def _reach(entry: dict[str, Any]) -> Reach:
-    return REACHES[entry["kind"]](**{key: value for key, value in entry.items() if key != "kind"})
+    return _REACHES[entry["kind"]](**{key: value for key, value in entry.items() if key != "kind"})
 
 
 def _check_schema(document: object, source: str) -> None:

@@ -15,11 +15,11 @@ from seqopt.arrays import Floats, Vector, frozen
 from seqopt.errors import SceneError
 from seqopt.scene.checks import short, vector, wholes
 
-Part = TypeVar("Part")
-STRAIGHT = 1e-9  # by how much a convex polygon may turn back, over the square of its longest edge
+_Part = TypeVar("_Part")
+_STRAIGHT = 1e-9  # by how much a convex polygon may turn back, over the square of its longest edge
 
 
-def rows(where: str, values: Iterable[Part]) -> tuple[Part, ...]:
+def rows(where: str, values: Iterable[_Part]) -> tuple[_Part, ...]:
     """Return what there is to go through. Raises `SceneError` if it is no list."""
     if isinstance(values, str) or not isinstance(values, Iterable):
         raise SceneError(f"{where} is {short(values)}; give a list")
@@ -41,7 +41,7 @@ def convex_polygon(
     edges = [(u - x, v - y) for (x, y), (u, v) in zip(points, points[1:] + points[:1], strict=True)]
     turns = [a * d - b * c for (a, b), (c, d) in zip(edges, edges[1:] + edges[:1], strict=True)]
     size = max((a * a + b * b for a, b in edges), default=0.0)
-    slack = STRAIGHT * size
+    slack = _STRAIGHT * size
     angle = math.fsum(
         math.atan2(turn, a * c + b * d)
         for turn, (a, b), (c, d) in zip(turns, edges, edges[1:] + edges[:1], strict=True)
@@ -55,8 +55,8 @@ def convex_polygon(
 
 
 FLAT = 1e-4  # by how much a face may leave its plane, over the size of the block
-EVEN = 1e-12  # share of the second moments by which axes of equal length are told apart
-NEAR = (1.0, 0.75, 0.5, 0.25, 0.1)  # of a quarter of the extent: where a node is tried
+_EVEN = 1e-12  # share of the second moments by which axes of equal length are told apart
+_NEAR = (1.0, 0.75, 0.5, 0.25, 0.1)  # of a quarter of the extent: where a node is tried
 
 
 @dataclass(frozen=True)
@@ -145,7 +145,7 @@ class Polyhedron:
         total = arms.sum(axis=1)
         spread = np.einsum("t,tia,tib->ab", volume, arms, arms)
         spread = (spread + np.einsum("t,ta,tb->ab", volume, total, total)) / 20
-        spread += EVEN * np.trace(spread) * np.diag([2.0, 1.0, 0.0])
+        spread += _EVEN * np.trace(spread) * np.diag([2.0, 1.0, 0.0])
         found = np.linalg.eigh(spread)[1].T[::-1].copy()
         found[2] = np.cross(found[0], found[1])
         for i in (0, 1):  # their signs follow from the shape, not from the solver
@@ -175,7 +175,7 @@ class Polyhedron:
         nearer, or along another axis, where that is outside; outside if all are.
         """
         reach = 0.25 * self.extents(self.axes)
-        tries = [(share * reach[i], i) for i in range(3) for share in NEAR]
+        tries = [(share * reach[i], i) for i in range(3) for share in _NEAR]
         steps = [(size * self.axes[i]) for size, i in tries]
         found = next((step for step in steps if self._holds(step)), steps[0])
         x, y, z = (found + 0.0).tolist()
@@ -249,7 +249,7 @@ def _require_closed(faces: tuple[tuple[int, ...], ...]) -> None:
             )
 
 
-SAME_PLACE = 1e-6  # distance treated as zero, over the size of a block
+_SAME_PLACE = 1e-6  # distance treated as zero, over the size of a block
 
 
 def two_points(where: str, given: tuple[Vector, Vector]) -> tuple[Vector, Vector]:
@@ -272,14 +272,14 @@ def check_shape(where: str, shape: object, dimensions: Vector, axes: tuple[Vecto
     if not isinstance(shape, Polyhedron):
         raise SceneError(f"{where}: shape is {short(shape)}; give a Polyhedron")
     off = math.hypot(*shape.centroid.tolist())
-    if not off <= SAME_PLACE * size:
+    if not off <= _SAME_PLACE * size:
         raise SceneError(
             f"{where}: the centroid of its shape is {off:.3g} m from its position; give vertices "
             "from the centroid"
         )
     length, width = np.array(axes[0]), np.array(axes[1])
     extents = shape.extents(np.stack([length, width, np.cross(length, width)]))
-    if not np.allclose(extents, dimensions, rtol=0.0, atol=SAME_PLACE * size):
+    if not np.allclose(extents, dimensions, rtol=0.0, atol=_SAME_PLACE * size):
         raise SceneError(
             f"{where}: dimensions are {list(dimensions)}, and its shape extends "
             f"{[float(f'{e:.6g}') for e in extents]} along its axes; give these"

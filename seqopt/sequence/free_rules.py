@@ -13,7 +13,7 @@ from seqopt.scene.parts import Robot
 from seqopt.scene.scene import Scene
 
 FREE = "free"  # the schedule that is no list of steps
-MOST_ROBOTS = 5
+_MOST_ROBOTS = 5
 
 
 class Newest(Enum):
@@ -101,9 +101,9 @@ class FreeRules:
                 hint = did_you_mean(name, known)
                 raise StepError(f"robot {name!r} does not exist{hint}; give some of {listed}")
         team = tuple(i for i, name in enumerate(known) if name in self.robots or not self.robots)
-        if not 2 <= len(team) <= MOST_ROBOTS:
+        if not 2 <= len(team) <= _MOST_ROBOTS:
             raise StepError(
-                f"the free schedule: {len(team)} robots take part; name two to {MOST_ROBOTS}"
+                f"the free schedule: {len(team)} robots take part; name two to {_MOST_ROBOTS}"
             )
         outside = [name for name in self.placers if known.index(name) not in team]
         if outside:
@@ -162,12 +162,12 @@ def with_robots(scene: Scene, count: int) -> Scene:
     >>> [robot.name for robot in with_robots(seqopt.load_scene("arch25"), 4).robots]
     ['rob1', 'rob2', 'rob3', 'rob4']
     """
-    if not isinstance(count, Integral) or not 2 <= count <= MOST_ROBOTS:
-        raise StepError(f"{short(count)} robots: the free schedule takes two to {MOST_ROBOTS}")
+    if not isinstance(count, Integral) or not 2 <= count <= _MOST_ROBOTS:
+        raise StepError(f"{short(count)} robots: the free schedule takes two to {_MOST_ROBOTS}")
     robots = list(scene.robots[:count])
     names = {robot.name for robot in robots}
     payload = max((robot.payload for robot in scene.robots), default=float("nan"))
-    fresh = (f"rob{i}" for i in range(1, 2 * MOST_ROBOTS + 1) if f"rob{i}" not in names)
+    fresh = (f"rob{i}" for i in range(1, 2 * _MOST_ROBOTS + 1) if f"rob{i}" not in names)
     robots += [Robot(name=next(fresh), payload=payload) for _ in range(count - len(robots))]
     return replace(scene, robots=tuple(robots))
 

@@ -248,9 +248,9 @@ class Schedule(Shown):
         return check_sequence(self.scene, steps)
 
 
-RULE = re.compile(r"(near|within):([0-9]+\.?[0-9]*|\.[0-9]+)")
-NEWEST = 2  # bricks that make the working end: a build from both ends has two of them
-Distance = Callable[[Scene, int], dict[int, float]]
+_RULE = re.compile(r"(near|within):([0-9]+\.?[0-9]*|\.[0-9]+)")
+_NEWEST = 2  # bricks that make the working end: a build from both ends has two of them
+_Distance = Callable[[Scene, int], dict[int, float]]
 
 
 def thin(schedule: Schedule, rule: str) -> Schedule:
@@ -268,7 +268,7 @@ def thin(schedule: Schedule, rule: str) -> Schedule:
     >>> thin(schedule, "near:3").left_out
     'near:3 keeps 173 of 492 candidates'
     """
-    found = RULE.fullmatch(rule.strip()) if isinstance(rule, str) else None
+    found = _RULE.fullmatch(rule.strip()) if isinstance(rule, str) else None
     if found is None:
         hint = did_you_mean(str(rule).partition(":")[0], ("near", "within"))
         raise StepError(f"candidates {rule!r}{hint}: give near:JOINTS or within:METERS, as near:12")
@@ -296,7 +296,7 @@ def _joints_away(scene: Scene, bricks: int) -> dict[int, float]:
     graph: nx.Graph[int] = nx.Graph()
     graph.add_nodes_from(names)
     graph.add_edges_from(joint.bricks for joint in scene.joints if names.issuperset(joint.bricks))
-    newest = {brick.name for brick in placed[-NEWEST:]}
+    newest = {brick.name for brick in placed[-_NEWEST:]}
     away = nx.multi_source_dijkstra_path_length(graph, newest)
     return {n: float(away.get(b.name, math.inf)) for b in placed for n in b.nodes}
 
@@ -304,7 +304,7 @@ def _joints_away(scene: Scene, bricks: int) -> dict[int, float]:
 def _meters_away(scene: Scene, bricks: int) -> dict[int, float]:
     """Return how far the nodes of placed bricks are from the centroids of the newest, m."""
     placed = scene.placed[:bricks]
-    ends = [brick.position for brick in placed[-NEWEST:]]
+    ends = [brick.position for brick in placed[-_NEWEST:]]
     return {
         n: min(math.dist(b.node_position(n), end) for end in ends) for b in placed for n in b.nodes
     }

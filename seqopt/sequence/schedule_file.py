@@ -20,7 +20,7 @@ from seqopt.sequence.schedule import OpenGrip, OpenStep, Schedule, ScheduledGrip
 from seqopt.sequence.steps import check_step
 from seqopt.sequence.three_robots import SCHEDULES, make_schedule, open_schedule, robot_loop
 
-MARK = re.compile(r"\?\s*(\d*)")  # an open grip, and the number of its move if it is given
+_MARK = re.compile(r"\?\s*(\d*)")  # an open grip, and the number of its move if it is given
 MOST = 3  # robots that take part where nobody says who: as many as in the loop of Bruun et al.
 
 
@@ -191,7 +191,7 @@ def _grips(scene: Scene, row: Row, before: Sequence[OpenStep], where: str) -> Sc
     for robot, held in zip(scene.robots, last, strict=True):
         column = f"{robot.name}_node"
         cell = row[column].strip()
-        mark = MARK.fullmatch(cell)
+        mark = _MARK.fullmatch(cell)
         if mark is None:
             grips.append(_given(scene, row, column, where))
             continue

@@ -18,7 +18,7 @@ from seqopt.network.network import GROUND, Network
 from seqopt.sequence.schedule import Move, OpenGrip, OpenStep
 from seqopt.sequence.steps import Step
 
-Island = frozenset[int]
+_Island = frozenset[int]
 
 
 def acting_bodies(network: Network, bricks: int) -> Ints:
@@ -32,7 +32,7 @@ def acting_bodies(network: Network, bricks: int) -> Ints:
     return np.asarray(springs.bodies[acting])
 
 
-def islands(network: Network, bricks: int) -> tuple[Island, ...]:
+def islands(network: Network, bricks: int) -> tuple[_Island, ...]:
     """Return the parts of a partial structure that no joint ties to a ground end.
 
     Result: names of the bricks of every island, in build order of their first bricks.
@@ -69,7 +69,7 @@ def check_support(
     if _always_tied(network):
         return
     scene = network.scene
-    known: dict[int, tuple[Island, ...]] = {}
+    known: dict[int, tuple[_Island, ...]] = {}
     for step in steps:
         if step.bricks not in known:
             known[step.bricks] = islands(network, step.bricks)

@@ -192,7 +192,7 @@ def _loop(network: Network, order: Sequence[int], turns: Sequence[_Turn]) -> lis
     return steps
 
 
-class ScheduleMethod(Protocol):
+class _ScheduleMethod(Protocol):
     """A rule that makes a schedule."""
 
     def __call__(self, network: Network | Scene, robots: Sequence[str] = ()) -> Schedule:
@@ -329,7 +329,7 @@ def _free(scene: Scene, window: Sequence[Step], helpers: Sequence[int]) -> int:
     )
 
 
-SCHEDULES: dict[str, ScheduleMethod] = {
+SCHEDULES: dict[str, _ScheduleMethod] = {
     "three-robot": three_robot_loop,
     "modified-sequential": modified_sequential,
     "two-robot": two_robot_loop,

@@ -21,8 +21,8 @@ from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Step, StepKind, check_sequence
 from seqopt.sequence.support import acting_bodies, check_support
 
-Pair = tuple[int, int]  # who places, who holds meanwhile: indices of the scene's robots
-_Ways = dict[Pair, tuple[int, tuple[Pair, ...]]]  # by pair: changes so far, pairs so far
+_Pair = tuple[int, int]  # who places, who holds meanwhile: indices of the scene's robots
+_Ways = dict[_Pair, tuple[int, tuple[_Pair, ...]]]  # by pair: changes so far, pairs so far
 
 
 def find_robots(scene: Scene, names: Sequence[str], method: str, roles: int) -> list[int]:
@@ -51,7 +51,7 @@ def find_robots(scene: Scene, names: Sequence[str], method: str, roles: int) -> 
     return [known.index(name) for name in names]
 
 
-def can_place(scene: Scene, robot: Robot, brick: Brick) -> bool:
+def _can_place(scene: Scene, robot: Robot, brick: Brick) -> bool:
     """Return whether a robot reaches a node by which it can place a brick.
 
     ``scene``: with the nodes that are blocked.
@@ -63,8 +63,8 @@ def can_place(scene: Scene, robot: Robot, brick: Brick) -> bool:
 
 
 def take_turns(
-    network: Network, swap_after: Set[int], robots: Sequence[int], starts: Sequence[Pair] = ()
-) -> list[Pair]:
+    network: Network, swap_after: Set[int], robots: Sequence[int], starts: Sequence[_Pair] = ()
+) -> list[_Pair]:
     """Return who places every brick and who holds meanwhile, two robots at a time.
 
     After some bricks the one that placed stays and holds, after the others the one that held. The
@@ -82,7 +82,7 @@ def take_turns(
         for placer, holder in starts or permutations(robots, 2)
     }
     for k, brick in enumerate(scene.placed):
-        able = {robot for robot in rank if can_place(scene, scene.robots[robot], brick)}
+        able = {robot for robot in rank if _can_place(scene, scene.robots[robot], brick)}
         possible = {pair: way for pair, way in ways.items() if pair[0] in able}
         if not possible:
             raise _nobody(scene, [pair[0] for pair in ways], able, k)
@@ -123,7 +123,11 @@ def cast(scene: Scene, roles: Sequence[Set[int]], robots: Sequence[int]) -> list
     robots.
     """
     fits = [
-        [r for r in robots if all(can_place(scene, scene.robots[r], scene.placed[b]) for b in role)]
+        [
+            r
+            for r in robots
+            if all(_can_place(scene, scene.robots[r], scene.placed[b]) for b in role)
+        ]
         for role in roles
     ]
     found = _first_match(fits)
@@ -231,10 +235,10 @@ def degeneration(network: Network, method: str) -> str:
     return ""
 
 
-Grip = TypeVar("Grip")
+_Grip = TypeVar("_Grip")
 
 
-class Method(Protocol):
+class _Method(Protocol):
     """A rule that makes a sequence of steps."""
 
     def __call__(self, network: Network, robots: Sequence[str] = ()) -> tuple[Step, ...]:
@@ -353,15 +357,15 @@ def cantilever(network: Network | Scene, robots: Sequence[str] = ()) -> tuple[St
     return _two_robots(network, "cantilever", swaps, robots)
 
 
-METHODS: dict[str, Method] = {"sequential": sequential, "cantilever": cantilever}
+METHODS: dict[str, _Method] = {"sequential": sequential, "cantilever": cantilever}
 
 
 def alternate(
     network: Network,
     swap_after: Set[int],
-    pairs: Sequence[Pair],
-    grip: Callable[[int, int], Grip],
-) -> Iterator[tuple[StepKind, int, tuple[Grip | None, ...]]]:
+    pairs: Sequence[_Pair],
+    grip: Callable[[int, int], _Grip],
+) -> Iterator[tuple[StepKind, int, tuple[_Grip | None, ...]]]:
     """Yield the steps in which two robots place and hold.
 
     After each brick one of the two releases, if it holds anything; after the last one both do.
@@ -372,7 +376,7 @@ def alternate(
     count. Results: ``grips``: by robot of the scene.
     """
     scene = network.scene
-    grips: list[Grip | None] = [None] * len(scene.robots)
+    grips: list[_Grip | None] = [None] * len(scene.robots)
     for count, (brick, pair) in enumerate(zip(scene.placed, pairs, strict=True), start=1):
         placer, holder = pair
         grips[placer] = grip(placer, count)

@@ -40,9 +40,9 @@ def compile_held(assembly: Assembly, case: Case) -> HeldProgram:
     return compiled(assembly, case)
 
 
-SIDES = 8  # of a cone to start with, the axes of its contact among them
-SPREAD = np.array([p for p in product((-1.0, 0.0, 1.0), repeat=3) if any(p)])
-GAIN = 1e-7  # least gain for which a direction joins, over the largest entry of the motion
+_SIDES = 8  # of a cone to start with, the axes of its contact among them
+_SPREAD = np.array([p for p in product((-1.0, 0.0, 1.0), repeat=3) if any(p)])
+_GAIN = 1e-7  # least gain for which a direction joins, over the largest entry of the motion
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -73,12 +73,12 @@ def first_directions(corners: int, grips: int) -> Directions:
     >>> len(first_directions(4, 1).owner)
     58
     """
-    angle = 2 * np.pi * np.arange(SIDES) / SIDES
-    flat = np.stack([np.zeros(SIDES), np.cos(angle), np.sin(angle)], axis=1)
-    space = SPREAD / np.linalg.norm(SPREAD, axis=1, keepdims=True)
+    angle = 2 * np.pi * np.arange(_SIDES) / _SIDES
+    flat = np.stack([np.zeros(_SIDES), np.cos(angle), np.sin(angle)], axis=1)
+    space = _SPREAD / np.linalg.norm(_SPREAD, axis=1, keepdims=True)
     owner = np.concatenate(
         [
-            np.repeat(np.arange(corners), SIDES),
+            np.repeat(np.arange(corners), _SIDES),
             corners + np.repeat(np.arange(grips), len(space)),
         ]
     )
@@ -96,5 +96,5 @@ def better_directions(known: Directions, along: Floats, wanted: Bools) -> Direct
     best = np.zeros(len(along))
     np.maximum.at(best, known.owner, np.einsum("ij,ij->i", known.unit, along[known.owner]))
     size = np.linalg.norm(along, axis=1)
-    which = np.flatnonzero(wanted & (size - best > GAIN))
+    which = np.flatnonzero(wanted & (size - best > _GAIN))
     return Directions(which, along[which] / size[which, None])

@@ -29,8 +29,8 @@ from seqopt.stability.limit_analysis import (
     violation,
 )
 
-TIGHT = 1e-8  # largest violation of forces that prove, over the force scale and max(1, z)
-IDLE = 1e-10  # a grip's force treated as zero, over the force scale
+_TIGHT = 1e-8  # largest violation of forces that prove, over the force scale and max(1, z)
+_IDLE = 1e-10  # a grip's force treated as zero, over the force scale
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -42,7 +42,7 @@ class HoldingForces(FrozenValue):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class FallingMotion(FrozenValue):
+class _FallingMotion(FrozenValue):
     """A motion of the blocks, and what counts for any grips.
 
     ``work``, ``growth``: of the loads, less what contacts take up, and its growth with z;
@@ -65,7 +65,7 @@ class Known:
     def __init__(self, assembly: Assembly, case: Case) -> None:
         self._assembly, self._case = assembly, case
         self._forces: list[HoldingForces] = []
-        self._motions: list[FallingMotion] = []
+        self._motions: list[_FallingMotion] = []
 
     def bracket(self, places: Ints, payload: Floats) -> Floats:
         """Return between which values z is proven to lie.
@@ -98,7 +98,7 @@ class Known:
         out._motions = self._motions + other._motions
         return out
 
-    def motions_of(self, motion: Floats) -> list[FallingMotion]:
+    def motions_of(self, motion: Floats) -> list[_FallingMotion]:
         """Return what counts of a motion, at most one; none if it is not finite or none.
 
         ``motion`` (B, 6): as of `seqopt.stability.limit_analysis.Answer`.
@@ -121,7 +121,7 @@ class Known:
             taken.append(float(cohesion @ sliding + cut @ np.maximum(opening, 0)))
         speed = np.linalg.norm((assembly.grip_map.T @ flat).reshape(-1, 3), axis=1)
         return [
-            FallingMotion(
+            _FallingMotion(
                 work=float(assembly.load() @ flat) - taken[0],
                 growth=float(assembly.load(case.pull) @ flat) - (taken[1] - taken[0]),
                 closing=LARGEST_FORCE * float(np.maximum(-opening, 0).sum()),
@@ -145,7 +145,7 @@ class Known:
         self,
         out: Floats,
         forces: list[HoldingForces],
-        motions: list[FallingMotion],
+        motions: list[_FallingMotion],
         places: Ints,
         payload: Floats,
     ) -> Floats:
@@ -168,11 +168,11 @@ class Known:
         if not is_finite(self._assembly, answer):
             return []
         case = self._case
-        idle = np.linalg.norm(answer.grip_force, axis=1) <= IDLE
+        idle = np.linalg.norm(answer.grip_force, axis=1) <= _IDLE
         grip = np.where(idle[:, None], 0.0, answer.grip_force)
         value = max(answer.value, 0.0)
         clean = Answer(answer.claim, value, answer.contact_force, grip, answer.motion)
-        if not violation(self._assembly, case, clean, held) <= TIGHT * max(1.0, value):
+        if not violation(self._assembly, case, clean, held) <= _TIGHT * max(1.0, value):
             return []
         if grip[held <= 0].any():
             return []
@@ -186,11 +186,11 @@ class Known:
         out = np.ones(len(places), dtype=bool)
         for grip in needed.tolist():
             able = (places == grip) & (payload > 0)
-            able &= most >= known.needed[grip] - TIGHT * max(1.0, known.value)
+            able &= most >= known.needed[grip] - _TIGHT * max(1.0, known.value)
             out &= able.any(axis=1)
         return out
 
-    def _proven_by(self, motion: FallingMotion, places: Ints, payload: Floats) -> Floats:
+    def _proven_by(self, motion: _FallingMotion, places: Ints, payload: Floats) -> Floats:
         """Return the value of z that a motion proves for every row."""
         own, common = self._case.payload
         force = self._assembly.scales[0]
@@ -208,7 +208,7 @@ class Known:
         return np.where(growth > 0, value, CAP)
 
 
-Settled = Callable[[Floats], Bools]
+_Settled = Callable[[Floats], Bools]
 """Says which brackets (S, 2) are narrow enough."""
 
 
@@ -254,7 +254,7 @@ class HeldStates:
         self._tried: set[bytes] = set()
         self.solved = 0
 
-    def bracket(self, places: Ints, payload: Floats, settled: Settled) -> Floats:
+    def bracket(self, places: Ints, payload: Floats, settled: _Settled) -> Floats:
         """Return proven brackets of z, as narrow as needed where the solver's answers allow it.
 
         ``places`` (S, r): grips of the assembly that are held, from 0; as many as it has for none.
@@ -285,7 +285,7 @@ class HeldStates:
         np.maximum.at(out, places, payload)
         return out[:-1]
 
-    def _solve(self, held: Floats, settled: Settled) -> Known:
+    def _solve(self, held: Floats, settled: _Settled) -> Known:
         """Return what answers prove for those grips."""
         places, payload = np.flatnonzero(held)[None], held[held > 0][None]
         new = Known(self.assembly, self._case)

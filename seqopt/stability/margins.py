@@ -26,7 +26,7 @@ from seqopt.stability.limit_analysis import CAP, GAP, Case
 from seqopt.stability.prover import DIRECTIONS, FINE, NEAR, in_every_direction, sideways
 from seqopt.stability.screens import FALLS, STANDS, Screen, held_places
 
-Cases = Callable[[Assembly], list[Case]]
+_Cases = Callable[[Assembly], list[Case]]
 
 
 class Margins:
@@ -193,7 +193,7 @@ class Margins:
         return replace(case, tension=(case.tension[0], 0.0), cohesion=(case.cohesion[0], 0.0))
 
     def _brackets(
-        self, name: str, cases: Cases, bricks: int, grips: tuple[ArrayLike, ArrayLike | None]
+        self, name: str, cases: _Cases, bricks: int, grips: tuple[ArrayLike, ArrayLike | None]
     ) -> list[Floats]:
         """Return the brackets (S, 2) of z of every case."""
         places, loads = held_places(self.network, bricks, *grips)

@@ -117,7 +117,7 @@ class Screen:
             pull = np.tan(self.tilt) / (np.cos(np.pi / count) if around else 1.0)
             self._levels[level] = tuple(
                 lacking(assembly, self.mortar, self._compile)
-                for assembly in pulled(upright, pull, self.network.scene.up, count)
+                for assembly in _pulled(upright, pull, self.network.scene.up, count)
             )
         return self._levels[level]
 
@@ -140,7 +140,7 @@ def decided(bracket: Floats) -> Bools:
     return np.asarray((bracket[:, 1] <= EXACT) | (bracket[:, 0] > EXACT))
 
 
-def pulled(assembly: Assembly, pull: float, up: Vector, count: int) -> tuple[Assembly, ...]:
+def _pulled(assembly: Assembly, pull: float, up: Vector, count: int) -> tuple[Assembly, ...]:
     """Return the assemblies to which sideways pulls turn one.
 
     ``pull``: over gravity; for none it is the assembly itself. ``up``: unit vector against gravity.

@@ -8,14 +8,14 @@ from collections.abc import Callable, Iterable, Iterator, Sized
 from dataclasses import dataclass
 from typing import Protocol, TypeAlias, TypeVar
 
-QUIET = 1.0  # s after which a computation says how far it is
-PAUSE = 0.2  # s between two lines of that
+_QUIET = 1.0  # s after which a computation says how far it is
+_PAUSE = 0.2  # s between two lines of that
 
 Tell: TypeAlias = Callable[[object], object]  # told in words, or a `Stage`, how far something is
-Item_co = TypeVar("Item_co", covariant=True)
+_Item_co = TypeVar("_Item_co", covariant=True)
 
 
-class SizedIterable(Sized, Iterable[Item_co], Protocol[Item_co]):
+class _SizedIterable(Sized, Iterable[_Item_co], Protocol[_Item_co]):
     """Anything with a length whose items come one after the other."""
 
 
@@ -49,7 +49,7 @@ class Stage:
 
 
 class Progress:
-    """How far a computation is, told as a `Stage` once it takes longer than `QUIET`.
+    """How far a computation is, told as a `Stage` once it takes longer than `_QUIET`.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ class Progress:
         """Say that some work is done. ``work``: in the unit of the total."""
         self._done += work
         now = time.perf_counter()
-        if self._tell is None or now - self._start < QUIET or now - self._told < PAUSE:
+        if self._tell is None or now - self._start < _QUIET or now - self._told < _PAUSE:
             return
         self._told = now
         share = min(self._done / self._total, 1.0)
@@ -78,7 +78,7 @@ class Progress:
         self._tell(Stage(self._what, share, left))
 
 
-def told(what: str, items: SizedIterable[Item_co], tell: Tell | None) -> Iterator[Item_co]:
+def told(what: str, items: _SizedIterable[_Item_co], tell: Tell | None) -> Iterator[_Item_co]:
     """Yield items one after the other, and tell how far that is.
 
     ``what``: what is done with the items, in a few words; ``tell``: told a `Stage` before the work

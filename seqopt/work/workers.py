@@ -167,7 +167,7 @@ def _wait_and_end(end: Connection) -> None:
     os._exit(1)
 
 
-UNKNOWN = 16  # workers of an executor that does not say how many it has
+_UNKNOWN = 16  # workers of an executor that does not say how many it has
 
 
 class Crew(Protocol):
@@ -218,7 +218,7 @@ class Crew(Protocol):
 
 
 @dataclass(frozen=True)
-class Given:
+class _Given:
     """An executor of the caller, who also ends it.
 
     ``workers``: how many tasks it works on at once.
@@ -270,8 +270,8 @@ def hire(
     """
     if executor is not None:
         known = getattr(executor, "_max_workers", None)
-        most = known if isinstance(known, int) else UNKNOWN
-        yield Given(executor, workers if workers > 1 else most)
+        most = known if isinstance(known, int) else _UNKNOWN
+        yield _Given(executor, workers if workers > 1 else most)
     elif workers > 1:
         processes = Lanes(workers) if lanes else Processes(workers)
         try:
@@ -284,21 +284,21 @@ def hire(
         yield None
 
 
-Task = TypeVar("Task")
-Result = TypeVar("Result")
-UNDER_WAY = 4  # tasks given out or waiting to be taken, for every worker
-PATIENCE = 1.0  # s without an answer, after which workers are looked after
-FAILURES = 3  # times in a row that workers may end without any answer
-GUARD = 'if __name__ == "__main__":'
+_Task = TypeVar("_Task")
+_Result = TypeVar("_Result")
+_UNDER_WAY = 4  # tasks given out or waiting to be taken, for every worker
+_PATIENCE = 1.0  # s without an answer, after which workers are looked after
+_FAILURES = 3  # times in a row that workers may end without any answer
+_GUARD = 'if __name__ == "__main__":'
 
 
 def map_ordered(
-    function: Callable[[Task], Result],
-    tasks: Iterable[Task],
+    function: Callable[[_Task], _Result],
+    tasks: Iterable[_Task],
     crew: Crew | None = None,
-    known: Callable[[Task], Result | None] | None = None,
-    done: Callable[[Task, Result], None] | None = None,
-) -> Generator[Result, None, None]:
+    known: Callable[[_Task], _Result | None] | None = None,
+    done: Callable[[_Task, _Result], None] | None = None,
+) -> Generator[_Result, None, None]:
     """Return what a function makes of every task, in their order.
 
     Parameters
@@ -345,25 +345,25 @@ def map_ordered(
 
 
 @dataclass
-class _Course(Generic[Task, Result]):
+class _Course(Generic[_Task, _Result]):
     """What was given out, what came back, and what is to be given out again."""
 
-    function: Callable[[Task], Result]
+    function: Callable[[_Task], _Result]
     crew: Crew
-    known: Callable[[Task], Result | None]
-    done: Callable[[Task, Result], None]
-    waiting: dict[int, Task] = field(default_factory=dict)  # to be given out
-    running: dict[Future[Any], tuple[int, Task]] = field(default_factory=dict)
+    known: Callable[[_Task], _Result | None]
+    done: Callable[[_Task, _Result], None]
+    waiting: dict[int, _Task] = field(default_factory=dict)  # to be given out
+    running: dict[Future[Any], tuple[int, _Task]] = field(default_factory=dict)
     ready: dict[int, tuple[bool, Any]] = field(default_factory=dict)
     failures: int = 0
 
-    def run(self, tasks: Iterator[Task]) -> Iterator[Result]:
+    def run(self, tasks: Iterator[_Task]) -> Iterator[_Result]:
         """Yield the results in order."""
         taken = given = 0
         more = True
         try:
             while more or taken < given:
-                while more and given - taken < UNDER_WAY * self.crew.workers:
+                while more and given - taken < _UNDER_WAY * self.crew.workers:
                     more = self._take(given, tasks)
                     given += more
                 if taken not in self.ready and taken < given:
@@ -378,7 +378,7 @@ class _Course(Generic[Task, Result]):
         finally:
             self.crew.drop(self.running)
 
-    def _take(self, number: int, tasks: Iterator[Task]) -> bool:
+    def _take(self, number: int, tasks: Iterator[_Task]) -> bool:
         """Take the next task up, whose result may be known; return whether there was one."""
         for task in tasks:
             result = self.known(task)
@@ -421,7 +421,7 @@ class _Course(Generic[Task, Result]):
     def _ended(self) -> set[Future[Any]]:
         """Wait until a call at least has ended."""
         while True:
-            ended = wait(self.running, PATIENCE, FIRST_COMPLETED).done
+            ended = wait(self.running, _PATIENCE, FIRST_COMPLETED).done
             if ended:
                 return ended
             self.crew.look_after()
@@ -429,17 +429,17 @@ class _Course(Generic[Task, Result]):
     def _failed(self, error: BaseException) -> None:
         """Replace workers that died, unless there are none any more."""
         self.failures += 1
-        if self.failures <= FAILURES and self.crew.replace(error):
+        if self.failures <= _FAILURES and self.crew.replace(error):
             gone = [future for future in self.running if future.done() and _lost(future)]
             self.waiting |= dict(self.running.pop(future) for future in gone)
             return
         raise WorkerError(
             f"workers ended {self.failures} times without an answer ({_said(error)}); give another "
-            f"executor, or fewer workers where memory is short; a script starts under {GUARD}"
+            f"executor, or fewer workers where memory is short; a script starts under {_GUARD}"
         ) from error
 
 
-def _attempt(function: Callable[[Task], Result], task: Task) -> tuple[bool, Result | Exception]:
+def _attempt(function: Callable[[_Task], _Result], task: _Task) -> tuple[bool, _Result | Exception]:
     """Return a result, or the error in its place: what is raised beside tells of the worker."""
     try:
         return True, function(task)

@@ -278,7 +278,7 @@ def test_answers_do_not_depend_on_how_they_are_summed(monkeypatch, name, grips):
     builder = OperatorBuilder(net, grow_tree(net))
     found = []
     for few, held in ((10**9, None), (0, None), (0, np.unique(columns // 2))):
-        monkeypatch.setattr("seqopt.engines.rigid.operator.FEW", few)
+        monkeypatch.setattr("seqopt.engines.rigid.operator._FEW", few)
         found.append(solve_batch(builder.operator(bricks, held), columns, Want.ALL)[0])
     for field in NAMES:
         once, *others = (getattr(fields, field) for fields in found)
@@ -294,7 +294,7 @@ def test_answers_beside_loose_motions_do_not_depend_on_it_either(monkeypatch):
     force = np.random.default_rng(0).normal(size=index.shape)
     answers = {}
     for few in (10**9, 0):
-        monkeypatch.setattr("seqopt.engines.rigid.operator.FEW", few)
+        monkeypatch.setattr("seqopt.engines.rigid.operator._FEW", few)
         answers[few] = {name: operator.answer(name, index, force) for name in FLAGS}
     for name, once in answers[10**9].items():
         assert np.abs(answers[0][name] - once).max() <= 1e-9 * np.abs(once).max(), name

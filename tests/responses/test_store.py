@@ -201,7 +201,7 @@ def test_answers_are_those_of_scene_engine_and_responses(tmp_path, asked, monkey
     assert computed(name="compliance") == blocks
     monkeypatch.setattr(sys.modules[__name__], "wanted", lambda _: {"D_max"})
     assert computed() == blocks
-    monkeypatch.setattr("seqopt.engines.registry.arithmetic", lambda: "of another version")
+    monkeypatch.setattr("seqopt.engines.registry._arithmetic", lambda: "of another version")
     assert computed() == blocks
 
 

@@ -84,7 +84,7 @@ def test_what_cannot_touch_is_one_line():
 
 
 def test_blocks_without_number_in_one_place_are_refused(monkeypatch):
-    monkeypatch.setattr("seqopt.scene.imports.detection.MOST_PAIRS", 5)
+    monkeypatch.setattr("seqopt.scene.imports.detection._MOST_PAIRS", 5)
     with pytest.raises(SceneError, match="more than 5 pairs of blocks are in one place"):
         touching_faces([box((1, 1, 1))] * 4, GAP)
 

@@ -84,7 +84,7 @@ def pad_stiffness(network: Network, index: int, node: Floats, pinch: Pinch) -> F
     return total
 
 
-GONE = "joints open or slip and brick {brick} becomes unstable; add a grip, a bond or friction"
+_GONE = "joints open or slip and brick {brick} becomes unstable; add a grip, a bond or friction"
 
 
 class DiscreteEngine(NamedEngine):
@@ -137,7 +137,7 @@ class DiscreteEngine(NamedEngine):
         nodes = network.node_position[network.inner.ravel()[columns]]
         held = held_nodes(network, system, columns, nodes)
         if pinch is not None:
-            held = pinched(network, system, columns, nodes, pinch)
+            held = _pinched(network, system, columns, nodes, pinch)
         found = settle(held)
         if not found.rests:
             raise _not_at_rest(network, held, found, network.inner.ravel()[columns])
@@ -149,7 +149,7 @@ def _not_at_rest(network: Network, held: Held, found: Settled, nodes: Ints) -> S
     system = held.system
     if held.gone(found):
         moved = system.unit * (held.free @ found.motion)
-        return mechanism_error(network, moved[: 6 * system.bricks], GONE)
+        return mechanism_error(network, moved[: 6 * system.bricks], _GONE)
     names = ", ".join(str(network.node_name[n]) for n in nodes) or "nothing"
     return SolverError(
         f"{system.bricks} bricks held at {names}: the discrete elements neither came to rest nor "
@@ -171,7 +171,7 @@ def held_nodes(network: Network, system: System, columns: Ints, nodes: Floats) -
     return Held(system, free, sparse.csr_array(system.layers.shape))
 
 
-def pinched(network: Network, system: System, columns: Ints, nodes: Floats, pinch: Pinch) -> Held:
+def _pinched(network: Network, system: System, columns: Ints, nodes: Floats, pinch: Pinch) -> Held:
     """Return a system whose held bricks are pinched between pads beside their nodes.
 
     ``columns`` (r,): grips as indices into ``network.inner.ravel()``; ``nodes`` (r, 3): where they

@@ -12,15 +12,15 @@ from scipy.sparse.linalg import splu
 from seqopt.arrays import Bools, Floats, FrozenValue, frozen
 from seqopt.engines.discrete.system import System
 
-ITERATIONS = 60
-BALANCED = 1e-10  # largest force left on a body, over the heaviest body's weight
-ROUNDING = 1e-13  # relative
+_ITERATIONS = 60
+_BALANCED = 1e-10  # largest force left on a body, over the heaviest body's weight
+_ROUNDING = 1e-13  # relative
 LARGEST_STEP, SMALLEST_STEP = 0.1, 1e-3  # of the load, once a bond breaks
-FIRST_RESISTANCE = 1.0  # resistance to motion at first, over the stiffness
-MOVES = 120  # against a resistance
-HALVINGS = 4
+_FIRST_RESISTANCE = 1.0  # resistance to motion at first, over the stiffness
+_MOVES = 120  # against a resistance
+_HALVINGS = 4
 FAR = 0.1  # motion over a brick's length beyond which a structure has gone
-LENT_STIFFNESS = (
+_LENT_STIFFNESS = (
     1e-12  # stiffness lent to every motion, over its own: a loose body can come to rest
 )
 
@@ -56,7 +56,7 @@ class Held(FrozenValue):
         ``motion`` (m,); ``force`` (P, 3): N. Result: N.
         """
         moved = np.abs(self.free @ motion)
-        return ROUNDING * float((self._sizes @ moved).max() + np.abs(force).sum())
+        return _ROUNDING * float((self._sizes @ moved).max() + np.abs(force).sum())
 
     @cached_property
     def _sizes(self) -> sparse.csr_array:
@@ -102,7 +102,7 @@ class Settled(FrozenValue):
     @property
     def rests(self) -> bool:
         """Whether this is an equilibrium."""
-        return self.left <= BALANCED
+        return self.left <= _BALANCED
 
 
 def settle(held: Held) -> Settled:
@@ -154,8 +154,8 @@ def _balance(held: Held, state: Settled, share: float) -> Settled:
     """
     found = _newton(held, state, share, 0.0)
     state = replace(state, left=np.inf)
-    resistance = FIRST_RESISTANCE
-    for _ in range(MOVES):
+    resistance = _FIRST_RESISTANCE
+    for _ in range(_MOVES):
         if found is not None and (found.rests or held.gone(found)):
             return found
         found = _newton(held, state, share, resistance)
@@ -169,19 +169,19 @@ def _balance(held: Held, state: Settled, share: float) -> Settled:
 def _newton(held: Held, state: Settled, share: float, resistance: float) -> Settled | None:
     """Return where a state moves to against a resistance, over the stiffness of every motion."""
     system, motion, shorter = held.system, state.motion, 0
-    drag = np.maximum(resistance, LENT_STIFFNESS) * held.diagonal
+    drag = np.maximum(resistance, _LENT_STIFFNESS) * held.diagonal
     step, best = np.zeros_like(motion), np.inf
-    for _ in range(ITERATIONS):
+    for _ in range(_ITERATIONS):
         opening = system.openings(held.free @ motion)
         force, slope = system.points.forces(opening, state.slip, state.broken)
         left = held.left(motion, force, share * system.load)
         missing = left - resistance * held.diagonal * (motion - state.motion)
         size = np.linalg.norm(missing)
-        unit = max(system.scale, held.rounding(motion, force) / BALANCED)
-        if np.abs(missing).max() <= BALANCED * unit:
+        unit = max(system.scale, held.rounding(motion, force) / _BALANCED)
+        if np.abs(missing).max() <= _BALANCED * unit:
             slip = system.points.slipped(opening, force)
             return Settled(motion, force, slip, state.broken, float(np.abs(left).max() / unit))
-        if size >= best and shorter < HALVINGS:
+        if size >= best and shorter < _HALVINGS:
             step *= 0.5
             motion, shorter = motion - step, shorter + 1
             continue

@@ -24,11 +24,11 @@ from seqopt.errors import SceneError
 from seqopt.network.mechanics import deformation, spring_stiffness
 from seqopt.network.network import Network
 
-EXCESS = 1e-9  # stress above a limit that counts as none, over the stress scale
+_EXCESS = 1e-9  # stress above a limit that counts as none, over the stress scale
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Points(FrozenValue):
+class _Points(FrozenValue):
     """The springs of P points of a bed.
 
     ``area`` (P,): m²; ``normal``, ``tangential`` (P,): stiffness, N/m; ``stress_scale``: Pa.
@@ -59,7 +59,7 @@ class Points(FrozenValue):
 
     def exceeds(self, force: Floats) -> Bools:
         """Return at which points bonds do not hold forces. ``force`` (P, 3): N. Result (P,)."""
-        mortar, margin = self.mortar, EXCESS * self.stress_scale
+        mortar, margin = self.mortar, _EXCESS * self.stress_scale
         normal, shear = force[:, 0] / self.area, np.linalg.norm(force[:, 1:], axis=1) / self.area
         return np.asarray(
             (-normal > mortar.tensile_strength + margin)
@@ -91,7 +91,7 @@ class Points(FrozenValue):
         return force, slope
 
 
-BED_OVER_JOINT = 10.0  # how much stiffer a bed is than its joint, whichever way it moves
+_BED_OVER_JOINT = 10.0  # how much stiffer a bed is than its joint, whichever way it moves
 
 
 @dataclass(frozen=True)
@@ -119,7 +119,7 @@ class System(FrozenValue):
 
     bricks: int
     acting: Ints  # (J,); the springs whose joints these are
-    points: Points
+    points: _Points
     face: Ints  # (P,); the joint of every point, in ascending order
     maps: Floats  # (P, 3, 6); openings for unit twists across a joint, taken at its spring
     gap: sparse.csr_array  # (6J, 6n); twists across the beds for unit twists of the n bodies
@@ -233,13 +233,13 @@ def _moduli(
         return np.tile([bed.normal, bed.tangential], (len(stiffness), 1))
     even = np.ones((len(stiffness), 2))
     return even * (
-        BED_OVER_JOINT * _relative_stiffness(stiffness, bed_stiffness(points, maps, even))
+        _BED_OVER_JOINT * _relative_stiffness(stiffness, bed_stiffness(points, maps, even))
     )
 
 
-def _points(points: Quadrature, moduli: Floats, mortar: Mortar, assembly: Assembly) -> Points:
+def _points(points: Quadrature, moduli: Floats, mortar: Mortar, assembly: Assembly) -> _Points:
     normal, tangential = (points.area * moduli[points.face, i] for i in (0, 1))
-    return Points(points.area, normal, tangential, mortar, assembly.stress_scale)
+    return _Points(points.area, normal, tangential, mortar, assembly.stress_scale)
 
 
 def _relative_stiffness(stiffness: Floats, bed: Floats) -> Floats:

@@ -46,10 +46,10 @@ def solve_positive(system: Floats, negative: int = 0, scale: float = 1.0) -> tup
     return answer, pivots
 
 
-TINY = np.finfo(float).tiny
+_TINY = np.finfo(float).tiny
 
 
-class GripForces(NamedTuple):
+class _GripForces(NamedTuple):
     """The forces of the grips of sets, and how well they are determined."""
 
     force: Floats  # (S, k); N
@@ -86,7 +86,7 @@ def pairs_of(operator: ComplianceOperator, columns: Ints) -> Pairs:
 
     ``columns`` (S, r): grips as indices into ``network.inner.ravel()``.
     """
-    first, second = couples(columns.shape[1])
+    first, second = _couples(columns.shape[1])
     bricks = columns.T // 2
     couple, sets = np.divmod(np.flatnonzero(bricks[first] == bricks[second]), len(columns))
     first, second = first[couple], second[couple]
@@ -95,14 +95,14 @@ def pairs_of(operator: ComplianceOperator, columns: Ints) -> Pairs:
 
 
 @cache
-def couples(grips: int) -> Ints:
+def _couples(grips: int) -> Ints:
     """Return all couples of a number of grips. Result (2, c)."""
     return frozen(np.array([*combinations(range(grips), 2)], dtype=np.int64).reshape(-1, 2).T)
 
 
 def grip_forces(
     operator: ComplianceOperator, columns: Ints, index: Ints, pairs: Pairs | None = None
-) -> GripForces:
+) -> _GripForces:
     """Return the forces with which grips hold their nodes still.
 
     Two grips on one rigid brick leave the force between them along the brick undetermined:
@@ -114,10 +114,10 @@ def grip_forces(
     pairs = pairs_of(operator, columns) if pairs is None else pairs
     rows = np.ascontiguousarray(index.T)
     force, pivot = _solved(operator, pairs, rows, operator.dead_displacement.take(rows))
-    return GripForces(force.T, pivot)
+    return _GripForces(force.T, pivot)
 
 
-def trusted(operator: ComplianceOperator, index: Ints, found: GripForces, most: float) -> Bools:
+def trusted(operator: ComplianceOperator, index: Ints, found: _GripForces, most: float) -> Bools:
     """Return which sets' forces rounding changes little enough.
 
     ``index`` (S, k): the loads at the grips; ``most``: largest of `doubts` that is accepted. Result
@@ -127,12 +127,12 @@ def trusted(operator: ComplianceOperator, index: Ints, found: GripForces, most: 
     out = np.asarray(most * lowest >= len(found.pivot) * operator.worst_doubt)
     rest = np.flatnonzero(~out & (lowest > 0))
     if rest.size:
-        part = GripForces(found.force[rest], found.pivot[:, rest])
+        part = _GripForces(found.force[rest], found.pivot[:, rest])
         out[rest] = doubts(operator, index[rest], part) <= most
     return out
 
 
-def doubts(operator: ComplianceOperator, index: Ints, found: GripForces) -> Floats:
+def doubts(operator: ComplianceOperator, index: Ints, found: _GripForces) -> Floats:
     """Return the error of forces for rounding of one part in one, over the largest of each set.
 
     A displacement is known to a share of all that adds up in it; with ``|G_ij| ≤ √(G_ii G_jj)``
@@ -146,7 +146,7 @@ def doubts(operator: ComplianceOperator, index: Ints, found: GripForces) -> Floa
         own += (root * size).sum(axis=0)
         own *= scale
         own /= found.pivot
-        most = size.max(axis=0, initial=TINY)
+        most = size.max(axis=0, initial=_TINY)
         return np.asarray(own.max(axis=0, initial=0.0) / most)
 
 

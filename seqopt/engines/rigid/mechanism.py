@@ -14,8 +14,8 @@ from seqopt.errors import MechanismError
 from seqopt.network.mechanics import Statics, build_statics, node_motion, spring_maps
 from seqopt.network.network import Network
 
-ROUNDING = 1e-13  # a smaller eigenvalue of the assembled stiffness may be rounding alone
-UNTIED = 1e-13  # share of the largest deformation of ties that is rounding: nothing is tied
+_ROUNDING = 1e-13  # a smaller eigenvalue of the assembled stiffness may be rounding alone
+_UNTIED = 1e-13  # share of the largest deformation of ties that is rounding: nothing is tied
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -81,7 +81,7 @@ def free_motion(network: Network, bricks: int, columns: Ints) -> Floats | None:
     ties = np.vstack([parts.deformation[parts.stiffness > 0].toarray(), held])
     with one_thread():
         _, sizes, motions = np.linalg.svd(ties, full_matrices=len(ties) < ties.shape[1])
-    if len(sizes) == ties.shape[1] and sizes[-1] > UNTIED * sizes[0]:
+    if len(sizes) == ties.shape[1] and sizes[-1] > _UNTIED * sizes[0]:
         return None
     motion = motions[-1]
     return np.asarray((motion / motion[np.abs(motion).argmax()]).reshape(-1, 6))
@@ -92,7 +92,7 @@ def lost_to_rounding(values: Floats) -> bool:
 
     ``values`` (m,): eigenvalues of a scaled stiffness, ascending.
     """
-    return len(values) > 0 and not values[0] > ROUNDING * values[-1]  # all may be zero
+    return len(values) > 0 and not values[0] > _ROUNDING * values[-1]  # all may be zero
 
 
 def resisting_modes(matrix: Floats, forbidden: Floats) -> tuple[Floats, Floats, Floats]:
@@ -104,8 +104,8 @@ def resisting_modes(matrix: Floats, forbidden: Floats) -> tuple[Floats, Floats, 
     """
     free = linalg.null_space(forbidden) if len(forbidden) else np.eye(len(matrix))
     diagonal = np.diag(free.T @ matrix @ free)
-    most = max(diagonal.max(initial=0.0), np.finfo(float).tiny / ROUNDING)
-    motions = free / np.sqrt(np.maximum(diagonal, ROUNDING * most))
+    most = max(diagonal.max(initial=0.0), np.finfo(float).tiny / _ROUNDING)
+    motions = free / np.sqrt(np.maximum(diagonal, _ROUNDING * most))
     values, vectors = np.linalg.eigh(motions.T @ matrix @ motions)
     return values, vectors, motions
 

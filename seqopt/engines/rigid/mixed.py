@@ -118,10 +118,10 @@ def rescaled(parts: Ungripped, wrench: Floats, twist: Floats) -> Floats:
     )
 
 
-CORRECTIONS = 3  # after which an answer is judged
+_CORRECTIONS = 3  # after which an answer is judged
 LAST_CORRECTION = 1e-10  # the largest of forces, moments, shifts and turns, relative to each
-EMPTY = 1e-6  # forces this small beside the moments over a brick's length are not looked at alone
-LIGHT = 1e-3  # nor what is this small beside the weight, or the motion it makes at a typical joint
+_EMPTY = 1e-6  # forces this small beside the moments over a brick's length are not looked at alone
+_LIGHT = 1e-3  # nor what is this small beside the weight, or the motion it makes at a typical joint
 
 
 def solve_mixed(network: Network, bricks: int, columns: Ints) -> Fields:
@@ -164,7 +164,7 @@ def solve_load(parts: Ungripped, grips: Ints, pull: Floats) -> Solution:
         require_resistance(network, bricks, grips)
         raise SolverError(f"{bricks} bricks: exactly singular in double precision") from error
     result = factors.solve(load)
-    for _ in range(CORRECTIONS):
+    for _ in range(_CORRECTIONS):
         correction = factors.solve(load - system.matrix @ result)
         result += correction
     both = np.stack([result, correction])[:, None, : joints + moves]
@@ -192,7 +192,7 @@ def unchanged(
     """
     size, change = _sizes(parts, states), _sizes(parts, corrections)
     other = size.reshape(-1, 2, 2).max(axis=2).repeat(2, axis=1)
-    least = np.maximum(EMPTY * other, LIGHT * np.abs(parts.load).max())
+    least = np.maximum(_EMPTY * other, _LIGHT * np.abs(parts.load).max())
     return np.asarray((change <= largest * np.maximum(size, least)).all(axis=1))
 
 
@@ -206,7 +206,7 @@ def _sizes(parts: Ungripped, states: Floats) -> Floats:
     return np.hstack([np.abs(part).max(axis=(1, 3), initial=0.0) for part in kinds])
 
 
-BACKWARD = 1e-10  # largest backward error of an accepted solution
+_BACKWARD = 1e-10  # largest backward error of an accepted solution
 
 
 def solve_dense(network: Network, bricks: int, columns: Ints) -> Fields:
@@ -214,7 +214,7 @@ def solve_dense(network: Network, bricks: int, columns: Ints) -> Fields:
 
     ``columns`` (S, r): grips as indices into ``network.inner.ravel()``. Raises `MechanismError` if
     nothing resists a motion; `SolverError` if a motion is resisted too little for the assembled
-    stiffness to tell, or the backward error of an answer is larger than `BACKWARD`.
+    stiffness to tell, or the backward error of an answer is larger than `_BACKWARD`.
     """
     parts = rigid_structure(network, bricks)
     answers = [_solve_one_dense(network, parts, grips) for grips in columns]
@@ -245,6 +245,6 @@ def _constrained(matrix: Floats, modes: tuple[Floats, Floats, Floats], load: Flo
     target = motions.T @ load
     answer = vectors @ (vectors.T @ target / values)
     residual = np.abs(motions.T @ (matrix @ (motions @ answer)) - target).max()
-    if not residual <= BACKWARD * (values[-1] * np.abs(answer).max() + np.abs(target).max()):
+    if not residual <= _BACKWARD * (values[-1] * np.abs(answer).max() + np.abs(target).max()):
         raise SolverError(f"direct solve of {len(matrix) // 6} bricks: backward error too large")
     return np.asarray(motions @ answer)

@@ -25,8 +25,8 @@ from seqopt.engines.rigid.response_maps import (
 )
 from seqopt.network.network import Network
 
-OF_TWISTS = ("displacement", "brick_twist")  # the other fields follow from wrenches
-FEW = 200  # loads whose responses take little, and are always made once for all
+_OF_TWISTS = ("displacement", "brick_twist")  # the other fields follow from wrenches
+_FEW = 200  # loads whose responses take little, and are always made once for all
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -142,7 +142,7 @@ class ComplianceOperator(FrozenValue):
         ``name``: of a field; ``index`` (S, k): loads that act; ``force`` (S, k): by how much, N;
         ``loads``: the same, if it was made before. Result (S, Q).
         """
-        few = name == "support" or 2 * self.axis.size <= max(FEW, len(index))
+        few = name == "support" or 2 * self.axis.size <= max(_FEW, len(index))
         if few:  # whatever was asked before: answers do not depend on it
             loads = self.loads(index, force) if loads is None else loads
             return loads.sum(getattr(self, name))
@@ -167,7 +167,7 @@ class ComplianceOperator(FrozenValue):
             out[np.arange(len(index)), self.inner_edge[brick[:, i]]] += along[:, i]
 
     def _states(self, name: str) -> Floats:
-        return self.twist if name in OF_TWISTS else self.wrench
+        return self.twist if name in _OF_TWISTS else self.wrench
 
     def _rows(self, name: str) -> Floats:
         return self.maps.apply(name, self._states(name))

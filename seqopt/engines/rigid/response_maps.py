@@ -17,7 +17,7 @@ AT_ONCE = 2**18  # numbers mapped at a time: they stay in the processor's cache
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class SceneMaps(FrozenValue):
+class _SceneMaps(FrozenValue):
     """What twists and wrenches of all bricks and springs of a scene mean, once all springs act.
 
     ``basis``: k directions of twists and wrenches. ``edge`` (E, kS): what edges carry of wrenches.
@@ -35,7 +35,7 @@ class SceneMaps(FrozenValue):
     support: Floats
 
 
-def scene_maps(network: Network, basis: Basis = SPACE) -> SceneMaps:
+def scene_maps(network: Network, basis: Basis = SPACE) -> _SceneMaps:
     """Return the maps of a scene. ``basis``: all directions by default."""
     statics, springs = build_statics(network), network.springs
     pick = np.zeros((3, len(basis.wrench)))
@@ -46,7 +46,7 @@ def scene_maps(network: Network, basis: Basis = SPACE) -> SceneMaps:
         each = sparse.eye_array(len(network.inner))
         motion = sparse.csr_array(motion @ sparse.kron(each, basis.wrench.T))
     since = np.where(network.node_spring >= 0, springs.since[network.node_spring], 0)
-    return SceneMaps(
+    return _SceneMaps(
         network=network,
         basis=basis,
         edge=sparse.csr_array(statics.edge_of_spring @ sparse.kron(every, pick)),
@@ -60,7 +60,7 @@ def scene_maps(network: Network, basis: Basis = SPACE) -> SceneMaps:
 class ResponseMaps(FrozenValue):
     """What twists (.., kb) and wrenches (.., ks) of the first b bricks and s springs mean."""
 
-    scene: SceneMaps
+    scene: _SceneMaps
     bricks: int  # how many stand
 
     @cached_property

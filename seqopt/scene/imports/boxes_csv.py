@@ -15,9 +15,9 @@ from seqopt.scene.checks import short
 from seqopt.scene.imports.content import MOST_BLOCKS, Content, FileBlock
 from seqopt.scene.imports.json_reading import LARGEST
 
-NEEDED = ("x", "y", "z", "length", "width", "height")
-TURNS = ("roll", "pitch", "yaw")
-COLUMNS = (*NEEDED, *TURNS, "name", "support", "density", "course")
+_NEEDED = ("x", "y", "z", "length", "width", "height")
+_TURNS = ("roll", "pitch", "yaw")
+_COLUMNS = (*_NEEDED, *_TURNS, "name", "support", "density", "course")
 YES, NO = ("1", "true", "yes"), ("", "0", "false", "no")
 
 
@@ -50,13 +50,13 @@ def read_boxes(text: str, source: str) -> Content:
 
 
 def _check_columns(source: str, names: list[str]) -> None:
-    missing = [name for name in NEEDED if name not in names]
+    missing = [name for name in _NEEDED if name not in names]
     if missing:
-        raise SceneError(f"{source}: column {missing[0]} is missing; give {', '.join(NEEDED)}")
+        raise SceneError(f"{source}: column {missing[0]} is missing; give {', '.join(_NEEDED)}")
     for name in names:
-        if name not in COLUMNS or names.count(name) > 1:
-            why = "occurs twice" if name in COLUMNS else "is not known"
-            raise SceneError(f"{source}: column {short(name)} {why}; give {', '.join(COLUMNS)}")
+        if name not in _COLUMNS or names.count(name) > 1:
+            why = "occurs twice" if name in _COLUMNS else "is not known"
+            raise SceneError(f"{source}: column {short(name)} {why}; give {', '.join(_COLUMNS)}")
 
 
 def _box(where: str, key: str, row: dict[str, str]) -> FileBlock:
@@ -64,7 +64,7 @@ def _box(where: str, key: str, row: dict[str, str]) -> FileBlock:
     size = np.array([_number(where, row, name) for name in ("length", "width", "height")])
     if not size.min() > 0:
         raise SceneError(f"{where}: its sizes are {size.tolist()}; give positive ones")
-    angles = [_number(where, row, name, "0") for name in TURNS]
+    angles = [_number(where, row, name, "0") for name in _TURNS]
     frame = Rotation.from_euler("xyz", angles, degrees=True).as_matrix()
     density = _number(where, row, "density", "nan")
     course = _number(where, row, "course", "nan")

@@ -65,7 +65,7 @@ def _beside(count: int, pairs: Iterable[tuple[int, int]]) -> list[set[int]]:
     return out
 
 
-STUB = 0.1  # of a ground end, over the smallest dimension of its block
+_STUB = 0.1  # of a ground end, over the smallest dimension of its block
 
 
 def build_scene(content: Content, given: Given, source: str) -> Scene:
@@ -221,7 +221,7 @@ def _springs(
     for (a, b), face in touching.faces:
         last = bricks[b]
         if a == GROUND:
-            made.append(face_ground(last.name, face, law, STUB * min(last.dimensions)))
+            made.append(face_ground(last.name, face, law, _STUB * min(last.dimensions)))
         else:
             made.append(face_joint((bricks[a].name, last.name), face, law))
     made += [_faceless(joint, bricks, law) for joint in touching.joints]
@@ -251,7 +251,7 @@ def _faceless(joint: FileJoint, bricks: Mapping[int, Brick], law: JointLaw) -> J
             translational_stiffness=shift,
             rotational_stiffness=turn,
         )
-    behind = joint.position - STUB * min(bricks[b].dimensions) * joint.along
+    behind = joint.position - _STUB * min(bricks[b].dimensions) * joint.along
     return Ground(
         brick=bricks[b].name,
         position=position,

@@ -14,8 +14,8 @@ from seqopt.scene.blocks import BOX_CORNERS, BOX_FACES
 from seqopt.scene.checks import short
 from seqopt.scene.imports.json_reading import Entry, entry, listing, mapping, number, point
 
-PLAIN = 1e-9  # by how much rounding may change the last row of a transformation
-Solid = tuple[Floats, list[list[int]]]
+_PLAIN = 1e-9  # by how much rounding may change the last row of a transformation
+_Solid = tuple[Floats, list[list[int]]]
 
 
 def payload(value: Any) -> Any:
@@ -42,7 +42,7 @@ def kind(value: Any) -> str:
     return name.rsplit("/", 1)[-1].lower() if isinstance(name, str) else ""
 
 
-def mesh(where: str, value: Any) -> Solid:
+def mesh(where: str, value: Any) -> _Solid:
     """Return the vertices and faces of a mesh.
 
     ``value``: with ``vertex`` and ``face``, as `compas.datastructures.Mesh` writes them, or with
@@ -59,7 +59,7 @@ def mesh(where: str, value: Any) -> Solid:
     return _halfedge(where, held)
 
 
-def _halfedge(where: str, held: Any) -> Solid:
+def _halfedge(where: str, held: Any) -> _Solid:
     """Return a mesh whose vertices and faces have keys."""
     vertex = mapping(f"{where}: vertex", entry(where, held, "vertex"))
     face = mapping(f"{where}: face", entry(where, held, "face"))
@@ -85,7 +85,7 @@ def _places(where: str, side: Any, place: dict[str, int] | None) -> list[int]:
     return out[:-1] if len(out) > 1 and out[0] == out[-1] else out
 
 
-def _box(where: str, held: dict[str, Any]) -> Solid:
+def _box(where: str, held: dict[str, Any]) -> _Solid:
     """Return a box, whose frame is in its middle."""
     size = [number(f"{where}: {key}", held[key]) for key in ("xsize", "ysize", "zsize")]
     origin, axes = frame(where, held.get("frame"))
@@ -112,7 +112,7 @@ def frame(where: str, value: Any) -> tuple[Floats, Floats]:
     return origin, np.stack([first, np.cross(third, first), third])
 
 
-def transformation(where: str, value: Any) -> Floats:
+def _transformation(where: str, value: Any) -> Floats:
     """Return a transformation.
 
     ``value``: with a ``matrix``, or a matrix; none if None. Result (4, 4).
@@ -129,7 +129,7 @@ def transformation(where: str, value: Any) -> Floats:
     matrix = [[number(where, x) for x in listing(where, row)] for row in rows]
     if [len(row) for row in matrix] != [4] * 4:
         raise SceneError(f"{where} is {short(value)}; a matrix of four by four is expected")
-    if not np.allclose(matrix[3], (0.0, 0.0, 0.0, 1.0), rtol=0.0, atol=PLAIN):
+    if not np.allclose(matrix[3], (0.0, 0.0, 0.0, 1.0), rtol=0.0, atol=_PLAIN):
         raise SceneError(f"{where} ends in {matrix[3]}; give a matrix that ends in 0, 0, 0, 1")
     return np.array(matrix)
 
@@ -163,7 +163,7 @@ def read_elements(source: str, held: Entry) -> list[Element]:
     named = {guid: f"{source}: element {i}" for i, (guid, _) in enumerate(rows)}
     inner = {guid: mapping(named[guid], payload(item)) for guid, item in rows}
     placed: dict[str | None, Floats] = {
-        None: transformation(f"{source}: transformation", held.get("transformation"))
+        None: _transformation(f"{source}: transformation", held.get("transformation"))
     }
     for guid, parent in _tree(source, held):
         if guid not in inner or guid in placed:
@@ -190,8 +190,8 @@ def by_guid(where: str, found: Any) -> Iterator[tuple[str, Entry]]:
 
 def _own(where: str, held: Entry) -> Floats:
     """Return the transformation of an element to its parent; early ones have a frame too."""
-    frame = transformation(f"{where}: frame", held.get("frame"))
-    return frame @ transformation(f"{where}: transformation", held.get("transformation"))
+    frame = _transformation(f"{where}: frame", held.get("frame"))
+    return frame @ _transformation(f"{where}: transformation", held.get("transformation"))
 
 
 def _tree(source: str, held: Entry) -> Iterator[tuple[str, str | None]]:

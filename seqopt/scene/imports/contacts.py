@@ -26,11 +26,11 @@ from seqopt.scene.library.common import JointLaw
 from seqopt.scene.parts import Brick, Ground, Joint
 from seqopt.scene.shape import Polyhedron, normal_of
 
-STUB = 0.05  # m; from a face on the ground to the fixed point behind it
+_STUB = 0.05  # m; from a face on the ground to the fixed point behind it
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class FlatFace(FrozenValue):
+class _FlatFace(FrozenValue):
     """A convex face in its own plane.
 
     ``center`` (3,): centroid, m; ``axes`` (3, 3): rows are unit vectors: the normal, and the two
@@ -46,7 +46,7 @@ class FlatFace(FrozenValue):
     moments: tuple[float, float]
 
 
-def flat_face(corners: Floats, normal: Floats | None = None) -> FlatFace:
+def flat_face(corners: Floats, normal: Floats | None = None) -> _FlatFace:
     """Return a face in its own plane.
 
     ``corners`` (m, 3): once around, m; what leaves their plane is projected onto it. ``normal``
@@ -76,7 +76,7 @@ def flat_face(corners: Floats, normal: Floats | None = None) -> FlatFace:
     if not np.linalg.det(spread) > 0:
         raise SceneError(f"a face crosses itself; its corners are {short(corners.tolist())}")
     sides = turned @ sides
-    return FlatFace(
+    return _FlatFace(
         center=np.asarray(middle + (turned @ shift) @ sides),
         axes=np.vstack([across, sides]),
         corners=np.asarray((flat - shift) @ turned.T),
@@ -85,7 +85,7 @@ def flat_face(corners: Floats, normal: Floats | None = None) -> FlatFace:
     )
 
 
-def face_joint(bricks: tuple[int, int], face: FlatFace, law: JointLaw) -> Joint:
+def face_joint(bricks: tuple[int, int], face: _FlatFace, law: JointLaw) -> Joint:
     """Return the joint of two bricks over a face.
 
     ``bricks``: names; the face's normal points from the first into the second.
@@ -103,7 +103,7 @@ def face_joint(bricks: tuple[int, int], face: FlatFace, law: JointLaw) -> Joint:
     )
 
 
-def face_ground(brick: int, face: FlatFace, law: JointLaw, stub: float = STUB) -> Ground:
+def face_ground(brick: int, face: _FlatFace, law: JointLaw, stub: float = _STUB) -> Ground:
     """Return the ground end of a brick over a face.
 
     ``brick``: name; the face's normal points into it. ``stub``: from the face to the fixed point
@@ -151,14 +151,14 @@ def _pairs(corners: Floats) -> tuple[tuple[float, float], ...]:
     return tuple((x, y) for x, y in corners.tolist())
 
 
-GAP = 0.05  # between faces that touch, over the thinnest block
-OFF = 0.05  # of a face from a block that it joins, over the size of the block
-ASIDE = 1e-2  # how far beside a face a point is that tells on which side of it a block lies
+_GAP = 0.05  # between faces that touch, over the thinnest block
+_OFF = 0.05  # of a face from a block that it joins, over the size of the block
+_ASIDE = 1e-2  # how far beside a face a point is that tells on which side of it a block lies
 GROUND = -1
-DOWN = np.array([0.0, 0.0, -1.0])
+_DOWN = np.array([0.0, 0.0, -1.0])
 
-Shape = Polyhedron | Surface
-Held = tuple[tuple[int, int], FlatFace]
+_Shape = Polyhedron | Surface
+_Held = tuple[tuple[int, int], _FlatFace]
 
 
 @dataclass(frozen=True)
@@ -169,7 +169,7 @@ class Touching:
     normals point into the second. ``joints``: those without a face. ``said``: where they come from.
     """
 
-    faces: tuple[Held, ...]
+    faces: tuple[_Held, ...]
     joints: tuple[FileJoint, ...]
     said: tuple[str, ...]
 
@@ -191,7 +191,7 @@ def find_touching(
     require_polygons("finding where blocks touch")
     solids, facets = [block.solid for block in blocks], [block.facets for block in blocks]
     thin = min(min(brick.dimensions) for brick in bricks.values())
-    gap = GAP * thin if given.gap is None else positive("gap", given.gap, "m")
+    gap = _GAP * thin if given.gap is None else positive("gap", given.gap, "m")
     if content.faces and not given.detect:
         off = _off_blocks(content, facets, gap)
         found = [*_file_faces(content, solids)]
@@ -214,7 +214,7 @@ def find_touching(
     return Touching(tuple(faces), tuple(joints), tuple(said))
 
 
-def _on_ground(pair: tuple[int, int], face: FlatFace, bricks: Mapping[int, Brick]) -> list[Held]:
+def _on_ground(pair: tuple[int, int], face: _FlatFace, bricks: Mapping[int, Brick]) -> list[_Held]:
     """Return a face between blocks, supports among them as the ground; none between supports."""
     a, b = (i if i in bricks else GROUND for i in pair)
     if a == b == GROUND:
@@ -237,7 +237,7 @@ def _off_blocks(content: Content, facets: Sequence[Surface], gap: float) -> list
                 beside = shapely.distance(polygon, shapely.points(seen[:, 1:]))
                 away = np.minimum(away, np.hypot(seen[:, 0], beside))
             off = float(away.max(initial=0.0))
-            if off > max(gap, OFF * float(np.ptp(facets[i].points, axis=0).max())):
+            if off > max(gap, _OFF * float(np.ptp(facets[i].points, axis=0).max())):
                 a, b = (content.blocks[k].key for k in held.blocks)
                 raise SceneError(
                     f"the face between blocks {a} and {b} lies {off:.3g} m off block "
@@ -249,7 +249,7 @@ def _off_blocks(content: Content, facets: Sequence[Surface], gap: float) -> list
     return [f"faces of the file lie up to {1e3 * farthest:.3g} mm off their blocks"]
 
 
-def _sides(solid: Surface) -> Iterator[tuple[FlatFace, Any]]:
+def _sides(solid: Surface) -> Iterator[tuple[_FlatFace, Any]]:
     """Yield the sides of a block in their mean planes, and as polygons there."""
     shapely = import_module("shapely")
     for face in solid.faces:
@@ -257,7 +257,7 @@ def _sides(solid: Surface) -> Iterator[tuple[FlatFace, Any]]:
         yield flat, shapely.make_valid(shapely.Polygon(flat.corners))
 
 
-def _file_faces(content: Content, solids: Sequence[Shape]) -> Iterator[Held]:
+def _file_faces(content: Content, solids: Sequence[_Shape]) -> Iterator[_Held]:
     """Yield the faces of a file, in convex pieces, their normals into the second block."""
     shapely = import_module("shapely")
     for held in content.faces:
@@ -272,10 +272,10 @@ def _file_faces(content: Content, solids: Sequence[Shape]) -> Iterator[Held]:
             yield (a, b), flat_face(corners, _into(corners, plane.axes[0], solids[a], solids[b]))
 
 
-def _into(corners: Floats, normal: Floats, first: Shape, second: Shape) -> Floats:
+def _into(corners: Floats, normal: Floats, first: _Shape, second: _Shape) -> Floats:
     """Return the normal of a face that points from the first block into the second."""
     middle = corners.mean(axis=0)
-    step = ASIDE * np.linalg.norm(np.ptp(corners, axis=0)) * normal
+    step = _ASIDE * np.linalg.norm(np.ptp(corners, axis=0)) * normal
     ahead = _holds(second, middle + step) + _holds(first, middle - step)
     behind = _holds(second, middle - step) + _holds(first, middle + step)
     if ahead == behind:  # a thin block, or one that is not where its face is
@@ -284,11 +284,11 @@ def _into(corners: Floats, normal: Floats, first: Shape, second: Shape) -> Float
     return normal if ahead > behind else -normal
 
 
-def _holds(solid: Shape, point: Floats) -> bool:
+def _holds(solid: _Shape, point: Floats) -> bool:
     return isinstance(solid, Polyhedron) and solid.contains(point)
 
 
-def _standing(bricks: Mapping[int, Brick], solids: Sequence[Shape], gap: float) -> Iterator[Held]:
+def _standing(bricks: Mapping[int, Brick], solids: Sequence[_Shape], gap: float) -> Iterator[_Held]:
     """Yield the faces of blocks at the lowest level, their normals into the blocks."""
     level = min(float(solids[i].points[:, 2].min()) for i in bricks)
     shapely = import_module("shapely")
@@ -297,8 +297,8 @@ def _standing(bricks: Mapping[int, Brick], solids: Sequence[Shape], gap: float) 
         for face in solids[i].faces:
             corners = solids[i].points[list(face)]
             flat = flat_face(corners)
-            if flat.axes[0] @ DOWN > OPPOSED and corners[:, 2].max() <= level + gap:
+            if flat.axes[0] @ _DOWN > OPPOSED and corners[:, 2].max() <= level + gap:
                 low.append(shapely.Polygon(corners[:, :2]))
         for piece in convex_pieces(low) if low else ():
             height = np.full((len(piece), 1), level)
-            yield (GROUND, i), flat_face(np.hstack([piece, height]), -DOWN)
+            yield (GROUND, i), flat_face(np.hstack([piece, height]), -_DOWN)

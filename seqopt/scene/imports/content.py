@@ -13,7 +13,7 @@ from seqopt.work.progress import Tell
 
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254, "ft": 0.3048}  # m
 UPS = ("z", "y")
-Y_TO_Z = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])  # (x, y, z) to (x, -z, y)
+_Y_TO_Z = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])  # (x, y, z) to (x, -z, y)
 MOST_BLOCKS = 20_000
 MOST_CORNERS = 2_000_000  # of all faces of all blocks
 
@@ -82,10 +82,10 @@ class Content:
         """Return the content of a file whose y is up, with z up."""
         return replace(
             self,
-            blocks=tuple(replace(b, vertices=b.vertices @ Y_TO_Z) for b in self.blocks),
-            faces=tuple(replace(f, corners=f.corners @ Y_TO_Z) for f in self.faces),
+            blocks=tuple(replace(b, vertices=b.vertices @ _Y_TO_Z) for b in self.blocks),
+            faces=tuple(replace(f, corners=f.corners @ _Y_TO_Z) for f in self.faces),
             joints=tuple(
-                replace(j, position=j.position @ Y_TO_Z, along=j.along @ Y_TO_Z)
+                replace(j, position=j.position @ _Y_TO_Z, along=j.along @ _Y_TO_Z)
                 for j in self.joints
             ),
         )
@@ -116,6 +116,6 @@ class Given:
     progress: Tell | None = None
 
 
-def mean_place(blocks: Sequence[FileBlock]) -> Floats:
+def _mean_place(blocks: Sequence[FileBlock]) -> Floats:
     """Return the middles of blocks' vertices. Result (B, 3)."""
     return np.array([block.vertices.mean(axis=0) for block in blocks]).reshape(-1, 3)

@@ -27,8 +27,8 @@ DOCUMENTS: dict[str, Callable[[Any, str], Content]] = {
     "compas_timber": read_timber,
     "frame": read_frame,
 }
-SUFFIXES = {".csv": "boxes", ".obj": "obj", ".ply": "ply", ".stl": "stl", ".json": ""}
-LYING = 3  # blocks on the ground from which on it is odd if most are there
+_SUFFIXES = {".csv": "boxes", ".obj": "obj", ".ply": "ply", ".stl": "stl", ".json": ""}
+_LYING = 3  # blocks on the ground from which on it is odd if most are there
 FORMATS = (*DOCUMENTS, "boxes", "obj", "ply", "stl")
 
 
@@ -70,7 +70,7 @@ def import_scene(path: str | Path, form: str | None = None, given: Given | None 
 def _warn_of_lying(scene: Scene) -> None:
     """Warn if most blocks rest on the ground, as they do where y is up and nobody says so."""
     low = {ground.brick for ground in scene.grounds}
-    if len(low) >= LYING and 2 * len(low) > len(scene.bricks):
+    if len(low) >= _LYING and 2 * len(low) > len(scene.bricks):
         warnings.warn(
             f"scene {scene.name}: {len(low)} of {len(scene.bricks)} blocks rest on the ground; if "
             "y is up in the file, say so (--up y)",
@@ -86,7 +86,7 @@ def read_content(path: Path, form: str | None = None) -> Content:
     cannot be read, or what reads it is not installed.
     """
     source = str(path)
-    named = SUFFIXES.get(path.suffix.lower()) if form is None else form
+    named = _SUFFIXES.get(path.suffix.lower()) if form is None else form
     if named is None or (form is not None and form not in FORMATS):
         what = f"format is {short(form)}" if form else f"{source}: its format is not known"
         raise SceneError(f"{what}; give one of {', '.join(FORMATS)}")

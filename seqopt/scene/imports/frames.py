@@ -20,8 +20,8 @@ from seqopt.scene.checks import short
 from seqopt.scene.imports.content import Content, FileBlock, FileJoint
 from seqopt.scene.imports.json_reading import Entry, entry, listing, mapping, number, point
 
-UNITS = {"meter": "m", "m": "m", "centimeter": "cm", "cm": "cm", "millimeter": "mm", "mm": "mm"}
-MEASURES = {
+_UNITS = {"meter": "m", "m": "m", "centimeter": "cm", "cm": "cm", "millimeter": "mm", "mm": "mm"}
+_MEASURES = {
     "m2": 1.0,
     "cm2": 1e-4,
     "mm2": 1e-6,
@@ -37,8 +37,8 @@ MEASURES = {
     "N/m3": 1.0,
     "kN/cm3": 1e9,
 }  # in m, N
-GROUND = -1
-LEAST = 1e-30  # area, second moment, modulus or density treated as zero
+_GROUND = -1
+_LEAST = 1e-30  # area, second moment, modulus or density treated as zero
 
 
 @dataclass(frozen=True)
@@ -83,9 +83,9 @@ def read_frame(document: Any, source: str) -> Content:
 def _nodes(source: str, held: Entry) -> tuple[Floats, set[int]]:
     """Return the nodes (n, 3) in m, and the places of those on the ground."""
     unit = held.get("unit", "meter")
-    if not isinstance(unit, str) or unit not in UNITS:
-        raise SceneError(f"{source}: unit is {short(unit)}; one of {', '.join(UNITS)} is expected")
-    factor = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}[UNITS[unit]]
+    if not isinstance(unit, str) or unit not in _UNITS:
+        raise SceneError(f"{source}: unit is {short(unit)}; one of {', '.join(_UNITS)} is expected")
+    factor = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}[_UNITS[unit]]
     rows = listing(f"{source}: nodes", entry(source, held, "nodes"), 20_000)
     places = [
         point(f"{source}: node {i}", entry(f"{source}: node {i}", row, "point"))
@@ -144,11 +144,11 @@ def _measure(
     if name not in item and otherwise is not None:
         return otherwise
     named = item.get(f"{name}_unit", unit)
-    if not isinstance(named, str) or named not in MEASURES:
-        known = ", ".join(MEASURES)
+    if not isinstance(named, str) or named not in _MEASURES:
+        known = ", ".join(_MEASURES)
         raise SceneError(f"{where}: {name}_unit is {short(named)}; one of {known} is known")
-    value = number(f"{where}: {name}", entry(where, item, name)) * MEASURES[named]
-    if not value > LEAST:
+    value = number(f"{where}: {name}", entry(where, item, name)) * _MEASURES[named]
+    if not value > _LEAST:
         raise SceneError(f"{where}: {name} is {value:g}; give a positive number")
     return value
 
@@ -177,14 +177,14 @@ def _joints(bars: list[_Bar], grounded: set[int]) -> list[FileJoint]:
             at.setdefault(node, []).append(i)
     out = []
     for node, mine in sorted(at.items()):
-        first = GROUND if node in grounded else mine[0]
-        for i in mine if first == GROUND else mine[1:]:
+        first = _GROUND if node in grounded else mine[0]
+        for i in mine if first == _GROUND else mine[1:]:
             out.append(_joint(bars, (first, i), node))
     return out
 
 
 def _joint(bars: list[_Bar], pair: tuple[int, int], node: int) -> FileJoint:
-    ends = [bars[i] for i in pair if i != GROUND]
+    ends = [bars[i] for i in pair if i != _GROUND]
     last = ends[-1]
     place = last.ends[last.nodes.index(node)]
     out = last.ends.mean(axis=0) - place

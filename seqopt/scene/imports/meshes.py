@@ -24,12 +24,12 @@ from seqopt.scene.imports.content import MOST_BLOCKS, Content, FileBlock
 from seqopt.scene.imports.json_reading import LARGEST
 from seqopt.scene.imports.repair import WELD
 
-Polygons = Sequence[Sequence[int]]
-Edges = frozenset[tuple[int, int]]
-LEAST = 4  # faces of a closed block
+_Polygons = Sequence[Sequence[int]]
+_Edges = frozenset[tuple[int, int]]
+_LEAST = 4  # faces of a closed block
 
 
-def split_blocks(vertices: Floats, faces: Polygons) -> list[list[int]]:
+def _split_blocks(vertices: Floats, faces: _Polygons) -> list[list[int]]:
     """Return the faces of each block of a mesh.
 
     A block ends where, in the file's order, every edge has been used twice, corners in one place
@@ -69,7 +69,7 @@ def _united(vertices: Floats) -> Ints:
     return _linked(len(points), pairs)[place.reshape(-1)]
 
 
-def _edges(face: Sequence[int]) -> Edges:
+def _edges(face: Sequence[int]) -> _Edges:
     """Return the edges of a face, without those that it passes twice."""
     out = set[tuple[int, int]]()
     for a, b in zip(face, (*face[1:], face[0]), strict=True):
@@ -77,18 +77,18 @@ def _edges(face: Sequence[int]) -> Edges:
     return frozenset(out)
 
 
-def _closed(faces: Iterable[int], edges: Sequence[Edges]) -> tuple[list[list[int]], list[int]]:
+def _closed(faces: Iterable[int], edges: Sequence[_Edges]) -> tuple[list[list[int]], list[int]]:
     """Return the blocks that faces close one after the other, and the faces that are left.
 
     A face that its block has already counts once.
     """
     blocks, block = list[list[int]](), list[int]()
-    seen, once = set[Edges](), set[tuple[int, int]]()
+    seen, once = set[_Edges](), set[tuple[int, int]]()
     for i in faces:
         block.append(i)
         once ^= edges[i] if edges[i] not in seen else set()
         seen.add(edges[i])
-        if not once and len(seen) >= LEAST:
+        if not once and len(seen) >= _LEAST:
             blocks.append(block)
             block, seen = [], set()
     if blocks and {edges[i] for i in block} <= {edges[i] for i in blocks[-1]}:
@@ -97,15 +97,15 @@ def _closed(faces: Iterable[int], edges: Sequence[Edges]) -> tuple[list[list[int
     return blocks, block
 
 
-def _unmixed(block: list[int], edges: Sequence[Edges], part: Ints) -> list[list[int]]:
+def _unmixed(block: list[int], edges: Sequence[_Edges], part: Ints) -> list[list[int]]:
     """Return closed faces, in parts that share no vertices if each is closed too."""
     groups = _grouped(block, part)
     return [block] if any(_closed(group, edges)[1] for group in groups) else groups
 
 
-def _once(blocks: list[list[int]], edges: Sequence[Edges]) -> list[list[int]]:
+def _once(blocks: list[list[int]], edges: Sequence[_Edges]) -> list[list[int]]:
     """Return blocks of which no two have the same faces; what stands there twice is one."""
-    found: dict[frozenset[Edges], list[int]] = {}
+    found: dict[frozenset[_Edges], list[int]] = {}
     for block in blocks:
         found.setdefault(frozenset(edges[i] for i in block), []).extend(block)
     return [*found.values()]
@@ -119,7 +119,7 @@ def _grouped(faces: Iterable[int], part: Ints) -> list[list[int]]:
     return [*out.values()]
 
 
-def _parts(count: int, faces: Polygons) -> Ints:
+def _parts(count: int, faces: _Polygons) -> Ints:
     """Return the number of the part of every face; parts share no vertex."""
     ends = np.array([(face[0], v) for face in faces for v in face[1:]]).reshape(-1, 2)
     return _linked(count, ends)[[face[0] for face in faces]]
@@ -131,8 +131,8 @@ def _linked(count: int, links: Ints) -> Ints:
     return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
 
 
-Faces = list[list[int]]
-UNASKED = logging.NullHandler()  # else Python prints what no one listens to
+_Faces = list[list[int]]
+_UNASKED = logging.NullHandler()  # else Python prints what no one listens to
 
 
 def read_obj(text: str, source: str) -> Content:
@@ -141,7 +141,7 @@ def read_obj(text: str, source: str) -> Content:
     Result: its blocks, by the names of objects or groups, whichever are more.
     """
     vertices: list[list[float]] = []
-    faces: Faces = []
+    faces: _Faces = []
     named = {"o": "", "g": ""}
     names: dict[str, list[str]] = {"o": [], "g": []}
     for i, line in enumerate(text.splitlines(), start=1):
@@ -181,7 +181,7 @@ def read_mesh(content: bytes, source: str, form: str) -> Content:
 
 def _loaded(content: bytes, source: str, form: str) -> tuple[Floats, Ints]:
     """Return what trimesh makes of bytes; what it logs is for those who asked for logs."""
-    logging.getLogger("trimesh").addHandler(UNASKED)
+    logging.getLogger("trimesh").addHandler(_UNASKED)
     try:
         found = import_module("trimesh").load_mesh(
             io.BytesIO(content), file_type=form, process=False
@@ -194,10 +194,10 @@ def _loaded(content: bytes, source: str, form: str) -> tuple[Floats, Ints]:
         raise SceneError(f"{source}: no {form} file that can be read: {said}") from error
 
 
-def _content(vertices: Floats, faces: Faces, source: str, names: Sequence[str] = ()) -> Content:
+def _content(vertices: Floats, faces: _Faces, source: str, names: Sequence[str] = ()) -> Content:
     if not faces:
         raise SceneError(f"{source}: it has no faces; give closed meshes")
-    own = split_blocks(vertices, faces)
+    own = _split_blocks(vertices, faces)
     if len(own) > MOST_BLOCKS:
         raise SceneError(f"{source}: {len(own)} blocks; {MOST_BLOCKS} is the most")
     keys = _keys([names[block[0]] if names else "" for block in own])

@@ -17,11 +17,11 @@ from seqopt.scene.library.common import MASONRY, JointLaw, few_enough, joint_wid
 from seqopt.scene.parts import THICKEST, Robot
 from seqopt.scene.scene import Scene
 
-Line = Callable[[float], Floats]
+_Line = Callable[[float], Floats]
 """Takes a number from 0 at the first springing to 1 at the second; returns (x, z), m."""
 
 
-def circular(span: float, rise: float) -> Line:
+def _circular(span: float, rise: float) -> _Line:
     """Return the arc of a circle through both springings and the crown.
 
     ``span``, ``rise``: m; at most a half circle. Raises `SceneError` if the rise is more than half
@@ -44,7 +44,7 @@ def circular(span: float, rise: float) -> Line:
     return line
 
 
-def catenary(span: float, rise: float) -> Line:
+def _catenary(span: float, rise: float) -> _Line:
     """Return a hanging chain turned upside down: the line of thrust of an even arch."""
     from scipy.optimize import brentq  # noqa: PLC0415  # slow to import, for arches only
 
@@ -60,7 +60,7 @@ def catenary(span: float, rise: float) -> Line:
     return line
 
 
-def pointed(span: float, rise: float) -> Line:
+def _pointed(span: float, rise: float) -> _Line:
     """Return two arcs that leave the springings upright and meet in a point.
 
     ``span``, ``rise``: m; more than a half circle rises. Raises `SceneError` if the rise is half of
@@ -82,15 +82,15 @@ def pointed(span: float, rise: float) -> Line:
     return line
 
 
-CURVES: dict[str, Callable[[float, float], Line]] = {
-    "circular": circular,
-    "catenary": catenary,
-    "pointed": pointed,
+_CURVES: dict[str, Callable[[float, float], _Line]] = {
+    "circular": _circular,
+    "catenary": _catenary,
+    "pointed": _pointed,
 }
 """By name; each takes span and rise, m."""
 
 
-def chords(line: Line, lengths: Floats) -> Floats | None:
+def _chords(line: _Line, lengths: Floats) -> Floats | None:
     """Return the points of a chain of rigid links laid along a line from its start.
 
     ``lengths`` (n,): of the links, m. Result (n + 1, 2): m; none if the line is too short.
@@ -111,8 +111,8 @@ def _apart(first: Floats, second: Floats) -> float:
     return math.dist(first.tolist(), second.tolist())
 
 
-REMEDY = "give another number of bricks, or shorter or thinner ones"
-TRIED = 8  # numbers of bricks, where none is given
+_REMEDY = "give another number of bricks, or shorter or thinner ones"
+_TRIED = 8  # numbers of bricks, where none is given
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -123,7 +123,7 @@ class ArchForm:
     as wide as it takes for the bricks to fill the curve.
 
     ``span``, ``rise``: between the springings, and from there to the crown; ``curve``:
-    ``circular``, ``catenary`` or ``pointed``; ``bricks``: by default as many as make the joints
+    ``_circular``, ``_catenary`` or ``_pointed``; ``bricks``: by default as many as make the joints
     most nearly as wide as ``gap``; ``pattern``: a letter per brick, repeated: ``V`` lies along the
     arch, ``L`` and ``R`` lie across it and stick out to the left and to the right; ``dimensions``:
     length, width and thickness of a brick; ``gap``: how wide joints are to be where the number of
@@ -149,8 +149,10 @@ class ArchForm:
         for name in ("span", "rise", "density"):
             unit = "kg/m³" if name == "density" else "m"
             _set(self, name, positive(f"arch: {name}", getattr(self, name), unit))
-        if self.curve not in CURVES:
-            raise SceneError(f"arch: curve is {short(self.curve)}; give one of {', '.join(CURVES)}")
+        if self.curve not in _CURVES:
+            raise SceneError(
+                f"arch: curve is {short(self.curve)}; give one of {', '.join(_CURVES)}"
+            )
         if self.bricks is not None:
             _set(self, "bricks", whole_number("arch: bricks", self.bricks, 2))
         if not isinstance(self.pattern, str) or not self.pattern or {*self.pattern} - {*LETTERS}:
@@ -163,9 +165,9 @@ class ArchForm:
         _set(self, "gap", joint_width("arch: gap", self.gap))
 
     @property
-    def line(self) -> Line:
+    def line(self) -> _Line:
         """The curve."""
-        return CURVES[self.curve](self.span, self.rise)
+        return _CURVES[self.curve](self.span, self.rise)
 
     def lengths(self, bricks: int) -> Floats:
         """Return how much of the arch each brick covers, without joints. Result (n,): m."""
@@ -189,7 +191,7 @@ def arch(form: ArchForm, name: str = "", *, robots: Sequence[Robot] | None = Non
     <Scene circular arch 2 x 0.7: 12 bricks, 11 joints, 2 ground ends, 3 robots>
     """
     refused: SceneError | None = None
-    for count in [form.bricks] if form.bricks else _counts(form)[:TRIED]:
+    for count in [form.bricks] if form.bricks else _counts(form)[:_TRIED]:
         try:
             return _arch(form, count, name, robots)
         except SceneError as error:
@@ -222,7 +224,7 @@ def _arch(form: ArchForm, count: int, name: str, robots: Sequence[Robot] | None)
         robots=robots,
         provenance="Generated by seqopt.scene.library.arch_form.",
     )
-    require_apart(f"arch of {count}", scene.bricks, REMEDY)
+    require_apart(f"arch of {count}", scene.bricks, _REMEDY)
     return scene
 
 
@@ -237,7 +239,7 @@ def _counts(form: ArchForm) -> list[int]:
     return [int(count) + 2 for count in np.argsort(off[1:], kind="stable")]
 
 
-def _laid(form: ArchForm, line: Line, count: int) -> tuple[float, Floats]:
+def _laid(form: ArchForm, line: _Line, count: int) -> tuple[float, Floats]:
     """Return the width of the joints, and the points (n + 1, 2) between bricks that fill a curve.
 
     The first brick begins at a springing and the last one ends at the other, half a joint behind
@@ -248,7 +250,7 @@ def _laid(form: ArchForm, line: Line, count: int) -> tuple[float, Floats]:
     lengths = form.lengths(count)
 
     def left(gap: float) -> float:
-        points = chords(line, lengths[:-1] + gap)
+        points = _chords(line, lengths[:-1] + gap)
         if points is None:
             return -form.span
         return math.dist(points[-1], line(1.0)) - float(lengths[-1]) - gap
@@ -265,7 +267,7 @@ def _laid(form: ArchForm, line: Line, count: int) -> tuple[float, Floats]:
             f"more than {count}, or longer ones"
         )
     gap = float(brentq(left, 0.0, widest, xtol=1e-15))
-    points = chords(line, lengths[:-1] + gap)
+    points = _chords(line, lengths[:-1] + gap)
     if points is None:  # by rounding alone
         raise SceneError(f"arch: {count} bricks do not fill its curve; give another number")
     return gap, np.vstack([points, line(1.0)])

@@ -59,8 +59,8 @@ MASONRY = JointLaw(
 )  # of the domes that Bruun et al. built later
 
 
-STANDARD_GRAVITY = 9.81  # m/s²
-MOST_BRICKS = 20_000  # of a generated scene
+_STANDARD_GRAVITY = 9.81  # m/s²
+_MOST_BRICKS = 20_000  # of a generated scene
 
 
 def mobile_robots(bricks: Sequence[Brick], count: int = 3) -> tuple[Robot, ...]:
@@ -68,7 +68,7 @@ def mobile_robots(bricks: Sequence[Brick], count: int = 3) -> tuple[Robot, ...]:
 
     Result: ``rob1``, ``rob2`` ….
     """
-    weight = STANDARD_GRAVITY * math.fsum(brick.mass for brick in bricks)
+    weight = _STANDARD_GRAVITY * math.fsum(brick.mass for brick in bricks)
     return tuple(Robot(name=f"rob{i}", payload=weight) for i in range(1, count + 1))
 
 
@@ -93,19 +93,19 @@ def touching_order(
 
 
 def whole_number(where: str, value: int, least: int) -> int:
-    """Return a whole number that is large enough, and at most `MOST_BRICKS`."""
+    """Return a whole number that is large enough, and at most `_MOST_BRICKS`."""
     whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
-    if not whole or not least <= value <= MOST_BRICKS:
+    if not whole or not least <= value <= _MOST_BRICKS:
         raise SceneError(
-            f"{where} is {short(value)}; give a whole number from {least} to {MOST_BRICKS}"
+            f"{where} is {short(value)}; give a whole number from {least} to {_MOST_BRICKS}"
         )
     return int(value)
 
 
 def few_enough(where: str, bricks: int) -> None:
-    """Raise an error if a structure would have more than `MOST_BRICKS`."""
-    if bricks > MOST_BRICKS:
-        raise SceneError(f"{where}: {bricks} bricks; give numbers that make at most {MOST_BRICKS}")
+    """Raise an error if a structure would have more than `_MOST_BRICKS`."""
+    if bricks > _MOST_BRICKS:
+        raise SceneError(f"{where}: {bricks} bricks; give numbers that make at most {_MOST_BRICKS}")
 
 
 def joint_width(where: str, value: float) -> float:

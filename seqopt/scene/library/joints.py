@@ -13,12 +13,12 @@ from seqopt.scene.boxes import Boxes, boxes
 from seqopt.scene.library.common import JointLaw
 from seqopt.scene.parts import THICKEST, Brick, Ground, Joint
 
-ON_EDGE = 1e-12  # distance treated as zero, over the size of the faces
-PARALLEL = 1e-12  # sine of an angle between edges treated as zero
+_ON_EDGE = 1e-12  # distance treated as zero, over the size of the faces
+_PARALLEL = 1e-12  # sine of an angle between edges treated as zero
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ContactAreas(FrozenValue):
+class _ContactAreas(FrozenValue):
     """The overlaps of P pairs of faces."""
 
     area: Floats  # (P,); m²; 0 where faces do not overlap
@@ -26,7 +26,7 @@ class ContactAreas(FrozenValue):
     moments: Floats  # (P, 2); second moments of area about the two axes through the centroid, m⁴
 
 
-def contact_areas(first: Floats, second: Floats) -> ContactAreas:
+def contact_areas(first: Floats, second: Floats) -> _ContactAreas:
     """Return the overlaps of convex polygons.
 
     ``first``, ``second`` (P, m, 2): corners, counterclockwise, m.
@@ -40,7 +40,7 @@ def contact_areas(first: Floats, second: Floats) -> ContactAreas:
     """
     near = first.mean(axis=1, keepdims=True)
     one, other = first - near, second - near
-    slack = ON_EDGE * np.abs(one).max(initial=0.0)  # an edge that both have is counted once
+    slack = _ON_EDGE * np.abs(one).max(initial=0.0)  # an edge that both have is counted once
     start, end = (
         np.concatenate(parts, axis=1)
         for parts in zip(_inside(one, other, slack), _inside(other, one, -slack), strict=True)
@@ -53,7 +53,7 @@ def contact_areas(first: Floats, second: Floats) -> ContactAreas:
     start, end = start - centroid[:, None], end - centroid[:, None]
     squares = start**2 + start * end + end**2
     moments = (_cross(start, end)[:, :, None] * squares).sum(axis=1)[:, ::-1] / 12
-    return ContactAreas(
+    return _ContactAreas(
         np.where(real, area, 0.0),
         centroid + near[:, 0],
         np.where(real[:, None], moments, 0.0),
@@ -70,7 +70,7 @@ def _inside(polygon: Floats, other: Floats, slack: float) -> tuple[Floats, Float
     side = side / np.linalg.norm(side, axis=2, keepdims=True)
     height = _cross(side[:, None], start[:, :, None] - other[:, None])  # (P, m, m)
     slope = _cross(side[:, None], step[:, :, None])
-    flat = np.abs(slope) <= PARALLEL * np.linalg.norm(step, axis=2)[:, :, None]
+    flat = np.abs(slope) <= _PARALLEL * np.linalg.norm(step, axis=2)[:, :, None]
     crossing = -height / np.where(flat, 1.0, slope)
     outside = flat & (height + slack < 0)
     enters = np.where(outside, np.inf, np.where(flat | (slope < 0), 0.0, crossing))
@@ -85,11 +85,11 @@ def _cross(first: Floats, second: Floats) -> Floats:
     return np.asarray(first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0])
 
 
-Pairs = Sequence[tuple[int, int]]
+_Pairs = Sequence[tuple[int, int]]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Faces(FrozenValue):
+class _Faces(FrozenValue):
     """The faces of boxes that look at others.
 
     ``which``, ``axis`` (P,): box, and the axis across its face; ``out`` (P, 3): unit vectors
@@ -102,7 +102,7 @@ class Faces(FrozenValue):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Meeting(FrozenValue):
+class _Meeting(FrozenValue):
     """Where pairs of boxes look at each other.
 
     ``faces``: of the first boxes and of the second. ``along`` (P, 3): mean normals, from the first
@@ -110,13 +110,13 @@ class Meeting(FrozenValue):
     edge of the first box. ``shared``: overlaps of the faces, seen along the normals.
     """
 
-    faces: tuple[Faces, Faces]
+    faces: tuple[_Faces, _Faces]
     along: Floats
     sides: Floats
-    shared: ContactAreas
+    shared: _ContactAreas
 
 
-def meeting(shapes: Boxes, pairs: Pairs, normals: Floats | None = None) -> Meeting:
+def meeting(shapes: Boxes, pairs: _Pairs, normals: Floats | None = None) -> _Meeting:
     """Return where boxes look at each other.
 
     ``pairs`` (int, int): at least one. ``normals`` (P, 3): about at right angles to the faces; by
@@ -131,10 +131,10 @@ def meeting(shapes: Boxes, pairs: Pairs, normals: Floats | None = None) -> Meeti
     across = _unit(across - along * (along * across).sum(axis=1, keepdims=True))
     sides = np.stack([across, np.cross(along, across)], axis=1)
     shared = contact_areas(_corners(shapes, one, sides), _corners(shapes, other, sides))
-    return Meeting((one, other), along, sides, shared)
+    return _Meeting((one, other), along, sides, shared)
 
 
-def shares(bricks: Sequence[Brick], pairs: Pairs, normals: Floats) -> Floats:
+def shares(bricks: Sequence[Brick], pairs: _Pairs, normals: Floats) -> Floats:
     """Return how much of the smaller of two faces the other one covers.
 
     ``pairs`` (int, int): which of them may touch; ``normals`` (P, 3): about at right angles to the
@@ -153,7 +153,7 @@ def shares(bricks: Sequence[Brick], pairs: Pairs, normals: Floats) -> Floats:
     return np.asarray(found.shared.area / np.minimum(*whole))
 
 
-def widths(shapes: Boxes, found: Meeting) -> tuple[Floats, Floats, Floats]:
+def _widths(shapes: Boxes, found: _Meeting) -> tuple[Floats, Floats, Floats]:
     """Return where faces are along the normals, in the middle of their overlaps.
 
     Results: ``start``, ``end`` (P,): of the first faces and of the second, m from the origin's
@@ -198,13 +198,13 @@ def _beyond(shapes: Boxes, which: Ints, other: Ints) -> Floats:
     return np.asarray(np.abs(away) / (shapes.half[which] + reach))
 
 
-def _towards(shapes: Boxes, which: Ints, axis: Ints, step: Floats) -> Faces:
+def _towards(shapes: Boxes, which: Ints, axis: Ints, step: Floats) -> _Faces:
     """Return the faces across some axes that look along steps (P, 3)."""
     normal = shapes.frame[which, axis]
-    return Faces(which, axis, np.sign((normal * step).sum(axis=1))[:, None] * normal)
+    return _Faces(which, axis, np.sign((normal * step).sum(axis=1))[:, None] * normal)
 
 
-def _corners(shapes: Boxes, face: Faces, sides: Floats) -> Floats:
+def _corners(shapes: Boxes, face: _Faces, sides: Floats) -> Floats:
     """Return the corners (P, 4, 2) of faces along two axes each (P, 2, 3), counterclockwise."""
     row = np.arange(len(face.which))
     edges = [(face.axis + k) % 3 for k in (1, 2)]
@@ -219,7 +219,7 @@ def _corners(shapes: Boxes, face: Faces, sides: Floats) -> Floats:
     return np.stack([middle + a * flat[0] + b * flat[1] for a, b in signs], axis=1)
 
 
-def _height(shapes: Boxes, face: Faces, along: Floats, point: Floats) -> Floats:
+def _height(shapes: Boxes, face: _Faces, along: Floats, point: Floats) -> Floats:
     """Return how far along directions (P, 3) from points (P, 3) faces lie, (P,)."""
     half = shapes.half[face.which, face.axis]
     away = ((shapes.place[face.which] - point) * face.out).sum(axis=1) + half
@@ -230,11 +230,11 @@ def _unit(vectors: Floats) -> Floats:
     return np.asarray(vectors / np.linalg.norm(vectors, axis=1, keepdims=True))
 
 
-STUB = 0.05  # m; of a ground end that does not say
+_STUB = 0.05  # m; of a ground end that does not say
 
 
 def joints_between(
-    bricks: Sequence[Brick], pairs: Pairs, law: JointLaw, normals: Floats | None = None
+    bricks: Sequence[Brick], pairs: _Pairs, law: JointLaw, normals: Floats | None = None
 ) -> tuple[Joint, ...]:
     """Return the joints of bricks, each where the faces that look at each other overlap.
 
@@ -268,7 +268,7 @@ def joints_between(
     )
 
 
-def ground_under(brick: Brick, down: Floats, law: JointLaw, stub: float = STUB) -> Ground:
+def ground_under(brick: Brick, down: Floats, law: JointLaw, stub: float = _STUB) -> Ground:
     """Return the ground end on the face of a brick that looks down most.
 
     ``down`` (3,): direction to the ground; ``stub``: distance from the face to the fixed point
@@ -299,7 +299,7 @@ def as_vector(values: Floats) -> Vector:
     return x, y, z
 
 
-def _require_overlap(bricks: Sequence[Brick], pairs: Pairs, found: Meeting) -> None:
+def _require_overlap(bricks: Sequence[Brick], pairs: _Pairs, found: _Meeting) -> None:
     """Raise an error that names the first two bricks whose faces share nothing."""
     apart = np.flatnonzero(found.shared.area == 0)
     if len(apart):
@@ -310,9 +310,9 @@ def _require_overlap(bricks: Sequence[Brick], pairs: Pairs, found: Meeting) -> N
         )
 
 
-def _between(shapes: Boxes, pairs: Pairs, found: Meeting) -> tuple[Floats, list[float]]:
+def _between(shapes: Boxes, pairs: _Pairs, found: _Meeting) -> tuple[Floats, list[float]]:
     """Return the points (P, 3) halfway between faces, and the widths of joints that are thick."""
-    start, end, taper = widths(shapes, found)
+    start, end, taper = _widths(shapes, found)
     middle = (found.shared.centroid[:, None, :] @ found.sides)[:, 0]
     place = middle + 0.5 * (start + end)[:, None] * found.along
     thin = 2 * shapes.half[np.array(pairs)].min(axis=(1, 2))

@@ -32,11 +32,11 @@ if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
 
 
-TILES = ((2, 0, True), (1, 0, False), (1, -1, False))  # rows, column, along: the pattern VLR
+_TILES = ((2, 0, True), (1, 0, False), (1, -1, False))  # rows, column, along: the pattern VLR
 
 
 @dataclass(frozen=True)
-class ArchLine:
+class _ArchLine:
     """The bricks of an arch, the tiles of a herringbone that they cover, and its line.
 
     ``bricks``: in build order; ``grounds``: under the first brick and the last; ``tiles``: of every
@@ -51,7 +51,7 @@ class ArchLine:
     @property
     def rows(self) -> int:
         """Rows from foot to foot."""
-        return self.tiles[-1].row + TILES[0][0]
+        return self.tiles[-1].row + _TILES[0][0]
 
     @cached_property
     def _curve(self) -> CubicSpline:
@@ -93,7 +93,7 @@ class ArchLine:
         return math.dist(self.grounds[0].anchor, self.grounds[0].position)
 
 
-def arch_line(arch: Scene) -> ArchLine:
+def _arch_line(arch: Scene) -> _ArchLine:
     """Return the line of an arch.
 
     Raises `SceneError` if it is no closed chain of equal bricks along, to the left, to the right
@@ -113,7 +113,7 @@ def arch_line(arch: Scene) -> ArchLine:
         )
     covered, row = [], 0
     for i, brick in enumerate(bricks):
-        rows, column, along = TILES[i % 3]
+        rows, column, along = _TILES[i % 3]
         covered.append(Tile(row, column, along))
         left = brick.length_axis[1]
         if (abs(left) < math.sqrt(0.5)) != along or (not along and (left > 0) != (column == 0)):
@@ -123,7 +123,7 @@ def arch_line(arch: Scene) -> ArchLine:
                 "VLR; give an arch along x, of this pattern"
             )
         row += rows
-    return ArchLine(bricks, arch.joints, arch.grounds, tuple(covered))
+    return _ArchLine(bricks, arch.joints, arch.grounds, tuple(covered))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -162,7 +162,7 @@ class VaultShape:
             )
 
 
-class Pose(NamedTuple):
+class _Pose(NamedTuple):
     """Where a brick lies; three arrays (3,): its middle, m, and two unit vectors."""
 
     center: Floats
@@ -170,7 +170,7 @@ class Pose(NamedTuple):
     left: Floats
 
 
-def poses(line: ArchLine, shape: VaultShape, places: Sequence[Tile]) -> list[Pose]:
+def _poses(line: _ArchLine, shape: VaultShape, places: Sequence[Tile]) -> list[_Pose]:
     """Return where bricks lie. ``line``: of the arch in the middle. Result: one for every tile."""
     if not places:
         return []
@@ -192,15 +192,15 @@ def poses(line: ArchLine, shape: VaultShape, places: Sequence[Tile]) -> list[Pos
         np.where(flush, _unit(left - forward * _dot(forward, left)), left),
     )
     center = np.where(flush, middle, 0.5 * (start + end))
-    return [Pose(*pose) for pose in zip(center, forward, left, strict=True)]
+    return [_Pose(*pose) for pose in zip(center, forward, left, strict=True)]
 
 
-def _surface(line: ArchLine, shape: VaultShape, row: Floats, beside: Floats) -> Floats:
+def _surface(line: _ArchLine, shape: VaultShape, row: Floats, beside: Floats) -> Floats:
     """Return points (n, 3) of the surface at rows of columns."""
     return _moved(line, shape, row + _drift(line, shape, row, beside), beside)
 
 
-def _moved(line: ArchLine, shape: VaultShape, row: Floats, beside: Floats) -> Floats:
+def _moved(line: _ArchLine, shape: VaultShape, row: Floats, beside: Floats) -> Floats:
     """Return points (n, 3) of the arch's line, moved along the rulings."""
     point = line.point(row)
     middle = line.point(np.array([0.0, float(line.rows)]))[:, 0].mean()
@@ -209,7 +209,7 @@ def _moved(line: ArchLine, shape: VaultShape, row: Floats, beside: Floats) -> Fl
     return np.asarray(point + np.stack([wider + ahead, beside, np.zeros_like(beside)], axis=1))
 
 
-def _drift(line: ArchLine, shape: VaultShape, row: Floats, beside: Floats) -> Floats:
+def _drift(line: _ArchLine, shape: VaultShape, row: Floats, beside: Floats) -> Floats:
     """Return by how many rows columns lag, so that rows leave the arch at right angles."""
     speed = line.speed(row)
     size = np.linalg.norm(speed, axis=1)
@@ -250,7 +250,7 @@ def herringbone_vault(
     >>> herringbone_vault(load_scene("arch25"), VaultShape(bricks=60))
     <Scene vault 60: 60 bricks, 125 joints, 4 ground ends, 3 robots>
     """
-    line = arch_line(arch)
+    line = _arch_line(arch)
     chosen = _chosen(line, shape)
     bricks = _bricks(line, shape, chosen)
     require_apart("vault", bricks, "give a wider spacing or a smaller plan_angle")
@@ -273,7 +273,7 @@ def _movers(arch: Scene, bricks: Sequence[Brick]) -> tuple[Robot, ...]:
     return tuple(replace(robot, payload=payload) for robot in movers)
 
 
-def _chosen(line: ArchLine, shape: VaultShape) -> list[Tile]:
+def _chosen(line: _ArchLine, shape: VaultShape) -> list[Tile]:
     """Return the tiles of the vault in the order of building."""
     rest = shape.bricks - len(line.tiles)
     if rest < 0:
@@ -313,20 +313,20 @@ def _layer(tile: Tile) -> tuple[int, bool]:
     return abs(column), tile.column >= 0
 
 
-def _feet(line: ArchLine, tile: Tile) -> int:
+def _feet(line: _ArchLine, tile: Tile) -> int:
     """Return on which ground a tile stands: -1 at the first foot, 1 at the second, 0 on none."""
     last = tile.cells[1][0] if tile.along else tile.row
     return -1 if tile.row == 0 else int(last == line.rows - 1)
 
 
-def _bricks(line: ArchLine, shape: VaultShape, chosen: Sequence[Tile]) -> list[Brick]:
+def _bricks(line: _ArchLine, shape: VaultShape, chosen: Sequence[Tile]) -> list[Brick]:
     """Return the bricks of the arch and those on the other tiles."""
     own = dict(zip(line.tiles, line.bricks, strict=True))
     places = [tile for tile in chosen if tile not in own]
     name = max(brick.name for brick in line.bricks)
     node = max(node for brick in line.bricks for node in brick.nodes)
     new = {}
-    for tile, pose in zip(places, poses(line, shape, places), strict=True):
+    for tile, pose in zip(places, _poses(line, shape, places), strict=True):
         outward = _layer(tile)[1]
         upward = outward == (shape.skew < 0)
         axes = (pose.forward if upward else -pose.forward, pose.left)
@@ -345,7 +345,7 @@ def _bricks(line: ArchLine, shape: VaultShape, chosen: Sequence[Tile]) -> list[B
     return [own.get(tile) or new[tile] for tile in chosen]
 
 
-def _joints(line: ArchLine, chosen: Sequence[Tile], bricks: Sequence[Brick]) -> tuple[Joint, ...]:
+def _joints(line: _ArchLine, chosen: Sequence[Tile], bricks: Sequence[Brick]) -> tuple[Joint, ...]:
     """Return the joints of the arch, and one wherever other bricks touch."""
     own = len(line.bricks)
     pairs = [pair for pair in neighbors(chosen) if pair[1] >= own]
@@ -353,7 +353,9 @@ def _joints(line: ArchLine, chosen: Sequence[Tile], bricks: Sequence[Brick]) -> 
     return (*line.joints, *joints_between(bricks, pairs, line.law))
 
 
-def _grounds(line: ArchLine, chosen: Sequence[Tile], bricks: Sequence[Brick]) -> tuple[Ground, ...]:
+def _grounds(
+    line: _ArchLine, chosen: Sequence[Tile], bricks: Sequence[Brick]
+) -> tuple[Ground, ...]:
     """Return the ground ends of the arch, and one under every other brick that stands on ground."""
     out = [*line.grounds]
     for tile, brick in zip(chosen[len(line.bricks) :], bricks[len(line.bricks) :], strict=True):

@@ -66,7 +66,7 @@ def read_source(scene: Scene, path: Path) -> Source:
     return Source(found, graph)
 
 
-Document = dict[str, Any]
+_Document = dict[str, Any]
 
 
 def timber_plan(scene: Scene, steps: Sequence[Step], source: Source | None = None) -> str:
@@ -100,7 +100,7 @@ def timber_plan(scene: Scene, steps: Sequence[Step], source: Source | None = Non
     return json.dumps(whole) + "\n"
 
 
-def _frame(brick: Brick | None) -> Document:
+def _frame(brick: Brick | None) -> _Document:
     """Return the pose of a brick, or the world's."""
     if brick is None:
         return {"point": [0.0] * 3, "xaxis": [1.0, 0.0, 0.0], "yaxis": [0.0, 1.0, 0.0]}
@@ -140,13 +140,13 @@ def compas_assembly(scene: Scene, steps: Sequence[Step], source: Source | None =
     return json.dumps(whole) + "\n"
 
 
-def _plain(row: StepStates) -> Document:
+def _plain(row: StepStates) -> _Document:
     holds = {robot: [node, brick] for robot, (node, brick) in row.holds.items()}
     step = row.step
     return {"step": step.number, "type": step.kind.value, "placed": list(row.new), "holds": holds}
 
 
-def _assembly(scene: Scene) -> Document:
+def _assembly(scene: Scene) -> _Document:
     """Return the blocks of a scene and the faces between them as an assembly.
 
     Faces on the ground make a support of their own, a surface.
@@ -157,7 +157,7 @@ def _assembly(scene: Scene) -> Document:
         if joint.corners is not None:
             edge = edges[a].setdefault(b, {"interfaces": []})
             edge["interfaces"].append(_interface(joint.corners))
-    nodes: dict[str, Document] = {
+    nodes: dict[str, _Document] = {
         str(brick.name): {"block": _block(*vertices_of(brick))} for brick in scene.bricks
     }
     ground = max(brick.name for brick in scene.bricks) + 1
@@ -185,23 +185,23 @@ def _assembly(scene: Scene) -> Document:
     }
 
 
-def _interface(corners: Sequence[Sequence[float]]) -> Document:
+def _interface(corners: Sequence[Sequence[float]]) -> _Document:
     points = [list(corner) for corner in corners]
     return {"dtype": "compas_assembly.datastructures/Interface", "data": {"points": points}}
 
 
-def _block(points: Floats, faces: Sequence[Sequence[int]]) -> Document:
+def _block(points: Floats, faces: Sequence[Sequence[int]]) -> _Document:
     return {"dtype": "compas_assembly.datastructures/Block", "data": _mesh(points, faces)}
 
 
-def _sheet(polygons: Sequence[Sequence[Sequence[float]]]) -> Document:
+def _sheet(polygons: Sequence[Sequence[Sequence[float]]]) -> _Document:
     """Return polygons as a block that is not closed: the ground where bricks stand."""
     ends = np.cumsum([0, *map(len, polygons)]).tolist()
     faces = [list(range(a, b)) for a, b in pairwise(ends)]
     return _block(np.concatenate([np.array(p) for p in polygons]), faces)
 
 
-def _mesh(points: Floats, faces: Sequence[Sequence[int]]) -> Document:
+def _mesh(points: Floats, faces: Sequence[Sequence[int]]) -> _Document:
     rows = points.tolist()
     return {
         "attributes": {},

@@ -14,16 +14,16 @@ from seqopt.sequence.exports.tables import plan_csv, plan_json, sequencer_json
 from seqopt.sequence.plan_file import read_plan
 from seqopt.sequence.steps import Step
 
-PLAIN: dict[str, Callable[[Scene, Sequence[Step]], str]] = {
+_PLAIN: dict[str, Callable[[Scene, Sequence[Step]], str]] = {
     "csv": plan_csv,
     "json": plan_json,
     "sequencer": sequencer_json,
 }
-WITH_SOURCE: dict[str, Callable[[Scene, Sequence[Step], Source | None], str]] = {
+_WITH_SOURCE: dict[str, Callable[[Scene, Sequence[Step], Source | None], str]] = {
     "compas_timber": timber_plan,
     "compas_assembly": compas_assembly,
 }
-EXPORTS = (*PLAIN, *WITH_SOURCE)
+EXPORTS = (*_PLAIN, *_WITH_SOURCE)
 
 
 def export_plan(
@@ -47,12 +47,12 @@ def export_plan(
     """
     if form not in EXPORTS:
         raise StepError(f"format is {short(form)}; give one of {', '.join(EXPORTS)}")
-    if form in PLAIN and source is not None:
+    if form in _PLAIN and source is not None:
         raise StepError(f"format {form} takes no source; leave it out")
-    if form in PLAIN:
-        return PLAIN[form](scene, steps)
+    if form in _PLAIN:
+        return _PLAIN[form](scene, steps)
     read = None if source is None else read_source(scene, Path(source))
-    return WITH_SOURCE[form](scene, steps, read)
+    return _WITH_SOURCE[form](scene, steps, read)
 
 
 def read_folder(folder: Path) -> tuple[Scene, tuple[Step, ...]]:
