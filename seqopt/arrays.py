@@ -17,7 +17,7 @@ Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 Vector = tuple[float, float, float]
 _Content = TypeVar("_Content")
-LONGEST = 240  # letters of what is shown of a value, its name aside
+_LONGEST = 240  # letters of what is shown of a value, its name aside
 
 _COMPRESSED = (sparse.csr_array, sparse.csc_array)
 
@@ -42,7 +42,7 @@ class Terse:
     """Base of dataclasses that stay short at the prompt, whatever they hold.
 
     Arrays are shown by shape and type, long tuples by length, numbers with six digits; fields at
-    their defaults are left out, and what would go beyond `LONGEST` letters is counted. Subclasses
+    their defaults are left out, and what would go beyond `_LONGEST` letters is counted. Subclasses
     are decorated with ``@dataclass(repr=False)``.
     """
 
@@ -54,7 +54,7 @@ class Terse:
             if field.repr and not _is_default(getattr(self, field.name), field.default)
         ]
         ends = accumulate(len(text) + 2 for text in shown)
-        kept = max(1, sum(end <= LONGEST for end in ends))
+        kept = max(1, sum(end <= _LONGEST for end in ends))
         more = [f"and {len(shown) - kept} more"] if kept < len(shown) else []
         return f"{type(self).__name__}({', '.join(shown[:kept] + more)})"
 

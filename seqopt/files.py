@@ -13,8 +13,8 @@ import pandas as pd
 from seqopt.errors import FileError
 from seqopt.interrupts import undisturbed
 
-FORMULA = ("=", "+", "-", "@")
-MARK = "'"
+_FORMULA = ("=", "+", "-", "@")
+_MARK = "'"
 
 
 def harmless(text: str) -> str:
@@ -28,15 +28,15 @@ def harmless(text: str) -> str:
     >>> harmless("=cmd_node"), harmless("rob1_node"), plain(harmless("'=x"))
     ("'=cmd_node", 'rob1_node', "'=x")
     """
-    return MARK + text if text.lstrip(MARK).startswith(FORMULA) else text
+    return _MARK + text if text.lstrip(_MARK).startswith(_FORMULA) else text
 
 
 def plain(text: str) -> str:
     """Return what a cell said before `harmless`."""
-    return text[1:] if text.startswith(MARK) and harmless(text) != text else text
+    return text[1:] if text.startswith(_MARK) and harmless(text) != text else text
 
 
-def harmless_table(table: pd.DataFrame) -> pd.DataFrame:
+def _harmless_table(table: pd.DataFrame) -> pd.DataFrame:
     """Return a table whose columns and texts are `harmless`; numbers stay as they are."""
     texts = [k for k, kind in enumerate(table.dtypes) if not pd.api.types.is_numeric_dtype(kind)]
     columns = [table.iloc[:, k] for k in range(table.shape[1])]
@@ -46,15 +46,15 @@ def harmless_table(table: pd.DataFrame) -> pd.DataFrame:
     return out.rename(columns=lambda name: harmless(name) if isinstance(name, str) else name)
 
 
-LARGEST_INPUT = 64_000_000  # bytes; a scene of 100,000 bricks has 40 million
+_LARGEST_INPUT = 64_000_000  # bytes; a scene of 100,000 bricks has 40 million
 HIDDEN = ".seqopt-"  # start of the names of what is not complete yet
 
 
 def read_text(path: Path) -> str:
     """Return the text of a UTF-8 file.
 
-    Raises `FileError` if the file cannot be read, is a pipe or device, larger than `LARGEST_INPUT`,
-    or not UTF-8.
+    Raises `FileError` if the file cannot be read, is a pipe or device, is too large, or
+    is not UTF-8.
     """
     try:
         return read_bytes(path).decode("utf-8-sig")  # spreadsheets start text with a mark
@@ -68,9 +68,9 @@ def read_bytes(path: Path) -> bytes:
         if not stat.S_ISREG(Path(path).stat().st_mode):  # a pipe would be waited for
             raise FileError(f"cannot read {path}: it is not a regular file; name one")
         with Path(path).open("rb") as stream:
-            content = stream.read(LARGEST_INPUT + 1)
-        if len(content) > LARGEST_INPUT:
-            most = LARGEST_INPUT / 1e6
+            content = stream.read(_LARGEST_INPUT + 1)
+        if len(content) > _LARGEST_INPUT:
+            most = _LARGEST_INPUT / 1e6
             raise FileError(f"cannot read {path}: it has more than {most:g} MB; name a smaller one")
         return content
     except (OSError, ValueError) as error:
@@ -92,7 +92,7 @@ def csv_text(table: pd.DataFrame) -> str:
 
     Result: a line per row, after one with the names of the columns; no text begins as a formula.
     """
-    safe = harmless_table(table)
+    safe = _harmless_table(table)
     return str(safe.to_csv(index=False, float_format="%.6g", lineterminator="\n"))
 
 

@@ -34,7 +34,7 @@ from seqopt.network.mechanics import build_statics
 from seqopt.scene.boxes import boxes
 from seqopt.scene.imports.contacts import flat_face
 from seqopt.scene.imports.detection import Surface, touching_faces
-from seqopt.scene.library.joints import meeting
+from seqopt.scene.library.joints import overlaps
 from seqopt.stability.assessment import assess, bonded
 from seqopt.stability.held_program import first_directions
 from seqopt.stability.held_states import HoldingForces, Known
@@ -58,7 +58,7 @@ def values(arch25):
     plane = Plane(np.zeros(3), np.array([0.0, 1.0, 0.0]), np.eye(3)[[0, 2]])
     maps = scene_maps(network)
     shapes = boxes(arch25.bricks)
-    joined = meeting(shapes, [(0, 1)])
+    joined = overlaps(shapes, [(0, 1)])
     (touching,) = touching_faces([box((1, 1, 1)), box((1, 1, 1), at=(0, 0, 1))], 1e-3)
     every = (
         *(maps, ResponseMaps(maps, 2)),

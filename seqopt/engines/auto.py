@@ -51,9 +51,9 @@ class LevelChoice:
     reason: str  # a clause that goes into a sentence
 
 
-IN_PLANE = LevelChoice(Level.PLANAR, "bricks, springs, gravity and grips lie in one plane")
+_IN_PLANE = LevelChoice(Level.PLANAR, "bricks, springs, gravity and grips lie in one plane")
 _OFF_PLANE = LevelChoice(Level.RIGID, "a grip lies outside the plane of the bricks")
-BEYOND = LevelChoice(Level.DISCRETE, "a joint would leave its elastic limits")
+_BEYOND = LevelChoice(Level.DISCRETE, "a joint would leave its elastic limits")
 
 
 class AutoEngine(NamedEngine):
@@ -112,9 +112,9 @@ class AutoEngine(NamedEngine):
         if beyond.any():
             found = self._discrete.solve(bricks, sets[beyond], asked)
             fields = merge_sets(beyond, keep_wanted(found, asked), select_sets(fields, ~beyond))
-        self._count(IN_PLANE, flat & ~beyond)
+        self._count(_IN_PLANE, flat & ~beyond)
         self._count(self._in_space, ~flat & ~beyond)
-        self._count(BEYOND, beyond)
+        self._count(_BEYOND, beyond)
         return keep_wanted(fields, want)
 
     def _flat(self, columns: Ints) -> Bools:

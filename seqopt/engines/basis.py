@@ -32,13 +32,6 @@ class Basis(FrozenValue):
         """Both as rows, (k, 6) with k = d + m."""
         return frozen(linalg.block_diag(self.force, self.moment))
 
-    def embedded(self, rows: Floats) -> Floats:
-        """Return wrenches or twists of the basis with all their parts.
-
-        ``rows`` (..., k, n). Result (..., 6, n).
-        """
-        return rows if self is SPACE else np.asarray(self.wrench.T @ rows)
-
     def levers(self, arms: Floats) -> Floats:
         """Return the moments of unit forces at the ends of arms.
 

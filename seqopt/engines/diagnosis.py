@@ -29,7 +29,7 @@ from seqopt.errors import MechanismError, SolverError
 from seqopt.network.network import GROUND, Network
 
 UNRESISTED = 1e-17  # a scaled eigenvalue below this is found by a shift
-LEAST_DIAGONAL = 1e-13  # over the largest: by it a motion without stiffness is scaled
+_LEAST_DIAGONAL = 1e-13  # over the largest: by it a motion without stiffness is scaled
 _SHIFT = 1e-15  # added to the scaled stiffness of a mechanism to find its mode
 _EIGENVALUE_TOLERANCE = 1e-6  # relative
 
@@ -49,7 +49,7 @@ def spectrum(network: Network, bricks: int, columns: Ints) -> tuple[float, float
     root = np.sqrt(parts.stiffness)[:, None]
     diagonal = np.asarray((parts.deformation * root).power(2).sum(axis=0)).ravel()
     most = max(diagonal.max(), 1.0 if not diagonal.any() else 0.0)
-    scale = np.sqrt(np.maximum(diagonal, LEAST_DIAGONAL * most))
+    scale = np.sqrt(np.maximum(diagonal, _LEAST_DIAGONAL * most))
     try:
         lowest, motion = _lowest(mixed_system(parts, columns), scale, len(root))
     except RuntimeError:  # exactly singular, or the iteration broke down

@@ -107,7 +107,7 @@ class Engine(Protocol):
         """
 
 
-NAMES = tuple(field.name for field in fields(Fields))
+_NAMES = tuple(field.name for field in fields(Fields))
 FLAGS = {
     "edge_force": Want.EDGES,
     "displacement": Want.DISPLACEMENTS,
@@ -144,7 +144,7 @@ def require_finite(answer: Fields, bricks: int, grips: ArrayLike) -> Fields:
     ``grips`` (S, r). Raises `SolverError` if one is not: NaN elsewhere means that a robot holds
     nothing.
     """
-    for name in NAMES:
+    for name in _NAMES:
         values = getattr(answer, name)
         if values.size and not np.isfinite(values.sum()) and not np.isfinite(values).all():
             of_set = ~np.isfinite(values).reshape(len(values), -1).all(axis=1)
@@ -244,7 +244,7 @@ def no_sets(network: Network, bricks: int, held: int) -> Fields:
 
 def select_sets(answer: Fields, which: Bools | Ints) -> Fields:
     """Return the fields of some grip sets. ``which`` (S,), (s,)."""
-    return Fields(**{name: getattr(answer, name)[which] for name in NAMES})
+    return Fields(**{name: getattr(answer, name)[which] for name in _NAMES})
 
 
 def join_sets(parts: Sequence[Fields], which: Sequence[Bools | slice] | None = None) -> Fields:
@@ -257,9 +257,9 @@ def join_sets(parts: Sequence[Fields], which: Sequence[Bools | slice] | None = N
     total = int(after[-1])
     if which is None:
         which = [slice(b - len(a.grip_force), b) for a, b in zip(parts, after, strict=True)]
-    whole = {name: np.empty((total, *getattr(parts[0], name).shape[1:])) for name in NAMES}
+    whole = {name: np.empty((total, *getattr(parts[0], name).shape[1:])) for name in _NAMES}
     for part, mine in zip(parts, which, strict=True):
-        for name in NAMES:
+        for name in _NAMES:
             whole[name][mine] = getattr(part, name)
     return Fields(**whole)
 

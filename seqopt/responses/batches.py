@@ -64,7 +64,7 @@ class Wanted(Protocol):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Alike(FrozenValue):
+class Batch(FrozenValue):
     """Open steps with as many bricks and as many grips."""
 
     schedule: Schedule
@@ -106,14 +106,14 @@ class Alike(FrozenValue):
         return out
 
 
-def steps_alike(schedule: Schedule) -> list[list[list[OpenStep]]]:
+def steps_of_batches(schedule: Schedule) -> list[list[list[OpenStep]]]:
     """Return the open steps of a schedule by brick count and, within it, by how many grips.
 
     Result: ascending.
     """
     keyed = sorted(
         (
-            (step.bricks, len(robots_holding(step)), step.number, step)
+            (step.bricks, len(_robots_holding(step)), step.number, step)
             for step in schedule.steps
             if step.moves
         ),
@@ -130,7 +130,7 @@ def choices_of(schedule: Schedule, step: OpenStep) -> int:
     return math.prod(len(schedule.moves[m].candidates) for m in step.moves)
 
 
-def alike(schedule: Schedule, steps: Sequence[OpenStep], wanted: Wanted) -> Alike:
+def batch_of(schedule: Schedule, steps: Sequence[OpenStep], wanted: Wanted) -> Batch:
     """Return what open steps with as many bricks and as many grips have in common.
 
     ``wanted``: which responses every move needs.
@@ -140,7 +140,7 @@ def alike(schedule: Schedule, steps: Sequence[OpenStep], wanted: Wanted) -> Alik
     possible = tuple(no_node_twice(rows) for rows in choices)
     rows = np.concatenate([rows[ok] for rows, ok in zip(choices, possible, strict=True)])
     states, state = distinct(np.sort(rows, axis=1))
-    return Alike(schedule, tuple(steps), names, rows, possible, states, state)
+    return Batch(schedule, tuple(steps), names, rows, possible, states, state)
 
 
 def _spread(values: Floats | None, possible: Bools) -> Floats:
@@ -167,7 +167,7 @@ def distinct(rows: Ints) -> tuple[Ints, Ints]:
     return ranked[first], back
 
 
-def robots_holding(step: OpenStep) -> list[int]:
+def _robots_holding(step: OpenStep) -> list[int]:
     """Return which of the scene's robots grip."""
     return [i for i, grip in enumerate(step.grips) if grip is not None]
 
@@ -180,7 +180,7 @@ def combinations(schedule: Schedule, step: OpenStep) -> Ints:
     candidates = [np.array(schedule.moves[m].candidates, dtype=np.int64) for m in step.moves]
     grid = np.meshgrid(*candidates, indexing="ij")
     columns = []
-    for robot in robots_holding(step):
+    for robot in _robots_holding(step):
         grip = step.grips[robot]
         if isinstance(grip, OpenGrip):
             columns.append(grid[step.moves.index(grip.move)].ravel())
@@ -196,18 +196,18 @@ def no_node_twice(rows: Ints) -> Bools:
 
 def _robot_forces(schedule: Schedule, step: OpenStep, forces: Floats) -> dict[str, Floats]:
     """Return the forces by robot, of the robot whose move decides the step, and the largest."""
-    robots = [schedule.scene.robots[i].name for i in robots_holding(step)]
+    robots = [schedule.scene.robots[i].name for i in _robots_holding(step)]
     out = {robot_response(name): forces[:, i] for i, name in enumerate(robots)}
     out["F_move"] = out[robot_response(schedule.moves[step.moves[-1]].robot)]
     out["F_largest"] = forces.max(axis=1)
     return out
 
 
-NUMBER = 8  # bytes
-BESIDE = 6  # numbers per choice beside its responses: nodes, order, costs
-COSTS = 4  # numbers per choice where costs alone are kept: as found, posed, handed over, solved
-AT_ONCE = 24  # numbers per choice of the brick count that is being evaluated
-SHARE = 0.8  # of the free memory that responses and costs may take
+_NUMBER = 8  # bytes
+_BESIDE = 6  # numbers per choice beside its responses: nodes, order, costs
+_COSTS = 4  # numbers per choice where costs alone are kept: as found, posed, handed over, solved
+_AT_ONCE = 24  # numbers per choice of the brick count that is being evaluated
+_SHARE = 0.8  # of the free memory that responses and costs may take
 
 
 class Keeping(Enum):
@@ -226,8 +226,8 @@ def bytes_of_choices(schedule: Schedule, wanted: Callable[[int], Set[str]]) -> i
     for step in schedule.steps:
         moves = [schedule.moves[m] for m in step.moves]
         if moves:
-            kept = len(wanted(moves[-1].bricks)) + BESIDE
-            total += NUMBER * kept * math.prod(len(move.candidates) for move in moves)
+            kept = len(wanted(moves[-1].bricks)) + _BESIDE
+            total += _NUMBER * kept * math.prod(len(move.candidates) for move in moves)
     return total
 
 
@@ -243,7 +243,9 @@ def bytes_of_costs(schedule: Schedule) -> int:
             choices = choices_of(schedule, step)
             of_moves[step.moves] = choices
             of_bricks[step.bricks] = of_bricks.get(step.bricks, 0) + choices
-    return NUMBER * (COSTS * sum(of_moves.values()) + AT_ONCE * max(of_bricks.values(), default=0))
+    return _NUMBER * (
+        _COSTS * sum(of_moves.values()) + _AT_ONCE * max(of_bricks.values(), default=0)
+    )
 
 
 def require_memory(
@@ -252,9 +254,9 @@ def require_memory(
     """Return what can be kept of all choices; raise an error if not even their costs can be.
 
     ``wanted``: which responses every move needs. ``most``: bytes that may be used; by default
-    `SHARE` of what is free.
+    `_SHARE` of what is free.
     """
-    most = SHARE * free_memory() if most is None else most
+    most = _SHARE * free_memory() if most is None else most
     if bytes_of_choices(schedule, wanted) <= most:
         return Keeping.RESPONSES
     needed = bytes_of_costs(schedule)

@@ -38,7 +38,7 @@ from seqopt.errors import FileError, SceneError
 from seqopt.files import HIDDEN, make_folder, require_folder, write_bytes
 from seqopt.responses.quantities import CHOSEN_BY, lengths, require_finite
 
-Tally = tuple[tuple[object, int], ...]
+_Tally = tuple[tuple[object, int], ...]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -64,10 +64,10 @@ class Block(FrozenValue):
 
 def work(states: int, bricks: int) -> float:
     """Return about how long states take, in no unit."""
-    return float(states * (bricks + APART))
+    return float(states * (bricks + _APART))
 
 
-APART = 20  # bricks whose share of the work is what every state costs, however small it is
+_APART = 20  # bricks whose share of the work is what every state costs, however small it is
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -81,7 +81,7 @@ class Answers(FrozenValue):
 
     values: Mapping[str, Floats]
     forces: Floats
-    tally: Tally = ()
+    tally: _Tally = ()
 
 
 def answer(engine: Engine, block: Block) -> Answers:
@@ -110,7 +110,7 @@ def tally_of(engine: Engine) -> dict[object, int]:
     return found if isinstance(found, dict) else {}
 
 
-HELD = 2  # engines that a process keeps between tasks: of the run before, and of this one
+_HELD = 2  # engines that a process keeps between tasks: of the run before, and of this one
 Blocks = Sequence[Block]
 
 
@@ -134,7 +134,7 @@ def pack(engine: Engine) -> Shipment:
 
     Raises `SceneError` if it is an engine of one's own that cannot be sent.
     """
-    recipe = known_recipe(engine)
+    recipe = _known_recipe(engine)
     try:
         content = pickle.dumps(engine if recipe is None else recipe)
     except Exception as error:  # whatever objects of others may raise
@@ -145,7 +145,7 @@ def pack(engine: Engine) -> Shipment:
     return Shipment(hashlib.sha256(content).hexdigest(), content)
 
 
-def known_recipe(engine: Engine) -> Recipe | None:
+def _known_recipe(engine: Engine) -> Recipe | None:
     """Return how an engine can be made again with the same answers.
 
     Result: None for an engine that is not made by name, or of a network that its scene does not
@@ -189,7 +189,7 @@ class _Shelf(threading.local):
 
     def engine(self, shipment: Shipment) -> Engine:
         if shipment.key not in self.engines:
-            while len(self.engines) >= HELD:
+            while len(self.engines) >= _HELD:
                 self.engines.popitem(last=False)
             self.engines[shipment.key] = shipment.unpack()
         self.engines.move_to_end(shipment.key)
@@ -199,9 +199,9 @@ class _Shelf(threading.local):
 _shelf = _Shelf()
 
 
-LEFT = 3600.0  # s after which a file that is not complete is one that was given up
-DIGEST = 32  # bytes of a checksum
-WORDS = 2**16  # bytes that what an engine counted takes at most
+_LEFT = 3600.0  # s after which a file that is not complete is one that was given up
+_DIGEST = 32  # bytes of a checksum
+_WORDS = 2**16  # bytes that what an engine counted takes at most
 
 
 class Store:
@@ -213,7 +213,7 @@ class Store:
 
     def __init__(self, folder: Path, engine: Engine) -> None:
         require_folder(folder)
-        recipe = known_recipe(engine)
+        recipe = _known_recipe(engine)
         if recipe is None:
             raise SceneError(
                 f"cache {folder}: a {type(engine).__name__} does not say what its answers depend "
@@ -231,16 +231,16 @@ class Store:
     def find(self, block: Block) -> Answers | None:
         """Return the answers to a block, if they are there and whole."""
         sets, columns = len(block.grips), len(block.names) + block.grips.shape[1]
-        words = DIGEST + 8 * sets * columns
+        words = _DIGEST + 8 * sets * columns
         try:
             with self.path(block).open("rb") as file:
-                content = file.read(words + WORDS + 1)
+                content = file.read(words + _WORDS + 1)
         except OSError:
             return None
-        whole = words <= len(content) <= words + WORDS
-        if not whole or content[:DIGEST] != self._checksum(block, content[DIGEST:]):
+        whole = words <= len(content) <= words + _WORDS
+        if not whole or content[:_DIGEST] != self._checksum(block, content[_DIGEST:]):
             return None
-        numbers = np.frombuffer(content[DIGEST:words], "<f8").reshape(columns, sets).astype(float)
+        numbers = np.frombuffer(content[_DIGEST:words], "<f8").reshape(columns, sets).astype(float)
         if not np.isfinite(numbers).all():
             return None
         try:
@@ -278,7 +278,7 @@ def _tidy(folder: Path) -> None:
     """Take away what runs that were killed left half-written."""
     for path in folder.glob(f"{HIDDEN}*"):
         try:
-            if time.time() - path.stat().st_mtime > LEFT:
+            if time.time() - path.stat().st_mtime > _LEFT:
                 path.unlink()
         except FileNotFoundError:  # another run was faster
             continue

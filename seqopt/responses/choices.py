@@ -23,17 +23,17 @@ from seqopt.arrays import Terse
 from seqopt.engines.interface import Engine
 from seqopt.errors import MemoryShortError
 from seqopt.responses.batches import (
-    Alike,
+    Batch,
     Keeping,
     StepChoices,
     Wanted,
-    alike,
+    batch_of,
     choices_of,
     combinations,
     distinct,
     no_node_twice,
     require_memory,
-    steps_alike,
+    steps_of_batches,
 )
 from seqopt.responses.blocks import Answers, Block, work
 from seqopt.responses.division import answer_blocks
@@ -160,12 +160,12 @@ def _by_level(
 ) -> Generator[tuple[list[StepChoices], int], None, None]:
     """Yield the steps with one brick count after the other, and how many models they have."""
     schedule = evaluation.schedule
-    levels = steps_alike(schedule)
-    under_way: deque[list[Alike]] = deque()
+    levels = steps_of_batches(schedule)
+    under_way: deque[list[Batch]] = deque()
 
     def blocks() -> Iterator[Block]:
         for level in levels:
-            groups = [alike(schedule, steps, evaluation.wanted) for steps in level]
+            groups = [batch_of(schedule, steps, evaluation.wanted) for steps in level]
             under_way.append(groups)
             for group in groups:
                 yield from group.blocks()
@@ -189,7 +189,7 @@ def _by_level(
                 found = []
 
 
-def _joined(groups: Sequence[Alike], answers: Sequence[Answers]) -> list[StepChoices]:
+def _joined(groups: Sequence[Batch], answers: Sequence[Answers]) -> list[StepChoices]:
     """Return the choices of all steps with as many bricks, in order."""
     out: list[StepChoices] = []
     start = 0
@@ -208,7 +208,7 @@ def window_models(schedule: Schedule, choice: Sequence[int]) -> int:
     ``choice``: the chosen candidate of every move.
     """
     models = 0
-    for level in steps_alike(schedule):
+    for level in steps_of_batches(schedule):
         for steps in level:
             rows = np.concatenate([_window_states(schedule, step, choice) for step in steps])
             models += len(distinct(rows)[0])

@@ -17,10 +17,10 @@ from seqopt.responses.resources import Resources
 from seqopt.work.progress import Progress
 from seqopt.work.workers import Crew, Lanes, hire, map_ordered
 
-Found = TypeVar("Found")
-SEVERAL = 4  # portions' work that states of one brick count may be before they are parted
-PREPARED = 0.15  # of all work, that every process does for itself on the vault of 338 bricks
-PORTIONS = 32  # tasks for every worker: one that is slow, or dies, leaves little to the others
+_Found = TypeVar("_Found")
+_SEVERAL = 4  # portions' work that states of one brick count may be before they are parted
+_PREPARED = 0.15  # of all work, that every process does for itself on the vault of 338 bricks
+_PORTIONS = 32  # tasks for every worker: one that is slow, or dies, leaves little to the others
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ def take_turns(portions: Sequence[Portion], lanes: int) -> tuple[Iterator[int], 
     before them too: with a share f of the work they end together where lane i ends at the share (1
     - q^i) / (1 - q^n) with q = 1 / (1 + f).
     """
-    before = 1 - (1 + PREPARED) ** -np.arange(1.0, lanes + 1)
+    before = 1 - (1 + _PREPARED) ** -np.arange(1.0, lanes + 1)
     work = np.array([portion.work for portion in portions])
     middle = (np.cumsum(work) - work / 2) / max(float(work.sum()), 1.0)
     lane_of = np.searchsorted(before[:-1] / before[-1], middle).tolist()
@@ -91,12 +91,12 @@ def take_turns(portions: Sequence[Portion], lanes: int) -> tuple[Iterator[int], 
     return iter([place for place, _ in turns]), iter([portion for _, portion in turns])
 
 
-def in_places(places: Iterable[int], results: Iterable[Found]) -> Iterator[Found]:
+def in_places(places: Iterable[int], results: Iterable[_Found]) -> Iterator[_Found]:
     """Yield results in the order of their places, each as soon as those before it are there.
 
     ``places``: from 0, each once, in the order of the results.
     """
-    waiting: dict[int, Found] = {}
+    waiting: dict[int, _Found] = {}
     following = 0
     for result, place in zip(results, places, strict=False):
         waiting[place] = result
@@ -116,7 +116,7 @@ def share_out(
 
     ``total``: about how much work they are; ``crew``: without one each block is a portion.
     """
-    enough = 0.0 if crew is None else total / (PORTIONS * crew.workers)
+    enough = 0.0 if crew is None else total / (_PORTIONS * crew.workers)
     mine: list[Block] = []
     for block in blocks:
         if _complete(mine, block, enough):
@@ -138,7 +138,7 @@ def _complete(mine: Sequence[Block], coming: Block, enough: float) -> bool:
     """Return whether blocks are a portion before another one comes."""
     work = sum(block.work for block in mine)
     between = bool(mine) and coming.bricks != mine[-1].bricks
-    return work >= (enough if between else SEVERAL * enough) and bool(mine)
+    return work >= (enough if between else _SEVERAL * enough) and bool(mine)
 
 
 @dataclass(frozen=True)

@@ -24,8 +24,8 @@ from seqopt.errors import SceneError
 from seqopt.responses.quantities import RESPONSES, length_text, lengths, steps_in_words
 
 _TURN = 0.1  # rad; sine and angle differ by 0.2 %, cosine and one by 0.5 %
-STRAIN = 0.1  # of a joint, over its thickness; true strain differs by 5 %
-_DEFORMED = f"{{:.3g}} times its thickness, more than {STRAIN:g} times"
+_STRAIN = 0.1  # of a joint, over its thickness; true strain differs by 5 %
+_DEFORMED = f"{{:.3g}} times its thickness, more than {_STRAIN:g} times"
 _STRESSED = (
     f"{{:.3g}} MPa beyond what epoxy holds, {EPOXY.tensile_strength / 1e6:g} MPa in tension, "
     f"{EPOXY.cohesion / 1e6:g} MPa and friction in shear"
@@ -95,7 +95,7 @@ class LinearRange:
         found = (
             ("displacement", moved, far, lambda most: length_text(most) + within),
             ("rotation", turned, _TURN, f"{{:.3g}} rad, more than {_TURN:g} rad".format),
-            ("deformation of a joint", strained, STRAIN, _DEFORMED.format),
+            ("deformation of a joint", strained, _STRAIN, _DEFORMED.format),
             ("stress in a joint", stressed, 0.0, lambda most: _STRESSED.format(most / 1e6)),
         )
         out = []

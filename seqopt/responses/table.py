@@ -123,22 +123,13 @@ def step_fields(engine: Engine, step: Step) -> Fields:
         raise SolverError(f"step {step.number}: {error}") from error
 
 
-def _fields_archive(engine: Engine, steps: Sequence[Step]) -> bytes:
-    """Return the full fields of every step as a NumPy archive (``.npz``).
+def archive(network: Network, answers: Iterable[tuple[Step, Fields]]) -> bytes:
+    """Return the full fields of steps as a NumPy archive (``.npz``).
 
     Arrays are named ``step1_edge_force``, ``step1_displacement``, ``step1_grip_force``,
     ``step1_support`` and so on, as in `Fields` without its first axis; ``edge_nodes`` (E, 2),
     ``node_position`` (N, 3), ``node_name`` (N,), and of the ground ends ``support_brick`` (G,) and
     ``support_point`` (G, 3), the fixed points, say what they run over.
-
-    Result: the content of the archive; SI units. Raises `MechanismError`, `SolverError` as the
-    engine does, the step named.
-    """
-    return archive(engine.network, [(step, step_fields(engine, step)) for step in steps])
-
-
-def archive(network: Network, answers: Iterable[tuple[Step, Fields]]) -> bytes:
-    """Return the full fields of steps as `_fields_archive` does.
 
     ``answers`` (Step, Fields): steps and the full fields of one grip set each. Result: the content
     of the archive; SI units.

@@ -33,7 +33,7 @@ _DENSITIES = (10.0, 30_000.0)  # kg/m³; from aerogel to the heaviest metals
 _PULL = 100.0  # m/s²; ten times that of the earth
 
 
-def doubts(scene: Scene) -> tuple[str, ...]:
+def find_warnings(scene: Scene) -> tuple[str, ...]:
     """Return what looks wrong in a scene, one line each.
 
     Result: each names the object, its value and what may be meant; empty for most scenes.
@@ -43,9 +43,9 @@ def doubts(scene: Scene) -> tuple[str, ...]:
     >>> from dataclasses import replace
     >>> from seqopt.scene.scene_file import load_scene
     >>> scene = load_scene("arch25")
-    >>> doubts(scene)
+    >>> find_warnings(scene)
     ()
-    >>> doubts(replace(scene, gravity=(0.0, 0.0, -9810.0)))
+    >>> find_warnings(replace(scene, gravity=(0.0, 0.0, -9810.0)))
     ('gravity is 9810 m/s²: give it in meters, if it is meant in millimeters',)
     """
     return (*_of_units(scene), *_of_places(scene), *_of_joints(scene))
@@ -61,7 +61,7 @@ def warn_of(scene: Scene, name: str) -> None:
     SceneWarning
         A warning for each doubt.
     """
-    for doubt in doubts(scene):
+    for doubt in find_warnings(scene):
         warnings.warn(f"scene {name}: {doubt}", SceneWarning, stacklevel=3)
 
 

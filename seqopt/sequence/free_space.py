@@ -34,7 +34,7 @@ class Moves(NamedTuple):
     way: Floats  # (m,); how far the robot goes that takes a grip, m; zero where ways do not count
 
 
-def grip_pairs(
+def _grip_pairs(
     states: Ints, slot: int, nodes: Ints, robots_and_ways: tuple[int, Floats | None]
 ) -> Moves:
     """Return the moves in which the robot of a column takes one of some nodes that nobody holds.
@@ -64,14 +64,14 @@ def sort_entries(states: Ints, first: int, end: int) -> None:
         states[:, first:end] = -np.sort(-states[:, first:end], axis=1)
 
 
-def join_moves(parts: Sequence[Moves], states: Ints) -> Moves:
+def _join_moves(parts: Sequence[Moves], states: Ints) -> Moves:
     """Return several moves as one. ``states`` (n, c): that they lead from."""
     none = np.zeros(0, dtype=np.int64)
     whole = [Moves(none, states[:0], np.zeros(0)), *parts]
     return Moves(*map(np.concatenate, zip(*whole, strict=True)))
 
 
-def number_rows(states: Ints, robots: int, least: int, most: int) -> Ints:
+def _number_rows(states: Ints, robots: int, least: int, most: int) -> Ints:
     """Return a number for every state that no other one has.
 
     ``states`` (n, c): columns after those of robots count first; ``robots``: how many columns are
@@ -88,7 +88,7 @@ def number_rows(states: Ints, robots: int, least: int, most: int) -> Ints:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class RobotKind(FrozenValue):
+class _RobotKind(FrozenValue):
     """Robots that reach the same nodes, may carry as much, and may place or not.
 
     Nodes are counted as in ``network.inner.ravel()``: brick by brick in build order.
@@ -107,26 +107,26 @@ class RobotKind(FrozenValue):
 
 def sort_robots(
     network: Network, rules: FreeRules, caps: Mapping[str, float] | None = None
-) -> tuple[RobotKind, ...]:
+) -> tuple[_RobotKind, ...]:
     """Return the robots that take part, sorted by kind.
 
     ``caps``: largest force of a robot's grip beside its payload, by its name, N. Result: in the
     order of their first robots.
     """
     alike: dict[tuple[object, ...], list[int]] = {}
-    parts: dict[tuple[object, ...], RobotKind] = {}
+    parts: dict[tuple[object, ...], _RobotKind] = {}
     for i in rules.team(network.scene):
         robot = network.scene.robots[i]
-        reach = reached(network, robot)
+        reach = _reached(network, robot)
         newest = reach if rules.newest is not Newest.PLACING else _placing(network, robot, reach)
         places = not rules.placers or robot.name in rules.placers
         cap = robot.payload if rules.payload is Payload.KEPT else np.inf
         cap = min(cap, (caps or {}).get(robot.name, np.inf))
         key = (reach.tobytes(), newest.tobytes(), places, cap)
         alike.setdefault(key, []).append(i)
-        parts.setdefault(key, RobotKind((), reach, newest, places, cap))
+        parts.setdefault(key, _RobotKind((), reach, newest, places, cap))
     return tuple(
-        RobotKind(tuple(robots), parts[key].reach, parts[key].newest, parts[key].places, key[3])  # type: ignore[arg-type]
+        _RobotKind(tuple(robots), parts[key].reach, parts[key].newest, parts[key].places, key[3])  # type: ignore[arg-type]
         for key, robots in alike.items()
     )
 
@@ -139,7 +139,7 @@ def node_numbers(network: Network) -> list[int]:
     return [node for brick in network.scene.placed for node in brick.nodes]
 
 
-def reached(network: Network, robot: Robot) -> Bools:
+def _reached(network: Network, robot: Robot) -> Bools:
     """Return which nodes a robot may hold: within its reach and not blocked. Result (2B,)."""
     scene = network.scene
     return np.array(
@@ -162,7 +162,7 @@ def _placing(network: Network, robot: Robot, reach: Bools) -> Bools:
     return out
 
 
-PAIRS = 4_000_000  # of states and nodes that are looked at together
+_PAIRS = 4_000_000  # of states and nodes that are looked at together
 
 
 @dataclass(frozen=True, repr=False)
@@ -175,7 +175,7 @@ class FreeSpace(Terse):
 
     network: Network
     rules: FreeRules
-    kinds: tuple[RobotKind, ...]
+    kinds: tuple[_RobotKind, ...]
     parks: bool = False
 
     @property
@@ -221,7 +221,7 @@ class FreeSpace(Terse):
         ``states`` (n, c). Result (n,).
         """
         last = 2 * self.bricks
-        return number_rows(states, self.robots, -last if self.parks else 0, last)
+        return _number_rows(states, self.robots, -last if self.parks else 0, last)
 
     def held(self, states: Ints) -> Ints:
         """Return which nodes are held, sorted, zeros for robots that are free first.
@@ -244,7 +244,7 @@ class FreeSpace(Terse):
         for k, kind in enumerate(self.kinds):
             if kind.places:
                 parts += self._take(k, states, nodes[kind.newest[nodes]])
-        moves = join_moves(parts, states)
+        moves = _join_moves(parts, states)
         if self._counts:
             moves.states[:, -1] = 0
         return self._lawful_only(bricks + 1, moves)
@@ -261,7 +261,7 @@ class FreeSpace(Terse):
         parts = []
         for k, kind in enumerate(self.kinds):
             parts += self._take(k, states[rows], np.flatnonzero(kind.reach[: 2 * bricks]))
-        moves = join_moves(parts, states)
+        moves = _join_moves(parts, states)
         if self._counts:
             moves.states[:, -1] += 1
         return Moves(rows[moves.source], moves.states, moves.way)
@@ -280,7 +280,7 @@ class FreeSpace(Terse):
                 new[:, slot] = -new[:, slot] if self.parks else 0
                 sort_entries(new, first, end)
                 parts.append(Moves(rows, new, np.zeros(len(rows))))
-        moves = join_moves(parts, states)
+        moves = _join_moves(parts, states)
         if bricks < self.bricks or self.rules.ending is not Ending.ONE_BY_ONE:
             moves = self._lawful_only(bricks, moves)
         if bricks < self.bricks or self.rules.ending is Ending.HELD:
@@ -318,7 +318,7 @@ class FreeSpace(Terse):
             none = states[rows]
             none[:, : self.robots] = 0
             parts = [moves, Moves(rows, none, np.zeros(len(rows)))]
-            moves = join_moves(parts, states)
+            moves = _join_moves(parts, states)
         bare = (moves.states[:, : self.robots] <= 0).all(axis=1)
         moves.states[bare, : self.robots] = 0
         return moves
@@ -340,7 +340,7 @@ class FreeSpace(Terse):
         """Return the moves in which a free robot of a kind takes one of some nodes."""
         first, end = self.slots[k]
         slots = range(first, end) if self.parks else [end - 1]  # entries are sorted
-        step = max(1, PAIRS // max(1, len(nodes)))
+        step = max(1, _PAIRS // max(1, len(nodes)))
         parts = []
         for slot in slots if len(nodes) else ():
             free = states[:, slot] <= 0
@@ -349,7 +349,7 @@ class FreeSpace(Terse):
             rows = np.flatnonzero(free)
             for start in range(0, len(rows), step):
                 block = rows[start : start + step]
-                moves = grip_pairs(states[block], slot, nodes, self._free_grips)
+                moves = _grip_pairs(states[block], slot, nodes, self._free_grips)
                 sort_entries(moves.states, first, end)
                 parts.append(Moves(block[moves.source], moves.states, moves.way))
         return parts

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from numbers import Integral
@@ -250,7 +250,6 @@ class Schedule(Shown):
 
 _RULE = re.compile(r"(near|within):([0-9]+\.?[0-9]*|\.[0-9]+)")
 _NEWEST = 2  # bricks that make the working end: a build from both ends has two of them
-_Distance = Callable[[Scene, int], dict[int, float]]
 
 
 def thin(schedule: Schedule, rule: str) -> Schedule:

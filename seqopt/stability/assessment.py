@@ -31,10 +31,10 @@ from seqopt.stability.limit_analysis import (
 from seqopt.stability.prover import DIRECTIONS, Proven, Prover, safe_pull
 from seqopt.work.progress import Tell, told
 
-STILL = 1e-6  # motion slower than this, beside the fastest, is none
+_STILL = 1e-6  # motion slower than this, beside the fastest, is none
 
 
-def first_to_fail(assembly: Assembly, motion: Floats) -> tuple[str, str]:
+def _first_to_fail(assembly: Assembly, motion: Floats) -> tuple[str, str]:
     """Return what goes first in a motion.
 
     ``motion`` (B, 6): as of `seqopt.stability.limit_analysis.Answer`. Results: ``block``,
@@ -46,14 +46,14 @@ def first_to_fail(assembly: Assembly, motion: Floats) -> tuple[str, str]:
     block = str(assembly.block_name[int(speed.argmax())])
     parting = (assembly.contact_map.T @ motion.ravel()).reshape(-1, 3)
     apart = np.linalg.norm(parting, axis=1)
-    if not apart.max(initial=0.0) > STILL:
+    if not apart.max(initial=0.0) > _STILL:
         return block, ""
     return block, assembly.contact_name[int(assembly.contact[int(apart.argmax())])]
 
 
 ROUGHEST = 10.0  # largest coefficient of friction that is tried
-LITTLE = 1e-3  # friction that holds nothing but what is jammed
-FRICTION_STEP = 1e-4  # to which the least one is found
+_LITTLE = 1e-3  # friction that holds nothing but what is jammed
+_FRICTION_STEP = 1e-4  # to which the least one is found
 
 
 class Verdict(Enum):
@@ -169,8 +169,8 @@ def assess(
     known = failure.value < CAP if stands else verdict is Verdict.FALLS
     motion = failure.answer.motion if known else np.zeros((len(assembly.centroid), 6))
     motion = motion / (np.abs(motion).max(initial=0.0) or 1.0)
-    block, contact = first_to_fail(assembly, motion)
-    friction = least_friction(prove, mortar)
+    block, contact = _first_to_fail(assembly, motion)
+    friction = _least_friction(prove, mortar)
     return Stability(
         verdict=verdict,
         bond=_amount(bond.value) * assembly.stress_scale,
@@ -181,7 +181,7 @@ def assess(
         motion=motion / np.repeat([1.0, assembly.scales[1]], 3),
         first_block=block,
         first_contact=contact,
-        jammed=stands and not friction > LITTLE and friction != 0 and is_jammed(prove, mortar),
+        jammed=stands and not friction > _LITTLE and friction != 0 and _is_jammed(prove, mortar),
         claims=dict(prove.claims),
         unproven=prove.unproven,
     )
@@ -214,8 +214,8 @@ def verdict_of(stand: Proven) -> Verdict:
     return Verdict.STANDS if stand.value <= EXACT else Verdict.UNDECIDED
 
 
-def least_friction(prove: Prover, mortar: Mortar) -> float:
-    """Return the least coefficient of friction with which no bond is lacking, to `FRICTION_STEP`.
+def _least_friction(prove: Prover, mortar: Mortar) -> float:
+    """Return the least coefficient of friction with which no bond is lacking, to `_FRICTION_STEP`.
 
     The lacking bond falls with the friction. A line through two points where some is lacking aims
     at where none is; where that does not help, the middle is tried.
@@ -236,7 +236,7 @@ def least_friction(prove: Prover, mortar: Mortar) -> float:
         return np.nan if np.isnan(list(tried.values())).any() else np.inf
     high = enough[0]
     before: tuple[float, float] | None = None
-    step = FRICTION_STEP
+    step = _FRICTION_STEP
     while high - low[0] > step:
         middle = 0.5 * (low[0] + high)
         if before is not None and before[1] > low[1] < np.inf:
@@ -252,14 +252,14 @@ def least_friction(prove: Prover, mortar: Mortar) -> float:
     return high
 
 
-def is_jammed(prove: Prover, mortar: Mortar) -> bool:
+def _is_jammed(prove: Prover, mortar: Mortar) -> bool:
     """Return whether hardly any friction is enough, by contact forces far above all loads.
 
     ``prove``: of an assembly that stands with the mortar, and not without friction. Result: only
     where that is proven by forces.
     """
     assembly, case = prove.assembly, bonded(prove.assembly, mortar)
-    proven = prove(replace(case, friction=min(LITTLE, mortar.friction)))
+    proven = prove(replace(case, friction=min(_LITTLE, mortar.friction)))
     total = np.linalg.norm(assembly.weight, axis=1).sum() + assembly.payload.sum()
     most = proven.answer.contact_force[:, 0].max(initial=0.0) * assembly.scales[0]
     return bool(proven.held <= EXACT and most > LARGEST_FORCE * total)

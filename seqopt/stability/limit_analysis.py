@@ -29,7 +29,7 @@ EXACT = 1e-6  # largest violation of an accepted proof, over the force scale and
 GAP = 1e-3  # largest difference between the two proofs, relative to max(1, z)
 ROUNDING = 1e-12  # work in a motion treated as zero, over the largest entry of the motion
 LARGEST_FORCE = 10.0  # of a corner, over total weight and payloads: prices motions that violate
-CLOSING = 1e-4  # by which a motion that proves may close a corner, over its largest entry
+_CLOSING = 1e-4  # by which a motion that proves may close a corner, over its largest entry
 CAP = 1e5  # z is sought between 0 and this
 
 
@@ -156,7 +156,7 @@ def bound(assembly: Assembly, case: Case, answer: Answer) -> float:
     """Return the z that an answer's motion proves: none below (smallest) or above (largest) exists.
 
     A motion proves nothing, 0 or `CAP`, if the load does less work in it than is taken up, or if
-    a corner closes by more than `CLOSING`. Less than that is charged with a corner force of
+    a corner closes by more than `_CLOSING`. Less than that is charged with a corner force of
     `LARGEST_FORCE` times the sum of weights and payloads.
     """
     nothing = 0.0 if case.sense is Sense.SMALLEST else CAP
@@ -186,7 +186,7 @@ def _taken(
     sliding = np.linalg.norm(parting[:, 1:], axis=1)
     opening = parting[:, 0] - case.friction * sliding
     total = np.linalg.norm(assembly.weight, axis=1).sum() + assembly.payload.sum()
-    most = LARGEST_FORCE if -opening.min(initial=0.0) <= CLOSING else np.inf
+    most = LARGEST_FORCE if -opening.min(initial=0.0) <= _CLOSING else np.inf
     closing = most * total / assembly.scales[0] * np.maximum(-opening, 0).sum()
     taken = []
     tip = None

@@ -30,7 +30,7 @@ from seqopt.stability.limit_analysis import (
     violation,
 )
 
-HANDS = frozen(np.vstack([np.eye(3), -np.ones(3)]))
+_HANDS = frozen(np.vstack([np.eye(3), -np.ones(3)]))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -72,7 +72,7 @@ class Prover:
             self.claims[answer.claim] += 1
             value = proven_value(self.assembly, case, answer)
             best = np.fmin if case.sense is Sense.SMALLEST else np.fmax
-            held = float(best(held, held_value(self.assembly, case, answer)))
+            held = float(best(held, _held_value(self.assembly, case, answer)))
             if answer.claim is Claim.INFEASIBLE or not np.isnan(value):
                 break
         proven = bound(self.assembly, case, answer)
@@ -90,7 +90,7 @@ class Prover:
         assembly = self.assembly
         blocks = len(assembly.centroid)
         payload = limits(assembly, case, CAP)[2] * assembly.scales[0]
-        reach = assembly.centroid[:, None] + assembly.scales[1] * HANDS
+        reach = assembly.centroid[:, None] + assembly.scales[1] * _HANDS
         helped = replace(
             assembly,
             grip_block=np.concatenate([assembly.grip_block, np.repeat(np.arange(blocks), 4)]),
@@ -116,10 +116,10 @@ def proven_value(assembly: Assembly, case: Case, answer: Answer) -> float:
     """
     gap = abs(answer.value - bound(assembly, case, answer))
     small = gap <= GAP * max(1.0, abs(answer.value))
-    return held_value(assembly, case, answer) if small else np.nan
+    return _held_value(assembly, case, answer) if small else np.nan
 
 
-def held_value(assembly: Assembly, case: Case, answer: Answer) -> float:
+def _held_value(assembly: Assembly, case: Case, answer: Answer) -> float:
     """Return the z of an answer if its forces alone prove that it will do.
 
     Result: naN if they do not, or a number of the answer is not finite.
@@ -132,7 +132,7 @@ def held_value(assembly: Assembly, case: Case, answer: Answer) -> float:
 
 DIRECTIONS = 8  # in which an assembly is pulled sideways, evenly spread
 FINE = 8 * DIRECTIONS  # where these leave open what a grip set survives
-MORE = 8  # directions at most that are added where the bound for all others is least
+_MORE = 8  # directions at most that are added where the bound for all others is least
 NEAR = 5e-3  # share of the least pull by which the bound may fall short before any is added
 
 
@@ -149,7 +149,7 @@ def safe_pull(prove: Prover, fixed: Case, up: Vector) -> tuple[list[Proven], flo
     """Return the largest sideways accelerations, and one that is survived in every direction.
 
     Where the bound is least a direction is added, until it falls short of the least pull found by
-    no more than `NEAR`, or `MORE` have been.
+    no more than `NEAR`, or `_MORE` have been.
 
     ``fixed``: whose strengths do not grow with z; ``up``: unit vector against gravity. Results:
     ``pulls``: of `sideways`, then of the directions added; ``worst``: naN if forces prove too few.
@@ -160,7 +160,7 @@ def safe_pull(prove: Prover, fixed: Case, up: Vector) -> tuple[list[Proven], flo
         held = np.array([pull.held for pull in pulls])
         worst, angle = in_every_direction(angles, held)
         short = worst < (1 - NEAR) * np.fmin.reduce(held)
-        if not short or len(pulls) == DIRECTIONS + MORE or np.isnan(held[DIRECTIONS:]).any():
+        if not short or len(pulls) == DIRECTIONS + _MORE or np.isnan(held[DIRECTIONS:]).any():
             return pulls, worst
         angles = np.append(angles, angle)
         pulls.append(prove(_pulled(fixed, up, angle)))

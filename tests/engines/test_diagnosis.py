@@ -11,7 +11,7 @@ from experiments.engines.parts.limit_scenes import HELD, LOOSE_AT, chain, loosen
 from experiments.engines.parts.reference_chain import solve_exactly
 from experiments.harness.walls import running_bond
 from seqopt.engines.diagnosis import (
-    LEAST_DIAGONAL,
+    _LEAST_DIAGONAL,
     UNRESISTED,
     WELL,
     Finding,
@@ -79,7 +79,7 @@ def test_the_smallest_eigenvalue_is_that_of_the_dense_matrix():
     system = mixed_system(parts, grips)
     dense = parts.deformation.toarray()
     matrix = dense.T * parts.stiffness @ dense
-    scale = np.sqrt(np.maximum(matrix.diagonal(), LEAST_DIAGONAL * matrix.diagonal().max()))
+    scale = np.sqrt(np.maximum(matrix.diagonal(), _LEAST_DIAGONAL * matrix.diagonal().max()))
     null = np.linalg.svd(system.forbidden.toarray() / scale)[2][6:].T
     values, vectors = np.linalg.eigh(null.T @ (matrix / scale / scale[:, None]) @ null)
     lowest, condition, mode = spectrum(net, 9, grips)

@@ -9,7 +9,7 @@ import pytest
 
 from experiments.harness.walls import running_bond
 from seqopt.engines.basis import SPACE
-from seqopt.engines.interface import FLAGS, NAMES, Want, grip_columns
+from seqopt.engines.interface import _NAMES, FLAGS, Want, grip_columns
 from seqopt.engines.planar import PlanarEngine
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.engines.rigid.grip_equations import (
@@ -23,7 +23,7 @@ from seqopt.engines.rigid.growth import grow_tree
 from seqopt.engines.rigid.mixed import solve_dense
 from seqopt.engines.rigid.operator import OperatorBuilder
 from seqopt.engines.rigid.refinement import held_operator, hold_loose
-from seqopt.engines.rigid.response_maps import GATHERED, loads_of
+from seqopt.engines.rigid.response_maps import _GATHERED, loads_of
 from seqopt.engines.rigid.trial import solve_batch
 from seqopt.engines.rigid.ungripped import ungripped_system
 from seqopt.network.build import build_network
@@ -85,7 +85,7 @@ def test_every_field_is_that_of_a_direct_solve(name, grips):
         fields, trusted = solve_batch(builder.operator(bricks), columns, Want.ALL)
         direct = solve_dense(net, bricks, columns)
         assert trusted.all()
-        for field in NAMES:
+        for field in _NAMES:
             own, other = getattr(fields, field), getattr(direct, field)
             unit = 1e-8 if field in ("displacement", "brick_twist") else 1.0  # what 1 N moves
             gap = np.abs(own - other).max(initial=0)
@@ -114,7 +114,7 @@ def test_in_a_plane_the_same_with_fewer_directions(grips):
     for bricks in (2, 5, 6):
         sets = sets_of(net.scene, bricks, grips)
         a, b = (engine.solve(bricks, sets, Want.ALL) for engine in (plane, space))
-        for field in NAMES:
+        for field in _NAMES:
             size = np.abs(getattr(b, field)).max()
             assert np.abs(getattr(a, field) - getattr(b, field)).max() <= 1e-8 * size, field
 
@@ -148,7 +148,7 @@ def test_loads_as_a_matrix():
     assert none.matrix.toarray().tolist() == [[0, 0, 0, 0, 1]] * 2
 
 
-@pytest.mark.parametrize("sets", [0, 1, GATHERED // 20, GATHERED // 20 + 1])
+@pytest.mark.parametrize("sets", [0, 1, _GATHERED // 20, _GATHERED // 20 + 1])
 def test_loads_sum_rows_as_their_matrix_does(sets):
     """Few are gathered, many multiplied."""
     rng = np.random.default_rng(0)
@@ -280,7 +280,7 @@ def test_answers_do_not_depend_on_how_they_are_summed(monkeypatch, name, grips):
     for few, held in ((10**9, None), (0, None), (0, np.unique(columns // 2))):
         monkeypatch.setattr("seqopt.engines.rigid.operator._FEW", few)
         found.append(solve_batch(builder.operator(bricks, held), columns, Want.ALL)[0])
-    for field in NAMES:
+    for field in _NAMES:
         once, *others = (getattr(fields, field) for fields in found)
         for other in others:
             assert np.abs(other - once).max() <= 1e-9 * np.abs(once).max(), field

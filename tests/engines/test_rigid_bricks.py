@@ -85,7 +85,7 @@ def test_a_batch_of_many_passes(monkeypatch):
     net = build_network(chain(8))
     sets = [(1, 9, 14), (14, 15, 3), (4, 5, 2), (12, 10, 7), (8, 9, 15)]
     whole = ComplianceEngine(net).solve(8, sets, Want.ALL)
-    monkeypatch.setattr(trial, "CHUNK", 2)
+    monkeypatch.setattr(trial, "_CHUNK", 2)
     parts = ComplianceEngine(net).solve(8, sets, Want.ALL)
     for name in ("edge_force", "displacement", "grip_force", "support"):
         gap = np.abs(getattr(parts, name) - getattr(whole, name)).max()

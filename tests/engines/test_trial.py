@@ -43,7 +43,7 @@ def test_asked_twice_it_says_the_same(asked):
 def test_sets_are_trusted_whatever_stands_beside_them(monkeypatch, asked, chunk):
     whole, trusted = solve_batch(*asked, Want.ALL)
     assert trusted.all()
-    monkeypatch.setattr(trial, "CHUNK", chunk)
+    monkeypatch.setattr(trial, "_CHUNK", chunk)
     parts, also = solve_batch(*asked, Want.ALL)
     assert also.all()
     size = np.abs(whole.edge_force).max()

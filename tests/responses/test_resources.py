@@ -59,7 +59,7 @@ def test_results_are_the_same_whatever_the_workers(small_blocks, loop25, name, w
 @pytest.mark.slow
 @pytest.mark.parametrize("portions", [1, 7, 1000])
 def test_results_are_the_same_however_work_is_shared(small_blocks, loop25, portions, monkeypatch):
-    monkeypatch.setattr(division, "PORTIONS", portions)
+    monkeypatch.setattr(division, "_PORTIONS", portions)
     expected = evaluation(make_engine("auto", loop25.scene), loop25).steps
     with ThreadPoolExecutor(3) as executor:
         for workers in (1, 5):
@@ -72,10 +72,10 @@ def test_results_are_the_same_however_work_is_shared(small_blocks, loop25, porti
 def test_what_states_of_a_brick_count_share_is_prepared_once(loop25, portions, monkeypatch):
     """Blocks of one brick count go to one worker unless they are several portions' work."""
     monkeypatch.setattr(batches, "BLOCK", 5)
-    monkeypatch.setattr(division, "PORTIONS", portions)
+    monkeypatch.setattr(division, "_PORTIONS", portions)
     single = replace(loop25, steps=tuple(s for s in loop25.steps if len(s.moves) == 1))
-    levels = batches.steps_alike(single)
-    groups = [batches.alike(single, steps, everything) for level in levels for steps in level]
+    levels = batches.steps_of_batches(single)
+    groups = [batches.batch_of(single, steps, everything) for level in levels for steps in level]
     every = [block for group in groups for block in group.blocks()]
     total = sum(block.work for block in every)
     shared = [*division.share_out(every, None, total, Processes(2))]
@@ -84,7 +84,7 @@ def test_what_states_of_a_brick_count_share_is_prepared_once(loop25, portions, m
     if portions == 3:
         counts = [{block.bricks for block in portion.blocks} for portion in shared]
         assert all(a.isdisjoint(b) for a, b in itertools.pairwise(counts))
-    most = division.SEVERAL * total / (2 * portions) + max(block.work for block in every)
+    most = division._SEVERAL * total / (2 * portions) + max(block.work for block in every)
     assert all(portion.work <= most for portion in shared)
     alone = [*division.share_out(every, None, total, None)]
     assert [len(portion.blocks) for portion in alone] == [1] * len(every)
@@ -96,8 +96,8 @@ STATES = three_robot_loop(BUILT)
 
 def blocks():
     """Return blocks of all brick counts, in order."""
-    levels = batches.steps_alike(STATES)
-    groups = [batches.alike(STATES, steps, everything) for level in levels for steps in level]
+    levels = batches.steps_of_batches(STATES)
+    groups = [batches.batch_of(STATES, steps, everything) for level in levels for steps in level]
     return [block for group in groups for block in group.blocks()]
 
 

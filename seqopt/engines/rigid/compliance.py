@@ -71,9 +71,9 @@ class Kept:
             total -= self._bytes.get(first, 0)
 
 
-KEPT = 32e6  # bytes of operators that may stay when another is made
-SCREEN = 1e-6  # the same, of what is only to be compared
-EVEN = 5e-5  # softest over stiffest joint from which on pivots tell the whole error
+_KEPT = 32e6  # bytes of operators that may stay when another is made
+_SCREEN = 1e-6  # the same, of what is only to be compared
+_EVEN = 5e-5  # softest over stiffest joint from which on pivots tell the whole error
 
 
 class ComplianceEngine(NamedEngine):
@@ -81,7 +81,7 @@ class ComplianceEngine(NamedEngine):
 
     ``basis``: the directions in which bricks are loaded and move; all by default, fewer in a plane.
     ``accuracy``: largest error of fields, over the largest entry of each, that is accepted; with
-    `Want.SCREEN`, `SCREEN` if that is larger. Sets that may err more are corrected.
+    `Want.SCREEN`, `_SCREEN` if that is larger. Sets that may err more are corrected.
     """
 
     def __init__(
@@ -91,7 +91,7 @@ class ComplianceEngine(NamedEngine):
         self._network = network
         self._basis, self._accuracy = basis, accuracy
         self._tree = grow_tree(network)
-        self._kept = Kept(KEPT)
+        self._kept = Kept(_KEPT)
         self._even = _count_even(network)
         self._refinement: Refinement | None = None  # of the brick count that was asked last
 
@@ -124,7 +124,7 @@ class ComplianceEngine(NamedEngine):
     def _tried(self, bricks: int, columns: Ints, want: Want) -> Tried:
         """Return what the operator alone says about grip sets."""
         operator, even = self._operator(bricks, columns), bricks <= self._even
-        accuracy = max(SCREEN, self._accuracy) if want & Want.SCREEN else self._accuracy
+        accuracy = max(_SCREEN, self._accuracy) if want & Want.SCREEN else self._accuracy
         return try_forces(operator, columns, even=even, accuracy=accuracy)
 
     def _operator(self, bricks: int, columns: Ints) -> ComplianceOperator:
@@ -154,7 +154,7 @@ class ComplianceEngine(NamedEngine):
 
     def _refined(self, bricks: int, columns: Ints, want: Want) -> Fields:
         """Return the fields of grip sets that the operator alone does not answer well enough."""
-        largest = SCREEN if want & Want.SCREEN else LAST_CORRECTION
+        largest = _SCREEN if want & Want.SCREEN else LAST_CORRECTION
         operator = self._operator(bricks, columns) if bricks <= len(self._tree.spring) else None
         with one_thread():
             if self._refinement is None or self._refinement.bricks != bricks:
@@ -171,5 +171,5 @@ def _count_even(network: Network) -> int:
     for stiffness in (springs.translational_stiffness, springs.rotational_stiffness):
         low = np.minimum.accumulate(stiffness[order].min(axis=1))
         high = np.maximum.accumulate(stiffness[order].max(axis=1))
-        even &= low >= EVEN * high
+        even &= low >= _EVEN * high
     return len(network.inner) if even.all() else int(springs.since[order][even.argmin()]) - 1

@@ -84,12 +84,12 @@ def compliances(network: Network, which: Ints, basis: Basis = SPACE) -> Floats:
 
 
 TINY, ROUNDING = np.finfo(float).tiny, np.finfo(float).eps
-AT_ONCE = 2**17  # numbers changed at a time: they stay in the processor's cache
-SUMMED = 2**19  # the same, where much is done with each
-TAKEN = 1e3  # times less a brick moves in closed loops: rounding of what is gone would show
-WORSE = 10.0  # times the rounding that was left when they were summed anew
-SAMPLE = 600  # motions that are compared with each other, about
-MOST = 0.95  # share of all pairs of motions in space whose asymmetry counts as rounding
+_AT_ONCE = 2**17  # numbers changed at a time: they stay in the processor's cache
+_SUMMED = 2**19  # the same, where much is done with each
+_TAKEN = 1e3  # times less a brick moves in closed loops: rounding of what is gone would show
+_WORSE = 10.0  # times the rounding that was left when they were summed anew
+_SAMPLE = 600  # motions that are compared with each other, about
+_MOST = 0.95  # share of all pairs of motions in space whose asymmetry counts as rounding
 
 
 class Growth:
@@ -231,7 +231,7 @@ class Growth:
         self._tie(springs, self._ties)
         lost = (before / np.maximum(self._own(), TINY)).reshape(self.bricks, k).max(axis=1)
         self.loss[: self.bricks] *= np.maximum(lost, 1.0)
-        if self.loss[: self.bricks].max() > max(TAKEN, WORSE * self._left):
+        if self.loss[: self.bricks].max() > max(_TAKEN, _WORSE * self._left):
             self._sum_again()
 
     def _own(self) -> Floats:
@@ -248,7 +248,7 @@ class Growth:
             )
             arm = center[brick] - center[parent] if parent != GROUND else np.zeros(3)
             ways.append((brick, parent, spring, -sign * given, self._carried(arm).T))
-        step = max(1, SUMMED // self._moves)
+        step = max(1, _SUMMED // self._moves)
         for start in range(0, 1 + self._moves, step):
             part = slice(start, min(start + step, 1 + self._moves))
             twist = self.twist[part].reshape(part.stop - start, -1, k)
@@ -261,11 +261,11 @@ class Growth:
 
     def _asymmetry(self) -> float:
         """Return by how many last digits what should be symmetric is not: that is rounding."""
-        some = np.linspace(0, self._moves - 1, min(self._moves, SAMPLE)).astype(int)
+        some = np.linspace(0, self._moves - 1, min(self._moves, _SAMPLE)).astype(int)
         matrix, root = self.twist[np.ix_(1 + some, some)], np.sqrt(np.abs(self._own()[some]))
         apart = np.abs(matrix - matrix.T) / np.maximum(root * root[:, None], TINY)
         more = (len(SPACE.wrench) / self._size) ** 2  # in space there are as many times the pairs
-        return max(1.0, float(np.quantile(apart, 1 - more * (1 - MOST))) / ROUNDING)
+        return max(1.0, float(np.quantile(apart, 1 - more * (1 - _MOST))) / ROUNDING)
 
     def _gap(self, spring: int) -> Floats:
         """Return how far the bodies of a spring part at it under every load, (1 + kb, k)."""
@@ -330,7 +330,7 @@ class Growth:
 
 def _add_product(target: Floats, left: Floats, right: Floats) -> None:
     """Add the product of matrices (n, p) and (p, m) to one (n, m), a few rows at a time."""
-    step = max(1, AT_ONCE // target.shape[1])
+    step = max(1, _AT_ONCE // target.shape[1])
     room = np.empty((step, target.shape[1]))
     for start in range(0, len(target), step):
         part = target[start : start + step]

@@ -42,13 +42,13 @@ from seqopt.errors import SolverError
 from seqopt.network.mechanics import point_motion
 from seqopt.network.network import GROUND, Network
 
-NEAR = 0.1  # of the largest: a pivot that large is taken if it fills less, and corrected after
-PANEL = 4  # columns that are eliminated together: few, since each meets few others
-SOFT = 1e-7  # stiffness over the typical one below which a direction ties nothing
+_NEAR = 0.1  # of the largest: a pivot that large is taken if it fills less, and corrected after
+_PANEL = 4  # columns that are eliminated together: few, since each meets few others
+_SOFT = 1e-7  # stiffness over the typical one below which a direction ties nothing
 
 
 @dataclass(frozen=True)
-class HeldSystem:
+class _HeldSystem:
     """The factored system of a partial structure whose loose motions are held."""
 
     parts: Ungripped
@@ -71,7 +71,7 @@ class HeldSystem:
         return states, force * self.parts.unit
 
 
-def hold_loose(parts: Ungripped, *, tied: bool = False) -> HeldSystem:
+def hold_loose(parts: Ungripped, *, tied: bool = False) -> _HeldSystem:
     """Return the factored system of a partial structure with its loose motions held.
 
     ``tied``: whether springs are known to tie every brick to the ground, however softly. Raises
@@ -89,20 +89,20 @@ def hold_loose(parts: Ungripped, *, tied: bool = False) -> HeldSystem:
         factors = splu(
             sparse.csc_array(matrix),
             permc_spec="NATURAL",
-            diag_pivot_thresh=NEAR,
-            panel_size=PANEL,
+            diag_pivot_thresh=_NEAR,
+            panel_size=_PANEL,
         )
     except RuntimeError as error:  # SuperLU met an exactly zero pivot
         raise SolverError(
             f"{parts.bricks} bricks: exactly singular in double precision; stiffen what is soft"
         ) from error
-    return HeldSystem(parts, rows.shape[0], factors)
+    return _HeldSystem(parts, rows.shape[0], factors)
 
 
 def _held_motions(parts: Ungripped, *, tied: bool) -> sparse.csr_array:
     """Return the rows (m, 6b) whose products with scaled twists say how far loose motions go."""
     stiff = parts.stiffness.reshape(-1, 6)
-    firm = stiff.min(axis=1) >= SOFT
+    firm = stiff.min(axis=1) >= _SOFT
     none = sparse.csr_array((0, 6 * parts.bricks))
     if tied and firm.all():
         return none
@@ -114,7 +114,7 @@ def _held_motions(parts: Ungripped, *, tied: bool) -> sparse.csr_array:
     strain = np.sqrt(parts.stiffness[soft])[:, None] * (parts.deformation[soft] @ rigid)
     _, sizes, modes = np.linalg.svd(strain)  # SciPy 1.12 refuses an empty matrix
     weak = np.ones(len(modes), dtype=bool)
-    weak[: len(sizes)] = sizes < np.sqrt(SOFT)
+    weak[: len(sizes)] = sizes < np.sqrt(_SOFT)
     held = (6 * first[:, None] + np.arange(6)).ravel()
     rows = sparse.lil_array((int(weak.sum()), 6 * parts.bricks))
     rows[:, held] = np.linalg.pinv((rigid @ modes[weak].T)[held])
@@ -149,10 +149,10 @@ def _cluster_motions(parts: Ungripped, label: Ints, first: Ints) -> Floats:
     return out.reshape(6 * parts.bricks, -1) / parts.twist_unit[:, None]
 
 
-TIED = 0.1  # most that what resists loose motions may be of the springs that they stand on
+_TIED = 0.1  # most that what resists loose motions may be of the springs that they stand on
 
 
-def held_operator(system: HeldSystem) -> ComplianceOperator:
+def held_operator(system: _HeldSystem) -> ComplianceOperator:
     """Return the operator of a partial structure whose loose motions are unknowns of grip sets.
 
     Result: of all directions of space, with a load for each loose motion after those of the nodes.
@@ -187,7 +187,7 @@ def _softness(flexibility: Floats, reach: Floats, resistance: Floats, unit: floa
     if not len(reach):
         return 0.0
     own = float(np.trace(flexibility)) / max(float((reach**2).sum()), float(len(reach)))
-    most = TIED / max(float(np.abs(resistance).sum()), np.finfo(float).tiny)
+    most = _TIED / max(float(np.abs(resistance).sum()), np.finfo(float).tiny)
     return min(max(own, 1 / unit), most)
 
 
@@ -221,9 +221,9 @@ def _operator(
     )
 
 
-TOGETHER = 256  # grip sets per pass: their unknowns stay in the processor's cache
-STEPS = 5  # corrections, after which a set is solved on its own
-HARDLY_HELD = 1e-9  # a pivot of loose motions below which they are looked into one by one
+_TOGETHER = 256  # grip sets per pass: their unknowns stay in the processor's cache
+_STEPS = 5  # corrections, after which a set is solved on its own
+_HARDLY_HELD = 1e-9  # a pivot of loose motions below which they are looked into one by one
 
 
 class Refinement:
@@ -238,7 +238,7 @@ class Refinement:
     ) -> None:
         self.network, self.bricks = network, bricks
         self.parts = ungripped_system(network, bricks, shared)
-        self.held: HeldSystem = hold_loose(self.parts, tied=tied)
+        self.held: _HeldSystem = hold_loose(self.parts, tied=tied)
         self.inner = self.parts.inner
         weighed = sparse.csr_array(self.parts.load[None])
         self.pulls = sparse.vstack([self.inner / self.parts.unit, weighed], format="csr")
@@ -263,11 +263,11 @@ class Refinement:
         kind. ``basis``: the directions that the operator knows; in the others nothing may move.
         """
         empty = no_sets(self.network, self.bricks, columns.shape[1])
-        starts = range(0, len(columns), TOGETHER)
+        starts = range(0, len(columns), _TOGETHER)
         if operator is None or self.held.loose:
             operator, basis = self.own, SPACE
         corrector = Corrector(self, operator, largest, basis)
-        parts = (corrector.together(columns[i : i + TOGETHER]) for i in starts)
+        parts = (corrector.together(columns[i : i + _TOGETHER]) for i in starts)
         return join_sets([empty, *parts])
 
 
@@ -298,7 +298,7 @@ class Corrector:
         index = operator.load_index(columns)
         found = grip_forces(operator, columns, index)
         if operator.loose:
-            for row in columns[~(found.lowest >= HARDLY_HELD)]:
+            for row in columns[~(found.lowest >= _HARDLY_HELD)]:
                 require_resistance(self.network, bricks, row)
         answers = _Answers(
             self._states(index, found.force), self._in_space(found.force, columns.shape[1])
@@ -333,7 +333,7 @@ class Corrector:
         """Correct answers until they no longer change; return which have come so far, (S,)."""
         done = np.zeros(len(columns), dtype=bool)
         left = np.flatnonzero(np.isfinite(answers.states).all(axis=1))
-        for _ in range(STEPS):
+        for _ in range(_STEPS):
             if not len(left):
                 break
             state, force = answers.states[left], answers.force[left]

@@ -143,7 +143,7 @@ def _leading(
     return sparse.csr_array(entries, shape=(rows, width))
 
 
-GATHERED = 2**16  # numbers up to which gathering rows takes less than making a sparse matrix
+_GATHERED = 2**16  # numbers up to which gathering rows takes less than making a sparse matrix
 
 
 @dataclass(frozen=True)
@@ -156,7 +156,7 @@ class Loads:
 
     def sum(self, rows: Floats) -> Floats:
         """Return the sums of what the loads mean. ``rows`` (count, Q). Result (S, Q)."""
-        if self.index.size * rows.shape[1] <= GATHERED:  # in the order of the sparse product
+        if self.index.size * rows.shape[1] <= _GATHERED:  # in the order of the sparse product
             return np.asarray(np.einsum("sk,skq->sq", self.share, rows[self.index]))
         return np.asarray(self.matrix @ rows)
 

@@ -12,10 +12,12 @@ from seqopt.engines.interface import SHAPES, Fields, Want, names_wanted
 from seqopt.engines.rigid.grip_equations import Pairs, grip_forces, pairs_of, share_pairs, trusted
 from seqopt.engines.rigid.operator import ComplianceOperator
 
-CHUNK = 4096  # grip sets per pass: keeps the work arrays in the processor's cache
+_CHUNK = 4096  # grip sets per pass: keeps the work arrays in the processor's cache
 ACCURACY = 1e-9  # largest error of fields over the largest of each
-UNSEEN = 100 * np.finfo(float).eps  # largest error that was met over what is read off the equations
-CANCEL = 10.0  # what the grips undo over what is left, where pivots do not
+_UNSEEN = (
+    100 * np.finfo(float).eps
+)  # largest error that was met over what is read off the equations
+_CANCEL = 10.0  # what the grips undo over what is left, where pivots do not
 
 
 @dataclass(frozen=True)
@@ -65,12 +67,12 @@ def try_forces(
     """
     sets, index, pairs = len(columns), operator.load_index(columns), pairs_of(operator, columns)
     force, good = np.empty(index.shape), np.empty(sets, dtype=bool)
-    for start in range(0, sets, CHUNK):
-        part = slice(start, start + CHUNK)
-        mine = pairs if sets <= CHUNK else pairs.within(start, start + CHUNK)
+    for start in range(0, sets, _CHUNK):
+        part = slice(start, start + _CHUNK)
+        mine = pairs if sets <= _CHUNK else pairs.within(start, start + _CHUNK)
         found = grip_forces(operator, columns[part], index[part], mine)
         force[part] = found.force
-        good[part] = trusted(operator, index[part], found, accuracy / UNSEEN)
+        good[part] = trusted(operator, index[part], found, accuracy / _UNSEEN)
     force[~good] = 0.0
     if not even:
         good &= ~cancels(operator, index, force)
@@ -106,10 +108,10 @@ def cancels(operator: ComplianceOperator, index: Ints, force: Floats) -> Bools:
         return out
     size = np.abs(operator.flexibility)
     dead = operator.dead_displacement
-    for start in range(0, len(index), CHUNK):
-        rows, pull = index[start : start + CHUNK], force[start : start + CHUNK]
+    for start in range(0, len(index), _CHUNK):
+        rows, pull = index[start : start + _CHUNK], force[start : start + _CHUNK]
         held = rows[:, :, None], rows[:, None]
         parts = np.einsum("sij,sj->si", size[held], np.abs(pull)) + np.abs(dead[rows])
         left = np.abs(operator.answer("displacement", rows, pull)).max(axis=1)
-        out[start : start + CHUNK] = parts.max(axis=1) > CANCEL * left
+        out[start : start + _CHUNK] = parts.max(axis=1) > _CANCEL * left
     return out

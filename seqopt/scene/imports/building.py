@@ -11,9 +11,9 @@ import numpy as np
 from seqopt.errors import SceneError
 from seqopt.scene.blocks import as_vectors, block_brick
 from seqopt.scene.checks import LARGEST_NUMBER, positive, short
-from seqopt.scene.imports.contacts import GROUND, Touching, face_ground, face_joint, find_touching
+from seqopt.scene.imports.contacts import GROUND, Contacts, face_ground, face_joint, find_contacts
 from seqopt.scene.imports.content import MOST_CORNERS, UNITS, UPS, Content, FileJoint, Given
-from seqopt.scene.imports.repair import Tidied, tidy_shape
+from seqopt.scene.imports.repair import Repaired, repair_shape
 from seqopt.scene.library.common import MASONRY, JointLaw, mobile_robots, whole_number
 from seqopt.scene.parts import Brick, Ground, Joint
 from seqopt.scene.scene import Scene
@@ -83,7 +83,7 @@ def build_scene(content: Content, given: Given, source: str) -> Scene:
         supports = _supports(content, given, said)
         blocks = _tidied(content, supports, said)
         bricks = _bricks(content, given, blocks, supports, said)
-        touching = find_touching(content, given, blocks, bricks)
+        touching = find_contacts(content, given, blocks, bricks)
         said += touching.said
         law = _law(content, given, touching, said)
         springs = _springs(touching, bricks, law)
@@ -155,9 +155,9 @@ def _supports(content: Content, given: Given, said: list[str]) -> set[int]:
     return {place[key] for key in keys}
 
 
-def _tidied(content: Content, supports: set[int], said: list[str]) -> list[Tidied]:
+def _tidied(content: Content, supports: set[int], said: list[str]) -> list[Repaired]:
     """Return the blocks as polyhedra, and say what was mended."""
-    blocks = [tidy_shape(b, may_be_open=i in supports) for i, b in enumerate(content.blocks)]
+    blocks = [repair_shape(b, may_be_open=i in supports) for i, b in enumerate(content.blocks)]
     total = sum((block.mended for block in blocks), Counter[str]())
     said += [f"{text}: {count}" for text, count in total.items()]
     return blocks
@@ -166,7 +166,7 @@ def _tidied(content: Content, supports: set[int], said: list[str]) -> list[Tidie
 def _bricks(
     content: Content,
     given: Given,
-    blocks: Sequence[Tidied],
+    blocks: Sequence[Repaired],
     supports: set[int],
     said: list[str],
 ) -> dict[int, Brick]:
@@ -204,7 +204,7 @@ def block_numbers(keys: Sequence[str]) -> list[int]:
     return [*range(1, len(keys) + 1)]
 
 
-def _law(content: Content, given: Given, touching: Touching, said: list[str]) -> JointLaw:
+def _law(content: Content, given: Given, touching: Contacts, said: list[str]) -> JointLaw:
     law = given.law or content.law or MASONRY
     if touching.faces or any(joint.translational is None for joint in touching.joints):
         origin = "as given" if given.law else "of the file" if content.law else "by default"
@@ -214,7 +214,7 @@ def _law(content: Content, given: Given, touching: Touching, said: list[str]) ->
 
 
 def _springs(
-    touching: Touching, bricks: Mapping[int, Brick], law: JointLaw
+    touching: Contacts, bricks: Mapping[int, Brick], law: JointLaw
 ) -> tuple[tuple[Joint, ...], tuple[Ground, ...]]:
     """Return the joints and ground ends where blocks touch."""
     made: list[Joint | Ground] = []
@@ -264,7 +264,7 @@ def _faceless(joint: FileJoint, bricks: Mapping[int, Brick], law: JointLaw) -> J
 
 
 def _order(
-    touching: Touching, content: Content, bricks: Mapping[int, Brick], said: list[str]
+    touching: Contacts, content: Content, bricks: Mapping[int, Brick], said: list[str]
 ) -> list[int]:
     """Return the places of the bricks in the order of building."""
     places = [*bricks]

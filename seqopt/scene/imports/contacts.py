@@ -21,7 +21,7 @@ from seqopt.scene.imports.detection import (
     require_polygons,
     touching_faces,
 )
-from seqopt.scene.imports.repair import Tidied
+from seqopt.scene.imports.repair import Repaired
 from seqopt.scene.library.common import JointLaw
 from seqopt.scene.parts import Brick, Ground, Joint
 from seqopt.scene.shape import Polyhedron, normal_of
@@ -162,7 +162,7 @@ _Held = tuple[tuple[int, int], _FlatFace]
 
 
 @dataclass(frozen=True)
-class Touching:
+class Contacts:
     """Where blocks touch each other and the ground.
 
     ``faces`` (int, int): places of the blocks in the file, the ground is -1 and comes first;
@@ -179,9 +179,9 @@ class Touching:
         return [*(pair for pair, _ in self.faces), *(joint.blocks for joint in self.joints)]
 
 
-def find_touching(
-    content: Content, given: Given, blocks: Sequence[Tidied], bricks: Mapping[int, Brick]
-) -> Touching:
+def find_contacts(
+    content: Content, given: Given, blocks: Sequence[Repaired], bricks: Mapping[int, Brick]
+) -> Contacts:
     """Return where blocks touch each other and the ground.
 
     ``content``: in m. ``blocks``: all of the file. ``bricks``: those that are built, by their
@@ -211,7 +211,7 @@ def find_touching(
     if everywhere and not any(GROUND in joint.blocks for joint in joints):
         faces += _standing(bricks, facets, gap)
         said.append("no supports are named: blocks with a face at the lowest level stand there")
-    return Touching(tuple(faces), tuple(joints), tuple(said))
+    return Contacts(tuple(faces), tuple(joints), tuple(said))
 
 
 def _on_ground(pair: tuple[int, int], face: _FlatFace, bricks: Mapping[int, Brick]) -> list[_Held]:

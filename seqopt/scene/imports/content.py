@@ -114,8 +114,3 @@ class Given:
     robots: int = 3
     name: str | None = None
     progress: Tell | None = None
-
-
-def _mean_place(blocks: Sequence[FileBlock]) -> Floats:
-    """Return the middles of blocks' vertices. Result (B, 3)."""
-    return np.array([block.vertices.mean(axis=0) for block in blocks]).reshape(-1, 3)

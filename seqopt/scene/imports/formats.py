@@ -21,7 +21,7 @@ from seqopt.scene.imports.meshes import read_mesh, read_obj
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import warn_of
 
-DOCUMENTS: dict[str, Callable[[Any, str], Content]] = {
+_DOCUMENTS: dict[str, Callable[[Any, str], Content]] = {
     "compas_assembly": read_assembly,
     "compas_dem": read_model,
     "compas_timber": read_timber,
@@ -29,7 +29,7 @@ DOCUMENTS: dict[str, Callable[[Any, str], Content]] = {
 }
 _SUFFIXES = {".csv": "boxes", ".obj": "obj", ".ply": "ply", ".stl": "stl", ".json": ""}
 _LYING = 3  # blocks on the ground from which on it is odd if most are there
-FORMATS = (*DOCUMENTS, "boxes", "obj", "ply", "stl")
+FORMATS = (*_DOCUMENTS, "boxes", "obj", "ply", "stl")
 
 
 def import_scene(path: str | Path, form: str | None = None, given: Given | None = None) -> Scene:
@@ -96,13 +96,13 @@ def read_content(path: Path, form: str | None = None) -> Content:
     if named in ("boxes", "obj"):
         return (read_boxes if named == "boxes" else read_obj)(text, source)
     document = parse_json(text, source)
-    return DOCUMENTS[named or sniffed(document, source)](document, source)
+    return _DOCUMENTS[named or sniffed(document, source)](document, source)
 
 
 def sniffed(document: Any, source: str) -> str:
     """Return which format a JSON document has.
 
-    Result: one of `DOCUMENTS`. Raises `SceneError` if it has none of them.
+    Result: one of `_DOCUMENTS`. Raises `SceneError` if it has none of them.
     """
     by_kind = {"blockmodel": "compas_dem", "problem": "compas_dem", "timbermodel": "compas_timber"}
     if kind(document) in by_kind:

@@ -43,7 +43,7 @@ def _split_blocks(vertices: Floats, faces: _Polygons) -> list[list[int]]:
     >>> corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 0, -1]])
     >>> up = [(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)]
     >>> down = [(0, 1, 2), (0, 4, 1), (0, 2, 4), (1, 4, 2)]
-    >>> split_blocks(corners, [*up, *down])
+    >>> _split_blocks(corners, [*up, *down])
     [[0, 1, 2, 3], [4, 5, 6, 7]]
     """
     place = _united(vertices)

@@ -26,7 +26,7 @@ _TURNED = "faces are turned so that all agree which side is outside"
 
 
 @dataclass(frozen=True)
-class Tidied:
+class Repaired:
     """A block whose faces are in order.
 
     ``solid``: a surface where a support is not closed; ``facets``: its faces as the file has them,
@@ -39,7 +39,7 @@ class Tidied:
     mended: Counter[str]
 
 
-def tidy_shape(block: FileBlock, *, may_be_open: bool = False) -> Tidied:
+def repair_shape(block: FileBlock, *, may_be_open: bool = False) -> Repaired:
     """Return a block as a polyhedron, or a support that is not closed as a surface.
 
     ``block``: in m; ``may_be_open``: whether it is a support, of which the surface alone counts.
@@ -57,12 +57,12 @@ def tidy_shape(block: FileBlock, *, may_be_open: bool = False) -> Tidied:
     place = {v: i for i, v in enumerate(used)}
     try:
         named = tuple(tuple(place[v] for v in face) for face in faces)
-        return Tidied(Polyhedron(as_vectors(points[used]), named), facets, mended)
+        return Repaired(Polyhedron(as_vectors(points[used]), named), facets, mended)
     except SceneError as error:
         if may_be_open and faces:
             mended[_OPEN] += 1
             both = Surface(points, (*facets.faces, *(face[::-1] for face in facets.faces)))
-            return Tidied(both, both, mended)
+            return Repaired(both, both, mended)
         raise SceneError(f"block {block.key}: {error}") from error
 
 

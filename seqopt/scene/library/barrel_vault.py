@@ -20,7 +20,7 @@ from seqopt.scene.library.common import MASONRY, JointLaw
 from seqopt.scene.parts import Robot
 from seqopt.scene.scene import Scene
 
-Row = dict[str, str]
+_Row = dict[str, str]
 
 
 def barrel_vault(
@@ -54,7 +54,7 @@ def barrel_vault(
     return scene
 
 
-def _shape(row: Row, law: JointLaw) -> ArchShape:
+def _shape(row: _Row, law: JointLaw) -> ArchShape:
     """Return the shape of a tested vault."""
     span, rise, width = (float(row[key]) for key in ("L_m", "r_m", "b_m"))
     thickness, bricks = float(row["t_mm"]) / 1e3, int(row["n_bricks"])
@@ -77,7 +77,7 @@ def _shape(row: Row, law: JointLaw) -> ArchShape:
     )
 
 
-def _row(test: int) -> Row:
+def _row(test: int) -> _Row:
     """Return the printed numbers of a test."""
     source = resources.files("seqopt").joinpath("data/paper/arch_tests.csv")
     rows = {row["test"]: row for row in csv.DictReader(source.read_text("utf-8").splitlines())}

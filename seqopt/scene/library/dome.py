@@ -26,8 +26,8 @@ from seqopt.scene.library.joints import as_vector, ground_under, joints_between,
 from seqopt.scene.parts import Brick, Robot
 from seqopt.scene.scene import Scene
 
-BONDS = ("running", "herringbone")
-LENGTHS = ("span", "rise", "opening", "thickness")
+_BONDS = ("running", "herringbone")
+_LENGTHS = ("span", "rise", "opening", "thickness")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,11 +64,11 @@ class DomeShape:
         _set(self, "courses", whole_number("dome: courses", self.courses, 1))
         _set(self, "around", whole_number("dome: around", self.around, 3))
         few_enough("dome", self.courses * self.around)
-        for name in LENGTHS:
+        for name in _LENGTHS:
             _set(self, name, positive(f"dome: {name}", getattr(self, name), "m"))
         _set(self, "gap", joint_width("dome: gap", self.gap))
-        if self.bond not in BONDS:
-            raise SceneError(f"dome: bond is {short(self.bond)}; give one of {', '.join(BONDS)}")
+        if self.bond not in _BONDS:
+            raise SceneError(f"dome: bond is {short(self.bond)}; give one of {', '.join(_BONDS)}")
         if self.bond == "herringbone" and 2 * self.around % REPEAT:
             raise SceneError(
                 f"dome: around is {self.around}; give an even number, so that herringbone closes"
@@ -100,9 +100,9 @@ def _set(value: object, name: str, content: object) -> None:
     object.__setattr__(value, name, content)
 
 
-LEAST_SHARE = 0.1  # of the smaller face: bricks that share less have no joint
-NO_SHARE = 1e-6  # of an angle: places that share less only meet at a corner
-TURN = 2 * math.pi
+_LEAST_SHARE = 0.1  # of the smaller face: bricks that share less have no joint
+_NO_SHARE = 1e-6  # of an angle: places that share less only meet at a corner
+_TURN = 2 * math.pi
 
 
 @dataclass(frozen=True)
@@ -151,7 +151,7 @@ def _laid(shape: DomeShape) -> tuple[list[_Place], list[tuple[int, int]], Floats
     places = _running(shape) if shape.bond == "running" else _herringbone(shape)
     loose = [_brick(shape, place, i) for i, place in enumerate(places)]
     pairs, normals = _beside(shape, places)
-    kept = np.flatnonzero(shares(loose, pairs, normals) >= LEAST_SHARE)
+    kept = np.flatnonzero(shares(loose, pairs, normals) >= _LEAST_SHARE)
     pairs, normals = [pairs[k] for k in kept], normals[kept]
     order = touching_order(len(places), pairs, [i for i, p in enumerate(places) if not p.low])
     if len(order) < len(places):
@@ -171,7 +171,7 @@ def _running(shape: DomeShape) -> list[_Place]:
     for row in range(shape.courses):
         size = math.cos(shape.latitude(row)) / math.cos(shape.latitude(0))
         count = max(3, round(shape.around * size))
-        half = 0.5 * TURN / count
+        half = 0.5 * _TURN / count
         shift = half * (row % 2)
         out += [_Place(row, row + 1, 2 * half * i + shift, half) for i in range(count)]
     return out
@@ -179,7 +179,7 @@ def _running(shape: DomeShape) -> list[_Place]:
 
 def _herringbone(shape: DomeShape) -> list[_Place]:
     """Return the tiles of a herringbone that closes around the dome, from the ground up."""
-    cell = 0.5 * TURN / shape.around
+    cell = 0.5 * _TURN / shape.around
     out = []
     for tile in tiles(shape.courses, range(2 * shape.around)):
         rows, columns = (2, 1) if tile.along else (1, 2)
@@ -192,11 +192,11 @@ def _beside(shape: DomeShape, places: Sequence[_Place]) -> tuple[list[tuple[int,
     """Return which places share an edge, and directions across these, (P, 3)."""
     low, high = (np.array([getattr(p, name) for p in places]) for name in ("low", "high"))
     azimuth, half = (np.array([getattr(p, name) for p in places]) for name in ("azimuth", "half"))
-    away = np.abs((azimuth[:, None] - azimuth + 0.5 * TURN) % TURN - 0.5 * TURN)
+    away = np.abs((azimuth[:, None] - azimuth + 0.5 * _TURN) % _TURN - 0.5 * _TURN)
     shared = half[:, None] + half - away
-    above = (high[:, None] == low) & (shared > NO_SHARE * half)
+    above = (high[:, None] == low) & (shared > _NO_SHARE * half)
     level = (low[:, None] < high) & (low < high[:, None])
-    beside = level & (np.abs(shared) <= NO_SHARE * half)
+    beside = level & (np.abs(shared) <= _NO_SHARE * half)
     a, b = np.nonzero(np.triu(above | above.T | beside, 1))
     middle = [_directions(shape.latitude(0.5 * (p.low + p.high)), p.azimuth) for p in places]
     axes = np.array(middle)[:, :2]

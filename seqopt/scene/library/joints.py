@@ -102,7 +102,7 @@ class _Faces(FrozenValue):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class _Meeting(FrozenValue):
+class _Overlaps(FrozenValue):
     """Where pairs of boxes look at each other.
 
     ``faces``: of the first boxes and of the second. ``along`` (P, 3): mean normals, from the first
@@ -116,7 +116,7 @@ class _Meeting(FrozenValue):
     shared: _ContactAreas
 
 
-def meeting(shapes: Boxes, pairs: _Pairs, normals: Floats | None = None) -> _Meeting:
+def overlaps(shapes: Boxes, pairs: _Pairs, normals: Floats | None = None) -> _Overlaps:
     """Return where boxes look at each other.
 
     ``pairs`` (int, int): at least one. ``normals`` (P, 3): about at right angles to the faces; by
@@ -131,7 +131,7 @@ def meeting(shapes: Boxes, pairs: _Pairs, normals: Floats | None = None) -> _Mee
     across = _unit(across - along * (along * across).sum(axis=1, keepdims=True))
     sides = np.stack([across, np.cross(along, across)], axis=1)
     shared = contact_areas(_corners(shapes, one, sides), _corners(shapes, other, sides))
-    return _Meeting((one, other), along, sides, shared)
+    return _Overlaps((one, other), along, sides, shared)
 
 
 def shares(bricks: Sequence[Brick], pairs: _Pairs, normals: Floats) -> Floats:
@@ -143,7 +143,7 @@ def shares(bricks: Sequence[Brick], pairs: _Pairs, normals: Floats) -> Floats:
     if not pairs:
         return np.zeros(0)
     shapes = boxes(bricks)
-    found = meeting(shapes, pairs, normals)
+    found = overlaps(shapes, pairs, normals)
     row = np.arange(len(pairs))
     whole = [
         4 * half[row, (face.axis + 1) % 3] * half[row, (face.axis + 2) % 3]
@@ -153,7 +153,7 @@ def shares(bricks: Sequence[Brick], pairs: _Pairs, normals: Floats) -> Floats:
     return np.asarray(found.shared.area / np.minimum(*whole))
 
 
-def _widths(shapes: Boxes, found: _Meeting) -> tuple[Floats, Floats, Floats]:
+def _widths(shapes: Boxes, found: _Overlaps) -> tuple[Floats, Floats, Floats]:
     """Return where faces are along the normals, in the middle of their overlaps.
 
     Results: ``start``, ``end`` (P,): of the first faces and of the second, m from the origin's
@@ -248,7 +248,7 @@ def joints_between(
     if not pairs:
         return ()
     shapes = boxes(bricks)
-    found = meeting(shapes, pairs, normals)
+    found = overlaps(shapes, pairs, normals)
     _require_overlap(bricks, pairs, found)
     place, thick = _between(shapes, pairs, found)
     faces = zip(found.shared.area.tolist(), found.shared.moments.tolist(), strict=True)
@@ -299,7 +299,7 @@ def as_vector(values: Floats) -> Vector:
     return x, y, z
 
 
-def _require_overlap(bricks: Sequence[Brick], pairs: _Pairs, found: _Meeting) -> None:
+def _require_overlap(bricks: Sequence[Brick], pairs: _Pairs, found: _Overlaps) -> None:
     """Raise an error that names the first two bricks whose faces share nothing."""
     apart = np.flatnonzero(found.shared.area == 0)
     if len(apart):
@@ -310,7 +310,7 @@ def _require_overlap(bricks: Sequence[Brick], pairs: _Pairs, found: _Meeting) ->
         )
 
 
-def _between(shapes: Boxes, pairs: _Pairs, found: _Meeting) -> tuple[Floats, list[float]]:
+def _between(shapes: Boxes, pairs: _Pairs, found: _Overlaps) -> tuple[Floats, list[float]]:
     """Return the points (P, 3) halfway between faces, and the widths of joints that are thick."""
     start, end, taper = _widths(shapes, found)
     middle = (found.shared.centroid[:, None, :] @ found.sides)[:, 0]

@@ -18,8 +18,8 @@ from seqopt.scene.boxes import boxes, separations
 from seqopt.scene.scene_file import (
     about,
     builtin_scenes,
-    doubts,
     dump_scene,
+    find_warnings,
     load_scene,
     parse_scene,
 )
@@ -53,7 +53,7 @@ def test_every_built_in_scene_is_named_drawn_from_text_and_not_odd(name):
     scene = load_scene(name)
     assert scene.name == name
     assert scene.provenance
-    assert doubts(scene) == ()
+    assert find_warnings(scene) == ()
     assert about(name)
     assert "\n" not in about(name)
     assert parse_scene(dump_scene(scene)) == scene
