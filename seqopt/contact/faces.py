@@ -77,8 +77,7 @@ def face_distance(brick: Brick, normal: Floats, point: Floats) -> float:
     ``normal`` (3,): unit vector that points into the brick; ``point`` (3,): from where, m. Result:
     m; negative if the point lies inside.
     """
-    length, width = np.array(brick.length_axis), np.array(brick.width_axis)
-    frame = np.stack([length, width, np.cross(length, width)])
+    frame = brick.frame
     i = int(np.abs(frame @ normal).argmax())
     outward = -np.sign(frame[i] @ normal) * frame[i]
     face = np.array(brick.position) + 0.5 * brick.dimensions[i] * outward
@@ -228,8 +227,7 @@ def _overlap(axes: Floats, point: Floats, between: list[Brick], name: str) -> Fl
 
 def _face(brick: Brick, normal: Floats, point: Floats) -> Floats:
     """Return the corners (4, 3) of the face of a brick that looks at a plane."""
-    length, width = np.array(brick.length_axis), np.array(brick.width_axis)
-    frame = np.stack([length, width, np.cross(length, width)])
+    frame = brick.frame
     half = 0.5 * np.array(brick.dimensions)[:, None] * frame
     i = int(np.abs(frame @ normal).argmax())
     toward = np.sign((point - np.array(brick.position)) @ normal) * np.sign(frame[i] @ normal)

@@ -11,6 +11,7 @@ import numpy as np
 
 from seqopt.arrays import Floats, Terse, Vector
 from seqopt.errors import SceneError, SceneWarning
+from seqopt.scene.blocks import as_vector
 from seqopt.scene.checks import short
 from seqopt.scene.parts import THICKEST, Anywhere, Brick, Ground, Joint, Reach, Robot, Side
 from seqopt.scene.scene import Scene
@@ -242,9 +243,9 @@ def _brick(shape: ArchShape, b: int, pose: tuple[Floats, Floats, Floats], line_n
         placing = nodes[int((letter == "L") == (b % 2 == 1))]  # robots on either side take turns
     return Brick(
         name=b,
-        position=_vector(position),
-        length_axis=_vector(length_axis),
-        width_axis=_vector(width_axis),
+        position=as_vector(position),
+        length_axis=as_vector(length_axis),
+        width_axis=as_vector(width_axis),
         dimensions=shape.dimensions,
         density=shape.density,
         nodes=nodes,
@@ -256,8 +257,8 @@ def _joint(shape: ArchShape, brick: int, position: Floats, direction: Floats) ->
     """Return the joint between a brick and the next one."""
     return Joint(
         bricks=(brick, brick + 1),
-        position=_vector(position),
-        along=_vector(direction / np.linalg.norm(direction)),
+        position=as_vector(position),
+        along=as_vector(direction / np.linalg.norm(direction)),
         across=_across(direction),
         translational_stiffness=shape.translational_stiffness,
         rotational_stiffness=shape.rotational_stiffness,
@@ -268,22 +269,17 @@ def _joint(shape: ArchShape, brick: int, position: Floats, direction: Floats) ->
 def _ground(shape: ArchShape, brick: int, end: Floats, tangent: Floats, sign: float) -> Ground:
     return Ground(
         brick=brick,
-        position=_vector(end),
-        along=_vector(tangent),
+        position=as_vector(end),
+        along=as_vector(tangent),
         across=_across(tangent),
         translational_stiffness=shape.translational_stiffness,
         rotational_stiffness=shape.rotational_stiffness,
         thickness=shape.thickness,
-        anchor=_vector(end + sign * shape.stub * tangent),
+        anchor=as_vector(end + sign * shape.stub * tangent),
     )
 
 
 def _across(direction: Floats) -> Vector:
     """Return the unit vector to the left at right angles to a direction."""
     rest = _LEFT - direction * (direction @ _LEFT) / (direction @ direction)
-    return _vector(rest / np.linalg.norm(rest))
-
-
-def _vector(values: Floats) -> Vector:
-    x, y, z = values.tolist()
-    return x, y, z
+    return as_vector(rest / np.linalg.norm(rest))

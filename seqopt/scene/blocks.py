@@ -69,6 +69,12 @@ def as_vectors(points: Floats) -> tuple[Vector, ...]:
     return tuple((x, y, z) for x, y, z in points.tolist())
 
 
+def as_vector(values: Floats) -> Vector:
+    """Return three numbers of an array as a tuple. ``values`` (3,)."""
+    x, y, z = values.tolist()
+    return x, y, z
+
+
 def vertices_of(brick: Brick) -> tuple[Floats, Sequence[Sequence[int]]]:
     """Return the vertices of a brick, box or not, and its faces.
 
@@ -77,12 +83,7 @@ def vertices_of(brick: Brick) -> tuple[Floats, Sequence[Sequence[int]]]:
     """
     if brick.shape is not None:
         return np.asarray(brick.shape.points + np.array(brick.position)), brick.shape.faces
-    length, width = np.array(brick.length_axis), np.array(brick.width_axis)
-    half = (
-        0.5
-        * np.array(brick.dimensions)[:, None]
-        * np.stack([length, width, np.cross(length, width)])
-    )
+    half = 0.5 * np.array(brick.dimensions)[:, None] * brick.frame
     return np.asarray(np.array(brick.position) + BOX_CORNERS @ half), BOX_FACES
 
 

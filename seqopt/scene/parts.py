@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from seqopt.arrays import Terse, Vector
+from seqopt.arrays import Floats, Terse, Vector
 from seqopt.errors import SceneError
 from seqopt.scene.checks import (
     UNIT_TOLERANCE,
@@ -178,6 +178,12 @@ class Brick(Terse):
         if self.shape is not None:
             across = (self.length_axis, self.width_axis)
             check_shape(where, self.shape, self.dimensions, across)
+
+    @property
+    def frame(self) -> Floats:
+        """Unit vectors along length, width and thickness, (3, 3), as rows."""
+        length, width = np.array(self.length_axis), np.array(self.width_axis)
+        return np.stack([length, width, np.cross(length, width)])
 
     @property
     def volume(self) -> float:

@@ -106,8 +106,7 @@ def _of_joints(scene: Scene) -> Iterator[str]:
 
 def _distance(brick: Brick, point: Vector) -> float:
     """Return the distance of a point from a brick, m."""
-    length, width = np.array(brick.length_axis), np.array(brick.width_axis)
-    frame = np.stack([length, width, np.cross(length, width)])
+    frame = brick.frame
     at = np.abs(frame @ (np.array(point) - np.array(brick.position)))
     return float(np.linalg.norm(np.maximum(at - 0.5 * np.array(brick.dimensions), 0.0)))
 

@@ -112,7 +112,7 @@ class Prover:
 def proven_value(assembly: Assembly, case: Case, answer: Answer) -> float:
     """Return the z of an answer if its forces and its motion prove it.
 
-    Result: naN if they do not, or a number of the answer is not finite.
+    Result: NaN if they do not, or a number of the answer is not finite.
     """
     gap = abs(answer.value - bound(assembly, case, answer))
     small = gap <= GAP * max(1.0, abs(answer.value))
@@ -122,7 +122,7 @@ def proven_value(assembly: Assembly, case: Case, answer: Answer) -> float:
 def _held_value(assembly: Assembly, case: Case, answer: Answer) -> float:
     """Return the z of an answer if its forces alone prove that it will do.
 
-    Result: naN if they do not, or a number of the answer is not finite.
+    Result: NaN if they do not, or a number of the answer is not finite.
     """
     if not is_finite(assembly, answer):
         return np.nan
@@ -152,7 +152,7 @@ def safe_pull(prove: Prover, fixed: Case, up: Vector) -> tuple[list[Proven], flo
     no more than `NEAR`, or `_MORE` have been.
 
     ``fixed``: whose strengths do not grow with z; ``up``: unit vector against gravity. Results:
-    ``pulls``: of `sideways`, then of the directions added; ``worst``: naN if forces prove too few.
+    ``pulls``: of `sideways`, then of the directions added; ``worst``: NaN if forces prove too few.
     """
     angles = 2 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
     pulls = [prove(case) for case in sideways(fixed, up)]

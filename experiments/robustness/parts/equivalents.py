@@ -137,7 +137,7 @@ EQUIVALENT = (
         for old, new in (("2 *", "2 +"), ("2 *", "3 *"))
     ),
     *(
-        Equivalent(TRIAL, "sets <= CHUNK", "<=", new, "those within all sets are all")
+        Equivalent(TRIAL, "sets <= _CHUNK", "<=", new, "those within all sets are all")
         for new in ("<", "==")
     ),
     Equivalent(TRIAL, "CANCEL * left", ">", ">=", "no sum is it to the last bit"),

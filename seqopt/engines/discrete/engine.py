@@ -68,8 +68,7 @@ def pad_stiffness(network: Network, index: int, node: Floats, pinch: Pinch) -> F
     ``index``: of the brick in build order; ``node`` (3,). Result (6, 6): N/m and N m/rad.
     """
     brick = network.scene.placed[index]
-    length, width = np.array(brick.length_axis), np.array(brick.width_axis)
-    axes = np.stack([length, width, np.cross(length, width)])
+    axes = brick.frame
     out = axes[pinch.across]
     sides = np.delete(axes, pinch.across, axis=0)
     moduli = pinch.stiffness.tangential * np.eye(3)

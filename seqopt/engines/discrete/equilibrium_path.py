@@ -20,9 +20,7 @@ _FIRST_RESISTANCE = 1.0  # resistance to motion at first, over the stiffness
 _MOVES = 120  # against a resistance
 _HALVINGS = 4
 FAR = 0.1  # motion over a brick's length beyond which a structure has gone
-_LENT_STIFFNESS = (
-    1e-12  # stiffness lent to every motion, over its own: a loose body can come to rest
-)
+_LENT_STIFFNESS = 1e-12  # lent to every motion, over its own: a loose body can come to rest
 
 
 @dataclass(frozen=True, eq=False, repr=False)

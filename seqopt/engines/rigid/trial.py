@@ -14,9 +14,7 @@ from seqopt.engines.rigid.operator import ComplianceOperator
 
 _CHUNK = 4096  # grip sets per pass: keeps the work arrays in the processor's cache
 ACCURACY = 1e-9  # largest error of fields over the largest of each
-_UNSEEN = (
-    100 * np.finfo(float).eps
-)  # largest error that was met over what is read off the equations
+_UNSEEN = 100 * np.finfo(float).eps  # largest error met, over what is read off the equations
 _CANCEL = 10.0  # what the grips undo over what is left, where pivots do not
 
 

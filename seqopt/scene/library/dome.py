@@ -10,6 +10,7 @@ import numpy as np
 
 from seqopt.arrays import Floats
 from seqopt.errors import SceneError
+from seqopt.scene.blocks import as_vector
 from seqopt.scene.boxes import require_apart
 from seqopt.scene.checks import positive, short
 from seqopt.scene.library.common import (
@@ -22,7 +23,7 @@ from seqopt.scene.library.common import (
     whole_number,
 )
 from seqopt.scene.library.herringbone import REPEAT, tiles
-from seqopt.scene.library.joints import as_vector, ground_under, joints_between, shares
+from seqopt.scene.library.joints import ground_under, joints_between, shares
 from seqopt.scene.parts import Brick, Robot
 from seqopt.scene.scene import Scene
 

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from seqopt.arrays import Floats, FrozenValue, Ints, Vector
+from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.errors import SceneError
+from seqopt.scene.blocks import as_vector
 from seqopt.scene.boxes import Boxes, boxes
 from seqopt.scene.library.common import JointLaw
 from seqopt.scene.parts import THICKEST, Brick, Ground, Joint
@@ -291,12 +292,6 @@ def ground_under(brick: Brick, down: Floats, law: JointLaw, stub: float = _STUB)
         rotational_stiffness=turn,
         anchor=as_vector(place + stub * out),
     )
-
-
-def as_vector(values: Floats) -> Vector:
-    """Return three numbers of an array as a tuple. ``values`` (3,)."""
-    x, y, z = values.tolist()
-    return x, y, z
 
 
 def _require_overlap(bricks: Sequence[Brick], pairs: _Pairs, found: _Overlaps) -> None:
