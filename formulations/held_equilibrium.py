@@ -29,8 +29,13 @@ from scipy import sparse
 
 from seqopt.arrays import Floats, Ints
 from seqopt.contact.assembly import Assembly
-from seqopt.stability.directions import Directions, better_directions, first_directions
-from seqopt.stability.held_program import Enough, HeldProgram
+from seqopt.stability.held_program import (
+    Directions,
+    Enough,
+    HeldProgram,
+    better_directions,
+    first_directions,
+)
 from seqopt.stability.limit_analysis import CAP, Answer, Case, Claim, limits
 
 ROUNDS = 12  # of refinement

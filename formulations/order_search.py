@@ -42,9 +42,8 @@ from seqopt.placement.order_work import Trial, trying, worth
 from seqopt.placement.schedule_formulation import Finds, ScheduleFormulation
 from seqopt.responses.resources import HERE, Resources
 from seqopt.scene.orders import ORDERS, Order
-from seqopt.work.crew import hire
-from seqopt.work.ordered import map_ordered
 from seqopt.work.progress import Stage
+from seqopt.work.workers import hire, map_ordered
 
 FAR_BELOW = 4.0  # the best order known, over the first threshold
 GROWTH = 1.1  # of the threshold

@@ -43,8 +43,7 @@ if TYPE_CHECKING:
     from seqopt.placement.solving import solve
     from seqopt.responses.table import analyze
     from seqopt.scene.arch import ArchShape, arch_scene
-    from seqopt.scene.parts import Robot
-    from seqopt.scene.reach import Sphere
+    from seqopt.scene.parts import Robot, Sphere
     from seqopt.scene.scenarios import scenarios
     from seqopt.scene.scene import Scene
     from seqopt.scene.scene_file import load_scene, save_scene
@@ -55,8 +54,7 @@ if TYPE_CHECKING:
     from seqopt.sequence.steps import Step
     from seqopt.sequence.three_robots import modified_sequential, three_robot_loop
     from seqopt.sequence.two_robots import cantilever, sequential
-    from seqopt.stability.assessment import Stability
-    from seqopt.stability.steps import assess_steps
+    from seqopt.stability.assessment import Stability, assess_steps
     from seqopt.study.presets import CRITERIA
     from seqopt.workflow import optimize
 
@@ -80,8 +78,7 @@ _HOMES = {
     "placement.solving": ("solve",),
     "responses.table": ("analyze",),
     "scene.arch": ("ArchShape", "arch_scene"),
-    "scene.parts": ("Robot",),
-    "scene.reach": ("Sphere",),
+    "scene.parts": ("Robot", "Sphere"),
     "scene.scenarios": ("scenarios",),
     "scene.scene": ("Scene",),
     "scene.scene_file": ("load_scene", "save_scene"),
@@ -92,8 +89,7 @@ _HOMES = {
     "sequence.steps": ("Step",),
     "sequence.three_robots": ("modified_sequential", "three_robot_loop"),
     "sequence.two_robots": ("cantilever", "sequential"),
-    "stability.assessment": ("Stability",),
-    "stability.steps": ("assess_steps",),
+    "stability.assessment": ("Stability", "assess_steps"),
     "study.presets": ("CRITERIA",),
     "workflow": ("optimize",),
 }

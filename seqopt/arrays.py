@@ -16,8 +16,8 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 Vector = tuple[float, float, float]
-Content = TypeVar("Content")
-LONGEST = 240  # letters of what is shown of a value, its name aside
+_Content = TypeVar("_Content")
+_LONGEST = 240  # letters of what is shown of a value, its name aside
 
 _COMPRESSED = (sparse.csr_array, sparse.csc_array)
 
@@ -25,13 +25,7 @@ _COMPRESSED = (sparse.csr_array, sparse.csc_array)
 def skew(vectors: Floats) -> Floats:
     """Return the matrices that take the cross product with vectors from the left.
 
-    Parameters
-    ----------
-    vectors : (..., 3) float
-
-    Returns
-    -------
-    (..., 3, 3) float
+    ``vectors`` (..., 3). Result (..., 3, 3).
 
     Examples
     --------
@@ -48,7 +42,7 @@ class Terse:
     """Base of dataclasses that stay short at the prompt, whatever they hold.
 
     Arrays are shown by shape and type, long tuples by length, numbers with six digits; fields at
-    their defaults are left out, and what would go beyond `LONGEST` letters is counted. Subclasses
+    their defaults are left out, and what would go beyond `_LONGEST` letters is counted. Subclasses
     are decorated with ``@dataclass(repr=False)``.
     """
 
@@ -60,7 +54,7 @@ class Terse:
             if field.repr and not _is_default(getattr(self, field.name), field.default)
         ]
         ends = accumulate(len(text) + 2 for text in shown)
-        kept = max(1, sum(end <= LONGEST for end in ends))
+        kept = max(1, sum(end <= _LONGEST for end in ends))
         more = [f"and {len(shown) - kept} more"] if kept < len(shown) else []
         return f"{type(self).__name__}({', '.join(shown[:kept] + more)})"
 
@@ -98,18 +92,10 @@ class FrozenValue(Terse):
         return hash((type(self), *map(_hashable, _parts(self))))
 
 
-def frozen(content: Content) -> Content:
+def frozen(content: _Content) -> _Content:
     """Return read-only arrays and sparse arrays, also within tuples and mappings.
 
-    Parameters
-    ----------
-    content : object
-        Other contents are returned as they are.
-
-    Returns
-    -------
-    object
-        The same object.
+    ``content``: other contents are returned as they are. Result: the same object.
     """
     if isinstance(content, np.ndarray):
         content.flags.writeable = False

@@ -47,16 +47,9 @@ class InfeasibleError(ProblemError):
 class MechanismError(SeqoptError, ArithmeticError):
     """Bricks, joints and grips leave a motion that nothing resists.
 
-    Parameters
-    ----------
-    message : str
-        One line that names the brick which moves most.
-
-    Attributes
-    ----------
-    mode : tuple of (int, tuple of 6 float)
-        The unresisted motion: per brick its name and (translation, rotation), the largest
-        component of all scaled to 1.
+    ``message``: one line that names the brick which moves most. ``mode`` (int, tuple of 6 float):
+    the unresisted motion: per brick its name and (translation, rotation), the largest component of
+    all scaled to 1.
     """
 
     def __init__(self, message: str, mode: tuple[tuple[int, tuple[float, ...]], ...] = ()) -> None:
@@ -91,17 +84,8 @@ class SceneWarning(UserWarning):
 def did_you_mean(given: object, known: Iterable[str]) -> str:
     """Return a hint at the word that was probably meant.
 
-    Parameters
-    ----------
-    given : str
-        A word that does not exist; there is no hint at anything else.
-    known : iterable of str
-        The words that exist.
-
-    Returns
-    -------
-    str
-        To be put after the word; empty if none is near, or two are equally near.
+    ``given``: a word that does not exist; there is no hint at anything else. ``known``: the words
+    that exist. Result: to be put after the word; empty if none is near, or two are equally near.
 
     Examples
     --------

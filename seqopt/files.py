@@ -10,21 +10,51 @@ from pathlib import Path
 
 import pandas as pd
 
-from seqopt.cells import harmless_table
 from seqopt.errors import FileError
 from seqopt.interrupts import undisturbed
 
-LARGEST_INPUT = 64_000_000  # bytes; a scene of 100,000 bricks has 40 million
+_FORMULA = ("=", "+", "-", "@")
+_MARK = "'"
+
+
+def harmless(text: str) -> str:
+    """Return a cell that spreadsheets show as it is.
+
+    ``text``: that begins with a name, of a robot for example. Result: after an apostrophe where a
+    formula could begin; `plain` takes it away again.
+
+    Examples
+    --------
+    >>> harmless("=cmd_node"), harmless("rob1_node"), plain(harmless("'=x"))
+    ("'=cmd_node", 'rob1_node', "'=x")
+    """
+    return _MARK + text if text.lstrip(_MARK).startswith(_FORMULA) else text
+
+
+def plain(text: str) -> str:
+    """Return what a cell said before `harmless`."""
+    return text[1:] if text.startswith(_MARK) and harmless(text) != text else text
+
+
+def _harmless_table(table: pd.DataFrame) -> pd.DataFrame:
+    """Return a table whose columns and texts are `harmless`; numbers stay as they are."""
+    texts = [k for k, kind in enumerate(table.dtypes) if not pd.api.types.is_numeric_dtype(kind)]
+    columns = [table.iloc[:, k] for k in range(table.shape[1])]
+    for k in texts:
+        columns[k] = columns[k].map(lambda v: harmless(v) if isinstance(v, str) else v)
+    out = pd.concat(columns, axis=1) if columns else table
+    return out.rename(columns=lambda name: harmless(name) if isinstance(name, str) else name)
+
+
+_LARGEST_INPUT = 64_000_000  # bytes; a scene of 100,000 bricks has 40 million
 HIDDEN = ".seqopt-"  # start of the names of what is not complete yet
 
 
 def read_text(path: Path) -> str:
     """Return the text of a UTF-8 file.
 
-    Raises
-    ------
-    FileError
-        If the file cannot be read, is a pipe or device, larger than `LARGEST_INPUT`, or not UTF-8.
+    Raises `FileError` if the file cannot be read, is a pipe or device, is too large, or
+    is not UTF-8.
     """
     try:
         return read_bytes(path).decode("utf-8-sig")  # spreadsheets start text with a mark
@@ -38,9 +68,9 @@ def read_bytes(path: Path) -> bytes:
         if not stat.S_ISREG(Path(path).stat().st_mode):  # a pipe would be waited for
             raise FileError(f"cannot read {path}: it is not a regular file; name one")
         with Path(path).open("rb") as stream:
-            content = stream.read(LARGEST_INPUT + 1)
-        if len(content) > LARGEST_INPUT:
-            most = LARGEST_INPUT / 1e6
+            content = stream.read(_LARGEST_INPUT + 1)
+        if len(content) > _LARGEST_INPUT:
+            most = _LARGEST_INPUT / 1e6
             raise FileError(f"cannot read {path}: it has more than {most:g} MB; name a smaller one")
         return content
     except (OSError, ValueError) as error:
@@ -52,10 +82,7 @@ def read_bytes(path: Path) -> bytes:
 def write_text(path: Path, text: str) -> None:
     """Write a UTF-8 file whole: it appears under its name only once complete.
 
-    Raises
-    ------
-    FileError
-        If the file cannot be written.
+    Raises `FileError` if the file cannot be written.
     """
     _write(path, text)
 
@@ -63,23 +90,16 @@ def write_text(path: Path, text: str) -> None:
 def csv_text(table: pd.DataFrame) -> str:
     """Return a table as CSV, without its index, numbers with six digits.
 
-    Returns
-    -------
-    str
-        A line per row, after one with the names of the columns; no text begins as a formula.
+    Result: a line per row, after one with the names of the columns; no text begins as a formula.
     """
-    safe = harmless_table(table)
+    safe = _harmless_table(table)
     return str(safe.to_csv(index=False, float_format="%.6g", lineterminator="\n"))
 
 
 def write_csv(path: Path, table: pd.DataFrame) -> None:
     """Write a table as a CSV file, whole.
 
-    Parameters
-    ----------
-    path : pathlib.Path
-    table : pandas.DataFrame
-        Written as `csv_text` does, and as `write_text` does.
+    ``table``: written as `csv_text` does, and as `write_text` does.
     """
     write_text(path, csv_text(table))
 
@@ -89,10 +109,8 @@ def write_bytes(path: Path, content: bytes) -> None:
 
     A link is followed to its target; a file that is there keeps its mode.
 
-    Raises
-    ------
-    FileError
-        If the file cannot be written, or what is there is no regular file: a device, say.
+    Raises `FileError` if the file cannot be written, or what is there is no regular file: a device,
+    say.
     """
     _write(path, content)
 
@@ -103,17 +121,8 @@ def write_folder(folder: Path, files: Mapping[str, bytes | str]) -> None:
     A new folder appears under its name with all of its files at once. In one that is there all
     files are complete beside their places before the first is put in its place.
 
-    Parameters
-    ----------
-    folder : pathlib.Path
-        Those above it are made too.
-    files : mapping of str to (bytes or str)
-        Content by name.
-
-    Raises
-    ------
-    FileError
-        If a file or the folder cannot be written.
+    ``folder``: those above it are made too; ``files``: content by name. Raises `FileError` if a
+    file or the folder cannot be written.
     """
     target = Path(os.path.realpath(folder))
     try:
@@ -134,13 +143,7 @@ def write_folder(folder: Path, files: Mapping[str, bytes | str]) -> None:
 
 
 def require_apart(outputs: Sequence[Path], inputs: Sequence[Path] = ()) -> None:
-    """Raise an error if two outputs are one file, or one is an input.
-
-    Raises
-    ------
-    FileError
-        Naming the path.
-    """
+    """Raise an error if two outputs are one file, or one is an input."""
     seen: list[Path] = []
     for path in outputs:
         if any(_is_same(path, other) for other in inputs):
@@ -153,15 +156,8 @@ def require_apart(outputs: Sequence[Path], inputs: Sequence[Path] = ()) -> None:
 def require_folder(path: Path) -> None:
     """Raise an error, before anything is computed, if a folder cannot be written.
 
-    Parameters
-    ----------
-    path : pathlib.Path
-        It need not be there.
-
-    Raises
-    ------
-    FileError
-        If it, or what is above it, is no folder or cannot be written.
+    ``path``: it need not be there. Raises `FileError` if it, or what is above it, is no folder or
+    cannot be written.
     """
     there = Path(os.path.realpath(path))
     while not os.path.lexists(there) and there != there.parent:
@@ -174,10 +170,7 @@ def require_folder(path: Path) -> None:
 def make_folder(path: Path) -> None:
     """Make a folder, and those above it, unless it is there.
 
-    Raises
-    ------
-    FileError
-        If the folder cannot be made.
+    Raises `FileError` if the folder cannot be made.
     """
     try:
         path.mkdir(parents=True, exist_ok=True)

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 
-ENDS = tuple(
+_ENDS = tuple(
     getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
 )
 
@@ -27,8 +27,8 @@ def undisturbed() -> Iterator[None]:
         came.append(number)
 
     masks = hasattr(signal, "pthread_sigmask")  # other threads may still take them: see note
-    mask = signal.pthread_sigmask(signal.SIG_BLOCK, ENDS) if masks else set()
-    answered = [(number, signal.getsignal(number)) for number in ENDS]
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, _ENDS) if masks else set()
+    answered = [(number, signal.getsignal(number)) for number in _ENDS]
     answers = [(number, answer) for number, answer in answered if callable(answer)]
     try:
         for number, _ in answers:
@@ -49,13 +49,10 @@ def answered(told: Callable[[], object]) -> Iterator[None]:
 
     Signals that somebody else answers in a way of his own are left to him.
 
-    Parameters
-    ----------
-    told : callable
-        Called between two instructions of the main thread: it only takes note.
+    ``told``: called between two instructions of the main thread: it only takes note.
     """
     mine = threading.current_thread() is threading.main_thread()
-    numbers = [n for n in ENDS if mine and signal.getsignal(n) is signal.default_int_handler]
+    numbers = [n for n in _ENDS if mine and signal.getsignal(n) is signal.default_int_handler]
 
     def give_back() -> None:
         for number in numbers:
@@ -79,15 +76,8 @@ def ending(seconds: float) -> Iterator[None]:
 
     In the main thread alone, which is interrupted; elsewhere a block takes as long as it takes.
 
-    Parameters
-    ----------
-    seconds : float
-        Infinite for no end.
-
-    Raises
-    ------
-    TimeoutError
-        Between two instructions of the block; before the first one where no time is left.
+    ``seconds``: infinite for no end. Raises `TimeoutError`: between two instructions of the block;
+    before the first one where no time is left.
     """
     if seconds <= 0:
         raise TimeoutError

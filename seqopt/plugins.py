@@ -7,16 +7,13 @@ import sys
 from functools import lru_cache
 from importlib.metadata import EntryPoint, EntryPoints, entry_points
 
-Places = tuple[tuple[str, int], ...]
+_Places = tuple[tuple[str, int], ...]
 
 
 def plugins(group: str) -> dict[str, EntryPoint]:
     """Return the entry points of a group by name.
 
-    Returns
-    -------
-    dict of str to EntryPoint
-        Also of packages that were installed since Python started.
+    Result: also of packages that were installed since Python started.
 
     Examples
     --------
@@ -26,7 +23,7 @@ def plugins(group: str) -> dict[str, EntryPoint]:
     return {entry.name: entry for entry in _read(_places()).select(group=group)}
 
 
-def _places() -> Places:
+def _places() -> _Places:
     """Return where packages lie and when something there last changed."""
     return tuple((place, _changed(place)) for place in sys.path)
 
@@ -39,6 +36,6 @@ def _changed(place: str) -> int:
 
 
 @lru_cache(maxsize=1)
-def _read(places: Places) -> EntryPoints:  # noqa: ARG001  # what is read follows from them
+def _read(places: _Places) -> EntryPoints:  # noqa: ARG001  # what is read follows from them
     found: EntryPoints = entry_points()  # type: ignore[assignment]  # typed as of Python 3.9
     return found

@@ -35,15 +35,8 @@ DISPLAYS = {
 def display(name: str) -> Callable[..., Any]:
     """Return a function that draws, loaded when it is first asked for.
 
-    Parameters
-    ----------
-    name : str
-        A key of `DISPLAYS`.
-
-    Raises
-    ------
-    ExtraError
-        If it needs matplotlib and that is not installed.
+    ``name``: a key of `DISPLAYS`. Raises `ExtraError` if it needs matplotlib and that is not
+    installed.
     """
     try:
         found: Callable[..., Any] = getattr(import_module(DISPLAYS[name]), name)
@@ -68,18 +61,10 @@ class Shown:
 
 @dataclass(frozen=True, repr=False)
 class Page:
-    """A self-contained page of HTML, shown in a notebook or, by `open`, in a browser.
+    """A self-contained page of HTML, shown in a notebook or, by `open`, in a browser."""
 
-    Attributes
-    ----------
-    text : str
-        The whole page.
-    height : int
-        Height of the frame that shows it in a notebook, pixels.
-    """
-
-    text: str
-    height: int = 900
+    text: str  # the whole page
+    height: int = 900  # height of the frame that shows it in a notebook, pixels
 
     def __repr__(self) -> str:
         size = len(self.text.encode()) / 1e6
@@ -93,33 +78,14 @@ class Page:
         )
 
     def save(self, path: str | Path) -> Path:
-        """Write the page to a file.
-
-        Returns
-        -------
-        pathlib.Path
-            Of the file.
-
-        Raises
-        ------
-        FileError
-            If it cannot be written.
-        """
+        """Write the page to a file. Raises `FileError` if it cannot be written."""
         write_text(Path(path), self.text)
         return Path(path)
 
     def open(self, path: str | Path | None = None) -> Path:
         """Write the page to a file and show it in a browser.
 
-        Parameters
-        ----------
-        path : str or pathlib.Path, optional
-            By default a new file in the folder for temporary ones.
-
-        Returns
-        -------
-        pathlib.Path
-            Of the file.
+        ``path``: by default a new file in the folder for temporary ones.
         """
         written = self.save(path or Path(tempfile.mkdtemp(prefix="seqopt-")) / "report.html")
         webbrowser.open(written.resolve().as_uri())

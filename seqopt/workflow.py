@@ -28,9 +28,8 @@ from seqopt.scene.orders import in_order
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.free_rules import FREE, FreeRules, with_robots
-from seqopt.sequence.schedule import Schedule
+from seqopt.sequence.schedule import Schedule, thin
 from seqopt.sequence.schedule_file import find_schedule
-from seqopt.sequence.thinning import thin
 from seqopt.study.presets import EQUATIONS, find_criterion
 
 RULES = tuple(field.name for field in fields(FreeRules) if field.name != "robots")
@@ -46,16 +45,9 @@ LOOP_WORDS = ("workers", "executor", "cache")
 class Defaults:
     """What is taken where nothing is asked for, in Python and on the command line alike.
 
-    Attributes
-    ----------
-    criterion : Criterion
-        What a step costs.
-    formulation, with_budgets : str
-        What chooses, without and with budgets.
-    engine : str
-        What computes responses.
-    aim : str
-        What a free schedule is to make as small as possible.
+    ``criterion``: what a step costs; ``formulation``, ``with_budgets``: what chooses, without and
+    with budgets; ``engine``: what computes responses; ``aim``: what a free schedule is to make as
+    small as possible.
     """
 
     criterion: Criterion
@@ -203,20 +195,10 @@ def posed(
 ) -> Problem:
     """Return the problem of a schedule with open grips, by what people say of it.
 
-    Parameters
-    ----------
-    engine : Engine
-        What computes responses; it has the scene.
-    schedule : Schedule
-        With the grips that are open.
-    criterion : Criterion or str, optional
-        As of `optimize`.
-    limits : sequence of Limit, optional
-        As of `seqopt.pose`.
-    budgets : sequence of str, optional
-        Caps on totals over the build, as of `seqopt.placement.asked_budgets.parse_budgets`.
-    resources : Resources, optional
-        What the computation may use.
+    ``engine``: what computes responses; it has the scene. ``schedule``: with the grips that are
+    open. ``criterion``: as of `optimize`. ``limits``: as of `seqopt.pose`. ``budgets``: caps on
+    totals over the build, as of `seqopt.placement.asked_budgets.parse_budgets`. ``resources``: what
+    the computation may use.
     """
     asked = parse_budgets(budgets)
     chosen = find_criterion(criterion or DEFAULTS["any other"].criterion)
@@ -235,17 +217,8 @@ def posed_free(
 ) -> FreeProblem:
     """Return the problem of a free schedule, or of states of another, by what people say of it.
 
-    Parameters
-    ----------
-    engine : Engine
-        What computes responses; it has the scene.
-    criterion : Criterion or str, optional
-        As of `optimize`.
-    aim : str, optional
-        What is to be as small as possible.
-    rules : FreeRules or Schedule, optional
-    limits, stands : optional
-        As of `seqopt.pose_free`.
+    ``engine``: what computes responses; it has the scene. ``criterion``: as of `optimize`. ``aim``:
+    what is to be as small as possible. ``limits``, ``stands``: as of `seqopt.pose_free`.
     """
     usual = DEFAULTS[FREE]
     chosen = find_criterion(criterion or usual.criterion)

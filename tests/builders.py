@@ -10,8 +10,7 @@ import numpy as np
 
 from seqopt.network.build import build_network
 from seqopt.scene.arch import ArchShape, arch_scene
-from seqopt.scene.parts import Brick, Ground, Joint, Robot
-from seqopt.scene.reach import Side
+from seqopt.scene.parts import Brick, Ground, Joint, Robot, Side
 from seqopt.scene.scene import Scene
 
 ROOT = Path(__file__).parents[1]

@@ -11,8 +11,7 @@ from experiments.harness.walls import running_bond
 from seqopt.placement.costs import Budget, LayeredCosts
 from seqopt.placement.interface import CostProblem
 from seqopt.scene.arch import ArchShape, arch_scene
-from seqopt.scene.parts import Robot
-from seqopt.scene.reach import Anywhere, Side, Sphere
+from seqopt.scene.parts import Anywhere, Robot, Side, Sphere
 from seqopt.sequence.free_rules import FreeRules
 from seqopt.study.presets import ROBOTS
 from tests.builders import about_vertical, from_both_sides, moved

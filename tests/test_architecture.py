@@ -17,7 +17,7 @@ from seqopt.showing import DISPLAYS
 ROOT = Path(__file__).resolve().parent.parent
 
 ROOMS = (
-    {"arrays", "cells", "errors", "interrupts", "plugins"},
+    {"arrays", "errors", "interrupts", "plugins"},
     {"files", "work"},
     {"showing"},
     {"scene"},
@@ -37,7 +37,7 @@ SOLVER_HOME = "formulations"
 SHARED = {  # what formulations may import
     *("formulations.cones", "formulations.solvers", "formulations.whole_program")
 }
-MECHANICS = {"network.statics", "network.kinematics", "engines.rigid"}  # not for the frame
+MECHANICS = {"network.mechanics", "engines.rigid"}  # not for the frame
 LINES, LINES_OF_A_FUNCTION = 300, 50  # of code; imports, docstrings and comments aside
 NO_CODE = {COMMENT, NL, NEWLINE, INDENT, DEDENT, ENDMARKER}
 SAID = (ast.Module, ast.ClassDef, ast.FunctionDef)  # what may have a docstring

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import pytest
 
 import seqopt
-from seqopt.arrays import LONGEST, Terse
+from seqopt.arrays import _LONGEST, Terse
 from seqopt.engines.registry import ENGINES
 from seqopt.errors import SceneError
 from seqopt.placement.budgets import travel
@@ -20,7 +20,7 @@ from seqopt.placement.order_problem import OrderProblem
 from seqopt.placement.unseen import judge_unseen
 from seqopt.report.comparison import compare
 from seqopt.scene.library import ArchForm, DomeShape, VaultShape
-from seqopt.stability.steps import assess_steps
+from seqopt.stability.assessment import assess_steps
 
 MOST = 300  # letters
 OURS = ("seqopt.", "formulations.")
@@ -133,7 +133,7 @@ def test_a_terse_value_leaves_out_defaults_and_counts_what_is_too_much():
 
     assert repr(Part("a", (1 / 3, 2.0))) == "Part(name='a', place=(0.333333, 2))"
     assert repr(Part("a", (0.0, 2.0), "odd")) == "Part(name='a', place=(0, 2), kind='odd')"
-    assert repr(Part("a" * LONGEST, (0.0, 2.0))).endswith("', and 1 more)")
+    assert repr(Part("a" * _LONGEST, (0.0, 2.0))).endswith("', and 1 more)")
 
 
 def test_figures_at_the_prompt_are_those_of_the_values(met):

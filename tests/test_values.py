@@ -11,34 +11,33 @@ import pytest
 from scipy import sparse
 
 from seqopt.arrays import Floats, FrozenValue
-from seqopt.contact.elastic_limits import find_elastic_limits
+from seqopt.contact.elastic_limits import face_quadrature, find_elastic_limits
 from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import EPOXY
-from seqopt.contact.quadrature import face_quadrature
 from seqopt.engines.basis import SPACE
 from seqopt.engines.diagnosis import diagnose
 from seqopt.engines.discrete.engine import held_nodes
 from seqopt.engines.discrete.equilibrium_path import settle
 from seqopt.engines.discrete.system import build_system
 from seqopt.engines.interface import Fields, Want
-from seqopt.engines.plane import Plane
+from seqopt.engines.planar import Plane
 from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.engines.rigid.growth import grow_tree
 from seqopt.engines.rigid.mechanism import rigid_structure
 from seqopt.engines.rigid.mixed import mixed_system
-from seqopt.engines.rigid.operator_builder import OperatorBuilder
+from seqopt.engines.rigid.operator import OperatorBuilder
 from seqopt.engines.rigid.recovery import Solution
 from seqopt.engines.rigid.response_maps import ResponseMaps, scene_maps
-from seqopt.engines.rigid.spanning_tree import grow_tree
 from seqopt.engines.rigid.ungripped import share, ungripped_system
 from seqopt.network.build import build_network
-from seqopt.network.statics import build_statics
+from seqopt.network.mechanics import build_statics
 from seqopt.scene.boxes import boxes
-from seqopt.scene.detection import Surface, touching_faces
-from seqopt.scene.face_joints import flat_face
-from seqopt.scene.library.meeting import meeting
+from seqopt.scene.imports.contacts import flat_face
+from seqopt.scene.imports.detection import Surface, touching_faces
+from seqopt.scene.library.joints import overlaps
 from seqopt.stability.assessment import assess, bonded
-from seqopt.stability.directions import first_directions
-from seqopt.stability.known import HoldingForces, Known
+from seqopt.stability.held_program import first_directions
+from seqopt.stability.held_states import HoldingForces, Known
 from seqopt.stability.prover import Prover
 from tests.blocks import box
 
@@ -59,7 +58,7 @@ def values(arch25):
     plane = Plane(np.zeros(3), np.array([0.0, 1.0, 0.0]), np.eye(3)[[0, 2]])
     maps = scene_maps(network)
     shapes = boxes(arch25.bricks)
-    joined = meeting(shapes, [(0, 1)])
+    joined = overlaps(shapes, [(0, 1)])
     (touching,) = touching_faces([box((1, 1, 1)), box((1, 1, 1), at=(0, 0, 1))], 1e-3)
     every = (
         *(maps, ResponseMaps(maps, 2)),

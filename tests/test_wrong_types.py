@@ -17,8 +17,7 @@ from seqopt.errors import SeqoptError
 from seqopt.placement.certificate import judge
 from seqopt.placement.criteria import RankSum, WeightedSum, WorstRatio
 from seqopt.placement.fitting import require_fit
-from seqopt.scene.parts import Robot
-from seqopt.scene.reach import Anywhere
+from seqopt.scene.parts import Anywhere, Robot
 from tests.builders import six_bricks
 
 SCENE = six_bricks()

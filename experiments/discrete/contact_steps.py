@@ -37,8 +37,7 @@ from seqopt.report.style import BLUE, GRAY, VERMILION, new_figure, plain, styled
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.steps import Step
 from seqopt.sequence.two_robots import METHODS
-from seqopt.stability.assessment import Verdict
-from seqopt.stability.steps import assess_steps
+from seqopt.stability.assessment import Verdict, assess_steps
 
 RESTS, GOES, NEITHER = "rests", "goes", "neither"
 SHOWN: dict[str, dict[str, Any]] = {

@@ -41,8 +41,7 @@ from experiments.harness.plotting import RESULTS, save_all, stored
 from seqopt.arrays import Floats
 from seqopt.contact.elastic_limits import find_elastic_limits
 from seqopt.contact.mortar import EPOXY
-from seqopt.engines.discrete.engine import DiscreteEngine
-from seqopt.engines.discrete.pads import Across, Pinch
+from seqopt.engines.discrete.engine import Across, DiscreteEngine, Pinch
 from seqopt.engines.interface import Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network

@@ -43,14 +43,11 @@ from experiments.engines.parts.reference_chain import Reference, solve_exactly
 from experiments.harness.claim import Claim, Finding, Options
 from experiments.harness.plotting import RESULTS, save_all, stored
 from seqopt.arrays import Floats, Ints
-from seqopt.engines.diagnosis import WELL
-from seqopt.engines.eigenvalues import UNRESISTED, spectrum
+from seqopt.engines.diagnosis import UNRESISTED, WELL, residual, spectrum
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import Fields, Want, grip_columns
-from seqopt.engines.residuals import residual
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.engines.rigid.dense import solve_dense
-from seqopt.engines.rigid.mixed import solve_mixed
+from seqopt.engines.rigid.mixed import solve_dense, solve_mixed
 from seqopt.errors import MechanismError, SolverError
 from seqopt.network.build import build_network
 from seqopt.network.network import Network

@@ -30,8 +30,8 @@ from experiments.harness.timing import best
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import Want, grip_columns
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.engines.rigid.operator_builder import OperatorBuilder
-from seqopt.engines.rigid.spanning_tree import SpanningTree, grow_tree
+from seqopt.engines.rigid.growth import SpanningTree, grow_tree
+from seqopt.engines.rigid.operator import OperatorBuilder
 from seqopt.engines.rigid.trial import solve_batch
 from seqopt.network.build import build_network
 from seqopt.network.network import Network

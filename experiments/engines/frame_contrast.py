@@ -25,7 +25,7 @@ from experiments.harness.plotting import RESULTS, save_all, stored
 from seqopt.engines.frame import CONTRAST, FrameEngine
 from seqopt.engines.interface import Engine, Fields, grip_columns
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.engines.rigid.dense import solve_dense
+from seqopt.engines.rigid.mixed import solve_dense
 from seqopt.errors import SolverError
 from seqopt.network.build import build_network
 from seqopt.report.style import GRAY, SMALL, dress, looks, new_figure, styled

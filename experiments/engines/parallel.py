@@ -36,14 +36,13 @@ from experiments.harness.walls import running_bond
 from seqopt.engines.registry import make_engine
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
-from seqopt.responses.alike import StepChoices
+from seqopt.responses.batches import StepChoices
 from seqopt.responses.choices import Evaluation
 from seqopt.responses.resources import Resources
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.three_robots import three_robot_loop
-from seqopt.work.crew import hire
-from seqopt.work.ordered import map_ordered
+from seqopt.work.workers import hire, map_ordered
 
 TWO = 1.6  # times as fast as one process that two have to be
 WANTED = frozenset({"T_max", "M_sup", "D_max", "F_largest"})

@@ -35,7 +35,7 @@ from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.scene.imports.content import Given
 from seqopt.scene.imports.formats import import_scene
-from seqopt.scene.library.builtin import ABOUT
+from seqopt.scene.library.by_words import ABOUT
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.steps import Step

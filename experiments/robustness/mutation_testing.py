@@ -76,7 +76,6 @@ MODULES = {
         *("engines/test_operator", "engines/test_rigid_bricks"),
     ),
     "seqopt.engines.rigid.operator": RIGID,
-    "seqopt.engines.rigid.operator_builder": RIGID,
     "seqopt.engines.rigid.grip_equations": RIGID,
     "seqopt.engines.rigid.growth": ("engines/test_operator", "engines/test_growth"),
     "seqopt.placement.costs": ("placement/test_costs", "placement/test_values"),

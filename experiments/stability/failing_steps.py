@@ -38,7 +38,7 @@ from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.steps import Step
 from seqopt.sequence.three_robots import modified_sequential, three_robot_loop
 from seqopt.sequence.two_robots import METHODS
-from seqopt.stability.steps import assess_steps, stability_table
+from seqopt.stability.assessment import assess_steps, stability_table
 from seqopt.study.presets import EQUATIONS
 from seqopt.study.published import published_plan
 

@@ -33,7 +33,7 @@ from seqopt.cli.status import Status
 from seqopt.cli.steps_arguments import asked_steps, steps_arguments
 from seqopt.cli.values import parse_time_limit
 from seqopt.engines.interface import Fields
-from seqopt.engines.provenance import provenance
+from seqopt.engines.registry import provenance
 from seqopt.files import csv_text, write_bytes, write_csv
 from seqopt.network.build import build_network
 from seqopt.responses.linear_range import LinearRange

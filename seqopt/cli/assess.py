@@ -15,11 +15,10 @@ from seqopt.cli.status import Status
 from seqopt.cli.steps_arguments import asked_steps, steps_arguments
 from seqopt.cli.values import parse_mortar
 from seqopt.contact.mortar import MORTARS
-from seqopt.engines.provenance import versions
+from seqopt.engines.registry import versions
 from seqopt.files import csv_text, write_csv
 from seqopt.network.build import build_network
-from seqopt.stability.assessment import Verdict
-from seqopt.stability.steps import assess_steps, format_verdicts, stability_table
+from seqopt.stability.assessment import Verdict, assess_steps, format_verdicts, stability_table
 
 DESCRIPTION = (
     "Prove of every step of a sequence that it stands, or that it does not, as rigid bricks whose "

@@ -25,7 +25,7 @@ from seqopt.cli.facts import scene_facts
 from seqopt.cli.layout import wrapped
 from seqopt.cli.outputs import comparison_files, figure_notes, require_out, write_outputs
 from seqopt.cli.values import parse_robots
-from seqopt.engines.provenance import provenance
+from seqopt.engines.registry import provenance
 from seqopt.network.build import build_network
 from seqopt.report.comparison import Comparison, compare
 from seqopt.report.plan_pages import PAGE, comparison_page

@@ -13,7 +13,7 @@ from seqopt.errors import ProblemError
 from seqopt.files import require_apart, write_text
 from seqopt.scene.imports.content import UNITS, UPS, Given
 from seqopt.scene.imports.formats import FORMATS, import_scene
-from seqopt.scene.library.law import JointLaw
+from seqopt.scene.library.common import JointLaw
 from seqopt.scene.scene_file import dump_scene
 from seqopt.work.progress import Tell
 

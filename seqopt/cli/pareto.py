@@ -25,7 +25,7 @@ from seqopt.cli.free_arguments import add_rules
 from seqopt.cli.outputs import figure_notes, write_outputs, written_to
 from seqopt.cli.values import parse_numbers, parse_robots
 from seqopt.engines.interface import Engine
-from seqopt.engines.provenance import provenance
+from seqopt.engines.registry import provenance
 from seqopt.errors import ProblemError, StepError, did_you_mean
 from seqopt.files import csv_text, require_folder
 from seqopt.placement.free_front import FreeFront

@@ -13,9 +13,8 @@ from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.placement.asked_budgets import parse_budgets
 from seqopt.placement.problem import Problem
-from seqopt.sequence.schedule import Schedule
+from seqopt.sequence.schedule import Schedule, thin
 from seqopt.sequence.schedule_file import find_schedule
-from seqopt.sequence.thinning import thin
 from seqopt.workflow import posed
 
 

@@ -16,7 +16,7 @@ from seqopt.cli.facts import scene_facts
 from seqopt.cli.outputs import write_outputs, written_to
 from seqopt.cli.posing import asked_problem
 from seqopt.cli.values import number_word, parse_time_limit, split_word
-from seqopt.engines.provenance import provenance
+from seqopt.engines.registry import provenance
 from seqopt.errors import ProblemError, did_you_mean
 from seqopt.files import csv_text
 from seqopt.placement.robust_aim import RobustAim, parse_robust

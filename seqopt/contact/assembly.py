@@ -175,14 +175,8 @@ class Assembly(FrozenValue):
     def load(self, direction: Vector | None = None) -> Floats:
         """Return the weights as wrenches over the force scale.
 
-        Parameters
-        ----------
-        direction : Vector, optional
-            Every block is pulled this way as hard as it weighs; down by default.
-
-        Returns
-        -------
-        (6B,) float
+        ``direction``: every block is pulled this way as hard as it weighs; down by default. Result
+        (6B,).
         """
         pull = self.weight
         if direction is not None:

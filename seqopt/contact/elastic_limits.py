@@ -3,6 +3,8 @@
 The wrench (force and moment) of a joint is distributed linearly over its face: force over area,
 moment over second moment. The stress is largest at the corners, so it is checked there: tension
 against the tensile strength, and shear against cohesion and friction.
+
+A face is also a bed of points here, on which the wrench of its joint acts.
 """
 
 from __future__ import annotations
@@ -11,19 +13,88 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from seqopt.arrays import Bools, Floats, FrozenValue
+from seqopt.arrays import Bools, Floats, FrozenValue, Ints
 from seqopt.contact.assembly import Assembly
 from seqopt.contact.faces import bare_assembly
 from seqopt.contact.mortar import Mortar
-from seqopt.contact.quadrature import (
-    face_quadrature,
-    first_points,
-    opening_maps,
-    quadrature_stiffness,
-)
+from seqopt.network.mechanics import point_motion
 from seqopt.network.network import Network
 
-STRESS_MARGIN = 1e-6  # stress above a limit that counts as none, over the stress scale
+_CUTS = 2  # times that each triangle of a face is cut into four
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Quadrature(FrozenValue):
+    """Points that stand for faces; a face is a contact of an assembly."""
+
+    point: Floats  # (P, 3); m
+    face: Ints  # (P,)
+    area: Floats  # (P,); share of its face that a point stands for, m²
+
+
+def face_quadrature(assembly: Assembly, cuts: int = _CUTS) -> Quadrature:
+    """Return the bed of all contacts.
+
+    Faces are cut into triangles, each into four ``cuts`` times; the middles of a triangle's edges
+    with a third of its area each integrate squares exactly.
+
+    Result: faces in ascending order.
+    """
+    triangles, face = [], []
+    for c in range(len(assembly.bodies)):
+        corner = assembly.corner[assembly.contact == c]
+        fan = [np.array([corner[0], corner[i], corner[i + 1]]) for i in range(1, len(corner) - 1)]
+        for _ in range(cuts):
+            fan = [part for triangle in fan for part in _quarters(triangle)]
+        triangles += fan
+        face += [c] * len(fan)
+    corners = np.array(triangles).reshape(-1, 3, 3)
+    sides = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    area = np.linalg.norm(sides, axis=1) / 6  # a third of the triangle
+    middles = 0.5 * (corners + np.roll(corners, 1, axis=1))
+    return Quadrature(
+        middles.reshape(-1, 3), np.repeat(np.array(face, np.int64), 3), np.repeat(area, 3)
+    )
+
+
+def _quarters(triangle: Floats) -> list[Floats]:
+    a, b, c = triangle
+    ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
+    return [np.array(t) for t in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))]
+
+
+def opening_maps(assembly: Assembly, points: Floats, face: Ints, center: Floats) -> Floats:
+    """Return the motions of points for unit twists of their faces' second bodies.
+
+    ``points`` (P, 3). ``face`` (P,): the contact of every point. ``center`` (C, 3): where the
+    twists of the C faces are taken, m; their axes are the scene's. Result (P, 3, 6): normal part
+    first, then two tangential ones (`Assembly.axes`).
+    """
+    axes = assembly.axes[face]
+    return np.asarray(axes @ point_motion(points - center[face]))
+
+
+def quadrature_stiffness(bed: Quadrature, maps: Floats, moduli: Floats) -> Floats:
+    """Return the stiffness of the beds of C faces at their centers.
+
+    ``bed``: its faces in ascending order; ``maps`` (P, 3, 6): from `opening_maps`; ``moduli`` (C,
+    2): normal and tangential, N/m³. Result (C, 6, 6): N/m and N m/rad.
+    """
+    slope = bed.area[:, None] * moduli[bed.face][:, [0, 1, 1]]
+    each = np.einsum("pij,pi,pik->pjk", maps, slope, maps)
+    return np.asarray(np.add.reduceat(each, first_points(bed.face, len(moduli)), axis=0))
+
+
+def first_points(face: Ints, faces: int) -> Ints:
+    """Return the first point of every face.
+
+    ``face`` (P,): the face of every point, ascending; ``faces``: how many there are. Result
+    (faces,).
+    """
+    return np.searchsorted(face, np.arange(faces))
+
+
+_STRESS_MARGIN = 1e-6  # stress above a limit that counts as none, over the stress scale
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -45,15 +116,8 @@ class ElasticLimits(FrozenValue):
     def excess(self, wrench: Floats) -> Floats:
         """Return by how much wrenches exceed the limits of the joints.
 
-        Parameters
-        ----------
-        wrench : (S, J, 6) float
-            As of `seqopt.engines.interface.Fields`, N and N m.
-
-        Returns
-        -------
-        (S, J) float
-            Pa; negative is within.
+        ``wrench`` (S, J, 6): as of `seqopt.engines.interface.Fields`, N and N m. Result (S, J): Pa;
+        negative is within.
         """
         face, mortar = self.assembly.contact, self.mortar
         stress = np.einsum("kij,skj->ski", self.stress, wrench[:, face])
@@ -68,16 +132,9 @@ class ElasticLimits(FrozenValue):
     def exceeded(self, wrench: Floats) -> Bools:
         """Return which grip sets leave the elastic limits anywhere, beyond rounding.
 
-        Parameters
-        ----------
-        wrench : (S, J, 6) float
-            As of `excess`.
-
-        Returns
-        -------
-        (S,) bool
+        ``wrench`` (S, J, 6): as of `excess`. Result (S,).
         """
-        margin = STRESS_MARGIN * self.assembly.stress_scale
+        margin = _STRESS_MARGIN * self.assembly.stress_scale
         if self._bound(wrench) <= margin:  # as a rule, and a tenth of the work
             return np.zeros(len(wrench), dtype=bool)
         return np.asarray(self.excess(wrench).max(axis=1, initial=-np.inf) > margin)

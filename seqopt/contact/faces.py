@@ -1,19 +1,103 @@
-"""The faces where bricks touch, and a step of a build as an assembly of rigid blocks."""
+"""The faces where bricks touch, and a step of a build as an assembly of rigid blocks.
+
+Faces are projected onto the plane of their joint before their overlap is taken, so that bricks
+meters apart, or one inside the other, would have a contact like any others. What lies between the
+faces is the joint's thickness: none where bricks are laid dry, at most `THICKEST` of the smallest
+dimension of the bricks, or what the joint itself says. Faces that are not quite parallel meet in
+places; everything is measured in the middle of the overlap.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from seqopt.arrays import Floats
 from seqopt.contact.assembly import Assembly
-from seqopt.contact.joint_space import JointSpace, distance_beside, face_distance
 from seqopt.errors import SceneError
 from seqopt.network.network import GROUND, Network
-from seqopt.scene.parts import Brick
+from seqopt.scene.parts import THICKEST, Brick
 
-SLIVER = 1e-6  # smallest overlap of two faces, as a share of the smaller one
+_OVERLAP = 0.05  # by which bricks may interpenetrate, over their smallest dimension
+_BESIDE = 0.5  # by which a joint's position may lie beside the faces, over the same
+
+
+@dataclass(frozen=True)
+class _JointSpace:
+    """Where a joint lies between the faces of its bricks.
+
+    ``bricks``: one on the ground, or two. ``ends``: where the faces of the first body and of the
+    last are along the joint's normal, from its plane and in the middle of the overlap, m.
+    ``beside``: how far its position lies outside the overlap, m; negative inside. ``thickness``:
+    what the scene says, m; NaN if it does not.
+    """
+
+    name: str
+    bricks: tuple[Brick, ...]
+    ends: tuple[float, float]
+    beside: float
+    thickness: float
+
+    def require_touching(self) -> None:
+        """Raise an error unless the bricks touch through the joint.
+
+        Raises `SceneError` if they are too far apart, interpenetrate, or the joint lies elsewhere.
+        """
+        size = min(min(brick.dimensions) for brick in self.bricks)
+        apart, slack = self.ends[1] - self.ends[0], _OVERLAP * size
+        inside = max(self.ends[0], -self.ends[1])
+        if apart < -slack:
+            raise SceneError(
+                f"joint {self.name}: its bricks interpenetrate by {-1e3 * apart:.3g} mm, more than "
+                f"{1e3 * slack:.3g} mm; move them apart"
+            )
+        if inside > slack:
+            raise SceneError(
+                f"joint {self.name}: its plane lies {1e3 * inside:.3g} mm inside a brick; "
+                "move its position between the faces"
+            )
+        most = THICKEST * size if np.isnan(self.thickness) else self.thickness + slack
+        if apart > most:
+            raise SceneError(
+                f"joint {self.name}: there are {1e3 * apart:.3g} mm between its faces, more than "
+                f"{1e3 * most:.3g} mm; move the bricks together or give the joint its thickness"
+            )
+        if self.beside > _BESIDE * size:
+            raise SceneError(
+                f"joint {self.name}: its position lies {1e3 * self.beside:.3g} mm beside the faces "
+                "that it joins; move it between them"
+            )
+
+
+def face_distance(brick: Brick, normal: Floats, point: Floats) -> float:
+    """Return how far along a normal the face of a brick lies that looks against it.
+
+    ``normal`` (3,): unit vector that points into the brick; ``point`` (3,): from where, m. Result:
+    m; negative if the point lies inside.
+    """
+    frame = brick.frame
+    i = int(np.abs(frame @ normal).argmax())
+    outward = -np.sign(frame[i] @ normal) * frame[i]
+    face = np.array(brick.position) + 0.5 * brick.dimensions[i] * outward
+    return float((face - point) @ outward / (normal @ outward))
+
+
+def distance_beside(polygon: Floats) -> float:
+    """Return how far the origin lies outside a convex polygon.
+
+    ``polygon`` (m, 2): corners counterclockwise, m. Result: m; negative inside. Of the lines of its
+    edges: beside a corner it is somewhat farther.
+    """
+    edge = np.roll(polygon, -1, axis=0) - polygon
+    size = np.linalg.norm(edge, axis=1)
+    real = size > 0
+    out = polygon[real, 1] * edge[real, 0] - polygon[real, 0] * edge[real, 1]
+    return float((out / size[real]).max())
+
+
+_SLIVER = 1e-6  # smallest overlap of two faces, as a share of the smaller one
 
 
 class Contacts(dict[int, tuple[str, Floats, Floats]]):
@@ -58,7 +142,7 @@ def step_assembly(
     Raises
     ------
     SceneError
-        If the bricks of a joint do not touch there: see `seqopt.contact.joint_space`.
+        If the bricks of a joint do not touch there: see `seqopt.contact.faces`.
     """
     placed = network.scene.placed
     acting = network.springs.acting(bricks)
@@ -95,6 +179,11 @@ def bare_assembly(network: Network, bricks: int, known: Contacts | None = None) 
     Returns
     -------
     Assembly
+
+    Raises
+    ------
+    SceneError
+        If the bricks of a joint do not touch there: see `seqopt.contact.faces`.
     """
     nobody = (None,) * len(network.scene.robots)
     return step_assembly(network, bricks, nobody, known)
@@ -115,7 +204,7 @@ def _contact(network: Network, spring: int) -> tuple[str, Floats, Floats]:
     common = _overlap(axes, point, between, name)
     middle = point + _centroid(common) @ axes[1:]
     before = -face_distance(between[0], -axes[0], middle) if len(between) > 1 else 0.0
-    JointSpace(
+    _JointSpace(
         name=name,
         bricks=tuple(between),
         ends=(before, face_distance(between[-1], axes[0], middle)),
@@ -149,7 +238,7 @@ def _overlap(axes: Floats, point: Floats, between: list[Brick], name: str) -> Fl
     for other in flat[1:]:
         common = _clip(common, _ordered(other))
     size = min(_polygon_area(_ordered(face)) for face in flat)
-    if len(common) < 3 or not _polygon_area(common) > SLIVER * size:
+    if len(common) < 3 or not _polygon_area(common) > _SLIVER * size:
         raise SceneError(
             f"joint {name}: the faces of its bricks do not overlap along its normal; "
             "move the joint between them or correct its axis"
@@ -159,8 +248,7 @@ def _overlap(axes: Floats, point: Floats, between: list[Brick], name: str) -> Fl
 
 def _face(brick: Brick, normal: Floats, point: Floats) -> Floats:
     """Return the corners (4, 3) of the face of a brick that looks at a plane."""
-    length, width = np.array(brick.length_axis), np.array(brick.width_axis)
-    frame = np.stack([length, width, np.cross(length, width)])
+    frame = brick.frame
     half = 0.5 * np.array(brick.dimensions)[:, None] * frame
     i = int(np.abs(frame @ normal).argmax())
     toward = np.sign((point - np.array(brick.position)) @ normal) * np.sign(frame[i] @ normal)

@@ -43,8 +43,8 @@ class Mortar:
                 raise SceneError(f"mortar: {name} is {value}; give a number that is not negative")
 
 
-FRICTION = math.tan(math.radians(25.0))
-DRY = Mortar(friction=FRICTION)
+_FRICTION = math.tan(math.radians(25.0))
+DRY = Mortar(friction=_FRICTION)
 """Blocks laid dry: compression and friction alone.
 
 Examples
@@ -52,7 +52,7 @@ Examples
 >>> DRY.cohesion
 0.0
 """
-EPOXY = Mortar(friction=FRICTION, tensile_strength=3e6, cohesion=2e6)
+EPOXY = Mortar(friction=_FRICTION, tensile_strength=3e6, cohesion=2e6)
 """The epoxy putty of Bruun et al. (section 3.2.3: 25°, 3 MPa, and 2 MPa printed as "2 MPa/m").
 
 Examples
@@ -63,19 +63,10 @@ Examples
 MORTARS = {"epoxy": EPOXY, "dry": DRY}
 
 
-def bond_mortar(strength: float, friction: float = FRICTION) -> Mortar:
+def bond_mortar(strength: float, friction: float = _FRICTION) -> Mortar:
     """Return the mortar of a bond with the same strength in tension and in shear.
 
-    Parameters
-    ----------
-    strength : float
-        Pa.
-    friction : float, optional
-
-    Raises
-    ------
-    SceneError
-        If a number is negative or not finite.
+    ``strength``: Pa. Raises `SceneError` if a number is negative or not finite.
 
     Examples
     --------
@@ -88,15 +79,7 @@ def bond_mortar(strength: float, friction: float = FRICTION) -> Mortar:
 def find_mortar(mortar: Mortar | str) -> Mortar:
     """Return a mortar, by name or itself.
 
-    Parameters
-    ----------
-    mortar : Mortar or str
-        A mortar, a name of `MORTARS`, or ``bond=STRENGTH`` with a strength in Pa.
-
-    Raises
-    ------
-    SceneError
-        If it is neither.
+    ``mortar``: a mortar, a name of `MORTARS`, or ``bond=STRENGTH`` with a strength in Pa.
     """
     if isinstance(mortar, Mortar):
         return mortar

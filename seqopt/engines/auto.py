@@ -18,11 +18,16 @@ from seqopt.arrays import Bools, Ints
 from seqopt.contact.elastic_limits import ElasticLimits, find_elastic_limits
 from seqopt.contact.mortar import EPOXY, Mortar
 from seqopt.engines.discrete.engine import DiscreteEngine
-from seqopt.engines.interface import Fields, Want, grip_columns, keep_wanted
-from seqopt.engines.joined_fields import merge_sets, select_sets
-from seqopt.engines.named import NamedEngine
-from seqopt.engines.planar import PlanarEngine
-from seqopt.engines.plane import NoPlane, find_plane, off_plane
+from seqopt.engines.interface import (
+    Fields,
+    NamedEngine,
+    Want,
+    grip_columns,
+    keep_wanted,
+    merge_sets,
+    select_sets,
+)
+from seqopt.engines.planar import NoPlane, PlanarEngine, find_plane, off_plane
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import SceneError
 from seqopt.network.build import network_of
@@ -40,39 +45,23 @@ class Level(Enum):
 
 @dataclass(frozen=True)
 class LevelChoice:
-    """A level and why it was taken.
-
-    Attributes
-    ----------
-    level : Level
-    reason : str
-        A clause that goes into a sentence.
-    """
+    """A level and why it was taken."""
 
     level: Level
-    reason: str
+    reason: str  # a clause that goes into a sentence
 
 
-IN_PLANE = LevelChoice(Level.PLANAR, "bricks, springs, gravity and grips lie in one plane")
-OFF_PLANE = LevelChoice(Level.RIGID, "a grip lies outside the plane of the bricks")
-BEYOND = LevelChoice(Level.DISCRETE, "a joint would leave its elastic limits")
+_IN_PLANE = LevelChoice(Level.PLANAR, "bricks, springs, gravity and grips lie in one plane")
+_OFF_PLANE = LevelChoice(Level.RIGID, "a grip lies outside the plane of the bricks")
+_BEYOND = LevelChoice(Level.DISCRETE, "a joint would leave its elastic limits")
 
 
 class AutoEngine(NamedEngine):
     """Computes every grip set at the cheapest level whose condition it meets.
 
-    Parameters
-    ----------
-    network : Network or Scene
-    mortar : Mortar, optional
-        What the joints hold; the epoxy of Bruun et al. by default.
-
-    Attributes
-    ----------
-    tally : dict of LevelChoice to int
-        How many grip sets of all calls were answered at which level, and why.
-    unchecked : str
-        Why elastic limits are not checked; empty if they are.
+    ``mortar``: what the joints hold; the epoxy of Bruun et al. by default. ``tally``: how many grip
+    sets of all calls were answered at which level, and why. ``unchecked``: why elastic limits are
+    not checked; empty if they are.
     """
 
     def __init__(self, network: Network | Scene, mortar: Mortar = EPOXY) -> None:
@@ -80,7 +69,7 @@ class AutoEngine(NamedEngine):
         self._rigid = ComplianceEngine(network)
         self._discrete = DiscreteEngine(network, mortar)
         self._planar: PlanarEngine | None = None
-        self._in_space = OFF_PLANE
+        self._in_space = _OFF_PLANE
         self._limits: ElasticLimits | None = None
         self.tally: dict[LevelChoice, int] = {}
         self.unchecked = ""
@@ -107,19 +96,7 @@ class AutoEngine(NamedEngine):
     def solve(self, bricks: int, grips: ArrayLike, want: Want = Want.RESPONSES) -> Fields:
         """Return the fields of a partial structure for many grip sets.
 
-        Parameters
-        ----------
-        bricks : int
-            How many bricks stand.
-        grips : (S, r) int
-            Node numbers.
-        want : Want, optional
-
-        Raises
-        ------
-        GripError, MechanismError, SolverError
-            As of `seqopt.engines.interface.Engine` and, beyond elastic limits, of
-            `seqopt.engines.discrete.engine.DiscreteEngine`.
+        ``grips`` (S, r): node numbers.
         """
         columns = grip_columns(self.network, bricks, grips)
         sets = np.asarray(grips).reshape(columns.shape)
@@ -135,9 +112,9 @@ class AutoEngine(NamedEngine):
         if beyond.any():
             found = self._discrete.solve(bricks, sets[beyond], asked)
             fields = merge_sets(beyond, keep_wanted(found, asked), select_sets(fields, ~beyond))
-        self._count(IN_PLANE, flat & ~beyond)
+        self._count(_IN_PLANE, flat & ~beyond)
         self._count(self._in_space, ~flat & ~beyond)
-        self._count(BEYOND, beyond)
+        self._count(_BEYOND, beyond)
         return keep_wanted(fields, want)
 
     def _flat(self, columns: Ints) -> Bools:

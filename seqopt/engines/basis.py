@@ -16,10 +16,8 @@ from seqopt.arrays import Floats, FrozenValue, frozen
 class Basis(FrozenValue):
     """The directions in which a structure is loaded and moves.
 
-    Attributes
-    ----------
-    force, moment : (d, 3), (m, 3) float
-        Unit vectors of forces and translations, of moments and rotations.
+    ``force``, ``moment`` (d, 3), (m, 3): unit vectors of forces and translations, of moments and
+    rotations.
     """
 
     force: Floats
@@ -34,31 +32,10 @@ class Basis(FrozenValue):
         """Both as rows, (k, 6) with k = d + m."""
         return frozen(linalg.block_diag(self.force, self.moment))
 
-    def embedded(self, rows: Floats) -> Floats:
-        """Return wrenches or twists of the basis with all their parts.
-
-        Parameters
-        ----------
-        rows : (..., k, n) float
-
-        Returns
-        -------
-        (..., 6, n) float
-        """
-        return rows if self is SPACE else np.asarray(self.wrench.T @ rows)
-
     def levers(self, arms: Floats) -> Floats:
         """Return the moments of unit forces at the ends of arms.
 
-        Parameters
-        ----------
-        arms : (..., 3) float
-            m.
-
-        Returns
-        -------
-        (..., m, d) float
-            m.
+        ``arms`` (..., 3). Result (..., m, d).
         """
         sizes = len(self.moment), len(self.force)
         return np.asarray((arms @ self._turns.T).reshape(*arms.shape[:-1], *sizes))

@@ -5,6 +5,9 @@ the one that was asked; a long chain may be solved well although its condition i
 residual, relative to the load, looks like failure. Whether the structure resists every motion at
 all is asked of the ties that springs and grips are, however soft; the smallest eigenvalue of the
 stiffness, scaled by its diagonal, says how well it does.
+
+Deformations, wrenches and balances are written out here once more, on purpose: a check that used
+the maps of `seqopt.network.mechanics` would share their errors.
 """
 
 from __future__ import annotations
@@ -14,17 +17,195 @@ from enum import Enum
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy import sparse
+from scipy.sparse.linalg import LinearOperator, eigsh
 
-from seqopt.arrays import Floats, FrozenValue
-from seqopt.engines.eigenvalues import spectrum
-from seqopt.engines.interface import Engine, Want, grip_columns
-from seqopt.engines.residuals import Residuals, residual
+from seqopt.arrays import Floats, FrozenValue, Ints
+from seqopt.engines.interface import Engine, Fields, Want, grip_columns
 from seqopt.engines.rigid.mechanism import free_motion
-from seqopt.engines.rigid.mixed import solve_mixed
+from seqopt.engines.rigid.mixed import MixedSystem, factorize, mixed_system, solve_mixed
+from seqopt.engines.rigid.ungripped import ungripped_system
 from seqopt.errors import MechanismError, SolverError
-from seqopt.network.network import Network
+from seqopt.network.network import GROUND, Network
 
-LOOKED_INTO = 1e-15  # a smallest scaled eigenvalue below which a motion may be free
+UNRESISTED = 1e-17  # a scaled eigenvalue below this is found by a shift
+_LEAST_DIAGONAL = 1e-13  # over the largest: by it a motion without stiffness is scaled
+_SHIFT = 1e-15  # added to the scaled stiffness of a mechanism to find its mode
+_EIGENVALUE_TOLERANCE = 1e-6  # relative
+
+
+def spectrum(network: Network, bricks: int, columns: Ints) -> tuple[float, float, Floats]:
+    """Return how the constrained stiffness, scaled by its diagonal, resists motions.
+
+    The inverse is applied by the mixed system, which keeps small eigenvalues that the stiffness
+    matrix has lost to rounding; a mechanism is shifted.
+
+    ``columns`` (r,): grips as indices into ``network.inner.ravel()``. Results: ``lowest``: smallest
+    eigenvalue, without unit; ``condition``: largest eigenvalue over smallest; ``mode`` (b, 6): the
+    motion that is resisted least, its largest component 1, as in
+    `seqopt.engines.diagnosis.Diagnosis`.
+    """
+    parts = ungripped_system(network, bricks)
+    root = np.sqrt(parts.stiffness)[:, None]
+    diagonal = np.asarray((parts.deformation * root).power(2).sum(axis=0)).ravel()
+    most = max(diagonal.max(), 1.0 if not diagonal.any() else 0.0)
+    scale = np.sqrt(np.maximum(diagonal, _LEAST_DIAGONAL * most))
+    try:
+        lowest, motion = _lowest(mixed_system(parts, columns), scale, len(root))
+    except RuntimeError:  # exactly singular, or the iteration broke down
+        lowest = 0.0
+    if not lowest > UNRESISTED:
+        shifted = mixed_system(parts, columns, shift=_SHIFT * scale**2)
+        lowest, motion = _lowest(shifted, scale, len(root))
+        lowest = max(lowest - _SHIFT, 0.0)
+    scaled = sparse.diags_array(root.ravel()) @ parts.deformation @ sparse.diags_array(1 / scale)
+    condition = _highest(scaled) / lowest if lowest else np.inf
+    return lowest, condition, (motion / motion[np.abs(motion).argmax()]).reshape(-1, 6)
+
+
+def _highest(scaled: sparse.csr_array) -> float:
+    """Return the largest eigenvalue of the unconstrained scaled stiffness."""
+    value = eigsh(scaled.T @ scaled, k=1, tol=1e-3, return_eigenvectors=False, v0=_start(scaled))
+    return float(value[0])
+
+
+def _lowest(system: MixedSystem, scale: Floats, before: int) -> tuple[float, Floats]:
+    """Return the smallest eigenvalue and its motion in scaled twists, which stand after others."""
+    factors = factorize(system)
+    moves = len(scale)
+    load = np.zeros(system.matrix.shape[0])
+
+    def inverse(vector: Floats) -> Floats:
+        load[before : before + moves] = scale * vector.ravel()
+        answer = factors.solve(load)
+        answer += factors.solve(load - system.matrix @ answer)
+        return np.asarray(scale * answer[before : before + moves])
+
+    operator = LinearOperator((moves, moves), matvec=inverse, dtype=np.float64)
+    values, vectors = eigsh(operator, k=1, tol=_EIGENVALUE_TOLERANCE, v0=_start(scale))
+    return float(1 / values[0]), vectors[:, 0] / scale
+
+
+def _start(like: Floats | sparse.csr_array) -> Floats:
+    return np.asarray(np.random.default_rng(0).standard_normal(like.shape[-1]))
+
+
+@dataclass(frozen=True)
+class _Residuals:
+    """What is left of the equations when fields are put in, without unit.
+
+    ``equilibrium``: force or moment left on a brick over the largest sum of magnitudes on one;
+    ``joints``: wrench of a joint less stiffness times deformation, over the sum of the magnitudes
+    in it, or over the weight of a brick where they are smaller; ``grips``: motion of a held node
+    over the largest motion of any brick, or over what the weight of a brick does to the stiffest
+    joint where all are smaller; ``plain``: stiffness times motions less load, over the load: no
+    measure of quality, shown to compare.
+    """
+
+    equilibrium: float
+    joints: float
+    grips: float
+    plain: float
+
+    @property
+    def backward_error(self) -> float:
+        """The largest of the three that measure quality."""
+        return max(self.equilibrium, self.joints, self.grips)
+
+
+def residual(network: Network, bricks: int, columns: Ints, fields: Fields) -> _Residuals:
+    """Return the residuals of the first grip set's fields, from the network alone.
+
+    ``columns`` (r,): grips as indices into ``network.inner.ravel()``; ``fields``: with joint
+    wrenches and brick twists.
+    """
+    springs, center = network.springs, network.centroid[:bricks]
+    acting = springs.acting(bricks)
+    bodies, at, axes = springs.bodies[acting], springs.position[acting], springs.axes[acting]
+    raw = springs.stiffness[acting]
+    wrench, twist = fields.joint_wrench[0, acting], fields.brick_twist[0]
+    gap, moved = np.zeros_like(wrench), np.zeros_like(wrench)
+    for side, sign in ((0, -1.0), (1, 1.0)):
+        there = np.flatnonzero(bodies[:, side] != GROUND)
+        body = bodies[there, side]
+        parts = _moved(twist[body], at[there] - center[body])
+        gap[there] += sign * parts.sum(axis=0)
+        moved[there] += np.abs(parts).sum(axis=0)
+    law = _spring_force(axes, raw, gap)
+    size = raw.reshape(-1, 2, 3).max(axis=2)[:, :, None]
+    scale = (size * moved.reshape(-1, 2, 3) + np.abs(wrench).reshape(-1, 2, 3)).max(axis=2)
+    heavy, least = _beside_weight(network, bricks, raw)
+    apart = np.abs(wrench + law).reshape(-1, 2, 3).max(axis=2)
+    node = network.node_position[network.inner[:bricks].ravel()]
+    owner = columns // 2
+    grip = np.hstack([fields.grip_force[0], np.zeros((len(columns), 3))])
+    still = _moved(twist[owner], node[columns] - center[owner]).sum(axis=0)[:, :3]
+    every = np.repeat(np.arange(bricks), 2)
+    motion = np.abs(_moved(twist[every], node - center[every])[:, :, :3]).sum(axis=0).max()
+    dead = np.hstack([network.weight[:bricks], np.zeros((bricks, 3))])
+    outside = [(np.arange(bricks), center, dead), (owner, node[columns], grip)]
+    left = _balance(center, [*_both(bodies, at, wrench), *outside])
+    plain = _balance(center, [*_both(bodies, at, -law), *outside])[0]
+    return _Residuals(
+        equilibrium=_ratio(left[0], left[1]),
+        joints=float((apart / np.maximum(scale, heavy)).max()),
+        grips=float(np.abs(still).max(initial=0.0) / max(motion, least)),
+        plain=float(np.linalg.norm(plain[:, :3]) / np.linalg.norm(dead)),
+    )
+
+
+def _beside_weight(network: Network, bricks: int, stiffness: Floats) -> tuple[Floats, float]:
+    """Return the weight of a brick, its moment over a brick's length, and what it moves, m."""
+    tiny = np.finfo(float).tiny
+    heavy = float(np.linalg.norm(network.weight[:bricks], axis=1).max())
+    ends = network.node_position[network.inner[:bricks]]
+    longest = float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).max())
+    moved = heavy / max(stiffness[:, :3].max(initial=0.0), tiny)
+    return np.maximum([heavy, heavy * longest], tiny), max(moved, tiny)
+
+
+_Pull = tuple[Ints, Floats, Floats]  # bricks, points and wrenches about them
+
+
+def _both(bodies: Ints, at: Floats, wrench: Floats) -> list[_Pull]:
+    """Return the wrenches of springs on both of their bodies."""
+    pulls = []
+    for side, sign in ((0, -1.0), (1, 1.0)):
+        there = np.flatnonzero(bodies[:, side] != GROUND)
+        pulls.append((bodies[there, side], at[there], sign * wrench[there]))
+    return pulls
+
+
+def _moved(twist: Floats, arm: Floats) -> Floats:
+    """Return what two bricks' translation and rotation add to the motion at an arm, (2, n, 6)."""
+    zero = np.zeros_like(arm)
+    turning = np.hstack([np.cross(twist[:, 3:], arm), twist[:, 3:]])
+    return np.stack([np.hstack([twist[:, :3], zero]), turning])
+
+
+def _spring_force(axes: Floats, stiffness: Floats, gap: Floats) -> Floats:
+    """Return stiffness times deformation in global axes, (s, 6)."""
+    own = np.einsum("sij,shj->shi", axes, gap.reshape(-1, 2, 3)) * stiffness.reshape(-1, 2, 3)
+    return np.asarray(np.einsum("sij,shi->shj", axes, own).reshape(-1, 6))
+
+
+def _balance(center: Floats, pulls: list[_Pull]) -> tuple[Floats, Floats]:
+    """Return the sums (b, 6) of wrenches on every brick about its centroid, and of magnitudes."""
+    total, size = np.zeros((2, len(center), 6))
+    for body, point, wrench in pulls:
+        turn = np.hstack([np.zeros_like(point), np.cross(point - center[body], wrench[:, :3])])
+        np.add.at(total, body, wrench + turn)
+        np.add.at(size, body, np.abs(wrench) + np.abs(turn))
+    return total, size
+
+
+def _ratio(total: Floats, size: Floats) -> float:
+    """Return the larger of forces and moments left over, each over its largest magnitude."""
+    rest, most = (np.abs(a).reshape(-1, 2, 3).max(axis=(0, 2)) for a in (total, size))
+    return float((rest / np.maximum(most, np.finfo(float).tiny)).max())
+
+
+_LOOKED_INTO = 1e-15  # a smallest scaled eigenvalue below which a motion may be free
 WELL = 1e-9  # largest backward error of fields that keep the nine digits an engine promises
 
 
@@ -57,7 +238,7 @@ class Diagnosis(FrozenValue):
 
     finding: Finding
     reason: str
-    residuals: Residuals | None
+    residuals: _Residuals | None
     smallest_eigenvalue: float
     condition: float
     mode: Floats
@@ -93,7 +274,7 @@ def diagnose(source: Engine | Network, bricks: int, grips: ArrayLike) -> Diagnos
     numbers = np.array(grips, dtype=np.int64).reshape(1, -1)
     columns = grip_columns(network, bricks, numbers)
     lowest, condition, mode = spectrum(network, bricks, columns[0])
-    free = free_motion(network, bricks, columns[0]) if lowest < LOOKED_INTO else None
+    free = free_motion(network, bricks, columns[0]) if lowest < _LOOKED_INTO else None
     if free is not None:
         lowest, condition, mode = 0.0, np.inf, free
     residuals, refusal = None, None
@@ -112,7 +293,7 @@ def diagnose(source: Engine | Network, bricks: int, grips: ArrayLike) -> Diagnos
 def _judge(
     lowest: float,
     condition: float,
-    residuals: Residuals | None,
+    residuals: _Residuals | None,
     refusal: MechanismError | SolverError | None,
 ) -> tuple[Finding, str]:
     if not lowest:

@@ -19,10 +19,16 @@ from scipy import sparse
 from scipy.sparse.linalg import SuperLU, splu
 
 from seqopt.arrays import Floats, Ints
-from seqopt.engines.failures import failing_in_a_line
-from seqopt.engines.interface import Fields, Want, grip_columns, require_finite
-from seqopt.engines.joined_fields import join_sets, no_sets
-from seqopt.engines.named import NamedEngine
+from seqopt.engines.interface import (
+    Fields,
+    NamedEngine,
+    Want,
+    failing_in_a_line,
+    grip_columns,
+    join_sets,
+    no_sets,
+    require_finite,
+)
 from seqopt.engines.rigid.mechanism import require_resistance
 from seqopt.errors import SolverError
 from seqopt.network.build import network_of
@@ -30,21 +36,17 @@ from seqopt.network.network import Network, PartKind
 from seqopt.scene.scene import Scene
 
 CONTRAST = 1e7  # bar over joint stiffness; see experiments/engines/frame_contrast.py
-FRAME_CORRECTIONS = 3  # after which a solution is judged
-LAST_FRAME_CORRECTION = 1e-6  # the largest of an accepted solution, relative to it
-SUSPICIOUS = 1e-9  # a smallest scaled eigenvalue below this, over the contrast, is looked into
-LOOSE = 1e-12  # stiffness of a spring that has none, over the stiffest: holds its joint node
+_FRAME_CORRECTIONS = 3  # after which a solution is judged
+_LAST_FRAME_CORRECTION = 1e-6  # the largest of an accepted solution, relative to it
+_SUSPICIOUS = 1e-9  # a smallest scaled eigenvalue below this, over the contrast, is looked into
+_LOOSE = 1e-12  # stiffness of a spring that has none, over the stiffest: holds its joint node
 
 
 class FrameEngine(NamedEngine):
     """Solves each grip set as a frame of its own.
 
-    Parameters
-    ----------
-    network : Network or Scene
-    contrast : float, optional
-        Stiffness of the bars over that of the stiffest joint, in stretching and in bending. Low
-        values bend the bars, high ones spoil the conditioning.
+    ``contrast``: stiffness of the bars over that of the stiffest joint, in stretching and in
+    bending. Low values bend the bars, high ones spoil the conditioning.
     """
 
     def __init__(self, network: Network | Scene, contrast: float = CONTRAST) -> None:
@@ -62,20 +64,8 @@ class FrameEngine(NamedEngine):
 
         All fields are evaluated whatever is asked: the factorization dominates the cost.
 
-        Parameters
-        ----------
-        bricks : int
-            How many bricks stand.
-        grips : (S, r) int
-            Node numbers.
-        want : Want, optional
-
-        Raises
-        ------
-        GripError, MechanismError
-            As of `seqopt.engines.interface.Engine`.
-        SolverError
-            If corrections do not settle, which a lower contrast may help.
+        ``grips`` (S, r): node numbers. Raises `SolverError` if corrections do not settle, which a
+        lower contrast may help.
         """
         network = self._network
         columns = grip_columns(network, bricks, grips)
@@ -150,7 +140,7 @@ def _frame(network: Network, bricks: int, contrast: float) -> _Frame:
         (pairs, np.dstack([zero, -turn]), np.dstack([zero, turn])),
     ]
     own = [
-        2 * np.maximum(k[which], LOOSE * k.max()).ravel()
+        2 * np.maximum(k[which], _LOOSE * k.max()).ravel()
         for k in (springs.translational_stiffness, springs.rotational_stiffness)
     ]
     stiffness = np.concatenate([beam_stiffness, *own])
@@ -228,14 +218,17 @@ def _solve(
     except RuntimeError as error:  # SuperLU met an exactly zero pivot
         examine()
         raise failure from error
-    if _smallest_eigenvalue(factor, len(load)) < SUSPICIOUS / contrast:
+    if _smallest_eigenvalue(factor, len(load)) < _SUSPICIOUS / contrast:
         examine()
     answer = scale * factor.solve(scale * load)
-    for _ in range(FRAME_CORRECTIONS):
+    for _ in range(_FRAME_CORRECTIONS):
         residual = load - deformation.T @ (stiffness * (deformation @ answer))
         correction = scale * factor.solve(scale * residual)
         answer += correction
-    if not np.abs(correction / scale).max() <= LAST_FRAME_CORRECTION * np.abs(answer / scale).max():
+    if (
+        not np.abs(correction / scale).max()
+        <= _LAST_FRAME_CORRECTION * np.abs(answer / scale).max()
+    ):
         raise failure
     return np.asarray(answer)
 

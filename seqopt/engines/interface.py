@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from enum import Flag, auto
-from functools import cache
+from functools import cache, wraps
 from itertools import combinations
-from typing import Protocol
+from typing import TYPE_CHECKING, ParamSpec, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from seqopt.arrays import Floats, FrozenValue, Ints
+from seqopt.arrays import Bools, Floats, FrozenValue, Ints
 from seqopt.errors import GripError, SolverError
 from seqopt.network.network import Network
 
@@ -106,7 +107,7 @@ class Engine(Protocol):
         """
 
 
-NAMES = tuple(field.name for field in fields(Fields))
+_NAMES = tuple(field.name for field in fields(Fields))
 FLAGS = {
     "edge_force": Want.EDGES,
     "displacement": Want.DISPLACEMENTS,
@@ -140,25 +141,10 @@ def keep_wanted(answer: Fields, want: Want) -> Fields:
 def require_finite(answer: Fields, bricks: int, grips: ArrayLike) -> Fields:
     """Return fields if all of their numbers are finite.
 
-    Parameters
-    ----------
-    answer : Fields
-    bricks : int
-        How many bricks stand.
-    grips : (S, r) int
-        Node numbers, for the message.
-
-    Returns
-    -------
-    Fields
-        The same.
-
-    Raises
-    ------
-    SolverError
-        If one is not: NaN elsewhere means that a robot holds nothing.
+    ``grips`` (S, r). Raises `SolverError` if one is not: NaN elsewhere means that a robot holds
+    nothing.
     """
-    for name in NAMES:
+    for name in _NAMES:
         values = getattr(answer, name)
         if values.size and not np.isfinite(values.sum()) and not np.isfinite(values).all():
             of_set = ~np.isfinite(values).reshape(len(values), -1).all(axis=1)
@@ -173,23 +159,8 @@ def require_finite(answer: Fields, bricks: int, grips: ArrayLike) -> Fields:
 def grip_columns(network: Network, bricks: int, grips: ArrayLike) -> Ints:
     """Return grip sets as indices into ``network.inner.ravel()``, checked.
 
-    Parameters
-    ----------
-    network : Network
-    bricks : int
-        How many bricks stand.
-    grips : (S, r) int
-        Node numbers.
-
-    Returns
-    -------
-    (S, r) int
-
-    Raises
-    ------
-    GripError
-        If there are fewer bricks, the shape is another, or a set names an unknown, blocked,
-        unplaced or repeated node.
+    ``grips`` (S, r): node numbers. Result (S, r). Raises `GripError` if there are fewer bricks, the
+    shape is another, or a set names an unknown, blocked, unplaced or repeated node.
     """
     total = len(network.inner)
     if not 1 <= bricks <= total:
@@ -228,3 +199,88 @@ def _require_different(columns: Ints, numbers: Ints) -> None:
             raise GripError(
                 f"grip set {numbers[twice][0].tolist()}: a node is held twice; name it once"
             )
+
+
+_Asked = ParamSpec("_Asked")
+_Answer = TypeVar("_Answer")
+_NOT_FINITE = "infs or NaNs"  # what SciPy says of arrays that it does not take
+
+
+def failing_in_a_line(solve: Callable[_Asked, _Answer]) -> Callable[_Asked, _Answer]:
+    """Return a function whose numerical failures are a `SolverError`.
+
+    ``solve``: that of an engine. Result: the same, but for what it raises.
+    """
+
+    @wraps(solve)
+    def solved(*arguments: _Asked.args, **named: _Asked.kwargs) -> _Answer:
+        try:
+            return solve(*arguments, **named)
+        except (np.linalg.LinAlgError, ValueError) as error:
+            if not isinstance(error, np.linalg.LinAlgError) and _NOT_FINITE not in str(error):
+                raise
+            raise SolverError(
+                f"the equations have no answer in numbers ({error}); correct lengths, masses or "
+                "stiffnesses beyond all bounds in the scene"
+            ) from error
+
+    return solved
+
+
+def no_sets(network: Network, bricks: int, held: int) -> Fields:
+    """Return the fields of no grip set at all: their shapes.
+
+    ``held``: how many nodes each set would hold. Result: arrays with a first axis of length zero.
+    """
+    return Fields(
+        edge_force=np.empty((0, network.count_edges(bricks))),
+        displacement=np.empty((0, network.count_nodes(bricks), 3)),
+        grip_force=np.empty((0, held, 3)),
+        support=np.empty((0, len(network.springs.support), 6)),
+        joint_wrench=np.empty((0, len(network.springs.since), 6)),
+        brick_twist=np.empty((0, bricks, 6)),
+    )
+
+
+def select_sets(answer: Fields, which: Bools | Ints) -> Fields:
+    """Return the fields of some grip sets. ``which`` (S,), (s,)."""
+    return Fields(**{name: getattr(answer, name)[which] for name in _NAMES})
+
+
+def join_sets(parts: Sequence[Fields], which: Sequence[Bools | slice] | None = None) -> Fields:
+    """Return the fields of the grip sets of several answers.
+
+    ``parts``: alike in everything but the number of sets. ``which`` (S,): which of all sets are
+    those of each part, in their order; by default one part's come after another's.
+    """
+    after = np.cumsum([len(part.grip_force) for part in parts])
+    total = int(after[-1])
+    if which is None:
+        which = [slice(b - len(a.grip_force), b) for a, b in zip(parts, after, strict=True)]
+    whole = {name: np.empty((total, *getattr(parts[0], name).shape[1:])) for name in _NAMES}
+    for part, mine in zip(parts, which, strict=True):
+        for name in _NAMES:
+            whole[name][mine] = getattr(part, name)
+    return Fields(**whole)
+
+
+def merge_sets(which: Bools, inside: Fields, outside: Fields) -> Fields:
+    """Return the fields of grip sets, some from one answer and the rest from another.
+
+    ``which`` (S,): the sets that the first answer is about, in their order.
+    """
+    return join_sets([inside, outside], [which, ~which])
+
+
+class NamedEngine:
+    """Base of engines: they say what they are and which structure they compute."""
+
+    if TYPE_CHECKING:
+
+        @property
+        def network(self) -> Network:
+            """The network whose nodes and edges the fields follow."""
+
+    def __repr__(self) -> str:
+        scene = self.network.scene
+        return f"<{type(self).__name__} of {scene.name}: {len(scene.bricks)} bricks>"

@@ -7,41 +7,149 @@ This is exact, not an approximation. Motions out of the plane are not considered
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import ArrayLike
 
-from seqopt.engines.interface import Fields, Want, grip_columns
-from seqopt.engines.named import NamedEngine
-from seqopt.engines.plane import NoPlane, Plane, find_plane, off_plane
+from seqopt.arrays import Floats, FrozenValue, Ints
+from seqopt.engines.basis import Basis
+from seqopt.engines.interface import Fields, NamedEngine, Want, grip_columns
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import GripError, SceneError
 from seqopt.network.build import network_of
-from seqopt.network.network import Network
+from seqopt.network.network import GROUND, Network
 from seqopt.scene.scene import Scene
 
-ELSE = "use the compliance engine"
+_FLAT = 1e-9  # distance from the plane that counts as none, over the size of the structure
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Plane(FrozenValue):
+    """A plane that mirrors a structure onto itself, as far as forces in it are concerned."""
+
+    point: Floats  # (3,); m
+    normal: Floats  # (3,)
+    axes: Floats  # (2, 3); unit vectors in the plane
+
+    @property
+    def basis(self) -> Basis:
+        """The forces and the moment that stay in the plane."""
+        return Basis(self.axes, self.normal[None])
+
+    def distance(self, points: Floats) -> Floats:
+        """Return how far points lie from the plane. ``points`` (..., 3). Result (...): m."""
+        return np.asarray(np.abs((points - self.point) @ self.normal))
+
+
+@dataclass(frozen=True)
+class NoPlane:
+    """That a structure lies in no plane."""
+
+    reason: str  # what lies outside, a clause that goes into a sentence
+
+
+def find_plane(network: Network) -> Plane | NoPlane:
+    """Return the plane of a structure: bricks, springs and gravity lie in it, springs along it.
+
+    Bricks may be of any width: their nodes need not lie in the plane, their centroids must.
+    """
+    springs = network.springs
+    points = np.vstack([network.centroid, springs.position, springs.anchor])
+    normal = _normal(network, points - points.mean(axis=0))
+    plane = Plane(points.mean(axis=0), normal, _spanned(normal))
+    outside = _points_outside(network, plane) or _turned_springs(network, normal)
+    return NoPlane(outside) if outside else plane
+
+
+def off_plane(network: Network, plane: Plane, columns: Ints) -> Floats:
+    """Return how far grips lie from a plane.
+
+    ``columns`` (S, r): grips as indices into ``network.inner.ravel()``. Result (S, r): m; zero
+    where a grip lies in the plane to within rounding.
+    """
+    inner = network.node_position[network.inner.ravel()]
+    away = plane.distance(inner)
+    away[away <= _FLAT * np.ptp(inner, axis=0).max()] = 0.0
+    return np.asarray(away[columns])
+
+
+def _normal(network: Network, spread: Floats) -> Floats:
+    """Return the horizontal direction in which points (P, 3) about their middle spread least.
+
+    Where they all stand above each other, a horizontal axis of the first spring.
+    """
+    up = np.array(network.scene.up)
+    flat = spread - np.outer(spread @ up, up)
+    if np.abs(flat).max() <= _FLAT * np.abs(spread).max():
+        flat = network.springs.axes[0] - np.outer(network.springs.axes[0] @ up, up)
+        flat = flat[np.linalg.norm(flat, axis=1).argmax()][None]
+    longest = np.linalg.svd(flat, full_matrices=False)[2][0]
+    normal = np.cross(up, longest)
+    return np.asarray(normal / np.linalg.norm(normal))
+
+
+def _spanned(normal: Floats) -> Floats:
+    """Return two unit vectors (2, 3) at right angles to a normal and to each other."""
+    first = np.cross(normal, np.eye(3)[np.abs(normal).argmin()])
+    first /= np.linalg.norm(first)
+    return np.array([first, np.cross(normal, first)])
+
+
+def _points_outside(network: Network, plane: Plane) -> str:
+    """Return which brick, spring or fixed point lies outside; empty if none does."""
+    scene = network.scene
+    size = float(np.ptp(network.centroid, axis=0).max()) or max(scene.placed[0].dimensions)
+    away = plane.distance(network.centroid)
+    outside = "outside the scene's middle plane"
+    if away.max() > _FLAT * size:
+        brick = scene.placed[int(away.argmax())].name
+        return f"brick {brick}: its centroid lies {1e3 * away.max():.3g} mm {outside}"
+    springs = network.springs
+    away = np.maximum(plane.distance(springs.position), plane.distance(springs.anchor))
+    if away.max() > _FLAT * size:
+        name = _spring(network, int(away.argmax()))
+        return f"{name}: it lies {1e3 * away.max():.3g} mm {outside}"
+    return ""
+
+
+def _turned_springs(network: Network, normal: Floats) -> str:
+    """Return which spring answers a motion in the plane by a force across; empty if none does."""
+    springs = network.springs
+    for stiffness in (springs.translational_stiffness, springs.rotational_stiffness):
+        pull = np.einsum("sij,si,si->sj", springs.axes, stiffness, springs.axes @ normal)
+        across = pull - (pull @ normal)[:, None] * normal
+        turned = np.linalg.norm(across, axis=1) > _FLAT * stiffness.max(axis=1)
+        if turned.any():
+            name = _spring(network, int(turned.argmax()))
+            return f"{name}: its axes are turned out of the scene's plane"
+    return ""
+
+
+def _spring(network: Network, index: int) -> str:
+    """Return a spring's name for a message."""
+    placed = network.scene.placed
+    first, second = network.springs.bodies[index]
+    if first == GROUND:
+        return f"ground end of brick {placed[second].name}"
+    return f"joint {placed[first].name}-{placed[second].name}"
+
+
+_ELSE = "use the compliance engine"
 
 
 class PlanarEngine(NamedEngine):
     """Computes any batch of grip sets on any partial structure of a planar scene.
 
-    Parameters
-    ----------
-    network : Network or Scene
-    plane : Plane, optional
-        The structure's, if it is known; by default it is found.
-
-    Raises
-    ------
-    SceneError
-        If bricks, springs or gravity leave the scene's plane.
+    ``plane``: the structure's, if it is known; by default it is found. Raises `SceneError` if
+    bricks, springs or gravity leave the scene's plane.
     """
 
     def __init__(self, network: Network | Scene, plane: Plane | None = None) -> None:
         network = network_of(network)
         found = find_plane(network) if plane is None else plane
         if isinstance(found, NoPlane):
-            raise SceneError(f"{found.reason}; {ELSE}")
+            raise SceneError(f"{found.reason}; {_ELSE}")
         self.plane = found
         self._engine = ComplianceEngine(network, found.basis)
 
@@ -53,26 +161,13 @@ class PlanarEngine(NamedEngine):
     def solve(self, bricks: int, grips: ArrayLike, want: Want = Want.RESPONSES) -> Fields:
         """Return the fields of a partial structure for many grip sets.
 
-        Parameters
-        ----------
-        bricks : int
-            How many bricks stand.
-        grips : (S, r) int
-            Node numbers.
-        want : Want, optional
-
-        Raises
-        ------
-        GripError
-            As of `seqopt.engines.interface.Engine`, and if a grip lies outside the plane.
-        MechanismError, SolverError
-            As of `seqopt.engines.interface.Engine`.
+        ``grips`` (S, r): node numbers.
         """
         away = off_plane(self.network, self.plane, grip_columns(self.network, bricks, grips))
         if away.any():
             node = np.asarray(grips).ravel()[away.argmax()]
             raise GripError(
                 f"grip on node {node}: it lies {1e3 * away.max():.3g} mm outside the scene's "
-                f"plane; {ELSE}"
+                f"plane; {_ELSE}"
             )
         return self._engine.solve(bricks, grips, want)

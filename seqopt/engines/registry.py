@@ -1,8 +1,22 @@
-"""The engines by name."""
+"""The engines by name, how one was made, and what a result came from.
+
+A recipe is enough to make an engine again elsewhere, and to know its answers by content.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import hashlib
+import json
+import platform
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, field
+from functools import cache, cached_property
+from importlib.metadata import PackageNotFoundError, requires, version
+from pathlib import Path
+
+import numpy as np
+import scipy
 
 from seqopt.contact.mortar import Mortar, find_mortar
 from seqopt.engines.auto import AutoEngine
@@ -10,12 +24,72 @@ from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import Engine
 from seqopt.engines.planar import PlanarEngine
-from seqopt.engines.recipe import Recipe
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import SceneError
-from seqopt.network.build import network_of
+from seqopt.network.build import build_network, network_of
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
+from seqopt.scene.scene_file import scene_to_dict
+
+_ARITHMETIC = ("arrays.py", "contact", "engines", "network", "responses/quantities.py")
+"""Files and folders of the package that answers depend on."""
+_WITHOUT_EFFECT = ("name", "provenance", "robots")  # of a scene, on answers to given grips
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """An engine's name, scene and options, as `seqopt.engines.registry.make_engine` takes them.
+
+    ``options``: values whose representation says all of them.
+    """
+
+    engine: str
+    scene: Scene
+    options: Mapping[str, object] = field(default_factory=dict)
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return Recipe, (self.engine, self.scene, dict(self.options))
+
+    @cached_property
+    def network(self) -> Network:
+        """The network of the scene; it is not sent along."""
+        return build_network(self.scene)
+
+    @cached_property
+    def key(self) -> str:
+        """What answers depend on, condensed: equal for equal scenes, options and arithmetic.
+
+        Names, provenance and robots of a scene change no answer and are left out.
+        """
+        scene = {k: v for k, v in scene_to_dict(self.scene).items() if k not in _WITHOUT_EFFECT}
+        built = json.dumps(scene, sort_keys=True)
+        parts = (self.engine, repr(sorted(self.options.items())), built, _arithmetic())
+        return hashlib.sha256("\0".join(parts).encode()).hexdigest()
+
+
+@cache
+def _arithmetic() -> str:
+    """Return a mark of the code that answers come from: its text, NumPy and SciPy."""
+    home = Path(__file__).parents[1]
+    found = (home / name for name in _ARITHMETIC)
+    files = [
+        f for path in found for f in ([path] if path.is_file() else sorted(path.rglob("*.py")))
+    ]
+    mark = hashlib.sha256(f"{np.__version__} {scipy.__version__}".encode())
+    for file in files:
+        mark.update(file.relative_to(home).as_posix().encode() + file.read_bytes())
+    return mark.hexdigest()
+
+
+def recipe_of(engine: object) -> Recipe | None:
+    """Return how an engine was made.
+
+    Result: None where it was not made by name; an engine of one's own may have an attribute
+    ``recipe``.
+    """
+    found = getattr(engine, "recipe", None)
+    return found if isinstance(found, Recipe) else None
+
 
 ENGINES: dict[str, Callable[[Network], Engine]] = {
     "auto": AutoEngine,
@@ -25,7 +99,7 @@ ENGINES: dict[str, Callable[[Network], Engine]] = {
     "discrete": DiscreteEngine,
 }
 USUAL = "compliance"  # the engine where none is asked for
-LIMITED: dict[str, Callable[[Network, Mortar], Engine]] = {
+_LIMITED: dict[str, Callable[[Network, Mortar], Engine]] = {
     "auto": AutoEngine,
     "discrete": DiscreteEngine,
 }  # engines whose joints hold only what their mortar does
@@ -65,14 +139,14 @@ def make_engine(name: str, network: Network | Scene, mortar: Mortar | str | None
     network = network_of(network)
     if mortar is None:
         return _known_by(ENGINES[name](network), Recipe(name, network.scene))
-    if name not in LIMITED:
+    if name not in _LIMITED:
         raise SceneError(
             f"engine {name}: its joints never fail, so a mortar changes nothing; "
-            f"use the engine {' or '.join(LIMITED)}"
+            f"use the engine {' or '.join(_LIMITED)}"
         )
     mortar = find_mortar(mortar)
     return _known_by(
-        LIMITED[name](network, mortar), Recipe(name, network.scene, {"mortar": mortar})
+        _LIMITED[name](network, mortar), Recipe(name, network.scene, {"mortar": mortar})
     )
 
 
@@ -80,3 +154,43 @@ def _known_by(engine: Engine, recipe: Recipe) -> Engine:
     """Return an engine that says how it was made, so that others can make it again."""
     vars(engine)["recipe"] = recipe
     return engine
+
+
+def provenance(engine: Engine) -> dict[str, object]:
+    """Return what a summary says of the engine that computed it, and of packages.
+
+    ``engine``: after it computed. Result: ``engine`` with its ``name``, the ``reason`` for it, the
+    ``mortar`` if one was given, and of an automatic one the ``levels`` that it took, for how many
+    grip ``sets``, and why each; ``versions`` as of `versions`.
+    """
+    recipe = recipe_of(engine)
+    said: dict[str, object] = {"name": type(engine).__name__, "reason": "given as an object"}
+    if recipe is not None:
+        why = "the default" if recipe.engine == USUAL else "asked for by name"
+        said = {"name": recipe.engine, "reason": why}
+        said |= {name: asdict(value) for name, value in recipe.options.items()}  # type: ignore[call-overload]
+    if isinstance(engine, AutoEngine):
+        said["levels"] = [
+            {"engine": choice.level.value, "sets": sets, "reason": choice.reason}
+            for choice, sets in engine.tally.items()
+        ]
+        said["unchecked"] = engine.unchecked or None
+    return {"engine": said, "versions": dict(versions())}
+
+
+@cache
+def versions() -> Mapping[str, str]:
+    """Return the versions of Python, of seqopt and of the packages that it needs.
+
+    Result: by name.
+    """
+    lines = (line for line in requires("seqopt") or () if "extra ==" not in line)
+    names = ["seqopt", *(re.split(r"[^\w.-]", line)[0] for line in lines)]
+    return {"python": platform.python_version()} | {name: _version(name) for name in names}
+
+
+def _version(name: str) -> str:
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return "not installed"

@@ -12,8 +12,8 @@ from threadpoolctl import ThreadpoolController
 from seqopt.errors import MemoryShortError
 from seqopt.work.memory import free_memory
 
-BUFFERS = 100e6  # bytes; taken at once: OpenBLAS waits without end for buffers it does not get
-SOME = 200  # rows of a matrix whose product and factors need them
+_BUFFERS = 100e6  # bytes; taken at once: OpenBLAS waits without end for buffers it does not get
+_SOME = 200  # rows of a matrix whose product and factors need them
 
 
 def one_thread() -> AbstractContextManager[object]:
@@ -22,10 +22,7 @@ def one_thread() -> AbstractContextManager[object]:
     The matrices of a partial structure are small enough for one core. Threads that share them spend
     their time waiting, without end where another process wants the second core.
 
-    Returns
-    -------
-    context manager
-        Entered for a whole operator or pass of grip sets, it costs some 10 µs.
+    Result: entered for a whole operator or pass of grip sets, it costs some 10 µs.
     """
     limited: AbstractContextManager[object] = _libraries().limit(limits=1, user_api="blas")
     return limited
@@ -35,14 +32,14 @@ def one_thread() -> AbstractContextManager[object]:
 def _libraries() -> ThreadpoolController:
     """Return the handle to the linear algebra of the process; finding it takes milliseconds."""
     free = free_memory()
-    if free < BUFFERS:
+    if free < _BUFFERS:
         raise MemoryShortError(
-            f"linear algebra takes buffers of {BUFFERS / 1e6:.0f} MB, and {free / 1e6:.0f} MB are "
+            f"linear algebra takes buffers of {_BUFFERS / 1e6:.0f} MB, and {free / 1e6:.0f} MB are "
             "free; raise the limit"
         )
     found = ThreadpoolController()
     with found.limit(limits=1, user_api="blas"):
-        some = np.eye(SOME)
+        some = np.eye(_SOME)
         _ = some @ some, np.linalg.inv(some)  # of NumPy's library, and
         _ = blas.dgemm(1.0, some, some), lapack.dgetrf(some)  # of SciPy's
     return found

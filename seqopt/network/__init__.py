@@ -19,9 +19,8 @@ Linear maps give the motion of nodes from that of bricks, and edge forces from s
 """
 
 from seqopt.network.build import build_network
-from seqopt.network.kinematics import node_motion
+from seqopt.network.mechanics import Statics, build_statics, node_motion
 from seqopt.network.network import GROUND, Network, PartKind, Springs
-from seqopt.network.statics import Statics, build_statics
 
 __all__ = [
     "GROUND",

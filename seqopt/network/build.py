@@ -14,7 +14,7 @@ from seqopt.scene.orders import in_order
 from seqopt.scene.parts import Brick, Ground, Joint
 from seqopt.scene.scene import Scene
 
-EQUALLY_FAR = 1e-6  # inner nodes whose distances from a joint differ by no larger share
+_EQUALLY_FAR = 1e-6  # inner nodes whose distances from a joint differ by no larger share
 
 
 @dataclass(frozen=True)
@@ -95,13 +95,7 @@ def _of_bricks(scene: Scene) -> tuple[list[_Node], list[_Edge]]:
 
 
 def network_of(given: Network | Scene) -> Network:
-    """Return a network, or that of a scene.
-
-    Raises
-    ------
-    SceneError
-        If it is neither.
-    """
+    """Return a network, or that of a scene."""
     if isinstance(given, Network | Scene):
         return given if isinstance(given, Network) else build_network(given)
     kind = type(given).__name__
@@ -145,7 +139,7 @@ def _nearest(brick: Brick, spring: Joint | Ground) -> int:
     first, second = (
         np.linalg.norm(np.subtract(brick.node_position(n), spring.position)) for n in brick.nodes
     )
-    return brick.nodes[0] if first <= second * (1 + EQUALLY_FAR) else brick.nodes[1]
+    return brick.nodes[0] if first <= second * (1 + _EQUALLY_FAR) else brick.nodes[1]
 
 
 def _arrays(

@@ -19,13 +19,37 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from seqopt.arrays import Floats, FrozenValue, Ints, frozen
-from seqopt.network.weight import shared_weight
+from seqopt.errors import SceneError
+from seqopt.scene.parts import Brick
 from seqopt.scene.scene import Scene
 from seqopt.showing import Shown, display
 
 if TYPE_CHECKING:
     import networkx as nx
     from matplotlib.figure import Figure
+
+_OFF_PLANE = 1e-9  # lever of a weight about the line of its nodes treated as zero, over the brick
+
+
+def _shared_weight(brick: Brick, weight: Floats) -> Floats:
+    """Return forces at a brick's two inner nodes that act on it as its weight does.
+
+    ``brick``: with nodes of its own; ``weight`` (3,): at the centroid, N. Result (2, 3): N. Raises
+    `SceneError` if the weight turns the brick about the line through its nodes: two forces there
+    cannot.
+    """
+    first, second = (np.subtract(brick.node_position(node), brick.position) for node in brick.nodes)
+    span, middle = 0.5 * (second - first), 0.5 * (first + second)
+    moment = -np.cross(middle, weight)  # of the weight about the middle between the nodes
+    along = abs(float(moment @ span)) / float(np.linalg.norm(span))
+    if along > _OFF_PLANE * max(brick.dimensions) * float(np.linalg.norm(weight)):
+        raise SceneError(
+            f"brick {brick.name}: its weight turns it about the line through its nodes "
+            f"{list(brick.nodes)}; give nodes above, below or on either side of the centroid"
+        )
+    shift = np.cross(moment, span) / (2 * span @ span)
+    return np.stack([0.5 * weight - shift, 0.5 * weight + shift])
+
 
 GROUND = -1  # stands for the ground where a brick's index in build order is expected
 
@@ -82,18 +106,7 @@ class Springs(FrozenValue):
     face: tuple[Floats, ...]
 
     def acting(self, bricks: int) -> Ints:
-        """Return the springs that act on a partial structure.
-
-        Parameters
-        ----------
-        bricks : int
-            How many bricks stand.
-
-        Returns
-        -------
-        (s,) int
-            Ascending.
-        """
+        """Return the springs that act on a partial structure. Result (s,): ascending."""
         return np.flatnonzero(self.since <= bricks)
 
     @cached_property
@@ -184,7 +197,7 @@ class Network(Shown, FrozenValue):
         half = np.repeat(0.5 * self.weight, 2, axis=0)
         for i, brick in enumerate(self.scene.placed):
             if brick.node_offsets is not None:
-                half[2 * i : 2 * i + 2] = shared_weight(brick, self.weight[i])
+                half[2 * i : 2 * i + 2] = _shared_weight(brick, self.weight[i])
         return frozen(half)
 
     @cached_property
@@ -214,42 +227,19 @@ class Network(Shown, FrozenValue):
         return frozen((numbers[order], np.where(blocked, len(numbers), order)))
 
     def count_nodes(self, bricks: int) -> int:
-        """Return how many nodes a partial structure has.
-
-        Parameters
-        ----------
-        bricks : int
-            How many bricks stand.
-        """
+        """Return how many nodes a partial structure has."""
         return int(np.searchsorted(self.node_since, bricks, side="right"))
 
     def count_edges(self, bricks: int) -> int:
-        """Return how many edges a partial structure has.
-
-        Parameters
-        ----------
-        bricks : int
-            How many bricks stand.
-        """
+        """Return how many edges a partial structure has."""
         return int(np.searchsorted(self.edge_since, bricks, side="right"))
 
     def plot(self, bricks: int | None = None) -> Figure:
         """Draw the network, or its part of the first bricks.
 
-        Parameters
-        ----------
-        bricks : int, optional
-            How many, in build order; all by default.
-
-        Returns
-        -------
-        matplotlib.figure.Figure
-            A notebook shows it; ``savefig`` writes it to a file.
-
-        Raises
-        ------
-        ExtraError
-            If matplotlib is not installed (extra ``plot``).
+        ``bricks``: how many, in build order; all by default. Result: a notebook shows it;
+        ``savefig`` writes it to a file. Raises `ExtraError` if matplotlib is not installed (extra
+        ``plot``).
         """
         figure: Figure = display("network_picture")(self, bricks)
         return figure
@@ -257,16 +247,8 @@ class Network(Shown, FrozenValue):
     def graph(self, bricks: int) -> nx.Graph[object]:
         """Return a partial structure as a graph.
 
-        Parameters
-        ----------
-        bricks : int
-            How many bricks stand.
-
-        Returns
-        -------
-        networkx.Graph
-            Nodes carry ``kind`` and ``position`` (m), edges ``number`` (from 1), ``kind`` and
-            ``length`` (m).
+        Result: nodes carry ``kind`` and ``position`` (m), edges ``number`` (from 1), ``kind`` and
+        ``length`` (m).
         """
         import networkx as nx  # noqa: PLC0415  # slow to import, and needed nowhere else
 

@@ -15,9 +15,9 @@ import numpy as np
 from seqopt.errors import FileError
 from seqopt.network.network import Network
 from seqopt.placement.problem import Problem
+from seqopt.responses.blocks import pack
 from seqopt.responses.choices import Evaluation
 from seqopt.responses.quantities import CHOSEN_BY
-from seqopt.responses.shipping import pack
 
 SAME = 1e-5  # over its largest, that a response may differ: ten times what a screen may err
 

@@ -17,7 +17,7 @@ from seqopt.placement.free_tables import Follows, RuleTables
 from seqopt.placement.requirements import LIMIT_TOLERANCE
 from seqopt.placement.schedule_tables import ScheduleTables
 from seqopt.placement.standing_proof import StandingProof
-from seqopt.responses.known_rows import KnownRows
+from seqopt.responses.grip_sets import KnownRows
 from seqopt.sequence.free_check import RuleBook
 from seqopt.sequence.free_rules import Payload
 from seqopt.sequence.schedule import Schedule

@@ -13,7 +13,7 @@ import pandas as pd
 
 from seqopt.contact.mortar import Mortar
 from seqopt.engines.interface import Engine
-from seqopt.engines.provenance import provenance
+from seqopt.engines.registry import provenance
 from seqopt.errors import InfeasibleError
 from seqopt.placement.formulation import Formulation
 from seqopt.placement.free_goals import judged_by
@@ -31,7 +31,7 @@ from seqopt.responses.table import analyze
 from seqopt.sequence.free_rules import FREE, Ending
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import Step, StepKind, idle_robots
-from seqopt.stability.steps import stability_table
+from seqopt.stability.assessment import stability_table
 
 COUNTED = ("each", "sets", "screened", "stability")  # of a problem: they know what was computed
 
@@ -146,7 +146,7 @@ class FreePlan(ShownBuild):
         Returns
         -------
         pandas.DataFrame
-            As of `seqopt.stability.steps.stability_table`.
+            As of `seqopt.stability.assessment.stability_table`.
         """
         if mortar is not None:
             return super().stability(mortar)

@@ -30,8 +30,7 @@ from seqopt.responses.quantities import robot_response
 from seqopt.scene.checks import short
 from seqopt.scene.scene import Scene
 from seqopt.sequence.free_rules import FreeRules
-from seqopt.sequence.free_space import FreeSpace
-from seqopt.sequence.free_start import free_space
+from seqopt.sequence.free_space import FreeSpace, free_space
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.schedule_space import ScheduleSpace
 from seqopt.sequence.steps import Grips

@@ -11,7 +11,7 @@ from seqopt.arrays import Bools, Floats, Ints
 from seqopt.graph.explore import Explorer, Moves
 from seqopt.placement.free_goals import Measure
 from seqopt.placement.free_problem import FreeProblem
-from seqopt.sequence import free_moves
+from seqopt.sequence import free_space
 
 
 @dataclass(frozen=True)
@@ -137,7 +137,7 @@ def explore(
 
 
 def _joined(
-    found: Sequence[tuple[free_moves.Moves, bool]], states: Ints, *, regrips: bool = True
+    found: Sequence[tuple[free_space.Moves, bool]], states: Ints, *, regrips: bool = True
 ) -> Moves:
     """Return moves together, those that are regrips only if these are wanted."""
     parts = [Moves(np.zeros(0, dtype=np.int64), states[:0], np.zeros((0, 2)))]

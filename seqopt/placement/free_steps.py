@@ -7,8 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from seqopt.errors import SolverError
-from seqopt.sequence.free_space import FreeSpace
-from seqopt.sequence.free_team import node_numbers
+from seqopt.sequence.free_space import FreeSpace, node_numbers
 from seqopt.sequence.schedule_space import ScheduleSpace
 from seqopt.sequence.steps import Step, StepKind, check_sequence
 

@@ -11,7 +11,7 @@ from seqopt.placement.free_goals import LARGEST
 from seqopt.placement.free_problem import FreeProblem
 from seqopt.placement.order_problem import OrderProblem
 from seqopt.sequence.free_rules import Ending
-from seqopt.sequence.free_team import node_numbers
+from seqopt.sequence.free_space import node_numbers
 
 MOST_SETS = 200_000  # grip sets of the whole structure that are looked at
 

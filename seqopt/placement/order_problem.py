@@ -8,8 +8,7 @@ from enum import Enum
 from functools import cached_property
 
 from seqopt.arrays import FrozenValue
-from seqopt.engines.recipe import recipe_of
-from seqopt.engines.registry import make_engine
+from seqopt.engines.registry import make_engine, recipe_of
 from seqopt.errors import ProblemError
 from seqopt.network.build import build_network
 from seqopt.placement.free_goals import Measure

@@ -25,7 +25,7 @@ from seqopt.placement.order_problem import OrderProblem
 from seqopt.scene.orders import Order
 from seqopt.sequence.free_check import RuleBook
 from seqopt.sequence.free_rules import Ending
-from seqopt.sequence.free_team import node_numbers
+from seqopt.sequence.free_space import node_numbers
 
 Key = tuple[frozenset[int], int]  # bricks that stand, and the newest
 MOST = 5000  # sets of bricks that are looked at

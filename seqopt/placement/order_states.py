@@ -17,8 +17,7 @@ from seqopt.graph.explore import Moves
 from seqopt.placement.free_problem import FreeProblem
 from seqopt.placement.free_states import FreeStates
 from seqopt.placement.order_problem import OrderProblem
-from seqopt.sequence.free_moves import sort_entries
-from seqopt.sequence.free_team import node_numbers
+from seqopt.sequence.free_space import node_numbers, sort_entries
 
 Key = tuple[frozenset[int], int]  # bricks that stand, and the newest
 

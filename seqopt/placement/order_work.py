@@ -14,7 +14,7 @@ from seqopt.graph.paths import least_peak
 from seqopt.placement.free_problem import FreeProblem
 from seqopt.placement.free_states import explore
 from seqopt.placement.order_problem import OrderProblem
-from seqopt.responses.shipping import Shipment, engine_of, pack
+from seqopt.responses.blocks import Shipment, engine_of, pack
 from seqopt.scene.orders import Order
 
 NARROW = 50  # states of a brick count with which an order is tried first

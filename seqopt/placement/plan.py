@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from seqopt.engines.interface import Engine
-from seqopt.engines.provenance import provenance
+from seqopt.engines.registry import provenance
 from seqopt.errors import ProblemError
 from seqopt.placement.certificate import TOLERANCE, Certificate
 from seqopt.placement.formulation import (
@@ -262,7 +262,7 @@ class Plan(ShownBuild):
             ``stopped`` before that or ``interrupted``; the limits of the linear range that are left
             and the payloads that are exceeded; ``idle_robots``, which never grip;
             ``models_evaluated`` and ``seconds``; the ``engine`` and ``versions`` (see
-            `seqopt.engines.provenance`).
+            `seqopt.engines.registry`).
         """
         schedule, proof = self._posed.schedule, self.certificate
         status = "unproven"

@@ -21,7 +21,7 @@ def moves_table(problem: Problem, choice: Sequence[int], grips: pd.DataFrame) ->
     choice : sequence of int
         The candidate that is taken for every move.
     grips : pandas.DataFrame
-        Of the plan, as of `seqopt.responses.grips.grips_table`.
+        Of the plan, as of `seqopt.responses.table.grips_table`.
 
     Returns
     -------

@@ -11,8 +11,7 @@ import pandas as pd
 from seqopt.errors import InfeasibleError
 from seqopt.placement.problem import Problem
 from seqopt.placement.requirements import Limit, payload_limits
-from seqopt.responses.in_words import steps_in_words
-from seqopt.responses.quantities import RESPONSES, robot_response
+from seqopt.responses.quantities import RESPONSES, robot_response, steps_in_words
 from seqopt.responses.table import analyze, force_column
 from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import OpenStep

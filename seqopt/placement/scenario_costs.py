@@ -9,8 +9,7 @@ from contextlib import closing
 from dataclasses import dataclass
 
 from seqopt.arrays import FrozenValue
-from seqopt.engines.recipe import Recipe
-from seqopt.engines.registry import make_engine
+from seqopt.engines.registry import Recipe, make_engine
 from seqopt.errors import MechanismError, ProblemError, SolverError
 from seqopt.placement.costs import LayeredCosts
 from seqopt.placement.problem import Problem
@@ -21,9 +20,8 @@ from seqopt.responses.choices import Evaluation
 from seqopt.responses.resources import Resources
 from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import Schedule
-from seqopt.work.crew import Crew, hire
-from seqopt.work.ordered import map_ordered
 from seqopt.work.progress import Progress
+from seqopt.work.workers import Crew, hire, map_ordered
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from seqopt.engines.interface import Engine
-from seqopt.engines.recipe import Recipe, recipe_of
-from seqopt.engines.registry import make_engine
+from seqopt.engines.registry import Recipe, make_engine, recipe_of
 from seqopt.errors import ProblemError
 from seqopt.scene.checks import short
 from seqopt.scene.scene import Scene

@@ -14,8 +14,7 @@ from seqopt.arrays import Bools, Floats, Ints
 from seqopt.errors import StepError
 from seqopt.network.network import Network
 from seqopt.placement.free_tables import Follows
-from seqopt.sequence.holds import Hold, holds
-from seqopt.sequence.schedule import OpenGrip, Schedule
+from seqopt.sequence.schedule import Hold, OpenGrip, Schedule, holds
 from seqopt.sequence.steps import Step, StepKind
 
 

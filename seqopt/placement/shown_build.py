@@ -10,11 +10,11 @@ import pandas as pd
 
 from seqopt.contact.mortar import Mortar
 from seqopt.engines.interface import Engine
-from seqopt.responses.grips import grips_table
 from seqopt.responses.linear_range import Departure, LinearRange
+from seqopt.responses.table import grips_table
 from seqopt.sequence.steps import Step
 from seqopt.showing import Page, Shown, display
-from seqopt.stability.steps import assess_steps, stability_table
+from seqopt.stability.assessment import assess_steps, stability_table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -79,7 +79,7 @@ class ShownBuild(Shown):
         Returns
         -------
         pandas.DataFrame
-            As of `seqopt.stability.steps.stability_table`.
+            As of `seqopt.stability.assessment.stability_table`.
         """
         results = assess_steps(self.engine.network, self.steps, mortar)
         return stability_table(self.steps, results)

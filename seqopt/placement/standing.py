@@ -12,7 +12,7 @@ from seqopt.arrays import Bools, Floats, Ints
 from seqopt.contact.mortar import DRY, Mortar, bond_mortar, find_mortar
 from seqopt.errors import ProblemError
 from seqopt.network.network import Network
-from seqopt.responses.known_rows import KnownRows
+from seqopt.responses.grip_sets import KnownRows
 from seqopt.scene.checks import short
 from seqopt.stability.margins import Margins
 from seqopt.stability.screens import FALLS, OPEN, STANDS, Screen

@@ -12,8 +12,7 @@ from seqopt.errors import SolverError
 from seqopt.placement.free_problem import FreeProblem
 from seqopt.placement.standing import Standing, StandingSets, slack
 from seqopt.sequence.steps import Step
-from seqopt.stability.assessment import Stability, Verdict
-from seqopt.stability.steps import assess_steps, step_verdicts
+from seqopt.stability.assessment import Stability, Verdict, assess_steps, step_verdicts
 
 SURE = 1e-3  # rad, or as a share: how far the cone program may be from what forces prove
 

@@ -24,8 +24,8 @@ from seqopt.placement.shown_build import ShownBuild
 from seqopt.report.comparison import largest
 from seqopt.report.page_builds import WORDS
 from seqopt.report.wording import typed
-from seqopt.responses.in_words import number_text
 from seqopt.responses.linear_range import OUTSIDE, REMEDY
+from seqopt.responses.quantities import number_text
 from seqopt.scene.boxes import boxes
 from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import Schedule

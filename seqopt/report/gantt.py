@@ -20,7 +20,7 @@ from seqopt.report.picture import new_picture
 from seqopt.report.style import SMALL, styled
 from seqopt.responses.table import force_column
 from seqopt.scene.scene import Scene
-from seqopt.sequence.holds import Hold, holds
+from seqopt.sequence.schedule import Hold, holds
 from seqopt.sequence.steps import AnyStep
 
 SHADES = "YlGnBu"

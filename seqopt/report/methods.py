@@ -11,8 +11,7 @@ from seqopt.errors import StepError
 from seqopt.responses.table import analyze
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import AnyStep, idle_robots
-from seqopt.sequence.stretches import degeneration
-from seqopt.sequence.two_robots import METHODS
+from seqopt.sequence.two_robots import METHODS, degeneration
 from seqopt.study.published import PUBLISHED, is_reference_arch, published_plan
 
 

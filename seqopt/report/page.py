@@ -15,7 +15,7 @@ import pandas as pd
 from seqopt.engines.interface import Engine
 from seqopt.errors import ProblemError
 from seqopt.report.page_data import Build, Scatter, build_data, size_of, structure_data
-from seqopt.responses.in_words import number_text
+from seqopt.responses.quantities import number_text
 
 RESPONSES = {
     "F_largest": "largest grip force, N",

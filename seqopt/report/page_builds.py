@@ -10,8 +10,8 @@ from seqopt.files import csv_text
 from seqopt.placement.promises import overloads
 from seqopt.report.comparison import LARGEST, largest
 from seqopt.report.page_data import Build
-from seqopt.responses.in_words import length_text, number_text
 from seqopt.responses.linear_range import OUTSIDE, REMEDY, Departure, builds_in_words
+from seqopt.responses.quantities import length_text, number_text
 from seqopt.scene.scene import Scene
 from seqopt.sequence.plan_file import parse_plan
 

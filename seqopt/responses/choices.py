@@ -22,21 +22,22 @@ import numpy as np
 from seqopt.arrays import Terse
 from seqopt.engines.interface import Engine
 from seqopt.errors import MemoryShortError
-from seqopt.responses.alike import (
-    Alike,
+from seqopt.responses.batches import (
+    Batch,
+    Keeping,
     StepChoices,
     Wanted,
-    alike,
+    batch_of,
     choices_of,
     combinations,
     distinct,
     no_node_twice,
-    steps_alike,
+    require_memory,
+    steps_of_batches,
 )
+from seqopt.responses.blocks import Answers, Block, work
 from seqopt.responses.division import answer_blocks
-from seqopt.responses.memory import Keeping, require_memory
 from seqopt.responses.resources import HERE, Resources
-from seqopt.responses.states import Answers, Block, work
 from seqopt.sequence.schedule import OpenGrip, OpenStep, Schedule
 
 CHOICE_RESPONSES = ("T_max", "M_sup", "D_max", "C_max", "F_move", "F_largest")  # and one per robot
@@ -69,10 +70,7 @@ class Evaluation(Terse):
     def streams(self) -> bool:
         """Whether there is memory for costs alone: responses then come, and go, step by step.
 
-        Raises
-        ------
-        MemoryShortError
-            If there is not even that.
+        Raises `MemoryShortError` if there is not even that.
         """
         most = self.resources.max_memory
         return require_memory(self.schedule, self.wanted, most) is Keeping.COSTS
@@ -81,10 +79,7 @@ class Evaluation(Terse):
     def steps(self) -> tuple[StepChoices, ...]:
         """All open steps, in order.
 
-        Raises
-        ------
-        MemoryShortError
-            If there is not the memory to keep them.
+        Raises `MemoryShortError` if there is not the memory to keep them.
         """
         if self.streams:
             raise MemoryShortError(
@@ -98,18 +93,10 @@ class Evaluation(Terse):
 
         They are computed as they are taken, and kept for the next time where there is memory.
 
-        Parameters
-        ----------
-        soon : bool, optional
-            Whether there is much to do with each: several processes then work on the next ones
-            together. Else each works on a part of the build of its own, which takes less time.
-
-        Raises
-        ------
-        MechanismError, SolverError, WorkerError
-            As the engine does, and the workers.
-        MemoryShortError
-            If there is not the memory.
+        ``soon``: whether there is much to do with each: several processes then work on the next
+        ones together. Else each works on a part of the build of its own, which takes less time.
+        Raises `MechanismError`, `SolverError`, `WorkerError` as the engine does, and the workers;
+        `MemoryShortError` if there is not the memory.
         """
         keep, known = not self.streams, vars(self).get("_found")
         if known is not None and keep:
@@ -158,29 +145,11 @@ def evaluate_choices(
 ) -> tuple[tuple[StepChoices, ...], int]:
     """Solve every distinct model that the open steps of a schedule contain, once.
 
-    Parameters
-    ----------
-    engine : Engine
-        What solves them.
-    schedule : Schedule
-        Whose open steps are evaluated.
-    wanted : Wanted
-        Which responses every move needs.
-    resources : Resources, optional
-
-    Returns
-    -------
-    steps : tuple of StepChoices
-        All open steps, in order.
-    models : int
-        How many different models there were: a model is a brick count and the nodes held.
-
-    Raises
-    ------
-    MechanismError, SolverError, WorkerError
-        As the engine does, and the workers.
-    MemoryShortError
-        If there is not the memory for them.
+    ``engine``: what solves them; ``schedule``: whose open steps are evaluated; ``wanted``: which
+    responses every move needs. Results: ``steps``: all open steps, in order; ``models``: how many
+    different models there were: a model is a brick count and the nodes held. Raises
+    `MechanismError`, `SolverError`, `WorkerError` as the engine does, and the workers;
+    `MemoryShortError` if there is not the memory for them.
     """
     evaluation = Evaluation(engine, schedule, wanted, resources)
     return evaluation.steps, evaluation.models
@@ -191,12 +160,12 @@ def _by_level(
 ) -> Generator[tuple[list[StepChoices], int], None, None]:
     """Yield the steps with one brick count after the other, and how many models they have."""
     schedule = evaluation.schedule
-    levels = steps_alike(schedule)
-    under_way: deque[list[Alike]] = deque()
+    levels = steps_of_batches(schedule)
+    under_way: deque[list[Batch]] = deque()
 
     def blocks() -> Iterator[Block]:
         for level in levels:
-            groups = [alike(schedule, steps, evaluation.wanted) for steps in level]
+            groups = [batch_of(schedule, steps, evaluation.wanted) for steps in level]
             under_way.append(groups)
             for group in groups:
                 yield from group.blocks()
@@ -220,7 +189,7 @@ def _by_level(
                 found = []
 
 
-def _joined(groups: Sequence[Alike], answers: Sequence[Answers]) -> list[StepChoices]:
+def _joined(groups: Sequence[Batch], answers: Sequence[Answers]) -> list[StepChoices]:
     """Return the choices of all steps with as many bricks, in order."""
     out: list[StepChoices] = []
     start = 0
@@ -236,14 +205,10 @@ def window_models(schedule: Schedule, choice: Sequence[int]) -> int:
     A step that two moves share is then solved for the later one's candidates only, the earlier
     choice being made.
 
-    Parameters
-    ----------
-    schedule : Schedule
-    choice : sequence of int
-        The chosen candidate of every move.
+    ``choice``: the chosen candidate of every move.
     """
     models = 0
-    for level in steps_alike(schedule):
+    for level in steps_of_batches(schedule):
         for steps in level:
             rows = np.concatenate([_window_states(schedule, step, choice) for step in steps])
             models += len(distinct(rows)[0])

@@ -12,37 +12,24 @@ from typing import TypeVar
 import numpy as np
 
 from seqopt.engines.interface import Engine
+from seqopt.responses.blocks import Answers, Block, Blocks, Store, open_store, tally_of, worker_for
 from seqopt.responses.resources import Resources
-from seqopt.responses.shipping import Blocks, worker_for
-from seqopt.responses.states import Answers, Block, tally_of
-from seqopt.responses.store import Store, open_store
-from seqopt.work.crew import Crew, hire
-from seqopt.work.lanes import Lanes
-from seqopt.work.ordered import map_ordered
 from seqopt.work.progress import Progress
+from seqopt.work.workers import Crew, Lanes, hire, map_ordered
 
-Found = TypeVar("Found")
-SEVERAL = 4  # portions' work that states of one brick count may be before they are parted
-PREPARED = 0.15  # of all work, that every process does for itself on the vault of 338 bricks
-PORTIONS = 32  # tasks for every worker: one that is slow, or dies, leaves little to the others
+_Found = TypeVar("_Found")
+_SEVERAL = 4  # portions' work that states of one brick count may be before they are parted
+_PREPARED = 0.15  # of all work, that every process does for itself on the vault of 338 bricks
+_PORTIONS = 32  # tasks for every worker: one that is slow, or dies, leaves little to the others
 
 
 @dataclass(frozen=True)
 class Portion:
-    """Blocks that are answered together.
-
-    Attributes
-    ----------
-    blocks : tuple of Block
-    stored : list of Answers or None
-        Their answers, if they are known.
-    lane : int
-        Which of several processes is to answer them.
-    """
+    """Blocks that are answered together."""
 
     blocks: tuple[Block, ...]
-    stored: list[Answers] | None = None
-    lane: int = 0
+    stored: list[Answers] | None = None  # their answers, if they are known
+    lane: int = 0  # which of several processes is to answer them
 
     @property
     def work(self) -> float:
@@ -63,21 +50,9 @@ def answer_blocks(
     Each process of our own prepares every brick count up to the last that it is asked for. Apart,
     it gets neighboring ones only, and answers to later ones wait for those to earlier ones.
 
-    Parameters
-    ----------
-    engine : Engine
-    blocks : iterable of Block
-        Taken as they are needed.
-    total : float
-        About how much work they are.
-    resources : Resources
-    apart : bool, optional
-        Whether there is room for all answers, and no hurry for the next one.
-
-    Raises
-    ------
-    MechanismError, SolverError, WorkerError
-        As the engine does, and the workers.
+    ``blocks``: taken as they are needed; ``total``: about how much work they are; ``apart``:
+    whether there is room for all answers, and no hurry for the next one. Raises `MechanismError`,
+    `SolverError`, `WorkerError` as the engine does, and the workers.
     """
     store = open_store(resources.cache, engine)
     progress = Progress("responses", total, resources.progress)
@@ -101,15 +76,11 @@ def answer_blocks(
 def take_turns(portions: Sequence[Portion], lanes: int) -> tuple[Iterator[int], Iterator[Portion]]:
     """Return portions with their lanes, which take turns, and the places where they stood.
 
-    Parameters
-    ----------
-    portions : sequence of Portion
-    lanes : int
-        Each gets neighboring ones. Later lanes get fewer, since they prepare all that comes before
-        them too: with a share f of the work they end together where lane i ends at the share
-        (1 - q^i) / (1 - q^n) with q = 1 / (1 + f).
+    ``lanes``: each gets neighboring ones. Later lanes get fewer, since they prepare all that comes
+    before them too: with a share f of the work they end together where lane i ends at the share (1
+    - q^i) / (1 - q^n) with q = 1 / (1 + f).
     """
-    before = 1 - (1 + PREPARED) ** -np.arange(1.0, lanes + 1)
+    before = 1 - (1 + _PREPARED) ** -np.arange(1.0, lanes + 1)
     work = np.array([portion.work for portion in portions])
     middle = (np.cumsum(work) - work / 2) / max(float(work.sum()), 1.0)
     lane_of = np.searchsorted(before[:-1] / before[-1], middle).tolist()
@@ -120,16 +91,12 @@ def take_turns(portions: Sequence[Portion], lanes: int) -> tuple[Iterator[int], 
     return iter([place for place, _ in turns]), iter([portion for _, portion in turns])
 
 
-def in_places(places: Iterable[int], results: Iterable[Found]) -> Iterator[Found]:
+def in_places(places: Iterable[int], results: Iterable[_Found]) -> Iterator[_Found]:
     """Yield results in the order of their places, each as soon as those before it are there.
 
-    Parameters
-    ----------
-    places : iterable of int
-        From 0, each once, in the order of the results.
-    results : iterable
+    ``places``: from 0, each once, in the order of the results.
     """
-    waiting: dict[int, Found] = {}
+    waiting: dict[int, _Found] = {}
     following = 0
     for result, place in zip(results, places, strict=False):
         waiting[place] = result
@@ -147,16 +114,9 @@ def share_out(
     one share they prepare once: portions keep the order of the blocks, and end between brick counts
     unless one has several portions' work.
 
-    Parameters
-    ----------
-    blocks : iterable of Block
-    store : Store or None
-    total : float
-        About how much work they are.
-    crew : Crew or None
-        Without one each block is a portion.
+    ``total``: about how much work they are; ``crew``: without one each block is a portion.
     """
-    enough = 0.0 if crew is None else total / (PORTIONS * crew.workers)
+    enough = 0.0 if crew is None else total / (_PORTIONS * crew.workers)
     mine: list[Block] = []
     for block in blocks:
         if _complete(mine, block, enough):
@@ -178,7 +138,7 @@ def _complete(mine: Sequence[Block], coming: Block, enough: float) -> bool:
     """Return whether blocks are a portion before another one comes."""
     work = sum(block.work for block in mine)
     between = bool(mine) and coming.bricks != mine[-1].bricks
-    return work >= (enough if between else SEVERAL * enough) and bool(mine)
+    return work >= (enough if between else _SEVERAL * enough) and bool(mine)
 
 
 @dataclass(frozen=True)

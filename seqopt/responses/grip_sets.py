@@ -6,7 +6,7 @@ solved in batches, each of them once.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import reduce
 from operator import or_
 
@@ -16,22 +16,63 @@ from numpy.typing import ArrayLike
 from seqopt.arrays import Floats, Ints
 from seqopt.engines.interface import Engine, Want
 from seqopt.errors import MechanismError
-from seqopt.responses.alike import BLOCK
-from seqopt.responses.known_rows import KnownRows
+from seqopt.responses.batches import BLOCK
 from seqopt.responses.quantities import CHOSEN_BY, lengths, require_finite
+
+
+class KnownRows:
+    """Rows of values by a key and a code, each computed once.
+
+    ``count``: how many rows were computed.
+
+    Examples
+    --------
+    >>> rows = KnownRows()
+    >>> codes = np.array([3, 1, 3])
+    >>> rows.of("squares", codes, lambda places: codes[places, None] ** 2.0).ravel()
+    array([9., 1., 9.])
+    >>> rows.count
+    2
+    """
+
+    def __init__(self) -> None:
+        self._known: dict[object, tuple[Ints, Floats]] = {}
+        self.count = 0
+
+    @property
+    def nbytes(self) -> int:
+        """How much memory the rows take."""
+        return sum(
+            codes.nbytes + (0 if values is None else values.nbytes)
+            for codes, values in self._known.values()
+        )
+
+    def of(self, key: object, codes: Ints, compute: Callable[[Ints], Floats]) -> Floats:
+        """Return the rows of codes, those that are new computed now, all together.
+
+        ``key``: codes of other keys are others; ``codes`` (n,); ``compute``: returns the rows (m,
+        k) of distinct codes, given the places (m,) where they first stand among those asked for.
+        Result (n, k).
+        """
+        distinct, first = np.unique(codes, return_index=True)
+        known, values = self._known.get(key, (distinct[:0], None))
+        fresh = first[~np.isin(distinct, known, assume_unique=True)]
+        if values is None or len(fresh):
+            computed = compute(fresh)
+            known = np.concatenate([known, codes[fresh]])
+            values = computed if values is None else np.concatenate([values, computed])
+            order = np.argsort(known, kind="stable")
+            known, values = known[order], values[order]
+            self._known[key] = known, values
+            self.count += len(fresh)
+        return np.asarray(values[np.searchsorted(known, codes)])
 
 
 class GripSets:
     """The responses of grip sets of one scene.
 
-    Parameters
-    ----------
-    engine : Engine
-        What solves them.
-    names : sequence of str
-        Responses of `seqopt.responses.quantities.CHOSEN_BY` that are wanted.
-    screen : bool, optional
-        Whether six digits are enough, to choose by.
+    ``engine``: what solves them; ``names``: responses of `seqopt.responses.quantities.CHOSEN_BY`
+    that are wanted; ``screen``: whether six digits are enough, to choose by.
 
     Examples
     --------
@@ -74,20 +115,10 @@ class GripSets:
     def answers(self, bricks: int, held: Ints) -> tuple[Floats, Floats]:
         """Return the responses of grip sets and the forces of their grips.
 
-        Parameters
-        ----------
-        bricks : int
-            How many bricks stand.
-        held : (S, r) int
-            Nodes held, ascending in every row, as places in build order counted from 1; zeros for
-            robots that hold none.
-
-        Returns
-        -------
-        responses : (S, R) float
-            In the order of the names, SI units; infinite where something would be loose.
-        forces : (S, r) float
-            N; zero for a robot that holds none.
+        ``held`` (S, r): nodes held, ascending in every row, as places in build order counted from
+        1; zeros for robots that hold none. Results: ``responses`` (S, R): in the order of the
+        names, SI units; infinite where something would be loose. ``forces`` (S, r): N; zero for a
+        robot that holds none.
         """
         held = np.asarray(held)
         out = np.zeros((len(held), len(self._names) + held.shape[1]))

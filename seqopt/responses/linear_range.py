@@ -21,13 +21,12 @@ from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.discrete.equilibrium_path import FAR
 from seqopt.engines.interface import Engine, Fields, Want
 from seqopt.errors import SceneError
-from seqopt.responses.in_words import length_text, steps_in_words
-from seqopt.responses.quantities import RESPONSES, lengths
+from seqopt.responses.quantities import RESPONSES, length_text, lengths, steps_in_words
 
-TURN = 0.1  # rad; sine and angle differ by 0.2 %, cosine and one by 0.5 %
-STRAIN = 0.1  # of a joint, over its thickness; true strain differs by 5 %
-DEFORMED = f"{{:.3g}} times its thickness, more than {STRAIN:g} times"
-STRESSED = (
+_TURN = 0.1  # rad; sine and angle differ by 0.2 %, cosine and one by 0.5 %
+_STRAIN = 0.1  # of a joint, over its thickness; true strain differs by 5 %
+_DEFORMED = f"{{:.3g}} times its thickness, more than {_STRAIN:g} times"
+_STRESSED = (
     f"{{:.3g}} MPa beyond what epoxy holds, {EPOXY.tensile_strength / 1e6:g} MPa in tension, "
     f"{EPOXY.cohesion / 1e6:g} MPa and friction in shear"
 )
@@ -41,21 +40,11 @@ REMEDY = (
 
 @dataclass(frozen=True)
 class Departure:
-    """A limit of the linear range that some steps leave.
+    """A limit of the linear range that some steps leave."""
 
-    Attributes
-    ----------
-    what : str
-        What is too large, in a word or two.
-    said : str
-        The largest value, the limit, and why it is one.
-    steps : tuple of int
-        Numbers of the steps.
-    """
-
-    what: str
-    said: str
-    steps: tuple[int, ...]
+    what: str  # what is too large, in a word or two
+    said: str  # the largest value, the limit, and why it is one
+    steps: tuple[int, ...]  # numbers of the steps
 
     def __str__(self) -> str:
         return f"{self.what} of up to {self.said} ({steps_in_words(self.steps)})"
@@ -64,10 +53,7 @@ class Departure:
 class LinearRange:
     """Finds the steps of builds in which an engine's results leave the linear range.
 
-    Attributes
-    ----------
-    unchecked : tuple of str
-        Why stresses in joints are not checked, if they should be: in a line, or none.
+    ``unchecked``: why stresses in joints are not checked, if they should be: in a line, or none.
     """
 
     def __init__(self, engine: Engine) -> None:
@@ -89,12 +75,8 @@ class LinearRange:
     ) -> tuple[Departure, ...]:
         """Return the limits that the steps of a build leave.
 
-        Parameters
-        ----------
-        table : pandas.DataFrame
-            Responses of the steps, from `seqopt.analyze`.
-        fields : iterable of Fields, optional
-            Of every step, with all fields; by default the engine computes them.
+        ``table``: responses of the steps, from `seqopt.analyze`. ``fields``: of every step, with
+        all fields; by default the engine computes them.
 
         Examples
         --------
@@ -112,9 +94,9 @@ class LinearRange:
         within = f", more than {length_text(far)}, a tenth of the smallest side of a brick"
         found = (
             ("displacement", moved, far, lambda most: length_text(most) + within),
-            ("rotation", turned, TURN, f"{{:.3g}} rad, more than {TURN:g} rad".format),
-            ("deformation of a joint", strained, STRAIN, DEFORMED.format),
-            ("stress in a joint", stressed, 0.0, lambda most: STRESSED.format(most / 1e6)),
+            ("rotation", turned, _TURN, f"{{:.3g}} rad, more than {_TURN:g} rad".format),
+            ("deformation of a joint", strained, _STRAIN, _DEFORMED.format),
+            ("stress in a joint", stressed, 0.0, lambda most: _STRESSED.format(most / 1e6)),
         )
         out = []
         for what, values, most, say in found:
@@ -127,10 +109,7 @@ class LinearRange:
     def of_builds(self, tables: Mapping[str, pd.DataFrame]) -> dict[str, tuple[Departure, ...]]:
         """Return the limits that builds leave, for those that leave any.
 
-        Parameters
-        ----------
-        tables : mapping of str to pandas.DataFrame
-            Responses of the steps of each, by name.
+        ``tables``: responses of the steps of each, by name.
         """
         return {name: left for name, each in tables.items() if (left := self.departures(each))}
 
@@ -170,15 +149,7 @@ class LinearRange:
 def builds_in_words(departures: Mapping[str, Sequence[Departure]]) -> tuple[str, ...]:
     """Return which builds leave the linear range, and by what.
 
-    Parameters
-    ----------
-    departures : mapping of str to sequence of Departure
-        By the name of the build.
-
-    Returns
-    -------
-    tuple of str
-        Of one line, or none.
+    ``departures``: by the name of the build. Result: of one line, or none.
 
     Examples
     --------

@@ -6,7 +6,7 @@ needs. Sizes of grip forces are functions of their own, since there is one per r
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,8 +16,50 @@ from seqopt.engines.interface import Fields, Want
 from seqopt.errors import SolverError
 from seqopt.network.network import Network
 
-SLACK = 1e-6  # an edge is in tension above this share of the mean weight of a brick
-LEVEL = 1e-9  # share of a force that may point down where it counts as level
+_LISTED = 12  # steps that are named one by one
+
+
+def number_text(value: float) -> str:
+    """Return a number with at least four digits, and no power of ten where it can be read.
+
+    Examples
+    --------
+    >>> number_text(27.88), number_text(116312.4)
+    ('27.88', '116,312')
+    """
+    return f"{value:,.0f}" if 1e4 <= abs(value) < 1e12 else f"{value:.4g}"
+
+
+def length_text(length: float) -> str:
+    """Return a length in words, in the unit that suits it.
+
+    Examples
+    --------
+    >>> length_text(2.79e-5), length_text(0.1163), length_text(0.0)
+    ('27.9 µm', '116.3 mm', '0 mm')
+    """
+    for unit, size in (("m", 1.0), ("mm", 1e-3), ("µm", 1e-6)):
+        if abs(length) >= 0.9999 * size:
+            return f"{length / size:.4g} {unit}"
+    return f"{length * 1e3:.4g} mm"
+
+
+def steps_in_words(steps: Sequence[int]) -> str:
+    """Return which steps these are; of many the first.
+
+    ``steps``: their numbers.
+
+    Examples
+    --------
+    >>> steps_in_words([3]), steps_in_words(range(1, 20))
+    ('step 3', 'steps 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12 and 7 more')
+    """
+    more = f" and {len(steps) - _LISTED} more" if len(steps) > _LISTED else ""
+    return f"step{'s' * (len(steps) > 1)} {', '.join(map(str, steps[:_LISTED]))}{more}"
+
+
+_SLACK = 1e-6  # an edge is in tension above this share of the mean weight of a brick
+_LEVEL = 1e-9  # share of a force that may point down where it counts as level
 TO_1E_3MM = 1e6  # from m to the tables' unit of length, 1e-3 mm
 
 
@@ -49,20 +91,13 @@ class Response:
 def lengths(vectors: Floats) -> Floats:
     """Return the lengths of vectors.
 
-    Parameters
-    ----------
-    vectors : (..., 3) float
-
-    Returns
-    -------
-    (...) float
-        In the unit of the vectors.
+    ``vectors`` (..., 3). Result (...): in the unit of the vectors.
     """
     return np.asarray(np.sqrt(_squared(vectors)))
 
 
-TAKEN = {"rob", "max", "move", "largest", "each"}  # beside RESPONSES: other meanings of F_
-MARKS = set("[]=,;")  # of the language of criteria, limits and tables
+_TAKEN = {"rob", "max", "move", "largest", "each"}  # beside RESPONSES: other meanings of F_
+_MARKS = set("[]=,;")  # of the language of criteria, limits and tables
 
 
 def robot_response(robot: str) -> str:
@@ -71,10 +106,7 @@ def robot_response(robot: str) -> str:
     It is ``F_`` and the robot's name; where that means something else already, or cannot be read
     back from a list, the name stands in brackets.
 
-    Parameters
-    ----------
-    robot : str
-        Its name.
+    ``robot``: its name.
 
     Examples
     --------
@@ -82,30 +114,15 @@ def robot_response(robot: str) -> str:
     ('F_rob1', 'F_[sup]', 'F_[a,b]')
     """
     of_an_end = robot.startswith("sup_")  # `seqopt.responses.table.support_columns`
-    means_more = robot in TAKEN or of_an_end or f"F_{robot}" in RESPONSES or MARKS & set(robot)
+    means_more = robot in _TAKEN or of_an_end or f"F_{robot}" in RESPONSES or _MARKS & set(robot)
     return f"F_[{robot}]" if means_more or not robot.strip() else f"F_{robot}"
 
 
 def require_finite(name: str, values: Floats, bricks: int) -> Floats:
     """Return values of a response if all are finite.
 
-    Parameters
-    ----------
-    name : str
-        Of the response, for the message.
-    values : (...) float
-    bricks : int
-        How many bricks stand, for the message.
-
-    Returns
-    -------
-    (...) float
-        The same.
-
-    Raises
-    ------
-    SolverError
-        If one is not: NaN elsewhere means that a robot holds nothing.
+    ``values`` (...). Result (...). Raises `SolverError` if one is not: NaN elsewhere means that a
+    robot holds nothing.
     """
     if not np.isfinite(values).all():
         raise SolverError(
@@ -118,17 +135,8 @@ def require_finite(name: str, values: Floats, bricks: int) -> Floats:
 def grip_forces(network: Network, fields: Fields) -> Floats:
     """Return the size of every grip force, negative where it points down.
 
-    Parameters
-    ----------
-    network : Network
-        Of a scene that says where up is.
-    fields : Fields
-        Of S grip sets with r grips each.
-
-    Returns
-    -------
-    (S, r) float
-        N; F_rob of Bruun et al.
+    ``network``: of a scene that says where up is; ``fields``: of S grip sets with r grips each.
+    Result (S, r): N; F_rob of Bruun et al.
     """
     return _signed(network, fields.grip_force)
 
@@ -136,17 +144,8 @@ def grip_forces(network: Network, fields: Fields) -> Floats:
 def support_forces(network: Network, fields: Fields) -> Floats:
     """Return the size of the reaction at every ground end, negative where it points down.
 
-    Parameters
-    ----------
-    network : Network
-        Of a scene that says where up is.
-    fields : Fields
-        Of S grip sets, with the supports.
-
-    Returns
-    -------
-    (S, G) float
-        N; zero where the end does not act yet. Ends in the scene's order.
+    ``network``: of a scene that says where up is; ``fields``: of S grip sets, with the supports.
+    Result (S, G): N; zero where the end does not act yet. Ends in the scene's order.
     """
     return _signed(network, fields.support[..., :3])
 
@@ -154,15 +153,8 @@ def support_forces(network: Network, fields: Fields) -> Floats:
 def support_moments(fields: Fields) -> Floats:
     """Return the size of the moment at every ground end about its fixed point.
 
-    Parameters
-    ----------
-    fields : Fields
-        Of S grip sets, with the supports.
-
-    Returns
-    -------
-    (S, G) float
-        N m; zero where the end does not act yet. Ends in the scene's order.
+    ``fields``: of S grip sets, with the supports. Result (S, G): N m; zero where the end does not
+    act yet. Ends in the scene's order.
     """
     return lengths(fields.support[..., 3:])
 
@@ -175,7 +167,7 @@ def _squared(vectors: Floats) -> Floats:
 
 def _signed(network: Network, vectors: Floats) -> Floats:
     size = lengths(vectors)
-    return np.asarray(np.copysign(size, vectors @ np.array(network.scene.up) + LEVEL * size))
+    return np.asarray(np.copysign(size, vectors @ np.array(network.scene.up) + _LEVEL * size))
 
 
 def _largest_force(network: Network, fields: Fields) -> Floats:
@@ -187,7 +179,7 @@ def _largest_force(network: Network, fields: Fields) -> Floats:
 
 def _in_tension(network: Network, fields: Fields) -> Floats:
     weight = float(np.linalg.norm(network.weight, axis=1).mean())
-    return np.asarray(100 * (fields.edge_force > SLACK * weight).mean(axis=1))
+    return np.asarray(100 * (fields.edge_force > _SLACK * weight).mean(axis=1))
 
 
 _EDGES, _MOTION, _SUPPORT = Want.EDGES, Want.DISPLACEMENTS, Want.SUPPORT

@@ -63,13 +63,7 @@ class Resources:
             raise ProblemError(f"max_memory is {most!r}; give a number of bytes above zero")
 
     def alone(self) -> Resources:
-        """Return the same for what is too little to share.
-
-        Returns
-        -------
-        Resources
-            One process, and nobody told.
-        """
+        """Return the same for what is too little to share. Result: one process, and nobody told."""
         return replace(self, workers=1, executor=None, progress=None)
 
 

@@ -25,7 +25,7 @@ from seqopt.engines.rigid.recovery import edge_forces, reactions, split_pairs
 from seqopt.engines.rigid.ungripped import Ungripped, ungripped_system
 from seqopt.errors import MechanismError, SolverError, StepError
 from seqopt.network.build import network_of
-from seqopt.network.kinematics import spring_maps
+from seqopt.network.mechanics import spring_maps
 from seqopt.network.network import Network
 from seqopt.responses.table import response_table
 from seqopt.scene.checks import short
@@ -44,17 +44,10 @@ class Placing(Enum):
 class StagedState(FrozenValue):
     """What a partial structure has come to.
 
-    Attributes
-    ----------
-    bricks : int
-    twist : (6b,) float
-        Of the bricks from where the plan has them, m and rad.
-    wrench : (J, 6) float
-        Of every spring of the network on its second body, N and N m.
-    carried : (E,) float
-        By the edges, tension positive, N.
-    grips : mapping of int to (3,) float
-        Forces of the grips on their nodes, as indices into ``network.inner.ravel()``, N.
+    ``twist`` (6b,): of the bricks from where the plan has them, m and rad; ``wrench`` (J, 6): of
+    every spring of the network on its second body, N and N m; ``carried`` (E,): by the edges,
+    tension positive, N; ``grips`` (3,): forces of the grips on their nodes, as indices into
+    ``network.inner.ravel()``, N.
     """
 
     bricks: int
@@ -109,25 +102,9 @@ def staged_fields(
 ) -> Iterator[Fields]:
     """Yield the full fields of every step with everything that earlier steps lock in.
 
-    Parameters
-    ----------
-    network : Network
-    steps : sequence of Step
-        From the first brick on, with every grip given.
-    placing : Placing or str, optional
-        Where a brick is set down.
-
-    Yields
-    ------
-    Fields
-        Of one grip set.
-
-    Raises
-    ------
-    MechanismError, SolverError
-        As an engine does, the step named.
-    StepError
-        If the steps are not the whole of a build up to its last one.
+    ``steps``: from the first brick on, with every grip given; ``placing``: where a brick is set
+    down. Result: of one grip set. Raises `MechanismError`, `SolverError` as an engine does, the
+    step named; `StepError` if the steps are not the whole of a build up to its last one.
     """
     check_sequence(network.scene, require_steps(steps))
     way = _way(placing)
@@ -148,24 +125,8 @@ def staged_fields(
 def next_state(parts: Ungripped, before: StagedState, step: Step, placing: Placing) -> StagedState:
     """Return the state that a step leads to.
 
-    Parameters
-    ----------
-    parts : Ungripped
-        Of the structure after the step.
-    before : StagedState
-    step : Step
-        That places one brick at most.
-    placing : Placing
-
-    Returns
-    -------
-    StagedState
-        Its grips in the order of the robots.
-
-    Raises
-    ------
-    MechanismError, SolverError
-        As an engine does.
+    ``parts``: of the structure after the step; ``step``: that places one brick at most. Result: its
+    grips in the order of the robots. Raises `MechanismError`, `SolverError` as an engine does.
     """
     network, bricks = parts.network, step.bricks
     load = np.zeros((2 * bricks, 3))
@@ -184,19 +145,7 @@ def next_state(parts: Ungripped, before: StagedState, step: Step, placing: Placi
 
 
 def state_fields(parts: Ungripped, state: StagedState) -> Fields:
-    """Return the fields of a state.
-
-    Parameters
-    ----------
-    parts : Ungripped
-        Of its structure.
-    state : StagedState
-
-    Returns
-    -------
-    Fields
-        Of one grip set.
-    """
+    """Return the fields of a state. ``parts``: of its structure. Result: of one grip set."""
     force = np.array(list(state.grips.values())).reshape(1, -1, 3)
     return Fields(
         edge_force=state.carried[None].copy(),

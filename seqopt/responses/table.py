@@ -1,4 +1,7 @@
-"""Responses of steps as a table: the columns of Tables A.1 and A.2 of Bruun et al."""
+"""Responses of steps as a table: the columns of Tables A.1 and A.2 of Bruun et al.
+
+Also its grips: who holds what, from when to when, and with which force.
+"""
 
 from __future__ import annotations
 
@@ -21,6 +24,7 @@ from seqopt.responses.quantities import (
 )
 from seqopt.scene.parts import Robot
 from seqopt.scene.scene import Scene
+from seqopt.sequence.schedule import Hold, holds
 from seqopt.sequence.steps import Step, require_steps
 
 
@@ -73,16 +77,8 @@ def analyze(engine: Engine, steps: Sequence[Step]) -> pd.DataFrame:
 def response_table(network: Network, answers: Iterable[tuple[Step, Fields]]) -> pd.DataFrame:
     """Return a row of responses for every step, as `analyze` does, from the fields of each.
 
-    Parameters
-    ----------
-    network : Network
-    answers : iterable of (Step, Fields)
-        Steps with every grip given, and the full fields of one grip set each.
-
-    Raises
-    ------
-    SolverError
-        If a response is not finite.
+    ``answers`` (Step, Fields): steps with every grip given, and the full fields of one grip set
+    each. Raises `SolverError` if a response is not finite.
     """
     return pd.DataFrame([_row(network, step, fields) for step, fields in answers])
 
@@ -95,11 +91,9 @@ def force_column(robot: Robot) -> str:
 def support_columns(scene: Scene) -> list[tuple[str, str]]:
     """Return the columns of a table that hold what a scene's ground ends carry one by one.
 
-    Returns
-    -------
-    list of (str, str)
-        Of the force, N, and the moment, N m, of every ground end in the scene's order, named after
-        the end's brick, and counted from its second end on; none where the scene has one end.
+    Result (str, str): of the force, N, and the moment, N m, of every ground end in the scene's
+    order, named after the end's brick, and counted from its second end on; none where the scene has
+    one end.
 
     Examples
     --------
@@ -118,15 +112,8 @@ def support_columns(scene: Scene) -> list[tuple[str, str]]:
 def step_fields(engine: Engine, step: Step) -> Fields:
     """Return the full fields of one step.
 
-    Returns
-    -------
-    Fields
-        Of one grip set, S = 1.
-
-    Raises
-    ------
-    MechanismError, SolverError
-        As the engine does, the step named.
+    Result: of one grip set, S = 1. Raises `MechanismError`, `SolverError` as the engine does, the
+    step named.
     """
     try:
         return engine.solve(step.bricks, np.array([step.held], dtype=np.int64).reshape(1, -1))
@@ -136,40 +123,16 @@ def step_fields(engine: Engine, step: Step) -> Fields:
         raise SolverError(f"step {step.number}: {error}") from error
 
 
-def fields_archive(engine: Engine, steps: Sequence[Step]) -> bytes:
-    """Return the full fields of every step as a NumPy archive (``.npz``).
+def archive(network: Network, answers: Iterable[tuple[Step, Fields]]) -> bytes:
+    """Return the full fields of steps as a NumPy archive (``.npz``).
 
     Arrays are named ``step1_edge_force``, ``step1_displacement``, ``step1_grip_force``,
     ``step1_support`` and so on, as in `Fields` without its first axis; ``edge_nodes`` (E, 2),
     ``node_position`` (N, 3), ``node_name`` (N,), and of the ground ends ``support_brick`` (G,) and
     ``support_point`` (G, 3), the fixed points, say what they run over.
 
-    Returns
-    -------
-    bytes
-        The content of the archive; SI units.
-
-    Raises
-    ------
-    MechanismError, SolverError
-        As the engine does, the step named.
-    """
-    return archive(engine.network, [(step, step_fields(engine, step)) for step in steps])
-
-
-def archive(network: Network, answers: Iterable[tuple[Step, Fields]]) -> bytes:
-    """Return the full fields of steps as `fields_archive` does.
-
-    Parameters
-    ----------
-    network : Network
-    answers : iterable of (Step, Fields)
-        Steps and the full fields of one grip set each.
-
-    Returns
-    -------
-    bytes
-        The content of the archive; SI units.
+    ``answers`` (Step, Fields): steps and the full fields of one grip set each. Result: the content
+    of the archive; SI units.
     """
     arrays: dict[str, np.ndarray] = {
         "edge_nodes": network.edge_nodes,
@@ -211,3 +174,46 @@ def _supports(network: Network, step: Step, fields: Fields) -> dict[str, float]:
     for columns, *values in zip(support_columns(network.scene), forces, moments, strict=False):
         cells |= dict(zip(columns, values, strict=True))
     return cells
+
+
+def grips_table(scene: Scene, steps: Sequence[Step], responses: pd.DataFrame) -> pd.DataFrame:
+    """Return every grip of a build, for as long as it lasts.
+
+    ``responses``: of these steps, as `seqopt.analyze` makes them. Result: a row per grip, by first
+    step. Columns: ``robot``, ``from_step``, ``to_step``, ``brick``, ``node``, ``places`` (whether
+    the robot places the brick with it), ``largest_force_N`` and ``at_step``, the step of that
+    force.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> scene = seqopt.load_scene("arch25")
+    >>> engine = seqopt.make_engine("compliance", seqopt.build_network(scene))
+    >>> steps = seqopt.sequential(engine.network)
+    >>> table = grips_table(scene, steps, seqopt.analyze(engine, steps))
+    >>> print(table.loc[:1, ["robot", "from_step", "to_step", "brick", "node", "places"]])
+      robot  from_step  to_step  brick  node  places
+    0  rob1          1        2      1     1    True
+    1  rob2          2        4      2     2    True
+    """
+    rows = [
+        _grip_row(scene, hold, responses[force_column(scene.robots[hold.robot])].to_numpy(float))
+        for hold in sorted(holds(scene, steps), key=lambda hold: (hold.first, hold.robot))
+    ]
+    return pd.DataFrame(rows)
+
+
+def _grip_row(scene: Scene, hold: Hold, forces: np.ndarray) -> dict[str, object]:
+    """Return the row of a hold, from the forces of its robot's grips in all steps, N."""
+    assert hold.node is not None  # steps have no open grips
+    own = forces[hold.first - 1 : hold.last]
+    return {
+        "robot": scene.robots[hold.robot].name,
+        "from_step": hold.first,
+        "to_step": hold.last,
+        "brick": scene.brick_of_node[hold.node].name,
+        "node": hold.node,
+        "places": hold.places is not None,
+        "largest_force_N": float(own.max()),
+        "at_step": hold.first + int(own.argmax()),
+    }

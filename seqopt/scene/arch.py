@@ -11,12 +11,12 @@ import numpy as np
 
 from seqopt.arrays import Floats, Terse, Vector
 from seqopt.errors import SceneError, SceneWarning
+from seqopt.scene.blocks import as_vector
 from seqopt.scene.checks import short
-from seqopt.scene.parts import THICKEST, Brick, Ground, Joint, Robot
-from seqopt.scene.reach import Anywhere, Reach, Side
+from seqopt.scene.parts import THICKEST, Anywhere, Brick, Ground, Joint, Reach, Robot, Side
 from seqopt.scene.scene import Scene
 
-LEFT = np.array([0.0, 1.0, 0.0])
+_LEFT = np.array([0.0, 1.0, 0.0])
 LETTERS = "VLR"
 STANDARD_GRAVITY = 9.81  # m/s²
 
@@ -128,7 +128,7 @@ def arch_scene(
     shape : ArchShape
     name : str
     robots : sequence of Robot, optional
-        By default `robots_beside` the arch.
+        By default `_robots_beside` the arch.
     line_nodes : mapping of int to int, optional
         Per brick that lies across: which of its nodes is on the arch line; 2b-2 by default.
     provenance : str
@@ -157,20 +157,16 @@ def arch_scene(
         joints=tuple(joints),
         grounds=tuple(grounds),
         build_order=tuple(brick.name for brick in bricks),
-        robots=robots_beside(shape) if robots is None else tuple(robots),
+        robots=_robots_beside(shape) if robots is None else tuple(robots),
         blocked_nodes=(0,),
     )
 
 
-def robots_beside(shape: ArchShape) -> tuple[Robot, ...]:
+def _robots_beside(shape: ArchShape) -> tuple[Robot, ...]:
     """Return three robots for an arch: one on either side, and a mobile one that reaches all.
 
     Those beside it reach its line, but not the far ends of bricks that stick out to the other side.
     Each can bear the weight of the whole arch: give robots of your own to have payloads that bind.
-
-    Returns
-    -------
-    tuple of 3 Robot
     """
     beyond = shape.overhang + 0.25 * shape.dimensions[1]
     weight = math.prod(shape.dimensions) * shape.density * STANDARD_GRAVITY * len(shape.pitch)
@@ -207,7 +203,7 @@ def _axes(shape: ArchShape) -> tuple[Floats, Floats, Floats]:
     roll, yaw = (zero if a is None else np.asarray(a, float) for a in (shape.roll, shape.yaw))
     forward = np.stack([np.cos(pitch), zero, np.sin(pitch)], axis=1)
     normal = np.stack([-np.sin(pitch), zero, np.cos(pitch)], axis=1)
-    rolled = np.cos(roll)[:, None] * LEFT + np.sin(roll)[:, None] * normal
+    rolled = np.cos(roll)[:, None] * _LEFT + np.sin(roll)[:, None] * normal
     lies_along = np.array([letter == "V" for letter in _pattern(shape)])
     cos, sin = np.cos(yaw)[:, None], np.sin(yaw)[:, None]
     tangent = np.where(lies_along[:, None], cos * forward + sin * rolled, forward)
@@ -247,9 +243,9 @@ def _brick(shape: ArchShape, b: int, pose: tuple[Floats, Floats, Floats], line_n
         placing = nodes[int((letter == "L") == (b % 2 == 1))]  # robots on either side take turns
     return Brick(
         name=b,
-        position=_vector(position),
-        length_axis=_vector(length_axis),
-        width_axis=_vector(width_axis),
+        position=as_vector(position),
+        length_axis=as_vector(length_axis),
+        width_axis=as_vector(width_axis),
         dimensions=shape.dimensions,
         density=shape.density,
         nodes=nodes,
@@ -261,8 +257,8 @@ def _joint(shape: ArchShape, brick: int, position: Floats, direction: Floats) ->
     """Return the joint between a brick and the next one."""
     return Joint(
         bricks=(brick, brick + 1),
-        position=_vector(position),
-        along=_vector(direction / np.linalg.norm(direction)),
+        position=as_vector(position),
+        along=as_vector(direction / np.linalg.norm(direction)),
         across=_across(direction),
         translational_stiffness=shape.translational_stiffness,
         rotational_stiffness=shape.rotational_stiffness,
@@ -273,22 +269,17 @@ def _joint(shape: ArchShape, brick: int, position: Floats, direction: Floats) ->
 def _ground(shape: ArchShape, brick: int, end: Floats, tangent: Floats, sign: float) -> Ground:
     return Ground(
         brick=brick,
-        position=_vector(end),
-        along=_vector(tangent),
+        position=as_vector(end),
+        along=as_vector(tangent),
         across=_across(tangent),
         translational_stiffness=shape.translational_stiffness,
         rotational_stiffness=shape.rotational_stiffness,
         thickness=shape.thickness,
-        anchor=_vector(end + sign * shape.stub * tangent),
+        anchor=as_vector(end + sign * shape.stub * tangent),
     )
 
 
 def _across(direction: Floats) -> Vector:
     """Return the unit vector to the left at right angles to a direction."""
-    rest = LEFT - direction * (direction @ LEFT) / (direction @ direction)
-    return _vector(rest / np.linalg.norm(rest))
-
-
-def _vector(values: Floats) -> Vector:
-    x, y, z = values.tolist()
-    return x, y, z
+    rest = _LEFT - direction * (direction @ _LEFT) / (direction @ direction)
+    return as_vector(rest / np.linalg.norm(rest))

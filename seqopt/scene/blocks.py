@@ -11,34 +11,20 @@ from seqopt.arrays import Floats, Vector
 from seqopt.errors import SceneError
 from seqopt.scene.checks import short, vector, whole
 from seqopt.scene.parts import Brick
-from seqopt.scene.polygon import rows
-from seqopt.scene.shape import Polyhedron
+from seqopt.scene.shape import Polyhedron, rows
 
-Numbers = tuple[int, int] | None
-Places = tuple[Vector, Vector] | None
+_Numbers = tuple[int, int] | None
+_Places = tuple[Vector, Vector] | None
 
 
 def block_brick(
-    name: int, shape: Polyhedron, density: float, *, nodes: Numbers = None, grips: Places = None
+    name: int, shape: Polyhedron, density: float, *, nodes: _Numbers = None, grips: _Places = None
 ) -> Brick:
     """Return a brick of any shape.
 
-    Parameters
-    ----------
-    name : int
-    shape : Polyhedron
-        Where it is in the scene, m.
-    density : float
-        kg/m³.
-    nodes : tuple of 2 int, optional
-        Numbers of its nodes; twice the name, and one more, by default.
-    grips : tuple of 2 Vector, optional
-        Where these are, in the scene, m; `Polyhedron.nodes` by default.
-
-    Returns
-    -------
-    Brick
-        Placed by its second node.
+    ``shape``: where it is in the scene, m. ``density``: kg/m³. ``nodes``: numbers of its nodes;
+    twice the name, and one more, by default. ``grips``: where these are, in the scene, m;
+    `Polyhedron.nodes` by default. Result: placed by its second node.
 
     Examples
     --------
@@ -68,7 +54,7 @@ def block_brick(
     )
 
 
-def _from(center: Floats, name: int, grips: Places) -> tuple[Vector, Vector]:
+def _from(center: Floats, name: int, grips: _Places) -> tuple[Vector, Vector]:
     """Return where grips are from a center."""
     where = f"brick {name}: grips"
     found = [vector(where, row) for row in rows(where, grips or ())]
@@ -79,33 +65,25 @@ def _from(center: Floats, name: int, grips: Places) -> tuple[Vector, Vector]:
 
 
 def as_vectors(points: Floats) -> tuple[Vector, ...]:
-    """Return the rows of an array as tuples.
-
-    Parameters
-    ----------
-    points : (k, 3) float
-    """
+    """Return the rows of an array as tuples. ``points`` (k, 3)."""
     return tuple((x, y, z) for x, y, z in points.tolist())
+
+
+def as_vector(values: Floats) -> Vector:
+    """Return three numbers of an array as a tuple. ``values`` (3,)."""
+    x, y, z = values.tolist()
+    return x, y, z
 
 
 def vertices_of(brick: Brick) -> tuple[Floats, Sequence[Sequence[int]]]:
     """Return the vertices of a brick, box or not, and its faces.
 
-    Returns
-    -------
-    vertices : (V, 3) float
-        In the scene, m.
-    faces : sequence of sequence of int
-        Places among them, counterclockwise from outside.
+    Results: ``vertices`` (V, 3): in the scene, m; ``faces``: places among them, counterclockwise
+    from outside.
     """
     if brick.shape is not None:
         return np.asarray(brick.shape.points + np.array(brick.position)), brick.shape.faces
-    length, width = np.array(brick.length_axis), np.array(brick.width_axis)
-    half = (
-        0.5
-        * np.array(brick.dimensions)[:, None]
-        * np.stack([length, width, np.cross(length, width)])
-    )
+    half = 0.5 * np.array(brick.dimensions)[:, None] * brick.frame
     return np.asarray(np.array(brick.position) + BOX_CORNERS @ half), BOX_FACES
 
 

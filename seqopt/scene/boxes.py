@@ -17,36 +17,20 @@ from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.errors import SceneError
 from seqopt.scene.parts import Brick
 
-PARALLEL = 1e-9  # sine of an angle between edges treated as zero
-DEEPEST = 1e-6  # depth that is rounding, over the smallest dimension
+_PARALLEL = 1e-9  # sine of an angle between edges treated as zero
+_DEEPEST = 1e-6  # depth that is rounding, over the smallest dimension
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Boxes(FrozenValue):
-    """Where bricks are and how large, as arrays.
+    """Where bricks are and how large, as arrays."""
 
-    Attributes
-    ----------
-    place : (n, 3) float
-        Centroids, m.
-    frame : (n, 3, 3) float
-        Rows are unit vectors along length, width and thickness.
-    half : (n, 3) float
-        Half of each dimension, m.
-    """
-
-    place: Floats
-    frame: Floats
-    half: Floats
+    place: Floats  # (n, 3); centroids, m
+    frame: Floats  # (n, 3, 3); rows are unit vectors along length, width and thickness
+    half: Floats  # (n, 3); half of each dimension, m
 
     def corners(self) -> Floats:
-        """Return where the corners are.
-
-        Returns
-        -------
-        (n, 8, 3) float
-            m.
-        """
+        """Return where the corners are. Result (n, 8, 3): m."""
         signs = np.array(list(product((-1.0, 1.0), repeat=3)))
         return np.asarray(self.place[:, None] + (signs * self.half[:, None]) @ self.frame)
 
@@ -65,13 +49,10 @@ def boxes(bricks: Sequence[Brick]) -> Boxes:
 def separations(bricks: Sequence[Brick]) -> tuple[Ints, Floats]:
     """Return how far bricks are apart that are near each other.
 
-    Returns
-    -------
-    pairs : (P, 2) int
-        Indices of the bricks whose centroids are no farther apart than the longest diagonal.
-    distance : (P,) float
-        m, along the direction in which they are farthest apart: no more than their distance, and
-        the same where faces look at each other; negative where they interpenetrate.
+    Results: ``pairs`` (P, 2): indices of the bricks whose centroids are no farther apart than the
+    longest diagonal. ``distance`` (P,): m, along the direction in which they are farthest apart: no
+    more than their distance, and the same where faces look at each other; negative where they
+    interpenetrate.
 
     Examples
     --------
@@ -94,29 +75,16 @@ def separations(bricks: Sequence[Brick]) -> tuple[Ints, Floats]:
     for which in (a, b):
         spread = np.abs(axes @ shapes.frame[which].transpose(0, 2, 1))
         apart -= (spread @ shapes.half[which][:, :, None])[:, :, 0]
-    real = np.linalg.norm(axes, axis=2) > PARALLEL
+    real = np.linalg.norm(axes, axis=2) > _PARALLEL
     return pairs, np.where(real, apart, -np.inf).max(axis=1, initial=-np.inf)
 
 
 def require_apart(
-    where: str, bricks: Sequence[Brick], remedy: str, deepest: float = DEEPEST
+    where: str, bricks: Sequence[Brick], remedy: str, deepest: float = _DEEPEST
 ) -> None:
     """Require bricks of which no two interpenetrate.
 
-    Parameters
-    ----------
-    where : str
-        What they make, for the message.
-    bricks : sequence of Brick
-    remedy : str
-        What to change, for the message.
-    deepest : float, optional
-        By how much they may, over the smallest dimension.
-
-    Raises
-    ------
-    SceneError
-        Naming the two that interpenetrate most.
+    ``deepest``: by how much they may, over the smallest dimension.
     """
     pairs, distance = separations(bricks)
     thin = min(min(brick.dimensions) for brick in bricks)
@@ -132,4 +100,4 @@ def _edge_normals(first: Floats, second: Floats) -> Floats:
     """Return unit vectors across an edge of each of two boxes, (P, 9, 3); zero if they agree."""
     normal = np.cross(first[:, :, None], second[:, None, :]).reshape(len(first), 9, 3)
     size = np.linalg.norm(normal, axis=2, keepdims=True)
-    return np.asarray(np.where(size > PARALLEL, normal / np.maximum(size, PARALLEL), 0.0))
+    return np.asarray(np.where(size > _PARALLEL, normal / np.maximum(size, _PARALLEL), 0.0))

@@ -10,42 +10,26 @@ from typing import TypeVar
 from seqopt.arrays import Vector
 from seqopt.errors import SceneError
 
-Part = TypeVar("Part")
+_Part = TypeVar("_Part")
 LARGEST_NUMBER = 10**15  # of a brick or node: what arrays of numbers hold without loss
-TURNS = {*range(0x202A, 0x202F), *range(0x2066, 0x206A), 0x2028, 0x2029}  # turn or break lines
+_TURNS = {*range(0x202A, 0x202F), *range(0x2066, 0x206A), 0x2028, 0x2029}  # turn or break lines
 UNIT_TOLERANCE = 1e-9  # how far a direction may be from unit length, or a pair from a right angle
 
 
 def steers(sign: str) -> bool:
     """Return whether a character steers a terminal or is half of one, and is none to be read.
 
-    Parameters
-    ----------
-    sign : str
-        One character.
-
-    Returns
-    -------
-    bool
-        For control characters, lone surrogates, and what turns or breaks lines.
+    ``sign``: one character. Result: for control characters, lone surrogates, and what turns or
+    breaks lines.
     """
     code = ord(sign)
-    return code < 0x20 or 0x7F <= code < 0xA0 or 0xD800 <= code < 0xE000 or code in TURNS
+    return code < 0x20 or 0x7F <= code < 0xA0 or 0xD800 <= code < 0xE000 or code in _TURNS
 
 
 def printable(where: str, value: str) -> str:
     """Return a name that can be printed and written.
 
-    Parameters
-    ----------
-    where : str
-        What it names, for the message.
-    value : str
-
-    Raises
-    ------
-    SceneError
-        If it is no text, or holds what steers a terminal or half a character.
+    Raises `SceneError` if it is no text, or holds what steers a terminal or half a character.
     """
     if not isinstance(value, str) or any(map(steers, value)):
         raise SceneError(f"{where}: its name is {short(value)}; give text of printable characters")
@@ -55,16 +39,7 @@ def printable(where: str, value: str) -> str:
 def whole(where: str, value: int) -> int:
     """Return a whole number, as bricks and nodes have for names.
 
-    Parameters
-    ----------
-    where : str
-        What it is, for the message.
-    value : int
-
-    Raises
-    ------
-    SceneError
-        If it is none, or larger than `LARGEST_NUMBER`.
+    Raises `SceneError` if it is none, or larger than `LARGEST_NUMBER`.
     """
     try:
         number = int(value) if isinstance(value, float) else operator.index(value)
@@ -80,36 +55,17 @@ def whole(where: str, value: int) -> int:
 def wholes(where: str, values: Iterable[int]) -> tuple[int, ...]:
     """Return whole numbers.
 
-    Parameters
-    ----------
-    where : str
-        What they are, for the message.
-    values : iterable of int
-
-    Raises
-    ------
-    SceneError
-        If there are none to go through, or one is not whole.
+    Raises `SceneError` if there are none to go through, or one is not whole.
     """
     if isinstance(values, str) or not isinstance(values, Iterable):
         raise SceneError(f"{where} is {short(values)}; give whole numbers")
     return tuple(whole(where, value) for value in values)
 
 
-def parts(where: str, values: Iterable[Part], kind: type[Part]) -> tuple[Part, ...]:
+def parts(where: str, values: Iterable[_Part], kind: type[_Part]) -> tuple[_Part, ...]:
     """Return parts of a scene if all are of one kind.
 
-    Parameters
-    ----------
-    where : str
-        What they are, for the message.
-    values : iterable of object
-    kind : type
-
-    Raises
-    ------
-    SceneError
-        If one is of another kind, or there is nothing to go through.
+    Raises `SceneError` if one is of another kind, or there is nothing to go through.
     """
     found = tuple(values) if isinstance(values, Iterable) else (values,)
     for value in found:
@@ -119,14 +75,7 @@ def parts(where: str, values: Iterable[Part], kind: type[Part]) -> tuple[Part, .
 
 
 def short(value: object, most: int = 60) -> str:
-    """Return a representation of a value that fits a line.
-
-    Parameters
-    ----------
-    value : object
-    most : int, optional
-        Characters.
-    """
+    """Return a representation of a value that fits a line. ``most``: characters."""
     try:
         text = repr(value)
     except ValueError:  # an integer of more digits than Python writes
@@ -137,18 +86,8 @@ def short(value: object, most: int = 60) -> str:
 def vector(where: str, values: Iterable[float], at_least: float = -math.inf) -> Vector:
     """Return three finite floats.
 
-    Parameters
-    ----------
-    where : str
-        What the numbers are, for the message.
-    values : iterable of float
-    at_least : float, optional
-        The least value that is allowed.
-
-    Raises
-    ------
-    SceneError
-        If there are not three, or one is not finite or too small.
+    ``at_least``: the least value that is allowed. Raises `SceneError` if there are not three, or
+    one is not finite or too small.
     """
     try:
         x, y, z = (float(value) for value in values)
@@ -163,18 +102,7 @@ def vector(where: str, values: Iterable[float], at_least: float = -math.inf) -> 
 def positive(where: str, value: float, unit: str) -> float:
     """Return a positive finite float.
 
-    Parameters
-    ----------
-    where : str
-        What the number is, for the message.
-    value : float
-    unit : str
-        Of the number, for the message.
-
-    Raises
-    ------
-    SceneError
-        If it is no number, not finite or not positive.
+    Raises `SceneError` if it is no number, not finite or not positive.
     """
     try:
         number = float(value) if isinstance(value, int | float) else math.nan
@@ -188,20 +116,8 @@ def positive(where: str, value: float, unit: str) -> float:
 def axes(where: str, first: Iterable[float], second: Iterable[float]) -> tuple[Vector, Vector]:
     """Return two unit vectors at right angles.
 
-    Parameters
-    ----------
-    where : str
-        What the vectors are, for the message.
-    first, second : iterable of float
-
-    Returns
-    -------
-    tuple of 2 Vector
-
-    Raises
-    ------
-    SceneError
-        If one is not of unit length, or they are not at right angles, to `UNIT_TOLERANCE`.
+    Raises `SceneError` if one is not of unit length, or they are not at right angles, to
+    `UNIT_TOLERANCE`.
     """
     a, b = vector(where, first), vector(where, second)
     if max(abs(dot(a, a) - 1), abs(dot(b, b) - 1), abs(dot(a, b))) > UNIT_TOLERANCE:
@@ -215,19 +131,7 @@ def dot(a: Vector, b: Vector) -> float:
 
 
 def finite(where: str, value: float) -> float:
-    """Return a finite float.
-
-    Parameters
-    ----------
-    where : str
-        What the number is, for the message.
-    value : float
-
-    Raises
-    ------
-    SceneError
-        If it is no number or not finite.
-    """
+    """Return a finite float. Raises `SceneError` if it is no number or not finite."""
     try:
         number = float(value) if isinstance(value, int | float) else math.nan
     except OverflowError:

@@ -13,17 +13,14 @@ from seqopt.scene.checks import short, wholes
 from seqopt.scene.scene import Scene
 
 Order = tuple[int, ...]
-PART = re.compile(r"(-?\d+)(?:\.\.(-?\d+))?")
+_PART = re.compile(r"(-?\d+)(?:\.\.(-?\d+))?")
 
 
 def from_all_ends(scene: Scene) -> Order:
     """Return the order that builds from all ground ends at once.
 
-    Returns
-    -------
-    tuple of int
-        Bricks by how many joints lie between them and the nearest ground end, those of one number
-        in turn from one ground end to the next; then those that no joint ties to any.
+    Result: bricks by how many joints lie between them and the nearest ground end, those of one
+    number in turn from one ground end to the next; then those that no joint ties to any.
 
     Examples
     --------
@@ -52,17 +49,8 @@ ORDERS: dict[str, Callable[[Scene], Order]] = {"reversed": _reversed, "ends": fr
 def parse_order(scene: Scene, text: str) -> Order:
     """Return an order from words.
 
-    Parameters
-    ----------
-    scene : Scene
-    text : str
-        A key of `ORDERS`, or names of bricks with commas between them, runs as ``1..12`` or
-        ``25..13``.
-
-    Raises
-    ------
-    SceneError
-        If it is neither.
+    ``text``: a key of `ORDERS`, or names of bricks with commas between them, runs as ``1..12`` or
+    ``25..13``.
 
     Examples
     --------
@@ -74,7 +62,7 @@ def parse_order(scene: Scene, text: str) -> Order:
         return ORDERS[text](scene)
     out: list[int] = []
     for part in text.split(","):
-        found = PART.fullmatch(part.strip())
+        found = _PART.fullmatch(part.strip())
         if found is None:
             hint = did_you_mean(text, (*ORDERS, "search"))
             raise SceneError(
@@ -92,16 +80,8 @@ def parse_order(scene: Scene, text: str) -> Order:
 def in_order(scene: Scene, order: Sequence[int] | str | None) -> Scene:
     """Return a scene whose bricks are placed in an order.
 
-    Parameters
-    ----------
-    scene : Scene
-    order : sequence of int or str or None
-        Names of all bricks, or words as `parse_order` takes them; None for the scene's own.
-
-    Raises
-    ------
-    SceneError
-        If a brick is missing, unknown or named twice.
+    ``order``: names of all bricks, or words as `parse_order` takes them; None for the scene's own.
+    Raises `SceneError` if a brick is missing, unknown or named twice.
 
     Examples
     --------

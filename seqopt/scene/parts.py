@@ -11,13 +11,100 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from seqopt.arrays import Terse, Vector
+from seqopt.arrays import Floats, Terse, Vector
 from seqopt.errors import SceneError
-from seqopt.scene.checks import axes, positive, printable, vector, whole, wholes
-from seqopt.scene.polygon import convex_polygon
-from seqopt.scene.reach import Anywhere, Reach, as_reach
-from seqopt.scene.shape import Polyhedron
-from seqopt.scene.shape_checks import check_shape, two_points
+from seqopt.scene.checks import (
+    UNIT_TOLERANCE,
+    axes,
+    dot,
+    positive,
+    printable,
+    short,
+    vector,
+    whole,
+    wholes,
+)
+from seqopt.scene.shape import Polyhedron, check_shape, convex_polygon, two_points
+
+
+@dataclass(frozen=True)
+class Anywhere:
+    """A mobile robot: every node is within reach."""
+
+    def covers(self, point: Vector) -> bool:
+        """Return whether a point is within reach."""
+        return True
+
+
+@dataclass(frozen=True, kw_only=True)
+class Side:
+    """A robot beside the structure reaches every point of a half-space.
+
+    ``toward``: unit vector that points to the robot's side; ``point``: a point of the plane that
+    bounds the reach, m. Raises `SceneError` if ``toward`` is not a unit vector or a number is not
+    finite.
+    """
+
+    toward: Vector
+    point: Vector
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "toward", vector("reach: toward", self.toward))
+        object.__setattr__(self, "point", vector("reach: point", self.point))
+        if abs(dot(self.toward, self.toward) - 1) > UNIT_TOLERANCE:
+            raise SceneError(f"reach: toward is {list(self.toward)}; give a unit vector")
+
+    def covers(self, point: Vector) -> bool:
+        """Return whether a point is within reach."""
+        return dot(self.toward, point) >= dot(self.toward, self.point)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sphere:
+    """A robot at a fixed base reaches every point within a radius.
+
+    Parameters
+    ----------
+    center : Vector
+        m.
+    radius : float
+        m.
+
+    Raises
+    ------
+    SceneError
+        If the radius is not a positive number or the center is not finite.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> seqopt.Sphere(center=(0.0, 0.0, 0.5), radius=1.0).covers((0.0, 0.9, 0.5))
+    True
+    """
+
+    center: Vector
+    radius: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "center", vector("reach: center", self.center))
+        object.__setattr__(self, "radius", positive("reach: radius", self.radius, "m"))
+
+    def covers(self, point: Vector) -> bool:
+        """Return whether a point is within reach."""
+        return math.dist(self.center, point) <= self.radius
+
+
+Reach = Anywhere | Side | Sphere
+
+
+def _as_reach(where: str, given: Reach | str) -> Reach:
+    """Return a reach; ``"anywhere"`` is one too."""
+    if isinstance(given, str) and given == "anywhere":
+        return Anywhere()
+    if not isinstance(given, Anywhere | Side | Sphere):
+        raise SceneError(f"{where} is {short(given)}; give Anywhere(), Side(...) or Sphere(...)")
+    return given
+
 
 THICKEST = 0.5  # of a joint that does not say, over the smallest dimension of its bricks
 
@@ -93,6 +180,12 @@ class Brick(Terse):
             check_shape(where, self.shape, self.dimensions, across)
 
     @property
+    def frame(self) -> Floats:
+        """Unit vectors along length, width and thickness, (3, 3), as rows."""
+        length, width = np.array(self.length_axis), np.array(self.width_axis)
+        return np.stack([length, width, np.cross(length, width)])
+
+    @property
     def volume(self) -> float:
         """Volume, m³."""
         return math.prod(self.dimensions) if self.shape is None else self.shape.volume
@@ -103,18 +196,7 @@ class Brick(Terse):
         return self.volume * self.density
 
     def node_position(self, node: int) -> Vector:
-        """Return where one of the brick's inner nodes lies.
-
-        Parameters
-        ----------
-        node : int
-            One of ``nodes``.
-
-        Returns
-        -------
-        Vector
-            m.
-        """
+        """Return where one of the brick's inner nodes lies. ``node``: one of ``nodes``."""
         if self.node_offsets is not None:
             away = self.node_offsets[self.nodes.index(node)]
             x, y, z = (p + d for p, d in zip(self.position, away, strict=True))
@@ -129,24 +211,15 @@ class Brick(Terse):
 class Spring(Terse):
     """Where a joint acts and how stiff it is, in its own axes.
 
-    Parameters
-    ----------
-    position : Vector
-        The point where the springs act, m.
-    along, across : Vector
-        Unit vectors along the joint's normal and across it, at right angles; the third axis is
-        their cross product.
-    translational_stiffness : Vector
-        N/m along the three axes, zero allowed.
-    rotational_stiffness : Vector
-        N m/rad about the three axes, zero allowed.
-    thickness : float, optional
-        Of what lies between the faces, m: to be given where it is more than `THICKEST` of the
-        smallest dimension of the bricks; faces farther apart do not touch.
-    face : tuple of tuple of 2 float, optional
-        Corners of the convex face over which the bodies touch, once around: from ``position`` along
-        ``across`` and along the third axis, m. ``along`` then points from the first brick into the
-        second, or from the ground into its brick. By default faces follow from the boxes.
+    ``position``: the point where the springs act, m. ``along``, ``across``: unit vectors along the
+    joint's normal and across it, at right angles; the third axis is their cross product.
+    ``translational_stiffness``: N/m along the three axes, zero allowed. ``rotational_stiffness``: N
+    m/rad about the three axes, zero allowed. ``thickness``: of what lies between the faces, m: to
+    be given where it is more than `THICKEST` of the smallest dimension of the bricks; faces farther
+    apart do not touch. ``face``: corners of the convex face over which the bodies touch, once
+    around: from ``position`` along ``across`` and along the third axis, m. ``along`` then points
+    from the first brick into the second, or from the ground into its brick. By default faces follow
+    from the boxes.
     """
 
     position: Vector
@@ -270,7 +343,7 @@ class Robot:
 
     def __post_init__(self) -> None:
         printable("robot", self.name)
-        _set(self, "reach", as_reach(f"robot {self.name}: reach", self.reach))
+        _set(self, "reach", _as_reach(f"robot {self.name}: reach", self.reach))
         _set(self, "payload", positive(f"robot {self.name}: payload", self.payload, "N"))
 
 

@@ -10,36 +10,96 @@ from __future__ import annotations
 import math
 import operator
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from numbers import Real
+from typing import TypeVar
 
 import numpy as np
 
+from seqopt.arrays import Floats, Vector
 from seqopt.errors import SceneError
 from seqopt.scene.checks import short
+from seqopt.scene.parts import Ground, Joint
 from seqopt.scene.scene import Scene
-from seqopt.scene.variations import shifted, stiffened, weighed
+
+_End = TypeVar("_End", Joint, Ground)
+
+
+def stiffened(scene: Scene, translational: Floats, rotational: Floats) -> Scene:
+    """Return a scene whose joints and ground ends are stiffer by factors.
+
+    ``translational``, ``rotational`` (J + G,): a factor for every joint, then for every ground end,
+    for all three axes; no unit.
+    """
+    pairs = [*zip(translational.tolist(), rotational.tolist(), strict=True)]
+
+    def stiffer(spring: _End, factors: tuple[float, float]) -> _End:
+        (x, y, z), (a, b, c) = spring.translational_stiffness, spring.rotational_stiffness
+        t, r = factors
+        return replace(
+            spring,
+            translational_stiffness=(t * x, t * y, t * z),
+            rotational_stiffness=(r * a, r * b, r * c),
+        )
+
+    count = len(scene.joints)
+    joints = map(stiffer, scene.joints, pairs[:count])
+    return replace(
+        scene, joints=tuple(joints), grounds=tuple(map(stiffer, scene.grounds, pairs[count:]))
+    )
+
+
+def weighed(scene: Scene, factors: Floats) -> Scene:
+    """Return a scene whose bricks are heavier by factors.
+
+    ``factors`` (B,): for the density of every brick, in the scene's order; no unit.
+    """
+    pairs = zip(scene.bricks, factors.tolist(), strict=True)
+    return replace(scene, bricks=tuple(replace(b, density=b.density * f) for b, f in pairs))
+
+
+def shifted(scene: Scene, size: float, rng: np.random.Generator) -> Scene:
+    """Return a scene with bricks, joints and ground ends moved up to a size along every axis.
+
+    A brick takes its nodes with it, a ground end its fixed point.
+
+    ``size``: m; every coordinate moves by a uniform draw between minus and plus this.
+    """
+
+    def moved(point: Vector, step: Floats) -> Vector:
+        x, y, z = (np.array(point) + step).tolist()
+        return x, y, z
+
+    def draw() -> Floats:
+        return rng.uniform(-size, size, 3)
+
+    grounds = []
+    for ground in scene.grounds:
+        step = draw()
+        grounds.append(
+            replace(
+                ground, position=moved(ground.position, step), anchor=moved(ground.anchor, step)
+            )
+        )
+    return replace(
+        scene,
+        bricks=tuple(replace(b, position=moved(b.position, draw())) for b in scene.bricks),
+        joints=tuple(replace(j, position=moved(j.position, draw())) for j in scene.joints),
+        grounds=tuple(grounds),
+    )
+
 
 MOST = 100_000  # scenarios; more are a slip of the finger
-LARGEST_FACTOR = 1e6
+_LARGEST_FACTOR = 1e6
 
 
 @dataclass(frozen=True)
 class Scenarios:
     """Samples of a scene, and how they were drawn.
 
-    Attributes
-    ----------
-    nominal : Scene
-        What they are samples of.
-    stiffness : (float, float)
-        Least and largest factor of a joint's stiffness.
-    density : float
-        Largest relative change of a brick's density.
-    position : float
-        Largest shift along every axis, m.
-    seed : int
-    scenes : tuple of Scene
+    ``nominal``: what they are samples of; ``stiffness`` (float, float): least and largest factor of
+    a joint's stiffness; ``density``: largest relative change of a brick's density; ``position``:
+    largest shift along every axis, m.
     """
 
     nominal: Scene
@@ -149,10 +209,10 @@ def _factors(given: Sequence[float]) -> tuple[float, float]:
         low, high = (float(value) for value in given)
     except (TypeError, ValueError):
         low, high = math.nan, math.nan
-    if not 1 / LARGEST_FACTOR <= low <= high <= LARGEST_FACTOR:
+    if not 1 / _LARGEST_FACTOR <= low <= high <= _LARGEST_FACTOR:
         raise SceneError(
             f"stiffness is {short(given)}; give the least and the largest factor, from "
-            f"{1 / LARGEST_FACTOR:g} to {LARGEST_FACTOR:g}"
+            f"{1 / _LARGEST_FACTOR:g} to {_LARGEST_FACTOR:g}"
         )
     return low, high
 

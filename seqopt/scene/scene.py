@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -12,15 +12,82 @@ from typing import TYPE_CHECKING
 from seqopt.arrays import Vector
 from seqopt.errors import SceneError
 from seqopt.scene.checks import parts, printable, vector, wholes
-from seqopt.scene.geometry import check_bricks, check_springs
-from seqopt.scene.parts import Brick, Ground, Joint, Robot
-from seqopt.scene.reach import Reach
+from seqopt.scene.parts import Brick, Ground, Joint, Reach, Robot
 from seqopt.showing import Shown, display
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-KINDS = {"bricks": Brick, "joints": Joint, "grounds": Ground, "robots": Robot}
+_AT_NODE = 1e-6  # distance treated as zero, over the length of the brick
+_FAR = 1e9  # of a position from the origin, over the smallest dimension: digits are lost beyond
+_SIZES = (1e-9, 1e9)  # m; dimensions that a brick may have
+_HEAVY = 1e100  # N, N/m, N m/rad; squares of what is beyond overflow, of its inverse vanish
+
+
+def _check_bricks(bricks: Sequence[Brick], gravity: Vector) -> None:
+    """Require bricks that have a size, a place and a weight. ``gravity``: m/s²."""
+    pull = math.hypot(*gravity)
+    for brick in bricks:
+        where, smallest = f"brick {brick.name}", min(brick.dimensions)
+        if not _SIZES[0] <= smallest <= max(brick.dimensions) <= _SIZES[1]:
+            raise SceneError(
+                f"{where}: dimensions are {list(brick.dimensions)}; "
+                f"give meters, from {_SIZES[0]:g} to {_SIZES[1]:g}"
+            )
+        if max(map(abs, brick.position)) > _FAR * smallest:
+            raise SceneError(
+                f"{where}: position is {list(brick.position)}, so far out that its size is lost "
+                "to rounding; move the scene to the origin"
+            )
+        if pull and not 1 / _HEAVY <= brick.mass * pull <= _HEAVY:
+            raise SceneError(
+                f"{where}: it weighs {brick.mass * pull:g} N; correct its density "
+                f"{brick.density:g} kg/m³ or the scene's gravity {pull:g} m/s²"
+            )
+
+
+def _check_springs(springs: Sequence[Joint | Ground], bricks: Mapping[int, Brick]) -> None:
+    """Require joints and ground ends whose edges have a length. ``bricks``: by name."""
+    farthest = _FAR * max(max(brick.dimensions) for brick in bricks.values())
+    for spring in springs:
+        ends = spring.bricks if isinstance(spring, Joint) else (spring.brick,)
+        where = (
+            f"joint {spring.bricks}"
+            if isinstance(spring, Joint)
+            else f"ground end of brick {ends[0]}"
+        )
+        points = {"position": spring.position}
+        if isinstance(spring, Ground):
+            points["anchor"] = spring.anchor
+        for name, point in points.items():
+            if max(map(abs, point)) > farthest:
+                raise SceneError(f"{where}: {name} is {list(point)}; move it to its bricks")
+        stiffness = (*spring.translational_stiffness, *spring.rotational_stiffness)
+        stiffest = max(stiffness)
+        softest = min(filter(None, stiffness), default=1.0)
+        if stiffest > _HEAVY or softest < 1 / _HEAVY:
+            wrong = stiffest if stiffest > _HEAVY else softest
+            raise SceneError(
+                f"{where}: a stiffness is {wrong:g}; give 0, or from {1 / _HEAVY:g} to {_HEAVY:g}"
+            )
+        for brick in (bricks[end] for end in ends):
+            _check_edges(where, spring, brick)
+
+
+def _check_edges(where: str, spring: Joint | Ground, brick: Brick) -> None:
+    """Require a joint off the nodes of a brick, and a stub with a length."""
+    near = _AT_NODE * brick.dimensions[0]
+    for node in brick.nodes:
+        if math.dist(brick.node_position(node), spring.position) <= near:
+            raise SceneError(
+                f"{where}: position is that of node {node} of brick {brick.name}; "
+                "give a point between the faces that it joins"
+            )
+    if isinstance(spring, Ground) and math.dist(spring.anchor, spring.position) <= near:
+        raise SceneError(f"{where}: anchor and position are one point; give the stub a length")
+
+
+_KINDS = {"bricks": Brick, "joints": Joint, "grounds": Ground, "robots": Robot}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,7 +136,7 @@ class Scene(Shown):
     provenance: str = ""
 
     def __post_init__(self) -> None:
-        for name, kind in KINDS.items():
+        for name, kind in _KINDS.items():
             _set(self, name, parts(f"scene: {name}", getattr(self, name), kind))
         printable("scene", self.name)
         for name in ("build_order", "blocked_nodes"):
@@ -83,8 +150,8 @@ class Scene(Shown):
         _unique(f"scene {self.name}: node", (n for brick in self.bricks for n in brick.nodes))
         _unique(f"scene {self.name}: robot", (robot.name for robot in self.robots))
         self._check_references()
-        check_bricks(self.bricks, self.gravity)
-        check_springs((*self.joints, *self.grounds), {brick.name: brick for brick in self.bricks})
+        _check_bricks(self.bricks, self.gravity)
+        _check_springs((*self.joints, *self.grounds), {brick.name: brick for brick in self.bricks})
 
     def __repr__(self) -> str:
         counts = (
@@ -125,27 +192,13 @@ class Scene(Shown):
         return {node: brick for brick in self.bricks for node in brick.nodes}
 
     def node_position(self, node: int) -> Vector:
-        """Return where an inner node lies.
-
-        Parameters
-        ----------
-        node : int
-            Its number.
-
-        Returns
-        -------
-        Vector
-            m.
-        """
+        """Return where an inner node lies. ``node``: its number."""
         return self.brick_of_node[node].node_position(node)
 
     def within_reach(self, robot: Robot) -> tuple[tuple[int, ...], ...]:
         """Return the nodes that a robot may hold, by brick.
 
-        Returns
-        -------
-        tuple of tuple of int
-            Bricks in build order; nodes neither blocked nor out of reach.
+        Result: bricks in build order; nodes neither blocked nor out of reach.
         """
         if robot.reach not in self._within_reach:
             blocked, covers = {*self.blocked_nodes}, robot.reach.covers
@@ -173,10 +226,7 @@ class Scene(Shown):
     def with_robots(self, *robots: Robot) -> Scene:
         """Return the same scene with other robots.
 
-        Parameters
-        ----------
-        *robots : Robot
-            All robots of the new scene.
+        ``*robots``: all robots of the new scene.
 
         Examples
         --------
@@ -190,20 +240,9 @@ class Scene(Shown):
     def plot(self, bricks: int | None = None) -> Figure:
         """Draw the scene, or its first bricks.
 
-        Parameters
-        ----------
-        bricks : int, optional
-            How many, in build order; the others are drawn pale. All by default.
-
-        Returns
-        -------
-        matplotlib.figure.Figure
-            A notebook shows it; ``savefig`` writes it to a file.
-
-        Raises
-        ------
-        ExtraError
-            If matplotlib is not installed (extra ``plot``).
+        ``bricks``: how many, in build order; the others are drawn pale. All by default. Result: a
+        notebook shows it; ``savefig`` writes it to a file. Raises `ExtraError` if matplotlib is not
+        installed (extra ``plot``).
         """
         figure: Figure = display("scene_picture")(self, bricks)
         return figure

@@ -1,28 +1,130 @@
-"""Scenes as versioned JSON, checked against the published schema ``data/scene.schema.json``."""
+"""Scenes as versioned JSON, checked against the published schema ``data/scene.schema.json``.
+
+A warning is given for values that are possible but probably wrong, such as mixed-up units.
+"""
 
 from __future__ import annotations
 
 import json
+import math
 import os
+import warnings
+from collections.abc import Iterator
 from dataclasses import asdict
 from functools import partial
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from seqopt.errors import SceneError, did_you_mean
+import numpy as np
+
+from seqopt.arrays import Vector
+from seqopt.errors import SceneError, SceneWarning, did_you_mean
 from seqopt.files import read_text, write_text
-from seqopt.scene.doubts import warn_of
-from seqopt.scene.library.builtin import ABOUT, GENERATED
-from seqopt.scene.library.by_words import KINDS, scene_by_words
-from seqopt.scene.parts import Brick, Ground, Joint, Robot
-from seqopt.scene.reach import Anywhere, Reach, Side, Sphere
+from seqopt.scene.library.by_words import ABOUT, GENERATED, KINDS, scene_by_words
+from seqopt.scene.parts import Anywhere, Brick, Ground, Joint, Reach, Robot, Side, Sphere
 from seqopt.scene.scene import Scene
 from seqopt.scene.shape import with_shape
 
-VERSION = 1
-UNSAID = ("thickness", "face", "shape", "node_offsets")  # left out of a file where there is none
-REACHES: dict[str, type[Anywhere] | type[Side] | type[Sphere]] = {
+_ONE_PLACE = 0.25  # distance of centroids treated as zero, over the smallest dimension
+_FAR_AWAY = 1.0  # of a joint from a brick, over the brick's largest dimension
+_THICK_BRICK = 5.0  # m; the smallest dimension of a brick whose lengths may be meant in mm
+_DENSITIES = (10.0, 30_000.0)  # kg/m³; from aerogel to the heaviest metals
+_PULL = 100.0  # m/s²; ten times that of the earth
+
+
+def find_warnings(scene: Scene) -> tuple[str, ...]:
+    """Return what looks wrong in a scene, one line each.
+
+    Result: each names the object, its value and what may be meant; empty for most scenes.
+
+    Examples
+    --------
+    >>> from dataclasses import replace
+    >>> from seqopt.scene.scene_file import load_scene
+    >>> scene = load_scene("arch25")
+    >>> find_warnings(scene)
+    ()
+    >>> find_warnings(replace(scene, gravity=(0.0, 0.0, -9810.0)))
+    ('gravity is 9810 m/s²: give it in meters, if it is meant in millimeters',)
+    """
+    return (*_of_units(scene), *_of_places(scene), *_of_joints(scene))
+
+
+def warn_of(scene: Scene, name: str) -> None:
+    """Warn of what looks wrong in a scene.
+
+    ``name``: what to call it.
+
+    Warns
+    -----
+    SceneWarning
+        A warning for each doubt.
+    """
+    for doubt in find_warnings(scene):
+        warnings.warn(f"scene {name}: {doubt}", SceneWarning, stacklevel=3)
+
+
+def _of_units(scene: Scene) -> Iterator[str]:
+    pull = math.hypot(*scene.gravity)
+    if pull > _PULL:
+        yield f"gravity is {pull:g} m/s²: give it in meters, if it is meant in millimeters"
+    thick = [brick for brick in scene.bricks if min(brick.dimensions) > _THICK_BRICK]
+    if thick:
+        yield (
+            f"{_named(thick)}: dimensions of {list(thick[0].dimensions)} m look like millimeters; "
+            "give meters"
+        )
+    odd = [brick for brick in scene.bricks if not _DENSITIES[0] <= brick.density <= _DENSITIES[1]]
+    if odd:
+        yield f"{_named(odd)}: a density of {odd[0].density:g} kg/m³ is odd; check its unit"
+
+
+def _of_places(scene: Scene) -> Iterator[str]:
+    """Yield bricks that stand where others do."""
+    from scipy.spatial import KDTree  # noqa: PLC0415  # for scenes from files only
+
+    near = _ONE_PLACE * np.array([min(brick.dimensions) for brick in scene.bricks])
+    place = np.array([brick.position for brick in scene.bricks])
+    for i, j in sorted(KDTree(place).query_pairs(float(near.max()))):
+        if math.dist(place[i], place[j]) <= min(near[i], near[j]):
+            first, second = scene.bricks[i].name, scene.bricks[j].name
+            yield f"bricks {first} and {second} are in one place, {list(scene.bricks[i].position)}"
+
+
+def _of_joints(scene: Scene) -> Iterator[str]:
+    """Yield joints and ground ends that lie far from their bricks."""
+    bricks = {brick.name: brick for brick in scene.bricks}
+    springs: tuple[Joint | Ground, ...] = (*scene.joints, *scene.grounds)
+    for spring in springs:
+        ends = spring.bricks if isinstance(spring, Joint) else (spring.brick,)
+        for brick in (bricks[end] for end in ends):
+            away = _distance(brick, spring.position)
+            if away > _FAR_AWAY * max(brick.dimensions):
+                yield f"{_called(spring)}: it lies {away:.4g} m from brick {brick.name}"
+
+
+def _distance(brick: Brick, point: Vector) -> float:
+    """Return the distance of a point from a brick, m."""
+    frame = brick.frame
+    at = np.abs(frame @ (np.array(point) - np.array(brick.position)))
+    return float(np.linalg.norm(np.maximum(at - 0.5 * np.array(brick.dimensions), 0.0)))
+
+
+def _called(spring: Joint | Ground) -> str:
+    if isinstance(spring, Joint):
+        return f"joint {spring.bricks}"
+    return f"ground end of brick {spring.brick}"
+
+
+def _named(bricks: list[Brick]) -> str:
+    more = f" and {len(bricks) - 1} more" if len(bricks) > 1 else ""
+    return f"brick {bricks[0].name}{more}"
+
+
+_VERSION = 1
+_UNSAID = ("thickness", "face", "shape", "node_offsets")  # left out of a file where there is none
+_REACHES: dict[str, type[Anywhere] | type[Side] | type[Sphere]] = {
     "anywhere": Anywhere,
     "side": Side,
     "sphere": Sphere,
@@ -37,29 +139,12 @@ def schema() -> dict[str, Any]:
 
 
 def builtin_scenes() -> tuple[str, ...]:
-    """Return the names of the scenes that ship with the package.
-
-    Returns
-    -------
-    tuple of str
-        In alphabetical order.
-    """
+    """Return the names of the scenes that ship with the package. Result: in alphabetical order."""
     return tuple(sorted({*_stored(), *GENERATED}))
 
 
 def about(name: str) -> str:
-    """Return what a built-in scene is.
-
-    Parameters
-    ----------
-    name : str
-        One of `builtin_scenes`.
-
-    Returns
-    -------
-    str
-        A line.
-    """
+    """Return what a built-in scene is. ``name``: one of `builtin_scenes`. Result: a line."""
     return ABOUT[name]
 
 
@@ -98,7 +183,7 @@ def load_scene(name: str | Path) -> Scene:
     Warns
     -----
     SceneWarning
-        If something in a file is probably a mistake; see `seqopt.scene.doubts`.
+        If something in a file is probably a mistake; see `seqopt.scene.scene_file`.
 
     Examples
     --------
@@ -135,17 +220,8 @@ def _no_such(name: str) -> str:
 def parse_scene(text: str, source: str = "text") -> Scene:
     """Return the scene that a JSON document describes.
 
-    Parameters
-    ----------
-    text : str
-        The document.
-    source : str, optional
-        Where it comes from, for messages.
-
-    Raises
-    ------
-    SceneError
-        If the text is not JSON, breaks the schema or describes no scene that can be.
+    ``text``: the document. Raises `SceneError` if the text is not JSON, breaks the schema or
+    describes no scene that can be.
     """
     try:
         document = json.loads(text, object_pairs_hook=partial(_entries, source))
@@ -158,7 +234,7 @@ def parse_scene(text: str, source: str = "text") -> Scene:
         raise
     except ValueError as error:  # an integer of thousands of digits
         raise SceneError(f"scene {source}: a number has too many digits; give fewer") from error
-    return scene_from_dict(document)
+    return _scene_from_dict(document)
 
 
 def _entries(source: str, pairs: list[tuple[str, Any]]) -> dict[str, Any]:
@@ -171,18 +247,10 @@ def _entries(source: str, pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     return out
 
 
-def scene_from_dict(document: dict[str, Any]) -> Scene:
+def _scene_from_dict(document: dict[str, Any]) -> Scene:
     """Return the scene of a document that obeys the schema.
 
-    Parameters
-    ----------
-    document : dict
-        As of `scene_to_dict`.
-
-    Raises
-    ------
-    SceneError
-        If its parts do not fit together.
+    ``document``: as of `scene_to_dict`. Raises `SceneError` if its parts do not fit together.
     """
     content = {key: value for key, value in document.items() if key not in ("format", "version")}
     content["bricks"] = [Brick(**with_shape(brick)) for brick in content["bricks"]]
@@ -197,12 +265,12 @@ def scene_from_dict(document: dict[str, Any]) -> Scene:
 
 def scene_to_dict(scene: Scene) -> dict[str, Any]:
     """Return a scene as a document that obeys the schema."""
-    document = {"format": "seqopt-scene", "version": VERSION, **asdict(scene)}
+    document = {"format": "seqopt-scene", "version": _VERSION, **asdict(scene)}
     for part in (*document["bricks"], *document["joints"], *document["grounds"]):
-        for key in UNSAID:
+        for key in _UNSAID:
             if part.get(key, "") is None:
                 del part[key]
-    names = {cls: kind for kind, cls in REACHES.items()}
+    names = {cls: kind for kind, cls in _REACHES.items()}
     for entry, robot in zip(document["robots"], scene.robots, strict=True):
         entry["reach"] = {"kind": names[type(robot.reach)], **entry["reach"]}
     return document
@@ -247,7 +315,7 @@ def save_scene(scene: Scene, path: Path) -> None:
 
 
 def _reach(entry: dict[str, Any]) -> Reach:
-    return REACHES[entry["kind"]](**{key: value for key, value in entry.items() if key != "kind"})
+    return _REACHES[entry["kind"]](**{key: value for key, value in entry.items() if key != "kind"})
 
 
 def _check_schema(document: object, source: str) -> None:

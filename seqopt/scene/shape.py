@@ -1,12 +1,13 @@
-"""Blocks of any shape: closed polyhedra, their volume, centroid and longest axis."""
+"""Convex polygons and closed polyhedra, checked: volume, centroid and longest axis of any block."""
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -14,27 +15,58 @@ from seqopt.arrays import Floats, Vector, frozen
 from seqopt.errors import SceneError
 from seqopt.scene.checks import short, vector, wholes
 
+_Part = TypeVar("_Part")
+_STRAIGHT = 1e-9  # by how much a convex polygon may turn back, over the square of its longest edge
+
+
+def rows(where: str, values: Iterable[_Part]) -> tuple[_Part, ...]:
+    """Return what there is to go through. Raises `SceneError` if it is no list."""
+    if isinstance(values, str) or not isinstance(values, Iterable):
+        raise SceneError(f"{where} is {short(values)}; give a list")
+    return tuple(values)
+
+
+def convex_polygon(
+    where: str, corners: Iterable[Iterable[float]]
+) -> tuple[tuple[float, float], ...]:
+    """Return the corners of a convex polygon, counterclockwise.
+
+    ``corners``: two coordinates each, once around, m. Raises `SceneError` if there are fewer than
+    three, one is not finite, or they are no convex polygon with an area.
+    """
+    points = []
+    for corner in rows(where, corners):
+        x, y, _ = vector(f"{where}: a corner", (*rows(f"{where}: a corner", corner), 0.0))
+        points.append((x, y))
+    edges = [(u - x, v - y) for (x, y), (u, v) in zip(points, points[1:] + points[:1], strict=True)]
+    turns = [a * d - b * c for (a, b), (c, d) in zip(edges, edges[1:] + edges[:1], strict=True)]
+    size = max((a * a + b * b for a, b in edges), default=0.0)
+    slack = _STRAIGHT * size
+    angle = math.fsum(
+        math.atan2(turn, a * c + b * d)
+        for turn, (a, b), (c, d) in zip(turns, edges, edges[1:] + edges[:1], strict=True)
+    )
+    if len(points) < 3 or not max(turns) > slack or min(turns) < -slack or angle > 3 * math.pi:
+        raise SceneError(
+            f"{where} is {short(points)}; give three corners or more of a convex polygon, "
+            "counterclockwise"
+        )
+    return tuple(points)
+
+
 FLAT = 1e-4  # by how much a face may leave its plane, over the size of the block
-EVEN = 1e-12  # share of the second moments by which axes of equal length are told apart
-NEAR = (1.0, 0.75, 0.5, 0.25, 0.1)  # of a quarter of the extent: where a node is tried
+_EVEN = 1e-12  # share of the second moments by which axes of equal length are told apart
+_NEAR = (1.0, 0.75, 0.5, 0.25, 0.1)  # of a quarter of the extent: where a node is tried
 
 
 @dataclass(frozen=True)
 class Polyhedron:
     """A closed polyhedron, convex or not.
 
-    Parameters
-    ----------
-    vertices : tuple of Vector
-        From the block's centroid, in the scene's axes, m.
-    faces : tuple of tuple of int
-        Places among the vertices, once around each face, counterclockwise from outside.
-
-    Raises
-    ------
-    SceneError
-        If it is not closed, its faces are not flat or do not agree which side is outside, or its
-        volume is not positive.
+    ``vertices``: from the block's centroid, in the scene's axes, m; ``faces``: places among the
+    vertices, once around each face, counterclockwise from outside. Raises `SceneError` if it is not
+    closed, its faces are not flat or do not agree which side is outside, or its volume is not
+    positive.
 
     Examples
     --------
@@ -113,7 +145,7 @@ class Polyhedron:
         total = arms.sum(axis=1)
         spread = np.einsum("t,tia,tib->ab", volume, arms, arms)
         spread = (spread + np.einsum("t,ta,tb->ab", volume, total, total)) / 20
-        spread += EVEN * np.trace(spread) * np.diag([2.0, 1.0, 0.0])
+        spread += _EVEN * np.trace(spread) * np.diag([2.0, 1.0, 0.0])
         found = np.linalg.eigh(spread)[1].T[::-1].copy()
         found[2] = np.cross(found[0], found[1])
         for i in (0, 1):  # their signs follow from the shape, not from the solver
@@ -123,27 +155,11 @@ class Polyhedron:
         return frozen(found)
 
     def extents(self, axes: Floats) -> Floats:
-        """Return how far it extends along unit vectors.
-
-        Parameters
-        ----------
-        axes : (k, 3) float
-
-        Returns
-        -------
-        (k,) float
-            m.
-        """
+        """Return how far it extends along unit vectors. ``axes`` (k, 3). Result (k,): m."""
         return np.asarray(np.ptp(self.points @ axes.T, axis=0))
 
     def contains(self, point: Floats) -> bool:
-        """Return whether a point lies inside: its faces surround it once.
-
-        Parameters
-        ----------
-        point : (3,) float
-            m.
-        """
+        """Return whether a point lies inside: its faces surround it once. ``point`` (3,)."""
         a, b, c = np.moveaxis(self.triangles - point, 1, 0)
         lengths = [np.linalg.norm(side, axis=1) for side in (a, b, c)]
         above = np.einsum("ti,ti->t", a, np.cross(b, c))
@@ -155,14 +171,11 @@ class Polyhedron:
     def nodes(self) -> tuple[Vector, Vector]:
         """Return where its two inner nodes lie if nobody says: on either side of the centroid.
 
-        Returns
-        -------
-        tuple of 2 Vector
-            From the centroid, m: a quarter of the extent away along the longest principal axis;
-            nearer, or along another axis, where that is outside; outside if all are.
+        Result: from the centroid, m: a quarter of the extent away along the longest principal axis;
+        nearer, or along another axis, where that is outside; outside if all are.
         """
         reach = 0.25 * self.extents(self.axes)
-        tries = [(share * reach[i], i) for i in range(3) for share in NEAR]
+        tries = [(share * reach[i], i) for i in range(3) for share in _NEAR]
         steps = [(size * self.axes[i]) for size, i in tries]
         found = next((step for step in steps if self._holds(step)), steps[0])
         x, y, z = (found + 0.0).tolist()
@@ -175,15 +188,7 @@ class Polyhedron:
 def normal_of(corners: Floats) -> Floats:
     """Return the normal of a polygon, as long as twice its area.
 
-    Parameters
-    ----------
-    corners : (m, 3) float
-        Once around, m.
-
-    Returns
-    -------
-    (3,) float
-        m².
+    ``corners`` (m, 3): once around, m. Result (3,): m².
     """
     spokes = corners - corners[0]
     return np.asarray(np.cross(spokes[1:-1], spokes[2:]).sum(axis=0))
@@ -192,15 +197,7 @@ def normal_of(corners: Floats) -> Floats:
 def bend(corners: Floats) -> float:
     """Return how far corners of a polygon lie from its plane.
 
-    Parameters
-    ----------
-    corners : (m, 3) float
-        Once around, m.
-
-    Returns
-    -------
-    float
-        m; infinite if it has no area.
+    ``corners`` (m, 3): once around, m. Result: m; infinite if it has no area.
     """
     normal = normal_of(corners)
     size = float(np.linalg.norm(normal))
@@ -212,15 +209,7 @@ def bend(corners: Floats) -> float:
 def with_shape(entry: dict[str, Any]) -> dict[str, Any]:
     """Return the entry of a brick in a document with its shape, if it has one, as a value.
 
-    Parameters
-    ----------
-    entry : dict
-        With ``name`` and perhaps ``shape``.
-
-    Raises
-    ------
-    SceneError
-        Naming the brick, if its shape is no polyhedron.
+    ``entry``: with ``name`` and perhaps ``shape``.
     """
     if entry.get("shape") is None:
         return entry
@@ -258,3 +247,40 @@ def _require_closed(faces: tuple[tuple[int, ...], ...]) -> None:
                 f"shape: at edge {a}-{b} faces do not agree which side is outside, or more than "
                 "two meet; list vertices counterclockwise as seen from outside"
             )
+
+
+_SAME_PLACE = 1e-6  # distance treated as zero, over the size of a block
+
+
+def two_points(where: str, given: tuple[Vector, Vector]) -> tuple[Vector, Vector]:
+    """Return where the nodes of a block are if they are two places.
+
+    Raises `SceneError` if they are not two different points.
+    """
+    found = [vector(f"{where}: node_offsets", row) for row in rows(f"{where}: node_offsets", given)]
+    if len(found) != 2 or found[0] == found[1]:
+        raise SceneError(f"{where}: node_offsets are {short(given)}; give two different points")
+    return found[0], found[1]
+
+
+def check_shape(where: str, shape: object, dimensions: Vector, axes: tuple[Vector, Vector]) -> None:
+    """Require a shape about the centroid that extends as far as the dimensions say.
+
+    ``axes``: unit vectors along length and width. Raises `SceneError` if it is not such a shape.
+    """
+    size = max(dimensions)
+    if not isinstance(shape, Polyhedron):
+        raise SceneError(f"{where}: shape is {short(shape)}; give a Polyhedron")
+    off = math.hypot(*shape.centroid.tolist())
+    if not off <= _SAME_PLACE * size:
+        raise SceneError(
+            f"{where}: the centroid of its shape is {off:.3g} m from its position; give vertices "
+            "from the centroid"
+        )
+    length, width = np.array(axes[0]), np.array(axes[1])
+    extents = shape.extents(np.stack([length, width, np.cross(length, width)]))
+    if not np.allclose(extents, dimensions, rtol=0.0, atol=_SAME_PLACE * size):
+        raise SceneError(
+            f"{where}: dimensions are {list(dimensions)}, and its shape extends "
+            f"{[float(f'{e:.6g}') for e in extents]} along its axes; give these"
+        )

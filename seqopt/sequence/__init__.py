@@ -15,7 +15,7 @@ its scene. A schedule is a sequence in which some grips are still to be chosen.
 >>> move.robot, move.step, move.candidates
 ('rob3', 3, (4, 5))
 
-Loops of two robots and of more are in `seqopt.sequence.loops`.
+Loops of two robots and of more are in `seqopt.sequence.three_robots`.
 """
 
 from seqopt.sequence.plan_file import read_plan

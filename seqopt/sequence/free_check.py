@@ -58,16 +58,8 @@ class RuleBook:
     def fault(self, bricks: int, grips: Grips) -> str:
         """Return which rule a state breaks, the ending aside.
 
-        Parameters
-        ----------
-        bricks : int
-        grips : tuple of (int or None)
-            Node that each of the scene's robots holds.
-
-        Returns
-        -------
-        str
-            In a few words; empty if it breaks none.
+        ``grips``: node that each of the scene's robots holds. Result: in a few words; empty if it
+        breaks none.
         """
         held = [node for node in grips if node is not None]
         if bricks > 1 and len(held) < self.rules.least_grips:
@@ -86,20 +78,7 @@ class RuleBook:
     ) -> Iterator[tuple[StepKind, int, Grips, int]]:
         """Yield every step that is possible from a state.
 
-        Parameters
-        ----------
-        bricks : int
-            Zero before the first.
-        grips : tuple of (int or None)
-        regrips : int
-            Grips taken since the last brick.
-
-        Yields
-        ------
-        kind : StepKind
-        bricks : int
-        grips : tuple of (int or None)
-        regrips : int
+        ``bricks``: zero before the first; ``regrips``: grips taken since the last brick.
         """
         last = len(self.network.scene.placed)
         keeps = bricks > 0 and not self.fault(bricks, grips)
@@ -142,13 +121,7 @@ class RuleBook:
                     yield after
 
     def ends(self, bricks: int, grips: Grips) -> bool:
-        """Return whether a state ends the build.
-
-        Parameters
-        ----------
-        bricks : int
-        grips : tuple of (int or None)
-        """
+        """Return whether a state ends the build."""
         if bricks < len(self.network.scene.placed):
             return False
         if self.rules.ending is Ending.HELD:
@@ -159,17 +132,8 @@ class RuleBook:
 def check_free(network: Network, rules: FreeRules, steps: Sequence[Step]) -> None:
     """Require that a sequence keeps the rules of a free schedule, payloads aside.
 
-    Parameters
-    ----------
-    network : Network
-    rules : FreeRules
-    steps : sequence of Step
-        Of one that `seqopt.sequence.steps.check_sequence` accepts.
-
-    Raises
-    ------
-    StepError
-        If a step is not among those that were possible; the message says which.
+    ``steps``: of one that `seqopt.sequence.steps.check_sequence` accepts. Raises `StepError` if a
+    step is not among those that were possible; the message says which.
     """
     book = RuleBook(network, rules)
     state: tuple[int, Grips, int] = (0, (None,) * len(network.scene.robots), 0)

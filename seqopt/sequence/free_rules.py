@@ -13,7 +13,7 @@ from seqopt.scene.parts import Robot
 from seqopt.scene.scene import Scene
 
 FREE = "free"  # the schedule that is no list of steps
-MOST_ROBOTS = 5
+_MOST_ROBOTS = 5
 
 
 class Newest(Enum):
@@ -91,15 +91,8 @@ class FreeRules:
     def team(self, scene: Scene) -> tuple[int, ...]:
         """Return which of a scene's robots take part.
 
-        Returns
-        -------
-        tuple of int
-            Indices of its robots, ascending.
-
-        Raises
-        ------
-        StepError
-            If a robot is not in the scene, too few or too many take part, or fewer than must hold.
+        Result: indices of its robots, ascending. Raises `StepError` if a robot is not in the scene,
+        too few or too many take part, or fewer than must hold.
         """
         known = [robot.name for robot in scene.robots]
         for name in (*self.robots, *self.placers):
@@ -108,9 +101,9 @@ class FreeRules:
                 hint = did_you_mean(name, known)
                 raise StepError(f"robot {name!r} does not exist{hint}; give some of {listed}")
         team = tuple(i for i, name in enumerate(known) if name in self.robots or not self.robots)
-        if not 2 <= len(team) <= MOST_ROBOTS:
+        if not 2 <= len(team) <= _MOST_ROBOTS:
             raise StepError(
-                f"the free schedule: {len(team)} robots take part; name two to {MOST_ROBOTS}"
+                f"the free schedule: {len(team)} robots take part; name two to {_MOST_ROBOTS}"
             )
         outside = [name for name in self.placers if known.index(name) not in team]
         if outside:
@@ -126,13 +119,7 @@ class FreeRules:
         return team
 
     def described(self, scene: Scene) -> dict[str, object]:
-        """Return the rules with their values, ready for JSON.
-
-        Returns
-        -------
-        dict
-            By name.
-        """
+        """Return the rules with their values, ready for JSON. Result: by name."""
         names = [scene.robots[i].name for i in self.team(scene)]
         return {
             "robots": names,
@@ -166,21 +153,8 @@ class FreeRules:
 def with_robots(scene: Scene, count: int) -> Scene:
     """Return a scene with a number of robots: its own first, then mobile ones that reach all.
 
-    Parameters
-    ----------
-    scene : Scene
-    count : int
-        From two to five.
-
-    Returns
-    -------
-    Scene
-        Further robots reach every node and have the largest payload of the scene's own.
-
-    Raises
-    ------
-    StepError
-        If there would be fewer or more.
+    ``count``: from two to five. Result: further robots reach every node and have the largest
+    payload of the scene's own. Raises `StepError` if there would be fewer or more.
 
     Examples
     --------
@@ -188,12 +162,12 @@ def with_robots(scene: Scene, count: int) -> Scene:
     >>> [robot.name for robot in with_robots(seqopt.load_scene("arch25"), 4).robots]
     ['rob1', 'rob2', 'rob3', 'rob4']
     """
-    if not isinstance(count, Integral) or not 2 <= count <= MOST_ROBOTS:
-        raise StepError(f"{short(count)} robots: the free schedule takes two to {MOST_ROBOTS}")
+    if not isinstance(count, Integral) or not 2 <= count <= _MOST_ROBOTS:
+        raise StepError(f"{short(count)} robots: the free schedule takes two to {_MOST_ROBOTS}")
     robots = list(scene.robots[:count])
     names = {robot.name for robot in robots}
     payload = max((robot.payload for robot in scene.robots), default=float("nan"))
-    fresh = (f"rob{i}" for i in range(1, 2 * MOST_ROBOTS + 1) if f"rob{i}" not in names)
+    fresh = (f"rob{i}" for i in range(1, 2 * _MOST_ROBOTS + 1) if f"rob{i}" not in names)
     robots += [Robot(name=next(fresh), payload=payload) for _ in range(count - len(robots))]
     return replace(scene, robots=tuple(robots))
 

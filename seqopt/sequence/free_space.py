@@ -10,39 +10,167 @@ the node that it held last, -n.
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
-from seqopt.arrays import Bools, Floats, Ints, Terse, frozen
+from seqopt.arrays import Bools, Floats, FrozenValue, Ints, Terse, frozen
+from seqopt.errors import StepError
 from seqopt.network.network import Network
-from seqopt.sequence.free_moves import (
-    Moves,
-    grip_pairs,
-    join_moves,
-    number_rows,
-    sort_entries,
-)
-from seqopt.sequence.free_rules import Ending, FreeRules, Newest
-from seqopt.sequence.free_team import RobotKind
+from seqopt.scene.parts import Robot
+from seqopt.sequence.free_rules import Ending, FreeRules, Newest, Payload
 from seqopt.sequence.support import islands
+from seqopt.sequence.two_robots import placing_node
 
-PAIRS = 4_000_000  # of states and nodes that are looked at together
+
+class Moves(NamedTuple):
+    """Moves from states of one brick count."""
+
+    source: Ints  # (m,); row of the state that each leads from
+    states: Ints  # (m, c); the states that they lead to
+    way: Floats  # (m,); how far the robot goes that takes a grip, m; zero where ways do not count
+
+
+def _grip_pairs(
+    states: Ints, slot: int, nodes: Ints, robots_and_ways: tuple[int, Floats | None]
+) -> Moves:
+    """Return the moves in which the robot of a column takes one of some nodes that nobody holds.
+
+    ``states`` (n, c): in which that robot is free. ``slot``: its column. ``nodes`` (m,): from 0.
+    ``robots_and_ways``: how many columns are robots; distances between nodes, (2B + 1, 2B + 1), m,
+    or None where ways do not count. Result: the entries of a kind are not sorted.
+    """
+    robots, distance = robots_and_ways
+    taken = np.zeros((len(states), int(max(nodes.max() + 1, states[:, :robots].max())) + 1), bool)
+    for column in range(robots):
+        taken[np.arange(len(states)), states[:, column].clip(min=0)] = True
+    source, node = np.nonzero(~taken[:, nodes + 1])
+    number = nodes[node] + 1
+    new = states[source]
+    way = np.zeros(len(new)) if distance is None else distance[-new[:, slot], number]
+    new[:, slot] = number
+    return Moves(source, new, way)
+
+
+def sort_entries(states: Ints, first: int, end: int) -> None:
+    """Sort the entries of the robots of a kind, largest first, in place.
+
+    ``states`` (n, c); ``first``, ``end``: its first column, and the one after its last.
+    """
+    if end - first > 1:
+        states[:, first:end] = -np.sort(-states[:, first:end], axis=1)
+
+
+def _join_moves(parts: Sequence[Moves], states: Ints) -> Moves:
+    """Return several moves as one. ``states`` (n, c): that they lead from."""
+    none = np.zeros(0, dtype=np.int64)
+    whole = [Moves(none, states[:0], np.zeros(0)), *parts]
+    return Moves(*map(np.concatenate, zip(*whole, strict=True)))
+
+
+def number_rows(states: Ints, robots: int, least: int, most: int) -> Ints:
+    """Return a number for every state that no other one has.
+
+    ``states`` (n, c): columns after those of robots count first; ``robots``: how many columns are
+    robots; ``least``, ``most``: between which their entries are. Result (n,).
+    """
+    further = states.shape[1] > robots
+    out = np.zeros(len(states), dtype=np.int64)
+    out += states[:, -1] if further else 0
+    for column in range(robots):
+        out *= 1 + most - least
+        out += states[:, column]
+        out -= least
+    return np.asarray(out)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class RobotKind(FrozenValue):
+    """Robots that reach the same nodes, may carry as much, and may place or not.
+
+    Nodes are counted as in ``network.inner.ravel()``: brick by brick in build order.
+
+    ``robots``: indices of the scene's robots; ``reach`` (2B,): nodes that they may hold: within
+    reach and not blocked; ``newest`` (2B,): nodes at which they hold a brick when they place it,
+    and as the newest one; ``places``: whether they may place; ``cap``: largest force of a grip, N.
+    """
+
+    robots: tuple[int, ...]
+    reach: Bools
+    newest: Bools
+    places: bool
+    cap: float
+
+
+def sort_robots(
+    network: Network, rules: FreeRules, caps: Mapping[str, float] | None = None
+) -> tuple[RobotKind, ...]:
+    """Return the robots that take part, sorted by kind.
+
+    ``caps``: largest force of a robot's grip beside its payload, by its name, N. Result: in the
+    order of their first robots.
+    """
+    alike: dict[tuple[object, ...], list[int]] = {}
+    parts: dict[tuple[object, ...], RobotKind] = {}
+    for i in rules.team(network.scene):
+        robot = network.scene.robots[i]
+        reach = _reached(network, robot)
+        newest = reach if rules.newest is not Newest.PLACING else _placing(network, robot, reach)
+        places = not rules.placers or robot.name in rules.placers
+        cap = robot.payload if rules.payload is Payload.KEPT else np.inf
+        cap = min(cap, (caps or {}).get(robot.name, np.inf))
+        key = (reach.tobytes(), newest.tobytes(), places, cap)
+        alike.setdefault(key, []).append(i)
+        parts.setdefault(key, RobotKind((), reach, newest, places, cap))
+    return tuple(
+        RobotKind(tuple(robots), parts[key].reach, parts[key].newest, parts[key].places, key[3])  # type: ignore[arg-type]
+        for key, robots in alike.items()
+    )
+
+
+def node_numbers(network: Network) -> list[int]:
+    """Return the scene's numbers of all inner nodes, brick by brick in build order.
+
+    Result: (2B,).
+    """
+    return [node for brick in network.scene.placed for node in brick.nodes]
+
+
+def _reached(network: Network, robot: Robot) -> Bools:
+    """Return which nodes a robot may hold: within its reach and not blocked. Result (2B,)."""
+    scene = network.scene
+    return np.array(
+        [
+            node not in scene.blocked_nodes and robot.reach.covers(brick.node_position(node))
+            for brick in scene.placed
+            for node in brick.nodes
+        ]
+    )
+
+
+def _placing(network: Network, robot: Robot, reach: Bools) -> Bools:
+    """Return at which node a robot places every brick."""
+    out = np.zeros_like(reach)
+    for k, brick in enumerate(network.scene.placed):
+        try:
+            out[2 * k + brick.nodes.index(placing_node(network, robot, brick))] = True
+        except StepError:  # it reaches none
+            continue
+    return out
+
+
+_PAIRS = 4_000_000  # of states and nodes that are looked at together
 
 
 @dataclass(frozen=True, repr=False)
 class FreeSpace(Terse):
     """The states of a free schedule and the moves between them.
 
-    Parameters
-    ----------
-    network : Network
-    rules : FreeRules
-    kinds : tuple of RobotKind
-        The robots that take part.
-    parks : bool
-        Whether free robots stay where they were, for their travel.
+    ``kinds``: the robots that take part; ``parks``: whether free robots stay where they were, for
+    their travel.
     """
 
     network: Network
@@ -98,10 +226,8 @@ class FreeSpace(Terse):
     def start(self) -> Ints:
         """Return the one state before the first brick.
 
-        Returns
-        -------
-        (1, c) int
-            Of the smallest type that holds every node: there may be tens of millions of states.
+        Result (1, c): of the smallest type that holds every node: there may be tens of millions of
+        states.
         """
         kind = np.min_scalar_type(-max(2 * self.bricks, self.rules.regrips or 0) - 1)
         return np.zeros((1, self.robots + self._counts), dtype=kind)
@@ -109,13 +235,7 @@ class FreeSpace(Terse):
     def codes(self, states: Ints) -> Ints:
         """Return a number for every state that no other one of its brick count has.
 
-        Parameters
-        ----------
-        states : (n, c) int
-
-        Returns
-        -------
-        (n,) int
+        ``states`` (n, c). Result (n,).
         """
         last = 2 * self.bricks
         return number_rows(states, self.robots, -last if self.parks else 0, last)
@@ -123,49 +243,25 @@ class FreeSpace(Terse):
     def held(self, states: Ints) -> Ints:
         """Return which nodes are held, sorted, zeros for robots that are free first.
 
-        Parameters
-        ----------
-        states : (n, c) int
-
-        Returns
-        -------
-        (n, robots) int
+        ``states`` (n, c). Result (n, robots).
         """
         return np.sort(states[:, : self.robots].clip(min=0), axis=1)
 
     def grips(self, states: Ints) -> Ints:
-        """Return how many grips are held.
-
-        Parameters
-        ----------
-        states : (n, c) int
-
-        Returns
-        -------
-        (n,) int
-        """
+        """Return how many grips are held. ``states`` (n, c). Result (n,)."""
         return np.asarray((states[:, : self.robots] > 0).sum(axis=1))
 
     def places(self, bricks: int, states: Ints) -> Moves:
         """Return the moves that place the next brick; a free robot then holds it.
 
-        Parameters
-        ----------
-        bricks : int
-            How many bricks stand before.
-        states : (n, c) int
-
-        Returns
-        -------
-        Moves
-            To lawful states.
+        ``bricks``: how many bricks stand before; ``states`` (n, c). Result: to lawful states.
         """
         nodes = np.array([2 * bricks, 2 * bricks + 1])
         parts = []
         for k, kind in enumerate(self.kinds):
             if kind.places:
                 parts += self._take(k, states, nodes[kind.newest[nodes]])
-        moves = join_moves(parts, states)
+        moves = _join_moves(parts, states)
         if self._counts:
             moves.states[:, -1] = 0
         return self._lawful_only(bricks + 1, moves)
@@ -173,15 +269,7 @@ class FreeSpace(Terse):
     def holds(self, bricks: int, states: Ints) -> Moves:
         """Return the moves in which a free robot takes a grip on a brick that stands.
 
-        Parameters
-        ----------
-        bricks : int
-        states : (n, c) int
-
-        Returns
-        -------
-        Moves
-            To lawful states, as many of them as rules allow.
+        ``states`` (n, c). Result: to lawful states, as many of them as rules allow.
         """
         able = self.lawful(bricks, states)
         if self.rules.regrips is not None:
@@ -190,7 +278,7 @@ class FreeSpace(Terse):
         parts = []
         for k, kind in enumerate(self.kinds):
             parts += self._take(k, states[rows], np.flatnonzero(kind.reach[: 2 * bricks]))
-        moves = join_moves(parts, states)
+        moves = _join_moves(parts, states)
         if self._counts:
             moves.states[:, -1] += 1
         return Moves(rows[moves.source], moves.states, moves.way)
@@ -198,15 +286,8 @@ class FreeSpace(Terse):
     def releases(self, bricks: int, states: Ints) -> Moves:
         """Return the moves in which one robot lets go, or at the end all do.
 
-        Parameters
-        ----------
-        bricks : int
-        states : (n, c) int
-
-        Returns
-        -------
-        Moves
-            To lawful states, and at the last brick to those that the rules' ending allows.
+        ``states`` (n, c). Result: to lawful states, and at the last brick to those that the rules'
+        ending allows.
         """
         parts = []
         for first, end in self.slots:
@@ -216,7 +297,7 @@ class FreeSpace(Terse):
                 new[:, slot] = -new[:, slot] if self.parks else 0
                 sort_entries(new, first, end)
                 parts.append(Moves(rows, new, np.zeros(len(rows))))
-        moves = join_moves(parts, states)
+        moves = _join_moves(parts, states)
         if bricks < self.bricks or self.rules.ending is not Ending.ONE_BY_ONE:
             moves = self._lawful_only(bricks, moves)
         if bricks < self.bricks or self.rules.ending is Ending.HELD:
@@ -226,14 +307,7 @@ class FreeSpace(Terse):
     def lawful(self, bricks: int, states: Ints) -> Bools:
         """Return which states keep the rules as long as the build goes on.
 
-        Parameters
-        ----------
-        bricks : int
-        states : (n, c) int
-
-        Returns
-        -------
-        (n,) bool
+        ``states`` (n, c). Result (n,).
         """
         held = states[:, : self.robots]
         ok = np.asarray(self.grips(states) >= (self.rules.least_grips if bricks > 1 else 0))
@@ -249,16 +323,7 @@ class FreeSpace(Terse):
         return ok
 
     def ended(self, states: Ints) -> Bools:
-        """Return which states with all bricks end the build.
-
-        Parameters
-        ----------
-        states : (n, c) int
-
-        Returns
-        -------
-        (n,) bool
-        """
+        """Return which states with all bricks end the build. ``states`` (n, c). Result (n,)."""
         if self.rules.ending is Ending.HELD:
             return self.lawful(self.bricks, states)
         return np.asarray((states[:, : self.robots] <= 0).all(axis=1))
@@ -270,7 +335,7 @@ class FreeSpace(Terse):
             none = states[rows]
             none[:, : self.robots] = 0
             parts = [moves, Moves(rows, none, np.zeros(len(rows)))]
-            moves = join_moves(parts, states)
+            moves = _join_moves(parts, states)
         bare = (moves.states[:, : self.robots] <= 0).all(axis=1)
         moves.states[bare, : self.robots] = 0
         return moves
@@ -292,7 +357,7 @@ class FreeSpace(Terse):
         """Return the moves in which a free robot of a kind takes one of some nodes."""
         first, end = self.slots[k]
         slots = range(first, end) if self.parks else [end - 1]  # entries are sorted
-        step = max(1, PAIRS // max(1, len(nodes)))
+        step = max(1, _PAIRS // max(1, len(nodes)))
         parts = []
         for slot in slots if len(nodes) else ():
             free = states[:, slot] <= 0
@@ -301,7 +366,7 @@ class FreeSpace(Terse):
             rows = np.flatnonzero(free)
             for start in range(0, len(rows), step):
                 block = rows[start : start + step]
-                moves = grip_pairs(states[block], slot, nodes, self._free_grips)
+                moves = _grip_pairs(states[block], slot, nodes, self._free_grips)
                 sort_entries(moves.states, first, end)
                 parts.append(Moves(block[moves.source], moves.states, moves.way))
         return parts
@@ -309,3 +374,34 @@ class FreeSpace(Terse):
     def _lawful_only(self, bricks: int, moves: Moves) -> Moves:
         ok = self.lawful(bricks, moves.states)
         return Moves(moves.source[ok], moves.states[ok], moves.way[ok])
+
+
+def free_space(
+    network: Network,
+    rules: FreeRules,
+    caps: Mapping[str, float] | None = None,
+    *,
+    parks: bool = False,
+) -> FreeSpace:
+    """Return the states of a free schedule in a scene.
+
+    ``caps``: largest force of a robot's grip beside its payload, by its name, N; ``parks``: whether
+    free robots stay where they were, for their travel. Raises `StepError` if robots do not fit the
+    rules, or states cannot be numbered.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> network = seqopt.build_network(seqopt.load_scene("arch25"))
+    >>> space = free_space(network, FreeRules())
+    >>> space.places(0, space.start()).states.tolist()  # node 0 of its first brick is blocked
+    [[2, 0, 0], [0, 2, 0], [0, 0, 2]]
+    """
+    space = FreeSpace(network, rules, sort_robots(network, rules, caps), parks)
+    base = 1 + (2 if parks else 1) * 2 * space.bricks
+    if base**space.robots * (1 + (rules.regrips or 0)) >= 2**62:
+        raise StepError(
+            f"scene {network.scene.name}: {space.bricks} bricks and {space.robots} robots have "
+            "more states than can be numbered; let fewer robots take part"
+        )
+    return space

@@ -6,9 +6,8 @@ import csv
 import io
 from pathlib import Path
 
-from seqopt.cells import plain
 from seqopt.errors import StepError
-from seqopt.files import read_text
+from seqopt.files import plain, read_text
 from seqopt.scene.checks import short, whole
 from seqopt.scene.parts import Robot
 from seqopt.scene.scene import Scene
@@ -58,26 +57,10 @@ def read_plan(scene: Scene, path: Path) -> tuple[Step, ...]:
 def parse_plan(scene: Scene, text: str, source: str) -> tuple[Step, ...]:
     """Return the checked steps of a plan.
 
-    Parameters
-    ----------
-    scene : Scene
-        In which every step must be possible.
-    text : str
-        CSV with the columns ``step``, ``type``, ``bricks`` and, for every robot, ``NAME_node`` and,
-        if present, ``NAME_brick``; an empty cell means that the robot does not grip. Other columns
-        are ignored.
-    source : str
-        What to call the plan in messages.
-
-    Returns
-    -------
-    tuple of Step
-        Numbered from 1.
-
-    Raises
-    ------
-    StepError
-        If the text is not such a table or a step is impossible.
+    ``scene``: in which every step must be possible. ``text``: CSV with the columns ``step``,
+    ``type``, ``bricks`` and, for every robot, ``NAME_node`` and, if present, ``NAME_brick``; an
+    empty cell means that the robot does not grip. Other columns are ignored. Result: numbered from
+    1. Raises `StepError` if the text is not such a table or a step is impossible.
     """
     rows = read_rows(scene, text, f"plan {source}")
     steps = [_step(scene, row, f"plan {source}, line {line}") for line, row in rows]
@@ -92,24 +75,9 @@ def parse_plan(scene: Scene, text: str, source: str) -> tuple[Step, ...]:
 def read_rows(scene: Scene, text: str, what: str) -> list[tuple[int, Row]]:
     """Return the rows of a table of steps.
 
-    Parameters
-    ----------
-    scene : Scene
-        Whose robots have a column each.
-    text : str
-        CSV, as in `parse_plan`.
-    what : str
-        What to call the table in messages.
-
-    Returns
-    -------
-    list of (int, dict of str to str)
-        The number of the line, and its cells by column.
-
-    Raises
-    ------
-    StepError
-        If a column is missing or occurs twice, or the text is not a CSV file.
+    ``scene``: whose robots have a column each; ``text``: CSV, as in `parse_plan`. Result (int, dict
+    of str to str): the number of the line, and its cells by column. Raises `StepError` if a column
+    is missing or occurs twice, or the text is not a CSV file.
     """
     try:
         return _rows(scene, csv.DictReader(io.StringIO(text), restval=""), what)
@@ -138,17 +106,8 @@ def _step(scene: Scene, row: Row, where: str) -> Step:
 def read_cells(row: Row, where: str) -> tuple[int, StepKind, int]:
     """Return what a row says beside its grips.
 
-    Parameters
-    ----------
-    row : dict of str to str
-        Cells by column.
-    where : str
-        What to call the row in messages.
-
-    Raises
-    ------
-    StepError
-        If a cell is not a whole number, or there is no such type.
+    ``row``: cells by column. Raises `StepError` if a cell is not a whole number, or there is no
+    such type.
     """
     kinds = {kind.value: kind for kind in StepKind}
     if row["type"] not in kinds:
@@ -160,19 +119,8 @@ def read_cells(row: Row, where: str) -> tuple[int, StepKind, int]:
 def read_grip(scene: Scene, robot: Robot, row: Row, where: str) -> int | None:
     """Return the node a robot holds; its brick, if named, must be the node's.
 
-    Parameters
-    ----------
-    scene : Scene
-    robot : Robot
-    row : dict of str to str
-        Cells by column.
-    where : str
-        What to call the row in messages.
-
-    Raises
-    ------
-    StepError
-        If a cell is not a whole number, or the node is on another brick.
+    ``row``: cells by column. Raises `StepError` if a cell is not a whole number, or the node is on
+    another brick.
     """
     if not row[f"{robot.name}_node"].strip():
         return None

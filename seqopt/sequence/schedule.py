@@ -1,19 +1,27 @@
-"""Schedules: sequences in which some grips are still to be chosen."""
+"""Schedules: sequences in which some grips are still to be chosen.
+
+Candidates may be thinned to those near the working end, where the two bricks are that were placed
+last. What is left out is not looked at, so that whatever is found among the rest is a heuristic for
+the whole, however it is found.
+"""
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from numbers import Integral
 from typing import TYPE_CHECKING
 
+import networkx as nx
 import pandas as pd
 
 from seqopt.arrays import Terse
-from seqopt.errors import StepError
+from seqopt.errors import StepError, did_you_mean
 from seqopt.scene.scene import Scene
-from seqopt.sequence.holds import holds
-from seqopt.sequence.steps import Step, StepKind, check_sequence
+from seqopt.sequence.steps import AnyStep, Step, StepKind, check_sequence
 from seqopt.showing import Shown, display
 
 if TYPE_CHECKING:
@@ -21,14 +29,64 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class OpenGrip:
-    """A grip to be chosen.
+class Hold:
+    """One grip, for as long as it lasts.
 
-    Parameters
-    ----------
-    move : int
-        Index of its move among the moves of the schedule, from 0.
+    ``robot``: index among the scene's robots. ``first``, ``last``: numbers of the first and the
+    last step in which it is held. ``node``: that is held; None where it is still to be chosen.
+    ``move``: index of the move that chooses it, from 0; None where it is given. ``places``: name of
+    the brick that is placed with it in its first step; None if none is.
     """
+
+    robot: int
+    first: int
+    last: int
+    node: int | None
+    move: int | None
+    places: int | None
+
+
+def holds(scene: Scene, steps: Sequence[AnyStep]) -> tuple[Hold, ...]:
+    """Return every grip of a sequence or schedule, for as long as it lasts.
+
+    ``steps``: of a method, a plan or a schedule, in order. Result: by robot, then by first step.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> scene = seqopt.load_scene("arch25")
+    >>> holds(scene, seqopt.sequential(seqopt.build_network(scene)))[0]
+    Hold(robot=0, first=1, last=2, node=1, move=None, places=1)
+    """
+    out = []
+    for robot in range(len(scene.robots)):
+        start = 0
+        grips = [step.grips[robot] for step in steps]
+        for i in range(1, len(steps) + 1):
+            if i == len(steps) or grips[i] != grips[start]:
+                if grips[start] is not None:
+                    out.append(_hold(scene, robot, steps[start], steps[i - 1].number))
+                start = i
+    return tuple(out)
+
+
+def _hold(scene: Scene, robot: int, first: AnyStep, last: int) -> Hold:
+    """Return the hold that a robot begins in a step: what is begun as a brick comes places it."""
+    grip = first.grips[robot]
+    is_placing = first.kind is StepKind.PLACE
+    return Hold(
+        robot=robot,
+        first=first.number,
+        last=last,
+        node=int(grip) if isinstance(grip, Integral) else None,
+        move=getattr(grip, "move", None),  # an open grip names its move
+        places=scene.placed[first.bricks - 1].name if is_placing else None,
+    )
+
+
+@dataclass(frozen=True)
+class OpenGrip:
+    """A grip to be chosen. ``move``: index of its move among the moves of the schedule, from 0."""
 
     move: int
 
@@ -43,16 +101,9 @@ ScheduledGrips = tuple[int | OpenGrip | None, ...]
 class OpenStep:
     """A step whose grips are nodes, open moves, or none.
 
-    Parameters
-    ----------
-    number : int
-        From 1.
-    kind : StepKind
-        What the step does.
-    bricks : int
-        How many bricks stand, in build order.
-    grips : tuple of (int, OpenGrip or None)
-        What each of the scene's robots holds: a node, a grip to be chosen, or nothing.
+    ``number``: from 1; ``kind``: what the step does; ``bricks``: how many bricks stand, in build
+    order; ``grips`` (int, OpenGrip or None): what each of the scene's robots holds: a node, a grip
+    to be chosen, or nothing.
     """
 
     number: int
@@ -70,16 +121,9 @@ class OpenStep:
 class Move(Terse):
     """One repositioning to be decided.
 
-    Parameters
-    ----------
-    robot : str
-        Name of the robot that moves.
-    step : int
-        Number of the step in which it takes its grip.
-    bricks : int
-        Bricks placed at that step.
-    candidates : tuple of int
-        Nodes open to it: within reach, and held by no other robot while it stays.
+    ``robot``: name of the robot that moves; ``step``: number of the step in which it takes its
+    grip; ``bricks``: bricks placed at that step; ``candidates``: nodes open to it: within reach,
+    and held by no other robot while it stays.
     """
 
     robot: str
@@ -143,13 +187,10 @@ class Schedule(Shown):
     def table(self) -> pd.DataFrame:
         """Return what is to be chosen.
 
-        Returns
-        -------
-        pandas.DataFrame
-            A row per open grip. Columns: ``move`` (from 1), ``robot``, ``step`` in which it takes
-            the grip, ``to_step``, the last before it lets go, ``bricks`` that stand, ``newest``,
-            the brick placed last, ``places``, whether the robot places it with this grip,
-            ``candidates``, how many nodes it may take, and these ``nodes``.
+        Result: a row per open grip. Columns: ``move`` (from 1), ``robot``, ``step`` in which it
+        takes the grip, ``to_step``, the last before it lets go, ``bricks`` that stand, ``newest``,
+        the brick placed last, ``places``, whether the robot places it with this grip,
+        ``candidates``, how many nodes it may take, and these ``nodes``.
         """
         open_holds = {hold.move: hold for hold in holds(self.scene, self.steps)}
         rows = [
@@ -171,17 +212,9 @@ class Schedule(Shown):
     def gantt(self, first: int = 1, last: int | None = None) -> Figure:
         """Draw the grips over the steps, a lane per robot; those to be chosen are hatched.
 
-        Parameters
-        ----------
-        first, last : int, optional
-            Numbers of the first and the last step that are drawn; by default all.
-
-        Raises
-        ------
-        ExtraError
-            If matplotlib is not installed (extra ``plot``).
-        StepError
-            If there are no such steps.
+        ``first``, ``last``: numbers of the first and the last step that are drawn; by default all.
+        Raises `ExtraError` if matplotlib is not installed (extra ``plot``); `StepError` if there
+        are no such steps.
         """
         figure: Figure = display("gantt_picture")(self.scene, self.steps, None, (first, last))
         return figure
@@ -197,20 +230,8 @@ class Schedule(Shown):
     def fill(self, nodes: Sequence[int]) -> tuple[Step, ...]:
         """Return the checked sequence in which every move takes the node chosen for it.
 
-        Parameters
-        ----------
-        nodes : sequence of int
-            A node for every move.
-
-        Returns
-        -------
-        tuple of Step
-            As many as the schedule has.
-
-        Raises
-        ------
-        StepError
-            If there is not one node per move, or a step is impossible with them.
+        ``nodes``: a node for every move. Result: as many as the schedule has. Raises `StepError` if
+        there is not one node per move, or a step is impossible with them.
         """
         if len(nodes) != len(self.moves):
             raise StepError(f"{len(nodes)} nodes for {len(self.moves)} moves; give one each")
@@ -224,3 +245,64 @@ class Schedule(Shown):
             for step in self.steps
         ]
         return check_sequence(self.scene, steps)
+
+
+_RULE = re.compile(r"(near|within):([0-9]+\.?[0-9]*|\.[0-9]+)")
+_NEWEST = 2  # bricks that make the working end: a build from both ends has two of them
+
+
+def thin(schedule: Schedule, rule: str) -> Schedule:
+    """Return a schedule with the candidates near the working end alone.
+
+    ``rule``: ``near:12`` keeps the nodes of bricks that at most 12 joints part from the bricks
+    placed last, ``within:1.5`` the nodes at most 1.5 m from these bricks' centroids. Where a rule
+    keeps none, the nearest stay. Result: that says what was left out; the same where nothing is.
+    Raises `StepError` if there is no such rule.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> schedule = seqopt.three_robot_loop(seqopt.load_scene("arch25"))
+    >>> thin(schedule, "near:3").left_out
+    'near:3 keeps 173 of 492 candidates'
+    """
+    found = _RULE.fullmatch(rule.strip()) if isinstance(rule, str) else None
+    if found is None:
+        hint = did_you_mean(str(rule).partition(":")[0], ("near", "within"))
+        raise StepError(f"candidates {rule!r}{hint}: give near:JOINTS or within:METERS, as near:12")
+    distance = _joints_away if found[1] == "near" else _meters_away
+    most, scene = float(found[2]), schedule.scene
+    moves = tuple(_thinned(move, distance(scene, move.bricks), most) for move in schedule.moves)
+    kept, all_ = (sum(len(m.candidates) for m in some) for some in (moves, schedule.moves))
+    if kept == all_:
+        return schedule
+    said = f"{found[0]} keeps {kept:,} of {all_:,} candidates"
+    return replace(schedule, moves=moves, left_out=said)
+
+
+def _thinned(move: Move, away: dict[int, float], most: float) -> Move:
+    """Return a move with the candidates that are near, or the nearest."""
+    limit = max(most, min(away.get(node, math.inf) for node in move.candidates))
+    near = tuple(node for node in move.candidates if away.get(node, math.inf) <= limit)
+    return replace(move, candidates=near)
+
+
+def _joints_away(scene: Scene, bricks: int) -> dict[int, float]:
+    """Return how many joints part the nodes of placed bricks from the newest."""
+    placed = scene.placed[:bricks]
+    names = {brick.name for brick in placed}
+    graph: nx.Graph[int] = nx.Graph()
+    graph.add_nodes_from(names)
+    graph.add_edges_from(joint.bricks for joint in scene.joints if names.issuperset(joint.bricks))
+    newest = {brick.name for brick in placed[-_NEWEST:]}
+    away = nx.multi_source_dijkstra_path_length(graph, newest)
+    return {n: float(away.get(b.name, math.inf)) for b in placed for n in b.nodes}
+
+
+def _meters_away(scene: Scene, bricks: int) -> dict[int, float]:
+    """Return how far the nodes of placed bricks are from the centroids of the newest, m."""
+    placed = scene.placed[:bricks]
+    ends = [brick.position for brick in placed[-_NEWEST:]]
+    return {
+        n: min(math.dist(b.node_position(n), end) for end in ends) for b in placed for n in b.nodes
+    }

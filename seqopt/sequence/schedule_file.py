@@ -8,22 +8,19 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
-from seqopt.cells import harmless, plain
 from seqopt.errors import StepError, did_you_mean
-from seqopt.files import read_text
+from seqopt.files import harmless, plain, read_text
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.scene.checks import short
 from seqopt.scene.scene import Scene
 from seqopt.sequence.free_rules import FREE
-from seqopt.sequence.loops import robot_loop
-from seqopt.sequence.moves import open_schedule
 from seqopt.sequence.plan_file import Row, read_cells, read_grip, read_rows
 from seqopt.sequence.schedule import OpenGrip, OpenStep, Schedule, ScheduledGrips
 from seqopt.sequence.steps import check_step
-from seqopt.sequence.three_robots import SCHEDULES, make_schedule
+from seqopt.sequence.three_robots import SCHEDULES, make_schedule, open_schedule, robot_loop
 
-MARK = re.compile(r"\?\s*(\d*)")  # an open grip, and the number of its move if it is given
+_MARK = re.compile(r"\?\s*(\d*)")  # an open grip, and the number of its move if it is given
 MOST = 3  # robots that take part where nobody says who: as many as in the loop of Bruun et al.
 
 
@@ -68,23 +65,13 @@ def read_schedule(where: Network | Scene, path: Path) -> Schedule:
 def parse_schedule(where: Network | Scene, text: str, source: str) -> Schedule:
     """Return the checked schedule of a table.
 
-    Parameters
-    ----------
-    where : Network or Scene
-        In which every step must be possible.
-    text : str
-        CSV with the columns of a plan (`seqopt.sequence.plan_file.parse_plan`). A cell of a robot
-        is empty where it does not grip, the number of a node where this is given, and ``?`` where
-        the grip is open; in the rows that follow, ``?`` is the same grip, until the robot lets go.
-        Open grips may carry the number of their move, ``?1``, ``?2``, in the order in which they
-        are taken; it must be right.
-    source : str
-        What to call the table in messages; its last part without suffix names the schedule.
-
-    Raises
-    ------
-    StepError
-        If the text is not such a table or a step is impossible.
+    ``where``: in which every step must be possible. ``text``: CSV with the columns of a plan
+    (`seqopt.sequence.plan_file.parse_plan`). A cell of a robot is empty where it does not grip, the
+    number of a node where this is given, and ``?`` where the grip is open; in the rows that follow,
+    ``?`` is the same grip, until the robot lets go. Open grips may carry the number of their move,
+    ``?1``, ``?2``, in the order in which they are taken; it must be right. ``source``: what to call
+    the table in messages; its last part without suffix names the schedule. Raises `StepError` if
+    the text is not such a table or a step is impossible.
     """
     network = where if isinstance(where, Network) else build_network(where)
     scene, what = network.scene, f"schedule {source}"
@@ -104,10 +91,7 @@ def parse_schedule(where: Network | Scene, text: str, source: str) -> Schedule:
 def schedule_text(schedule: Schedule) -> str:
     """Return a schedule as the table that `parse_schedule` reads.
 
-    Returns
-    -------
-    str
-        CSV; open grips are marked with the numbers of their moves, from 1.
+    Result: CSV; open grips are marked with the numbers of their moves, from 1.
 
     Examples
     --------
@@ -134,21 +118,11 @@ def find_schedule(
 ) -> Schedule:
     """Return a schedule by name, from a file, or itself; the usual loop where none is given.
 
-    Parameters
-    ----------
-    network : Network
-    schedule : Schedule, pathlib.Path or str, optional
-        A schedule of the same scene, a file, or a key of `SCHEDULES`; by default the loop of the
-        robots that are named, else of three, or of two where the scene has no third.
-    robots : sequence of str, optional
-        Of a loop or a schedule by name: robots in the order of their roles.
-
-    Raises
-    ------
-    FileError
-        If the file cannot be read.
-    StepError
-        If there is no such schedule, it is impossible in the scene or belongs to another one.
+    ``schedule``: a schedule of the same scene, a file, or a key of `SCHEDULES`; by default the loop
+    of the robots that are named, else of three, or of two where the scene has no third. ``robots``:
+    of a loop or a schedule by name: robots in the order of their roles. Raises `FileError` if the
+    file cannot be read; `StepError` if there is no such schedule, it is impossible in the scene or
+    belongs to another one.
     """
     if schedule is None:
         return robot_loop(network, robots or min(len(network.scene.robots), MOST))
@@ -217,7 +191,7 @@ def _grips(scene: Scene, row: Row, before: Sequence[OpenStep], where: str) -> Sc
     for robot, held in zip(scene.robots, last, strict=True):
         column = f"{robot.name}_node"
         cell = row[column].strip()
-        mark = MARK.fullmatch(cell)
+        mark = _MARK.fullmatch(cell)
         if mark is None:
             grips.append(_given(scene, row, column, where))
             continue

@@ -17,8 +17,7 @@ import numpy as np
 from seqopt.arrays import Bools, Floats, Ints, Terse
 from seqopt.errors import StepError
 from seqopt.network.network import Network
-from seqopt.sequence.free_moves import Moves, number_rows
-from seqopt.sequence.free_team import RobotKind, node_numbers
+from seqopt.sequence.free_space import Moves, RobotKind, node_numbers, number_rows
 from seqopt.sequence.schedule import OpenGrip, OpenStep, Schedule
 from seqopt.sequence.steps import Step, StepKind, check_sequence
 

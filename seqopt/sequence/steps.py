@@ -84,16 +84,7 @@ class AnyStep(Protocol):
 def idle_robots(scene: Scene, steps: Iterable[AnyStep]) -> tuple[str, ...]:
     """Return the robots of a scene that never grip.
 
-    Parameters
-    ----------
-    scene : Scene
-    steps : iterable of AnyStep
-        Of a sequence, a schedule or a plan.
-
-    Returns
-    -------
-    tuple of str
-        Names, in the order of the scene.
+    ``steps``: of a sequence, a schedule or a plan. Result: names, in the order of the scene.
 
     Examples
     --------
@@ -109,15 +100,7 @@ def idle_robots(scene: Scene, steps: Iterable[AnyStep]) -> tuple[str, ...]:
 def require_steps(steps: Sequence[Step]) -> Sequence[Step]:
     """Return steps if that is what they are.
 
-    Returns
-    -------
-    sequence of Step
-        The same.
-
-    Raises
-    ------
-    StepError
-        If they are something else, a schedule whose grips are open, say.
+    Raises `StepError` if they are something else, a schedule whose grips are open, say.
     """
     if not isinstance(steps, Sequence) or not all(isinstance(step, Step) for step in steps):
         raise StepError(
@@ -130,19 +113,8 @@ def require_steps(steps: Sequence[Step]) -> Sequence[Step]:
 def reachable(scene: Scene, robot: Robot, bricks: int) -> tuple[int, ...]:
     """Return the nodes of the first bricks that a robot may hold.
 
-    Parameters
-    ----------
-    scene : Scene
-        With the bricks, and the nodes that are blocked.
-    robot : Robot
-        Whose reach counts.
-    bricks : int
-        How many bricks stand.
-
-    Returns
-    -------
-    tuple of int
-        In build order; neither blocked nor out of reach.
+    ``scene``: with the bricks, and the nodes that are blocked; ``robot``: whose reach counts.
+    Result: in build order; neither blocked nor out of reach.
     """
     return tuple(chain.from_iterable(scene.within_reach(robot)[:bricks]))
 
@@ -150,22 +122,7 @@ def reachable(scene: Scene, robot: Robot, bricks: int) -> tuple[int, ...]:
 def check_sequence(scene: Scene, steps: Sequence[Step]) -> tuple[Step, ...]:
     """Return the steps if each is possible after the one before.
 
-    Parameters
-    ----------
-    scene : Scene
-        What is built, and by which robots.
-    steps : sequence of Step
-        From the first brick on.
-
-    Returns
-    -------
-    tuple of Step
-        The same.
-
-    Raises
-    ------
-    StepError
-        Naming the step, the robot or brick at fault, and what would be possible.
+    ``scene``: what is built, and by which robots; ``steps``: from the first brick on.
     """
     if not steps:
         raise StepError("the sequence has no steps; give at least one")
@@ -179,17 +136,7 @@ def check_sequence(scene: Scene, steps: Sequence[Step]) -> tuple[Step, ...]:
 def check_step(scene: Scene, before: AnyStep | None, step: AnyStep) -> None:
     """Require that a step is possible after the one before, whatever its open grips become.
 
-    Parameters
-    ----------
-    scene : Scene
-    before : AnyStep or None
-        None for the first step.
-    step : AnyStep
-
-    Raises
-    ------
-    StepError
-        As `check_sequence` does.
+    ``before``: None for the first step.
     """
     _check_state(scene, step)
     _check_change(scene, before or Step(0, StepKind.RELEASE, 0, (None,) * len(scene.robots)), step)

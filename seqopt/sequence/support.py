@@ -18,42 +18,24 @@ from seqopt.network.network import GROUND, Network
 from seqopt.sequence.schedule import Move, OpenGrip, OpenStep
 from seqopt.sequence.steps import Step
 
-Island = frozenset[int]
+_Island = frozenset[int]
 
 
 def acting_bodies(network: Network, bricks: int) -> Ints:
     """Return which bricks the springs of a partial structure join.
 
-    Parameters
-    ----------
-    network : Network
-    bricks : int
-        How many bricks stand.
-
-    Returns
-    -------
-    (s, 2) int
-        Indices in build order; `seqopt.network.network.GROUND` first for a ground end. A spring
-        without any stiffness joins nothing.
+    Result (s, 2): indices in build order; `seqopt.network.network.GROUND` first for a ground end. A
+    spring without any stiffness joins nothing.
     """
     springs = network.springs
     acting = (springs.since <= bricks) & springs.stiffness.any(axis=1)
     return np.asarray(springs.bodies[acting])
 
 
-def islands(network: Network, bricks: int) -> tuple[Island, ...]:
+def islands(network: Network, bricks: int) -> tuple[_Island, ...]:
     """Return the parts of a partial structure that no joint ties to a ground end.
 
-    Parameters
-    ----------
-    network : Network
-    bricks : int
-        How many bricks stand.
-
-    Returns
-    -------
-    tuple of frozenset of int
-        Names of the bricks of every island, in build order of their first bricks.
+    Result: names of the bricks of every island, in build order of their first bricks.
 
     Examples
     --------
@@ -82,23 +64,12 @@ def check_support(
 ) -> None:
     """Require that every island is held at every step, whatever is chosen for open grips.
 
-    Parameters
-    ----------
-    network : Network
-    steps : sequence of (Step or OpenStep)
-        Of a sequence or a schedule.
-    moves : sequence of Move, optional
-        Of the schedule, with their candidates.
-
-    Raises
-    ------
-    StepError
-        Naming the step and the bricks that nothing holds.
+    ``steps``: of a sequence or a schedule; ``moves``: of the schedule, with their candidates.
     """
     if _always_tied(network):
         return
     scene = network.scene
-    known: dict[int, tuple[Island, ...]] = {}
+    known: dict[int, tuple[_Island, ...]] = {}
     for step in steps:
         if step.bricks not in known:
             known[step.bricks] = islands(network, step.bricks)

@@ -1,27 +1,244 @@
-"""Methods: rules that turn a scene into the sequence of steps that builds it."""
+"""Methods: rules that turn a scene into the sequence of steps that builds it.
+
+Roles (which robot places and which holds) are filled by reach or by name.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence, Set
+from collections.abc import Callable, Iterator, Mapping, Sequence, Set
+from itertools import permutations
 from typing import Protocol, TypeVar
 
 import numpy as np
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import maximum_bipartite_matching
 
-from seqopt.errors import StepError
+from seqopt.errors import StepError, did_you_mean
 from seqopt.network.build import network_of
-from seqopt.network.network import Network
-from seqopt.scene.parts import Brick, Robot
-from seqopt.scene.reach import Side
+from seqopt.network.network import Network, PartKind
+from seqopt.scene.parts import Brick, Robot, Side
 from seqopt.scene.scene import Scene
-from seqopt.sequence.roles import Pair, find_robots, take_turns
 from seqopt.sequence.steps import Step, StepKind, check_sequence
-from seqopt.sequence.stretches import begins_elsewhere, lies_along
-from seqopt.sequence.support import check_support
+from seqopt.sequence.support import acting_bodies, check_support
 
-Grip = TypeVar("Grip")
+_Pair = tuple[int, int]  # who places, who holds meanwhile: indices of the scene's robots
+_Ways = dict[_Pair, tuple[int, tuple[_Pair, ...]]]  # by pair: changes so far, pairs so far
 
 
-class Method(Protocol):
+def find_robots(scene: Scene, names: Sequence[str], method: str, roles: int) -> list[int]:
+    """Return which robots a method may use, in the order of its roles.
+
+    ``names``: of robots, in the order of the roles; none for all robots of the scene. ``roles``:
+    how many roles the method has. Result: indices of the scene's robots. Raises `StepError` if
+    there are not as many as roles, or one is not in the scene or named twice.
+    """
+    known = [robot.name for robot in scene.robots]
+    if not names:
+        if len(known) < roles:
+            raise StepError(
+                f"scene {scene.name}: {len(known)} robots; this method needs {in_words(roles)}"
+            )
+        return list(range(len(known)))
+    for name in names:
+        if name not in known:
+            why = f"does not exist{did_you_mean(name, known)}; give some of {', '.join(known)}"
+            raise StepError(f"robot {name!r} {why}")
+    if len({*names}) < len(names):
+        raise StepError(f"robots {', '.join(names)}: one occurs twice; name different ones")
+    if len(names) != roles:
+        wanted = in_words(roles)
+        raise StepError(f"robots {', '.join(names)}: {len(names)} named; {method} takes {wanted}")
+    return [known.index(name) for name in names]
+
+
+def _can_place(scene: Scene, robot: Robot, brick: Brick) -> bool:
+    """Return whether a robot reaches a node by which it can place a brick.
+
+    ``scene``: with the nodes that are blocked.
+    """
+    return any(
+        node not in scene.blocked_nodes and robot.reach.covers(brick.node_position(node))
+        for node in brick.nodes
+    )
+
+
+def take_turns(
+    network: Network, swap_after: Set[int], robots: Sequence[int], starts: Sequence[_Pair] = ()
+) -> list[_Pair]:
+    """Return who places every brick and who holds meanwhile, two robots at a time.
+
+    After some bricks the one that placed stays and holds, after the others the one that held. The
+    two are the same all along where their reach allows it; otherwise a third robot takes the place
+    of the one that is free, as seldom as possible. Ties go to the order of the robots.
+
+    ``swap_after``: names of the bricks after which who placed stays. ``robots``: indices of the
+    robots that may take part. ``starts`` (int, int): who may place the first brick, and who is its
+    partner; by default any two. Result (int, int): for every brick in build order.
+    """
+    scene = network.scene
+    rank = {robot: i for i, robot in enumerate(robots)}
+    ways: _Ways = {
+        (placer, holder): (0, ((rank[placer], rank[holder]),))
+        for placer, holder in starts or permutations(robots, 2)
+    }
+    for k, brick in enumerate(scene.placed):
+        able = {robot for robot in rank if _can_place(scene, scene.robots[robot], brick)}
+        possible = {pair: way for pair, way in ways.items() if pair[0] in able}
+        if not possible:
+            raise _nobody(scene, [pair[0] for pair in ways], able, k)
+        ways = _go_on(possible, rank, swapped=k == 0 or brick.name in swap_after)
+    path = min(possible.values())[1]
+    return [(robots[placer], robots[holder]) for placer, holder in path]
+
+
+def _go_on(ways: _Ways, rank: Mapping[int, int], *, swapped: bool) -> _Ways:
+    """Return the best way to every pair that can be at work at the next brick."""
+    out: _Ways = {}
+    for (placer, holder), (changes, path) in ways.items():
+        free, held = (holder, placer) if swapped else (placer, holder)
+        for after in rank:
+            if after != held:
+                way = (changes + (after != free), (*path, (rank[after], rank[held])))
+                out[after, held] = min(way, out.get((after, held), way))
+    return out
+
+
+def _nobody(scene: Scene, free: Sequence[int], able: Set[int], k: int) -> StepError:
+    """Return the error that nobody is left to place a brick."""
+    brick = scene.placed[k]
+    nodes = [node for node in brick.nodes if node not in scene.blocked_nodes]
+    names = " and ".join(scene.robots[robot].name for robot in sorted({*free}))
+    reach = "reach" if " and " in names else "reaches"
+    why = f"brick {brick.name}: {names} {reach} none of its free nodes {nodes}"
+    if able and k:
+        why += f"; {scene.robots[min(able)].name} does, and holds the brick before"
+    return StepError(f"{why}; extend a reach or let another robot place it")
+
+
+def cast(scene: Scene, roles: Sequence[Set[int]], robots: Sequence[int]) -> list[int]:
+    """Return a different robot for every role that reaches all bricks which the role places.
+
+    ``roles``: by role, which bricks it places: indices in build order. ``robots``: who may take a
+    role; of all ways the first in this order is taken, role by role. Result: indices of the scene's
+    robots.
+    """
+    fits = [
+        [
+            r
+            for r in robots
+            if all(_can_place(scene, scene.robots[r], scene.placed[b]) for b in role)
+        ]
+        for role in roles
+    ]
+    found = _first_match(fits)
+    if found:
+        return found
+    role = min(range(len(roles)), key=lambda r: len(fits[r]))
+    names = ", ".join(scene.robots[robot].name for robot in robots)
+    bricks = ", ".join(str(scene.placed[b].name) for b in sorted(roles[role]))
+    fit = ", ".join(scene.robots[robot].name for robot in fits[role]) or "none"
+    raise StepError(
+        f"robots {names}: not every role has a robot of its own: one places bricks {bricks}, all "
+        f"within reach of {fit}; extend a reach, name other robots, or write a schedule of your own"
+    )
+
+
+def _first_match(fits: Sequence[Sequence[int]]) -> list[int]:
+    """Return the first way to give every role a robot of its own; none if there is no way."""
+    for robot in fits[0] if fits else ():
+        rest = [[other for other in fit if other != robot] for fit in fits[1:]]
+        if _matched(rest):
+            return [robot, *_first_match(rest)]
+    return []
+
+
+def _matched(fits: Sequence[Sequence[int]]) -> bool:
+    """Return whether every role can have a robot that no other has."""
+    if not fits or not all(fits):
+        return not fits
+    able = np.zeros((len(fits), 1 + max(map(max, fits))), dtype=bool)
+    for role, robots in enumerate(fits):
+        able[role, list(robots)] = True
+    return bool((maximum_bipartite_matching(csr_array(able), perm_type="column") >= 0).all())
+
+
+def in_words(number: int) -> str:
+    """Return a small number in words, a larger one in digits."""
+    words = ("no", "one", "two", "three", "four", "five", "six")
+    return words[number] if number < len(words) else str(number)
+
+
+def lies_along(network: Network) -> frozenset[int]:
+    """Return the bricks that lie along the structure: joints meet both of their inner nodes.
+
+    Result: names of the bricks.
+    """
+    half = network.edge_kind == PartKind.JOINT.value
+    touched = np.zeros(len(network.node_kind), dtype=bool)
+    touched[network.edge_nodes[half, 0]] = True
+    placed = network.scene.placed
+    along = np.flatnonzero(touched[network.inner].all(axis=1))
+    return frozenset(placed[i].name for i in along.tolist())
+
+
+def begins_elsewhere(network: Network) -> frozenset[int]:
+    """Return the bricks with which the cantilever method turns to another part of the structure.
+
+    A stretch is a brick that is held while others are placed, and these others. A brick begins
+    elsewhere if no joint ties it to the stretch that is being built; so does the first one.
+
+    Result: names of the bricks.
+    """
+    placed = network.scene.placed
+    along, stretch, out = lies_along(network), set[int](), set[int]()
+    tied: list[set[int]] = [set() for _ in placed]
+    for first, second in acting_bodies(network, len(placed)).tolist():
+        tied[second].add(first)
+    for k, brick in enumerate(placed):
+        if not tied[k] & stretch:
+            out.add(brick.name)
+        if brick.name in along | out:
+            stretch = set()
+        stretch.add(k)
+    return frozenset(out)
+
+
+def degeneration(network: Network, method: str) -> str:
+    """Return why a method becomes another one on a structure, or nothing.
+
+    ``method``: a key of `seqopt.sequence.two_robots.METHODS`. Result: a sentence; empty if the
+    method is what its name says.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> shape = seqopt.ArchShape(pitch=(1.2, 0.4, -0.4, -1.2), pattern="V")
+    >>> degeneration(seqopt.build_network(seqopt.arch_scene(shape)), "cantilever")
+    'every brick lies along the structure: it is the sequential method here'
+    """
+    between = [brick.name for brick in network.scene.placed[1:-1]]  # after the last all let go
+    if method != "cantilever":
+        return ""
+    if not between:
+        return "no bricks lie between the first and the last: it is the sequential method here"
+    along, elsewhere = lies_along(network), begins_elsewhere(network)
+    if along.issuperset(between):
+        return "every brick lies along the structure: it is the sequential method here"
+    if along | elsewhere >= {*between}:
+        return (
+            "no brick extends one that is held: each begins elsewhere or lies along; "
+            "it is the sequential method here"
+        )
+    if not (along | elsewhere) & {*between}:
+        first = network.scene.placed[0].name
+        return f"no brick lies along the structure: brick {first} is held until the end"
+    return ""
+
+
+_Grip = TypeVar("_Grip")
+
+
+class _Method(Protocol):
     """A rule that makes a sequence of steps."""
 
     def __call__(self, network: Network, robots: Sequence[str] = ()) -> tuple[Step, ...]:
@@ -46,23 +263,8 @@ def placing_node(network: Network, robot: Robot, brick: Brick) -> int:
     A robot on one side takes the node nearer to its side of a brick that lies across; any other
     case takes the brick's own placing node where it is within reach.
 
-    Parameters
-    ----------
-    network : Network
-    robot : Robot
-        One of the scene's.
-    brick : Brick
-        The one to be placed.
-
-    Returns
-    -------
-    int
-        One of the brick's two nodes.
-
-    Raises
-    ------
-    StepError
-        If the robot reaches no free node of the brick.
+    ``robot``: one of the scene's; ``brick``: the one to be placed. Result: one of the brick's two
+    nodes. Raises `StepError` if the robot reaches no free node of the brick.
     """
     free = [
         node
@@ -155,38 +357,26 @@ def cantilever(network: Network | Scene, robots: Sequence[str] = ()) -> tuple[St
     return _two_robots(network, "cantilever", swaps, robots)
 
 
-METHODS: dict[str, Method] = {"sequential": sequential, "cantilever": cantilever}
+METHODS: dict[str, _Method] = {"sequential": sequential, "cantilever": cantilever}
 
 
 def alternate(
     network: Network,
     swap_after: Set[int],
-    pairs: Sequence[Pair],
-    grip: Callable[[int, int], Grip],
-) -> Iterator[tuple[StepKind, int, tuple[Grip | None, ...]]]:
+    pairs: Sequence[_Pair],
+    grip: Callable[[int, int], _Grip],
+) -> Iterator[tuple[StepKind, int, tuple[_Grip | None, ...]]]:
     """Yield the steps in which two robots place and hold.
 
     After each brick one of the two releases, if it holds anything; after the last one both do.
 
-    Parameters
-    ----------
-    network : Network
-    swap_after : set of int
-        Names of the bricks after which who placed stays and holds.
-    pairs : sequence of (int, int)
-        Who places and who holds, for every brick; see `seqopt.sequence.roles.take_turns`.
-    grip : callable
-        What a robot holds of the brick that it places, from the robot's index and the brick count.
-
-    Yields
-    ------
-    kind : StepKind
-    bricks : int
-    grips : tuple
-        By robot of the scene.
+    ``swap_after``: names of the bricks after which who placed stays and holds. ``pairs`` (int,
+    int): who places and who holds, for every brick; see `seqopt.sequence.two_robots.take_turns`.
+    ``grip``: what a robot holds of the brick that it places, from the robot's index and the brick
+    count. Results: ``grips``: by robot of the scene.
     """
     scene = network.scene
-    grips: list[Grip | None] = [None] * len(scene.robots)
+    grips: list[_Grip | None] = [None] * len(scene.robots)
     for count, (brick, pair) in enumerate(zip(scene.placed, pairs, strict=True), start=1):
         placer, holder = pair
         grips[placer] = grip(placer, count)

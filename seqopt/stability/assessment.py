@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 
 import numpy as np
+import pandas as pd
 
 from seqopt.arrays import Floats, FrozenValue, Vector
 from seqopt.contact.assembly import Assembly
-from seqopt.contact.mortar import Mortar
+from seqopt.contact.faces import Contacts, step_assembly
+from seqopt.contact.mortar import Mortar, find_mortar
+from seqopt.network.build import network_of
+from seqopt.network.network import Network
+from seqopt.scene.scene import Scene
+from seqopt.sequence.steps import Grips, Step, require_steps
 from seqopt.showing import Shown
-from seqopt.stability.failure import first_to_fail
 from seqopt.stability.limit_analysis import (
     CAP,
     EXACT,
@@ -23,12 +28,32 @@ from seqopt.stability.limit_analysis import (
     Sense,
     compile_equilibrium,
 )
-from seqopt.stability.prover import Proven, Prover
-from seqopt.stability.tilts import DIRECTIONS, safe_pull
+from seqopt.stability.prover import DIRECTIONS, Proven, Prover, safe_pull
+from seqopt.work.progress import Tell, told
+
+_STILL = 1e-6  # motion slower than this, beside the fastest, is none
+
+
+def _first_to_fail(assembly: Assembly, motion: Floats) -> tuple[str, str]:
+    """Return what goes first in a motion.
+
+    ``motion`` (B, 6): as of `seqopt.stability.limit_analysis.Answer`. Results: ``block``,
+    ``contact``: the fastest block and the contact that parts fastest; empty where nothing moves.
+    """
+    speed = np.linalg.norm(motion, axis=1)
+    if not speed.max(initial=0.0) > 0:
+        return "", ""
+    block = str(assembly.block_name[int(speed.argmax())])
+    parting = (assembly.contact_map.T @ motion.ravel()).reshape(-1, 3)
+    apart = np.linalg.norm(parting, axis=1)
+    if not apart.max(initial=0.0) > _STILL:
+        return block, ""
+    return block, assembly.contact_name[int(assembly.contact[int(apart.argmax())])]
+
 
 ROUGHEST = 10.0  # largest coefficient of friction that is tried
-LITTLE = 1e-3  # friction that holds nothing but what is jammed
-FRICTION_STEP = 1e-4  # to which the least one is found
+_LITTLE = 1e-3  # friction that holds nothing but what is jammed
+_FRICTION_STEP = 1e-4  # to which the least one is found
 
 
 class Verdict(Enum):
@@ -58,7 +83,7 @@ class Stability(Shown, FrozenValue):
     tilt : float
         Tilt survived in every direction, rad: a safe bound by forces; NaN if it does not stand.
         Gravity turned by atan(a) mixes no load with gravity and a sideways a, all survived. It is
-        less than the largest such tilt by what `seqopt.stability.tilts.safe_pull` leaves, and
+        less than the largest such tilt by what `seqopt.stability.prover.safe_pull` leaves, and
         for bonds and for grips at their payload by what weighs less once it is turned.
     grip : float
         The largest grip force, made as small as equilibrium with the mortar allows, N; inf if no
@@ -79,7 +104,7 @@ class Stability(Shown, FrozenValue):
 
     Examples
     --------
-    >>> from seqopt.contact.faces import step_assembly
+    >>> from seqopt.contact.faces import Contacts, step_assembly
     >>> from seqopt.contact.mortar import DRY
     >>> from seqopt.network.build import build_network
     >>> from seqopt.scene.scene_file import load_scene
@@ -144,8 +169,8 @@ def assess(
     known = failure.value < CAP if stands else verdict is Verdict.FALLS
     motion = failure.answer.motion if known else np.zeros((len(assembly.centroid), 6))
     motion = motion / (np.abs(motion).max(initial=0.0) or 1.0)
-    block, contact = first_to_fail(assembly, motion)
-    friction = least_friction(prove, mortar)
+    block, contact = _first_to_fail(assembly, motion)
+    friction = _least_friction(prove, mortar)
     return Stability(
         verdict=verdict,
         bond=_amount(bond.value) * assembly.stress_scale,
@@ -156,7 +181,7 @@ def assess(
         motion=motion / np.repeat([1.0, assembly.scales[1]], 3),
         first_block=block,
         first_contact=contact,
-        jammed=stands and not friction > LITTLE and friction != 0 and is_jammed(prove, mortar),
+        jammed=stands and not friction > _LITTLE and friction != 0 and _is_jammed(prove, mortar),
         claims=dict(prove.claims),
         unproven=prove.unproven,
     )
@@ -194,16 +219,13 @@ def verdict_of(stand: Proven) -> Verdict:
     return Verdict.STANDS if stand.value <= EXACT else Verdict.UNDECIDED
 
 
-def least_friction(prove: Prover, mortar: Mortar) -> float:
-    """Return the least coefficient of friction with which no bond is lacking, to `FRICTION_STEP`.
+def _least_friction(prove: Prover, mortar: Mortar) -> float:
+    """Return the least coefficient of friction with which no bond is lacking, to `_FRICTION_STEP`.
 
     The lacking bond falls with the friction. A line through two points where some is lacking aims
     at where none is; where that does not help, the middle is tried.
 
-    Returns
-    -------
-    float
-        Infinite if none up to `ROUGHEST` is enough, NaN if nothing is proven.
+    Result: infinite if none up to `ROUGHEST` is enough, NaN if nothing is proven.
     """
 
     def lacking(friction: float) -> float:
@@ -219,7 +241,7 @@ def least_friction(prove: Prover, mortar: Mortar) -> float:
         return np.nan if np.isnan(list(tried.values())).any() else np.inf
     high = enough[0]
     before: tuple[float, float] | None = None
-    step = FRICTION_STEP
+    step = _FRICTION_STEP
     while high - low[0] > step:
         middle = 0.5 * (low[0] + high)
         if before is not None and before[1] > low[1] < np.inf:
@@ -235,22 +257,14 @@ def least_friction(prove: Prover, mortar: Mortar) -> float:
     return high
 
 
-def is_jammed(prove: Prover, mortar: Mortar) -> bool:
+def _is_jammed(prove: Prover, mortar: Mortar) -> bool:
     """Return whether hardly any friction is enough, by contact forces far above all loads.
 
-    Parameters
-    ----------
-    prove : Prover
-        Of an assembly that stands with the mortar, and not without friction.
-    mortar : Mortar
-
-    Returns
-    -------
-    bool
-        Only where that is proven by forces.
+    ``prove``: of an assembly that stands with the mortar, and not without friction. Result: only
+    where that is proven by forces.
     """
     assembly, case = prove.assembly, bonded(prove.assembly, mortar)
-    proven = prove(replace(case, friction=min(LITTLE, mortar.friction)))
+    proven = prove(replace(case, friction=min(_LITTLE, mortar.friction)))
     total = np.linalg.norm(assembly.weight, axis=1).sum() + assembly.payload.sum()
     most = proven.answer.contact_force[:, 0].max(initial=0.0) * assembly.scales[0]
     return bool(proven.held <= EXACT and most > LARGEST_FORCE * total)
@@ -266,3 +280,121 @@ def _grip(prove: Prover, fixed: Case) -> float:
     if not len(prove.assembly.payload):
         return 0.0
     return prove(replace(fixed, sense=Sense.SMALLEST, payload=(0.0, 1.0))).value
+
+
+def assess_steps(
+    network: Network | Scene,
+    steps: Sequence[Step],
+    mortar: Mortar | str,
+    progress: Tell | None = None,
+) -> tuple[Stability, ...]:
+    """Return verdict and margins of every step.
+
+    Parameters
+    ----------
+    network : Network or Scene
+    steps : sequence of Step
+    mortar : Mortar or str
+        The mortar of all joints, or its name.
+    progress : callable, optional
+        Told as a `seqopt.work.Stage` how far it is, step by step.
+
+    Returns
+    -------
+    tuple of Stability
+
+    Raises
+    ------
+    SceneError
+        If bricks that share a joint do not touch.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> network = seqopt.build_network(seqopt.load_scene("arch25"))
+    >>> steps = seqopt.sequential(network)[:2]
+    >>> [stability.verdict.value for stability in seqopt.assess_steps(network, steps, seqopt.EPOXY)]
+    ['stands', 'stands']
+    """
+    network, mortar = network_of(network), find_mortar(mortar)
+    known, up, out = Contacts(network), network.scene.up, []
+    for step in told("assessing steps", require_steps(steps), progress):
+        out.append(assess(step_assembly(network, step.bricks, step.grips, known), mortar, up))
+    return tuple(out)
+
+
+def step_verdicts(network: Network, steps: Sequence[Step], mortar: Mortar) -> tuple[Verdict, ...]:
+    """Return the verdict of every step; of equal partial structures it is asked once."""
+    contacts = Contacts(network)
+    found: dict[tuple[int, Grips], Verdict] = {}
+    for step in steps:
+        if (step.bricks, step.grips) not in found:
+            assembly = step_assembly(network, step.bricks, step.grips, contacts)
+            found[step.bricks, step.grips] = verdict(assembly, mortar)
+    return tuple(found[step.bricks, step.grips] for step in steps)
+
+
+def stability_table(steps: Sequence[Step], results: Sequence[Stability]) -> pd.DataFrame:
+    """Return one row per step; an empty cell is a number that is not proven.
+
+    Parameters
+    ----------
+    steps : sequence of Step
+    results : sequence of Stability
+        Of the steps.
+
+    Returns
+    -------
+    pandas.DataFrame
+        ``step``, ``type``, ``bricks``, ``verdict``, ``bond_needed_Pa``, ``friction_needed``,
+        ``tilt_survived_deg``, ``largest_grip_force_N``, ``first_brick``, ``first_joint`` and
+        ``jammed``, as in `seqopt.stability.assessment.Stability`; ``almost_solved``, ``stalled``
+        and ``unproven`` count cases.
+    """
+    rows = []
+    for step, result in zip(steps, results, strict=True):
+        rows.append(
+            {
+                "step": step.number,
+                "type": step.kind.value,
+                "bricks": step.bricks,
+                "verdict": result.verdict.value,
+                "bond_needed_Pa": result.bond,
+                "friction_needed": result.friction,
+                "tilt_survived_deg": np.degrees(result.tilt),
+                "largest_grip_force_N": result.grip,
+                "first_brick": result.first_block,
+                "first_joint": result.first_contact,
+                "jammed": result.jammed,
+                "almost_solved": result.claims.get(Claim.ALMOST, 0),
+                "stalled": result.claims.get(Claim.STALLED, 0),
+                "unproven": result.unproven,
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def format_verdicts(results: Sequence[Stability]) -> str:
+    """Return how many steps stand, do not stand and are undecided, and how the solver ended.
+
+    Result: one line.
+    """
+    words = {
+        Verdict.STANDS: "stand",
+        Verdict.FALLS: "do not stand",
+        Verdict.UNDECIDED: "are undecided",
+    }
+    verdicts = ", ".join(
+        f"{sum(result.verdict is verdict for result in results)} {word}"
+        for verdict, word in words.items()
+    )
+    jammed = sum(result.jammed for result in results)
+    verdicts += f" ({jammed} only jammed: do not trust these)" if jammed else ""
+    claims = {
+        claim: sum(result.claims.get(claim, 0) for result in results)
+        for claim in (Claim.ALMOST, Claim.STALLED)
+    }
+    cases = sum(sum(result.claims.values()) for result in results)
+    ends = ", ".join(f"{count} {claim.value}" for claim, count in claims.items())
+    unproven = sum(result.unproven for result in results)
+    return f"{len(results)} steps: {verdicts}; {cases} cases: {ends}, {unproven} unproven"

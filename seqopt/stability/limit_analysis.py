@@ -29,7 +29,7 @@ EXACT = 1e-6  # largest violation of an accepted proof, over the force scale and
 GAP = 1e-3  # largest difference between the two proofs, relative to max(1, z)
 ROUNDING = 1e-12  # work in a motion treated as zero, over the largest entry of the motion
 LARGEST_FORCE = 10.0  # of a corner, over total weight and payloads: prices motions that violate
-CLOSING = 1e-4  # by which a motion that proves may close a corner, over its largest entry
+_CLOSING = 1e-4  # by which a motion that proves may close a corner, over its largest entry
 CAP = 1e5  # z is sought between 0 and this
 
 
@@ -44,15 +44,9 @@ class Sense(Enum):
 class Case:
     """The numbers of one question; strengths over the stress scale, forces over the force scale.
 
-    Parameters
-    ----------
-    sense : Sense
-    friction : float
-    tension, cohesion, payload : tuple of 2 float
-        Value at z = 0 and growth with z. A payload is a multiple of every grip's own and an
-        amount that all have in common.
-    pull : Vector
-        Acceleration that grows with z, over that of gravity.
+    ``tension``, ``cohesion``, ``payload``: value at z = 0 and growth with z. A payload is a
+    multiple of every grip's own and an amount that all have in common; ``pull``: acceleration that
+    grows with z, over that of gravity.
     """
 
     sense: Sense
@@ -76,17 +70,9 @@ class Claim(Enum):
 class Answer(FrozenValue):
     """What a solver returns for a case.
 
-    Attributes
-    ----------
-    claim : Claim
-    value : float
-        z; NaN if there is none.
-    contact_force : (K, 3) float
-        Normal part, compression positive, and tangential parts, over the force scale.
-    grip_force : (G, 3) float
-        Over the force scale.
-    motion : (B, 6) float
-        Of the blocks: translation and rotation times the length scale, of any size.
+    ``value``: z; NaN if there is none. ``contact_force`` (K, 3): normal part, compression positive,
+    and tangential parts, over the force scale. ``grip_force`` (G, 3): over the force scale.
+    ``motion`` (B, 6): of the blocks: translation and rotation times the length scale, of any size.
     """
 
     claim: Claim
@@ -117,20 +103,8 @@ def limits(
 ) -> tuple[Floats, Floats, Floats]:
     """Return what corners and grips can bear at a z, over the force scale.
 
-    Parameters
-    ----------
-    assembly : Assembly
-    case : Case
-    z : float
-    own : (G,) float, optional
-        Payload of every grip, N; by default the assembly's.
-
-    Returns
-    -------
-    tension, cohesion : (K,) float
-        Of the corners.
-    payload : (G,) float
-        Of the grips.
+    ``own`` (G,): payload of every grip, N; by default the assembly's. Results: ``tension``,
+    ``cohesion`` (K,); ``payload`` (G,).
     """
     share = assembly.corner_area * assembly.stress_scale / assembly.scales[0]
     own = assembly.payload if own is None else own
@@ -146,18 +120,8 @@ def limits(
 def violation(assembly: Assembly, case: Case, answer: Answer, own: Floats | None = None) -> float:
     """Return by how much the forces of an answer violate a case at most.
 
-    Parameters
-    ----------
-    assembly : Assembly
-    case : Case
-    answer : Answer
-    own : (G,) float, optional
-        Payload of every grip, N; by default the assembly's.
-
-    Returns
-    -------
-    float
-        Over the force scale; infinite where the answer is not finite.
+    ``own`` (G,): payload of every grip, N; by default the assembly's. Result: over the force scale;
+    infinite where the answer is not finite.
     """
     z, force, grip = answer.value, answer.contact_force, answer.grip_force
     residual = assembly.contact_map @ force.ravel() + assembly.grip_map @ grip.ravel()
@@ -176,10 +140,7 @@ def violation(assembly: Assembly, case: Case, answer: Answer, own: Floats | None
 def is_finite(assembly: Assembly, answer: Answer) -> bool:
     """Return whether all numbers of an answer are finite, and as many as the assembly needs.
 
-    Returns
-    -------
-    bool
-        What is not finite proves nothing: no comparison holds against it.
+    Result: what is not finite proves nothing: no comparison holds against it.
     """
     parts = (
         (answer.contact_force, (len(assembly.corner), 3)),
@@ -195,7 +156,7 @@ def bound(assembly: Assembly, case: Case, answer: Answer) -> float:
     """Return the z that an answer's motion proves: none below (smallest) or above (largest) exists.
 
     A motion proves nothing, 0 or `CAP`, if the load does less work in it than is taken up, or if
-    a corner closes by more than `CLOSING`. Less than that is charged with a corner force of
+    a corner closes by more than `_CLOSING`. Less than that is charged with a corner force of
     `LARGEST_FORCE` times the sum of weights and payloads.
     """
     nothing = 0.0 if case.sense is Sense.SMALLEST else CAP
@@ -225,7 +186,7 @@ def _taken(
     sliding = np.linalg.norm(parting[:, 1:], axis=1)
     opening = parting[:, 0] - case.friction * sliding
     total = np.linalg.norm(assembly.weight, axis=1).sum() + assembly.payload.sum()
-    most = LARGEST_FORCE if -opening.min(initial=0.0) <= CLOSING else np.inf
+    most = LARGEST_FORCE if -opening.min(initial=0.0) <= _CLOSING else np.inf
     closing = most * total / assembly.scales[0] * np.maximum(-opening, 0).sum()
     taken = []
     tip = None

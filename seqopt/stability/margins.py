@@ -1,7 +1,8 @@
 """Margins of grip sets, many at a time: least bond, least friction, tilt survived, least payload.
 
 Every margin is a bracket: what forces prove on one side, a motion on the other, as in
-`seqopt.stability.known`. Where the solver's answers leave it wide it is wide, and still proven.
+`seqopt.stability.held_states`. Where the solver's answers leave it wide it is wide, and still
+proven.
 """
 
 from __future__ import annotations
@@ -23,10 +24,10 @@ from seqopt.stability.assessment import ROUGHEST, bonded
 from seqopt.stability.held_program import CompileHeld, compile_held
 from seqopt.stability.held_states import HeldStates, node_assembly
 from seqopt.stability.limit_analysis import CAP, GAP, Case
+from seqopt.stability.prover import DIRECTIONS, FINE, NEAR, in_every_direction, sideways
 from seqopt.stability.screens import FALLS, STANDS, Screen, held_places
-from seqopt.stability.tilts import DIRECTIONS, FINE, NEAR, in_every_direction, sideways
 
-Cases = Callable[[Assembly], list[Case]]
+_Cases = Callable[[Assembly], list[Case]]
 
 
 class Margins:
@@ -76,20 +77,10 @@ class Margins:
     def bond(self, bricks: int, held: ArrayLike, payload: ArrayLike | None = None) -> Floats:
         """Return the least bond of grip sets at the mortar's friction.
 
-        Parameters
-        ----------
-        bricks : int
-            How many bricks stand, in build order.
-        held : (S, r) int
-            Nodes held, as places in build order counted from 1; zero for none.
-        payload : float or (r,) or (S, r) float, optional
-            N.
-
-        Returns
-        -------
-        (S, 2) float
-            Between which values the strength lies, Pa, in tension and at once in shear; infinite if
-            none is enough.
+        ``bricks``: how many bricks stand, in build order. ``held`` (S, r): nodes held, as places in
+        build order counted from 1; zero for none. ``payload`` (r,), (S, r): N. Result (S, 2):
+        between which values the strength lies, Pa, in tension and at once in shear; infinite if
+        none is enough.
         """
         bare = Mortar(friction=self.mortar.friction)
 
@@ -103,19 +94,10 @@ class Margins:
     def grip(self, bricks: int, held: ArrayLike, payload: ArrayLike | None = None) -> Floats:
         """Return the least payload, the same for all who hold, with the mortar.
 
-        Parameters
-        ----------
-        bricks : int
-            How many bricks stand, in build order.
-        held : (S, r) int
-            Nodes held, as places in build order counted from 1; zero for none.
-        payload : float or (r,) or (S, r) float, optional
-            N; counts only in what a motion's rounding is charged with.
-
-        Returns
-        -------
-        (S, 2) float
-            Between which values it lies, N; infinite if none is enough.
+        ``bricks``: how many bricks stand, in build order. ``held`` (S, r): nodes held, as places in
+        build order counted from 1; zero for none. ``payload`` (r,), (S, r): N; counts only in what
+        a motion's rounding is charged with. Result (S, 2): between which values it lies, N;
+        infinite if none is enough.
         """
 
         def cases(assembly: Assembly) -> list[Case]:
@@ -128,20 +110,10 @@ class Margins:
     def tilt(self, bricks: int, held: ArrayLike, payload: ArrayLike | None = None) -> Floats:
         """Return the tilt that grip sets survive in every direction.
 
-        Parameters
-        ----------
-        bricks : int
-            How many bricks stand, in build order.
-        held : (S, r) int
-            Nodes held, as places in build order counted from 1; zero for none.
-        payload : float or (r,) or (S, r) float, optional
-            N.
-
-        Returns
-        -------
-        (S, 2) float
-            Between which values it lies, rad; NaN where it is not proven that the structure stands.
-            As `seqopt.stability.assessment.Stability.tilt`.
+        ``bricks``: how many bricks stand, in build order. ``held`` (S, r): nodes held, as places in
+        build order counted from 1; zero for none. ``payload`` (r,), (S, r): N. Result (S, 2):
+        between which values it lies, rad; NaN where it is not proven that the structure stands. As
+        `seqopt.stability.assessment.Stability.tilt`.
         """
         screen = self.screens[self.mortar.friction]
         out = np.full((len(np.asarray(held)), 2), np.nan)
@@ -178,22 +150,10 @@ class Margins:
     ) -> Floats:
         """Return the least coefficient of friction at the mortar's bond, by halving intervals.
 
-        Parameters
-        ----------
-        bricks : int
-            How many bricks stand, in build order.
-        held : (S, r) int
-            Nodes held, as places in build order counted from 1; zero for none.
-        payload : float or (r,) or (S, r) float, optional
-            N.
-        step : float, optional
-            How narrow the brackets shall be.
-
-        Returns
-        -------
-        (S, 2) float
-            Between which values it lies; infinite above where none up to `ROUGHEST` is proven to be
-            enough.
+        ``bricks``: how many bricks stand, in build order. ``held`` (S, r): nodes held, as places in
+        build order counted from 1; zero for none. ``payload`` (r,), (S, r): N. ``step``: how narrow
+        the brackets shall be. Result (S, 2): between which values it lies; infinite above where
+        none up to `ROUGHEST` is proven to be enough.
         """
         sets = np.asarray(held)
         out = np.tile([0.0, np.inf], (len(sets), 1))
@@ -235,7 +195,7 @@ class Margins:
         return replace(case, tension=(case.tension[0], 0.0), cohesion=(case.cohesion[0], 0.0))
 
     def _brackets(
-        self, name: str, cases: Cases, bricks: int, grips: tuple[ArrayLike, ArrayLike | None]
+        self, name: str, cases: _Cases, bricks: int, grips: tuple[ArrayLike, ArrayLike | None]
     ) -> list[Floats]:
         """Return the brackets (S, 2) of z of every case."""
         places, loads = held_places(self.network, bricks, *grips)
@@ -251,13 +211,7 @@ class Margins:
 def narrow(bracket: Floats) -> Bools:
     """Return which brackets are as narrow as proofs of a margin have to be.
 
-    Parameters
-    ----------
-    bracket : (S, 2) float
-
-    Returns
-    -------
-    (S,) bool
+    ``bracket`` (S, 2). Result (S,).
     """
     scale = np.maximum(1.0, np.where(np.isfinite(bracket[:, 0]), np.abs(bracket[:, 0]), 0.0))
     gap = bracket[:, 1] - bracket[:, 0] <= GAP * scale

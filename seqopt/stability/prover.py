@@ -1,4 +1,9 @@
-"""Cases of one assembly, solved and proven without trusting the solver."""
+"""Cases of one assembly, solved and proven without trusting the solver.
+
+A pull sideways is survived or not: the pulls that are survived form a convex set: forces for two
+pulls mix to forces for what lies between them. So what is survived in a few directions bounds from
+below what is in all others.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from seqopt.arrays import FrozenValue, frozen
+from seqopt.arrays import Floats, FrozenValue, Vector, frozen
 from seqopt.contact.assembly import Assembly
 from seqopt.stability.limit_analysis import (
     ATTEMPTS,
@@ -25,24 +30,18 @@ from seqopt.stability.limit_analysis import (
     violation,
 )
 
-HANDS = frozen(np.vstack([np.eye(3), -np.ones(3)]))
+_HANDS = frozen(np.vstack([np.eye(3), -np.ones(3)]))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Proven(FrozenValue):
     """A number with its two proofs.
 
-    Attributes
-    ----------
-    value : float
-        z of the case; inf if it is proven that none up to
-        `seqopt.stability.limit_analysis.CAP` will do, NaN if nothing is proven.
-    bound : float
-        What the motion alone proves: no smaller z will do, or of a largest z no larger one.
-    held : float
-        What forces alone prove: a z that will do; NaN if nothing.
-    answer : Answer
-        What it rests on: forces and motion.
+    ``value``: z of the case; inf if it is proven that none up to
+    `seqopt.stability.limit_analysis.CAP` will do, NaN if nothing is proven. ``bound``: what the
+    motion alone proves: no smaller z will do, or of a largest z no larger one. ``held``: what
+    forces alone prove: a z that will do; NaN if nothing. ``answer``: what it rests on: forces and
+    motion.
     """
 
     value: float
@@ -54,18 +53,8 @@ class Proven(FrozenValue):
 class Prover:
     """Solves cases of one assembly and proves the answers; counts what the solver claims.
 
-    Parameters
-    ----------
-    assembly : Assembly
-    compiled : callable
-        Makes the program to solve.
-
-    Attributes
-    ----------
-    claims : collections.Counter of Claim
-        How the solver said it ended, over all cases.
-    unproven : int
-        Cases of which nothing was proven.
+    ``compiled``: makes the program to solve. ``claims``: how the solver said it ended, over all
+    cases; ``unproven``: cases of which nothing was proven.
     """
 
     def __init__(self, assembly: Assembly, compiled: Compile) -> None:
@@ -83,7 +72,7 @@ class Prover:
             self.claims[answer.claim] += 1
             value = proven_value(self.assembly, case, answer)
             best = np.fmin if case.sense is Sense.SMALLEST else np.fmax
-            held = float(best(held, held_value(self.assembly, case, answer)))
+            held = float(best(held, _held_value(self.assembly, case, answer)))
             if answer.claim is Claim.INFEASIBLE or not np.isnan(value):
                 break
         proven = bound(self.assembly, case, answer)
@@ -101,7 +90,7 @@ class Prover:
         assembly = self.assembly
         blocks = len(assembly.centroid)
         payload = limits(assembly, case, CAP)[2] * assembly.scales[0]
-        reach = assembly.centroid[:, None] + assembly.scales[1] * HANDS
+        reach = assembly.centroid[:, None] + assembly.scales[1] * _HANDS
         helped = replace(
             assembly,
             grip_block=np.concatenate([assembly.grip_block, np.repeat(np.arange(blocks), 4)]),
@@ -123,25 +112,94 @@ class Prover:
 def proven_value(assembly: Assembly, case: Case, answer: Answer) -> float:
     """Return the z of an answer if its forces and its motion prove it.
 
-    Returns
-    -------
-    float
-        NaN if they do not, or a number of the answer is not finite.
+    Result: NaN if they do not, or a number of the answer is not finite.
     """
     gap = abs(answer.value - bound(assembly, case, answer))
     small = gap <= GAP * max(1.0, abs(answer.value))
-    return held_value(assembly, case, answer) if small else np.nan
+    return _held_value(assembly, case, answer) if small else np.nan
 
 
-def held_value(assembly: Assembly, case: Case, answer: Answer) -> float:
+def _held_value(assembly: Assembly, case: Case, answer: Answer) -> float:
     """Return the z of an answer if its forces alone prove that it will do.
 
-    Returns
-    -------
-    float
-        NaN if they do not, or a number of the answer is not finite.
+    Result: NaN if they do not, or a number of the answer is not finite.
     """
     if not is_finite(assembly, answer):
         return np.nan
     proven = violation(assembly, case, answer) <= EXACT * max(1.0, abs(answer.value))
     return max(answer.value, 0.0) if proven else np.nan
+
+
+DIRECTIONS = 8  # in which an assembly is pulled sideways, evenly spread
+FINE = 8 * DIRECTIONS  # where these leave open what a grip set survives
+_MORE = 8  # directions at most that are added where the bound for all others is least
+NEAR = 5e-3  # share of the least pull by which the bound may fall short before any is added
+
+
+def sideways(fixed: Case, up: Vector, count: int = DIRECTIONS) -> list[Case]:
+    """Return the cases of the largest sideways acceleration.
+
+    ``fixed``: whose strengths do not grow with z; ``up``: unit vector against gravity; ``count``:
+    of directions, evenly spread. Result: one per direction.
+    """
+    return [_pulled(fixed, up, angle) for angle in 2 * np.pi * np.arange(count) / count]
+
+
+def safe_pull(prove: Prover, fixed: Case, up: Vector) -> tuple[list[Proven], float]:
+    """Return the largest sideways accelerations, and one that is survived in every direction.
+
+    Where the bound is least a direction is added, until it falls short of the least pull found by
+    no more than `NEAR`, or `_MORE` have been.
+
+    ``fixed``: whose strengths do not grow with z; ``up``: unit vector against gravity. Results:
+    ``pulls``: of `sideways`, then of the directions added; ``worst``: NaN if forces prove too few.
+    """
+    angles = 2 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
+    pulls = [prove(case) for case in sideways(fixed, up)]
+    while True:
+        held = np.array([pull.held for pull in pulls])
+        worst, angle = in_every_direction(angles, held)
+        short = worst < (1 - NEAR) * np.fmin.reduce(held)
+        if not short or len(pulls) == DIRECTIONS + _MORE or np.isnan(held[DIRECTIONS:]).any():
+            return pulls, worst
+        angles = np.append(angles, angle)
+        pulls.append(prove(_pulled(fixed, up, angle)))
+
+
+def in_every_direction(angles: Floats, pulls: Floats) -> tuple[float, float]:
+    """Return the pull that is survived in every direction, by what is in some.
+
+    ``angles``, ``pulls`` (n,): directions, rad, and what is survived there; NaN where that is not
+    known. Results: ``pull``, ``angle``: the least and where it is; NaN if those known leave half of
+    all directions out.
+
+    Examples
+    --------
+    >>> pull, angle = in_every_direction(np.pi / 2 * np.arange(4), np.array([1, 1, 3, 3]))
+    >>> round(pull, 4), round(angle, 4)
+    (0.7071, 0.7854)
+    """
+    order = np.argsort(angles[np.isfinite(pulls)])
+    angles, pulls = (part[np.isfinite(pulls)][order] for part in (angles, pulls))
+    turns = np.diff(angles, append=angles[:1] + 2 * np.pi)
+    if len(angles) < 3 or turns.max() >= np.pi:
+        return np.nan, np.nan
+    ends = pulls[:, None] * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    along = np.roll(ends, -1, axis=0) - ends
+    size = np.maximum(np.square(along).sum(axis=1), np.finfo(float).tiny)
+    share = np.clip(-(ends * along).sum(axis=1) / size, 0.0, 1.0)
+    nearest = ends + share[:, None] * along
+    distance = np.linalg.norm(nearest, axis=1)
+    worst = int(distance.argmin())
+    x, y = nearest[worst]
+    return float(distance[worst]), float(np.arctan2(y, x) % (2 * np.pi))
+
+
+def _pulled(fixed: Case, up: Vector, angle: float) -> Case:
+    """Return the case of the largest acceleration in a direction."""
+    axis = np.array(up)
+    first = np.eye(3)[np.abs(axis).argmin()]
+    first = first - axis * (axis @ first)
+    first /= np.linalg.norm(first)
+    x, y, z = (np.cos(angle) * first + np.sin(angle) * np.cross(axis, first)).tolist()
+    return replace(fixed, sense=Sense.LARGEST, pull=(x, y, z))

@@ -1,9 +1,9 @@
 """Which grip sets of a partial structure stand: many at a time, most without a solver.
 
 A set stands if forces are found that hold it, and falls if a motion is found in which it falls:
-either is checked by the structure's own data (`seqopt.stability.known`), with the friction cone and
-the payloads as they are. What one set proves decides many others, so that a linear program, whose
-cones are inscribed polyhedra, is solved for few of them.
+either is checked by the structure's own data (`seqopt.stability.held_states`), with the friction
+cone and the payloads as they are. What one set proves decides many others, so that a linear
+program, whose cones are inscribed polyhedra, is solved for few of them.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from seqopt.stability.assessment import bonded
 from seqopt.stability.held_program import CompileHeld, compile_held
 from seqopt.stability.held_states import HeldStates, node_assembly
 from seqopt.stability.limit_analysis import EXACT
-from seqopt.stability.tilts import DIRECTIONS, FINE, sideways
+from seqopt.stability.prover import DIRECTIONS, FINE, sideways
 
 STANDS, FALLS, OPEN = 1, -1, 0
 
@@ -77,26 +77,12 @@ class Screen:
     ) -> NDArray[np.int8]:
         """Return which grip sets stand.
 
-        Parameters
-        ----------
-        bricks : int
-            How many bricks stand, in build order.
-        held : (S, r) int
-            Nodes held, as places in build order counted from 1; zero for a robot that holds none.
-        payload : float or (r,) or (S, r) float, optional
-            Largest force of those that hold them, N; by default of the scene's robots, if all have
-            the same.
-
-        Returns
-        -------
-        (S,) int8
-            1 where it is proven that the structure stands, -1 where it is proven that it falls, and
-            0 where neither is.
-
-        Raises
-        ------
-        GripError
-            If there are no such nodes, or payloads are missing or not numbers.
+        ``bricks``: how many bricks stand, in build order. ``held`` (S, r): nodes held, as places in
+        build order counted from 1; zero for a robot that holds none. ``payload`` (r,), (S, r):
+        largest force of those that hold them, N; by default of the scene's robots, if all have the
+        same. Result (S,): 1 where it is proven that the structure stands, -1 where it is proven
+        that it falls, and 0 where neither is. Raises `GripError` if there are no such nodes, or
+        payloads are missing or not numbers.
         """
         places, loads = held_places(self.network, bricks, held, payload)
         out = self._verdicts((bricks, DIRECTIONS, True), places, loads)
@@ -133,7 +119,7 @@ class Screen:
             pull = np.tan(self.tilt) / (np.cos(np.pi / count) if around else 1.0)
             self._levels[level] = tuple(
                 lacking(assembly, self.mortar, self._compile)
-                for assembly in pulled(upright, pull, self.network.scene.up, count)
+                for assembly in _pulled(upright, pull, self.network.scene.up, count)
             )
         return self._levels[level]
 
@@ -141,13 +127,7 @@ class Screen:
 def lacking(assembly: Assembly, mortar: Mortar, compiled: CompileHeld) -> HeldStates:
     """Return the question whether a structure stands: whether it lacks any bond.
 
-    Parameters
-    ----------
-    assembly : Assembly
-        Its grips are all that may ever be held.
-    mortar : Mortar
-    compiled : callable
-        Makes the program to solve.
+    ``assembly``: its grips are all that may ever be held; ``compiled``: makes the program to solve.
     """
     case = bonded(assembly, mortar)
     fixed = replace(case, tension=(case.tension[0], 0.0), cohesion=(case.cohesion[0], 0.0))
@@ -157,35 +137,16 @@ def lacking(assembly: Assembly, mortar: Mortar, compiled: CompileHeld) -> HeldSt
 def decided(bracket: Floats) -> Bools:
     """Return where it is proven that no bond is lacking, or that some is.
 
-    Parameters
-    ----------
-    bracket : (S, 2) float
-        Of the bond that is lacking.
-
-    Returns
-    -------
-    (S,) bool
+    ``bracket`` (S, 2): of the bond that is lacking. Result (S,).
     """
     return np.asarray((bracket[:, 1] <= EXACT) | (bracket[:, 0] > EXACT))
 
 
-def pulled(assembly: Assembly, pull: float, up: Vector, count: int) -> tuple[Assembly, ...]:
+def _pulled(assembly: Assembly, pull: float, up: Vector, count: int) -> tuple[Assembly, ...]:
     """Return the assemblies to which sideways pulls turn one.
 
-    Parameters
-    ----------
-    assembly : Assembly
-    pull : float
-        Over gravity; for none it is the assembly itself.
-    up : Vector
-        Unit vector against gravity.
-    count : int
-        Of directions, evenly spread.
-
-    Returns
-    -------
-    tuple of Assembly
-        One per direction.
+    ``pull``: over gravity; for none it is the assembly itself. ``up``: unit vector against gravity.
+    ``count``: of directions, evenly spread. Result: one per direction.
     """
     if not pull:
         return (assembly,)
@@ -200,27 +161,10 @@ def held_places(
 ) -> tuple[Ints, Floats]:
     """Return grip sets as grips of `seqopt.stability.held_states.node_assembly`.
 
-    Parameters
-    ----------
-    network : Network
-    bricks : int
-        How many bricks stand.
-    held : (S, r) int
-        Nodes held, as places in build order counted from 1; zero for a robot that holds none.
-    payload : float or (r,) or (S, r) float, optional
-        N; by default of the scene's robots, if all have the same.
-
-    Returns
-    -------
-    places : (S, r) int
-        From 0; the number of nodes for none.
-    payload : (S, r) float
-        N; zero for none.
-
-    Raises
-    ------
-    GripError
-        If there are no such nodes, or payloads are missing or not numbers.
+    ``held`` (S, r): nodes held, as places in build order counted from 1; zero for a robot that
+    holds none. ``payload`` (r,), (S, r): N; by default of the scene's robots, if all have the same.
+    Results: ``places`` (S, r): from 0; the number of nodes for none. ``payload`` (S, r): N; zero
+    for none. Raises `GripError` if there are no such nodes, or payloads are missing or not numbers.
     """
     sets = np.asarray(held)
     most = 2 * bricks

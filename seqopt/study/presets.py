@@ -13,8 +13,7 @@ from seqopt.placement.criteria import (
 )
 from seqopt.placement.requirements import Criterion
 from seqopt.placement.terms import equal
-from seqopt.scene.parts import Robot
-from seqopt.scene.reach import Anywhere, Side
+from seqopt.scene.parts import Anywhere, Robot, Side
 
 ROBOTS = (
     Robot(name="rob1", payload=392.4, reach=Side(toward=(0.0, 1.0, 0.0), point=(0.0, -0.075, 0.0))),

@@ -9,8 +9,7 @@ dies, its unfinished tasks are given out again.
 [3, 2]
 """
 
-from seqopt.work.crew import Crew, hire
-from seqopt.work.ordered import map_ordered
 from seqopt.work.progress import Progress, Stage
+from seqopt.work.workers import Crew, hire, map_ordered
 
 __all__ = ["Crew", "Progress", "Stage", "hire", "map_ordered"]

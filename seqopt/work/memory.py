@@ -6,9 +6,9 @@ import math
 import os
 from pathlib import Path
 
-MEMORY = Path("/proc/meminfo")
-OWN = Path("/proc/self/statm")
-GROUPS = (
+_MEMORY = Path("/proc/meminfo")
+_OWN = Path("/proc/self/statm")
+_GROUPS = (
     (Path("/sys/fs/cgroup/memory.max"), Path("/sys/fs/cgroup/memory.current")),
     (
         Path("/sys/fs/cgroup/memory/memory.limit_in_bytes"),
@@ -20,24 +20,21 @@ GROUPS = (
 def free_memory() -> float:
     """Return how much memory can still be had.
 
-    Returns
-    -------
-    float
-        Bytes; infinite where the system does not say.
+    Result: bytes; infinite where the system does not say.
     """
     return max(min(_free_at_all(), _free_in_group(), _free_within_limit()), 0.0)
 
 
 def _free_at_all() -> float:
-    if not MEMORY.exists():
+    if not _MEMORY.exists():
         return math.inf
-    rows = (line.split() for line in MEMORY.read_text(encoding="ascii").splitlines())
+    rows = (line.split() for line in _MEMORY.read_text(encoding="ascii").splitlines())
     return next((1024.0 * int(row[1]) for row in rows if row[0] == "MemAvailable:"), math.inf)
 
 
 def _free_in_group() -> float:
     """Return what is left of the memory that a container may have."""
-    for limit, used in GROUPS:
+    for limit, used in _GROUPS:
         try:
             return float(limit.read_text("ascii")) - float(used.read_text("ascii"))
         except (OSError, ValueError):  # not there, or "max"
@@ -54,5 +51,5 @@ def _free_within_limit() -> float:
     limit = resource.getrlimit(resource.RLIMIT_AS)[0]
     if limit == resource.RLIM_INFINITY:
         return math.inf
-    own = int(OWN.read_text("ascii").split()[0]) * resource.getpagesize() if OWN.exists() else 0
+    own = int(_OWN.read_text("ascii").split()[0]) * resource.getpagesize() if _OWN.exists() else 0
     return float(limit - own)

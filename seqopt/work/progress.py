@@ -8,14 +8,14 @@ from collections.abc import Callable, Iterable, Iterator, Sized
 from dataclasses import dataclass
 from typing import Protocol, TypeAlias, TypeVar
 
-QUIET = 1.0  # s after which a computation says how far it is
-PAUSE = 0.2  # s between two lines of that
+_QUIET = 1.0  # s after which a computation says how far it is
+_PAUSE = 0.2  # s between two lines of that
 
 Tell: TypeAlias = Callable[[object], object]  # told in words, or a `Stage`, how far something is
-Item_co = TypeVar("Item_co", covariant=True)
+_Item_co = TypeVar("_Item_co", covariant=True)
 
 
-class SizedIterable(Sized, Iterable[Item_co], Protocol[Item_co]):
+class _SizedIterable(Sized, Iterable[_Item_co], Protocol[_Item_co]):
     """Anything with a length whose items come one after the other."""
 
 
@@ -49,7 +49,7 @@ class Stage:
 
 
 class Progress:
-    """How far a computation is, told as a `Stage` once it takes longer than `QUIET`.
+    """How far a computation is, told as a `Stage` once it takes longer than `_QUIET`.
 
     Parameters
     ----------
@@ -67,16 +67,10 @@ class Progress:
         self._done = 0.0
 
     def add(self, work: float) -> None:
-        """Say that some work is done.
-
-        Parameters
-        ----------
-        work : float
-            In the unit of the total.
-        """
+        """Say that some work is done. ``work``: in the unit of the total."""
         self._done += work
         now = time.perf_counter()
-        if self._tell is None or now - self._start < QUIET or now - self._told < PAUSE:
+        if self._tell is None or now - self._start < _QUIET or now - self._told < _PAUSE:
             return
         self._told = now
         share = min(self._done / self._total, 1.0)
@@ -84,21 +78,11 @@ class Progress:
         self._tell(Stage(self._what, share, left))
 
 
-def told(what: str, items: SizedIterable[Item_co], tell: Tell | None) -> Iterator[Item_co]:
+def told(what: str, items: _SizedIterable[_Item_co], tell: Tell | None) -> Iterator[_Item_co]:
     """Yield items one after the other, and tell how far that is.
 
-    Parameters
-    ----------
-    what : str
-        What is done with the items, in a few words.
-    items : sequence or other iterable with a length
-    tell : callable or None
-        Told a `Stage` before the work on each item.
-
-    Yields
-    ------
-    object
-        Each item.
+    ``what``: what is done with the items, in a few words; ``tell``: told a `Stage` before the work
+    on each item.
 
     Examples
     --------
@@ -116,12 +100,8 @@ def told(what: str, items: SizedIterable[Item_co], tell: Tell | None) -> Iterato
 def within(tell: Tell, seconds: float) -> Tell:
     """Return what shows words as a stage of a computation that may take so long.
 
-    Parameters
-    ----------
-    tell : callable
-        Told words as a `Stage` whose share is that of the time; a `Stage` as it is.
-    seconds : float
-        From now on; as they come where it is infinite.
+    ``tell``: told words as a `Stage` whose share is that of the time; a `Stage` as it is.
+    ``seconds``: from now on; as they come where it is infinite.
 
     Examples
     --------

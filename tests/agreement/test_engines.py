@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import Want, grip_columns
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.engines.rigid.dense import solve_dense
+from seqopt.engines.rigid.mixed import solve_dense
 from seqopt.errors import MechanismError, SolverError
 from seqopt.network.build import build_network
 from seqopt.placement.problem import pose

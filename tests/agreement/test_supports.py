@@ -14,8 +14,7 @@ from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import Want, grip_columns
 from seqopt.engines.planar import PlanarEngine
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.engines.rigid.dense import solve_dense
-from seqopt.engines.rigid.mixed import solve_mixed
+from seqopt.engines.rigid.mixed import solve_dense, solve_mixed
 from seqopt.network.build import build_network
 from tests.builders import from_both_sides
 

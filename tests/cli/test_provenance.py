@@ -11,7 +11,7 @@ import pytest
 
 import seqopt
 from seqopt.cli.main import main
-from seqopt.engines.provenance import provenance
+from seqopt.engines.registry import provenance
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.scene.scene_file import save_scene
 from tests.builders import small_arch

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from experiments.harness.walls import running_bond
-from seqopt.contact.faces import bare_assembly
-from seqopt.contact.joint_space import distance_beside
+from seqopt.contact.faces import bare_assembly, distance_beside
 from seqopt.contact.mortar import DRY
 from seqopt.engines.auto import AutoEngine
 from seqopt.errors import SceneError
@@ -18,7 +17,7 @@ from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.parts import THICKEST
 from seqopt.scene.scene_file import dump_scene, parse_scene
 from seqopt.sequence.two_robots import sequential
-from seqopt.stability.steps import assess_steps
+from seqopt.stability.assessment import assess_steps
 
 WALL = running_bond(1, 2)  # two bricks 60 mm high, laid dry: nothing lies between them
 

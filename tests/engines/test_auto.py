@@ -10,7 +10,7 @@ import pytest
 from experiments.harness.walls import running_bond
 from seqopt.contact.elastic_limits import find_elastic_limits
 from seqopt.contact.mortar import DRY, EPOXY, Mortar
-from seqopt.engines.auto import BEYOND, IN_PLANE, AutoEngine, Level
+from seqopt.engines.auto import _BEYOND, _IN_PLANE, AutoEngine, Level
 from seqopt.engines.interface import Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network
@@ -30,7 +30,7 @@ def test_the_cheapest_level_is_taken_and_counted():
     exact = ComplianceEngine(net).solve(4, sets, Want.EDGES)
     assert largest_difference(found, exact, net) <= 1e-9
     (flat, two), (space, one) = engine.tally.items()
-    assert (flat, two, space.level, one) == (IN_PLANE, 2, Level.RIGID, 1)
+    assert (flat, two, space.level, one) == (_IN_PLANE, 2, Level.RIGID, 1)
 
 
 @pytest.mark.parametrize("share", [0.999, 1.001])
@@ -44,7 +44,7 @@ def test_contact_is_modeled_where_a_joint_would_leave_its_limits(share):
     engine.solve(6, [[11]])
     (choice,) = engine.tally
     assert choice.level is (Level.DISCRETE if share < 1 else Level.RIGID)
-    assert (choice == BEYOND) == (share < 1)
+    assert (choice == _BEYOND) == (share < 1)
 
 
 @pytest.mark.parametrize("mortar", [EPOXY, DRY], ids=["epoxy", "dry"])

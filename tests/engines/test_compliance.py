@@ -10,16 +10,16 @@ import pytest
 
 from experiments.engines.parts.limit_scenes import LOOSE_AT, chain, loosened
 from experiments.engines.parts.reference_chain import solve_exactly
-from seqopt.engines.interface import NAMES, Want, grip_columns
+from seqopt.engines.interface import _NAMES, Want, grip_columns
 from seqopt.engines.planar import PlanarEngine
 from seqopt.engines.rigid import compliance, trial
-from seqopt.engines.rigid.compliance import EVEN, ComplianceEngine
-from seqopt.engines.rigid.loads import loads_of
+from seqopt.engines.rigid.compliance import _EVEN, ComplianceEngine
+from seqopt.engines.rigid.growth import grow_tree
 from seqopt.engines.rigid.mixed import solve_mixed
-from seqopt.engines.rigid.operator_builder import OperatorBuilder
+from seqopt.engines.rigid.operator import OperatorBuilder
 from seqopt.engines.rigid.refinement import Corrector
-from seqopt.engines.rigid.spanning_tree import grow_tree
-from seqopt.engines.rigid.trial import CANCEL, cancels, solve_batch
+from seqopt.engines.rigid.response_maps import loads_of
+from seqopt.engines.rigid.trial import _CANCEL, cancels, solve_batch
 from seqopt.network.build import build_network
 from tests.builders import from_both_sides, six_bricks, small_arch
 
@@ -29,7 +29,7 @@ BOTH_SIDES = [(6, 15, 25), (9, 14, 26)]  # of the loose joint
 
 def apart(fields, others):
     """The largest difference of any field, relative to its largest entry."""
-    pairs = [(getattr(fields, name), getattr(others, name)) for name in NAMES]
+    pairs = [(getattr(fields, name), getattr(others, name)) for name in _NAMES]
     return max(np.abs(a - b).max() / np.abs(b).max() for a, b in pairs)
 
 
@@ -74,7 +74,7 @@ def evenly(scene, joint, kind, share):
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize(
-    ("share", "uneven"), [(1.0, False), (EVEN, False), (0.99 * EVEN, True), (1.01 / EVEN, True)]
+    ("share", "uneven"), [(1.0, False), (_EVEN, False), (0.99 * _EVEN, True), (1.01 / _EVEN, True)]
 )
 @pytest.mark.parametrize("scene", [chain(6), small_arch(5), from_both_sides(7)])
 def test_who_looks_for_what_cancels(monkeypatch, scene, kind, share, uneven):
@@ -97,7 +97,7 @@ def test_motions_cancel_where_their_parts_are_ten_times_what_is_left(
     monkeypatch, share, seen, chunk
 ):
     """At any node that a grip loads, what forces and weight move, signs aside, over the rest."""
-    monkeypatch.setattr(trial, "CHUNK", chunk)
+    monkeypatch.setattr(trial, "_CHUNK", chunk)
     rng = np.random.default_rng(0)
     flexibility, dead, motion = rng.normal(size=(6, 6)), rng.normal(size=6), np.eye(7, 9)
     index = np.array([[0, 1, 2], [3, 4, 5], [0, 4, 2], [5, 1, 3], [2, 0, 4]])
@@ -111,7 +111,7 @@ def test_motions_cancel_where_their_parts_are_ten_times_what_is_left(
             for i in index[row]
         )
         left = np.abs(loaded @ motion).max()
-        size = share * CANCEL * left / parts
+        size = share * _CANCEL * left / parts
         own = SimpleNamespace(
             flexibility=size * flexibility,
             dead_displacement=size * dead,
@@ -140,7 +140,7 @@ def test_grips_on_other_bricks_are_answered_as_if_nothing_had_been_asked():
         assert engine.solve(16, sets, Want.ALL) == engine.solve(16, sets, Want.ALL)
         own = ComplianceEngine(net).solve(16, sets, Want.ALL)
         again = engine.solve(16, sets, Want.ALL)
-        for name in NAMES:
+        for name in _NAMES:
             size = np.abs(getattr(own, name)).max()
             assert np.abs(getattr(again, name) - getattr(own, name)).max() <= 1e-9 * size, name
 
@@ -182,7 +182,7 @@ def test_what_is_only_compared_is_corrected_once_and_right_to_six_digits(monkeyp
     size = np.abs(exact.edge_force).max(axis=1)
     taken = {}
     for want, most in ((Want.RESPONSES, 1e-9), (Want.RESPONSES | Want.SCREEN, 1e-6)):
-        monkeypatch.setattr(trial, "UNSEEN", 1.0)  # nothing is trusted
+        monkeypatch.setattr(trial, "_UNSEEN", 1.0)  # nothing is trusted
         made.clear()
         off = np.abs(engine.solve(bricks, sets, want).edge_force - exact.edge_force).max(axis=1)
         assert (off <= most * size).all()
@@ -217,7 +217,7 @@ def test_what_is_only_to_be_compared_is_corrected_less(monkeypatch):
     operator = OperatorBuilder(net, grow_tree(net)).operator(100)
     columns = grip_columns(net, 100, sets)
     assert not solve_batch(operator, columns)[1].any()
-    assert solve_batch(operator, columns, accuracy=compliance.SCREEN)[1].all()
+    assert solve_batch(operator, columns, accuracy=compliance._SCREEN)[1].all()
     monkeypatch.setattr(compliance, "Refinement", None)
     engine.solve(100, sets, Want.RESPONSES | Want.SCREEN)
     with pytest.raises(TypeError):
@@ -244,5 +244,5 @@ def test_sets_keep_their_places_where_some_are_corrected():
         own = engine.solve(16, [grips], Want.ALL)
         assert all(
             np.allclose(getattr(whole, n)[row], getattr(own, n)[0], rtol=1e-9, atol=1e-12)
-            for n in NAMES
+            for n in _NAMES
         )

@@ -10,14 +10,19 @@ import pytest
 from experiments.engines.parts.limit_scenes import HELD, LOOSE_AT, chain, loosened, without_joint
 from experiments.engines.parts.reference_chain import solve_exactly
 from experiments.harness.walls import running_bond
-from seqopt.engines.diagnosis import WELL, Finding, diagnose
-from seqopt.engines.eigenvalues import LEAST_DIAGONAL, UNRESISTED, spectrum
+from seqopt.engines.diagnosis import (
+    _LEAST_DIAGONAL,
+    UNRESISTED,
+    WELL,
+    Finding,
+    diagnose,
+    residual,
+    spectrum,
+)
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import Want, grip_columns
-from seqopt.engines.residuals import residual
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.engines.rigid.dense import solve_dense
-from seqopt.engines.rigid.mixed import mixed_system, ungripped_system
+from seqopt.engines.rigid.mixed import mixed_system, solve_dense, ungripped_system
 from seqopt.network.build import build_network
 
 
@@ -74,7 +79,7 @@ def test_the_smallest_eigenvalue_is_that_of_the_dense_matrix():
     system = mixed_system(parts, grips)
     dense = parts.deformation.toarray()
     matrix = dense.T * parts.stiffness @ dense
-    scale = np.sqrt(np.maximum(matrix.diagonal(), LEAST_DIAGONAL * matrix.diagonal().max()))
+    scale = np.sqrt(np.maximum(matrix.diagonal(), _LEAST_DIAGONAL * matrix.diagonal().max()))
     null = np.linalg.svd(system.forbidden.toarray() / scale)[2][6:].T
     values, vectors = np.linalg.eigh(null.T @ (matrix / scale / scale[:, None]) @ null)
     lowest, condition, mode = spectrum(net, 9, grips)

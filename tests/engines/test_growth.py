@@ -10,14 +10,13 @@ from hypothesis import strategies as st
 from experiments.engines.parts.grip_sets import grip_sets
 from experiments.harness.arches import half_circle
 from experiments.harness.walls import running_bond
-from seqopt.engines.interface import NAMES, Want, grip_columns
+from seqopt.engines.interface import _NAMES, Want, grip_columns
 from seqopt.engines.rigid import compliance, growth, trial
-from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.engines.rigid.kept import Kept
+from seqopt.engines.rigid.compliance import ComplianceEngine, Kept
+from seqopt.engines.rigid.growth import grow_tree
 from seqopt.engines.rigid.mixed import solve_mixed
-from seqopt.engines.rigid.operator_builder import OperatorBuilder
+from seqopt.engines.rigid.operator import OperatorBuilder
 from seqopt.engines.rigid.refinement import Refinement
-from seqopt.engines.rigid.spanning_tree import grow_tree
 from seqopt.engines.rigid.trial import solve_batch
 from seqopt.network.build import build_network
 from tests.strategies import arches, both_sided, walls
@@ -53,7 +52,7 @@ def test_answers_do_not_depend_on_what_was_asked_before(scene, data):
 @pytest.mark.parametrize("scene", [running_bond(4, 5), half_circle(40).scene])
 def test_brick_counts_backwards(scene, monkeypatch):
     """Nothing is kept beside the arrays: each count starts anew, or leaves bricks out."""
-    monkeypatch.setattr(compliance, "KEPT", 0)
+    monkeypatch.setattr(compliance, "_KEPT", 0)
     net = build_network(scene)
     engine, total = ComplianceEngine(net), len(scene.bricks)
     for bricks in (total, total - 1, total - 1, total // 2, total // 2 - 1, 3, total - 2):
@@ -92,7 +91,7 @@ def test_an_arch_that_closes_keeps_its_digits(count, monkeypatch):
     net = half_circle(count)
     assert worst(net) <= 1e-10
     better = worst(net)
-    monkeypatch.setattr(growth, "TAKEN", np.inf)
+    monkeypatch.setattr(growth, "_TAKEN", np.inf)
     assert worst(net) > 3 * better  # negative control
 
 
@@ -147,7 +146,7 @@ def test_sets_that_err_are_there_to_be_noticed(monkeypatch):
     net, bricks = half_circle(160), 159
     columns = hard_sets(bricks, np.random.default_rng(bricks))
     operator = OperatorBuilder(net, grow_tree(net)).operator(bricks)
-    monkeypatch.setattr(trial, "UNSEEN", 1e-300)
+    monkeypatch.setattr(trial, "_UNSEEN", 1e-300)
     fields, trusted = solve_batch(operator, columns, Want.ALL, accuracy=1e-10)
     assert trusted.all()
     assert error(fields, Refinement(net, bricks).solve(columns, operator)).max() > 1e-10
@@ -169,7 +168,7 @@ def test_a_screen_is_not_corrected_where_six_digits_are_enough(monkeypatch):
 # what is kept
 
 
-def kept_bytes(net, most=compliance.KEPT):
+def kept_bytes(net, most=compliance._KEPT):
     """The bytes of all arrays after every brick count was asked for grips at all its nodes."""
     engine = ComplianceEngine(net)
     engine._kept = Kept(most)
@@ -209,7 +208,7 @@ def test_mapped_before_or_after_they_are_summed():
     many, _ = solve_batch(
         OperatorBuilder(net, grow_tree(net)).operator(50), np.tile(columns, (120, 1)), Want.ALL
     )
-    for name in NAMES:
+    for name in _NAMES:
         a, b = getattr(few, name), getattr(many, name)[:3]
         assert np.abs(a - b).max() <= 1e-12 * np.abs(b).max()
     assert not (few.edge_force == many.edge_force[:3]).all()  # they were other ways

@@ -14,19 +14,16 @@ from experiments.engines.parts.reference_chain import solve_exactly
 from experiments.harness.walls import running_bond
 from seqopt.engines.diagnosis import Finding, diagnose
 from seqopt.engines.frame import FrameEngine
-from seqopt.engines.interface import NAMES, Want, grip_columns
+from seqopt.engines.interface import _NAMES, Want, grip_columns
 from seqopt.engines.planar import PlanarEngine
 from seqopt.engines.rigid import compliance, refinement
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.engines.rigid.dense import solve_dense
-from seqopt.engines.rigid.held_operator import held_operator
-from seqopt.engines.rigid.ldlt import solve_positive
-from seqopt.engines.rigid.loose import hold_loose
+from seqopt.engines.rigid.grip_equations import solve_positive
+from seqopt.engines.rigid.growth import grow_tree
 from seqopt.engines.rigid.mechanism import require_resistance
-from seqopt.engines.rigid.mixed import solve_mixed
-from seqopt.engines.rigid.operator_builder import OperatorBuilder
-from seqopt.engines.rigid.refinement import Corrector, Refinement
-from seqopt.engines.rigid.spanning_tree import grow_tree
+from seqopt.engines.rigid.mixed import solve_dense, solve_mixed
+from seqopt.engines.rigid.operator import OperatorBuilder
+from seqopt.engines.rigid.refinement import Corrector, Refinement, held_operator, hold_loose
 from seqopt.engines.rigid.trial import solve_batch
 from seqopt.engines.rigid.ungripped import ungripped_system
 from seqopt.errors import MechanismError, SolverError
@@ -44,7 +41,7 @@ TWISTED = 12  # the joint of arch25 that acts from 14 bricks on
 def apart(fields, others):
     """The largest difference of each set and field, relative to its largest entry."""
     worst = 0.0
-    for name in NAMES:
+    for name in _NAMES:
         a, b = (getattr(f, name).reshape(len(f.grip_force), -1) for f in (fields, others))
         size = np.abs(b).max(axis=1, initial=1e-300)
         worst = max(worst, (np.abs(a - b).max(axis=1, initial=0) / size).max())
@@ -237,7 +234,7 @@ def test_what_does_not_settle_is_solved_on_its_own(monkeypatch):
     net = build_network(loosened(chain(25), 1e-9, only_turning=True))
     sets = [HELD, (30, 37, 49)]
     usual = ComplianceEngine(net).solve(25, sets, Want.ALL)
-    monkeypatch.setattr(refinement, "STEPS", 0)
+    monkeypatch.setattr(refinement, "_STEPS", 0)
     assert apart(ComplianceEngine(net).solve(25, sets, Want.ALL), usual) <= 1e-9
 
 

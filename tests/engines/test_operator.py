@@ -9,10 +9,9 @@ import pytest
 
 from experiments.harness.walls import running_bond
 from seqopt.engines.basis import SPACE
-from seqopt.engines.interface import FLAGS, NAMES, Want, grip_columns
+from seqopt.engines.interface import _NAMES, FLAGS, Want, grip_columns
 from seqopt.engines.planar import PlanarEngine
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.engines.rigid.dense import solve_dense
 from seqopt.engines.rigid.grip_equations import (
     doubts,
     grip_forces,
@@ -20,11 +19,11 @@ from seqopt.engines.rigid.grip_equations import (
     still_forces,
     trusted,
 )
-from seqopt.engines.rigid.held_operator import held_operator
-from seqopt.engines.rigid.loads import GATHERED, loads_of
-from seqopt.engines.rigid.loose import hold_loose
-from seqopt.engines.rigid.operator_builder import OperatorBuilder
-from seqopt.engines.rigid.spanning_tree import grow_tree
+from seqopt.engines.rigid.growth import grow_tree
+from seqopt.engines.rigid.mixed import solve_dense
+from seqopt.engines.rigid.operator import OperatorBuilder
+from seqopt.engines.rigid.refinement import held_operator, hold_loose
+from seqopt.engines.rigid.response_maps import _GATHERED, loads_of
 from seqopt.engines.rigid.trial import solve_batch
 from seqopt.engines.rigid.ungripped import ungripped_system
 from seqopt.network.build import build_network
@@ -86,7 +85,7 @@ def test_every_field_is_that_of_a_direct_solve(name, grips):
         fields, trusted = solve_batch(builder.operator(bricks), columns, Want.ALL)
         direct = solve_dense(net, bricks, columns)
         assert trusted.all()
-        for field in NAMES:
+        for field in _NAMES:
             own, other = getattr(fields, field), getattr(direct, field)
             unit = 1e-8 if field in ("displacement", "brick_twist") else 1.0  # what 1 N moves
             gap = np.abs(own - other).max(initial=0)
@@ -115,7 +114,7 @@ def test_in_a_plane_the_same_with_fewer_directions(grips):
     for bricks in (2, 5, 6):
         sets = sets_of(net.scene, bricks, grips)
         a, b = (engine.solve(bricks, sets, Want.ALL) for engine in (plane, space))
-        for field in NAMES:
+        for field in _NAMES:
             size = np.abs(getattr(b, field)).max()
             assert np.abs(getattr(a, field) - getattr(b, field)).max() <= 1e-8 * size, field
 
@@ -149,7 +148,7 @@ def test_loads_as_a_matrix():
     assert none.matrix.toarray().tolist() == [[0, 0, 0, 0, 1]] * 2
 
 
-@pytest.mark.parametrize("sets", [0, 1, GATHERED // 20, GATHERED // 20 + 1])
+@pytest.mark.parametrize("sets", [0, 1, _GATHERED // 20, _GATHERED // 20 + 1])
 def test_loads_sum_rows_as_their_matrix_does(sets):
     """Few are gathered, many multiplied."""
     rng = np.random.default_rng(0)
@@ -279,9 +278,9 @@ def test_answers_do_not_depend_on_how_they_are_summed(monkeypatch, name, grips):
     builder = OperatorBuilder(net, grow_tree(net))
     found = []
     for few, held in ((10**9, None), (0, None), (0, np.unique(columns // 2))):
-        monkeypatch.setattr("seqopt.engines.rigid.operator.FEW", few)
+        monkeypatch.setattr("seqopt.engines.rigid.operator._FEW", few)
         found.append(solve_batch(builder.operator(bricks, held), columns, Want.ALL)[0])
-    for field in NAMES:
+    for field in _NAMES:
         once, *others = (getattr(fields, field) for fields in found)
         for other in others:
             assert np.abs(other - once).max() <= 1e-9 * np.abs(once).max(), field
@@ -295,7 +294,7 @@ def test_answers_beside_loose_motions_do_not_depend_on_it_either(monkeypatch):
     force = np.random.default_rng(0).normal(size=index.shape)
     answers = {}
     for few in (10**9, 0):
-        monkeypatch.setattr("seqopt.engines.rigid.operator.FEW", few)
+        monkeypatch.setattr("seqopt.engines.rigid.operator._FEW", few)
         answers[few] = {name: operator.answer(name, index, force) for name in FLAGS}
     for name, once in answers[10**9].items():
         assert np.abs(answers[0][name] - once).max() <= 1e-9 * np.abs(once).max(), name

@@ -12,9 +12,9 @@ from experiments.engines.parts.reference_chain import solve_exactly
 from seqopt.engines.interface import Want, grip_columns
 from seqopt.engines.rigid import trial
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.engines.rigid.ldlt import solve_positive
-from seqopt.engines.rigid.operator_builder import OperatorBuilder
-from seqopt.engines.rigid.spanning_tree import grow_tree
+from seqopt.engines.rigid.grip_equations import solve_positive
+from seqopt.engines.rigid.growth import grow_tree
+from seqopt.engines.rigid.operator import OperatorBuilder
 from seqopt.engines.rigid.trial import solve_batch
 from seqopt.errors import MechanismError, SolverError
 from seqopt.network.build import build_network
@@ -85,7 +85,7 @@ def test_a_batch_of_many_passes(monkeypatch):
     net = build_network(chain(8))
     sets = [(1, 9, 14), (14, 15, 3), (4, 5, 2), (12, 10, 7), (8, 9, 15)]
     whole = ComplianceEngine(net).solve(8, sets, Want.ALL)
-    monkeypatch.setattr(trial, "CHUNK", 2)
+    monkeypatch.setattr(trial, "_CHUNK", 2)
     parts = ComplianceEngine(net).solve(8, sets, Want.ALL)
     for name in ("edge_force", "displacement", "grip_force", "support"):
         gap = np.abs(getattr(parts, name) - getattr(whole, name)).max()

@@ -6,7 +6,7 @@ import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.engines.rigid.operator_builder import OperatorBuilder
+from seqopt.engines.rigid.operator import OperatorBuilder
 from seqopt.engines.rigid.refinement import Refinement
 from seqopt.engines.threads import one_thread
 from seqopt.network.build import build_network

@@ -9,8 +9,8 @@ import pytest
 
 from seqopt.engines.interface import Want, grip_columns
 from seqopt.engines.rigid import trial
-from seqopt.engines.rigid.operator_builder import OperatorBuilder
-from seqopt.engines.rigid.spanning_tree import grow_tree
+from seqopt.engines.rigid.growth import grow_tree
+from seqopt.engines.rigid.operator import OperatorBuilder
 from seqopt.engines.rigid.trial import ACCURACY, solve_batch, try_forces
 from seqopt.network.build import build_network
 from tests.builders import small_arch
@@ -43,7 +43,7 @@ def test_asked_twice_it_says_the_same(asked):
 def test_sets_are_trusted_whatever_stands_beside_them(monkeypatch, asked, chunk):
     whole, trusted = solve_batch(*asked, Want.ALL)
     assert trusted.all()
-    monkeypatch.setattr(trial, "CHUNK", chunk)
+    monkeypatch.setattr(trial, "_CHUNK", chunk)
     parts, also = solve_batch(*asked, Want.ALL)
     assert also.all()
     size = np.abs(whole.edge_force).max()

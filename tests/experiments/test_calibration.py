@@ -34,7 +34,7 @@ from experiments.calibration.parts.calibration_spread import (
 from experiments.calibration.parts.laws import BED, errors, fit, laws, median_scale, square_scale
 from experiments.harness.plotting import RESULTS
 from seqopt.network.build import build_network
-from seqopt.network.kinematics import spring_maps
+from seqopt.network.mechanics import spring_maps
 from seqopt.study.tables import printed
 
 VAULTS = vaults()

@@ -20,7 +20,7 @@ from experiments.discrete.parts.arch_pads import AtCorners, pads_at_corners
 from experiments.discrete.parts.arches_lmgc90 import error, moved
 from experiments.discrete.parts.pad_readings import CORNERS, STEPS, Reading, readings
 from experiments.harness.plotting import RESULTS
-from seqopt.engines.discrete.pads import Across, Pinch, pad_stiffness
+from seqopt.engines.discrete.engine import Across, Pinch, pad_stiffness
 from seqopt.sequence.two_robots import sequential
 from seqopt.study.presets import STUDY_PADS
 from seqopt.study.tables import printed

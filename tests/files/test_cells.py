@@ -11,9 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seqopt.cells import FORMULA, harmless, plain
 from seqopt.engines.registry import make_engine
-from seqopt.files import csv_text
+from seqopt.files import _FORMULA, csv_text, harmless, plain
 from seqopt.network.build import build_network
 from seqopt.responses.table import analyze
 from seqopt.sequence.exports.tables import plan_csv
@@ -35,7 +34,7 @@ def named(names):
 
 @given(st.text("'=+-@a1"))
 def test_no_cell_begins_as_a_formula_and_every_one_comes_back(text):
-    assert not harmless(text).startswith(FORMULA)
+    assert not harmless(text).startswith(_FORMULA)
     assert plain(harmless(text)) == text
 
 
@@ -47,7 +46,7 @@ def test_a_plan_of_robots_with_such_names_is_read_again(names):
     table = csv_text(analyze(make_engine("compliance", network), steps))
     for text in (table, plan_csv(scene, steps)):
         cells = [cell for row in csv.reader(io.StringIO(text)) for cell in row]
-        assert not [c for c in cells if c.startswith(FORMULA) and not is_number(c)]
+        assert not [c for c in cells if c.startswith(_FORMULA) and not is_number(c)]
         assert parse_plan(scene, text, "plan") == steps
     schedule = three_robot_loop(network, [robot.name for robot in scene.robots])
     text = schedule_text(schedule)

@@ -84,7 +84,7 @@ def test_what_does_not_end_is_not_read(tmp_path, kind):
 
 
 def test_a_file_that_is_too_large_is_not_read(tmp_path, monkeypatch):
-    monkeypatch.setattr(files, "LARGEST_INPUT", 10)
+    monkeypatch.setattr(files, "_LARGEST_INPUT", 10)
     path = tmp_path / "large"
     path.write_text("x" * 11, encoding="utf-8")
     with pytest.raises(FileError, match="more than 1e-05 MB; name a smaller one"):

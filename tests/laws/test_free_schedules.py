@@ -15,8 +15,7 @@ from seqopt.network.build import build_network
 from seqopt.placement.criteria import WorstRatio
 from seqopt.placement.free_problem import pose_free
 from seqopt.placement.solving import solve
-from seqopt.scene.parts import Robot
-from seqopt.scene.reach import Anywhere, Sphere
+from seqopt.scene.parts import Anywhere, Robot, Sphere
 from seqopt.sequence.free_rules import FreeRules
 from tests.builders import rescaled
 from tests.strategies import free_builds

@@ -18,7 +18,7 @@ from seqopt.placement.formulation import Selection, find_formulation
 from seqopt.placement.interface import CostProblem
 from seqopt.placement.problem import pose
 from seqopt.placement.solving import solve
-from seqopt.responses import memory
+from seqopt.responses import batches
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.scene_file import save_scene
 from seqopt.sequence.three_robots import modified_sequential, three_robot_loop
@@ -162,18 +162,18 @@ def test_a_registered_formulation_that_is_none_is_named(monkeypatch, thing, said
 
 
 def test_what_does_not_fit_into_memory_is_refused_before(problem, monkeypatch):
-    needed = memory.bytes_of_costs(problem.schedule) / memory.SHARE
-    whole = memory.bytes_of_choices(problem.schedule, problem.evaluation.wanted) / memory.SHARE
-    monkeypatch.setattr(memory, "free_memory", lambda: 0.99 * min(needed, whole))
+    needed = batches.bytes_of_costs(problem.schedule) / batches._SHARE
+    whole = batches.bytes_of_choices(problem.schedule, problem.evaluation.wanted) / batches._SHARE
+    monkeypatch.setattr(batches, "free_memory", lambda: 0.99 * min(needed, whole))
     fresh = replace(problem, evaluation=replace(problem.evaluation))
     with pytest.raises(MemoryShortError, match=r"take about .* GB, .*up to 7 candidates"):
         _ = fresh.sums
-    monkeypatch.setattr(memory, "free_memory", lambda: 1.01 * needed)
+    monkeypatch.setattr(batches, "free_memory", lambda: 1.01 * needed)
     fresh = replace(problem, evaluation=replace(problem.evaluation))
     assert fresh.sums == problem.sums
 
 
 def test_the_estimate_of_memory_is_about_right(problem):
     kept = sum(a.nbytes for s in problem.evaluation.steps for a in s.responses.values())
-    assert 1 < memory.bytes_of_choices(problem.schedule, problem.evaluation.wanted) / kept < 5
-    assert memory.free_memory() > 1e6
+    assert 1 < batches.bytes_of_choices(problem.schedule, problem.evaluation.wanted) / kept < 5
+    assert batches.free_memory() > 1e6

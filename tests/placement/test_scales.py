@@ -21,7 +21,7 @@ from seqopt.placement.criteria import OVER_METHODS, RankSum, WeightedSum
 from seqopt.placement.scales import NEVER, ROUNDED, SceneFacts, crown, own_scales
 from seqopt.placement.terms import equal
 from seqopt.scene.arch import ArchShape, arch_scene
-from seqopt.scene.reach import Sphere
+from seqopt.scene.parts import Sphere
 from seqopt.sequence.free_rules import FreeRules
 from seqopt.sequence.two_robots import METHODS
 from seqopt.study.presets import CLOSEST, EQUATIONS, RESOLUTION

@@ -15,7 +15,7 @@ from seqopt.placement.order_problem import OrderProblem
 from seqopt.report.cards import card, facts
 from seqopt.report.comparison import largest
 from seqopt.report.draw import ROBOT_COLORS
-from seqopt.stability.steps import assess_steps
+from seqopt.stability.assessment import assess_steps
 
 HEAVIEST = 60_000  # letters of HTML
 

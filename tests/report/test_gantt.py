@@ -10,7 +10,7 @@ from seqopt.errors import StepError
 from seqopt.placement.given_sequence import GivenSequence
 from seqopt.placement.solving import solve
 from seqopt.report.gantt import gantt_picture
-from seqopt.sequence.holds import holds
+from seqopt.sequence.schedule import holds
 from seqopt.sequence.two_robots import sequential
 
 

@@ -26,8 +26,8 @@ from seqopt.report.page_data import LARGEST, Build, Scatter, build_data, structu
 from seqopt.report.plan_pages import comparison_page, plan_page
 from seqopt.responses.table import analyze
 from seqopt.scene.blocks import block_brick
-from seqopt.scene.face_joints import face_ground, flat_face
-from seqopt.scene.library.law import MASONRY
+from seqopt.scene.imports.contacts import face_ground, flat_face
+from seqopt.scene.library.common import MASONRY
 from seqopt.scene.parts import Robot
 from seqopt.scene.scene import Scene
 from seqopt.sequence.two_robots import cantilever, sequential

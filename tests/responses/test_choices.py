@@ -13,7 +13,7 @@ from seqopt.network.build import build_network
 from seqopt.placement.criteria import RankSum
 from seqopt.placement.problem import pose
 from seqopt.placement.terms import equal
-from seqopt.responses import alike
+from seqopt.responses import batches
 from seqopt.responses.choices import CHOICE_RESPONSES, evaluate_choices
 from seqopt.responses.quantities import responses_of
 from seqopt.responses.table import step_fields
@@ -71,9 +71,9 @@ def test_only_what_is_asked_is_evaluated(engine25, loop25):
 
 def test_fields_are_asked_for_in_blocks(engine25, monkeypatch):
     schedule = three_robot_loop(engine25.network)
-    monkeypatch.setattr(alike, "BLOCK", 10**9)
+    monkeypatch.setattr(batches, "BLOCK", 10**9)
     whole, models = evaluate_choices(engine25, schedule, lambda _: {*CHOICE_RESPONSES})
-    monkeypatch.setattr(alike, "BLOCK", 100)
+    monkeypatch.setattr(batches, "BLOCK", 100)
     parts, again = evaluate_choices(engine25, schedule, lambda _: {*CHOICE_RESPONSES})
     assert models == again
     for a, b in zip(parts, whole, strict=True):

@@ -10,7 +10,7 @@ import time
 import pytest
 
 from seqopt.engines.registry import make_engine
-from seqopt.responses import alike
+from seqopt.responses import batches
 from seqopt.responses.choices import CHOICE_RESPONSES, Evaluation
 from seqopt.responses.resources import HERE, Resources
 from seqopt.workflow import optimize
@@ -55,7 +55,7 @@ def test_a_whole_optimization_runs_on_a_cluster(client):
 
 
 def test_a_machine_that_is_lost_takes_nothing_with_it(client, loop25, expected, monkeypatch):
-    monkeypatch.setattr(alike, "BLOCK", 60)
+    monkeypatch.setattr(batches, "BLOCK", 60)
     blocks = evaluated(loop25, HERE)
     before = client.run(os.getpid)
     victim = next(iter(before.values()))

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seqopt.responses.division import PREPARED, Portion, in_places, take_turns
+from seqopt.responses.division import _PREPARED, Portion, in_places, take_turns
 
 
 class Stub:
@@ -46,7 +46,7 @@ def test_every_portion_is_taken_once_and_its_answer_comes_in_its_place(works, la
 def test_lanes_end_together_where_each_prepares_what_comes_before_it(lanes):
     _, turns = take_turns(portions_of([1.0] * 2000), lanes)
     own = np.bincount([turn.lane for turn in turns]) / 2000
-    takes = own + PREPARED * np.cumsum(own)
+    takes = own + _PREPARED * np.cumsum(own)
     assert takes == pytest.approx(takes[0], rel=0.01)
     assert own[0] > own[-1] > 0
 

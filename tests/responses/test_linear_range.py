@@ -15,7 +15,7 @@ from seqopt.engines.registry import make_engine
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network
 from seqopt.report.cards import card
-from seqopt.responses.linear_range import STRAIN, LinearRange
+from seqopt.responses.linear_range import _STRAIN, LinearRange
 from seqopt.responses.staged import staged_fields
 from seqopt.responses.table import analyze, response_table
 from seqopt.scene.library.by_words import scene_by_words
@@ -76,7 +76,7 @@ def test_every_limit_is_told_from_the_others(arch25, soft):
     assert 1 not in moved.steps
     assert {*found(changed(arch25, density=20.0))} == {"displacement", "stress in a joint"}
     thin = changed(arch25, thickness=1e-7, face=None)
-    assert found(thin)["deformation of a joint"].said.endswith(f"more than {STRAIN:g} times")
+    assert found(thin)["deformation of a joint"].said.endswith(f"more than {_STRAIN:g} times")
     assert "rotation" in found(changed(arch25, stiffness=1 / 1000))
 
 

@@ -19,15 +19,14 @@ from seqopt.errors import MemoryShortError, ProblemError, SceneError
 from seqopt.network.build import build_network
 from seqopt.placement.problem import pose
 from seqopt.placement.solving import solve
-from seqopt.responses import alike, division, memory
+from seqopt.responses import batches, division
+from seqopt.responses.blocks import Block, answer, pack, worker_for
 from seqopt.responses.choices import CHOICE_RESPONSES, Evaluation
 from seqopt.responses.resources import Resources
-from seqopt.responses.shipping import pack, worker_for
-from seqopt.responses.states import Block, answer
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.study.presets import CRITERIA, EQUATIONS
-from seqopt.work.processes import Processes
+from seqopt.work.workers import Processes
 
 
 def everything(_):
@@ -41,7 +40,7 @@ def evaluation(engine, schedule, **resources):
 @pytest.fixture
 def small_blocks(monkeypatch):
     """Many blocks on a small scene."""
-    monkeypatch.setattr(alike, "BLOCK", 50)
+    monkeypatch.setattr(batches, "BLOCK", 50)
 
 
 @pytest.mark.slow
@@ -60,7 +59,7 @@ def test_results_are_the_same_whatever_the_workers(small_blocks, loop25, name, w
 @pytest.mark.slow
 @pytest.mark.parametrize("portions", [1, 7, 1000])
 def test_results_are_the_same_however_work_is_shared(small_blocks, loop25, portions, monkeypatch):
-    monkeypatch.setattr(division, "PORTIONS", portions)
+    monkeypatch.setattr(division, "_PORTIONS", portions)
     expected = evaluation(make_engine("auto", loop25.scene), loop25).steps
     with ThreadPoolExecutor(3) as executor:
         for workers in (1, 5):
@@ -72,11 +71,11 @@ def test_results_are_the_same_however_work_is_shared(small_blocks, loop25, porti
 @pytest.mark.parametrize("portions", [3, 32])
 def test_what_states_of_a_brick_count_share_is_prepared_once(loop25, portions, monkeypatch):
     """Blocks of one brick count go to one worker unless they are several portions' work."""
-    monkeypatch.setattr(alike, "BLOCK", 5)
-    monkeypatch.setattr(division, "PORTIONS", portions)
+    monkeypatch.setattr(batches, "BLOCK", 5)
+    monkeypatch.setattr(division, "_PORTIONS", portions)
     single = replace(loop25, steps=tuple(s for s in loop25.steps if len(s.moves) == 1))
-    levels = alike.steps_alike(single)
-    groups = [alike.alike(single, steps, everything) for level in levels for steps in level]
+    levels = batches.steps_of_batches(single)
+    groups = [batches.batch_of(single, steps, everything) for level in levels for steps in level]
     every = [block for group in groups for block in group.blocks()]
     total = sum(block.work for block in every)
     shared = [*division.share_out(every, None, total, Processes(2))]
@@ -85,7 +84,7 @@ def test_what_states_of_a_brick_count_share_is_prepared_once(loop25, portions, m
     if portions == 3:
         counts = [{block.bricks for block in portion.blocks} for portion in shared]
         assert all(a.isdisjoint(b) for a, b in itertools.pairwise(counts))
-    most = division.SEVERAL * total / (2 * portions) + max(block.work for block in every)
+    most = division._SEVERAL * total / (2 * portions) + max(block.work for block in every)
     assert all(portion.work <= most for portion in shared)
     alone = [*division.share_out(every, None, total, None)]
     assert [len(portion.blocks) for portion in alone] == [1] * len(every)
@@ -97,8 +96,8 @@ STATES = three_robot_loop(BUILT)
 
 def blocks():
     """Return blocks of all brick counts, in order."""
-    levels = alike.steps_alike(STATES)
-    groups = [alike.alike(STATES, steps, everything) for level in levels for steps in level]
+    levels = batches.steps_of_batches(STATES)
+    groups = [batches.batch_of(STATES, steps, everything) for level in levels for steps in level]
     return [block for group in groups for block in group.blocks()]
 
 
@@ -154,7 +153,7 @@ def test_an_engine_is_made_once_for_a_worker(small_blocks, loop25, monkeypatch):
     engine = make_engine("compliance", loop25.scene)
     send = worker_for(engine, elsewhere=True)
     monkeypatch.setattr(
-        "seqopt.responses.shipping.make_engine",
+        "seqopt.responses.blocks.make_engine",
         lambda *given, **named: made.append(given) or make_engine(*given, **named),
     )
     with ThreadPoolExecutor(1) as executor:
@@ -219,7 +218,7 @@ def test_costs_are_the_same_where_responses_are_not_kept(engine25, loop25, crite
     """Where there is memory for costs alone, responses come and go; nothing else changes."""
     problem = pose(engine25, loop25, CRITERIA[criterion])
     asked = problem.evaluation.wanted
-    costs, whole = memory.bytes_of_costs(loop25), memory.bytes_of_choices(loop25, asked)
+    costs, whole = batches.bytes_of_costs(loop25), batches.bytes_of_choices(loop25, asked)
     assert costs < whole
     few = Resources(max_memory=whole - 1)
     streamed = pose(engine25, loop25, CRITERIA[criterion], resources=few)
@@ -241,7 +240,7 @@ def test_alternatives_are_those_that_go_with_the_choice_where_responses_are_not_
     engine25, loop25
 ):
     whole = pose(engine25, loop25, EQUATIONS)
-    kept = memory.bytes_of_choices(loop25, whole.evaluation.wanted)
+    kept = batches.bytes_of_choices(loop25, whole.evaluation.wanted)
     few = pose(engine25, loop25, EQUATIONS, resources=Resources(max_memory=kept - 1))
     every, some = (solve(p, "cascade").alternatives() for p in (whole, few))
     assert 0 < len(some) < len(every)

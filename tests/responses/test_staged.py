@@ -10,11 +10,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import linalg
 
-from seqopt.engines.interface import NAMES, Want
+from seqopt.engines.interface import _NAMES, Want
 from seqopt.engines.registry import make_engine
 from seqopt.errors import MechanismError, StepError
 from seqopt.network.build import build_network
-from seqopt.network.kinematics import node_motion, spring_maps
+from seqopt.network.mechanics import node_motion, spring_maps
 from seqopt.responses.staged import Placing, analyze_staged, staged_fields
 from seqopt.responses.table import analyze
 from seqopt.scene.parts import Joint
@@ -133,7 +133,7 @@ def test_a_grip_closes_without_force_where_it_finds_its_node():
     )
     w = float(np.linalg.norm(network.weight[0]))
     fields = list(staged_fields(network, steps))
-    for name in NAMES:
+    for name in _NAMES:
         if name != "grip_force":
             np.testing.assert_array_equal(getattr(fields[1], name), getattr(fields[2], name))
     assert not fields[2].grip_force.any()

@@ -21,10 +21,10 @@ from seqopt.placement.problem import pose
 from seqopt.placement.robust_plan import solve_robust
 from seqopt.placement.robust_problem import robust
 from seqopt.placement.solving import solve
-from seqopt.responses import states
+from seqopt.responses import blocks
+from seqopt.responses.blocks import Store
 from seqopt.responses.choices import Evaluation
 from seqopt.responses.resources import Resources
-from seqopt.responses.store import Store
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.study.presets import EQUATIONS
 from tests.builders import ROOT, six_bricks
@@ -40,13 +40,13 @@ def wanted(_):
 def asked(monkeypatch):
     """What engines are asked in this process."""
     calls = []
-    plain = states.answer
+    plain = blocks.answer
 
     def counted(engine, block):
         calls.append(block.key)
         return plain(engine, block)
 
-    monkeypatch.setattr("seqopt.responses.shipping.answer", counted)
+    monkeypatch.setattr("seqopt.responses.blocks.answer", counted)
     return calls
 
 
@@ -201,7 +201,7 @@ def test_answers_are_those_of_scene_engine_and_responses(tmp_path, asked, monkey
     assert computed(name="compliance") == blocks
     monkeypatch.setattr(sys.modules[__name__], "wanted", lambda _: {"D_max"})
     assert computed() == blocks
-    monkeypatch.setattr("seqopt.engines.recipe.arithmetic", lambda: "of another version")
+    monkeypatch.setattr("seqopt.engines.registry._arithmetic", lambda: "of another version")
     assert computed() == blocks
 
 

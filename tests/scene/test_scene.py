@@ -12,8 +12,7 @@ from hypothesis import strategies as st
 
 from seqopt.errors import FileError, SceneError, SeqoptError
 from seqopt.scene.arch import ArchShape, arch_scene
-from seqopt.scene.parts import Robot
-from seqopt.scene.reach import Side, Sphere
+from seqopt.scene.parts import Robot, Side, Sphere
 from seqopt.scene.scene_file import (
     dump_scene,
     load_scene,

@@ -12,9 +12,8 @@ from seqopt.errors import StepError
 from seqopt.network.build import build_network
 from seqopt.placement.problem import pose
 from seqopt.placement.solving import solve
-from seqopt.sequence.loops import robot_loop, two_robot_loop
 from seqopt.sequence.steps import StepKind, idle_robots
-from seqopt.sequence.three_robots import SCHEDULES, three_robot_loop
+from seqopt.sequence.three_robots import SCHEDULES, robot_loop, three_robot_loop, two_robot_loop
 from seqopt.sequence.two_robots import placing_node, sequential
 from seqopt.study.presets import EQUATIONS, WEIGHTED
 from tests.builders import anywhere, small_arch

@@ -9,13 +9,16 @@ import pytest
 
 from seqopt.errors import StepError
 from seqopt.network.build import build_network
-from seqopt.scene.parts import Robot
-from seqopt.scene.reach import Sphere
-from seqopt.sequence.loops import robot_loop, two_robot_loop
-from seqopt.sequence.roles import cast, take_turns
+from seqopt.scene.parts import Robot, Sphere
 from seqopt.sequence.steps import StepKind, idle_robots
-from seqopt.sequence.three_robots import SCHEDULES, modified_sequential, three_robot_loop
-from seqopt.sequence.two_robots import METHODS, sequential
+from seqopt.sequence.three_robots import (
+    SCHEDULES,
+    modified_sequential,
+    robot_loop,
+    three_robot_loop,
+    two_robot_loop,
+)
+from seqopt.sequence.two_robots import METHODS, cast, sequential, take_turns
 from tests.builders import anywhere, from_both_ends, small_arch
 
 

@@ -10,14 +10,20 @@ from experiments.harness.walls import running_bond
 from seqopt.errors import StepError
 from seqopt.network.build import build_network
 from seqopt.scene.arch import ArchShape, arch_scene
-from seqopt.sequence.moves import open_schedule
-from seqopt.sequence.roles import take_turns
 from seqopt.sequence.schedule import OpenGrip, OpenStep
 from seqopt.sequence.steps import Step, StepKind
-from seqopt.sequence.stretches import begins_elsewhere, degeneration, lies_along
 from seqopt.sequence.support import check_support, islands
-from seqopt.sequence.three_robots import three_robot_loop
-from seqopt.sequence.two_robots import alternate, cantilever, placing_node, sequential
+from seqopt.sequence.three_robots import open_schedule, three_robot_loop
+from seqopt.sequence.two_robots import (
+    alternate,
+    begins_elsewhere,
+    cantilever,
+    degeneration,
+    lies_along,
+    placing_node,
+    sequential,
+    take_turns,
+)
 from tests.builders import anywhere, branch, from_both_ends, small_arch
 
 

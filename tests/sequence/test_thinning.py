@@ -8,7 +8,7 @@ import pytest
 
 from experiments.harness.walls import running_bond
 from seqopt.errors import StepError
-from seqopt.sequence.thinning import thin
+from seqopt.sequence.schedule import thin
 from seqopt.sequence.three_robots import SCHEDULES, three_robot_loop
 from tests.builders import from_both_sides
 

@@ -169,7 +169,7 @@ def test_a_value_alone_says_neither_falls_nor_how_much_friction_is_needed(more):
 WEAKER = {
     "the value makes it fall": (assessment, "verdict_of", None),
     "closing is free": (limit_analysis, "LARGEST_FORCE", 0.0),
-    "any closing is charged": (limit_analysis, "CLOSING", CAP),
+    "any closing is charged": (limit_analysis, "_CLOSING", CAP),
     "forces may violate": (prover, "violation", lambda *_: 0.0),
 }
 
@@ -182,7 +182,7 @@ def test_a_weaker_judge_is_noticed(weaker, monkeypatch):
     else:
         monkeypatch.setattr(module, name, weak)
     if weaker == "closing is free":
-        monkeypatch.setattr(module, "CLOSING", CAP)
+        monkeypatch.setattr(module, "_CLOSING", CAP)
     assert false(judged()) > 0
 
 

@@ -8,8 +8,7 @@ import pytest
 from experiments.stability.parts.blocks import Blocks, Contact, ring, stack
 from seqopt.contact.mortar import DRY, Mortar, bond_mortar
 from seqopt.sequence.steps import Step, StepKind
-from seqopt.stability.assessment import Verdict, assess
-from seqopt.stability.steps import format_verdicts, stability_table
+from seqopt.stability.assessment import Verdict, assess, format_verdicts, stability_table
 
 
 def bar(*, on_the_ground=False):

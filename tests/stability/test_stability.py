@@ -15,8 +15,7 @@ from seqopt.network.build import build_network
 from seqopt.sequence.two_robots import METHODS
 from seqopt.stability.assessment import Verdict, assess, bonded
 from seqopt.stability.limit_analysis import CAP, EXACT, Answer, Case, Claim, Sense, bound, violation
-from seqopt.stability.prover import proven_value
-from seqopt.stability.tilts import sideways
+from seqopt.stability.prover import proven_value, sideways
 
 
 def liar(change):

@@ -15,9 +15,15 @@ from seqopt.network.build import build_network
 from seqopt.scene.scene_file import load_scene
 from seqopt.stability.assessment import Verdict, assess, bonded
 from seqopt.stability.margins import Margins
-from seqopt.stability.prover import Prover
+from seqopt.stability.prover import (
+    _MORE,
+    DIRECTIONS,
+    Prover,
+    in_every_direction,
+    safe_pull,
+    sideways,
+)
 from seqopt.stability.screens import FALLS, STANDS, Screen
-from seqopt.stability.tilts import DIRECTIONS, MORE, in_every_direction, safe_pull, sideways
 
 UP = (0.0, 0.0, 1.0)
 
@@ -65,7 +71,7 @@ def test_the_worst_of_eight_directions_is_not_safe():
     assembly = turned(STRUCTURES["a narrow block that tips"], np.pi / 8)
     pulls, worst = safe_pull(Prover(assembly, compile_equilibrium), fixed(assembly), UP)
     assert min(pull.held for pull in pulls[:DIRECTIONS]) > 1.05 * worst
-    assert DIRECTIONS < len(pulls) <= DIRECTIONS + MORE
+    assert DIRECTIONS < len(pulls) <= DIRECTIONS + _MORE
 
 
 def test_what_lies_between_two_pulls_is_on_the_line_between_them():

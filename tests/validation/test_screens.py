@@ -16,8 +16,8 @@ from seqopt.stability.assessment import bonded
 from seqopt.stability.held_states import HeldStates
 from seqopt.stability.limit_analysis import EXACT
 from seqopt.stability.margins import Margins, narrow
+from seqopt.stability.prover import sideways
 from seqopt.stability.screens import STANDS, Screen, decided, lacking
-from seqopt.stability.tilts import sideways
 from tests.builders import block, held
 
 NOBODY = np.zeros((1, 0), dtype=int), np.zeros((1, 0))

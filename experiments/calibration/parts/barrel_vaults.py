@@ -20,8 +20,8 @@ from typing import NamedTuple
 import numpy as np
 
 from seqopt.arrays import Floats
-from seqopt.engines.rigid.operator_builder import OperatorBuilder
-from seqopt.engines.rigid.spanning_tree import grow_tree
+from seqopt.engines.rigid.growth import grow_tree
+from seqopt.engines.rigid.operator import OperatorBuilder
 from seqopt.network.build import build_network
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.scene import Scene

@@ -19,11 +19,10 @@ from scipy import linalg
 
 from seqopt.arrays import Floats
 from seqopt.contact.assembly import Assembly
+from seqopt.contact.elastic_limits import opening_maps
 from seqopt.contact.faces import bare_assembly, step_assembly
 from seqopt.contact.mortar import EPOXY
-from seqopt.contact.quadrature import opening_maps
-from seqopt.engines.discrete.engine import DiscreteEngine
-from seqopt.engines.discrete.pads import Pinch
+from seqopt.engines.discrete.engine import DiscreteEngine, Pinch
 from seqopt.engines.discrete.system import BedStiffness, System, build_system
 from seqopt.engines.interface import Fields, Want
 from seqopt.network.network import GROUND, Network

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from itertools import product
 
 from experiments.discrete.parts.arch_pads import AtCorners, pads_at_corners
-from seqopt.engines.discrete.engine import DiscreteEngine
-from seqopt.engines.discrete.pads import Across, Pinch
+from seqopt.engines.discrete.engine import Across, DiscreteEngine, Pinch
 from seqopt.engines.discrete.system import BedStiffness
 from seqopt.network.network import Network
 from seqopt.study.presets import STUDY_BED, STUDY_PADS

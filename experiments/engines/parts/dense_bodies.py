@@ -15,9 +15,8 @@ from seqopt.arrays import Floats, Ints
 from seqopt.engines.interface import Fields
 from seqopt.engines.rigid.recovery import Solution, respond
 from seqopt.errors import SolverError
-from seqopt.network.kinematics import node_motion
+from seqopt.network.mechanics import build_statics, node_motion
 from seqopt.network.network import GROUND, Network
-from seqopt.network.statics import build_statics
 
 SETTLED = 1e-14  # relative change of an answer that is settled
 ROUNDS = 12

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from seqopt.scene.scenarios import shifted, stiffened, weighed
 from seqopt.scene.scene import Scene
-from seqopt.scene.variations import shifted, stiffened, weighed
 
 Grids = dict[str, tuple[float, ...]]
 FACTORS = (1 / 3, 1 / 2, 2 / 3, 3 / 2, 2.0, 3.0)

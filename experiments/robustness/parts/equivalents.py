@@ -44,7 +44,6 @@ class Equivalent:
 COMPLIANCE = "seqopt.engines.rigid.compliance"
 TRIAL = "seqopt.engines.rigid.trial"
 OPERATOR = "seqopt.engines.rigid.operator"
-BUILDER = "seqopt.engines.rigid.operator_builder"
 GROWTH = "seqopt.engines.rigid.growth"
 GRIPS = "seqopt.engines.rigid.grip_equations"
 COSTS, CERTIFICATE = "seqopt.placement.costs", "seqopt.placement.certificate"
@@ -133,7 +132,7 @@ EQUIVALENT = (
         for old, new in (("2 *", "2 +"), ("2 *", "3 *"))
     ),
     *(
-        Equivalent(TRIAL, "sets <= CHUNK", "<=", new, "those within all sets are all")
+        Equivalent(TRIAL, "sets <= _CHUNK", "<=", new, "those within all sets are all")
         for new in ("<", "==")
     ),
     Equivalent(TRIAL, "CANCEL * left", ">", ">=", "no sum is it to the last bit"),
@@ -171,7 +170,7 @@ EQUIVALENT = (
     ),
     Equivalent(OPERATOR, "loss.max", "initial=1.0", "initial=0.0", "every loss is one at least"),
     *(
-        Equivalent(BUILDER, "slice(bricks)", "==", new, "a slice of all bricks is all of them")
+        Equivalent(OPERATOR, "slice(bricks)", "==", new, "a slice of all bricks is all of them")
         for new in (">", ">=")
     ),
     Equivalent(GRIPS, "worst_doubt", ">=", ">", "no doubt is it to the last bit"),

@@ -1,8 +1,8 @@
-r"""The discrete-element engine: rigid bricks on beds of springs that open, slip and break.
+"""The discrete-element engine: rigid bricks on beds of springs that open, slip and break.
 
 A joint is its own elastic spring in series with a bed of points over the face between its bricks,
 so that within the elastic limits the answer is that of exactly rigid bricks; the bed takes over
-where tension or shear exceeds what the mortar holds (`seqopt.engines.discrete.friction_law`). With
+where tension or shear exceeds what the mortar holds (`seqopt.engines.discrete.system`). With
 a `BedStiffness` the bed alone is the joint, as in the discrete-element models of Bruun et al.
 (section 3.2.3). Every grip holds its node, or pinches its brick between two pads.
 
@@ -13,6 +13,9 @@ react. `seqopt.stability` asks less: that forces exist, whatever brings them abo
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from enum import IntEnum
+
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy import linalg, sparse
@@ -20,36 +23,75 @@ from scipy import linalg, sparse
 from seqopt.arrays import Floats, Ints
 from seqopt.contact.mortar import EPOXY, Mortar
 from seqopt.engines.discrete.equilibrium_path import Held, Settled, settle
-from seqopt.engines.discrete.pads import Pinch, pad_stiffness
 from seqopt.engines.discrete.system import BedStiffness, System, build_system
-from seqopt.engines.failures import failing_in_a_line
-from seqopt.engines.interface import Fields, Want, grip_columns, require_finite
-from seqopt.engines.joined_fields import join_sets, no_sets
-from seqopt.engines.named import NamedEngine
+from seqopt.engines.interface import (
+    Fields,
+    NamedEngine,
+    Want,
+    failing_in_a_line,
+    grip_columns,
+    join_sets,
+    no_sets,
+    require_finite,
+)
 from seqopt.engines.rigid.mechanism import mechanism_error, require_resistance
 from seqopt.engines.rigid.recovery import Solution, respond
 from seqopt.errors import SeqoptError, SolverError
 from seqopt.network.build import network_of
-from seqopt.network.kinematics import node_motion, point_motion
+from seqopt.network.mechanics import build_statics, node_motion, point_motion
 from seqopt.network.network import Network
-from seqopt.network.statics import build_statics
 from seqopt.scene.scene import Scene
 
-GONE = "joints open or slip and brick {brick} becomes unstable; add a grip, a bond or friction"
+
+class Across(IntEnum):
+    """Which way two pads press on a brick: along its width or its thickness."""
+
+    WIDTH = 1
+    THICKNESS = 2
+
+
+@dataclass(frozen=True)
+class Pinch:
+    """Two square pads that hold a brick on either side of its node and do not slip.
+
+    ``stiffness``: of the pads; ``side``: of a pad, m.
+    """
+
+    across: Across
+    stiffness: BedStiffness
+    side: float
+
+
+def pad_stiffness(network: Network, index: int, node: Floats, pinch: Pinch) -> Floats:
+    """Return the stiffness with which two pads beside a node hold a brick's twists.
+
+    ``index``: of the brick in build order; ``node`` (3,). Result (6, 6): N/m and N m/rad.
+    """
+    brick = network.scene.placed[index]
+    axes = brick.frame
+    out = axes[pinch.across]
+    sides = np.delete(axes, pinch.across, axis=0)
+    moduli = pinch.stiffness.tangential * np.eye(3)
+    moduli += (pinch.stiffness.normal - pinch.stiffness.tangential) * np.outer(out, out)
+    total = np.zeros((6, 6))
+    reach = pinch.side / np.sqrt(12)  # four points here have a square's second moments
+    for sign in (-0.5, 0.5):
+        for a, b in ((-reach, -reach), (-reach, reach), (reach, -reach), (reach, reach)):
+            point = node + sign * brick.dimensions[pinch.across] * out + a * sides[0] + b * sides[1]
+            moved = point_motion(point - network.centroid[index])
+            total += pinch.side**2 / 4 * moved.T @ moduli @ moved
+    return total
+
+
+_GONE = "joints open or slip and brick {brick} becomes unstable; add a grip, a bond or friction"
 
 
 class DiscreteEngine(NamedEngine):
     """Solves each grip set by discrete elements.
 
-    Parameters
-    ----------
-    network : Network or Scene
-    mortar : Mortar, optional
-        What the joints hold; the epoxy of Bruun et al. by default.
-    bed : BedStiffness, optional
-        The joints themselves; by default they are as stiff as the scene says.
-    pinch : Pinch, optional
-        How robots hold; by default a grip holds its node and lets its brick turn.
+    ``mortar``: what the joints hold; the epoxy of Bruun et al. by default. ``bed``: the joints
+    themselves; by default they are as stiff as the scene says. ``pinch``: how robots hold; by
+    default a grip holds its node and lets its brick turn.
     """
 
     def __init__(
@@ -74,24 +116,9 @@ class DiscreteEngine(NamedEngine):
 
         All fields are evaluated whatever is asked: finding the equilibrium dominates the cost.
 
-        Parameters
-        ----------
-        bricks : int
-            How many bricks stand.
-        grips : (S, r) int
-            Node numbers.
-        want : Want, optional
-
-        Raises
-        ------
-        GripError
-            As of `seqopt.engines.interface.Engine`.
-        MechanismError
-            Also if the structure moves a tenth of a brick's length and is not stopped by then.
-        SolverError
-            Also if it neither comes to rest nor goes.
-        SceneError
-            If the faces of a joint do not overlap.
+        ``grips`` (S, r): node numbers. Raises `MechanismError`: also if the structure moves a tenth
+        of a brick's length and is not stopped by then; `SolverError`: also if it neither comes to
+        rest nor goes; `SceneError` if the faces of a joint do not overlap.
         """
         network = self._network
         columns = grip_columns(network, bricks, grips)
@@ -109,7 +136,7 @@ class DiscreteEngine(NamedEngine):
         nodes = network.node_position[network.inner.ravel()[columns]]
         held = held_nodes(network, system, columns, nodes)
         if pinch is not None:
-            held = pinched(network, system, columns, nodes, pinch)
+            held = _pinched(network, system, columns, nodes, pinch)
         found = settle(held)
         if not found.rests:
             raise _not_at_rest(network, held, found, network.inner.ravel()[columns])
@@ -121,7 +148,7 @@ def _not_at_rest(network: Network, held: Held, found: Settled, nodes: Ints) -> S
     system = held.system
     if held.gone(found):
         moved = system.unit * (held.free @ found.motion)
-        return mechanism_error(network, moved[: 6 * system.bricks], GONE)
+        return mechanism_error(network, moved[: 6 * system.bricks], _GONE)
     names = ", ".join(str(network.node_name[n]) for n in nodes) or "nothing"
     return SolverError(
         f"{system.bricks} bricks held at {names}: the discrete elements neither came to rest nor "
@@ -132,14 +159,8 @@ def _not_at_rest(network: Network, held: Held, found: Settled, nodes: Ints) -> S
 def held_nodes(network: Network, system: System, columns: Ints, nodes: Floats) -> Held:
     """Return a system whose held nodes stand still.
 
-    Parameters
-    ----------
-    network : Network
-    system : System
-    columns : (r,) int
-        Grips as indices into ``network.inner.ravel()``.
-    nodes : (r, 3) float
-        Where they hold, m.
+    ``columns`` (r,): grips as indices into ``network.inner.ravel()``; ``nodes`` (r, 3): where they
+    hold, m.
     """
     blocks = [np.eye(6)] * (len(system.load) // 6)
     for body in np.unique(columns // 2):
@@ -149,18 +170,11 @@ def held_nodes(network: Network, system: System, columns: Ints, nodes: Floats) -
     return Held(system, free, sparse.csr_array(system.layers.shape))
 
 
-def pinched(network: Network, system: System, columns: Ints, nodes: Floats, pinch: Pinch) -> Held:
+def _pinched(network: Network, system: System, columns: Ints, nodes: Floats, pinch: Pinch) -> Held:
     """Return a system whose held bricks are pinched between pads beside their nodes.
 
-    Parameters
-    ----------
-    network : Network
-    system : System
-    columns : (r,) int
-        Grips as indices into ``network.inner.ravel()``.
-    nodes : (r, 3) float
-        Where they hold, m.
-    pinch : Pinch
+    ``columns`` (r,): grips as indices into ``network.inner.ravel()``; ``nodes`` (r, 3): where they
+    hold, m.
     """
     blocks = [sparse.csr_array((6, 6))] * (len(system.load) // 6)
     for body, node in zip(columns // 2, nodes, strict=True):

@@ -12,67 +12,37 @@ from scipy.sparse.linalg import splu
 from seqopt.arrays import Bools, Floats, FrozenValue, frozen
 from seqopt.engines.discrete.system import System
 
-ITERATIONS = 60
-BALANCED = 1e-10  # largest force left on a body, over the heaviest body's weight
-ROUNDING = 1e-13  # relative
+_ITERATIONS = 60
+_BALANCED = 1e-10  # largest force left on a body, over the heaviest body's weight
+_ROUNDING = 1e-13  # relative
 LARGEST_STEP, SMALLEST_STEP = 0.1, 1e-3  # of the load, once a bond breaks
-FIRST_RESISTANCE = 1.0  # resistance to motion at first, over the stiffness
-MOVES = 120  # against a resistance
-HALVINGS = 4
+_FIRST_RESISTANCE = 1.0  # resistance to motion at first, over the stiffness
+_MOVES = 120  # against a resistance
+_HALVINGS = 4
 FAR = 0.1  # motion over a brick's length beyond which a structure has gone
-LENT_STIFFNESS = (
-    1e-12  # stiffness lent to every motion, over its own: a loose body can come to rest
-)
+_LENT_STIFFNESS = 1e-12  # lent to every motion, over its own: a loose body can come to rest
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Held(FrozenValue):
-    """A system and what its grips do.
-
-    Attributes
-    ----------
-    system : System
-    free : (6n, m) sparse
-        Motions that the grips leave.
-    pads : (6n, 6n) sparse
-        Stiffness of grips that give way.
-    """
+    """A system and what its grips do."""
 
     system: System
-    free: sparse.csr_array
-    pads: sparse.csr_array
+    free: sparse.csr_array  # (6n, m); motions that the grips leave
+    pads: sparse.csr_array  # (6n, 6n); stiffness of grips that give way
 
     def left(self, motion: Floats, force: Floats, load: Floats) -> Floats:
         """Return what is not balanced in the free motions.
 
-        Parameters
-        ----------
-        motion, force, load
-            As of `reaction`.
-
-        Returns
-        -------
-        (m,) float
-            N.
+        ``motion``, ``force``, ``load``: as of `reaction`. Result (m,): N.
         """
         return np.asarray(self.free.T @ self.reaction(motion, force, load))
 
     def reaction(self, motion: Floats, force: Floats, load: Floats) -> Floats:
         """Return what is not balanced on the bodies: what the grips must take.
 
-        Parameters
-        ----------
-        motion : (m,) float
-            In the free motions.
-        force : (P, 3) float
-            Of the points, N.
-        load : (6n,) float
-            N.
-
-        Returns
-        -------
-        (6n,) float
-            N.
+        ``motion`` (m,): in the free motions; ``force`` (P, 3): of the points, N; ``load`` (6n,).
+        Result (6n,).
         """
         system = self.system
         carried = system.gap.T @ system.bed_wrenches(force).ravel()
@@ -81,19 +51,10 @@ class Held(FrozenValue):
     def rounding(self, motion: Floats, force: Floats) -> float:
         """Return what rounding leaves of a balance between large forces.
 
-        Parameters
-        ----------
-        motion : (m,) float
-        force : (P, 3) float
-            N.
-
-        Returns
-        -------
-        float
-            N.
+        ``motion`` (m,); ``force`` (P, 3): N. Result: N.
         """
         moved = np.abs(self.free @ motion)
-        return ROUNDING * float((self._sizes @ moved).max() + np.abs(force).sum())
+        return _ROUNDING * float((self._sizes @ moved).max() + np.abs(force).sum())
 
     @cached_property
     def _sizes(self) -> sparse.csr_array:
@@ -117,17 +78,9 @@ class Held(FrozenValue):
 class Settled(FrozenValue):
     """A state of the bodies.
 
-    Attributes
-    ----------
-    motion : (m,) float
-        In the free motions.
-    force : (P, 3) float
-        Of the points on second bodies, N.
-    slip : (P, 2) float
-        m.
-    broken : (P,) bool
-    left : float
-        Largest force not balanced, over the heaviest body's weight or what rounding makes of it.
+    ``motion`` (m,): in the free motions; ``force`` (P, 3): of the points on second bodies, N;
+    ``slip`` (P, 2); ``broken`` (P,); ``left``: largest force not balanced, over the heaviest body's
+    weight or what rounding makes of it.
     """
 
     motion: Floats
@@ -138,14 +91,7 @@ class Settled(FrozenValue):
 
     @classmethod
     def start(cls, held: Held, *, broken: bool) -> Settled:
-        """Return the state without load.
-
-        Parameters
-        ----------
-        held : Held
-        broken : bool
-            Whether all bonds are lost at once.
-        """
+        """Return the state without load. ``broken``: whether all bonds are lost at once."""
         points = len(held.system.points.area)
         none = np.zeros((points, 3))
         motion = np.zeros(held.free.shape[1])
@@ -154,7 +100,7 @@ class Settled(FrozenValue):
     @property
     def rests(self) -> bool:
         """Whether this is an equilibrium."""
-        return self.left <= BALANCED
+        return self.left <= _BALANCED
 
 
 def settle(held: Held) -> Settled:
@@ -163,10 +109,7 @@ def settle(held: Held) -> Settled:
     Where no bond breaks under the whole load at once, none would on the way to it: the limits are
     convex. Otherwise the load grows in steps, and a bond once broken stays so.
 
-    Returns
-    -------
-    Settled
-        An equilibrium if it rests.
+    Result: an equilibrium if it rests.
     """
     points = held.system.points
     dry = points.mortar.tensile_strength == 0 and points.mortar.cohesion == 0
@@ -209,8 +152,8 @@ def _balance(held: Held, state: Settled, share: float) -> Settled:
     """
     found = _newton(held, state, share, 0.0)
     state = replace(state, left=np.inf)
-    resistance = FIRST_RESISTANCE
-    for _ in range(MOVES):
+    resistance = _FIRST_RESISTANCE
+    for _ in range(_MOVES):
         if found is not None and (found.rests or held.gone(found)):
             return found
         found = _newton(held, state, share, resistance)
@@ -224,19 +167,19 @@ def _balance(held: Held, state: Settled, share: float) -> Settled:
 def _newton(held: Held, state: Settled, share: float, resistance: float) -> Settled | None:
     """Return where a state moves to against a resistance, over the stiffness of every motion."""
     system, motion, shorter = held.system, state.motion, 0
-    drag = np.maximum(resistance, LENT_STIFFNESS) * held.diagonal
+    drag = np.maximum(resistance, _LENT_STIFFNESS) * held.diagonal
     step, best = np.zeros_like(motion), np.inf
-    for _ in range(ITERATIONS):
+    for _ in range(_ITERATIONS):
         opening = system.openings(held.free @ motion)
         force, slope = system.points.forces(opening, state.slip, state.broken)
         left = held.left(motion, force, share * system.load)
         missing = left - resistance * held.diagonal * (motion - state.motion)
         size = np.linalg.norm(missing)
-        unit = max(system.scale, held.rounding(motion, force) / BALANCED)
-        if np.abs(missing).max() <= BALANCED * unit:
+        unit = max(system.scale, held.rounding(motion, force) / _BALANCED)
+        if np.abs(missing).max() <= _BALANCED * unit:
             slip = system.points.slipped(opening, force)
             return Settled(motion, force, slip, state.broken, float(np.abs(left).max() / unit))
-        if size >= best and shorter < HALVINGS:
+        if size >= best and shorter < _HALVINGS:
             step *= 0.5
             motion, shorter = motion - step, shorter + 1
             continue

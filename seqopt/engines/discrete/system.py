@@ -1,4 +1,10 @@
-"""A partial structure as bodies, elastic layers and beds, ready to be settled."""
+"""A partial structure as bodies, elastic layers and beds, ready to be settled.
+
+Points of a bed are springs until a bond breaks, then contact and friction. A bond breaks where
+tension exceeds the strength or shear exceeds cohesion and friction, and is then lost for good. What
+is broken carries compression and shear up to friction; it slips along the shear and keeps its slip,
+as long as it is closed.
+"""
 
 from __future__ import annotations
 
@@ -8,33 +14,91 @@ from functools import cached_property
 import numpy as np
 from scipy import linalg, sparse
 
-from seqopt.arrays import Floats, FrozenValue, Ints
+from seqopt.arrays import Bools, Floats, FrozenValue, Ints
 from seqopt.contact.assembly import Assembly
+from seqopt.contact.elastic_limits import Quadrature, face_quadrature, first_points, opening_maps
+from seqopt.contact.elastic_limits import quadrature_stiffness as bed_stiffness
 from seqopt.contact.faces import bare_assembly
 from seqopt.contact.mortar import Mortar
-from seqopt.contact.quadrature import Quadrature, face_quadrature, first_points, opening_maps
-from seqopt.contact.quadrature import quadrature_stiffness as bed_stiffness
-from seqopt.engines.discrete.friction_law import Points
 from seqopt.errors import SceneError
-from seqopt.network.kinematics import deformation, spring_stiffness
+from seqopt.network.mechanics import deformation, spring_stiffness
 from seqopt.network.network import Network
 
-BED_OVER_JOINT = 10.0  # how much stiffer a bed is than its joint, whichever way it moves
+_EXCESS = 1e-9  # stress above a limit that counts as none, over the stress scale
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class _Points(FrozenValue):
+    """The springs of P points of a bed.
+
+    ``area`` (P,): m²; ``normal``, ``tangential`` (P,): stiffness, N/m; ``stress_scale``: Pa.
+    """
+
+    area: Floats
+    normal: Floats
+    tangential: Floats
+    mortar: Mortar
+    stress_scale: float
+
+    def trial(self, opening: Floats, slip: Floats) -> Floats:
+        """Return the forces of unbroken springs that have slipped.
+
+        ``opening`` (P, 3); ``slip`` (P, 2). Result (P, 3): compression first, N.
+        """
+        stiffness = np.stack([self.normal, self.tangential, self.tangential], axis=1)
+        force = -stiffness * opening
+        force[:, 1:] += self.tangential[:, None] * slip
+        return force
+
+    def slipped(self, opening: Floats, force: Floats) -> Floats:
+        """Return the slip that is left when points carry forces.
+
+        ``opening`` (P, 3); ``force`` (P, 3): N. Result (P, 2): m.
+        """
+        return np.asarray(opening[:, 1:] + force[:, 1:] / self.tangential[:, None])
+
+    def exceeds(self, force: Floats) -> Bools:
+        """Return at which points bonds do not hold forces. ``force`` (P, 3): N. Result (P,)."""
+        mortar, margin = self.mortar, _EXCESS * self.stress_scale
+        normal, shear = force[:, 0] / self.area, np.linalg.norm(force[:, 1:], axis=1) / self.area
+        return np.asarray(
+            (-normal > mortar.tensile_strength + margin)
+            | (shear > mortar.cohesion + mortar.friction * normal + margin)
+        )
+
+    def forces(self, opening: Floats, slip: Floats, broken: Bools) -> tuple[Floats, Floats]:
+        """Return forces on the second bodies, and how fast they fall.
+
+        ``opening`` (P, 3); ``slip`` (P, 2); ``broken`` (P,): where the bond is lost. Results:
+        ``force`` (P, 3): N; ``slope`` (P, 3, 3): minus its derivative by the opening, N/m.
+        """
+        force = self.trial(opening, slip)
+        slope = np.zeros((len(force), 3, 3))
+        slope[:, 0, 0] = self.normal
+        slope[:, 1, 1] = slope[:, 2, 2] = self.tangential
+        size = np.linalg.norm(force[:, 1:], axis=1)
+        limit = self.mortar.friction * np.maximum(force[:, 0], 0.0)
+        slips = np.flatnonzero(broken & (size > limit))
+        along = force[slips, 1:] / size[slips, None]
+        share = limit[slips] / size[slips] * self.tangential[slips]
+        slope[slips, 1:, 1:] = share[:, None, None] * (
+            np.eye(2) - along[:, :, None] * along[:, None, :]
+        )
+        slope[slips, 1:, 0] = self.mortar.friction * self.normal[slips, None] * along
+        force[slips, 1:] = limit[slips, None] * along
+        apart = broken & (force[:, 0] <= 0)
+        force[apart], slope[apart] = 0.0, 0.0
+        return force, slope
+
+
+_BED_OVER_JOINT = 10.0  # how much stiffer a bed is than its joint, whichever way it moves
 
 
 @dataclass(frozen=True)
 class BedStiffness:
     """Stiffness of a joint or pad per area.
 
-    Parameters
-    ----------
-    normal, tangential : float
-        N/m³.
-
-    Raises
-    ------
-    SceneError
-        If one is not a positive number.
+    ``normal``, ``tangential``: N/m³. Raises `SceneError` if one is not a positive number.
     """
 
     normal: float
@@ -51,50 +115,23 @@ class System(FrozenValue):
     """Bodies, what holds them together, and what pulls at them; the bricks are the first bodies.
 
     Twists are in m and rad over ``unit``, wrenches in N and N m times it.
-
-    Attributes
-    ----------
-    bricks : int
-    acting : (J,) int
-        The springs whose joints these are.
-    points : Points
-    face : (P,) int
-        The joint of every point, in ascending order.
-    maps : (P, 3, 6) float
-        Openings for unit twists across a joint, taken at its spring.
-    gap : (6J, 6n) sparse
-        Twists across the beds for unit twists of the n bodies.
-    layers : (6n, 6n) sparse
-        Stiffness of the elastic layers.
-    load : (6n,) float
-    unit : (6n,) float
-    length : float
-        Of a brick, m.
     """
 
     bricks: int
-    acting: Ints
-    points: Points
-    face: Ints
-    maps: Floats
-    gap: sparse.csr_array
-    layers: sparse.csr_array
-    load: Floats
-    unit: Floats
-    length: float
+    acting: Ints  # (J,); the springs whose joints these are
+    points: _Points
+    face: Ints  # (P,); the joint of every point, in ascending order
+    maps: Floats  # (P, 3, 6); openings for unit twists across a joint, taken at its spring
+    gap: sparse.csr_array  # (6J, 6n); twists across the beds for unit twists of the n bodies
+    layers: sparse.csr_array  # (6n, 6n); stiffness of the elastic layers
+    load: Floats  # (6n,)
+    unit: Floats  # (6n,)
+    length: float  # of a brick, m
 
     def bed_wrenches(self, force: Floats) -> Floats:
         """Return the wrenches of point forces on second bodies, about the springs.
 
-        Parameters
-        ----------
-        force : (P, 3) float
-            N.
-
-        Returns
-        -------
-        (J, 6) float
-            N and N m.
+        ``force`` (P, 3): N. Result (J, 6): N and N m.
         """
         each = np.einsum("pij,pi->pj", self.maps, force)
         return np.asarray(np.add.reduceat(each, self._starts, axis=0))
@@ -102,15 +139,8 @@ class System(FrozenValue):
     def stiffness(self, slope: Floats) -> sparse.csr_array:
         """Return the stiffness of layers and beds.
 
-        Parameters
-        ----------
-        slope : (P, 3, 3) float
-            How fast the forces of the points fall, from `Points.forces`, N/m.
-
-        Returns
-        -------
-        (6n, 6n) sparse
-            For twists over ``unit``.
+        ``slope`` (P, 3, 3): how fast the forces of the points fall, from `Points.forces`, N/m.
+        Result (6n, 6n): for twists over ``unit``.
         """
         each = self.maps.transpose(0, 2, 1) @ slope @ self.maps
         joints = _diagonal(np.add.reduceat(each, self._starts, axis=0))
@@ -119,15 +149,7 @@ class System(FrozenValue):
     def openings(self, twist: Floats) -> Floats:
         """Return the openings of the points for twists of the bodies.
 
-        Parameters
-        ----------
-        twist : (6n,) float
-            Over ``unit``.
-
-        Returns
-        -------
-        (P, 3) float
-            m.
+        ``twist`` (6n,): over ``unit``. Result (P, 3): m.
         """
         across = (self.gap @ twist).reshape(-1, 6)
         return np.asarray(np.einsum("pij,pj->pi", self.maps, across[self.face]))
@@ -145,20 +167,9 @@ class System(FrozenValue):
 def build_system(network: Network, bricks: int, mortar: Mortar, bed: BedStiffness | None) -> System:
     """Return the system of a partial structure.
 
-    Parameters
-    ----------
-    network : Network
-    bricks : int
-        How many bricks stand.
-    mortar : Mortar
-        What the beds hold.
-    bed : BedStiffness or None
-        The joints themselves; by default beds in series with layers are as stiff as the scene says.
-
-    Raises
-    ------
-    SceneError
-        If the faces of a joint do not overlap.
+    ``mortar``: what the beds hold. ``bed``: the joints themselves; by default beds in series with
+    layers are as stiff as the scene says. Raises `SceneError` if the faces of a joint do not
+    overlap.
     """
     assembly = bare_assembly(network, bricks)
     acting = network.springs.acting(bricks)
@@ -222,13 +233,13 @@ def _moduli(
         return np.tile([bed.normal, bed.tangential], (len(stiffness), 1))
     even = np.ones((len(stiffness), 2))
     return even * (
-        BED_OVER_JOINT * _relative_stiffness(stiffness, bed_stiffness(points, maps, even))
+        _BED_OVER_JOINT * _relative_stiffness(stiffness, bed_stiffness(points, maps, even))
     )
 
 
-def _points(points: Quadrature, moduli: Floats, mortar: Mortar, assembly: Assembly) -> Points:
+def _points(points: Quadrature, moduli: Floats, mortar: Mortar, assembly: Assembly) -> _Points:
     normal, tangential = (points.area * moduli[points.face, i] for i in (0, 1))
-    return Points(points.area, normal, tangential, mortar, assembly.stress_scale)
+    return _Points(points.area, normal, tangential, mortar, assembly.stress_scale)
 
 
 def _relative_stiffness(stiffness: Floats, bed: Floats) -> Floats:

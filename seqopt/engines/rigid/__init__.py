@@ -7,7 +7,6 @@ routes, for last resorts, tests and mechanisms.
 """
 
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.engines.rigid.dense import solve_dense
-from seqopt.engines.rigid.mixed import solve_mixed
+from seqopt.engines.rigid.mixed import solve_dense, solve_mixed
 
 __all__ = ["ComplianceEngine", "solve_dense", "solve_mixed"]

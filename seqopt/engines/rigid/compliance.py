@@ -19,21 +19,19 @@ from numpy.typing import ArrayLike
 
 from seqopt.arrays import Ints
 from seqopt.engines.basis import SPACE, Basis
-from seqopt.engines.failures import failing_in_a_line
 from seqopt.engines.interface import (
     Fields,
+    NamedEngine,
     Want,
+    failing_in_a_line,
     grip_columns,
     keep_wanted,
     require_finite,
 )
-from seqopt.engines.named import NamedEngine
-from seqopt.engines.rigid.kept import Kept
+from seqopt.engines.rigid.growth import grow_tree
 from seqopt.engines.rigid.mixed import LAST_CORRECTION
-from seqopt.engines.rigid.operator import ComplianceOperator
-from seqopt.engines.rigid.operator_builder import OperatorBuilder
+from seqopt.engines.rigid.operator import ComplianceOperator, OperatorBuilder
 from seqopt.engines.rigid.refinement import Refinement
-from seqopt.engines.rigid.spanning_tree import grow_tree
 from seqopt.engines.rigid.trial import ACCURACY, Tried, try_forces
 from seqopt.engines.rigid.ungripped import Shared, share
 from seqopt.engines.threads import one_thread
@@ -41,22 +39,49 @@ from seqopt.network.build import network_of
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
 
-KEPT = 32e6  # bytes of operators that may stay when another is made
-SCREEN = 1e-6  # the same, of what is only to be compared
-EVEN = 5e-5  # softest over stiffest joint from which on pivots tell the whole error
+
+class Kept:
+    """The operators that were asked for last, by brick count.
+
+    ``most``: bytes that they may take when a further one is to be made.
+    """
+
+    def __init__(self, most: float) -> None:
+        self._most = most
+        self._operators: dict[int, ComplianceOperator] = {}  # the one asked last comes last
+        self._bytes: dict[int, int] = {}
+
+    def take(self, bricks: int) -> ComplianceOperator | None:
+        """Return the operator of a brick count, if it is here, and give it away."""
+        return self._operators.pop(bricks, None)
+
+    def put(self, bricks: int, operator: ComplianceOperator) -> None:
+        """Keep an operator as the one that was asked last."""
+        self._operators[bricks] = operator
+
+    def make_room(self) -> None:
+        """Drop those that were not asked for longest, until the rest takes little memory."""
+        if self._operators:
+            last = next(reversed(self._operators))
+            self._bytes[last] = self._operators[last].nbytes  # it grows while it is asked
+        total = sum(self._bytes.get(bricks, 0) for bricks in self._operators)
+        while total > self._most:
+            first = next(iter(self._operators))
+            del self._operators[first]
+            total -= self._bytes.get(first, 0)
+
+
+_KEPT = 32e6  # bytes of operators that may stay when another is made
+_SCREEN = 1e-6  # the same, of what is only to be compared
+_EVEN = 5e-5  # softest over stiffest joint from which on pivots tell the whole error
 
 
 class ComplianceEngine(NamedEngine):
     """Computes any batch of grip sets on any partial structure of a scene.
 
-    Parameters
-    ----------
-    network : Network or Scene
-    basis : Basis, optional
-        The directions in which bricks are loaded and move; all by default, fewer in a plane.
-    accuracy : float, optional
-        Largest error of fields, over the largest entry of each, that is accepted; with
-        `Want.SCREEN`, `SCREEN` if that is larger. Sets that may err more are corrected.
+    ``basis``: the directions in which bricks are loaded and move; all by default, fewer in a plane.
+    ``accuracy``: largest error of fields, over the largest entry of each, that is accepted; with
+    `Want.SCREEN`, `_SCREEN` if that is larger. Sets that may err more are corrected.
     """
 
     def __init__(
@@ -66,7 +91,7 @@ class ComplianceEngine(NamedEngine):
         self._network = network
         self._basis, self._accuracy = basis, accuracy
         self._tree = grow_tree(network)
-        self._kept = Kept(KEPT)
+        self._kept = Kept(_KEPT)
         self._even = _count_even(network)
         self._refinement: Refinement | None = None  # of the brick count that was asked last
 
@@ -79,18 +104,7 @@ class ComplianceEngine(NamedEngine):
     def solve(self, bricks: int, grips: ArrayLike, want: Want = Want.RESPONSES) -> Fields:
         """Return the fields of a partial structure for many grip sets.
 
-        Parameters
-        ----------
-        bricks : int
-            How many bricks stand.
-        grips : (S, r) int
-            Node numbers.
-        want : Want, optional
-
-        Raises
-        ------
-        GripError, MechanismError, SolverError
-            As of `seqopt.engines.interface.Engine`.
+        ``grips`` (S, r): node numbers.
         """
         columns = grip_columns(self._network, bricks, grips)
         tried = self._tried(bricks, columns, want) if bricks <= len(self._tree.spring) else None
@@ -110,7 +124,7 @@ class ComplianceEngine(NamedEngine):
     def _tried(self, bricks: int, columns: Ints, want: Want) -> Tried:
         """Return what the operator alone says about grip sets."""
         operator, even = self._operator(bricks, columns), bricks <= self._even
-        accuracy = max(SCREEN, self._accuracy) if want & Want.SCREEN else self._accuracy
+        accuracy = max(_SCREEN, self._accuracy) if want & Want.SCREEN else self._accuracy
         return try_forces(operator, columns, even=even, accuracy=accuracy)
 
     def _operator(self, bricks: int, columns: Ints) -> ComplianceOperator:
@@ -140,7 +154,7 @@ class ComplianceEngine(NamedEngine):
 
     def _refined(self, bricks: int, columns: Ints, want: Want) -> Fields:
         """Return the fields of grip sets that the operator alone does not answer well enough."""
-        largest = SCREEN if want & Want.SCREEN else LAST_CORRECTION
+        largest = _SCREEN if want & Want.SCREEN else LAST_CORRECTION
         operator = self._operator(bricks, columns) if bricks <= len(self._tree.spring) else None
         with one_thread():
             if self._refinement is None or self._refinement.bricks != bricks:
@@ -157,5 +171,5 @@ def _count_even(network: Network) -> int:
     for stiffness in (springs.translational_stiffness, springs.rotational_stiffness):
         low = np.minimum.accumulate(stiffness[order].min(axis=1))
         high = np.maximum.accumulate(stiffness[order].max(axis=1))
-        even &= low >= EVEN * high
+        even &= low >= _EVEN * high
     return len(network.inner) if even.all() else int(springs.since[order][even.argmin()]) - 1

@@ -9,25 +9,51 @@ from typing import NamedTuple
 import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints, frozen
-from seqopt.engines.rigid.ldlt import solve_positive
 from seqopt.engines.rigid.operator import ComplianceOperator
 
-TINY = np.finfo(float).tiny
 
+def solve_positive(system: Floats, negative: int = 0, scale: float = 1.0) -> tuple[Floats, Floats]:
+    """Solve S positive definite systems of k unknowns in place, the batch along the last axis.
 
-class GripForces(NamedTuple):
-    """The forces of the grips of sets, and how well they are determined.
+    The last unknowns may be those of a saddle: then only what is left of their equations, when the
+    others are eliminated, is definite, and negative.
 
-    Attributes
-    ----------
-    force : (S, k) float
-        N.
-    pivot : (k, S) float
-        The scaled pivots of the equations.
+    Up to three times as fast as ``numpy.linalg.solve`` for a thousand 9 x 9 systems, which calls
+    LAPACK once for each.
+
+    ``system`` (k + 1, k, S): the matrices, of which only the lower triangles are read, and the
+    loads as a last row. Overwritten; ``negative``: how many unknowns at the end belong to the
+    negative definite part; ``scale``: what their pivots are measured against. Results: ``answer``
+    (k, S): not finite where a matrix is not positive definite; ``pivot`` (k, S): pivots over their
+    diagonal entries: small where equations nearly repeat those before them.
     """
+    size = system.shape[1]
+    every = np.arange(size)
+    diagonal = np.abs(system[every, every])  # a negative pivot stays negative beside it
+    diagonal[size - negative :] = -scale
+    pivots = np.empty_like(diagonal)
+    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+        for j in range(size):
+            column = system[j:, j]
+            if j:
+                column -= np.einsum("ips,ps->is", system[j:, :j], system[j, :j] * pivots[:j])
+            pivots[j] = column[0]
+            column[1:] /= pivots[j]
+        answer = system[size]
+        for j in range(size - 1, 0, -1):
+            answer[:j] -= system[j, :j] * answer[j]
+        pivots /= diagonal
+    return answer, pivots
 
-    force: Floats
-    pivot: Floats
+
+_TINY = np.finfo(float).tiny
+
+
+class _GripForces(NamedTuple):
+    """The forces of the grips of sets, and how well they are determined."""
+
+    force: Floats  # (S, k); N
+    pivot: Floats  # (k, S); the scaled pivots of the equations
 
     @property
     def lowest(self) -> Floats:
@@ -38,12 +64,8 @@ class GripForces(NamedTuple):
 class Pairs(NamedTuple):
     """Two grips on one brick.
 
-    Attributes
-    ----------
-    sets, first, second, brick : (p,) int
-        The grip set, which two of its grips, and the brick.
-    axis : (p, d) float
-        Unit vectors from the brick's first node to its second.
+    ``sets``, ``first``, ``second``, ``brick`` (p,): the grip set, which two of its grips, and the
+    brick; ``axis`` (p, d): unit vectors from the brick's first node to its second.
     """
 
     sets: Ints
@@ -62,13 +84,9 @@ class Pairs(NamedTuple):
 def pairs_of(operator: ComplianceOperator, columns: Ints) -> Pairs:
     """Return all pairs of grips of the sets that share a brick.
 
-    Parameters
-    ----------
-    operator : ComplianceOperator
-    columns : (S, r) int
-        Grips as indices into ``network.inner.ravel()``.
+    ``columns`` (S, r): grips as indices into ``network.inner.ravel()``.
     """
-    first, second = couples(columns.shape[1])
+    first, second = _couples(columns.shape[1])
     bricks = columns.T // 2
     couple, sets = np.divmod(np.flatnonzero(bricks[first] == bricks[second]), len(columns))
     first, second = first[couple], second[couple]
@@ -77,82 +95,50 @@ def pairs_of(operator: ComplianceOperator, columns: Ints) -> Pairs:
 
 
 @cache
-def couples(grips: int) -> Ints:
-    """Return all couples of a number of grips.
-
-    Returns
-    -------
-    (2, c) int
-    """
+def _couples(grips: int) -> Ints:
+    """Return all couples of a number of grips. Result (2, c)."""
     return frozen(np.array([*combinations(range(grips), 2)], dtype=np.int64).reshape(-1, 2).T)
 
 
 def grip_forces(
     operator: ComplianceOperator, columns: Ints, index: Ints, pairs: Pairs | None = None
-) -> GripForces:
+) -> _GripForces:
     """Return the forces with which grips hold their nodes still.
 
     Two grips on one rigid brick leave the force between them along the brick undetermined:
     `share_pairs` says how they share it.
 
-    Parameters
-    ----------
-    operator : ComplianceOperator
-    columns : (S, r) int
-        Grips as indices into ``network.inner.ravel()``.
-    index : (S, k) int
-        The loads at the grips, from `ComplianceOperator.load_index`.
-    pairs : Pairs, optional
-        Of the sets, if they are known.
+    ``columns`` (S, r): grips as indices into ``network.inner.ravel()``; ``index`` (S, k): the loads
+    at the grips, from `ComplianceOperator.load_index`; ``pairs``: of the sets, if they are known.
     """
     pairs = pairs_of(operator, columns) if pairs is None else pairs
     rows = np.ascontiguousarray(index.T)
     force, pivot = _solved(operator, pairs, rows, operator.dead_displacement.take(rows))
-    return GripForces(force.T, pivot)
+    return _GripForces(force.T, pivot)
 
 
-def trusted(operator: ComplianceOperator, index: Ints, found: GripForces, most: float) -> Bools:
+def trusted(operator: ComplianceOperator, index: Ints, found: _GripForces, most: float) -> Bools:
     """Return which sets' forces rounding changes little enough.
 
-    Parameters
-    ----------
-    operator : ComplianceOperator
-    index : (S, k) int
-        The loads at the grips.
-    found : GripForces
-    most : float
-        Largest of `doubts` that is accepted.
-
-    Returns
-    -------
-    (S,) bool
+    ``index`` (S, k): the loads at the grips; ``most``: largest of `doubts` that is accepted. Result
+    (S,).
     """
     lowest = found.lowest
     out = np.asarray(most * lowest >= len(found.pivot) * operator.worst_doubt)
     rest = np.flatnonzero(~out & (lowest > 0))
     if rest.size:
-        part = GripForces(found.force[rest], found.pivot[:, rest])
+        part = _GripForces(found.force[rest], found.pivot[:, rest])
         out[rest] = doubts(operator, index[rest], part) <= most
     return out
 
 
-def doubts(operator: ComplianceOperator, index: Ints, found: GripForces) -> Floats:
+def doubts(operator: ComplianceOperator, index: Ints, found: _GripForces) -> Floats:
     """Return the error of forces for rounding of one part in one, over the largest of each set.
 
     A displacement is known to a share of all that adds up in it; with ``|G_ij| ≤ √(G_ii G_jj)``
     that is read off the diagonal. Over its pivot it is the force that it leaves undetermined.
 
-    Parameters
-    ----------
-    operator : ComplianceOperator
-    index : (S, k) int
-        The loads at the grips.
-    found : GripForces
-        With positive pivots.
-
-    Returns
-    -------
-    (S,) float
+    ``index`` (S, k): the loads at the grips; ``found``: with positive pivots. Result (S,).
     """
     size = np.abs(found.force.T)
     root, own, scale = operator.shares.take(np.ascontiguousarray(index.T), axis=1)
@@ -160,25 +146,16 @@ def doubts(operator: ComplianceOperator, index: Ints, found: GripForces) -> Floa
         own += (root * size).sum(axis=0)
         own *= scale
         own /= found.pivot
-        most = size.max(axis=0, initial=TINY)
+        most = size.max(axis=0, initial=_TINY)
         return np.asarray(own.max(axis=0, initial=0.0) / most)
 
 
 def still_forces(operator: ComplianceOperator, columns: Ints, index: Ints, moved: Floats) -> Floats:
     """Return the forces with which grips undo given displacements of their nodes.
 
-    Parameters
-    ----------
-    operator : ComplianceOperator
-    columns, index : (S, r), (S, k) int
-        As of `grip_forces`.
-    moved : (S, k) float
-        m; of loose motions, the force that pulls at them, N.
-
-    Returns
-    -------
-    (S, k) float
-        N; between two grips on one brick, none.
+    ``columns``, ``index`` (S, r), (S, k): as of `grip_forces`. ``moved`` (S, k): m; of loose
+    motions, the force that pulls at them, N. Result (S, k): N; between two grips on one brick,
+    none.
     """
     pairs, rows = pairs_of(operator, columns), np.ascontiguousarray(index.T)
     return _solved(operator, pairs, rows, np.ascontiguousarray(moved.T))[0].T
@@ -197,17 +174,9 @@ def share_pairs(
     Then the inner edge between them carries nothing: the limit of a stiff bar with both ends held.
     Nothing else in the structure changes.
 
-    Parameters
-    ----------
-    operator : ComplianceOperator
-    columns, index : (S, r), (S, k) int
-        As of `grip_forces`.
-    force : (S, k) float
-        Changed in place, N.
-    carried : (S, E) or (S, 0) float
-        By the edges, N; changed in place. Computed where they are needed if there are none.
-    pairs : Pairs, optional
-        Of the sets, if they are known.
+    ``columns``, ``index`` (S, r), (S, k): as of `grip_forces`. ``force`` (S, k): changed in place,
+    N. ``carried`` (S, E), (S, 0): by the edges, N; changed in place. Computed where they are needed
+    if there are none. ``pairs``: of the sets, if they are known.
     """
     pairs = pairs_of(operator, columns) if pairs is None else pairs
     if not len(pairs.sets):

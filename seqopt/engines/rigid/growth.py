@@ -16,22 +16,80 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 from scipy import linalg
 
-from seqopt.arrays import Floats, Ints
+from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.engines.basis import SPACE, Basis
-from seqopt.engines.rigid.spanning_tree import SpanningTree, compliances
 from seqopt.network.network import GROUND, Network
 
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SpanningTree(FrozenValue):
+    """A tree in which every brick hangs on one spring; arrays run over the first bricks placed."""
+
+    spring: Ints  # (B,); the spring that each brick hangs on
+    parent: Ints  # (B,); the brick at the spring's other end, or `GROUND`
+
+
+def grow_tree(network: Network) -> SpanningTree:
+    """Return the tree that hangs every brick, when placed, on the spring nearest to the ground.
+
+    It ends before the brick with which a spring without stiffness in some direction begins to act,
+    or that is placed without a spring to what stands: from there on a structure may have no
+    compliance of its own.
+
+    Result: of as many bricks as are tied in every direction when placed; maybe none.
+    """
+    springs = network.springs
+    count = _count_tied(network)
+    spring, parent = np.empty((2, count), dtype=np.int64)
+    depth = np.zeros(count + 1, dtype=np.int64)  # the ground, index -1, comes last
+    for b in range(count):
+        mine = np.flatnonzero((springs.bodies[:, 1] == b) & (springs.since == b + 1))
+        best = mine[np.argmin(depth[springs.bodies[mine, 0]])]
+        spring[b], parent[b] = best, springs.bodies[best, 0]
+        depth[b] = depth[parent[b]] + 1
+    return SpanningTree(spring, parent)
+
+
+def _count_tied(network: Network) -> int:
+    """Return how many bricks stand when the first is placed without a tie in every direction."""
+    springs = network.springs
+    slack = springs.since[(springs.stiffness <= 0).any(axis=1)]
+    hung = springs.bodies[springs.since == springs.bodies[:, 1] + 1, 1]
+    bare = np.setdiff1d(np.arange(len(network.inner)), hung)
+    return int(min([len(network.inner), *bare, *(slack - 1)]))
+
+
+def compliances(network: Network, which: Ints, basis: Basis = SPACE) -> Floats:
+    """Return the compliances of springs.
+
+    ``which`` (s,): springs of the network. ``basis``: k directions; all of space by default. Result
+    (s, k, k): m/N and rad/(N m).
+    """
+    springs = network.springs
+    axes = springs.axes[which]
+    count = len(basis.force)
+    out = np.zeros((len(which), *2 * basis.wrench.shape[:1]))
+    for block, directions, stiffness in (
+        (slice(0, count), basis.force, springs.translational_stiffness[which]),
+        (slice(count, None), basis.moment, springs.rotational_stiffness[which]),
+    ):
+        own = axes @ directions.T
+        out[:, block, block] = own.transpose(0, 2, 1) / stiffness[:, None, :] @ own
+    return out
+
+
 TINY, ROUNDING = np.finfo(float).tiny, np.finfo(float).eps
-AT_ONCE = 2**17  # numbers changed at a time: they stay in the processor's cache
-SUMMED = 2**19  # the same, where much is done with each
-TAKEN = 1e3  # times less a brick moves in closed loops: rounding of what is gone would show
-WORSE = 10.0  # times the rounding that was left when they were summed anew
-SAMPLE = 600  # motions that are compared with each other, about
-MOST = 0.95  # share of all pairs of motions in space whose asymmetry counts as rounding
+_AT_ONCE = 2**17  # numbers changed at a time: they stay in the processor's cache
+_SUMMED = 2**19  # the same, where much is done with each
+_TAKEN = 1e3  # times less a brick moves in closed loops: rounding of what is gone would show
+_WORSE = 10.0  # times the rounding that was left when they were summed anew
+_SAMPLE = 600  # motions that are compared with each other, about
+_MOST = 0.95  # share of all pairs of motions in space whose asymmetry counts as rounding
 
 
 class Growth:
@@ -41,25 +99,10 @@ class Growth:
     on brick b at its centroid. Of the arrays, which have room for all bricks of the tree, the rows
     and columns of bricks and springs that are there count.
 
-    Parameters
-    ----------
-    network : Network
-    tree : SpanningTree
-        On which the bricks hang.
-    basis : Basis, optional
-        k directions in which bricks are loaded and move; all by default.
-
-    Attributes
-    ----------
-    bricks : int
-        How many stand.
-    twist : (1 + kB, kB) float
-        Of the bricks, m and rad.
-    wrench : (1 + kB, kS) float
-        Of every spring on its second body, N and N m.
-    loss : (B,) float
-        How much more than the last digit of a brick's motions is rounding, as what moved it further
-        before is gone.
+    ``tree``: on which the bricks hang. ``basis``: k directions in which bricks are loaded and move;
+    all by default. ``twist`` (1 + kB, kB): of the bricks, m and rad; ``wrench`` (1 + kB, kS): of
+    every spring on its second body, N and N m; ``loss`` (B,): how much more than the last digit of
+    a brick's motions is rounding, as what moved it further before is gone.
     """
 
     def __init__(self, network: Network, tree: SpanningTree, basis: Basis = SPACE) -> None:
@@ -89,10 +132,7 @@ class Growth:
         More than stand are added. Fewer: if no loop was closed since, rows and columns of the
         others are left out; else all begins anew.
 
-        Parameters
-        ----------
-        bricks : int
-            At most as many as the tree has.
+        ``bricks``: at most as many as the tree has.
         """
         if bricks < self._closed:
             self._start()
@@ -191,7 +231,7 @@ class Growth:
         self._tie(springs, self._ties)
         lost = (before / np.maximum(self._own(), TINY)).reshape(self.bricks, k).max(axis=1)
         self.loss[: self.bricks] *= np.maximum(lost, 1.0)
-        if self.loss[: self.bricks].max() > max(TAKEN, WORSE * self._left):
+        if self.loss[: self.bricks].max() > max(_TAKEN, _WORSE * self._left):
             self._sum_again()
 
     def _own(self) -> Floats:
@@ -208,7 +248,7 @@ class Growth:
             )
             arm = center[brick] - center[parent] if parent != GROUND else np.zeros(3)
             ways.append((brick, parent, spring, -sign * given, self._carried(arm).T))
-        step = max(1, SUMMED // self._moves)
+        step = max(1, _SUMMED // self._moves)
         for start in range(0, 1 + self._moves, step):
             part = slice(start, min(start + step, 1 + self._moves))
             twist = self.twist[part].reshape(part.stop - start, -1, k)
@@ -221,11 +261,11 @@ class Growth:
 
     def _asymmetry(self) -> float:
         """Return by how many last digits what should be symmetric is not: that is rounding."""
-        some = np.linspace(0, self._moves - 1, min(self._moves, SAMPLE)).astype(int)
+        some = np.linspace(0, self._moves - 1, min(self._moves, _SAMPLE)).astype(int)
         matrix, root = self.twist[np.ix_(1 + some, some)], np.sqrt(np.abs(self._own()[some]))
         apart = np.abs(matrix - matrix.T) / np.maximum(root * root[:, None], TINY)
         more = (len(SPACE.wrench) / self._size) ** 2  # in space there are as many times the pairs
-        return max(1.0, float(np.quantile(apart, 1 - more * (1 - MOST))) / ROUNDING)
+        return max(1.0, float(np.quantile(apart, 1 - more * (1 - _MOST))) / ROUNDING)
 
     def _gap(self, spring: int) -> Floats:
         """Return how far the bodies of a spring part at it under every load, (1 + kb, k)."""
@@ -290,7 +330,7 @@ class Growth:
 
 def _add_product(target: Floats, left: Floats, right: Floats) -> None:
     """Add the product of matrices (n, p) and (p, m) to one (n, m), a few rows at a time."""
-    step = max(1, AT_ONCE // target.shape[1])
+    step = max(1, _AT_ONCE // target.shape[1])
     room = np.empty((step, target.shape[1]))
     for start in range(0, len(target), step):
         part = target[start : start + step]

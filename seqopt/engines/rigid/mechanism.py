@@ -11,68 +11,35 @@ from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.engines.rigid.ungripped import ungripped_system
 from seqopt.engines.threads import one_thread
 from seqopt.errors import MechanismError
-from seqopt.network.kinematics import node_motion, spring_maps
+from seqopt.network.mechanics import Statics, build_statics, node_motion, spring_maps
 from seqopt.network.network import Network
-from seqopt.network.statics import Statics, build_statics
 
-ROUNDING = 1e-13  # a smaller eigenvalue of the assembled stiffness may be rounding alone
-UNTIED = 1e-13  # share of the largest deformation of ties that is rounding: nothing is tied
+_ROUNDING = 1e-13  # a smaller eigenvalue of the assembled stiffness may be rounding alone
+_UNTIED = 1e-13  # share of the largest deformation of ties that is rounding: nothing is tied
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RigidStructure(FrozenValue):
-    """The parts of the stiffness of one partial structure.
+    """The parts of the stiffness of one partial structure."""
 
-    Attributes
-    ----------
-    acting : (s,) int
-        The springs that act.
-    gap : (s, 6, 6b) float
-        Their deformations for unit twists of the bricks.
-    stiffness : (s, 6, 6) float
-        Theirs, N/m and N m/rad.
-    matrix : (6b, 6b) float
-        Stiffness of the structure without grips.
-    motion : (3n, 6b) float
-        Displacements of the nodes for unit twists.
-    inner_motion : (6b, 6b) float
-        Of these, the inner nodes in the order of ``network.inner``.
-    statics : Statics
-        Of the network.
-    """
-
-    acting: Ints
-    gap: Floats
-    stiffness: Floats
-    matrix: Floats
-    motion: Floats
-    inner_motion: Floats
-    statics: Statics
+    acting: Ints  # (s,); the springs that act
+    gap: Floats  # (s, 6, 6b); their deformations for unit twists of the bricks
+    stiffness: Floats  # (s, 6, 6); theirs, N/m and N m/rad
+    matrix: Floats  # (6b, 6b); stiffness of the structure without grips
+    motion: Floats  # (3n, 6b); displacements of the nodes for unit twists
+    inner_motion: Floats  # (6b, 6b); of these, the inner nodes in the order of ``network.inner``
+    statics: Statics  # of the network
 
     def forbidden(self, grips: Ints) -> Floats:
         """Return the motions that grips forbid.
 
-        Parameters
-        ----------
-        grips : (r,) int
-            Indices into ``network.inner.ravel()``.
-
-        Returns
-        -------
-        (3r, 6b) float
+        ``grips`` (r,): indices into ``network.inner.ravel()``. Result (3r, 6b).
         """
         return np.asarray(self.inner_motion[(3 * grips[:, None] + np.arange(3)).ravel()])
 
 
 def rigid_structure(network: Network, bricks: int) -> RigidStructure:
-    """Return the parts of the stiffness of a partial structure.
-
-    Parameters
-    ----------
-    network : Network
-    bricks : int
-        How many bricks stand.
-    """
+    """Return the parts of the stiffness of a partial structure."""
     acting, gap, stiffness = spring_maps(network, bricks)
     matrix = np.einsum("sik,sij,sjl->kl", gap, stiffness, gap, optimize=True)
     motion = node_motion(network, bricks).toarray()
@@ -88,18 +55,8 @@ def require_resistance(network: Network, bricks: int, columns: Ints) -> None:
     The assembled stiffness settles most cases at once. It cannot tell a soft support from none;
     `free_motion` can.
 
-    Parameters
-    ----------
-    network : Network
-    bricks : int
-        How many bricks stand.
-    columns : (r,) int
-        Grips as indices into ``network.inner.ravel()``.
-
-    Raises
-    ------
-    MechanismError
-        If it does.
+    ``columns`` (r,): grips as indices into ``network.inner.ravel()``. Raises `MechanismError` if it
+    does.
     """
     parts = rigid_structure(network, bricks)
     with one_thread():
@@ -114,19 +71,9 @@ def free_motion(network: Network, bricks: int, columns: Ints) -> Floats | None:
     How stiff springs are does not count: a soft one ties as well as a stiff one, so that rounding
     has nothing to hide behind.
 
-    Parameters
-    ----------
-    network : Network
-    bricks : int
-        How many bricks stand.
-    columns : (r,) int
-        Grips as indices into ``network.inner.ravel()``.
-
-    Returns
-    -------
-    (b, 6) float or None
-        Translation over the length of the longest brick's inner edge, and rotation; the largest
-        component is 1. None if there is no such motion.
+    ``columns`` (r,): grips as indices into ``network.inner.ravel()``. Result (b, 6): translation
+    over the length of the longest brick's inner edge, and rotation; the largest component is 1.
+    None if there is no such motion.
     """
     parts = ungripped_system(network, bricks)
     node = 3 * network.inner.ravel()[columns][:, None] + np.arange(3)
@@ -134,7 +81,7 @@ def free_motion(network: Network, bricks: int, columns: Ints) -> Floats | None:
     ties = np.vstack([parts.deformation[parts.stiffness > 0].toarray(), held])
     with one_thread():
         _, sizes, motions = np.linalg.svd(ties, full_matrices=len(ties) < ties.shape[1])
-    if len(sizes) == ties.shape[1] and sizes[-1] > UNTIED * sizes[0]:
+    if len(sizes) == ties.shape[1] and sizes[-1] > _UNTIED * sizes[0]:
         return None
     motion = motions[-1]
     return np.asarray((motion / motion[np.abs(motion).argmax()]).reshape(-1, 6))
@@ -143,37 +90,22 @@ def free_motion(network: Network, bricks: int, columns: Ints) -> Floats | None:
 def lost_to_rounding(values: Floats) -> bool:
     """Return whether the least of eigenvalues may be rounding alone.
 
-    Parameters
-    ----------
-    values : (m,) float
-        Eigenvalues of a scaled stiffness, ascending.
+    ``values`` (m,): eigenvalues of a scaled stiffness, ascending.
     """
-    return len(values) > 0 and not values[0] > ROUNDING * values[-1]  # all may be zero
+    return len(values) > 0 and not values[0] > _ROUNDING * values[-1]  # all may be zero
 
 
 def resisting_modes(matrix: Floats, forbidden: Floats) -> tuple[Floats, Floats, Floats]:
     """Return how a structure resists the motions that its grips leave.
 
-    Parameters
-    ----------
-    matrix : (6b, 6b) float
-        Stiffness without grips.
-    forbidden : (c, 6b) float
-        Motions that the grips forbid.
-
-    Returns
-    -------
-    values : (m,) float
-        Eigenvalues of the scaled stiffness, ascending.
-    vectors : (m, m) float
-        Its modes.
-    motions : (6b, m) float
-        The motions that the modes combine.
+    ``matrix`` (6b, 6b): stiffness without grips; ``forbidden`` (c, 6b): motions that the grips
+    forbid. Results: ``values`` (m,): eigenvalues of the scaled stiffness, ascending; ``vectors``
+    (m, m): its modes; ``motions`` (6b, m): the motions that the modes combine.
     """
     free = linalg.null_space(forbidden) if len(forbidden) else np.eye(len(matrix))
     diagonal = np.diag(free.T @ matrix @ free)
-    most = max(diagonal.max(initial=0.0), np.finfo(float).tiny / ROUNDING)
-    motions = free / np.sqrt(np.maximum(diagonal, ROUNDING * most))
+    most = max(diagonal.max(initial=0.0), np.finfo(float).tiny / _ROUNDING)
+    motions = free / np.sqrt(np.maximum(diagonal, _ROUNDING * most))
     values, vectors = np.linalg.eigh(motions.T @ matrix @ motions)
     return values, vectors, motions
 
@@ -185,18 +117,8 @@ def mechanism_error(
 ) -> MechanismError:
     """Return the error that shows an unresisted motion.
 
-    Parameters
-    ----------
-    network : Network
-    twist : (6b,) float
-        The motion, of any size.
-    text : str, optional
-        What to say of the brick that moves most, ``{brick}``.
-
-    Returns
-    -------
-    MechanismError
-        With the motion's largest component scaled to 1.
+    ``twist`` (6b,): the motion, of any size; ``text``: what to say of the brick that moves most,
+    ``{brick}``. Result: with the motion's largest component scaled to 1.
     """
     shape = (twist / np.abs(twist).max()).reshape(-1, 6)
     worst = int(np.abs(shape).max(axis=1).argmax())

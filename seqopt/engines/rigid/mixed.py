@@ -1,27 +1,127 @@
-"""Rigid bricks solved with joint wrenches and motions as unknowns side by side.
+r"""Rigid bricks solved with joint wrenches and motions as unknowns side by side.
 
-One factorization of the system of `seqopt.engines.rigid.mixed_system` per grip set, corrected until
+One factorization of the system per grip set, corrected until
 it no longer changes: slow, sure, and the last resort of the fast engine.
+
+Stiffness form squares what separates a stiff joint from a soft chain. Kept apart, the deformations
+of the joints, the equilibrium of the bricks and the stillness of the grips make one sparse system
+
+.. math:: s + C B u = 0, \qquad -B^T s - H^T \lambda = f, \qquad H u = 0
+
+(wrenches :math:`s`, stiffnesses :math:`C`, twists :math:`u`, grip forces :math:`\lambda`) whose
+condition does not grow with the length of a chain as its stiffness does.
+
+`solve_dense` solves directly, one grip set at a time: the general case, mechanisms included.
 """
 
 from __future__ import annotations
 
-import numpy as np
+from dataclasses import dataclass
 
-from seqopt.arrays import Bools, Floats, Ints
-from seqopt.engines.interface import Fields
-from seqopt.engines.joined_fields import join_sets, no_sets
-from seqopt.engines.rigid.mechanism import require_resistance
-from seqopt.engines.rigid.mixed_system import factorize, mixed_system, unscaled
+import numpy as np
+from scipy import linalg, sparse
+from scipy.sparse.linalg import SuperLU, splu
+
+from seqopt.arrays import Bools, Floats, FrozenValue, Ints
+from seqopt.engines.interface import Fields, join_sets, no_sets
+from seqopt.engines.rigid.mechanism import (
+    RigidStructure,
+    lost_to_rounding,
+    require_resistance,
+    resisting_modes,
+    rigid_structure,
+)
 from seqopt.engines.rigid.recovery import Solution, respond
 from seqopt.engines.rigid.ungripped import Ungripped, ungripped_system
 from seqopt.errors import SolverError
 from seqopt.network.network import Network
 
-CORRECTIONS = 3  # after which an answer is judged
+
+@dataclass(frozen=True, eq=False, repr=False)
+class MixedSystem(FrozenValue):
+    """The system of one grip set."""
+
+    forbidden: sparse.csr_array  # (c, 6b); scaled twists that the grips forbid
+    matrix: sparse.csc_array  # (6s + 6b + c,)
+    force: Floats  # (3r, c); forces of the grips for unit multipliers
+
+
+def mixed_system(parts: Ungripped, grips: Ints, shift: Floats | None = None) -> MixedSystem:
+    """Return the system of one grip set.
+
+    ``grips`` (r,): indices into ``network.inner.ravel()``; ``shift`` (6b,): added to the diagonal
+    of the scaled stiffness, so that a mechanism can be factored.
+    """
+    rows, force = _constraints(parts, grips)
+    forbidden = sparse.csr_array(rows @ sparse.diags_array(parts.twist_unit))
+    matrix, joints = parts.matrix, len(parts.wrench_unit)
+    if shift is not None:
+        below = sparse.diags_array(np.concatenate([np.zeros(joints), shift]))
+        matrix = sparse.csc_array(matrix + below)
+    if len(force):
+        of_all = (forbidden.data, forbidden.indices + joints, forbidden.indptr)
+        rows = sparse.csr_array(of_all, shape=(forbidden.shape[0], matrix.shape[0]))
+        matrix = sparse.block_array([[matrix, -rows.T], [rows, None]], format="csc")
+    return MixedSystem(forbidden, sparse.csc_array(matrix), force)
+
+
+def factorize(system: MixedSystem) -> SuperLU:
+    """Return the factors of a system. Raises `RuntimeError` if the matrix is exactly singular."""
+    return splu(system.matrix)
+
+
+def _constraints(parts: Ungripped, grips: Ints) -> tuple[sparse.csr_array, Floats]:
+    """Return independent motions that grips forbid (c, 6b), and their forces (3r, c).
+
+    A second grip on a brick forbids nothing along the line to the first.
+    """
+    network = parts.network
+    inner = network.inner.ravel()[grips]
+    motion = parts.motion[(3 * inner[:, None] + np.arange(3)).ravel()]
+    directions = []
+    for i, brick in enumerate(grips // 2):
+        free = np.eye(3)
+        if (grips[:i] // 2 == brick).any():
+            step = np.diff(network.node_position[network.inner[brick]], axis=0)
+            free = linalg.null_space(step)
+        directions.append(free)
+    force = linalg.block_diag(*directions) if len(grips) else np.zeros((0, 0))
+    return sparse.csr_array(sparse.csr_array(force.T) @ motion), force
+
+
+def unscaled(parts: Ungripped, states: Floats) -> tuple[Floats, Floats]:
+    """Return the wrenches and twists that scaled unknowns stand for.
+
+    ``states`` (S, 6s + 6b). Results: ``wrench`` (S, J, 6): of every spring of the network on its
+    second body, N and N m; zero where it does not act. ``twist`` (S, 6b): of the bricks, m and rad.
+    """
+    springs, sets = parts.network.springs, len(states)
+    joints = len(parts.wrench_unit)
+    own = (states[:, :joints] * parts.wrench_unit).reshape(sets, len(parts.acting), 2, 3)
+    wrench = np.zeros((sets, len(springs.since), 6))
+    turned = np.einsum("nshi,sij->nshj", own, springs.axes[parts.acting])
+    wrench[:, parts.acting] = turned.reshape(sets, len(parts.acting), 6)
+    return wrench, states[:, joints:] * parts.twist_unit
+
+
+def rescaled(parts: Ungripped, wrench: Floats, twist: Floats) -> Floats:
+    """Return the scaled unknowns that stand for wrenches and twists.
+
+    ``wrench`` (S, J, 6): of every spring of the network on its second body, N and N m; ``twist``
+    (S, 6b): of the bricks, m and rad. Result (S, 6s + 6b).
+    """
+    joints = len(parts.wrench_unit)
+    acting = wrench[:, parts.acting].reshape(len(wrench), len(parts.acting), 2, 3)
+    own = np.einsum("nshj,sij->nshi", acting, parts.network.springs.axes[parts.acting])
+    return np.hstack(
+        [own.reshape(len(wrench), joints) / parts.wrench_unit, twist / parts.twist_unit]
+    )
+
+
+_CORRECTIONS = 3  # after which an answer is judged
 LAST_CORRECTION = 1e-10  # the largest of forces, moments, shifts and turns, relative to each
-EMPTY = 1e-6  # forces this small beside the moments over a brick's length are not looked at alone
-LIGHT = 1e-3  # nor what is this small beside the weight, or the motion it makes at a typical joint
+_EMPTY = 1e-6  # forces this small beside the moments over a brick's length are not looked at alone
+_LIGHT = 1e-3  # nor what is this small beside the weight, or the motion it makes at a typical joint
 
 
 def solve_mixed(network: Network, bricks: int, columns: Ints) -> Fields:
@@ -30,20 +130,9 @@ def solve_mixed(network: Network, bricks: int, columns: Ints) -> Fields:
     A mechanism that no load excites passes:
     `seqopt.engines.rigid.mechanism.require_resistance` finds it.
 
-    Parameters
-    ----------
-    network : Network
-    bricks : int
-        How many bricks stand.
-    columns : (S, r) int
-        Grips as indices into ``network.inner.ravel()``.
-
-    Raises
-    ------
-    MechanismError
-        If a motion that the load excites meets no resistance.
-    SolverError
-        If the answer still changes by more than `LAST_CORRECTION`.
+    ``columns`` (S, r): grips as indices into ``network.inner.ravel()``. Raises `MechanismError` if
+    a motion that the load excites meets no resistance; `SolverError` if the answer still changes by
+    more than `LAST_CORRECTION`.
     """
     parts = ungripped_system(network, bricks)
     answers = [_solve_one(parts, grips) for grips in columns]
@@ -60,25 +149,9 @@ def _solve_one(parts: Ungripped, grips: Ints) -> Fields:
 def solve_load(parts: Ungripped, grips: Ints, pull: Floats) -> Solution:
     """Return how a partial structure answers to a load while a grip set holds its nodes still.
 
-    Parameters
-    ----------
-    parts : Ungripped
-    grips : (r,) int
-        Indices into ``network.inner.ravel()``.
-    pull : (6b,) float
-        The load, scaled as ``parts.load``.
-
-    Returns
-    -------
-    Solution
-        Of one grip set.
-
-    Raises
-    ------
-    MechanismError
-        If a motion that the load excites meets no resistance.
-    SolverError
-        If the answer still changes by more than `LAST_CORRECTION`.
+    ``grips`` (r,): indices into ``network.inner.ravel()``; ``pull`` (6b,): the load, scaled as
+    ``parts.load``. Raises `MechanismError` if a motion that the load excites meets no resistance;
+    `SolverError` if the answer still changes by more than `LAST_CORRECTION`.
     """
     network, bricks = parts.network, parts.bricks
     system = mixed_system(parts, grips)
@@ -91,7 +164,7 @@ def solve_load(parts: Ungripped, grips: Ints, pull: Floats) -> Solution:
         require_resistance(network, bricks, grips)
         raise SolverError(f"{bricks} bricks: exactly singular in double precision") from error
     result = factors.solve(load)
-    for _ in range(CORRECTIONS):
+    for _ in range(_CORRECTIONS):
         correction = factors.solve(load - system.matrix @ result)
         result += correction
     both = np.stack([result, correction])[:, None, : joints + moves]
@@ -114,21 +187,12 @@ def unchanged(
     Where nothing moves, as where robots hold every brick at both nodes, what is left is rounding:
     it is measured against the weight.
 
-    Parameters
-    ----------
-    parts : Ungripped
-    states, corrections : (S, 6s + 6b) float
-        Scaled wrenches and twists.
-    largest : float, optional
-        That counts as small.
-
-    Returns
-    -------
-    (S,) bool
+    ``states``, ``corrections`` (S, 6s + 6b): scaled wrenches and twists; ``largest``: that counts
+    as small. Result (S,).
     """
     size, change = _sizes(parts, states), _sizes(parts, corrections)
     other = size.reshape(-1, 2, 2).max(axis=2).repeat(2, axis=1)
-    least = np.maximum(EMPTY * other, LIGHT * np.abs(parts.load).max())
+    least = np.maximum(_EMPTY * other, _LIGHT * np.abs(parts.load).max())
     return np.asarray((change <= largest * np.maximum(size, least)).all(axis=1))
 
 
@@ -140,3 +204,47 @@ def _sizes(parts: Ungripped, states: Floats) -> Floats:
         for part in np.split(states, ends, axis=1)
     ]
     return np.hstack([np.abs(part).max(axis=(1, 3), initial=0.0) for part in kinds])
+
+
+_BACKWARD = 1e-10  # largest backward error of an accepted solution
+
+
+def solve_dense(network: Network, bricks: int, columns: Ints) -> Fields:
+    """Return the fields of grip sets from the stiffness matrix of each.
+
+    ``columns`` (S, r): grips as indices into ``network.inner.ravel()``. Raises `MechanismError` if
+    nothing resists a motion; `SolverError` if a motion is resisted too little for the assembled
+    stiffness to tell, or the backward error of an answer is larger than `_BACKWARD`.
+    """
+    parts = rigid_structure(network, bricks)
+    answers = [_solve_one_dense(network, parts, grips) for grips in columns]
+    return join_sets([no_sets(network, bricks, columns.shape[1]), *answers])
+
+
+def _solve_one_dense(network: Network, parts: RigidStructure, grips: Ints) -> Fields:
+    """Return the fields of one grip set."""
+    bricks = len(parts.matrix) // 6
+    pull = parts.inner_motion.T @ network.inner_weight[: 2 * bricks].ravel()
+    forbidden = parts.forbidden(grips)
+    modes = resisting_modes(parts.matrix, forbidden)
+    if lost_to_rounding(modes[0]):
+        require_resistance(network, bricks, grips)
+        raise SolverError(f"direct solve of {bricks} bricks: too close to a mechanism")
+    twist = _constrained(parts.matrix, modes, pull)
+    wrench = np.zeros((len(network.springs.since), 6))
+    wrench[parts.acting] = -np.einsum("sij,sjk,k->si", parts.stiffness, parts.gap, twist)
+    missing = parts.matrix @ twist - pull
+    force = np.asarray(np.linalg.lstsq(forbidden.T, missing, rcond=None)[0].reshape(-1, 3))
+    solution = Solution(twist[None], wrench[None], force[None])
+    return respond(network, parts.statics, parts.motion, grips[None], solution)
+
+
+def _constrained(matrix: Floats, modes: tuple[Floats, Floats, Floats], load: Floats) -> Floats:
+    """Return the twists under a load that modes of the stiffness resist."""
+    values, vectors, motions = modes
+    target = motions.T @ load
+    answer = vectors @ (vectors.T @ target / values)
+    residual = np.abs(motions.T @ (matrix @ (motions @ answer)) - target).max()
+    if not residual <= _BACKWARD * (values[-1] * np.abs(answer).max() + np.abs(target).max()):
+        raise SolverError(f"direct solve of {len(matrix) // 6} bricks: backward error too large")
+    return np.asarray(motions @ answer)

@@ -1,4 +1,7 @@
-"""The compliance operator: how one partial structure answers forces at its inner nodes."""
+"""The compliance operator: how one partial structure answers forces at its inner nodes.
+
+The operators of all brick counts come from what grows with the build.
+"""
 
 from __future__ import annotations
 
@@ -8,12 +11,22 @@ from functools import cached_property
 import numpy as np
 
 from seqopt.arrays import Floats, FrozenValue, Ints, frozen
+from seqopt.engines.basis import SPACE, Basis
 from seqopt.engines.interface import FLAGS
-from seqopt.engines.rigid.loads import Loads, loads_of
-from seqopt.engines.rigid.response_maps import AT_ONCE, ResponseMaps
+from seqopt.engines.rigid.growth import Growth, SpanningTree
+from seqopt.engines.rigid.response_maps import (
+    AT_ONCE,
+    Loads,
+    ResponseMaps,
+    inner_edges,
+    inner_motions,
+    loads_of,
+    scene_maps,
+)
+from seqopt.network.network import Network
 
-OF_TWISTS = ("displacement", "brick_twist")  # the other fields follow from wrenches
-FEW = 200  # loads whose responses take little, and are always made once for all
+_OF_TWISTS = ("displacement", "brick_twist")  # the other fields follow from wrenches
+_FEW = 200  # loads whose responses take little, and are always made once for all
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -24,33 +37,15 @@ class ComplianceOperator(FrozenValue):
     (`Network.inner`) of the h bricks that are loaded, l = 2dh loads in all: d = 3 in space, 2 in a
     plane. One more row at the end of all but the first two arrays is the weight of the b bricks.
 
-    Attributes
-    ----------
-    held : (h,) int
-        The bricks that are loaded, ascending.
-    flexibility : (l, l) float
-        Displacements of their inner nodes, m/N.
-    dead_displacement : (l,) float
-        Displacements of these under the weight with no grip, m.
-    twist : (l + 1, kb) float
-        Of the bricks, in k directions.
-    wrench : (l + 1, ks) float
-        Of the s springs that act on their second bodies.
-    maps : ResponseMaps
-        What these mean.
-    at_second : (b,) float
-        Along every brick's inner edge, the weight at its second node, N.
-    axis : (b, d) float
-        Unit vectors along the inner edges, in the directions of the loads.
-    inner_edge : (b,) int
-        The inner edge of each brick.
-    loss : (l,) float
-        How many last digits of the flexibility of each load are rounding.
-    loose : int
-        How many loose motions come after the loads, as further rows and unknowns; see
-        `seqopt.engines.rigid.held_operator`.
-    softness : float
-        Of the springs that they stand on, m/N.
+    ``held`` (h,): the bricks that are loaded, ascending. ``flexibility`` (l, l): displacements of
+    their inner nodes, m/N. ``dead_displacement`` (l,): displacements of these under the weight with
+    no grip, m. ``twist`` (l + 1, kb): of the bricks, in k directions. ``wrench`` (l + 1, ks): of
+    the s springs that act on their second bodies. ``maps``: what these mean. ``at_second`` (b,):
+    along every brick's inner edge, the weight at its second node, N. ``axis`` (b, d): unit vectors
+    along the inner edges, in the directions of the loads. ``inner_edge`` (b,): the inner edge of
+    each brick. ``loss`` (l,): how many last digits of the flexibility of each load are rounding.
+    ``loose``: how many loose motions come after the loads, as further rows and unknowns; see
+    `seqopt.engines.rigid.refinement`. ``softness``: of the springs that they stand on, m/N.
     """
 
     held: Ints
@@ -111,26 +106,14 @@ class ComplianceOperator(FrozenValue):
         return float(2 * own * self.shares[2].max(initial=0.0))
 
     def covers(self, bricks: Ints) -> bool:
-        """Return whether loads act at the nodes of bricks.
-
-        Parameters
-        ----------
-        bricks : (..) int
-        """
+        """Return whether loads act at the nodes of bricks."""
         return len(self.held) == self.bricks or bool((self.place[bricks] >= 0).all())
 
     def load_index(self, columns: Ints) -> Ints:
         """Return which loads act at every grip, and after them all loose motions.
 
-        Parameters
-        ----------
-        columns : (S, r) int
-            Grips as indices into ``network.inner.ravel()``.
-
-        Returns
-        -------
-        (S, rd + m) int
-            Rows of the operator.
+        ``columns`` (S, r): grips as indices into ``network.inner.ravel()``. Result (S, rd + m):
+        rows of the operator.
         """
         every = len(self.held) == self.bricks
         nodes = columns if every else 2 * self.place[columns // 2] + columns % 2
@@ -144,14 +127,8 @@ class ComplianceOperator(FrozenValue):
     def loads(self, index: Ints, force: Floats, weight: float = 1.0) -> Loads:
         """Return forces at loads, and the weight.
 
-        Parameters
-        ----------
-        index : (S, k) int
-            Loads that act.
-        force : (S, k) float
-            By how much, N.
-        weight : float, optional
-            Share of the weight.
+        ``index`` (S, k): loads that act; ``force`` (S, k): by how much, N; ``weight``: share of the
+        weight.
         """
         return loads_of(index, force, len(self.twist), weight)
 
@@ -162,22 +139,10 @@ class ComplianceOperator(FrozenValue):
         and mapped; else those of the loads are mapped, once, and then summed. So are reactions,
         which few of the wrenches tell.
 
-        Parameters
-        ----------
-        name : str
-            Of a field.
-        index : (S, k) int
-            Loads that act.
-        force : (S, k) float
-            By how much, N.
-        loads : Loads, optional
-            The same, if it was made before.
-
-        Returns
-        -------
-        (S, Q) float
+        ``name``: of a field; ``index`` (S, k): loads that act; ``force`` (S, k): by how much, N;
+        ``loads``: the same, if it was made before. Result (S, Q).
         """
-        few = name == "support" or 2 * self.axis.size <= max(FEW, len(index))
+        few = name == "support" or 2 * self.axis.size <= max(_FEW, len(index))
         if few:  # whatever was asked before: answers do not depend on it
             loads = self.loads(index, force) if loads is None else loads
             return loads.sum(getattr(self, name))
@@ -202,7 +167,7 @@ class ComplianceOperator(FrozenValue):
             out[np.arange(len(index)), self.inner_edge[brick[:, i]]] += along[:, i]
 
     def _states(self, name: str) -> Floats:
-        return self.twist if name in OF_TWISTS else self.wrench
+        return self.twist if name in _OF_TWISTS else self.wrench
 
     def _rows(self, name: str) -> Floats:
         return self.maps.apply(name, self._states(name))
@@ -235,3 +200,63 @@ class ComplianceOperator(FrozenValue):
     def brick_twist(self) -> Floats:
         """Twists of all bricks, (l + 1, 6b)."""
         return frozen(self._rows("brick_twist"))
+
+
+class OperatorBuilder:
+    """Makes the operator of any brick count of a tree from what grows with it.
+
+    ``tree``: on which the bricks hang. ``basis``: the directions in which bricks are loaded and
+    move; all by default.
+    """
+
+    def __init__(self, network: Network, tree: SpanningTree, basis: Basis = SPACE) -> None:
+        self.network, self.basis = network, basis
+        self.growth = Growth(network, tree, basis)
+        self._maps = scene_maps(network, basis)
+        self._nodes = inner_motions(network, basis)
+
+    def operator(self, bricks: int, held: Ints | None = None) -> ComplianceOperator:
+        """Return the operator of a partial structure.
+
+        ``bricks``: how many bricks stand, at most as many as the tree has. ``held`` (h,): the
+        bricks at whose nodes loads act, ascending; all by default.
+        """
+        self.growth.reach(bricks)
+        held = np.arange(bricks) if held is None else held
+        which = slice(bricks) if len(held) == bricks else held
+        nodes = self._nodes[which]
+        twist, wrench = self._rows(bricks, which, nodes)
+        moved = _at_nodes(twist.reshape(len(twist), bricks, nodes.shape[2])[:, which], nodes)
+        inner_edge, axis, at_second = inner_edges(self.network, bricks)
+        return ComplianceOperator(
+            held=held,
+            flexibility=moved[:-1],
+            dead_displacement=moved[-1],
+            twist=twist,
+            wrench=wrench,
+            maps=ResponseMaps(self._maps, bricks),
+            at_second=at_second,
+            axis=axis @ self.basis.force.T,
+            inner_edge=inner_edge,
+            loss=np.repeat(self.growth.loss[held], nodes.shape[1]),
+        )
+
+    def _rows(self, bricks: int, which: Ints | slice, nodes: Floats) -> tuple[Floats, Floats]:
+        """Return the twists and wrenches under unit loads at nodes, and under the weight."""
+        k, loads = nodes.shape[2], nodes.shape[0] * nodes.shape[1]
+        springs = int(np.searchsorted(self.network.springs.since, bricks, side="right"))
+        out = []
+        for answers, width in ((self.growth.twist, k * bricks), (self.growth.wrench, k * springs)):
+            by_brick = answers[1 : 1 + k * bricks, :width].reshape(bricks, k, width)
+            rows = np.empty((loads + 1, width))
+            np.matmul(nodes, by_brick[which], out=rows[:-1].reshape(*nodes.shape[:2], width))
+            rows[-1] = answers[0, :width]
+            out.append(rows)
+        return out[0], out[1]
+
+
+def _at_nodes(twist: Floats, nodes: Floats) -> Floats:
+    """Return the displacements (L, 2dh) of nodes for rows of twists (L, h, k)."""
+    out = np.empty((len(twist), *nodes.shape[:2]))
+    np.matmul(twist.transpose(1, 0, 2), nodes.swapaxes(1, 2), out=out.transpose(1, 0, 2))
+    return out.reshape(len(twist), nodes.shape[0] * nodes.shape[1])

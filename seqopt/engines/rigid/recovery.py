@@ -10,22 +10,17 @@ from scipy import sparse
 
 from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.engines.interface import Fields
+from seqopt.network.mechanics import Statics
 from seqopt.network.network import Network
-from seqopt.network.statics import Statics
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Solution(FrozenValue):
     """What determines all fields of S grip sets.
 
-    Attributes
-    ----------
-    twist : (S, 6b) float
-        Of the bricks, m and rad.
-    wrench : (S, J, 6) float
-        Of every spring of the network on its second body, N and N m; zero where it does not act.
-    force : (S, r, 3) float
-        Of the grips, N; two on one brick may share theirs in any way.
+    ``twist`` (S, 6b): of the bricks, m and rad. ``wrench`` (S, J, 6): of every spring of the
+    network on its second body, N and N m; zero where it does not act. ``force`` (S, r, 3): of the
+    grips, N; two on one brick may share theirs in any way.
     """
 
     twist: Floats
@@ -42,16 +37,9 @@ def respond(
 ) -> Fields:
     """Return the fields of grip sets.
 
-    Parameters
-    ----------
-    network : Network
-    statics : Statics
-        Of the network.
-    motion : (3n, 6b) float
-        Displacements of the nodes for unit twists; see `seqopt.network.kinematics.node_motion`.
-    columns : (S, r) int
-        Grips as indices into ``network.inner.ravel()``.
-    solution : Solution
+    ``statics``: of the network. ``motion`` (3n, 6b): displacements of the nodes for unit twists;
+    see `seqopt.network.mechanics.node_motion`. ``columns`` (S, r): grips as indices into
+    ``network.inner.ravel()``.
     """
     twist, wrench, force = solution.twist, solution.wrench, solution.force.copy()
     sets, bricks = len(twist), twist.shape[1] // 6
@@ -72,20 +60,9 @@ def respond(
 def edge_forces(network: Network, statics: Statics, wrench: Floats, load: Floats) -> Floats:
     """Return what the edges carry.
 
-    Parameters
-    ----------
-    network : Network
-    statics : Statics
-        Of the network.
-    wrench : (S, J, 6) float
-        Of every spring of the network on its second body, N and N m.
-    load : (S, 2b, 3) float
-        Forces at the inner nodes, those of grips among them, N.
-
-    Returns
-    -------
-    (S, E) float
-        Tension positive, N.
+    ``statics``: of the network; ``wrench`` (S, J, 6): of every spring of the network on its second
+    body, N and N m; ``load`` (S, 2b, 3): forces at the inner nodes, those of grips among them, N.
+    Result (S, E): tension positive, N.
     """
     sets, bricks = len(load), load.shape[1] // 2
     edges = network.count_edges(bricks)
@@ -98,18 +75,8 @@ def edge_forces(network: Network, statics: Statics, wrench: Floats, load: Floats
 def reactions(network: Network, statics: Statics, wrench: Floats) -> Floats:
     """Return force and moment of every ground end about its fixed point.
 
-    Parameters
-    ----------
-    network : Network
-    statics : Statics
-        Of the network.
-    wrench : (S, J, 6) float
-        Of every spring of the network on its second body, N and N m.
-
-    Returns
-    -------
-    (S, G, 6) float
-        N and N m.
+    ``statics``: of the network; ``wrench`` (S, J, 6): of every spring of the network on its second
+    body, N and N m. Result (S, G, 6): N and N m.
     """
     at_spring = wrench[:, network.springs.support]
     return np.asarray(np.einsum("gij,sgj->sgi", statics.support_of_spring, at_spring))
@@ -118,15 +85,8 @@ def reactions(network: Network, statics: Statics, wrench: Floats) -> Floats:
 def split_pairs(network: Network, columns: Ints, force: Floats, carried: Floats) -> None:
     """Let each of two grips on one brick take what reaches its own node, in place.
 
-    Parameters
-    ----------
-    network : Network
-    columns : (S, r) int
-        Grips as indices into ``network.inner.ravel()``.
-    force : (S, r, 3) float
-        Of the grips, N.
-    carried : (S, E) float
-        By the edges, N.
+    ``columns`` (S, r): grips as indices into ``network.inner.ravel()``; ``force`` (S, r, 3): of the
+    grips, N; ``carried`` (S, E): by the edges, N.
     """
     inner = np.flatnonzero(network.edge_spring < 0)
     edge_of = np.empty(len(network.inner), dtype=np.int64)

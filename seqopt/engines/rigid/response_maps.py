@@ -1,4 +1,4 @@
-"""Which responses the twists of bricks and the wrenches of springs mean."""
+"""Which responses the twists of bricks, the wrenches of springs and the forces at nodes mean."""
 
 from __future__ import annotations
 
@@ -10,31 +10,21 @@ from scipy import sparse
 
 from seqopt.arrays import Floats, FrozenValue, Ints, frozen
 from seqopt.engines.basis import SPACE, Basis
-from seqopt.network.kinematics import node_motion
+from seqopt.network.mechanics import build_statics, node_motion
 from seqopt.network.network import Network
-from seqopt.network.statics import build_statics
 
 AT_ONCE = 2**18  # numbers mapped at a time: they stay in the processor's cache
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class SceneMaps(FrozenValue):
+class _SceneMaps(FrozenValue):
     """What twists and wrenches of all bricks and springs of a scene mean, once all springs act.
 
-    Attributes
-    ----------
-    network : Network
-    basis : Basis
-        k directions of twists and wrenches.
-    edge : (E, kS) sparse
-        What edges carry of wrenches.
-    motion : (3N, kB) sparse
-        How twists move nodes.
-    since : (m,) int
-        Of the entries of ``motion``, from which brick count on they hold; before, where its spring
-        does not act yet, a joint node follows the brick that is there alone.
-    support : (G, k, 6) float
-        Force and moment at every ground end for the wrench of its spring.
+    ``basis``: k directions of twists and wrenches. ``edge`` (E, kS): what edges carry of wrenches.
+    ``motion`` (3N, kB): how twists move nodes. ``since`` (m,): of the entries of ``motion``, from
+    which brick count on they hold; before, where its spring does not act yet, a joint node follows
+    the brick that is there alone. ``support`` (G, k, 6): force and moment at every ground end for
+    the wrench of its spring.
     """
 
     network: Network
@@ -45,15 +35,8 @@ class SceneMaps(FrozenValue):
     support: Floats
 
 
-def scene_maps(network: Network, basis: Basis = SPACE) -> SceneMaps:
-    """Return the maps of a scene.
-
-    Parameters
-    ----------
-    network : Network
-    basis : Basis, optional
-        All directions by default.
-    """
+def scene_maps(network: Network, basis: Basis = SPACE) -> _SceneMaps:
+    """Return the maps of a scene. ``basis``: all directions by default."""
     statics, springs = build_statics(network), network.springs
     pick = np.zeros((3, len(basis.wrench)))
     pick[:, : len(basis.force)] = basis.force.T
@@ -63,7 +46,7 @@ def scene_maps(network: Network, basis: Basis = SPACE) -> SceneMaps:
         each = sparse.eye_array(len(network.inner))
         motion = sparse.csr_array(motion @ sparse.kron(each, basis.wrench.T))
     since = np.where(network.node_spring >= 0, springs.since[network.node_spring], 0)
-    return SceneMaps(
+    return _SceneMaps(
         network=network,
         basis=basis,
         edge=sparse.csr_array(statics.edge_of_spring @ sparse.kron(every, pick)),
@@ -75,17 +58,10 @@ def scene_maps(network: Network, basis: Basis = SPACE) -> SceneMaps:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ResponseMaps(FrozenValue):
-    """What twists (.., kb) and wrenches (.., ks) of the first b bricks and s springs mean.
+    """What twists (.., kb) and wrenches (.., ks) of the first b bricks and s springs mean."""
 
-    Attributes
-    ----------
-    scene : SceneMaps
-    bricks : int
-        How many stand.
-    """
-
-    scene: SceneMaps
-    bricks: int
+    scene: _SceneMaps
+    bricks: int  # how many stand
 
     @cached_property
     def edge(self) -> sparse.csr_array:
@@ -125,19 +101,9 @@ class ResponseMaps(FrozenValue):
     def apply(self, name: str, states: Floats, out: Floats | None = None) -> Floats:
         """Return a field of states.
 
-        Parameters
-        ----------
-        name : str
-            Of the field.
-        states : (S, n) float
-            Wrenches; of displacements and brick twists, twists.
-        out : (S, Q) float, optional
-            Where to put it.
-
-        Returns
-        -------
-        (S, Q) float
-            Of edge forces, without what loads on the bricks' nodes add to the inner edges.
+        ``name``: of the field. ``states`` (S, n): wrenches; of displacements and brick twists,
+        twists. ``out`` (S, Q): where to put it. Result (S, Q): of edge forces, without what loads
+        on the bricks' nodes add to the inner edges.
         """
         out = np.empty((len(states), self.count(name))) if out is None else out
         if name == "support":
@@ -175,3 +141,67 @@ def _leading(
     before = np.concatenate([[0], np.cumsum(kept)])
     entries = data[kept], maps.indices[:stop][kept], before[maps.indptr[: rows + 1]]
     return sparse.csr_array(entries, shape=(rows, width))
+
+
+_GATHERED = 2**16  # numbers up to which gathering rows takes less than making a sparse matrix
+
+
+@dataclass(frozen=True)
+class Loads:
+    """Forces at the loads of an operator, and the weight: few of hundreds, for each of S sets."""
+
+    index: Ints  # (S, k + 1); rows of the operator that are loaded, the weight's last
+    share: Floats  # (S, k + 1); by how much, N; of the weight, which part
+    count: int  # how many rows there are, the weight's among them
+
+    def sum(self, rows: Floats) -> Floats:
+        """Return the sums of what the loads mean. ``rows`` (count, Q). Result (S, Q)."""
+        if self.index.size * rows.shape[1] <= _GATHERED:  # in the order of the sparse product
+            return np.asarray(np.einsum("sk,skq->sq", self.share, rows[self.index]))
+        return np.asarray(self.matrix @ rows)
+
+    @cached_property
+    def matrix(self) -> sparse.csr_array:
+        """All shares, (S, count): with many sets half the time of a dense product."""
+        first = np.arange(0, self.index.size + 1, self.index.shape[1], dtype=np.int32)
+        entries = self.share.ravel(), self.index.ravel(), first
+        return sparse.csr_array(entries, shape=(len(self.index), self.count))
+
+
+def loads_of(index: Ints, force: Floats, count: int, weight: float = 1.0) -> Loads:
+    """Return forces at the loads of an operator beside the weight.
+
+    ``index`` (S, k): rows of the operator that are loaded; ``force`` (S, k): by how much, N;
+    ``count``: how many rows there are, the weight's among them, which comes last; ``weight``: share
+    of the weight.
+    """
+    sets, loads = index.shape
+    rows = np.full((sets, loads + 1), count - 1, dtype=np.int32)
+    rows[:, :-1] = index
+    share = np.full((sets, loads + 1), weight)
+    share[:, :-1] = force
+    return Loads(rows, share, count)
+
+
+def inner_edges(network: Network, bricks: int) -> tuple[Ints, Floats, Floats]:
+    """Return the inner edges of bricks, and what weighs on their second nodes.
+
+    Results: ``edge`` (b,); ``axis`` (b, 3): unit vectors to the second nodes; ``weight`` (b,):
+    there, along the edge, N.
+    """
+    edge = np.flatnonzero(network.edge_spring[: network.count_edges(bricks)] < 0)
+    axis = network.edge_axis[edge]
+    return edge, axis, np.einsum("bi,bi->b", axis, network.inner_weight[1 : 2 * bricks : 2])
+
+
+def inner_motions(network: Network, basis: Basis) -> Floats:
+    """Return the displacements of the inner nodes of bricks for their unit twists.
+
+    ``basis``: d directions of forces, k of twists. Result (n, 2d, k).
+    """
+    count, forces = len(network.inner), len(basis.force)
+    arms = network.node_position[network.inner] - network.centroid[:count, None]
+    out = np.zeros((count, 2, forces, len(basis.wrench)))
+    out[..., :forces] = np.eye(forces)
+    out[..., forces:] = basis.levers(arms).swapaxes(-1, -2)
+    return out.reshape(count, 2 * forces, len(basis.wrench))

@@ -12,45 +12,27 @@ from seqopt.engines.interface import SHAPES, Fields, Want, names_wanted
 from seqopt.engines.rigid.grip_equations import Pairs, grip_forces, pairs_of, share_pairs, trusted
 from seqopt.engines.rigid.operator import ComplianceOperator
 
-CHUNK = 4096  # grip sets per pass: keeps the work arrays in the processor's cache
+_CHUNK = 4096  # grip sets per pass: keeps the work arrays in the processor's cache
 ACCURACY = 1e-9  # largest error of fields over the largest of each
-UNSEEN = 100 * np.finfo(float).eps  # largest error that was met over what is read off the equations
-CANCEL = 10.0  # what the grips undo over what is left, where pivots do not
+_UNSEEN = 100 * np.finfo(float).eps  # largest error met, over what is read off the equations
+_CANCEL = 10.0  # what the grips undo over what is left, where pivots do not
 
 
 @dataclass(frozen=True)
 class Tried:
-    """What an operator alone says about grip sets.
-
-    Attributes
-    ----------
-    operator : ComplianceOperator
-    columns : (S, r) int
-        Grips as indices into ``network.inner.ravel()``.
-    index : (S, k) int
-        Its loads at the grips.
-    force : (S, k) float
-        There, N; zero where it cannot be trusted.
-    pairs : Pairs
-        Of grips on one brick.
-    trusted : (S,) bool
-        Which sets it answers well enough.
-    """
+    """What an operator alone says about grip sets."""
 
     operator: ComplianceOperator
-    columns: Ints
-    index: Ints
-    force: Floats
-    pairs: Pairs
-    trusted: Bools
+    columns: Ints  # (S, r); grips as indices into ``network.inner.ravel()``
+    index: Ints  # (S, k); its loads at the grips
+    force: Floats  # (S, k); there, N; zero where it cannot be trusted
+    pairs: Pairs  # of grips on one brick
+    trusted: Bools  # (S,); which sets it answers well enough
 
     def fields(self, want: Want) -> dict[str, Floats]:
         """Return the fields of all sets by name.
 
-        Returns
-        -------
-        dict of str to array
-            As of `Fields`, grip forces in the directions of the operator.
+        Result: as of `Fields`, grip forces in the directions of the operator.
         """
         operator, columns = self.operator, self.columns
         force = self.force.copy() if len(self.pairs.sets) else self.force
@@ -77,24 +59,18 @@ def try_forces(
 ) -> Tried:
     """Return what an operator alone says about grip sets, and which of them it answers well enough.
 
-    Parameters
-    ----------
-    operator : ComplianceOperator
-    columns : (S, r) int
-        Grips as indices into ``network.inner.ravel()``.
-    even : bool
-        Whether the joints are about equally stiff: where not, pivots do not tell the whole error.
-    accuracy : float
-        Largest error of fields, over the largest entry of each, that is accepted.
+    ``columns`` (S, r): grips as indices into ``network.inner.ravel()``; ``even``: whether the
+    joints are about equally stiff: where not, pivots do not tell the whole error; ``accuracy``:
+    largest error of fields, over the largest entry of each, that is accepted.
     """
     sets, index, pairs = len(columns), operator.load_index(columns), pairs_of(operator, columns)
     force, good = np.empty(index.shape), np.empty(sets, dtype=bool)
-    for start in range(0, sets, CHUNK):
-        part = slice(start, start + CHUNK)
-        mine = pairs if sets <= CHUNK else pairs.within(start, start + CHUNK)
+    for start in range(0, sets, _CHUNK):
+        part = slice(start, start + _CHUNK)
+        mine = pairs if sets <= _CHUNK else pairs.within(start, start + _CHUNK)
         found = grip_forces(operator, columns[part], index[part], mine)
         force[part] = found.force
-        good[part] = trusted(operator, index[part], found, accuracy / UNSEEN)
+        good[part] = trusted(operator, index[part], found, accuracy / _UNSEEN)
     force[~good] = 0.0
     if not even:
         good &= ~cancels(operator, index, force)
@@ -111,20 +87,9 @@ def solve_batch(
 ) -> tuple[Fields, Bools]:
     """Return the fields of grip sets, and which of them are accurate.
 
-    Parameters
-    ----------
-    operator : ComplianceOperator
-    columns : (S, r) int
-        Grips as indices into ``network.inner.ravel()``.
-    want : Want, optional
-    even, accuracy : optional
-        As of `try_forces`: joints about equally stiff, `ACCURACY`.
-
-    Returns
-    -------
-    fields : Fields
-        Grip forces in the directions of the operator.
-    trusted : (S,) bool
+    ``columns`` (S, r): grips as indices into ``network.inner.ravel()``; ``even``, ``accuracy``: as
+    of `try_forces`: joints about equally stiff, `ACCURACY`. Results: ``fields``: grip forces in the
+    directions of the operator; ``trusted`` (S,).
     """
     tried = try_forces(operator, columns, even=even, accuracy=accuracy)
     return Fields(**tried.fields(want)), tried.trusted
@@ -133,27 +98,18 @@ def solve_batch(
 def cancels(operator: ComplianceOperator, index: Ints, force: Floats) -> Bools:
     """Return whether motions cancel at the grips of sets.
 
-    Parameters
-    ----------
-    operator : ComplianceOperator
-    index : (S, k) int
-        Rows of the operator that the grips load.
-    force : (S, k) float
-        There, N.
-
-    Returns
-    -------
-    (S,) bool
+    ``index`` (S, k): rows of the operator that the grips load; ``force`` (S, k): there, N. Result
+    (S,).
     """
     out = np.zeros(len(index), dtype=bool)
     if not index.size:
         return out
     size = np.abs(operator.flexibility)
     dead = operator.dead_displacement
-    for start in range(0, len(index), CHUNK):
-        rows, pull = index[start : start + CHUNK], force[start : start + CHUNK]
+    for start in range(0, len(index), _CHUNK):
+        rows, pull = index[start : start + _CHUNK], force[start : start + _CHUNK]
         held = rows[:, :, None], rows[:, None]
         parts = np.einsum("sij,sj->si", size[held], np.abs(pull)) + np.abs(dead[rows])
         left = np.abs(operator.answer("displacement", rows, pull)).max(axis=1)
-        out[start : start + CHUNK] = parts.max(axis=1) > CANCEL * left
+        out[start : start + _CHUNK] = parts.max(axis=1) > _CANCEL * left
     return out

@@ -9,23 +9,17 @@ import numpy as np
 from scipy import sparse
 
 from seqopt.arrays import Floats, FrozenValue, Ints, frozen
-from seqopt.network.kinematics import deformation, node_motion, point_motion
+from seqopt.network.mechanics import Statics, build_statics, deformation, node_motion, point_motion
 from seqopt.network.network import Network
-from seqopt.network.statics import Statics, build_statics
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Shared(FrozenValue):
     """What the systems of all brick counts are cut from.
 
-    Attributes
-    ----------
-    statics : Statics
-        Of the network.
-    gap : (6S, 6B) sparse
-        Deformation of every spring, in its own axes, for unit twists.
-    inner : (6B, 6B) sparse
-        Displacements of the inner nodes for unit twists, in the order of ``network.inner``.
+    ``statics``: of the network; ``gap`` (6S, 6B): deformation of every spring, in its own axes, for
+    unit twists; ``inner`` (6B, 6B): displacements of the inner nodes for unit twists, in the order
+    of ``network.inner``.
     """
 
     statics: Statics
@@ -37,27 +31,12 @@ class Shared(FrozenValue):
 class Ungripped(FrozenValue):
     """What the systems of all grip sets of a partial structure have in common, scaled to order one.
 
-    Attributes
-    ----------
-    network : Network
-    bricks : int
-    inner : (6b, 6b) sparse
-        Those of the inner nodes for scaled twists, in the order of ``network.inner``, m.
-    statics : Statics
-        Of the network.
-    deformation : (6s, 6b) sparse
-        Scaled deformation of the acting springs, in their own axes, for scaled twists.
-    stiffness : (6s,) float
-        Over ``unit``.
-    matrix : (6s + 6b,) square sparse
-        The system without grips.
-    load : (6b,) float
-        The weight, scaled.
-    acting : (s,) int
-    twist_unit, wrench_unit : (6b,), (6s,) float
-        What turns scaled twists into m and rad, scaled wrenches into N and N m.
-    unit : float
-        N/m.
+    ``inner`` (6b, 6b): those of the inner nodes for scaled twists, in the order of
+    ``network.inner``, m; ``statics``: of the network; ``deformation`` (6s, 6b): scaled deformation
+    of the acting springs, in their own axes, for scaled twists; ``stiffness`` (6s,): over ``unit``;
+    ``matrix`` (6s + 6b,): the system without grips; ``load`` (6b,): the weight, scaled; ``acting``
+    (s,); ``twist_unit``, ``wrench_unit`` (6b,), (6s,): what turns scaled twists into m and rad,
+    scaled wrenches into N and N m; ``unit``: N/m.
     """
 
     network: Network
@@ -96,13 +75,7 @@ def share(network: Network) -> Shared:
 def ungripped_system(network: Network, bricks: int, shared: Shared | None = None) -> Ungripped:
     """Return what all systems of a partial structure have in common.
 
-    Parameters
-    ----------
-    network : Network
-    bricks : int
-        How many bricks stand.
-    shared : Shared, optional
-        From `share`; made anew by default.
+    ``shared``: from `share`; made anew by default.
     """
     shared = share(network) if shared is None else shared
     springs = network.springs

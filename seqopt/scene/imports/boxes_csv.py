@@ -13,30 +13,21 @@ from seqopt.errors import SceneError
 from seqopt.scene.blocks import BOX_CORNERS, BOX_FACES
 from seqopt.scene.checks import short
 from seqopt.scene.imports.content import MOST_BLOCKS, Content, FileBlock
-from seqopt.scene.imports.documents import LARGEST
+from seqopt.scene.imports.json_reading import LARGEST
 
-NEEDED = ("x", "y", "z", "length", "width", "height")
-TURNS = ("roll", "pitch", "yaw")
-COLUMNS = (*NEEDED, *TURNS, "name", "support", "density", "course")
+_NEEDED = ("x", "y", "z", "length", "width", "height")
+_TURNS = ("roll", "pitch", "yaw")
+_COLUMNS = (*_NEEDED, *_TURNS, "name", "support", "density", "course")
 YES, NO = ("1", "true", "yes"), ("", "0", "false", "no")
 
 
 def read_boxes(text: str, source: str) -> Content:
     r"""Return the boxes of a table.
 
-    Parameters
-    ----------
-    text : str
-        CSV. Columns ``x``, ``y``, ``z`` (the centroid), ``length``, ``width`` and ``height`` (along
-        the box's own x, y and z) are needed; ``roll``, ``pitch``, ``yaw`` (degrees about x, then y,
-        then z), ``name``, ``support`` (1 or 0), ``density`` (kg/m³) and ``course`` may be there.
-    source : str
-        What to call it in messages.
-
-    Raises
-    ------
-    SceneError
-        If it is no such table.
+    ``text``: CSV. Columns ``x``, ``y``, ``z`` (the centroid), ``length``, ``width`` and ``height``
+    (along the box's own x, y and z) are needed; ``roll``, ``pitch``, ``yaw`` (degrees about x, then
+    y, then z), ``name``, ``support`` (1 or 0), ``density`` (kg/m³) and ``course`` may be there.
+    Raises `SceneError` if it is no such table.
 
     Examples
     --------
@@ -59,13 +50,13 @@ def read_boxes(text: str, source: str) -> Content:
 
 
 def _check_columns(source: str, names: list[str]) -> None:
-    missing = [name for name in NEEDED if name not in names]
+    missing = [name for name in _NEEDED if name not in names]
     if missing:
-        raise SceneError(f"{source}: column {missing[0]} is missing; give {', '.join(NEEDED)}")
+        raise SceneError(f"{source}: column {missing[0]} is missing; give {', '.join(_NEEDED)}")
     for name in names:
-        if name not in COLUMNS or names.count(name) > 1:
-            why = "occurs twice" if name in COLUMNS else "is not known"
-            raise SceneError(f"{source}: column {short(name)} {why}; give {', '.join(COLUMNS)}")
+        if name not in _COLUMNS or names.count(name) > 1:
+            why = "occurs twice" if name in _COLUMNS else "is not known"
+            raise SceneError(f"{source}: column {short(name)} {why}; give {', '.join(_COLUMNS)}")
 
 
 def _box(where: str, key: str, row: dict[str, str]) -> FileBlock:
@@ -73,7 +64,7 @@ def _box(where: str, key: str, row: dict[str, str]) -> FileBlock:
     size = np.array([_number(where, row, name) for name in ("length", "width", "height")])
     if not size.min() > 0:
         raise SceneError(f"{where}: its sizes are {size.tolist()}; give positive ones")
-    angles = [_number(where, row, name, "0") for name in TURNS]
+    angles = [_number(where, row, name, "0") for name in _TURNS]
     frame = Rotation.from_euler("xyz", angles, degrees=True).as_matrix()
     density = _number(where, row, "density", "nan")
     course = _number(where, row, "course", "nan")

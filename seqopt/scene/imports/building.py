@@ -2,49 +2,79 @@
 
 from __future__ import annotations
 
+import heapq
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
 from seqopt.errors import SceneError
 from seqopt.scene.blocks import as_vectors, block_brick
 from seqopt.scene.checks import LARGEST_NUMBER, positive, short
-from seqopt.scene.face_joints import face_ground, face_joint
+from seqopt.scene.imports.contacts import GROUND, Contacts, face_ground, face_joint, find_contacts
 from seqopt.scene.imports.content import MOST_CORNERS, UNITS, UPS, Content, FileJoint, Given
-from seqopt.scene.imports.ordering import upward_order
-from seqopt.scene.imports.tidying import Tidied, tidy_shape
-from seqopt.scene.imports.touching import GROUND, Touching, find_touching
-from seqopt.scene.library.law import MASONRY, JointLaw
-from seqopt.scene.library.laying import mobile_robots, whole_number
+from seqopt.scene.imports.repair import Repaired, repair_shape
+from seqopt.scene.library.common import MASONRY, JointLaw, mobile_robots, whole_number
 from seqopt.scene.parts import Brick, Ground, Joint
 from seqopt.scene.scene import Scene
 from seqopt.scene.shape import Polyhedron
 
-STUB = 0.1  # of a ground end, over the smallest dimension of its block
+
+def upward_order(
+    rank: Sequence[tuple[float, ...]],
+    pairs: Iterable[tuple[int, int]],
+    starts: Iterable[int],
+    keys: Sequence[str],
+) -> list[int]:
+    """Return blocks in an order in which each touches the ground or what stands before it.
+
+    ``rank``: of every block; of those that can be placed, the lowest is next. ``pairs``: which
+    touch each other. ``starts``: which touch the ground. Raises `SceneError` if some touch nothing
+    that leads to the ground.
+
+    Examples
+    --------
+    >>> upward_order([(0,), (2,), (1,)], [(0, 2), (2, 1)], [0], "abc")
+    [0, 2, 1]
+    """
+    beside = _beside(len(rank), pairs)
+    ready = [(rank[i], i) for i in sorted(set(starts))]
+    heapq.heapify(ready)
+    seen, order = {i for _, i in ready}, list[int]()
+    while ready:
+        i = heapq.heappop(ready)[1]
+        order.append(i)
+        for j in beside[i] - seen:
+            seen.add(j)
+            heapq.heappush(ready, (rank[j], j))
+    lost = [keys[i] for i in range(len(rank)) if i not in seen]
+    if lost:
+        raise SceneError(
+            f"{len(lost)} blocks touch nothing that leads to the ground, the first of them "
+            f"{', '.join(lost[:5])}; name supports, or allow a wider gap between faces"
+        )
+    return order
+
+
+def _beside(count: int, pairs: Iterable[tuple[int, int]]) -> list[set[int]]:
+    """Return what each of so many blocks touches."""
+    out: list[set[int]] = [set() for _ in range(count)]
+    for a, b in pairs:
+        out[a].add(b)
+        out[b].add(a)
+    return out
+
+
+_STUB = 0.1  # of a ground end, over the smallest dimension of its block
 
 
 def build_scene(content: Content, given: Given, source: str) -> Scene:
     """Return the scene of what a file and its user say.
 
-    Parameters
-    ----------
-    content : Content
-    given : Given
-    source : str
-        What the file is called, for messages and the provenance.
-
-    Returns
-    -------
-    Scene
-        What was read, mended and assumed stands in its provenance, a line each.
-
-    Raises
-    ------
-    SceneError
-        If the file lacks what the user did not give, or its assembly cannot be built.
-    FileError
-        If shapely is not installed.
+    ``source``: what the file is called, for messages and the provenance. Result: what was read,
+    mended and assumed stands in its provenance, a line each. Raises `SceneError` if the file lacks
+    what the user did not give, or its assembly cannot be built; `FileError` if shapely is not
+    installed.
     """
     try:
         said = list(content.said)
@@ -53,7 +83,7 @@ def build_scene(content: Content, given: Given, source: str) -> Scene:
         supports = _supports(content, given, said)
         blocks = _tidied(content, supports, said)
         bricks = _bricks(content, given, blocks, supports, said)
-        touching = find_touching(content, given, blocks, bricks)
+        touching = find_contacts(content, given, blocks, bricks)
         said += touching.said
         law = _law(content, given, touching, said)
         springs = _springs(touching, bricks, law)
@@ -125,9 +155,9 @@ def _supports(content: Content, given: Given, said: list[str]) -> set[int]:
     return {place[key] for key in keys}
 
 
-def _tidied(content: Content, supports: set[int], said: list[str]) -> list[Tidied]:
+def _tidied(content: Content, supports: set[int], said: list[str]) -> list[Repaired]:
     """Return the blocks as polyhedra, and say what was mended."""
-    blocks = [tidy_shape(b, may_be_open=i in supports) for i, b in enumerate(content.blocks)]
+    blocks = [repair_shape(b, may_be_open=i in supports) for i, b in enumerate(content.blocks)]
     total = sum((block.mended for block in blocks), Counter[str]())
     said += [f"{text}: {count}" for text, count in total.items()]
     return blocks
@@ -136,7 +166,7 @@ def _tidied(content: Content, supports: set[int], said: list[str]) -> list[Tidie
 def _bricks(
     content: Content,
     given: Given,
-    blocks: Sequence[Tidied],
+    blocks: Sequence[Repaired],
     supports: set[int],
     said: list[str],
 ) -> dict[int, Brick]:
@@ -165,10 +195,7 @@ def _bricks(
 def block_numbers(keys: Sequence[str]) -> list[int]:
     """Return the names of bricks: the keys of their blocks where these are numbers, else from 1.
 
-    Parameters
-    ----------
-    keys : sequence of str
-        Of all blocks of a file.
+    ``keys``: of all blocks of a file.
     """
     if all(key.isascii() and key.isdigit() and len(key) < 10 for key in keys):
         found = [int(key) for key in keys]
@@ -177,7 +204,7 @@ def block_numbers(keys: Sequence[str]) -> list[int]:
     return [*range(1, len(keys) + 1)]
 
 
-def _law(content: Content, given: Given, touching: Touching, said: list[str]) -> JointLaw:
+def _law(content: Content, given: Given, touching: Contacts, said: list[str]) -> JointLaw:
     law = given.law or content.law or MASONRY
     if touching.faces or any(joint.translational is None for joint in touching.joints):
         origin = "as given" if given.law else "of the file" if content.law else "by default"
@@ -187,14 +214,14 @@ def _law(content: Content, given: Given, touching: Touching, said: list[str]) ->
 
 
 def _springs(
-    touching: Touching, bricks: Mapping[int, Brick], law: JointLaw
+    touching: Contacts, bricks: Mapping[int, Brick], law: JointLaw
 ) -> tuple[tuple[Joint, ...], tuple[Ground, ...]]:
     """Return the joints and ground ends where blocks touch."""
     made: list[Joint | Ground] = []
     for (a, b), face in touching.faces:
         last = bricks[b]
         if a == GROUND:
-            made.append(face_ground(last.name, face, law, STUB * min(last.dimensions)))
+            made.append(face_ground(last.name, face, law, _STUB * min(last.dimensions)))
         else:
             made.append(face_joint((bricks[a].name, last.name), face, law))
     made += [_faceless(joint, bricks, law) for joint in touching.joints]
@@ -224,7 +251,7 @@ def _faceless(joint: FileJoint, bricks: Mapping[int, Brick], law: JointLaw) -> J
             translational_stiffness=shift,
             rotational_stiffness=turn,
         )
-    behind = joint.position - STUB * min(bricks[b].dimensions) * joint.along
+    behind = joint.position - _STUB * min(bricks[b].dimensions) * joint.along
     return Ground(
         brick=bricks[b].name,
         position=position,
@@ -237,7 +264,7 @@ def _faceless(joint: FileJoint, bricks: Mapping[int, Brick], law: JointLaw) -> J
 
 
 def _order(
-    touching: Touching, content: Content, bricks: Mapping[int, Brick], said: list[str]
+    touching: Contacts, content: Content, bricks: Mapping[int, Brick], said: list[str]
 ) -> list[int]:
     """Return the places of the bricks in the order of building."""
     places = [*bricks]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -10,19 +12,16 @@ from seqopt.arrays import Floats
 from seqopt.errors import SceneError
 from seqopt.scene.blocks import BOX_CORNERS, BOX_FACES
 from seqopt.scene.checks import short
-from seqopt.scene.imports.documents import entry, listing, mapping, number, point
+from seqopt.scene.imports.json_reading import Entry, entry, listing, mapping, number, point
 
-PLAIN = 1e-9  # by how much rounding may change the last row of a transformation
-Solid = tuple[Floats, list[list[int]]]
+_PLAIN = 1e-9  # by how much rounding may change the last row of a transformation
+_Solid = tuple[Floats, list[list[int]]]
 
 
 def payload(value: Any) -> Any:
     """Return what a serialized object holds, under whichever key its version uses.
 
-    Returns
-    -------
-    object
-        Itself, if it wraps nothing.
+    Result: itself, if it wraps nothing.
     """
     for _ in range(4):
         if not isinstance(value, dict):
@@ -37,36 +36,18 @@ def payload(value: Any) -> Any:
 def kind(value: Any) -> str:
     """Return the last part of what a serialized object says that it is, in small letters.
 
-    Returns
-    -------
-    str
-        Empty if it says nothing.
+    Result: empty if it says nothing.
     """
     name = value.get("dtype") if isinstance(value, dict) else None
     return name.rsplit("/", 1)[-1].lower() if isinstance(name, str) else ""
 
 
-def mesh(where: str, value: Any) -> Solid:
+def mesh(where: str, value: Any) -> _Solid:
     """Return the vertices and faces of a mesh.
 
-    Parameters
-    ----------
-    where : str
-        What it is, for messages.
-    value : object
-        With ``vertex`` and ``face``, as `compas.datastructures.Mesh` writes them, or with
-        ``vertices`` and ``faces``, as `compas.geometry.Polyhedron` does; or a box.
-
-    Returns
-    -------
-    vertices : (V, 3) float
-    faces : list of list of int
-        Places among the vertices.
-
-    Raises
-    ------
-    SceneError
-        If it is none.
+    ``value``: with ``vertex`` and ``face``, as `compas.datastructures.Mesh` writes them, or with
+    ``vertices`` and ``faces``, as `compas.geometry.Polyhedron` does; or a box. Results:
+    ``vertices`` (V, 3); ``faces``: places among the vertices.
     """
     held = payload(value)
     if isinstance(held, dict) and {"xsize", "ysize", "zsize"} <= set(held):
@@ -78,7 +59,7 @@ def mesh(where: str, value: Any) -> Solid:
     return _halfedge(where, held)
 
 
-def _halfedge(where: str, held: Any) -> Solid:
+def _halfedge(where: str, held: Any) -> _Solid:
     """Return a mesh whose vertices and faces have keys."""
     vertex = mapping(f"{where}: vertex", entry(where, held, "vertex"))
     face = mapping(f"{where}: face", entry(where, held, "face"))
@@ -104,7 +85,7 @@ def _places(where: str, side: Any, place: dict[str, int] | None) -> list[int]:
     return out[:-1] if len(out) > 1 and out[0] == out[-1] else out
 
 
-def _box(where: str, held: dict[str, Any]) -> Solid:
+def _box(where: str, held: dict[str, Any]) -> _Solid:
     """Return a box, whose frame is in its middle."""
     size = [number(f"{where}: {key}", held[key]) for key in ("xsize", "ysize", "zsize")]
     origin, axes = frame(where, held.get("frame"))
@@ -114,23 +95,8 @@ def _box(where: str, held: dict[str, Any]) -> Solid:
 def frame(where: str, value: Any) -> tuple[Floats, Floats]:
     """Return a frame.
 
-    Parameters
-    ----------
-    where : str
-        What it is, for messages.
-    value : object
-        With ``point``, ``xaxis`` and ``yaxis``; the world's if None.
-
-    Returns
-    -------
-    origin : (3,) float
-    axes : (3, 3) float
-        Rows are unit vectors.
-
-    Raises
-    ------
-    SceneError
-        If it is none.
+    ``value``: with ``point``, ``xaxis`` and ``yaxis``; the world's if None. Results: ``origin``
+    (3,); ``axes`` (3, 3): rows are unit vectors.
     """
     if value is None:
         return np.zeros(3), np.eye(3)
@@ -146,24 +112,10 @@ def frame(where: str, value: Any) -> tuple[Floats, Floats]:
     return origin, np.stack([first, np.cross(third, first), third])
 
 
-def transformation(where: str, value: Any) -> Floats:
+def _transformation(where: str, value: Any) -> Floats:
     """Return a transformation.
 
-    Parameters
-    ----------
-    where : str
-        What it is, for messages.
-    value : object
-        With a ``matrix``, or a matrix; none if None.
-
-    Returns
-    -------
-    (4, 4) float
-
-    Raises
-    ------
-    SceneError
-        If it is none.
+    ``value``: with a ``matrix``, or a matrix; none if None. Result (4, 4).
     """
     if value is None:
         return np.eye(4)
@@ -177,21 +129,80 @@ def transformation(where: str, value: Any) -> Floats:
     matrix = [[number(where, x) for x in listing(where, row)] for row in rows]
     if [len(row) for row in matrix] != [4] * 4:
         raise SceneError(f"{where} is {short(value)}; a matrix of four by four is expected")
-    if not np.allclose(matrix[3], (0.0, 0.0, 0.0, 1.0), rtol=0.0, atol=PLAIN):
+    if not np.allclose(matrix[3], (0.0, 0.0, 0.0, 1.0), rtol=0.0, atol=_PLAIN):
         raise SceneError(f"{where} ends in {matrix[3]}; give a matrix that ends in 0, 0, 0, 1")
     return np.array(matrix)
 
 
 def moved(points: Floats, matrix: Floats) -> Floats:
-    """Return points after a transformation.
-
-    Parameters
-    ----------
-    points : (k, 3) float
-    matrix : (4, 4) float
-
-    Returns
-    -------
-    (k, 3) float
-    """
+    """Return points after a transformation. ``points`` (k, 3); ``matrix`` (4, 4). Result (k, 3)."""
     return np.asarray(points @ matrix[:3, :3].T + matrix[:3, 3])
+
+
+@dataclass(frozen=True)
+class Element:
+    """An element of a model."""
+
+    where: str  # what to call it in messages
+    kind: str  # the last part of what it says that it is, in small letters
+    guid: str  # its identifier
+    held: Entry  # what it holds
+    matrix: Floats  # (4, 4); from its own coordinates to those of the model's world
+
+
+def read_elements(source: str, held: Entry) -> list[Element]:
+    """Return the elements of a model, each where COMPAS places it.
+
+    An element's transformation is relative to its parent in the tree, and the first of them to the
+    model's.
+
+    ``held``: what the model holds. Result: groups among them. Raises `SceneError` if it has no
+    elements, or its tree is none.
+    """
+    rows = [*by_guid(f"{source}: elements", entry(source, held, "elements"))]
+    named = {guid: f"{source}: element {i}" for i, (guid, _) in enumerate(rows)}
+    inner = {guid: mapping(named[guid], payload(item)) for guid, item in rows}
+    placed: dict[str | None, Floats] = {
+        None: _transformation(f"{source}: transformation", held.get("transformation"))
+    }
+    for guid, parent in _tree(source, held):
+        if guid not in inner or guid in placed:
+            why = "occurs twice" if guid in placed else "is not there"
+            raise SceneError(f"{source}: element {short(guid)} of the tree {why}")
+        placed[guid] = placed[parent] @ _own(named[guid], inner[guid])
+    for guid in inner.keys() - placed.keys():
+        placed[guid] = placed[None] @ _own(named[guid], inner[guid])
+    return [
+        Element(named[guid], kind(item), guid, inner[guid], placed[guid]) for guid, item in rows
+    ]
+
+
+def by_guid(where: str, found: Any) -> Iterator[tuple[str, Entry]]:
+    """Yield serialized objects, which stand by their identifiers or in a list, with these.
+
+    Raises `SceneError` if they are neither.
+    """
+    listed = not isinstance(found, dict)
+    for key, item in enumerate(listing(where, found)) if listed else found.items():
+        held = mapping(f"{where} {key}", item)
+        yield str(held.get("guid", key) if listed else key), held
+
+
+def _own(where: str, held: Entry) -> Floats:
+    """Return the transformation of an element to its parent; early ones have a frame too."""
+    frame = _transformation(f"{where}: frame", held.get("frame"))
+    return frame @ _transformation(f"{where}: transformation", held.get("transformation"))
+
+
+def _tree(source: str, held: Entry) -> Iterator[tuple[str, str | None]]:
+    """Yield the identifiers of elements and of their parents, parents first."""
+    tree = mapping(f"{source}: tree", payload(held.get("tree") or {}))
+    waiting: list[tuple[Any, str | None]] = [(tree.get("root") or {}, None)]
+    while waiting:
+        node, above = waiting.pop()
+        guid = mapping(f"{source}: a node of the tree", node).get("element")
+        if guid is not None:
+            yield str(guid), above
+            above = str(guid)
+        children = listing(f"{source}: children in the tree", node.get("children") or [])
+        waiting += [(child, above) for child in children]

@@ -10,57 +10,40 @@ from typing import Any
 from seqopt.errors import SceneError, SceneWarning
 from seqopt.files import read_bytes, read_text
 from seqopt.scene.checks import printable, short
-from seqopt.scene.doubts import warn_of
 from seqopt.scene.imports.boxes_csv import read_boxes
 from seqopt.scene.imports.building import build_scene
-from seqopt.scene.imports.compas_assembly import read_assembly
 from seqopt.scene.imports.compas_data import kind
-from seqopt.scene.imports.compas_dem import read_model
-from seqopt.scene.imports.compas_timber import read_timber
+from seqopt.scene.imports.compas_models import read_assembly, read_model, read_timber
 from seqopt.scene.imports.content import Content, Given
-from seqopt.scene.imports.documents import parse_json
 from seqopt.scene.imports.frames import read_frame
+from seqopt.scene.imports.json_reading import parse_json
 from seqopt.scene.imports.meshes import read_mesh, read_obj
 from seqopt.scene.scene import Scene
+from seqopt.scene.scene_file import warn_of
 
-DOCUMENTS: dict[str, Callable[[Any, str], Content]] = {
+_DOCUMENTS: dict[str, Callable[[Any, str], Content]] = {
     "compas_assembly": read_assembly,
     "compas_dem": read_model,
     "compas_timber": read_timber,
     "frame": read_frame,
 }
-SUFFIXES = {".csv": "boxes", ".obj": "obj", ".ply": "ply", ".stl": "stl", ".json": ""}
-LYING = 3  # blocks on the ground from which on it is odd if most are there
-FORMATS = (*DOCUMENTS, "boxes", "obj", "ply", "stl")
+_SUFFIXES = {".csv": "boxes", ".obj": "obj", ".ply": "ply", ".stl": "stl", ".json": ""}
+_LYING = 3  # blocks on the ground from which on it is odd if most are there
+FORMATS = (*_DOCUMENTS, "boxes", "obj", "ply", "stl")
 
 
 def import_scene(path: str | Path, form: str | None = None, given: Given | None = None) -> Scene:
     r"""Return the scene of a file that another program wrote.
 
-    Parameters
-    ----------
-    path : str or pathlib.Path
-    form : str, optional
-        One of `FORMATS`; by default what the file looks like.
-    given : Given, optional
-        What the file does not say: a unit of length, a density and more.
-
-    Returns
-    -------
-    Scene
-        Its provenance says what was read and what was assumed.
-
-    Raises
-    ------
-    FileError
-        If the file cannot be read, or what reads it is not installed.
-    SceneError
-        If it is no such file, or lacks what is not given.
+    ``form``: one of `FORMATS`; by default what the file looks like. ``given``: what the file does
+    not say: a unit of length, a density and more. Result: its provenance says what was read and
+    what was assumed. Raises `FileError` if the file cannot be read, or what reads it is not
+    installed; `SceneError` if it is no such file, or lacks what is not given.
 
     Warns
     -----
     SceneWarning
-        If something is probably a mistake; see `seqopt.scene.doubts`.
+        If something is probably a mistake; see `seqopt.scene.scene_file`.
 
     Examples
     --------
@@ -87,7 +70,7 @@ def import_scene(path: str | Path, form: str | None = None, given: Given | None 
 def _warn_of_lying(scene: Scene) -> None:
     """Warn if most blocks rest on the ground, as they do where y is up and nobody says so."""
     low = {ground.brick for ground in scene.grounds}
-    if len(low) >= LYING and 2 * len(low) > len(scene.bricks):
+    if len(low) >= _LYING and 2 * len(low) > len(scene.bricks):
         warnings.warn(
             f"scene {scene.name}: {len(low)} of {len(scene.bricks)} blocks rest on the ground; if "
             "y is up in the file, say so (--up y)",
@@ -99,21 +82,11 @@ def _warn_of_lying(scene: Scene) -> None:
 def read_content(path: Path, form: str | None = None) -> Content:
     """Return what a file of others says.
 
-    Parameters
-    ----------
-    path : pathlib.Path
-    form : str, optional
-        One of `FORMATS`; by default what the file looks like.
-
-    Raises
-    ------
-    FileError
-        If the file cannot be read, or what reads it is not installed.
-    SceneError
-        If it is no such file.
+    ``form``: one of `FORMATS`; by default what the file looks like. Raises `FileError` if the file
+    cannot be read, or what reads it is not installed.
     """
     source = str(path)
-    named = SUFFIXES.get(path.suffix.lower()) if form is None else form
+    named = _SUFFIXES.get(path.suffix.lower()) if form is None else form
     if named is None or (form is not None and form not in FORMATS):
         what = f"format is {short(form)}" if form else f"{source}: its format is not known"
         raise SceneError(f"{what}; give one of {', '.join(FORMATS)}")
@@ -123,27 +96,13 @@ def read_content(path: Path, form: str | None = None) -> Content:
     if named in ("boxes", "obj"):
         return (read_boxes if named == "boxes" else read_obj)(text, source)
     document = parse_json(text, source)
-    return DOCUMENTS[named or sniffed(document, source)](document, source)
+    return _DOCUMENTS[named or sniffed(document, source)](document, source)
 
 
 def sniffed(document: Any, source: str) -> str:
     """Return which format a JSON document has.
 
-    Parameters
-    ----------
-    document : object
-    source : str
-        What to call it in messages.
-
-    Returns
-    -------
-    str
-        One of `DOCUMENTS`.
-
-    Raises
-    ------
-    SceneError
-        If it has none of them.
+    Result: one of `_DOCUMENTS`. Raises `SceneError` if it has none of them.
     """
     by_kind = {"blockmodel": "compas_dem", "problem": "compas_dem", "timbermodel": "compas_timber"}
     if kind(document) in by_kind:

@@ -18,10 +18,10 @@ from seqopt.scene.arch import STANDARD_GRAVITY
 from seqopt.scene.blocks import BOX_CORNERS, BOX_FACES
 from seqopt.scene.checks import short
 from seqopt.scene.imports.content import Content, FileBlock, FileJoint
-from seqopt.scene.imports.documents import Entry, entry, listing, mapping, number, point
+from seqopt.scene.imports.json_reading import Entry, entry, listing, mapping, number, point
 
-UNITS = {"meter": "m", "m": "m", "centimeter": "cm", "cm": "cm", "millimeter": "mm", "mm": "mm"}
-MEASURES = {
+_UNITS = {"meter": "m", "m": "m", "centimeter": "cm", "cm": "cm", "millimeter": "mm", "mm": "mm"}
+_MEASURES = {
     "m2": 1.0,
     "cm2": 1e-4,
     "mm2": 1e-6,
@@ -37,8 +37,8 @@ MEASURES = {
     "N/m3": 1.0,
     "kN/cm3": 1e9,
 }  # in m, N
-GROUND = -1
-LEAST = 1e-30  # area, second moment, modulus or density treated as zero
+_GROUND = -1
+_LEAST = 1e-30  # area, second moment, modulus or density treated as zero
 
 
 @dataclass(frozen=True)
@@ -63,24 +63,9 @@ class _Bar:
 def read_frame(document: Any, source: str) -> Content:
     """Return the bars of a frame.
 
-    Parameters
-    ----------
-    document : object
-        A JSON document with ``nodes``, ``elements``, ``materials`` and ``cross_secs``. Where it
-        does not name the units of materials and cross-sections, they are kN and m. The density is a
-        weight per volume.
-    source : str
-        What to call it in messages.
-
-    Returns
-    -------
-    Content
-        In m.
-
-    Raises
-    ------
-    SceneError
-        If it is no such frame.
+    ``document``: A JSON document with ``nodes``, ``elements``, ``materials`` and ``cross_secs``.
+    Where it does not name the units of materials and cross-sections, they are kN and m. The density
+    is a weight per volume. Result: in m. Raises `SceneError` if it is no such frame.
     """
     held = mapping(source, document)
     nodes, grounded = _nodes(source, held)
@@ -98,9 +83,9 @@ def read_frame(document: Any, source: str) -> Content:
 def _nodes(source: str, held: Entry) -> tuple[Floats, set[int]]:
     """Return the nodes (n, 3) in m, and the places of those on the ground."""
     unit = held.get("unit", "meter")
-    if not isinstance(unit, str) or unit not in UNITS:
-        raise SceneError(f"{source}: unit is {short(unit)}; one of {', '.join(UNITS)} is expected")
-    factor = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}[UNITS[unit]]
+    if not isinstance(unit, str) or unit not in _UNITS:
+        raise SceneError(f"{source}: unit is {short(unit)}; one of {', '.join(_UNITS)} is expected")
+    factor = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}[_UNITS[unit]]
     rows = listing(f"{source}: nodes", entry(source, held, "nodes"), 20_000)
     places = [
         point(f"{source}: node {i}", entry(f"{source}: node {i}", row, "point"))
@@ -159,11 +144,11 @@ def _measure(
     if name not in item and otherwise is not None:
         return otherwise
     named = item.get(f"{name}_unit", unit)
-    if not isinstance(named, str) or named not in MEASURES:
-        known = ", ".join(MEASURES)
+    if not isinstance(named, str) or named not in _MEASURES:
+        known = ", ".join(_MEASURES)
         raise SceneError(f"{where}: {name}_unit is {short(named)}; one of {known} is known")
-    value = number(f"{where}: {name}", entry(where, item, name)) * MEASURES[named]
-    if not value > LEAST:
+    value = number(f"{where}: {name}", entry(where, item, name)) * _MEASURES[named]
+    if not value > _LEAST:
         raise SceneError(f"{where}: {name} is {value:g}; give a positive number")
     return value
 
@@ -192,14 +177,14 @@ def _joints(bars: list[_Bar], grounded: set[int]) -> list[FileJoint]:
             at.setdefault(node, []).append(i)
     out = []
     for node, mine in sorted(at.items()):
-        first = GROUND if node in grounded else mine[0]
-        for i in mine if first == GROUND else mine[1:]:
+        first = _GROUND if node in grounded else mine[0]
+        for i in mine if first == _GROUND else mine[1:]:
             out.append(_joint(bars, (first, i), node))
     return out
 
 
 def _joint(bars: list[_Bar], pair: tuple[int, int], node: int) -> FileJoint:
-    ends = [bars[i] for i in pair if i != GROUND]
+    ends = [bars[i] for i in pair if i != _GROUND]
     last = ends[-1]
     place = last.ends[last.nodes.index(node)]
     out = last.ends.mean(axis=0) - place

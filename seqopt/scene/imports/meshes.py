@@ -9,44 +9,139 @@ from __future__ import annotations
 import io
 import logging
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from importlib import import_module
 from importlib.util import find_spec
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from seqopt.arrays import Floats, Ints
 from seqopt.errors import FileError, SceneError
 from seqopt.scene.checks import short
 from seqopt.scene.imports.content import MOST_BLOCKS, Content, FileBlock
-from seqopt.scene.imports.documents import LARGEST
-from seqopt.scene.imports.splitting import split_blocks
+from seqopt.scene.imports.json_reading import LARGEST
+from seqopt.scene.imports.repair import WELD
 
-Faces = list[list[int]]
-UNASKED = logging.NullHandler()  # else Python prints what no one listens to
+_Polygons = Sequence[Sequence[int]]
+_Edges = frozenset[tuple[int, int]]
+_LEAST = 4  # faces of a closed block
+
+
+def _split_blocks(vertices: Floats, faces: _Polygons) -> list[list[int]]:
+    """Return the faces of each block of a mesh.
+
+    A block ends where, in the file's order, every edge has been used twice, corners in one place
+    being one: so blocks may share vertices, and faces need not. If blocks are left open so, one is
+    what shares vertices, where these say it.
+
+    ``vertices`` (V, 3); ``faces``: places among the vertices. Result: places among the faces.
+
+    Examples
+    --------
+    >>> corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 0, -1]])
+    >>> up = [(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)]
+    >>> down = [(0, 1, 2), (0, 4, 1), (0, 2, 4), (1, 4, 2)]
+    >>> _split_blocks(corners, [*up, *down])
+    [[0, 1, 2, 3], [4, 5, 6, 7]]
+    """
+    place = _united(vertices)
+    united = [[int(place[v]) for v in face] for face in faces]
+    edges = [_edges(face) for face in united]
+    part = _parts(len(vertices), faces)
+    blocks, rest = _closed(range(len(faces)), edges)
+    if rest:
+        alone = len({v for face in faces for v in face}) == sum(map(len, faces))
+        groups = _grouped(range(len(faces)), _parts(len(vertices), united) if alone else part)
+        ends = [_closed(group, edges) for group in groups]
+        return [block for closed, left in ends for block in [*closed, left] if block]
+    return _once([own for block in blocks for own in _unmixed(block, edges, part)], edges)
+
+
+def _united(vertices: Floats) -> Ints:
+    """Return one number for all vertices in one place."""
+    from scipy.spatial import KDTree  # noqa: PLC0415  # slow to import, and seldom needed
+
+    points, place = np.unique(vertices, axis=0, return_inverse=True)
+    reach = WELD * float(np.ptp(points, axis=0).max(initial=0.0))
+    pairs = KDTree(points).query_pairs(reach, output_type="ndarray")
+    return _linked(len(points), pairs)[place.reshape(-1)]
+
+
+def _edges(face: Sequence[int]) -> _Edges:
+    """Return the edges of a face, without those that it passes twice."""
+    out = set[tuple[int, int]]()
+    for a, b in zip(face, (*face[1:], face[0]), strict=True):
+        out ^= {(min(a, b), max(a, b))} if a != b else set()
+    return frozenset(out)
+
+
+def _closed(faces: Iterable[int], edges: Sequence[_Edges]) -> tuple[list[list[int]], list[int]]:
+    """Return the blocks that faces close one after the other, and the faces that are left.
+
+    A face that its block has already counts once.
+    """
+    blocks, block = list[list[int]](), list[int]()
+    seen, once = set[_Edges](), set[tuple[int, int]]()
+    for i in faces:
+        block.append(i)
+        once ^= edges[i] if edges[i] not in seen else set()
+        seen.add(edges[i])
+        if not once and len(seen) >= _LEAST:
+            blocks.append(block)
+            block, seen = [], set()
+    if blocks and {edges[i] for i in block} <= {edges[i] for i in blocks[-1]}:
+        blocks[-1] += block
+        block = []
+    return blocks, block
+
+
+def _unmixed(block: list[int], edges: Sequence[_Edges], part: Ints) -> list[list[int]]:
+    """Return closed faces, in parts that share no vertices if each is closed too."""
+    groups = _grouped(block, part)
+    return [block] if any(_closed(group, edges)[1] for group in groups) else groups
+
+
+def _once(blocks: list[list[int]], edges: Sequence[_Edges]) -> list[list[int]]:
+    """Return blocks of which no two have the same faces; what stands there twice is one."""
+    found: dict[frozenset[_Edges], list[int]] = {}
+    for block in blocks:
+        found.setdefault(frozenset(edges[i] for i in block), []).extend(block)
+    return [*found.values()]
+
+
+def _grouped(faces: Iterable[int], part: Ints) -> list[list[int]]:
+    """Return faces by the part that they belong to, in their order."""
+    out: dict[int, list[int]] = {}
+    for i in faces:
+        out.setdefault(int(part[i]), []).append(i)
+    return [*out.values()]
+
+
+def _parts(count: int, faces: _Polygons) -> Ints:
+    """Return the number of the part of every face; parts share no vertex."""
+    ends = np.array([(face[0], v) for face in faces for v in face[1:]]).reshape(-1, 2)
+    return _linked(count, ends)[[face[0] for face in faces]]
+
+
+def _linked(count: int, links: Ints) -> Ints:
+    """Return the number of the group that each of so many things is in, given links."""
+    graph = coo_array((np.ones(len(links)), (links[:, 0], links[:, 1])), shape=(count, count))
+    return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
+
+
+_Faces = list[list[int]]
+_UNASKED = logging.NullHandler()  # else Python prints what no one listens to
 
 
 def read_obj(text: str, source: str) -> Content:
     """Return the blocks of a Wavefront OBJ file.
 
-    Parameters
-    ----------
-    text : str
-    source : str
-        What to call it in messages.
-
-    Returns
-    -------
-    Content
-        Its blocks, by the names of objects or groups, whichever are more.
-
-    Raises
-    ------
-    SceneError
-        If it is no such file.
+    Result: its blocks, by the names of objects or groups, whichever are more.
     """
     vertices: list[list[float]] = []
-    faces: Faces = []
+    faces: _Faces = []
     named = {"o": "", "g": ""}
     names: dict[str, list[str]] = {"o": [], "g": []}
     for i, line in enumerate(text.splitlines(), start=1):
@@ -69,25 +164,7 @@ def read_obj(text: str, source: str) -> Content:
 def read_mesh(content: bytes, source: str, form: str) -> Content:
     """Return the blocks of a PLY or STL file.
 
-    Parameters
-    ----------
-    content : bytes
-    source : str
-        What to call it in messages.
-    form : str
-        ``ply`` or ``stl``.
-
-    Returns
-    -------
-    Content
-        Its blocks.
-
-    Raises
-    ------
-    FileError
-        If trimesh is not installed.
-    SceneError
-        If it is no such file.
+    ``form``: ``ply`` or ``stl``. Raises `FileError` if trimesh is not installed.
     """
     if find_spec("trimesh") is None:
         raise FileError(f"{source}: reading {form} needs trimesh; pip install 'seqopt[blocks]'")
@@ -104,7 +181,7 @@ def read_mesh(content: bytes, source: str, form: str) -> Content:
 
 def _loaded(content: bytes, source: str, form: str) -> tuple[Floats, Ints]:
     """Return what trimesh makes of bytes; what it logs is for those who asked for logs."""
-    logging.getLogger("trimesh").addHandler(UNASKED)
+    logging.getLogger("trimesh").addHandler(_UNASKED)
     try:
         found = import_module("trimesh").load_mesh(
             io.BytesIO(content), file_type=form, process=False
@@ -117,10 +194,10 @@ def _loaded(content: bytes, source: str, form: str) -> tuple[Floats, Ints]:
         raise SceneError(f"{source}: no {form} file that can be read: {said}") from error
 
 
-def _content(vertices: Floats, faces: Faces, source: str, names: Sequence[str] = ()) -> Content:
+def _content(vertices: Floats, faces: _Faces, source: str, names: Sequence[str] = ()) -> Content:
     if not faces:
         raise SceneError(f"{source}: it has no faces; give closed meshes")
-    own = split_blocks(vertices, faces)
+    own = _split_blocks(vertices, faces)
     if len(own) > MOST_BLOCKS:
         raise SceneError(f"{source}: {len(own)} blocks; {MOST_BLOCKS} is the most")
     keys = _keys([names[block[0]] if names else "" for block in own])

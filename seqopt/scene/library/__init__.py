@@ -36,11 +36,9 @@ from `seqopt.scene.arch_scene`. The same in words, wherever a scene is named:
 from seqopt.scene.library.arch_form import ArchForm, arch
 from seqopt.scene.library.barrel_vault import barrel_vault
 from seqopt.scene.library.chain import chain
-from seqopt.scene.library.dome import dome
-from seqopt.scene.library.dome_shape import DomeShape
-from seqopt.scene.library.law import JointLaw
-from seqopt.scene.library.vault import herringbone_vault
-from seqopt.scene.library.vault_surface import VaultShape
+from seqopt.scene.library.common import JointLaw
+from seqopt.scene.library.dome import DomeShape, dome
+from seqopt.scene.library.vault import VaultShape, herringbone_vault
 from seqopt.scene.library.wall import WallShape, wall
 
 __all__ = [

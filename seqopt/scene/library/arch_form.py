@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,14 +13,106 @@ from seqopt.errors import SceneError
 from seqopt.scene.arch import LETTERS, ArchShape, arch_scene
 from seqopt.scene.boxes import require_apart
 from seqopt.scene.checks import positive, short, vector
-from seqopt.scene.library.arch_curve import CURVES, Line, chords
-from seqopt.scene.library.law import MASONRY, JointLaw
-from seqopt.scene.library.laying import few_enough, joint_width, whole_number
+from seqopt.scene.library.common import MASONRY, JointLaw, few_enough, joint_width, whole_number
 from seqopt.scene.parts import THICKEST, Robot
 from seqopt.scene.scene import Scene
 
-REMEDY = "give another number of bricks, or shorter or thinner ones"
-TRIED = 8  # numbers of bricks, where none is given
+_Line = Callable[[float], Floats]
+"""Takes a number from 0 at the first springing to 1 at the second; returns (x, z), m."""
+
+
+def _circular(span: float, rise: float) -> _Line:
+    """Return the arc of a circle through both springings and the crown.
+
+    ``span``, ``rise``: m; at most a half circle. Raises `SceneError` if the rise is more than half
+    of the span.
+    """
+    if rise > 0.5 * span * (1 + 1e-12):
+        raise SceneError(
+            f"arch: rise is {rise:g} m; a circular arch rises at most half of its span, "
+            f"{0.5 * span:g}: give less, or the curve pointed or catenary"
+        )
+    radius = (0.25 * span**2 + rise**2) / (2 * rise)
+    half = 2 * math.atan(2 * rise / span)
+
+    def line(at: float) -> Floats:
+        turn = half * (2 * at - 1)
+        return np.array(
+            [0.5 * span + radius * math.sin(turn), rise - radius * (1 - math.cos(turn))]
+        )
+
+    return line
+
+
+def _catenary(span: float, rise: float) -> _Line:
+    """Return a hanging chain turned upside down: the line of thrust of an even arch."""
+    from scipy.optimize import brentq  # noqa: PLC0415  # slow to import, for arches only
+
+    # with u = span / 2a: rise / span = (cosh u - 1) / 2u
+    slope = float(brentq(lambda u: (math.cosh(u) - 1) / (2 * u) - rise / span, 1e-9, 100.0))
+    scale = 0.5 * span / slope
+    end = math.sinh(slope)
+
+    def line(at: float) -> Floats:
+        x = scale * math.asinh(end * (2 * at - 1))  # evenly along the line
+        return np.array([0.5 * span + x, rise - scale * (math.cosh(x / scale) - 1)])
+
+    return line
+
+
+def _pointed(span: float, rise: float) -> _Line:
+    """Return two arcs that leave the springings upright and meet in a point.
+
+    ``span``, ``rise``: m; more than a half circle rises. Raises `SceneError` if the rise is half of
+    the span or less.
+    """
+    if rise <= 0.5 * span:
+        raise SceneError(
+            f"arch: rise is {rise:g} m; a pointed arch rises more than half of its span, "
+            f"{0.5 * span:g}: give more, or the curve circular"
+        )
+    radius = (0.25 * span**2 + rise**2) / span
+    turn = math.asin(rise / radius) if radius > rise else 0.5 * math.pi
+
+    def line(at: float) -> Floats:
+        angle = turn * (2 * at if at <= 0.5 else 2 - 2 * at)
+        x = radius * (1 - math.cos(angle))
+        return np.array([x if at <= 0.5 else span - x, radius * math.sin(angle)])
+
+    return line
+
+
+_CURVES: dict[str, Callable[[float, float], _Line]] = {
+    "circular": _circular,
+    "catenary": _catenary,
+    "pointed": _pointed,
+}
+"""By name; each takes span and rise, m."""
+
+
+def _chords(line: _Line, lengths: Floats) -> Floats | None:
+    """Return the points of a chain of rigid links laid along a line from its start.
+
+    ``lengths`` (n,): of the links, m. Result (n + 1, 2): m; none if the line is too short.
+    """
+    from scipy.optimize import brentq  # noqa: PLC0415  # slow to import, for arches only
+
+    at, points = 0.0, [line(0.0)]
+    for length in lengths.tolist():
+        here = points[-1]
+        if _apart(line(1.0), here) < length:
+            return None
+        at = float(brentq(lambda s: _apart(line(s), here) - length, at, 1.0, xtol=1e-15))  # noqa: B023
+        points.append(line(at))
+    return np.array(points)
+
+
+def _apart(first: Floats, second: Floats) -> float:
+    return math.dist(first.tolist(), second.tolist())
+
+
+_REMEDY = "give another number of bricks, or shorter or thinner ones"
+_TRIED = 8  # numbers of bricks, where none is given
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,30 +122,12 @@ class ArchForm:
     The joints lie on the curve, the first and the last at its springings, which are level. They are
     as wide as it takes for the bricks to fill the curve.
 
-    Parameters
-    ----------
-    span, rise : float
-        Between the springings, and from there to the crown.
-    curve : str
-        ``circular``, ``catenary`` or ``pointed``.
-    bricks : int, optional
-        By default as many as make the joints most nearly as wide as ``gap``.
-    pattern : str
-        A letter per brick, repeated: ``V`` lies along the arch, ``L`` and ``R`` lie across it and
-        stick out to the left and to the right.
-    dimensions : Vector
-        Length, width and thickness of a brick.
-    gap : float
-        How wide joints are to be where the number of bricks is not given.
-    density : float
-        kg/m³.
-    law : JointLaw
-        How stiff joints are.
-
-    Raises
-    ------
-    SceneError
-        Naming the number that cannot be.
+    ``span``, ``rise``: between the springings, and from there to the crown; ``curve``:
+    ``_circular``, ``_catenary`` or ``_pointed``; ``bricks``: by default as many as make the joints
+    most nearly as wide as ``gap``; ``pattern``: a letter per brick, repeated: ``V`` lies along the
+    arch, ``L`` and ``R`` lie across it and stick out to the left and to the right; ``dimensions``:
+    length, width and thickness of a brick; ``gap``: how wide joints are to be where the number of
+    bricks is not given; ``density``: kg/m³; ``law``: how stiff joints are.
 
     Examples
     --------
@@ -75,8 +149,10 @@ class ArchForm:
         for name in ("span", "rise", "density"):
             unit = "kg/m³" if name == "density" else "m"
             _set(self, name, positive(f"arch: {name}", getattr(self, name), unit))
-        if self.curve not in CURVES:
-            raise SceneError(f"arch: curve is {short(self.curve)}; give one of {', '.join(CURVES)}")
+        if self.curve not in _CURVES:
+            raise SceneError(
+                f"arch: curve is {short(self.curve)}; give one of {', '.join(_CURVES)}"
+            )
         if self.bricks is not None:
             _set(self, "bricks", whole_number("arch: bricks", self.bricks, 2))
         if not isinstance(self.pattern, str) or not self.pattern or {*self.pattern} - {*LETTERS}:
@@ -89,18 +165,12 @@ class ArchForm:
         _set(self, "gap", joint_width("arch: gap", self.gap))
 
     @property
-    def line(self) -> Line:
+    def line(self) -> _Line:
         """The curve."""
-        return CURVES[self.curve](self.span, self.rise)
+        return _CURVES[self.curve](self.span, self.rise)
 
     def lengths(self, bricks: int) -> Floats:
-        """Return how much of the arch each brick covers, without joints.
-
-        Returns
-        -------
-        (n,) float
-            m.
-        """
+        """Return how much of the arch each brick covers, without joints. Result (n,): m."""
         along, across, _ = self.dimensions
         letters = (self.pattern * bricks)[:bricks]
         return np.array([along if letter == "V" else across for letter in letters])
@@ -111,18 +181,9 @@ def arch(form: ArchForm, name: str = "", *, robots: Sequence[Robot] | None = Non
 
     It stands on both, at z = 0, and runs towards +x in the plane y = 0.
 
-    Parameters
-    ----------
-    form : ArchForm
-    name : str, optional
-        By default the curve, the span and the rise.
-    robots : sequence of Robot, optional
-        By default two beside the arch and a mobile one; each can bear the whole weight.
-
-    Raises
-    ------
-    SceneError
-        If the bricks do not fill the curve, or interpenetrate.
+    ``name``: by default the curve, the span and the rise. ``robots``: by default two beside the
+    arch and a mobile one; each can bear the whole weight. Raises `SceneError` if the bricks do not
+    fill the curve, or interpenetrate.
 
     Examples
     --------
@@ -130,7 +191,7 @@ def arch(form: ArchForm, name: str = "", *, robots: Sequence[Robot] | None = Non
     <Scene circular arch 2 x 0.7: 12 bricks, 11 joints, 2 ground ends, 3 robots>
     """
     refused: SceneError | None = None
-    for count in [form.bricks] if form.bricks else _counts(form)[:TRIED]:
+    for count in [form.bricks] if form.bricks else _counts(form)[:_TRIED]:
         try:
             return _arch(form, count, name, robots)
         except SceneError as error:
@@ -163,7 +224,7 @@ def _arch(form: ArchForm, count: int, name: str, robots: Sequence[Robot] | None)
         robots=robots,
         provenance="Generated by seqopt.scene.library.arch_form.",
     )
-    require_apart(f"arch of {count}", scene.bricks, REMEDY)
+    require_apart(f"arch of {count}", scene.bricks, _REMEDY)
     return scene
 
 
@@ -178,7 +239,7 @@ def _counts(form: ArchForm) -> list[int]:
     return [int(count) + 2 for count in np.argsort(off[1:], kind="stable")]
 
 
-def _laid(form: ArchForm, line: Line, count: int) -> tuple[float, Floats]:
+def _laid(form: ArchForm, line: _Line, count: int) -> tuple[float, Floats]:
     """Return the width of the joints, and the points (n + 1, 2) between bricks that fill a curve.
 
     The first brick begins at a springing and the last one ends at the other, half a joint behind
@@ -189,7 +250,7 @@ def _laid(form: ArchForm, line: Line, count: int) -> tuple[float, Floats]:
     lengths = form.lengths(count)
 
     def left(gap: float) -> float:
-        points = chords(line, lengths[:-1] + gap)
+        points = _chords(line, lengths[:-1] + gap)
         if points is None:
             return -form.span
         return math.dist(points[-1], line(1.0)) - float(lengths[-1]) - gap
@@ -206,7 +267,7 @@ def _laid(form: ArchForm, line: Line, count: int) -> tuple[float, Floats]:
             f"more than {count}, or longer ones"
         )
     gap = float(brentq(left, 0.0, widest, xtol=1e-15))
-    points = chords(line, lengths[:-1] + gap)
+    points = _chords(line, lengths[:-1] + gap)
     if points is None:  # by rounding alone
         raise SceneError(f"arch: {count} bricks do not fill its curve; give another number")
     return gap, np.vstack([points, line(1.0)])

@@ -16,11 +16,11 @@ from seqopt.errors import SceneError
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.boxes import require_apart
 from seqopt.scene.checks import short
-from seqopt.scene.library.law import MASONRY, JointLaw
+from seqopt.scene.library.common import MASONRY, JointLaw
 from seqopt.scene.parts import Robot
 from seqopt.scene.scene import Scene
 
-Row = dict[str, str]
+_Row = dict[str, str]
 
 
 def barrel_vault(
@@ -31,21 +31,9 @@ def barrel_vault(
     Bricks are boxes as long as the inner face lets them be: neighbors touch there, and joints widen
     outward.
 
-    Parameters
-    ----------
-    test : int
-        From 1 to 8.
-    law : JointLaw, optional
-        How stiff joints are.
-    name : str, optional
-        By default the number of the test.
-    robots : sequence of Robot, optional
-        By default two beside the vault and a mobile one.
-
-    Raises
-    ------
-    SceneError
-        If there is no such test.
+    ``test``: from 1 to 8; ``law``: how stiff joints are; ``name``: by default the number of the
+    test; ``robots``: by default two beside the vault and a mobile one. Raises `SceneError` if there
+    is no such test.
 
     Examples
     --------
@@ -66,7 +54,7 @@ def barrel_vault(
     return scene
 
 
-def _shape(row: Row, law: JointLaw) -> ArchShape:
+def _shape(row: _Row, law: JointLaw) -> ArchShape:
     """Return the shape of a tested vault."""
     span, rise, width = (float(row[key]) for key in ("L_m", "r_m", "b_m"))
     thickness, bricks = float(row["t_mm"]) / 1e3, int(row["n_bricks"])
@@ -89,7 +77,7 @@ def _shape(row: Row, law: JointLaw) -> ArchShape:
     )
 
 
-def _row(test: int) -> Row:
+def _row(test: int) -> _Row:
     """Return the printed numbers of a test."""
     source = resources.files("seqopt").joinpath("data/paper/arch_tests.csv")
     rows = {row["test"]: row for row in csv.DictReader(source.read_text("utf-8").splitlines())}

@@ -10,36 +10,110 @@ import numpy as np
 
 from seqopt.arrays import Floats
 from seqopt.errors import SceneError
+from seqopt.scene.blocks import as_vector
 from seqopt.scene.boxes import require_apart
-from seqopt.scene.library.dome_shape import DomeShape
-from seqopt.scene.library.herringbone import tiles
-from seqopt.scene.library.joints import as_vector, ground_under, joints_between
-from seqopt.scene.library.laying import mobile_robots, touching_order
-from seqopt.scene.library.meeting import shares
+from seqopt.scene.checks import positive, short
+from seqopt.scene.library.common import (
+    MASONRY,
+    JointLaw,
+    few_enough,
+    joint_width,
+    mobile_robots,
+    touching_order,
+    whole_number,
+)
+from seqopt.scene.library.herringbone import REPEAT, tiles
+from seqopt.scene.library.joints import ground_under, joints_between, shares
 from seqopt.scene.parts import Brick, Robot
 from seqopt.scene.scene import Scene
 
-LEAST_SHARE = 0.1  # of the smaller face: bricks that share less have no joint
-NO_SHARE = 1e-6  # of an angle: places that share less only meet at a corner
-TURN = 2 * math.pi
+_BONDS = ("running", "herringbone")
+_LENGTHS = ("span", "rise", "opening", "thickness")
+
+
+@dataclass(frozen=True, kw_only=True)
+class DomeShape:
+    """The numbers that shape a dome, a cap of a sphere with an opening; lengths in m.
+
+    ``courses``: rows from the ground to the opening, equally high. ``around``: bricks in the lowest
+    course. In running bond courses have fewer the higher they are; in herringbone all have as many
+    cells, twice this number, and it must be even. ``bond``: ``running`` or ``herringbone``.
+    ``span``, ``rise``: diameter at the ground and height over it, of the surface through the
+    bricks' middles, before the opening is cut. ``opening``: diameter of the opening. ``thickness``:
+    of the bricks, at right angles to the surface. ``gap``: least width of the joints, on the
+    inside; boxes on a sphere leave more elsewhere. ``density``: kg/m³. ``law``: how stiff joints
+    are.
+
+    Examples
+    --------
+    >>> DomeShape(courses=8, around=24).rise
+    1.0
+    """
+
+    courses: int
+    around: int
+    bond: str = "running"
+    span: float = 2.0
+    rise: float = 1.0
+    opening: float = 0.5
+    thickness: float = 0.08
+    gap: float = 0.005
+    density: float = 2000.0
+    law: JointLaw = MASONRY
+
+    def __post_init__(self) -> None:
+        _set(self, "courses", whole_number("dome: courses", self.courses, 1))
+        _set(self, "around", whole_number("dome: around", self.around, 3))
+        few_enough("dome", self.courses * self.around)
+        for name in _LENGTHS:
+            _set(self, name, positive(f"dome: {name}", getattr(self, name), "m"))
+        _set(self, "gap", joint_width("dome: gap", self.gap))
+        if self.bond not in _BONDS:
+            raise SceneError(f"dome: bond is {short(self.bond)}; give one of {', '.join(_BONDS)}")
+        if self.bond == "herringbone" and 2 * self.around % REPEAT:
+            raise SceneError(
+                f"dome: around is {self.around}; give an even number, so that herringbone closes"
+            )
+        if self.rise > 0.5 * self.span:
+            raise SceneError(
+                f"dome: rise is {self.rise:g} m; give at most half of the span, {0.5 * self.span:g}"
+            )
+        if self.opening >= self.span:
+            raise SceneError(
+                f"dome: opening is {self.opening:g} m; give less than the span, {self.span:g}"
+            )
+
+    @property
+    def radius(self) -> float:
+        """Radius of the sphere, m."""
+        return (0.25 * self.span**2 + self.rise**2) / (2 * self.rise)
+
+    def latitude(self, row: float) -> float:
+        """Return the angle above the horizontal at which a row begins, seen from the center.
+
+        ``row``: from 0 at the ground. Result: rad.
+        """
+        first, last = (math.acos(0.5 * d / self.radius) for d in (self.span, self.opening))
+        return first + (last - first) * row / self.courses
+
+
+def _set(value: object, name: str, content: object) -> None:
+    object.__setattr__(value, name, content)
+
+
+_LEAST_SHARE = 0.1  # of the smaller face: bricks that share less have no joint
+_NO_SHARE = 1e-6  # of an angle: places that share less only meet at a corner
+_TURN = 2 * math.pi
 
 
 @dataclass(frozen=True)
 class _Place:
-    """The place of a brick: from one row to another, and how far around on either side.
+    """The place of a brick: from one row to another, and how far around on either side."""
 
-    Attributes
-    ----------
-    low, high : int
-        Rows.
-    azimuth, half : float
-        rad.
-    """
-
-    low: int
-    high: int
-    azimuth: float
-    half: float
+    low: int  # rows
+    high: int  # rows
+    azimuth: float  # rad
+    half: float  # rad
 
 
 def dome(shape: DomeShape, name: str = "", *, robots: Sequence[Robot] | None = None) -> Scene:
@@ -49,18 +123,8 @@ def dome(shape: DomeShape, name: str = "", *, robots: Sequence[Robot] | None = N
     boxes cut to the room that their place in the dome leaves: shorter the higher they are, unless a
     course has fewer of them.
 
-    Parameters
-    ----------
-    shape : DomeShape
-    name : str, optional
-        By default the kind and the number of bricks.
-    robots : sequence of Robot, optional
-        Three that reach everything by default.
-
-    Raises
-    ------
-    SceneError
-        If a place leaves no room for a brick, or bricks interpenetrate.
+    ``name``: by default the kind and the number of bricks; ``robots``: three that reach everything
+    by default. Raises `SceneError` if a place leaves no room for a brick, or bricks interpenetrate.
 
     Examples
     --------
@@ -88,7 +152,7 @@ def _laid(shape: DomeShape) -> tuple[list[_Place], list[tuple[int, int]], Floats
     places = _running(shape) if shape.bond == "running" else _herringbone(shape)
     loose = [_brick(shape, place, i) for i, place in enumerate(places)]
     pairs, normals = _beside(shape, places)
-    kept = np.flatnonzero(shares(loose, pairs, normals) >= LEAST_SHARE)
+    kept = np.flatnonzero(shares(loose, pairs, normals) >= _LEAST_SHARE)
     pairs, normals = [pairs[k] for k in kept], normals[kept]
     order = touching_order(len(places), pairs, [i for i, p in enumerate(places) if not p.low])
     if len(order) < len(places):
@@ -108,7 +172,7 @@ def _running(shape: DomeShape) -> list[_Place]:
     for row in range(shape.courses):
         size = math.cos(shape.latitude(row)) / math.cos(shape.latitude(0))
         count = max(3, round(shape.around * size))
-        half = 0.5 * TURN / count
+        half = 0.5 * _TURN / count
         shift = half * (row % 2)
         out += [_Place(row, row + 1, 2 * half * i + shift, half) for i in range(count)]
     return out
@@ -116,7 +180,7 @@ def _running(shape: DomeShape) -> list[_Place]:
 
 def _herringbone(shape: DomeShape) -> list[_Place]:
     """Return the tiles of a herringbone that closes around the dome, from the ground up."""
-    cell = 0.5 * TURN / shape.around
+    cell = 0.5 * _TURN / shape.around
     out = []
     for tile in tiles(shape.courses, range(2 * shape.around)):
         rows, columns = (2, 1) if tile.along else (1, 2)
@@ -129,11 +193,11 @@ def _beside(shape: DomeShape, places: Sequence[_Place]) -> tuple[list[tuple[int,
     """Return which places share an edge, and directions across these, (P, 3)."""
     low, high = (np.array([getattr(p, name) for p in places]) for name in ("low", "high"))
     azimuth, half = (np.array([getattr(p, name) for p in places]) for name in ("azimuth", "half"))
-    away = np.abs((azimuth[:, None] - azimuth + 0.5 * TURN) % TURN - 0.5 * TURN)
+    away = np.abs((azimuth[:, None] - azimuth + 0.5 * _TURN) % _TURN - 0.5 * _TURN)
     shared = half[:, None] + half - away
-    above = (high[:, None] == low) & (shared > NO_SHARE * half)
+    above = (high[:, None] == low) & (shared > _NO_SHARE * half)
     level = (low[:, None] < high) & (low < high[:, None])
-    beside = level & (np.abs(shared) <= NO_SHARE * half)
+    beside = level & (np.abs(shared) <= _NO_SHARE * half)
     a, b = np.nonzero(np.triu(above | above.T | beside, 1))
     middle = [_directions(shape.latitude(0.5 * (p.low + p.high)), p.azimuth) for p in places]
     axes = np.array(middle)[:, :2]

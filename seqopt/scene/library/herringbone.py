@@ -18,12 +18,8 @@ REPEAT = 4  # rows and columns after which the pattern repeats
 class Tile:
     """Two cells of the pattern, covered by one brick.
 
-    Parameters
-    ----------
-    row, column : int
-        Of the cell with the smaller numbers.
-    along : bool
-        Whether the other cell is in the next row; else it is in the next column.
+    ``row``, ``column``: of the cell with the smaller numbers. ``along``: whether the other cell is
+    in the next row; else it is in the next column.
     """
 
     row: int
@@ -47,17 +43,8 @@ class Tile:
 def tiles(rows: int, columns: Iterable[int]) -> list[Tile]:
     """Return the tiles between two edges at right angles to the columns.
 
-    Parameters
-    ----------
-    rows : int
-    columns : iterable of int
-        Of the tiles' first cells.
-
-    Returns
-    -------
-    list of Tile
-        Column by column. A tile that would cross an edge is left out: one cell in four stays open
-        there.
+    ``columns``: of the tiles' first cells. Result: column by column. A tile that would cross an
+    edge is left out: one cell in four stays open there.
 
     Examples
     --------
@@ -76,16 +63,8 @@ def tiles(rows: int, columns: Iterable[int]) -> list[Tile]:
 def neighbors(chosen: Sequence[Tile], around: int = 0) -> list[tuple[int, int]]:
     """Return which tiles share an edge of a cell.
 
-    Parameters
-    ----------
-    chosen : sequence of Tile
-    around : int, optional
-        How many columns close a ring; none by default.
-
-    Returns
-    -------
-    list of (int, int)
-        Indices, each pair once, ascending.
+    ``around``: how many columns close a ring; none by default. Result (int, int): indices, each
+    pair once, ascending.
     """
 
     def wrapped(row: int, column: int) -> tuple[int, int]:

@@ -3,51 +3,253 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from seqopt.arrays import Floats, Vector
+from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.errors import SceneError
+from seqopt.scene.blocks import as_vector
 from seqopt.scene.boxes import Boxes, boxes
-from seqopt.scene.library.law import JointLaw
-from seqopt.scene.library.meeting import Meeting, Pairs, meeting, widths
+from seqopt.scene.library.common import JointLaw
 from seqopt.scene.parts import THICKEST, Brick, Ground, Joint
 
-STUB = 0.05  # m; of a ground end that does not say
+_ON_EDGE = 1e-12  # distance treated as zero, over the size of the faces
+_PARALLEL = 1e-12  # sine of an angle between edges treated as zero
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class _ContactAreas(FrozenValue):
+    """The overlaps of P pairs of faces."""
+
+    area: Floats  # (P,); m²; 0 where faces do not overlap
+    centroid: Floats  # (P, 2); m
+    moments: Floats  # (P, 2); second moments of area about the two axes through the centroid, m⁴
+
+
+def contact_areas(first: Floats, second: Floats) -> _ContactAreas:
+    """Return the overlaps of convex polygons.
+
+    ``first``, ``second`` (P, m, 2): corners, counterclockwise, m.
+
+    Examples
+    --------
+    >>> square = np.array([[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]])
+    >>> half = contact_areas(square, square + [0.5, 0.0])
+    >>> half.area, half.centroid
+    (array([0.5]), array([[0.75, 0.5 ]]))
+    """
+    near = first.mean(axis=1, keepdims=True)
+    one, other = first - near, second - near
+    slack = _ON_EDGE * np.abs(one).max(initial=0.0)  # an edge that both have is counted once
+    start, end = (
+        np.concatenate(parts, axis=1)
+        for parts in zip(_inside(one, other, slack), _inside(other, one, -slack), strict=True)
+    )
+    turn = _cross(start, end)
+    area = 0.5 * turn.sum(axis=1)
+    real = area > slack**2
+    size = np.where(real, area, 1.0)[:, None]
+    centroid = (turn[:, :, None] * (start + end)).sum(axis=1) / (6 * size)
+    start, end = start - centroid[:, None], end - centroid[:, None]
+    squares = start**2 + start * end + end**2
+    moments = (_cross(start, end)[:, :, None] * squares).sum(axis=1)[:, ::-1] / 12
+    return _ContactAreas(
+        np.where(real, area, 0.0),
+        centroid + near[:, 0],
+        np.where(real[:, None], moments, 0.0),
+    )
+
+
+def _inside(polygon: Floats, other: Floats, slack: float) -> tuple[Floats, Floats]:
+    """Return where the part of each edge that lies in another polygon starts and ends, (P, m, 2).
+
+    A part of no length starts and ends in one point.
+    """
+    start, step = polygon, np.roll(polygon, -1, axis=1) - polygon
+    side = np.roll(other, -1, axis=1) - other
+    side = side / np.linalg.norm(side, axis=2, keepdims=True)
+    height = _cross(side[:, None], start[:, :, None] - other[:, None])  # (P, m, m)
+    slope = _cross(side[:, None], step[:, :, None])
+    flat = np.abs(slope) <= _PARALLEL * np.linalg.norm(step, axis=2)[:, :, None]
+    crossing = -height / np.where(flat, 1.0, slope)
+    outside = flat & (height + slack < 0)
+    enters = np.where(outside, np.inf, np.where(flat | (slope < 0), 0.0, crossing))
+    leaves = np.where(flat | (slope > 0), 1.0, crossing)
+    low = np.maximum(enters.max(axis=2), 0.0)
+    high = np.maximum(np.minimum(leaves.min(axis=2), 1.0), 0.0)
+    low = np.minimum(low, high)
+    return start + low[:, :, None] * step, start + high[:, :, None] * step
+
+
+def _cross(first: Floats, second: Floats) -> Floats:
+    return np.asarray(first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0])
+
+
+_Pairs = Sequence[tuple[int, int]]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class _Faces(FrozenValue):
+    """The faces of boxes that look at others.
+
+    ``which``, ``axis`` (P,): box, and the axis across its face; ``out`` (P, 3): unit vectors
+    outward.
+    """
+
+    which: Ints
+    axis: Ints
+    out: Floats
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class _Overlaps(FrozenValue):
+    """Where pairs of boxes look at each other.
+
+    ``faces``: of the first boxes and of the second. ``along`` (P, 3): mean normals, from the first
+    box to the second. ``sides`` (P, 2, 3): unit vectors across them; the first is most nearly an
+    edge of the first box. ``shared``: overlaps of the faces, seen along the normals.
+    """
+
+    faces: tuple[_Faces, _Faces]
+    along: Floats
+    sides: Floats
+    shared: _ContactAreas
+
+
+def overlaps(shapes: Boxes, pairs: _Pairs, normals: Floats | None = None) -> _Overlaps:
+    """Return where boxes look at each other.
+
+    ``pairs`` (int, int): at least one. ``normals`` (P, 3): about at right angles to the faces; by
+    default these are the ones that look at each other most.
+    """
+    a, b = np.array(pairs, dtype=np.int64).T
+    step = shapes.place[b] - shapes.place[a]
+    axes = _facing(shapes, a, b) if normals is None else _across(shapes, a, b, normals)
+    one, other = _towards(shapes, a, axes[0], step), _towards(shapes, b, axes[1], -step)
+    along = _unit(one.out - other.out)
+    across = shapes.frame[a, (one.axis + 1) % 3]
+    across = _unit(across - along * (along * across).sum(axis=1, keepdims=True))
+    sides = np.stack([across, np.cross(along, across)], axis=1)
+    shared = contact_areas(_corners(shapes, one, sides), _corners(shapes, other, sides))
+    return _Overlaps((one, other), along, sides, shared)
+
+
+def shares(bricks: Sequence[Brick], pairs: _Pairs, normals: Floats) -> Floats:
+    """Return how much of the smaller of two faces the other one covers.
+
+    ``pairs`` (int, int): which of them may touch; ``normals`` (P, 3): about at right angles to the
+    faces. Result (P,): from 0 to 1.
+    """
+    if not pairs:
+        return np.zeros(0)
+    shapes = boxes(bricks)
+    found = overlaps(shapes, pairs, normals)
+    row = np.arange(len(pairs))
+    whole = [
+        4 * half[row, (face.axis + 1) % 3] * half[row, (face.axis + 2) % 3]
+        for face in found.faces
+        for half in (shapes.half[face.which],)
+    ]
+    return np.asarray(found.shared.area / np.minimum(*whole))
+
+
+def _widths(shapes: Boxes, found: _Overlaps) -> tuple[Floats, Floats, Floats]:
+    """Return where faces are along the normals, in the middle of their overlaps.
+
+    Results: ``start``, ``end`` (P,): of the first faces and of the second, m from the origin's
+    plane; ``taper`` (P,): how much farther apart they are at the ends of the overlap, m, at most.
+    """
+    middle = (found.shared.centroid[:, None, :] @ found.sides)[:, 0]
+    start, end = (_height(shapes, face, found.along, middle) for face in found.faces)
+    slopes = [
+        (found.sides @ face.out[:, :, None])[..., 0] / (found.along * face.out).sum(axis=1)[:, None]
+        for face in found.faces
+    ]
+    area = np.maximum(found.shared.area, np.finfo(float).tiny)[:, None]
+    reach = np.sqrt(3 * found.shared.moments[:, ::-1] / area)  # half the sides of a rectangle
+    return start, end, np.asarray((np.abs(slopes[1] - slopes[0]) * reach).sum(axis=1))
+
+
+def _across(shapes: Boxes, a: Ints, b: Ints, normals: Floats) -> tuple[Ints, Ints]:
+    """Return the axes of first and second boxes that are most nearly along given directions."""
+    one, other = (np.abs(shapes.frame[i] @ normals[:, :, None])[..., 0] for i in (a, b))
+    return one.argmax(axis=1), other.argmax(axis=1)
+
+
+def _facing(shapes: Boxes, a: Ints, b: Ints) -> tuple[Ints, Ints]:
+    """Return the axes across the faces of first and second boxes that look at each other.
+
+    Of the three faces of the first that look at the second, each with the one of the second that is
+    most nearly parallel to it, it is those beyond which the other box lies farthest, in its size.
+    """
+    turned = shapes.frame[a] @ shapes.frame[b].transpose(0, 2, 1)
+    partner = np.abs(turned).argmax(axis=2)
+    second = np.take_along_axis(_beyond(shapes, b, a), partner, axis=1)
+    axis = (_beyond(shapes, a, b) + second).argmax(axis=1)
+    return axis, partner[np.arange(len(a)), axis]
+
+
+def _beyond(shapes: Boxes, which: Ints, other: Ints) -> Floats:
+    """Return how far other boxes lie along the axes of some, (P, 3), over where they touch."""
+    frame = shapes.frame[which]
+    away = (frame @ (shapes.place[other] - shapes.place[which])[:, :, None])[:, :, 0]
+    turned = np.abs(frame @ shapes.frame[other].transpose(0, 2, 1))
+    reach = (turned @ shapes.half[other][:, :, None])[:, :, 0]
+    return np.asarray(np.abs(away) / (shapes.half[which] + reach))
+
+
+def _towards(shapes: Boxes, which: Ints, axis: Ints, step: Floats) -> _Faces:
+    """Return the faces across some axes that look along steps (P, 3)."""
+    normal = shapes.frame[which, axis]
+    return _Faces(which, axis, np.sign((normal * step).sum(axis=1))[:, None] * normal)
+
+
+def _corners(shapes: Boxes, face: _Faces, sides: Floats) -> Floats:
+    """Return the corners (P, 4, 2) of faces along two axes each (P, 2, 3), counterclockwise."""
+    row = np.arange(len(face.which))
+    edges = [(face.axis + k) % 3 for k in (1, 2)]
+    frame, half = shapes.frame[face.which], shapes.half[face.which]
+    flat = [
+        half[row, edge][:, None] * (sides @ frame[row, edge][:, :, None])[:, :, 0] for edge in edges
+    ]
+    flat[1] *= np.sign(flat[0][:, :1] * flat[1][:, 1:] - flat[0][:, 1:] * flat[1][:, :1])
+    center = shapes.place[face.which] + half[row, face.axis][:, None] * face.out
+    middle = (sides @ center[:, :, None])[:, :, 0]
+    signs = ((-1, -1), (1, -1), (1, 1), (-1, 1))
+    return np.stack([middle + a * flat[0] + b * flat[1] for a, b in signs], axis=1)
+
+
+def _height(shapes: Boxes, face: _Faces, along: Floats, point: Floats) -> Floats:
+    """Return how far along directions (P, 3) from points (P, 3) faces lie, (P,)."""
+    half = shapes.half[face.which, face.axis]
+    away = ((shapes.place[face.which] - point) * face.out).sum(axis=1) + half
+    return np.asarray(away / (along * face.out).sum(axis=1))
+
+
+def _unit(vectors: Floats) -> Floats:
+    return np.asarray(vectors / np.linalg.norm(vectors, axis=1, keepdims=True))
+
+
+_STUB = 0.05  # m; of a ground end that does not say
 
 
 def joints_between(
-    bricks: Sequence[Brick], pairs: Pairs, law: JointLaw, normals: Floats | None = None
+    bricks: Sequence[Brick], pairs: _Pairs, law: JointLaw, normals: Floats | None = None
 ) -> tuple[Joint, ...]:
     """Return the joints of bricks, each where the faces that look at each other overlap.
 
-    Parameters
-    ----------
-    bricks : sequence of Brick
-    pairs : sequence of (int, int)
-        Which of them touch.
-    law : JointLaw
-    normals : (P, 3) float, optional
-        About at right angles to the faces; by default these are the ones that look at each other
-        most.
-
-    Returns
-    -------
-    tuple of Joint
-        Each in the middle of the overlap and halfway between the faces; its axes are the mean
-        normal of the faces, from the first brick to the second, and that edge of the first that is
-        most nearly at right angles to it. One that is thick where the faces are farthest apart says
-        so.
-
-    Raises
-    ------
-    SceneError
-        If faces do not overlap where they look at each other.
+    ``pairs`` (int, int): which of them touch. ``normals`` (P, 3): about at right angles to the
+    faces; by default these are the ones that look at each other most. Result: each in the middle of
+    the overlap and halfway between the faces; its axes are the mean normal of the faces, from the
+    first brick to the second, and that edge of the first that is most nearly at right angles to it.
+    One that is thick where the faces are farthest apart says so. Raises `SceneError` if faces do
+    not overlap where they look at each other.
     """
     if not pairs:
         return ()
     shapes = boxes(bricks)
-    found = meeting(shapes, pairs, normals)
+    found = overlaps(shapes, pairs, normals)
     _require_overlap(bricks, pairs, found)
     place, thick = _between(shapes, pairs, found)
     faces = zip(found.shared.area.tolist(), found.shared.moments.tolist(), strict=True)
@@ -67,22 +269,11 @@ def joints_between(
     )
 
 
-def ground_under(brick: Brick, down: Floats, law: JointLaw, stub: float = STUB) -> Ground:
+def ground_under(brick: Brick, down: Floats, law: JointLaw, stub: float = _STUB) -> Ground:
     """Return the ground end on the face of a brick that looks down most.
 
-    Parameters
-    ----------
-    brick : Brick
-    down : (3,) float
-        Direction to the ground.
-    law : JointLaw
-    stub : float, optional
-        Distance from the face to the fixed point behind it, m.
-
-    Returns
-    -------
-    Ground
-        In the middle of the face; its normal points into the brick.
+    ``down`` (3,): direction to the ground; ``stub``: distance from the face to the fixed point
+    behind it, m. Result: in the middle of the face; its normal points into the brick.
     """
     shapes = boxes([brick])
     frame, half = shapes.frame[0], shapes.half[0]
@@ -103,18 +294,7 @@ def ground_under(brick: Brick, down: Floats, law: JointLaw, stub: float = STUB) 
     )
 
 
-def as_vector(values: Floats) -> Vector:
-    """Return three numbers of an array as a tuple.
-
-    Parameters
-    ----------
-    values : (3,) float
-    """
-    x, y, z = values.tolist()
-    return x, y, z
-
-
-def _require_overlap(bricks: Sequence[Brick], pairs: Pairs, found: Meeting) -> None:
+def _require_overlap(bricks: Sequence[Brick], pairs: _Pairs, found: _Overlaps) -> None:
     """Raise an error that names the first two bricks whose faces share nothing."""
     apart = np.flatnonzero(found.shared.area == 0)
     if len(apart):
@@ -125,9 +305,9 @@ def _require_overlap(bricks: Sequence[Brick], pairs: Pairs, found: Meeting) -> N
         )
 
 
-def _between(shapes: Boxes, pairs: Pairs, found: Meeting) -> tuple[Floats, list[float]]:
+def _between(shapes: Boxes, pairs: _Pairs, found: _Overlaps) -> tuple[Floats, list[float]]:
     """Return the points (P, 3) halfway between faces, and the widths of joints that are thick."""
-    start, end, taper = widths(shapes, found)
+    start, end, taper = _widths(shapes, found)
     middle = (found.shared.centroid[:, None, :] @ found.sides)[:, 0]
     place = middle + 0.5 * (start + end)[:, None] * found.along
     thin = 2 * shapes.half[np.array(pairs)].min(axis=(1, 2))

@@ -11,19 +11,224 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from seqopt.arrays import Floats
 from seqopt.errors import SceneError
+from seqopt.scene.blocks import as_vector
 from seqopt.scene.boxes import require_apart
-from seqopt.scene.library.arch_line import ArchLine, arch_line
+from seqopt.scene.checks import finite, positive
+from seqopt.scene.library.common import JointLaw, mobile_robots, touching_order, whole_number
 from seqopt.scene.library.herringbone import Tile, neighbors, tiles
-from seqopt.scene.library.joints import as_vector, ground_under, joints_between
-from seqopt.scene.library.laying import mobile_robots, touching_order
-from seqopt.scene.library.vault_surface import VaultShape, poses
+from seqopt.scene.library.joints import ground_under, joints_between
 from seqopt.scene.parts import Brick, Ground, Joint, Robot
 from seqopt.scene.scene import Scene
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline
+
+
+_TILES = ((2, 0, True), (1, 0, False), (1, -1, False))  # rows, column, along: the pattern VLR
+
+
+@dataclass(frozen=True)
+class _ArchLine:
+    """The bricks of an arch, the tiles of a herringbone that they cover, and its line.
+
+    ``bricks``: in build order; ``grounds``: under the first brick and the last; ``tiles``: of every
+    brick.
+    """
+
+    bricks: tuple[Brick, ...]
+    joints: tuple[Joint, ...]
+    grounds: tuple[Ground, ...]
+    tiles: tuple[Tile, ...]
+
+    @property
+    def rows(self) -> int:
+        """Rows from foot to foot."""
+        return self.tiles[-1].row + _TILES[0][0]
+
+    @cached_property
+    def _curve(self) -> CubicSpline:
+        from scipy.interpolate import CubicSpline  # noqa: PLC0415  # slow to import, for vaults only
+
+        points = [self.grounds[0], *self.joints, self.grounds[1]]
+        row = [tile.row for tile in self.tiles]
+        return CubicSpline([*row, self.rows], [point.position for point in points])
+
+    def point(self, row: Floats) -> Floats:
+        """Return points of the line.
+
+        ``row`` (n,): from 0 at the first ground end; a joint lies at every row where a brick
+        begins. Result (n, 3): m.
+        """
+        return np.asarray(self._curve(row))
+
+    def share(self, row: float) -> float:
+        """Return by which share of the span a row lies before or behind the middle, -½ to ½."""
+        start, end, here = self.point(np.array([0.0, self.rows, row]))[:, 0].tolist()
+        return float((here - start) / (end - start) - 0.5)
+
+    def speed(self, row: Floats) -> Floats:
+        """Return the derivatives of the line. ``row`` (n,). Result (n, 3): m per row."""
+        return np.asarray(self._curve(row, 1))
+
+    @property
+    def law(self) -> JointLaw:
+        """The stiffness of the arch's first joint over the area of a brick's end."""
+        _, width, thickness = self.bricks[0].dimensions
+        joint, area = self.joints[0], width * thickness
+        shift = np.array(joint.translational_stiffness) / area
+        turn = np.array(joint.rotational_stiffness) / area
+        return JointLaw(translational=shift.tolist(), rotational=turn.tolist())
+
+    @property
+    def stub(self) -> float:
+        """Length of the stub behind the arch's first ground end, m."""
+        return math.dist(self.grounds[0].anchor, self.grounds[0].position)
+
+
+def _arch_line(arch: Scene) -> _ArchLine:
+    """Return the line of an arch.
+
+    Raises `SceneError` if it is no closed chain of equal bricks along, to the left, to the right
+    and so on, whose first and last lie along.
+    """
+    if not isinstance(arch, Scene):
+        raise SceneError(f"vault: a {type(arch).__name__} is not an arch; give a Scene")
+    bricks = arch.placed
+    names = [brick.name for brick in bricks]
+    linked = [joint.bricks for joint in arch.joints] == [*pairwise(names)]
+    stands = [ground.brick for ground in arch.grounds] == [names[0], names[-1]]
+    alike = len({(brick.dimensions, brick.density) for brick in bricks}) == 1
+    if len(bricks) < 4 or len(bricks) % 3 != 1 or not (linked and stands and alike):
+        raise SceneError(
+            f"vault: scene {arch.name} is not an arch to start from; give a closed chain of equal "
+            "bricks in the pattern VLR, 3n + 1 of them, in the order in which they are built"
+        )
+    covered, row = [], 0
+    for i, brick in enumerate(bricks):
+        rows, column, along = _TILES[i % 3]
+        covered.append(Tile(row, column, along))
+        left = brick.length_axis[1]
+        if (abs(left) < math.sqrt(0.5)) != along or (not along and (left > 0) != (column == 0)):
+            letter = "VLR"[i % 3]
+            raise SceneError(
+                f"vault: brick {brick.name} of {arch.name} does not lie as {letter} in the pattern "
+                "VLR; give an arch along x, of this pattern"
+            )
+        row += rows
+    return _ArchLine(bricks, arch.joints, arch.grounds, tuple(covered))
+
+
+@dataclass(frozen=True, kw_only=True)
+class VaultShape:
+    """The numbers that shape a herringbone vault; lengths in m, angles in rad.
+
+    ``bricks``: how many, those of the arch included. ``spacing``: distance of the columns from each
+    other. ``plan_angle``: from the left of the arch to the rulings, seen from above; positive turns
+    their left ends forward. ``skew``: how far the middle of the second foot lies to the left of
+    that of the first. ``widening``: by which share the span grows, over the square of the distance
+    from the arch, 1/m². ``drift``: over how many columns beside the arch its rows keep at right
+    angles to it; farther out they follow the rulings.
+
+    Examples
+    --------
+    >>> VaultShape(bricks=100).spacing
+    0.1327
+    """
+
+    bricks: int
+    spacing: float = 0.1327
+    plan_angle: float = 0.0
+    skew: float = 0.0
+    widening: float = 0.0
+    drift: float = 1.3
+
+    def __post_init__(self) -> None:
+        _set(self, "bricks", whole_number("vault: bricks", self.bricks, 1))
+        positive("vault: spacing", self.spacing, "m")
+        for name in ("plan_angle", "skew", "widening", "drift"):
+            _set(self, name, finite(f"vault: {name}", getattr(self, name)))
+        if abs(self.plan_angle) > 0.25 * math.pi:
+            raise SceneError(
+                f"vault: plan_angle is {self.plan_angle:g} rad; give at most 0.785, half a right "
+                "angle"
+            )
+
+
+class _Pose(NamedTuple):
+    """Where a brick lies; three arrays (3,): its middle, m, and two unit vectors."""
+
+    center: Floats
+    forward: Floats
+    left: Floats
+
+
+def _poses(line: _ArchLine, shape: VaultShape, places: Sequence[Tile]) -> list[_Pose]:
+    """Return where bricks lie. ``line``: of the arch in the middle. Result: one for every tile."""
+    if not places:
+        return []
+    row, column = np.array([tile.middle for tile in places]).T
+    along = np.array([tile.along for tile in places])
+    beside = column * shape.spacing
+    half = np.where(along, 1.0, 0.5)
+    start, end, middle = (
+        _surface(line, shape, row + step, beside) for step in (-half, half, 0.0 * half)
+    )
+    step = 1e-3 * shape.spacing
+    turned = row + _drift(line, shape, row, beside)
+    ruling = _moved(line, shape, turned, beside + step) - _moved(line, shape, turned, beside - step)
+    forward = _unit(end - start)
+    left = _unit(ruling)
+    flush = along[:, None]  # a brick along keeps to its column, one across to the ruling
+    forward, left = (
+        np.where(flush, forward, _unit(forward - left * _dot(forward, left))),
+        np.where(flush, _unit(left - forward * _dot(forward, left)), left),
+    )
+    center = np.where(flush, middle, 0.5 * (start + end))
+    return [_Pose(*pose) for pose in zip(center, forward, left, strict=True)]
+
+
+def _surface(line: _ArchLine, shape: VaultShape, row: Floats, beside: Floats) -> Floats:
+    """Return points (n, 3) of the surface at rows of columns."""
+    return _moved(line, shape, row + _drift(line, shape, row, beside), beside)
+
+
+def _moved(line: _ArchLine, shape: VaultShape, row: Floats, beside: Floats) -> Floats:
+    """Return points (n, 3) of the arch's line, moved along the rulings."""
+    point = line.point(row)
+    middle = line.point(np.array([0.0, float(line.rows)]))[:, 0].mean()
+    wider = (point[:, 0] - middle) * shape.widening * beside**2
+    ahead = math.tan(shape.plan_angle) * beside
+    return np.asarray(point + np.stack([wider + ahead, beside, np.zeros_like(beside)], axis=1))
+
+
+def _drift(line: _ArchLine, shape: VaultShape, row: Floats, beside: Floats) -> Floats:
+    """Return by how many rows columns lag, so that rows leave the arch at right angles."""
+    speed = line.speed(row)
+    size = np.linalg.norm(speed, axis=1)
+    columns = np.clip(beside / shape.spacing, -shape.drift, shape.drift)
+    shift = columns * shape.spacing * math.tan(shape.plan_angle) * speed[:, 0] / size
+    return np.asarray(-shift / size)
+
+
+def _unit(vectors: Floats) -> Floats:
+    return np.asarray(vectors / np.linalg.norm(vectors, axis=1, keepdims=True))
+
+
+def _dot(first: Floats, second: Floats) -> Floats:
+    return np.asarray((first * second).sum(axis=1, keepdims=True))
+
+
+def _set(value: object, name: str, content: object) -> None:
+    object.__setattr__(value, name, content)
 
 
 def herringbone_vault(
@@ -35,21 +240,10 @@ def herringbone_vault(
     in turn: a column of bricks along, and those that reach from it into the next one, from the foot
     that the skew leaves on that side. Every brick touches what stands before it, or the ground.
 
-    Parameters
-    ----------
-    arch : Scene
-        A closed chain as `seqopt.scene.arch.arch_scene` makes it of the pattern ``VLR``, whose
-        first and last bricks lie along.
-    shape : VaultShape
-    name : str, optional
-        By default the kind and the number of bricks.
-    robots : sequence of Robot, optional
-        Three that reach everything by default, with the largest payload at the arch.
-
-    Raises
-    ------
-    SceneError
-        If the arch is of another kind, bricks interpenetrate, or do not touch.
+    ``arch``: a closed chain as `seqopt.scene.arch.arch_scene` makes it of the pattern ``VLR``,
+    whose first and last bricks lie along; ``name``: by default the kind and the number of bricks;
+    ``robots``: three that reach everything by default, with the largest payload at the arch. Raises
+    `SceneError` if the arch is of another kind, bricks interpenetrate, or do not touch.
 
     Examples
     --------
@@ -57,7 +251,7 @@ def herringbone_vault(
     >>> herringbone_vault(load_scene("arch25"), VaultShape(bricks=60))
     <Scene vault 60: 60 bricks, 125 joints, 4 ground ends, 3 robots>
     """
-    line = arch_line(arch)
+    line = _arch_line(arch)
     chosen = _chosen(line, shape)
     bricks = _bricks(line, shape, chosen)
     require_apart("vault", bricks, "give a wider spacing or a smaller plan_angle")
@@ -80,7 +274,7 @@ def _movers(arch: Scene, bricks: Sequence[Brick]) -> tuple[Robot, ...]:
     return tuple(replace(robot, payload=payload) for robot in movers)
 
 
-def _chosen(line: ArchLine, shape: VaultShape) -> list[Tile]:
+def _chosen(line: _ArchLine, shape: VaultShape) -> list[Tile]:
     """Return the tiles of the vault in the order of building."""
     rest = shape.bricks - len(line.tiles)
     if rest < 0:
@@ -120,20 +314,20 @@ def _layer(tile: Tile) -> tuple[int, bool]:
     return abs(column), tile.column >= 0
 
 
-def _feet(line: ArchLine, tile: Tile) -> int:
+def _feet(line: _ArchLine, tile: Tile) -> int:
     """Return on which ground a tile stands: -1 at the first foot, 1 at the second, 0 on none."""
     last = tile.cells[1][0] if tile.along else tile.row
     return -1 if tile.row == 0 else int(last == line.rows - 1)
 
 
-def _bricks(line: ArchLine, shape: VaultShape, chosen: Sequence[Tile]) -> list[Brick]:
+def _bricks(line: _ArchLine, shape: VaultShape, chosen: Sequence[Tile]) -> list[Brick]:
     """Return the bricks of the arch and those on the other tiles."""
     own = dict(zip(line.tiles, line.bricks, strict=True))
     places = [tile for tile in chosen if tile not in own]
     name = max(brick.name for brick in line.bricks)
     node = max(node for brick in line.bricks for node in brick.nodes)
     new = {}
-    for tile, pose in zip(places, poses(line, shape, places), strict=True):
+    for tile, pose in zip(places, _poses(line, shape, places), strict=True):
         outward = _layer(tile)[1]
         upward = outward == (shape.skew < 0)
         axes = (pose.forward if upward else -pose.forward, pose.left)
@@ -152,7 +346,7 @@ def _bricks(line: ArchLine, shape: VaultShape, chosen: Sequence[Tile]) -> list[B
     return [own.get(tile) or new[tile] for tile in chosen]
 
 
-def _joints(line: ArchLine, chosen: Sequence[Tile], bricks: Sequence[Brick]) -> tuple[Joint, ...]:
+def _joints(line: _ArchLine, chosen: Sequence[Tile], bricks: Sequence[Brick]) -> tuple[Joint, ...]:
     """Return the joints of the arch, and one wherever other bricks touch."""
     own = len(line.bricks)
     pairs = [pair for pair in neighbors(chosen) if pair[1] >= own]
@@ -160,7 +354,9 @@ def _joints(line: ArchLine, chosen: Sequence[Tile], bricks: Sequence[Brick]) -> 
     return (*line.joints, *joints_between(bricks, pairs, line.law))
 
 
-def _grounds(line: ArchLine, chosen: Sequence[Tile], bricks: Sequence[Brick]) -> tuple[Ground, ...]:
+def _grounds(
+    line: _ArchLine, chosen: Sequence[Tile], bricks: Sequence[Brick]
+) -> tuple[Ground, ...]:
     """Return the ground ends of the arch, and one under every other brick that stands on ground."""
     out = [*line.grounds]
     for tile, brick in zip(chosen[len(line.bricks) :], bricks[len(line.bricks) :], strict=True):

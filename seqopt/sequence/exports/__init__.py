@@ -9,6 +9,6 @@
 """
 
 from seqopt.sequence.exports.formats import EXPORTS, export_plan, read_folder
-from seqopt.sequence.exports.states import BlockState, step_states
+from seqopt.sequence.exports.tables import BlockState, step_states
 
 __all__ = ["EXPORTS", "BlockState", "export_plan", "read_folder", "step_states"]

@@ -6,40 +6,75 @@ Both are JSON as `compas.json_load` reads it, written without COMPAS.
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from seqopt.arrays import Floats
+from seqopt.errors import StepError
+from seqopt.files import read_text
 from seqopt.scene.blocks import vertices_of
-from seqopt.scene.imports.compas_assembly import assembly_graph
-from seqopt.scene.imports.documents import entry
+from seqopt.scene.imports.building import block_numbers
+from seqopt.scene.imports.compas_data import by_guid, kind, payload
+from seqopt.scene.imports.compas_models import assembly_graph
+from seqopt.scene.imports.formats import read_content, sniffed
+from seqopt.scene.imports.json_reading import entry, parse_json
 from seqopt.scene.parts import Brick
 from seqopt.scene.scene import Scene
-from seqopt.sequence.exports.sources import Source
-from seqopt.sequence.exports.states import StepStates, step_states
+from seqopt.sequence.exports.tables import StepStates, step_states
 from seqopt.sequence.steps import Step
 
-Document = dict[str, Any]
+
+@dataclass(frozen=True)
+class Source:
+    """A file from which a scene was imported.
+
+    ``names``: what it calls bricks, by their names: identifiers of elements of a COMPAS model, else
+    keys; ``graph``: its document if it is a graph of compas_assembly, else None.
+    """
+
+    names: Mapping[int, str]
+    graph: Any = None
+
+
+def read_source(scene: Scene, path: Path) -> Source:
+    """Return the file from which a scene was imported, in any format that ``import`` knows.
+
+    Raises `FileError` if it cannot be read; `StepError` if it lacks a brick of the scene.
+    """
+    content, graph = read_content(path), None
+    keys = names = [block.key for block in content.blocks]
+    if path.suffix.lower() == ".json":
+        document = parse_json(read_text(path), str(path))
+        form = sniffed(document, str(path))
+        graph = document if form == "compas_assembly" and isinstance(document, dict) else None
+        if form in ("compas_dem", "compas_timber"):
+            held = payload(document)
+            held = payload(held["model"]) if "model" in held else held
+            rows = [*by_guid(f"{path}: element", held["elements"])]
+            if form == "compas_timber":  # its blocks are counted among its beams
+                rows = [(guid, item) for guid, item in rows if kind(item) == "beam"]
+            names = [rows[int(key)][0] for key in keys]
+    found = dict(zip(block_numbers(keys), names, strict=True))
+    lost = [brick.name for brick in scene.bricks if brick.name not in found]
+    if lost:
+        raise StepError(f"the source has no block {lost[0]}; give the file that was imported")
+    return Source(found, graph)
+
+
+_Document = dict[str, Any]
 
 
 def timber_plan(scene: Scene, steps: Sequence[Step], source: Source | None = None) -> str:
     """Return a plan as a ``BuildingPlan`` of compas_timber.
 
-    Parameters
-    ----------
-    scene : Scene
-    steps : sequence of Step
-    source : Source, optional
-        From which the scene was imported: elements are then named by its identifiers or keys.
-
-    Returns
-    -------
-    str
-        JSON. A step for every step of the plan: the elements that it places, and those that robots
-        hold meanwhile.
+    ``source``: from which the scene was imported: elements are then named by its identifiers or
+    keys. Result: JSON. A step for every step of the plan: the elements that it places, and those
+    that robots hold meanwhile.
     """
     names = source.names if source else {b.name: str(b.name) for b in scene.bricks}
     rows = []
@@ -65,7 +100,7 @@ def timber_plan(scene: Scene, steps: Sequence[Step], source: Source | None = Non
     return json.dumps(whole) + "\n"
 
 
-def _frame(brick: Brick | None) -> Document:
+def _frame(brick: Brick | None) -> _Document:
     """Return the pose of a brick, or the world's."""
     if brick is None:
         return {"point": [0.0] * 3, "xaxis": [1.0, 0.0, 0.0], "yaxis": [0.0, 1.0, 0.0]}
@@ -76,21 +111,11 @@ def _frame(brick: Brick | None) -> Document:
 def compas_assembly(scene: Scene, steps: Sequence[Step], source: Source | None = None) -> str:
     """Return an assembly of compas_assembly with the plan as attributes.
 
-    Parameters
-    ----------
-    scene : Scene
-    steps : sequence of Step
-    source : Source, optional
-        From which the scene was imported. An assembly stays as it is, with attributes added;
-        otherwise blocks and faces are those of the scene, and ``name`` what the source calls them.
-
-    Returns
-    -------
-    str
-        JSON. Every node of a block that is built has ``order``, its place in the build,
-        ``place_step`` and ``held``, a list of step, robot and node; the graph has ``plan``, a list
-        of steps.
-
+    ``source``: from which the scene was imported. An assembly stays as it is, with attributes
+    added; otherwise blocks and faces are those of the scene, and ``name`` what the source calls
+    them. Result: JSON. Every node of a block that is built has ``order``, its place in the build,
+    ``place_step`` and ``held``, a list of step, robot and node; the graph has ``plan``, a list of
+    steps.
     """
     rows = [*step_states(scene, steps)]
     kept = None if source is None else source.graph
@@ -115,13 +140,13 @@ def compas_assembly(scene: Scene, steps: Sequence[Step], source: Source | None =
     return json.dumps(whole) + "\n"
 
 
-def _plain(row: StepStates) -> Document:
+def _plain(row: StepStates) -> _Document:
     holds = {robot: [node, brick] for robot, (node, brick) in row.holds.items()}
     step = row.step
     return {"step": step.number, "type": step.kind.value, "placed": list(row.new), "holds": holds}
 
 
-def _assembly(scene: Scene) -> Document:
+def _assembly(scene: Scene) -> _Document:
     """Return the blocks of a scene and the faces between them as an assembly.
 
     Faces on the ground make a support of their own, a surface.
@@ -132,7 +157,7 @@ def _assembly(scene: Scene) -> Document:
         if joint.corners is not None:
             edge = edges[a].setdefault(b, {"interfaces": []})
             edge["interfaces"].append(_interface(joint.corners))
-    nodes: dict[str, Document] = {
+    nodes: dict[str, _Document] = {
         str(brick.name): {"block": _block(*vertices_of(brick))} for brick in scene.bricks
     }
     ground = max(brick.name for brick in scene.bricks) + 1
@@ -160,23 +185,23 @@ def _assembly(scene: Scene) -> Document:
     }
 
 
-def _interface(corners: Sequence[Sequence[float]]) -> Document:
+def _interface(corners: Sequence[Sequence[float]]) -> _Document:
     points = [list(corner) for corner in corners]
     return {"dtype": "compas_assembly.datastructures/Interface", "data": {"points": points}}
 
 
-def _block(points: Floats, faces: Sequence[Sequence[int]]) -> Document:
+def _block(points: Floats, faces: Sequence[Sequence[int]]) -> _Document:
     return {"dtype": "compas_assembly.datastructures/Block", "data": _mesh(points, faces)}
 
 
-def _sheet(polygons: Sequence[Sequence[Sequence[float]]]) -> Document:
+def _sheet(polygons: Sequence[Sequence[Sequence[float]]]) -> _Document:
     """Return polygons as a block that is not closed: the ground where bricks stand."""
     ends = np.cumsum([0, *map(len, polygons)]).tolist()
     faces = [list(range(a, b)) for a, b in pairwise(ends)]
     return _block(np.concatenate([np.array(p) for p in polygons]), faces)
 
 
-def _mesh(points: Floats, faces: Sequence[Sequence[int]]) -> Document:
+def _mesh(points: Floats, faces: Sequence[Sequence[int]]) -> _Document:
     rows = points.tolist()
     return {
         "attributes": {},

@@ -9,23 +9,21 @@ from seqopt.errors import FileError, StepError
 from seqopt.scene.checks import short
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import load_scene
-from seqopt.sequence.exports.compas_plans import compas_assembly, timber_plan
-from seqopt.sequence.exports.sequencer import sequencer_json
-from seqopt.sequence.exports.sources import Source, read_source
-from seqopt.sequence.exports.tables import plan_csv, plan_json
+from seqopt.sequence.exports.compas_plans import Source, compas_assembly, read_source, timber_plan
+from seqopt.sequence.exports.tables import plan_csv, plan_json, sequencer_json
 from seqopt.sequence.plan_file import read_plan
 from seqopt.sequence.steps import Step
 
-PLAIN: dict[str, Callable[[Scene, Sequence[Step]], str]] = {
+_PLAIN: dict[str, Callable[[Scene, Sequence[Step]], str]] = {
     "csv": plan_csv,
     "json": plan_json,
     "sequencer": sequencer_json,
 }
-WITH_SOURCE: dict[str, Callable[[Scene, Sequence[Step], Source | None], str]] = {
+_WITH_SOURCE: dict[str, Callable[[Scene, Sequence[Step], Source | None], str]] = {
     "compas_timber": timber_plan,
     "compas_assembly": compas_assembly,
 }
-EXPORTS = (*PLAIN, *WITH_SOURCE)
+EXPORTS = (*_PLAIN, *_WITH_SOURCE)
 
 
 def export_plan(
@@ -33,25 +31,11 @@ def export_plan(
 ) -> str:
     """Return a plan in the format of another program.
 
-    Parameters
-    ----------
-    scene : Scene
-    steps : sequence of Step
-        Of a plan for the scene.
-    form : str
-        One of `EXPORTS`.
-    source : str or pathlib.Path, optional
-        The file from which the scene was imported, of any format, for formats of COMPAS: the plan
-        then names its elements, or is written into it if it is an assembly.
-
-    Raises
-    ------
-    StepError
-        If there is no such format, or the source is not of this scene.
-    FileError
-        If the source cannot be read.
-    SceneError
-        If the source is no file of a known format.
+    ``steps``: of a plan for the scene; ``form``: one of `EXPORTS`; ``source``: the file from which
+    the scene was imported, of any format, for formats of COMPAS: the plan then names its elements,
+    or is written into it if it is an assembly. Raises `StepError` if there is no such format, or
+    the source is not of this scene; `FileError` if the source cannot be read; `SceneError` if the
+    source is no file of a known format.
 
     Examples
     --------
@@ -63,28 +47,19 @@ def export_plan(
     """
     if form not in EXPORTS:
         raise StepError(f"format is {short(form)}; give one of {', '.join(EXPORTS)}")
-    if form in PLAIN and source is not None:
+    if form in _PLAIN and source is not None:
         raise StepError(f"format {form} takes no source; leave it out")
-    if form in PLAIN:
-        return PLAIN[form](scene, steps)
+    if form in _PLAIN:
+        return _PLAIN[form](scene, steps)
     read = None if source is None else read_source(scene, Path(source))
-    return WITH_SOURCE[form](scene, steps, read)
+    return _WITH_SOURCE[form](scene, steps, read)
 
 
 def read_folder(folder: Path) -> tuple[Scene, tuple[Step, ...]]:
     """Return the scene and the steps of a plan's folder.
 
-    Parameters
-    ----------
-    folder : pathlib.Path
-        As ``seqopt optimize`` writes it, with ``scene.json`` and ``plan.csv``.
-
-    Raises
-    ------
-    FileError
-        If a file is missing.
-    SceneError, StepError
-        If one is wrong.
+    ``folder``: as ``seqopt optimize`` writes it, with ``scene.json`` and ``plan.csv``. Raises
+    `FileError` if a file is missing; `SceneError`, `StepError` if one is wrong.
     """
     for name in ("scene.json", "plan.csv"):
         if not (folder / name).is_file():

@@ -1,18 +1,83 @@
-"""Plans as a table and as JSON: absent, placed or held, by block and step."""
+"""Plans as a table and as JSON: absent, placed or held, by block and step.
+
+Also as sequencer_benchmark writes them: parts that a step installs, and parts that it holds.
+`assembly_sequence` of https://github.com/KIKI007/sequencer_benchmark is read there by
+``AssemblySequence::loadFromJson``. A part is the name of a brick.
+"""
 
 from __future__ import annotations
 
 import csv
 import io
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from enum import Enum
 
-from seqopt.cells import harmless
 from seqopt.errors import StepError
+from seqopt.files import harmless
 from seqopt.scene.checks import short
 from seqopt.scene.scene import Scene
-from seqopt.sequence.exports.states import step_states
 from seqopt.sequence.steps import Step, StepKind, check_sequence
+
+
+class BlockState(Enum):
+    """The state of a block in a step."""
+
+    ABSENT = "absent"
+    PLACED = "placed"
+    HELD = "held"  # placed, and held by a robot
+
+
+@dataclass(frozen=True)
+class StepStates:
+    """A step by its blocks.
+
+    ``new``: names of the bricks that this step places; ``holds`` (int, int): node and brick that
+    robots hold, by the robots' names; ``states``: by the names of all bricks of the scene, in build
+    order.
+    """
+
+    step: Step
+    new: tuple[int, ...]
+    holds: dict[str, tuple[int, int]]
+    states: dict[int, BlockState]
+
+
+def step_states(scene: Scene, steps: Sequence[Step]) -> Iterator[StepStates]:
+    """Yield what becomes of every block in every step.
+
+    ``steps``: checked, of a plan for the scene.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> scene = seqopt.load_scene("arch25")
+    >>> steps = seqopt.sequential(seqopt.build_network(scene))
+    >>> second = [*step_states(scene, steps)][1]
+    >>> second.new, [second.states[name].value for name in (1, 2, 3)]
+    ((2,), ['held', 'held', 'absent'])
+    """
+    before = 0
+    names = [brick.name for brick in scene.placed]
+    for step in steps:
+        holds = {
+            robot.name: (node, scene.brick_of_node[node].name)
+            for robot, node in zip(scene.robots, step.grips, strict=True)
+            if node is not None
+        }
+        held = {brick for _, brick in holds.values()}
+        states = {
+            name: BlockState.ABSENT
+            if i >= step.bricks
+            else BlockState.HELD
+            if name in held
+            else BlockState.PLACED
+            for i, name in enumerate(names)
+        }
+        yield StepStates(step, tuple(names[before : step.bricks]), holds, states)
+        before = step.bricks
+
 
 FORMAT, VERSION = "seqopt-plan", 1
 
@@ -20,11 +85,8 @@ FORMAT, VERSION = "seqopt-plan", 1
 def plan_csv(scene: Scene, steps: Sequence[Step]) -> str:
     """Return a plan as CSV.
 
-    Returns
-    -------
-    str
-        A row per step: ``step``, ``type``, the ``placed`` bricks, what every robot holds as
-        ``NAME_node`` and ``NAME_brick``, and a column ``block_N`` for every brick in build order.
+    Result: a row per step: ``step``, ``type``, the ``placed`` bricks, what every robot holds as
+    ``NAME_node`` and ``NAME_brick``, and a column ``block_N`` for every brick in build order.
     """
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
@@ -44,12 +106,9 @@ def plan_csv(scene: Scene, steps: Sequence[Step]) -> str:
 def plan_json(scene: Scene, steps: Sequence[Step]) -> str:
     """Return a plan as JSON.
 
-    Returns
-    -------
-    str
-        ``blocks``, the names of all bricks in build order; and ``steps``, each with its ``type``,
-        the bricks that are ``placed``, what robots hold as ``holds``, and the ``states`` of all
-        blocks in their order.
+    Result: ``blocks``, the names of all bricks in build order; and ``steps``, each with its
+    ``type``, the bricks that are ``placed``, what robots hold as ``holds``, and the ``states`` of
+    all blocks in their order.
     """
     rows = [
         {
@@ -77,16 +136,8 @@ def plan_json(scene: Scene, steps: Sequence[Step]) -> str:
 def parse_plan_json(scene: Scene, text: str) -> tuple[Step, ...]:
     """Return the checked steps of a plan that `plan_json` wrote.
 
-    Parameters
-    ----------
-    scene : Scene
-        In which every step must be possible.
-    text : str
-
-    Raises
-    ------
-    StepError
-        If it is no such plan, or of other blocks or robots, or a step is impossible.
+    ``scene``: in which every step must be possible. Raises `StepError` if it is no such plan, or of
+    other blocks or robots, or a step is impossible.
     """
     try:
         whole = json.loads(text)
@@ -108,3 +159,18 @@ def parse_plan_json(scene: Scene, text: str) -> tuple[Step, ...]:
             raise
         raise StepError(f"plan: no {FORMAT} document: {short(error, 80)}") from error
     return check_sequence(scene, steps)
+
+
+def sequencer_json(scene: Scene, steps: Sequence[Step]) -> str:
+    """Return a plan as an ``assembly_sequence``.
+
+    Result: JSON; which robot holds, and where, it does not say.
+    """
+    rows = [
+        {
+            "installPartIDs": list(row.new),
+            "holdPartIDs": sorted({brick for _, brick in row.holds.values()}),
+        }
+        for row in step_states(scene, steps)
+    ]
+    return json.dumps({"assembly_sequence": rows}) + "\n"

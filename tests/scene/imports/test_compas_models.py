@@ -13,8 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from seqopt.cli.main import main
 from seqopt.errors import SceneError, SceneWarning
-from seqopt.scene.imports.compas_dem import read_model
-from seqopt.scene.imports.compas_timber import read_timber
+from seqopt.scene.imports.compas_models import read_model, read_timber
 from seqopt.scene.imports.content import Given
 from seqopt.scene.imports.formats import import_scene
 from tests.blocks import box

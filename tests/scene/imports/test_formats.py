@@ -12,7 +12,7 @@ from seqopt.errors import FileError, SceneError
 from seqopt.scene.arch import STANDARD_GRAVITY
 from seqopt.scene.imports.content import Given
 from seqopt.scene.imports.formats import import_scene
-from seqopt.scene.library.law import JointLaw
+from seqopt.scene.library.common import JointLaw
 from seqopt.scene.scene_file import dump_scene, parse_scene
 from tests.blocks import box
 from tests.documents import BOXES, DOCUMENTS, HIGH, LOW, TOP, model, obj
@@ -264,7 +264,7 @@ def test_what_a_file_lacks_or_has_wrong_is_one_line(read, name, content, given, 
 def test_what_is_no_file_or_too_large_is_refused(tmp_path, monkeypatch):
     with pytest.raises(FileError, match="cannot read"):
         import_scene(tmp_path / "none.json")
-    monkeypatch.setattr("seqopt.files.LARGEST_INPUT", 10)
+    monkeypatch.setattr("seqopt.files._LARGEST_INPUT", 10)
     path = tmp_path / "large.stl"
     path.write_bytes(b"x" * 11)
     with pytest.raises(FileError, match="more than"):

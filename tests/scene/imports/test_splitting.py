@@ -14,7 +14,7 @@ from seqopt.scene.blocks import as_vectors
 from seqopt.scene.imports.content import Given
 from seqopt.scene.imports.formats import import_scene, read_content
 from seqopt.scene.imports.meshes import read_obj
-from seqopt.scene.imports.tidying import tidy_shape
+from seqopt.scene.imports.repair import repair_shape
 from seqopt.scene.scene_file import load_scene
 from seqopt.scene.shape import Polyhedron
 from tests.blocks import box
@@ -80,7 +80,7 @@ def test_an_arch_is_its_bricks_in_every_format(name, tmp_path):
     blocks = read_content(path).blocks
     assert [block.key for block in blocks] == [str(i) for i in range(len(SHAPES))]
     for block, shape in zip(blocks, SHAPES, strict=True):
-        solid = tidy_shape(block).solid
+        solid = repair_shape(block).solid
         assert solid.volume == pytest.approx(shape.volume, rel=1e-4)
         np.testing.assert_allclose(solid.centroid, shape.centroid, atol=1e-5)
     scene = import_scene(path, given=Given(unit="m", density=2000.0))
@@ -124,7 +124,7 @@ def test_faces_that_stand_there_twice_stay_one_block():
     for doubled in ([*faces, *faces], [face for face in faces for _ in (0, 1)]):
         text = "\n".join([*lines(obj(LOW), "v"), *doubled])
         (block,) = read_obj(text, "file").blocks
-        assert tidy_shape(block).solid.volume == pytest.approx(1.0)
+        assert repair_shape(block).solid.volume == pytest.approx(1.0)
 
 
 def test_what_is_open_is_said_to_be_open(tmp_path):

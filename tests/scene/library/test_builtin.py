@@ -8,16 +8,21 @@ import numpy as np
 import pytest
 
 import seqopt
-from seqopt.contact.faces import bare_assembly
-from seqopt.contact.joint_space import face_distance
+from seqopt.contact.faces import bare_assembly, face_distance
 from seqopt.engines.interface import Want, grip_columns
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.engines.rigid.dense import solve_dense
+from seqopt.engines.rigid.mixed import solve_dense
 from seqopt.errors import SceneError
 from seqopt.network.build import build_network
 from seqopt.scene.boxes import boxes, separations
-from seqopt.scene.doubts import doubts
-from seqopt.scene.scene_file import about, builtin_scenes, dump_scene, load_scene, parse_scene
+from seqopt.scene.scene_file import (
+    about,
+    builtin_scenes,
+    dump_scene,
+    find_warnings,
+    load_scene,
+    parse_scene,
+)
 from seqopt.sequence.support import islands
 from tests.builders import first, largest_difference
 
@@ -48,7 +53,7 @@ def test_every_built_in_scene_is_named_drawn_from_text_and_not_odd(name):
     scene = load_scene(name)
     assert scene.name == name
     assert scene.provenance
-    assert doubts(scene) == ()
+    assert find_warnings(scene) == ()
     assert about(name)
     assert "\n" not in about(name)
     assert parse_scene(dump_scene(scene)) == scene

@@ -13,12 +13,11 @@ from seqopt.contact.faces import bare_assembly
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import Want, grip_columns
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.engines.rigid.dense import solve_dense
+from seqopt.engines.rigid.mixed import solve_dense
 from seqopt.errors import SceneError
 from seqopt.network.build import build_network
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.boxes import separations
-from seqopt.scene.doubts import doubts
 from seqopt.scene.library import (
     ArchForm,
     DomeShape,
@@ -33,7 +32,7 @@ from seqopt.scene.library import (
 )
 from seqopt.scene.library.by_words import scene_by_words
 from seqopt.scene.library.joints import joints_between
-from seqopt.scene.scene_file import load_scene
+from seqopt.scene.scene_file import find_warnings, load_scene
 from seqopt.sequence.support import islands
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.sequence.two_robots import cantilever, sequential
@@ -116,7 +115,7 @@ def test_no_two_bricks_are_in_one_place(scene):
     pairs, distance = separations(scene.bricks)
     thin = min(min(brick.dimensions) for brick in scene.bricks)
     assert distance.min(initial=0.0) >= -1e-6 * thin
-    assert doubts(scene) == ()
+    assert find_warnings(scene) == ()
     joined = {frozenset(joint.bricks) for joint in scene.joints}
     assert len(joined) == len(scene.joints)
     names = [brick.name for brick in scene.bricks]

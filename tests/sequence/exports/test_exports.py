@@ -15,8 +15,7 @@ from seqopt.scene.imports.content import Given
 from seqopt.scene.imports.formats import import_scene
 from seqopt.scene.scene_file import save_scene
 from seqopt.sequence.exports.formats import EXPORTS, export_plan, read_folder
-from seqopt.sequence.exports.states import BlockState, step_states
-from seqopt.sequence.exports.tables import parse_plan_json
+from seqopt.sequence.exports.tables import BlockState, parse_plan_json, step_states
 from seqopt.sequence.plan_file import parse_plan
 from seqopt.sequence.two_robots import METHODS
 from tests.builders import six_bricks

@@ -1,4 +1,4 @@
-"""Rigid-body kinematics: how nodes follow bricks, and how bricks deform the springs between them.
+"""Rigid-body kinematics and equilibrium: motions and forces of nodes, springs, edges and supports.
 
 A twist is the translation of a body's reference point (a brick's centroid) and its rotation, m and
 rad. Under small twists every motion is linear in them, so each of these maps is a matrix.
@@ -6,25 +6,20 @@ rad. Under small twists every motion is linear in them, so each of these maps is
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy import sparse
 
-from seqopt.arrays import Floats, Ints, skew
+from seqopt.arrays import Floats, FrozenValue, Ints, skew
 from seqopt.network.network import GROUND, Network, PartKind
 
 
 def point_motion(arm: Floats) -> Floats:
     """Return the displacements of points of a body for its unit twists.
 
-    Parameters
-    ----------
-    arm : (..., 3) float
-        From the body's reference point to the point, m.
-
-    Returns
-    -------
-    (..., 3, 6) float
-        ``[I, -skew(arm)]``; its transpose takes forces at the points to wrenches.
+    ``arm`` (..., 3): from the body's reference point to the point, m. Result (..., 3, 6): ``[I,
+    -skew(arm)]``; its transpose takes forces at the points to wrenches.
     """
     shift = np.broadcast_to(np.eye(3), (*arm.shape, 3))
     return np.concatenate([shift, -skew(arm)], axis=-1)
@@ -78,20 +73,10 @@ def deformation(
 ) -> sparse.csr_array:
     """Return the twists of second bodies against first ones for unit twists of all bodies.
 
-    Parameters
-    ----------
-    bodies : (s, 2) int
-        First and second body of every spring; `GROUND` does not move.
-    at : (s, 3) float
-        The point at which each twist is taken, m.
-    center : (n, 3) float
-        Reference points of the bodies, m.
-    axes : (s, 3, 3) float, optional
-        Rows are the axes in which each twist is given; by default those of the scene.
-
-    Returns
-    -------
-    (6s, 6n) sparse
+    ``bodies`` (s, 2): first and second body of every spring; `GROUND` does not move. ``at`` (s, 3):
+    the point at which each twist is taken, m. ``center`` (n, 3): reference points of the bodies, m.
+    ``axes`` (s, 3, 3): rows are the axes in which each twist is given; by default those of the
+    scene. Result (6s, 6n).
     """
     spring, side = np.nonzero(bodies != GROUND)
     body = bodies[spring, side]
@@ -108,16 +93,7 @@ def deformation(
 def spring_stiffness(network: Network, which: Ints) -> Floats:
     """Return the stiffness of springs in the scene's axes.
 
-    Parameters
-    ----------
-    network : Network
-    which : (s,) int
-        Springs of the network.
-
-    Returns
-    -------
-    (s, 6, 6) float
-        N/m and N m/rad.
+    ``which`` (s,): springs of the network. Result (s, 6, 6): N/m and N m/rad.
     """
     springs = network.springs
     stiffness = np.zeros((len(which), 6, 6))
@@ -131,20 +107,8 @@ def spring_stiffness(network: Network, which: Ints) -> Floats:
 def spring_maps(network: Network, bricks: int) -> tuple[Ints, Floats, Floats]:
     """Return what stiffness matrices are assembled from, dense and spring by spring.
 
-    Parameters
-    ----------
-    network : Network
-    bricks : int
-        How many bricks stand.
-
-    Returns
-    -------
-    acting : (s,) int
-        The springs that act.
-    gap : (s, 6, 6b) float
-        Their `deformation` for unit twists of the bricks, in the scene's axes.
-    stiffness : (s, 6, 6) float
-        N/m and N m/rad.
+    Results: ``acting`` (s,): the springs that act; ``gap`` (s, 6, 6b): their `deformation` for unit
+    twists of the bricks, in the scene's axes; ``stiffness`` (s, 6, 6): N/m and N m/rad.
     """
     springs = network.springs
     acting = springs.acting(bricks)
@@ -161,3 +125,74 @@ def _spread(row: Ints, column: Ints, block: Floats, shape: tuple[int, int]) -> s
     columns = np.broadcast_to(across * column[:, None, None] + np.arange(across), block.shape)
     entries = (block.ravel(), (rows.ravel(), columns.ravel()))
     return sparse.csr_array(entries, shape=(down * shape[0], across * shape[1]))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Statics(FrozenValue):
+    """Linear maps from forces to what the edges and the supports carry, for the whole scene.
+
+    Attributes
+    ----------
+    edge_of_spring : (E, 3S) sparse
+        Axial edge forces for unit forces that springs exert on their second bodies.
+    edge_of_load : (E, 6B) sparse
+        Axial edge forces for unit forces on the inner nodes, in the order of `Network.inner`.
+    support_of_spring : (G, 6, 6) float
+        Force and moment at the fixed point of every ground end, in the scene's order, for the
+        wrench its spring exerts on its second body.
+    """
+
+    edge_of_spring: sparse.csr_array
+    edge_of_load: sparse.csr_array
+    support_of_spring: Floats
+
+
+def build_statics(network: Network) -> Statics:
+    """Return the equilibrium maps of a network.
+
+    A half-edge or a stub carries its spring's force along its own axis. An inner edge carries
+    along its axis what reaches its second node: the load there and the half-edges that end there.
+
+    Parameters
+    ----------
+    network : Network
+
+    Returns
+    -------
+    Statics
+    """
+    axis, kind, spring = network.edge_axis, network.edge_kind, network.edge_spring
+    springs = network.springs
+    outer = np.flatnonzero(kind != PartKind.INNER.value)
+    on_first = (springs.bodies[spring[outer], 0] == network.edge_brick[outer]) & (
+        kind[outer] == PartKind.JOINT.value
+    )
+    sign = np.where(on_first, -1.0, 1.0)[:, None]
+    inner = np.flatnonzero(kind == PartKind.INNER.value)
+    inner_edge = np.empty(len(network.inner), dtype=np.int64)
+    inner_edge[network.edge_brick[inner]] = inner
+    half = kind[outer] == PartKind.JOINT.value
+    brick = network.edge_brick[outer]
+    arrives = half & (network.edge_nodes[outer, 0] == network.inner[brick, 1])
+    through = inner_edge[brick[arrives]]
+    rows = np.concatenate([outer, through])
+    columns = np.concatenate([spring[outer], spring[outer[arrives]]])
+    values = np.vstack([sign * axis[outer], sign[arrives] * axis[through]])
+    second = 2 * network.edge_brick[inner] + 1
+    support = springs.support
+    moment = np.tile(np.eye(6), (len(support), 1, 1))
+    moment[:, 3:, :3] = skew(springs.position[support] - springs.anchor[support])
+    return Statics(
+        edge_of_spring=_by_threes(rows, columns, values, (len(axis), len(springs.since))),
+        edge_of_load=_by_threes(inner, second, axis[inner], (len(axis), network.inner.size)),
+        support_of_spring=moment,
+    )
+
+
+def _by_threes(
+    rows: np.ndarray, columns: np.ndarray, values: Floats, shape: tuple[int, int]
+) -> sparse.csr_array:
+    """Return a sparse matrix whose row vectors of three stand at columns 3c, 3c+1, 3c+2."""
+    spread = (3 * columns[:, None] + np.arange(3)).ravel()
+    entries = (values.ravel(), (np.repeat(rows, 3), spread))
+    return sparse.csr_array(entries, shape=(shape[0], 3 * shape[1]))

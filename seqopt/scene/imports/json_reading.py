@@ -19,16 +19,7 @@ LARGEST = 1e15  # number: products of coordinates beyond lose all digits
 def parse_json(text: str, source: str) -> Any:
     """Return a JSON document.
 
-    Parameters
-    ----------
-    text : str
-    source : str
-        What to call it in messages.
-
-    Raises
-    ------
-    SceneError
-        If it is no JSON, nested too deep, or holds numbers that no float can be.
+    Raises `SceneError` if it is no JSON, nested too deep, or holds numbers that no float can be.
     """
     try:
         return json.loads(text, parse_constant=_refuse)
@@ -47,19 +38,7 @@ def _refuse(name: str) -> float:
 
 
 def mapping(where: str, value: object) -> Entry:
-    """Return an object of a document.
-
-    Parameters
-    ----------
-    where : str
-        What it is, for the message.
-    value : object
-
-    Raises
-    ------
-    SceneError
-        If it is something else.
-    """
+    """Return an object of a document."""
     if not isinstance(value, dict):
         raise SceneError(f"{where} is {short(value)}; an object is expected")
     return value
@@ -68,17 +47,7 @@ def mapping(where: str, value: object) -> Entry:
 def entry(where: str, holder: object, *keys: str) -> Any:
     """Return what stands under the first of some keys that there is.
 
-    Parameters
-    ----------
-    where : str
-        What the holder is, for the message.
-    holder : object
-    *keys : str
-
-    Raises
-    ------
-    SceneError
-        If there is none of them, or the holder is no object.
+    Raises `SceneError` if there is none of them, or the holder is no object.
     """
     found = mapping(where, holder)
     for key in keys:
@@ -90,18 +59,7 @@ def entry(where: str, holder: object, *keys: str) -> Any:
 def listing(where: str, value: object, most: int = 10**7) -> list[Any]:
     """Return a list of a document.
 
-    Parameters
-    ----------
-    where : str
-        What it is, for the message.
-    value : object
-    most : int, optional
-        Entries that it may have.
-
-    Raises
-    ------
-    SceneError
-        If it is something else, or longer.
+    ``most``: entries that it may have. Raises `SceneError` if it is something else, or longer.
     """
     if not isinstance(value, list):
         raise SceneError(f"{where} is {short(value)}; a list is expected")
@@ -111,19 +69,7 @@ def listing(where: str, value: object, most: int = 10**7) -> list[Any]:
 
 
 def number(where: str, value: object) -> float:
-    """Return a finite number of a document, up to `LARGEST`.
-
-    Parameters
-    ----------
-    where : str
-        What it is, for the message.
-    value : object
-
-    Raises
-    ------
-    SceneError
-        If it is none.
-    """
+    """Return a finite number of a document, up to `LARGEST`."""
     try:
         found = float(value) if isinstance(value, int | float) else math.nan
     except OverflowError:
@@ -138,20 +84,7 @@ def number(where: str, value: object) -> float:
 def point(where: str, value: object) -> Floats:
     """Return a point of a document: three numbers, as they are or in an object of COMPAS.
 
-    Parameters
-    ----------
-    where : str
-        What it is, for the message.
-    value : object
-
-    Returns
-    -------
-    (3,) float
-
-    Raises
-    ------
-    SceneError
-        If it is none.
+    Result (3,).
     """
     plain = value
     while isinstance(plain, dict):

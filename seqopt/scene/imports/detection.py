@@ -18,38 +18,86 @@ import numpy as np
 from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.errors import FileError, SceneError
 from seqopt.scene.checks import positive, short
-from seqopt.scene.convex import convex_pieces
 from seqopt.scene.shape import normal_of
 from seqopt.work.progress import Progress, Tell
 
-OPPOSED = np.cos(np.radians(15.0))  # cosine from which on normals are against each other
-LEVEL = 1 - 1e-6  # cosine from which on faces are in one plane
-MOST_PAIRS = 300_000  # of blocks that are near each other
-SLIVER = 1e-6  # overlap treated as zero, over the smaller of two faces
+_THIN_PIECE = 1e-6  # by which the hull of what is convex may be larger, over its area
+_GRAIN = 1e-9  # length to which corners are rounded, over the size of what overlaps
 
-Plane = tuple[Floats, Floats, list[Any]]  # origin, axes, and polygons in it
+
+def convex_pieces(polygons: Sequence[Any]) -> Iterator[Floats]:
+    """Yield the convex pieces of a union of polygons.
+
+    Result (m, 2): corners counterclockwise, m. Raises `SceneError` if polygons are too degenerate
+    to be cut.
+    """
+    try:
+        yield from _pieces(import_module("shapely"), polygons)
+    except import_module("shapely.errors").ShapelyError as error:
+        raise SceneError(f"a face where blocks touch cannot be cut: {short(error, 80)}") from error
+
+
+def _pieces(shapely: Any, polygons: Sequence[Any]) -> Iterator[Floats]:
+    """Yield the convex pieces of a union of polygons, without a word where that fails."""
+    size = max((max(abs(x) for x in polygon.bounds) for polygon in polygons), default=1.0)
+    whole = shapely.unary_union(list(polygons), grid_size=_GRAIN * size).simplify(_GRAIN * size)
+    for part in getattr(whole, "geoms", [whole]):
+        if part.geom_type != "Polygon" or part.is_empty:
+            continue
+        if _is_convex(part):
+            yield _corners(part)
+            continue
+        triangles = [*shapely.constrained_delaunay_triangles(part).geoms]
+        yield from map(_corners, _merged(triangles, _GRAIN * size))
+
+
+def _merged(pieces: list[Any], grain: float) -> list[Any]:
+    """Return convex polygons united as long as two of them have a convex union."""
+    pieces = sorted(pieces, key=lambda piece: -piece.area)
+    i = 0
+    while i < len(pieces):
+        for j in range(i + 1, len(pieces)):
+            if pieces[i].intersection(pieces[j]).length <= grain:
+                continue
+            union = pieces[i].union(pieces[j], grid_size=grain).simplify(grain)
+            if union.geom_type == "Polygon" and _is_convex(union):
+                pieces[i] = union
+                del pieces[j]
+                break
+        else:
+            i += 1
+    return pieces
+
+
+def _is_convex(polygon: Any) -> bool:
+    hull = polygon.convex_hull.area
+    return not polygon.interiors and bool(hull - polygon.area <= _THIN_PIECE * hull)
+
+
+def _corners(polygon: Any) -> Floats:
+    """Return the corners of the hull of a polygon that is convex but for rounding."""
+    hull = import_module("shapely").geometry.polygon.orient(polygon.convex_hull)
+    return np.array(hull.exterior.coords)[:-1]
+
+
+OPPOSED = np.cos(np.radians(15.0))  # cosine from which on normals are against each other
+_LEVEL = 1 - 1e-6  # cosine from which on faces are in one plane
+_MOST_PAIRS = 300_000  # of blocks that are near each other
+_SLIVER = 1e-6  # overlap treated as zero, over the smaller of two faces
+
+_Plane = tuple[Floats, Floats, list[Any]]  # origin, axes, and polygons in it
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class TouchingFace(FrozenValue):
-    """A convex face between two blocks.
+class _TouchingFace(FrozenValue):
+    """A convex face between two blocks."""
 
-    Attributes
-    ----------
-    blocks : tuple of 2 int
-        Places of the blocks, ascending.
-    corners : (m, 3) float
-        Once around, m.
-    normal : (3,) float
-        Unit vector from the first block into the second.
-    """
-
-    blocks: tuple[int, int]
-    corners: Floats
-    normal: Floats
+    blocks: tuple[int, int]  # places of the blocks, ascending
+    corners: Floats  # (m, 3); once around, m
+    normal: Floats  # (3,); unit vector from the first block into the second
 
 
-class Solid(Protocol):
+class _Solid(Protocol):
     """What has faces: a polyhedron, or a surface that is not closed."""
 
     @property
@@ -63,18 +111,10 @@ class Solid(Protocol):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Surface(FrozenValue):
-    """A surface that is not closed, as of a support; both of its sides are faces.
+    """A surface that is not closed, as of a support; both of its sides are faces."""
 
-    Attributes
-    ----------
-    points : (V, 3) float
-        m.
-    faces : tuple of tuple of int
-        Places among the vertices.
-    """
-
-    points: Floats
-    faces: tuple[tuple[int, ...], ...]
+    points: Floats  # (V, 3); m
+    faces: tuple[tuple[int, ...], ...]  # places among the vertices
 
 
 @dataclass(frozen=True)
@@ -89,45 +129,22 @@ class _Facets:
 def require_polygons(what: str) -> None:
     """Raise an error unless polygons can be cut.
 
-    Parameters
-    ----------
-    what : str
-        What needs it, for the message.
-
-    Raises
-    ------
-    FileError
-        If the extra is not installed.
+    Raises `FileError` if the extra is not installed.
     """
     if find_spec("shapely") is None:
         raise FileError(f"{what} needs shapely; pip install 'seqopt[blocks]'")
 
 
 def touching_faces(
-    shapes: Sequence[Solid], gap: float, progress: Tell | None = None
-) -> tuple[TouchingFace, ...]:
+    shapes: Sequence[_Solid], gap: float, progress: Tell | None = None
+) -> tuple[_TouchingFace, ...]:
     """Return the faces over which blocks touch.
 
-    Parameters
-    ----------
-    shapes : sequence of Polyhedron or Surface
-        Where they are in the scene.
-    gap : float
-        Most that may lie between two faces, or by which they may interpenetrate, m.
-    progress : callable, optional
-        Told how far it is, once it takes longer than a second.
-
-    Returns
-    -------
-    tuple of TouchingFace
-        In the order of the blocks; halfway between the two faces.
-
-    Raises
-    ------
-    FileError
-        If shapely is not installed.
-    SceneError
-        If the gap is not positive, or more than `MOST_PAIRS` blocks are near each other.
+    ``shapes``: where they are in the scene; ``gap``: most that may lie between two faces, or by
+    which they may interpenetrate, m; ``progress``: told how far it is, once it takes longer than a
+    second. Result: in the order of the blocks; halfway between the two faces. Raises `FileError` if
+    shapely is not installed; `SceneError` if the gap is not positive, or more than `_MOST_PAIRS`
+    blocks are near each other.
 
     Examples
     --------
@@ -150,27 +167,27 @@ def touching_faces(
     return tuple(_found(shapes, gap, Progress("finding faces", len(shapes), progress)))
 
 
-def _found(shapes: Sequence[Solid], gap: float, course: Progress) -> Iterator[TouchingFace]:
+def _found(shapes: Sequence[_Solid], gap: float, course: Progress) -> Iterator[_TouchingFace]:
     """Yield the faces over which blocks touch, pair by pair."""
     facets, done = [_facets(shape) for shape in shapes], 0
     for tries, (i, j) in enumerate(_near(shapes, gap)):
         course.add(i - done)
         done = i
-        if tries == MOST_PAIRS:
-            raise SceneError(f"more than {MOST_PAIRS} pairs of blocks are in one place; part them")
+        if tries == _MOST_PAIRS:
+            raise SceneError(f"more than {_MOST_PAIRS} pairs of blocks are in one place; part them")
         for polygons, (origin, axes) in _overlaps(facets[i], facets[j], gap):
             for piece in convex_pieces(polygons):
-                yield TouchingFace((i, j), origin + piece @ axes[1:], axes[0])
+                yield _TouchingFace((i, j), origin + piece @ axes[1:], axes[0])
 
 
-def _facets(shape: Solid) -> _Facets:
+def _facets(shape: _Solid) -> _Facets:
     corners = tuple(shape.points[list(face)] for face in shape.faces)
     normals = np.array([normal_of(face) for face in corners])
     size = np.linalg.norm(normals, axis=1, keepdims=True)
     return _Facets(corners, normals / size, np.array([face.mean(axis=0) for face in corners]))
 
 
-def _near(shapes: Sequence[Solid], gap: float) -> Iterator[tuple[int, int]]:
+def _near(shapes: Sequence[_Solid], gap: float) -> Iterator[tuple[int, int]]:
     """Yield pairs of blocks whose boxes along the axes are no farther apart than a gap."""
     low = np.array([shape.points.min(axis=0) for shape in shapes]).reshape(-1, 3) - gap
     high = np.array([shape.points.max(axis=0) for shape in shapes]).reshape(-1, 3)
@@ -183,7 +200,7 @@ def _near(shapes: Sequence[Solid], gap: float) -> Iterator[tuple[int, int]]:
 
 def _overlaps(first: _Facets, second: _Facets, gap: float) -> Iterator[tuple[list[Any], Any]]:
     """Yield overlaps of the faces of two blocks, plane by plane, with the origins and axes."""
-    planes: list[Plane] = []
+    planes: list[_Plane] = []
     for k, m in _opposed(first, second, gap):
         normal = first.normal[k] - second.normal[m]
         normal /= np.linalg.norm(normal)
@@ -197,10 +214,10 @@ def _overlaps(first: _Facets, second: _Facets, gap: float) -> Iterator[tuple[lis
         yield polygons, (origin, axes)
 
 
-def _in_plane(plane: Plane, normal: Floats, middle: Floats, gap: float) -> bool:
+def _in_plane(plane: _Plane, normal: Floats, middle: Floats, gap: float) -> bool:
     """Return whether a face lies in a plane, no farther off than half a gap."""
     origin, axes, _ = plane
-    return bool(normal @ axes[0] > LEVEL and abs((middle - origin) @ axes[0]) <= 0.5 * gap)
+    return bool(normal @ axes[0] > _LEVEL and abs((middle - origin) @ axes[0]) <= 0.5 * gap)
 
 
 def _opposed(first: _Facets, second: _Facets, gap: float) -> Ints:
@@ -226,7 +243,7 @@ def _overlap(first: Floats, second: Floats, plane: tuple[Floats, Floats], gap: f
     seen = [(face - origin) @ axes.T for face in (first, second)]
     one, other = (shapely.make_valid(shapely.Polygon(face[:, 1:])) for face in seen)
     common = one.intersection(other)
-    if not common.area > SLIVER * min(one.area, other.area):
+    if not common.area > _SLIVER * min(one.area, other.area):
         return []
     points = shapely.get_coordinates(common)
     heights = [_heights(face, points) for face in seen]

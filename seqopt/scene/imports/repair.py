@@ -11,32 +11,27 @@ import numpy as np
 from seqopt.arrays import Floats
 from seqopt.errors import SceneError
 from seqopt.scene.blocks import as_vectors
-from seqopt.scene.detection import Surface
 from seqopt.scene.imports.content import FileBlock
+from seqopt.scene.imports.detection import Surface
 from seqopt.scene.shape import FLAT, Polyhedron, bend
 
 WELD = 1e-6  # distance of vertices that are one, over the size of the block
-Face = tuple[int, ...]
+_Face = tuple[int, ...]
 
-CUT = "faces that are not flat are cut into triangles"
-WELDED = "vertices in one place are united"
-TWICE = "faces that stand there twice are left out"
-OPEN = "supports are surfaces that are not closed"
-TURNED = "faces are turned so that all agree which side is outside"
+_CUT = "faces that are not flat are cut into triangles"
+_WELDED = "vertices in one place are united"
+_TWICE = "faces that stand there twice are left out"
+_OPEN = "supports are surfaces that are not closed"
+_TURNED = "faces are turned so that all agree which side is outside"
 
 
 @dataclass(frozen=True)
-class Tidied:
+class Repaired:
     """A block whose faces are in order.
 
-    Attributes
-    ----------
-    solid : Polyhedron or Surface
-        A surface where a support is not closed.
-    facets : Surface
-        Its faces as the file has them, also those that are not flat: where it touches others.
-    mended : Counter of str
-        What was done, and to how many faces or vertices.
+    ``solid``: a surface where a support is not closed; ``facets``: its faces as the file has them,
+    also those that are not flat: where it touches others; ``mended``: what was done, and to how
+    many faces or vertices.
     """
 
     solid: Polyhedron | Surface
@@ -44,20 +39,10 @@ class Tidied:
     mended: Counter[str]
 
 
-def tidy_shape(block: FileBlock, *, may_be_open: bool = False) -> Tidied:
+def repair_shape(block: FileBlock, *, may_be_open: bool = False) -> Repaired:
     """Return a block as a polyhedron, or a support that is not closed as a surface.
 
-    Parameters
-    ----------
-    block : FileBlock
-        In m.
-    may_be_open : bool, optional
-        Whether it is a support, of which the surface alone counts.
-
-    Raises
-    ------
-    SceneError
-        Naming the block, if it is not closed.
+    ``block``: in m; ``may_be_open``: whether it is a support, of which the surface alone counts.
     """
     mended: Counter[str] = Counter()
     points, faces = block.vertices, [_plain(face) for face in block.faces]
@@ -72,33 +57,33 @@ def tidy_shape(block: FileBlock, *, may_be_open: bool = False) -> Tidied:
     place = {v: i for i, v in enumerate(used)}
     try:
         named = tuple(tuple(place[v] for v in face) for face in faces)
-        return Tidied(Polyhedron(as_vectors(points[used]), named), facets, mended)
+        return Repaired(Polyhedron(as_vectors(points[used]), named), facets, mended)
     except SceneError as error:
         if may_be_open and faces:
-            mended[OPEN] += 1
+            mended[_OPEN] += 1
             both = Surface(points, (*facets.faces, *(face[::-1] for face in facets.faces)))
-            return Tidied(both, both, mended)
+            return Repaired(both, both, mended)
         raise SceneError(f"block {block.key}: {error}") from error
 
 
-def _plain(face: Sequence[int]) -> Face:
+def _plain(face: Sequence[int]) -> _Face:
     """Return a face without vertices that follow themselves."""
     return tuple(v for v, before in zip(face, (*face[-1:], *face[:-1]), strict=True) if v != before)
 
 
-def _once(faces: list[Face], mended: Counter[str]) -> list[Face]:
+def _once(faces: list[_Face], mended: Counter[str]) -> list[_Face]:
     """Return faces of which no two have the same vertices."""
     found = {frozenset(face): face for face in reversed(faces)}
     if len(found) < len(faces):
-        mended[TWICE] += len(faces) - len(found)
+        mended[_TWICE] += len(faces) - len(found)
     return [face for face in faces if found.get(frozenset(face)) is face]
 
 
-def _open_edges(faces: Sequence[Face]) -> bool:
+def _open_edges(faces: Sequence[_Face]) -> bool:
     return any(times != 2 for times in _edges(faces).values())
 
 
-def _edges(faces: Sequence[Face]) -> Counter[frozenset[int]]:
+def _edges(faces: Sequence[_Face]) -> Counter[frozenset[int]]:
     return Counter(
         frozenset((a, b))
         for face in faces
@@ -107,8 +92,8 @@ def _edges(faces: Sequence[Face]) -> Counter[frozenset[int]]:
 
 
 def _welded(
-    points: Floats, faces: list[Face], reach: float, mended: Counter[str]
-) -> tuple[Floats, list[Face]]:
+    points: Floats, faces: list[_Face], reach: float, mended: Counter[str]
+) -> tuple[Floats, list[_Face]]:
     """Return points, those in one place united, and the faces between them."""
     from scipy.spatial import KDTree  # noqa: PLC0415  # slow to import, and seldom needed
 
@@ -117,11 +102,11 @@ def _welded(
         first[b] = min(first[b], first[a])
     united = int((first != np.arange(len(points))).sum())
     if united:
-        mended[WELDED] += united
+        mended[_WELDED] += united
     return points, [_plain(tuple(int(first[v]) for v in face)) for face in faces]
 
 
-def _flat(points: Floats, face: Face, size: float, mended: Counter[str]) -> list[Face]:
+def _flat(points: Floats, face: _Face, size: float, mended: Counter[str]) -> list[_Face]:
     """Return a face, or triangles in its place if it is not flat; none if it has no area."""
     if len(set(face)) < len(face):
         return [face]  # the polyhedron refuses it
@@ -130,7 +115,7 @@ def _flat(points: Floats, face: Face, size: float, mended: Counter[str]) -> list
         return [face]
     if len(face) == 3:
         return [face]
-    mended[CUT] += 1
+    mended[_CUT] += 1
     if len(face) == 4:
         a, b, c, d = face
         shorter = np.linalg.norm(points[a] - points[c]) <= np.linalg.norm(points[b] - points[d])
@@ -138,7 +123,7 @@ def _flat(points: Floats, face: Face, size: float, mended: Counter[str]) -> list
     return [(face[0], face[k], face[k + 1]) for k in range(1, len(face) - 1)]
 
 
-def _agreeing(points: Floats, faces: list[Face], mended: Counter[str]) -> list[Face]:
+def _agreeing(points: Floats, faces: list[_Face], mended: Counter[str]) -> list[_Face]:
     """Return faces turned so that they agree which side is outside, and that it is outside."""
     beside = defaultdict(list)
     for i, face in enumerate(faces):
@@ -154,13 +139,13 @@ def _agreeing(points: Floats, faces: list[Face], mended: Counter[str]) -> list[F
         out = [face[::-1] for face in out]
     changed = sum(face != before for face, before in zip(out, faces, strict=True))
     if changed:
-        mended[TURNED] += changed
+        mended[_TURNED] += changed
     return out
 
 
 def _spread(
     start: int,
-    faces: list[Face],
+    faces: list[_Face],
     beside: dict[frozenset[int], list[tuple[int, bool]]],
     turned: dict[int, bool],
 ) -> None:
@@ -177,7 +162,7 @@ def _spread(
                     waiting.append(j)
 
 
-def _volume(points: Floats, faces: list[Face]) -> float:
+def _volume(points: Floats, faces: list[_Face]) -> float:
     """Return six times the signed volume within faces."""
     spokes = points - points.mean(axis=0)
     fans = [(f[0], f[k], f[k + 1]) for f in faces for k in range(1, len(f) - 1)]
