@@ -309,8 +309,8 @@ def test_claims_stand_apart_from_their_parts():
 @pytest.mark.parametrize(
     ("a", "b"),
     [
-        ("experiments.engines.engine_limits", "experiments.engines.engine_speed"),
-        ("experiments.engines.engine_limits", "experiments.peers.parts.chain"),
+        ("experiments.engines.fidelity_ladder", "experiments.engines.engine_speed"),
+        ("experiments.engines.fidelity_ladder", "experiments.peers.parts.chain"),
         ("experiments.harness.runs", "experiments.engines.parts.grip_sets"),
     ],
 )

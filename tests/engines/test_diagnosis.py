@@ -7,8 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.engines.parts.limit_scenes import HELD, LOOSE_AT, chain, loosened, without_joint
-from experiments.engines.parts.reference_chain import solve_exactly
 from experiments.harness.walls import running_bond
 from seqopt.engines.diagnosis import WELL, Finding, diagnose
 from seqopt.engines.eigenvalues import LEAST_DIAGONAL, UNRESISTED, spectrum
@@ -19,6 +17,8 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.engines.rigid.dense import solve_dense
 from seqopt.engines.rigid.mixed import mixed_system, ungripped_system
 from seqopt.network.build import build_network
+from tests.limit_scenes import HELD, LOOSE_AT, chain, loosened, without_joint
+from tests.reference_chain import solve_exactly
 
 
 def places(net, bricks, grips):

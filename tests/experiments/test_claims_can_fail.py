@@ -16,12 +16,10 @@ from experiments.calibration.parts import arch_scores, calibration_spread
 from experiments.discrete import contact_steps, discrete_arches
 from experiments.engines import (
     engine_growth,
-    engine_limits,
     engine_speed,
     fidelity_ladder,
     frame_contrast,
     parallel,
-    partial_structures,
 )
 from experiments.exchange import outside_assemblies
 from experiments.harness.catalog import claims
@@ -39,7 +37,6 @@ from experiments.placement import (
     speed_accuracy,
     staged_construction,
 )
-from experiments.robustness import fuzz, mutation_testing
 from experiments.stability import dry_grips, dry_map, failing_steps, witnesses
 from experiments.study import criteria_variants, paper_counterparts
 from experiments.study.parts.paper_items import ITEMS
@@ -105,11 +102,6 @@ def checks() -> dict[str, tuple[Check, Tables, Callable[..., Iterator[tuple[Any,
         "dry_grips": (dry_grips.holds, (rows("dry_grips"), rows("dry_grips_build")), spoil_dry),
         "dry_map": (dry_map.holds, (rows("dry_map"),), spoil_map),
         "engine_growth": (engine_growth.holds, (rows("engine_growth_runs"),), spoil_growth),
-        "engine_limits": (
-            lambda table: all(engine_limits.judge(table).values()),
-            (rows("engine_limits"),),
-            spoil_limits,
-        ),
         "engine_speed": (
             lambda table: engine_speed.holds(table.iloc[:, -1]),
             (pd.read_csv(RESULTS / "engine_speed.csv", index_col=0),),
@@ -135,21 +127,12 @@ def checks() -> dict[str, tuple[Check, Tables, Callable[..., Iterator[tuple[Any,
             (rows("frame_contrast"),),
             spoil_contrast,
         ),
-        "fuzz": (fuzz.holds, (rows("fuzz"), rows("fuzz_kills")), spoil_fuzz),
         "free_growth": (free_growth.holds, (rows("free_growth"),), spoil_free_growth),
         "heuristic_gaps": (heuristic_gaps.holds, (rows("heuristic_gaps"),), spoil_gaps),
         "identify_arch25": (
             lambda table: arch_scores.holds(table, quick=False),
             (rows("identify_arch25_refit"),),
             spoil_identified,
-        ),
-        "mutation_testing": (
-            mutation_testing.holds,
-            (
-                rows("mutation_testing"),
-                pd.read_csv(RESULTS / "mutation_survivors.csv", keep_default_na=False),
-            ),
-            spoil_mutation,
         ),
         "outside_assemblies": (
             outside_assemblies.holds,
@@ -162,11 +145,6 @@ def checks() -> dict[str, tuple[Check, Tables, Callable[..., Iterator[tuple[Any,
             spoil_counterparts,
         ),
         "parallel": (parallel.holds, (rows("parallel"),), spoil_parallel),
-        "partial_structures": (
-            partial_structures.holds,
-            (rows("partial_structures"),),
-            spoil_partial,
-        ),
         "peers": (peers.judge, tuple(parts), spoil_peers),
         "program_shapes": (program_shapes.holds, (rows("program_shapes"),), spoil_shapes),
         "robust_placement": (
@@ -276,23 +254,6 @@ def spoil_staged(table, chosen):
     yield table, chosen.assign(scratch_worst_fitted=1.0)
 
 
-def spoil_fuzz(cases, kills):
-    yield spoiled(cases, "faults", 1, kind="scene", command="analyze"), kills
-    yield cases, spoiled(kills, "left", "a part", signal="SIGKILL")
-    yield cases, spoiled(kills, "left", "whole, and a hidden folder", signal="SIGTERM")
-
-
-def spoil_mutation(table, survivors):
-    last = table["module"].iloc[-1]
-    named = survivors[survivors["reason"] != ""]
-    yield spoiled(table, "as_it_is", "killed", module=last), survivors
-    yield spoiled(table, "with_a_broken_line", "survived", module=last), survivors
-    yield spoiled(table, "equivalent_but_killed", 1, module=last), survivors
-    yield table, survivors.assign(reason="none could")
-    yield table, survivors.drop(index=named.index[0])
-    yield table.assign(survived=table["killed"] // 10), survivors
-
-
 def spoil_growth(table):
     for column in ("seconds", "memory_MB"):  # as the cube, and a run without an end
         cube = 1e-4 * table["bricks"] ** 3 + table["memory_MB"].min()
@@ -300,13 +261,6 @@ def spoil_growth(table):
     yield (spoiled(table, "seconds", np.nan, version="this", scene="vault338"),)
     yield (spoiled(table, "error", 2e-9, version="this", scene="chain338"),)
     yield (spoiled(table, "screen_error", 2e-6, version="this", scene="chain338"),)
-
-
-def spoil_limits(table):
-    yield (spoiled(table, "error", 2e-9, engine="fast", sweep=table["sweep"].iloc[0], bricks=25),)
-    yield (spoiled(table, "error", 1e-10, engine="fast", bricks=338),)  # worse than direct in walls
-    yield (spoiled(table, "status", "solved", engine="fast", mechanism=True),)
-    yield (spoiled(table, "backward_error", 1e-12, engine="frame"),)
 
 
 def spoil_speed(table):
@@ -348,12 +302,6 @@ def spoil_contrast(table):
     ),)  # fmt: skip
     flat = table.assign(**dict.fromkeys(frame_contrast.FIELDS, 1e-07), refused=0)
     yield (flat,)  # no contrast is better than another
-
-
-def spoil_partial(table):
-    yield (spoiled(table, "difference", 2e-9, scene="vault338", method="sequential"),)
-    yield (spoiled(table, "states", 12, scene="dome163", method="sequential"),)  # some left out
-    yield (table[table["scene"] != "armadillo_cra"],)
 
 
 def spoil_shapes(table):

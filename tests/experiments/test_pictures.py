@@ -13,8 +13,10 @@ from experiments.harness.catalog import claims
 from experiments.harness.plotting import FIGURES
 from seqopt.report.style import DPI, WIDTH, dress, looks, new_figure, styled
 from tests.pictures import flaws, texts
+from tests.quality.engine_limits import picture as limits_picture
 
 DRAWN = {name: draw for claim in claims().values() for name, draw in claim.pictures.items()}
+DRAWN["engine_limits.png"] = limits_picture
 LONG = {"calibration.png", "outside_assemblies.png", "dry_map.png", "decision_sensitivity.png"}
 ELSEWHERE = {"report.png"}  # of a browser
 TOUCHING = 1.5  # pixels that texts may share

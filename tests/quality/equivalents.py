@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fnmatch import fnmatch
 
-from experiments.robustness.parts.mutants import Mutant
+from tests.quality.mutants import Mutant
 
 
 @dataclass(frozen=True)

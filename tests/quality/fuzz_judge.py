@@ -1,4 +1,8 @@
-"""Run a case as the shell would, and say what is wrong with how it ended."""
+"""Run a case as the shell would, and say what is wrong with how it ended.
+
+Command: ``python -m tests.quality.fuzz_judge FIRST LAST`` prints a line of JSON for every case:
+in a process of their own, cases that hang can be ended.
+"""
 
 from __future__ import annotations
 
@@ -6,22 +10,27 @@ import contextlib
 import io
 import json
 import os
+import queue
+import subprocess
+import sys
 import tempfile
+import threading
 import time
 import traceback
 import warnings
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
-from experiments.robustness.parts.mutations import Case, write_case
 from seqopt.cli.main import main
 from seqopt.cli.status import Status
 from seqopt.responses.quantities import RESPONSES, robot_response
+from tests.builders import ROOT
+from tests.quality.fuzz_cases import Case, Mutator, write_case
 
 LONGEST = 60.0  # s; a case that takes longer hangs
 ENDS = {status.value for status in Status} - {Status.INTERRUPTED.value}
@@ -168,3 +177,69 @@ def _fault_of_table(text: str) -> str:
         if not (table[node].notna() == np.isfinite(table[force].astype(float))).all():
             return f"{force}: a robot that grips has no force"
     return ""
+
+
+Row = dict[str, object]
+
+
+def judged(first: int, last: int, longest: float = LONGEST) -> Iterator[Row]:
+    """Yield how the cases of some numbers ended; one that takes longer is a fault, and ended."""
+    while first < last:
+        for row in _some(first, last, longest):
+            first = int(str(row["number"])) + 1
+            yield row
+
+
+def _some(first: int, last: int, longest: float) -> Iterator[Row]:
+    """Yield cases until all are judged or one hangs or ends its process."""
+    words = [sys.executable, "-m", __name__, str(first), str(last)]
+    with subprocess.Popen(words, cwd=ROOT, stdout=subprocess.PIPE, text=True) as process:
+        lines: queue.Queue[str] = queue.Queue()
+        threading.Thread(target=_listen, args=(process, lines), daemon=True).start()
+        try:
+            while first < last:
+                try:
+                    line = lines.get(timeout=longest)
+                except queue.Empty:
+                    yield _ended(first, f"hangs: more than {longest:g} s")
+                    return
+                if not line:
+                    yield _ended(first, f"ends its process: {process.wait()}")
+                    return
+                yield json.loads(line)
+                first += 1
+        finally:
+            process.kill()
+
+
+def _listen(process: subprocess.Popen[str], lines: queue.Queue[str]) -> None:
+    assert process.stdout is not None
+    for line in process.stdout:
+        lines.put(line)
+    lines.put("")
+
+
+def _ended(number: int, fault: str) -> Row:
+    case = Mutator().case(number)
+    return {
+        "number": number,
+        "kind": case.kind,
+        "command": case.words[0],
+        "status": -1,
+        "fault": fault,
+        "seconds": LONGEST,
+    }
+
+
+def run(first: int, last: int) -> Iterator[Row]:
+    """Yield how cases ended, judged in this process."""
+    mutator = Mutator()
+    for number in range(first, last):
+        case = mutator.case(number)
+        about = {"number": number, "kind": case.kind, "command": case.words[0]}
+        yield about | asdict(judge(case))
+
+
+if __name__ == "__main__":
+    for found in run(int(sys.argv[1]), int(sys.argv[2])):
+        print(json.dumps(found), flush=True)

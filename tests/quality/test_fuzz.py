@@ -6,14 +6,13 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
-from experiments.robustness.fuzz import is_clean
-from experiments.robustness.parts import judging
-from experiments.robustness.parts.judging import judge
-from experiments.robustness.parts.kills import BLOCKS, _left, killed
-from experiments.robustness.parts.mutations import Mutator
-from experiments.robustness.parts.worker import judged, run
+from tests.quality import fuzz_judge
+from tests.quality.fuzz import BLOCKS, _left, holds, is_clean, killed, main, summary
+from tests.quality.fuzz_cases import Mutator
+from tests.quality.fuzz_judge import judge, judged, run
 
 CASES = 120
 
@@ -24,9 +23,19 @@ def mutator():
 
 
 @pytest.mark.slow
-def test_changed_input_leaves_no_fault():
+def test_a_small_run_of_the_command_finds_no_fault(capsys):
+    assert main(["--cases", "60", "--kills", "2"]) == 0
+    assert capsys.readouterr().out.splitlines()[-1] == "no fault: 60 cases, 2 kills"
+
+
+@pytest.mark.slow
+def test_changed_input_leaves_no_fault_and_one_that_would_is_told():
     rows = list(run(0, CASES))
     assert [row for row in rows if row["fault"]] == []
+    cases, kills = pd.DataFrame(rows), pd.DataFrame({"left": ["whole"], "signal": ["SIGKILL"]})
+    assert holds(summary(cases), kills)
+    assert not holds(summary(cases.assign(fault=["any", *[""] * (CASES - 1)])), kills)
+    assert not holds(summary(cases), kills.assign(left="a part"))
     assert {row["kind"] for row in rows} == {"scene", "plan", "words", "nothing"}
     assert {row["status"] for row in rows} >= {0, 2, 3}
 
@@ -51,7 +60,7 @@ def test_a_traceback_is_seen(mutator, monkeypatch):
     def fails(_):
         raise ZeroDivisionError
 
-    monkeypatch.setattr(judging, "main", fails)
+    monkeypatch.setattr(fuzz_judge, "main", fails)
     assert judge(case_of(mutator, "scene")).fault.startswith("traceback: ZeroDivisionError")
 
 
@@ -66,7 +75,7 @@ def test_a_traceback_is_seen(mutator, monkeypatch):
     ],
 )
 def test_an_end_that_is_wrong_is_seen(mutator, monkeypatch, does, seen):
-    monkeypatch.setattr(judging, "main", lambda _: does())
+    monkeypatch.setattr(fuzz_judge, "main", lambda _: does())
     assert seen in judge(case_of(mutator, "scene")).fault
 
 
@@ -77,7 +86,7 @@ def test_a_result_that_is_not_finite_is_seen(mutator, monkeypatch, lost):
     text = "step,type,bricks,rob1_brick,rob1_node,F_rob1_N,F_sup_N,M_sup_Nm,F_min_N,F_max_N,F_avg_N"
     text += ",T_pct,D_max_1e-3mm,D_avg_1e-3mm,D_std_1e-3mm\n1,place,1,1,1,{},1,1,1,{},1,1,1,1,1\n"
     cells = ("", 1) if lost == "F_rob1_N" else (1, "inf")
-    monkeypatch.setattr(judging, "main", lambda _: print(text.format(*cells), end="") or 0)
+    monkeypatch.setattr(fuzz_judge, "main", lambda _: print(text.format(*cells), end="") or 0)
     said = "a robot that grips has no force" if lost == "F_rob1_N" else "response is not finite"
     assert said in judge(case).fault
 

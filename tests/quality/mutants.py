@@ -22,9 +22,7 @@ from cosmic_ray.operators.operator import Example, Operator
 from parso.python.tree import Name
 from parso.tree import NodeOrLeaf
 
-from experiments.harness.places import HOME
-
-ROOT = HOME.parent
+ROOT = Path(__file__).resolve().parents[2]
 OPPOSITES = (("any", "all"), ("min", "max"), ("argmin", "argmax"), ("minimum", "maximum"))
 SWAPPED = {a: b for pair in OPPOSITES for a, b in (pair, pair[::-1])}
 

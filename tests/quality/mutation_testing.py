@@ -1,12 +1,12 @@
-"""Claim: tests notice at least 95 % of the changes to code that computes, costs and certifies.
+"""Tests notice at least 95 % of the changes to code that computes, costs and certifies.
 
 Method: Cosmic Ray changes one operator, number, loop or decorator of a module at a time
-(`experiments.robustness.parts.mutants`), and the tests that are for the module run against it. A
+(`tests.quality.mutants`), and the tests that are for the module run against it. A
 mutant that fails one is killed; one that loops is ended after ten times what the tests take, and
 counts as killed. Where a module has more mutants than ``--most``, as many are drawn, by a fixed
 seed. Modules that prove are a group of their own (``--only proofs``). A mutant that no test could
 kill, since nothing that is promised changes, is named in
-`experiments.robustness.parts.equivalents` with the reason; no other is taken off, and one that is
+`tests.quality.equivalents` with the reason; no other is taken off, and one that is
 named there and killed makes the claim fail. Controls, for every module: its own text survives, and
 a text with a line that raises is killed.
 
@@ -14,30 +14,33 @@ Of the tools that were alive in 2026 Cosmic Ray (8.7, MIT) was taken, since it a
 mutmut (3.8, BSD) leaves alone: constants of a module, properties and decorated functions, which
 here are tolerances and the engine's ``solve``; mutatest and mutpy have had no release since 2022.
 Its own runner starts a Python per mutant, a second of imports each; ours forks one that has them,
-and writes no file (`experiments.robustness.parts.mutant_trials`).
+and writes no file (`tests.quality.mutant_trials`).
 
 Inputs: the modules below. Command:
-``python -m experiments.robustness.mutation_testing [--quick] [--again] [--only TEXT] [--most N]``;
+``python -m tests.quality.mutation_testing [--quick] [--again] [--only TEXT] [--most N]``;
 ``--again`` tries what survived the last run, after tests were added, and with a larger ``--most``
 what was not tried. Tests that are written for what survived say nothing of mutants that were not
 drawn: for these stands what was killed at first sight. Writes
-``experiments/results/mutation_testing.csv`` and ``mutation_survivors.csv``.
+``mutation_testing.csv`` and ``mutation_survivors.csv`` beside this file; the exit status is 1 if
+too many survive.
 """
 
 from __future__ import annotations
 
+import argparse
+import sys
 import zlib
+from collections.abc import Sequence
+from importlib.util import find_spec
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
 from scipy.stats import binomtest
 
-from experiments.harness.claim import Claim, ClaimError, Extra, Finding, Option, Options
-from experiments.harness.places import RESULTS
-
 if TYPE_CHECKING:
-    from experiments.robustness.parts.mutants import Mutant
+    from tests.quality.mutants import Mutant
 
 RIGID = (
     "engines/test_trial",
@@ -103,7 +106,8 @@ LEAST = 0.95  # of the mutants that are not equivalent
 MOST, QUICK_MOST, QUICK = 60, 8, "seqopt.placement.ranks"
 BROKEN = "\nraise RuntimeError\n"
 CONTROLS = {"as_it_is": "survived", "with_a_broken_line": "killed"}
-STORE, SURVIVORS = RESULTS / "mutation_testing.csv", RESULTS / "mutation_survivors.csv"
+HOME = Path(__file__).resolve().parent
+STORE, SURVIVORS = HOME / "mutation_testing.csv", HOME / "mutation_survivors.csv"
 KEY = ["module", "operator", "before", "after"]
 
 
@@ -119,7 +123,7 @@ def files(module: str) -> list[str]:
 
 def drawn(module: str, most: int) -> tuple[list[Mutant], int]:
     """Return the mutants of a module to be tried, and how many there are."""
-    from experiments.robustness.parts.mutants import mutants  # noqa: PLC0415  # an extra
+    from tests.quality.mutants import mutants  # noqa: PLC0415  # an extra
 
     every = list(mutants(module))
     if len(every) <= most:
@@ -132,9 +136,9 @@ def drawn(module: str, most: int) -> tuple[list[Mutant], int]:
 
 def tried(module: str, chosen: list[Mutant]) -> tuple[pd.DataFrame, dict[str, str]]:
     """Return what became of mutants, a row each, and of the controls."""
-    from experiments.robustness.parts.equivalents import reason  # noqa: PLC0415
-    from experiments.robustness.parts.mutant_trials import limit, trial  # noqa: PLC0415
-    from experiments.robustness.parts.mutants import path_of  # noqa: PLC0415
+    from tests.quality.equivalents import reason  # noqa: PLC0415
+    from tests.quality.mutant_trials import limit, trial  # noqa: PLC0415
+    from tests.quality.mutants import path_of  # noqa: PLC0415
 
     source, tests = path_of(module).read_text(encoding="utf-8"), files(module)
     seconds = limit(module, source, tests)
@@ -150,7 +154,7 @@ def tried(module: str, chosen: list[Mutant]) -> tuple[pd.DataFrame, dict[str, st
 
 def text_of(module: str) -> str:
     """Return a number for the text of a module: rows of another text are of what it once was."""
-    from experiments.robustness.parts.mutants import path_of  # noqa: PLC0415
+    from tests.quality.mutants import path_of  # noqa: PLC0415
 
     return f"crc32 {zlib.crc32(path_of(module).read_bytes()):08x}"
 
@@ -203,7 +207,7 @@ def store(row: pd.DataFrame, survivors: pd.DataFrame) -> None:
 
 def measured_again(module: str, most: int) -> tuple[pd.DataFrame, pd.DataFrame]:
     """Return a module's row and survivors, what survived and what was not tried being tried."""
-    from experiments.robustness.parts.equivalents import reason  # noqa: PLC0415
+    from tests.quality.equivalents import reason  # noqa: PLC0415
 
     table, before = stored()
     row = table[table["module"] == module].reset_index(drop=True)
@@ -211,7 +215,7 @@ def measured_again(module: str, most: int) -> tuple[pd.DataFrame, pd.DataFrame]:
     drawn_before = drawn(module, int(row.loc[0, "tried"]))[0]
     killed = [m for m in drawn_before if tuple(getattr(m, name) for name in KEY) not in survived]
     if len(drawn_before) - len(killed) != (before["module"] == module).sum():
-        raise ClaimError(f"{module} is not what it was; run it without --again")
+        raise SystemExit(f"{module} is not what it was; run it without --again")
     more, mutants = drawn(module, most)
     again = [mutant for mutant in drawn_before if mutant not in killed]
     fresh = [mutant for mutant in more if mutant not in drawn_before] if most > MOST else []
@@ -256,11 +260,29 @@ def holds(table: pd.DataFrame, survivors: pd.DataFrame) -> bool:
     )
 
 
-def experiment(options: Options) -> Finding:
-    from experiments.robustness.parts.mutant_trials import preload  # noqa: PLC0415  # an extra
+def parsed(arguments: Sequence[str] | None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    for flag, default, text in (
+        ("--only", "", "modules with this in their names, or proofs; rows of others stay"),
+        ("--most", MOST, "how many mutants of a module are tried"),
+    ):
+        parser.add_argument(flag, type=type(default), default=default, help=text)
+    text = f"{QUICK_MOST} mutants of one module, nothing written"
+    parser.add_argument("--quick", action="store_true", help=text)
+    text = "try what survived the last run, and what --most has beyond it"
+    parser.add_argument("--again", action="store_true", help=text)
+    return parser.parse_args(arguments)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    options = parsed(arguments)
+    if find_spec("cosmic_ray") is None:
+        print('cosmic_ray is not installed: pip install "seqopt[mutation]"')
+        return 2
+    from tests.quality.mutant_trials import preload  # noqa: PLC0415  # an extra
 
     preload()
-    most = QUICK_MOST if options.quick else int(options.most)
+    most = QUICK_MOST if options.quick else options.most
     found = []
     for module in [QUICK] if options.quick else asked(options.only):
         found.append(measured_again(module, most) if options.again else measured(module, most))
@@ -273,25 +295,15 @@ def experiment(options: Options) -> Finding:
             print(f"{row.module} has changed since it was measured")
     for row in survivors[survivors["reason"] == ""].itertuples():
         print(f"survives: {row.module}:{row.line}: {row.before}  ->  {row.after}")
-    note = f": {share(table):.1%} of {table['tried'].sum()} mutants killed, equivalent ones aside"
+    note = f"{share(table):.1%} of {table['tried'].sum()} mutants killed, equivalent ones aside"
     if (table["tried"] < table["mutants"]).any():
         seen, least = first_look(table)
         note += (
             f"; {seen:.1%} at first sight, so of all {table['mutants'].sum()} {least:.1%} or more"
         )
-    return Finding(holds(table, survivors), note)
+    print(note)
+    return int(not holds(table, survivors))
 
-
-CLAIM = Claim(
-    experiment,
-    quick=f"{QUICK_MOST} mutants of one module, nothing written",
-    options=(
-        Option("--again", "try what survived the last run, and what --most has beyond it"),
-        Option("--only", "modules with this in their names, or proofs; rows of others stay", ""),
-        Option("--most", "how many mutants of a module are tried", str(MOST)),
-    ),
-    needs=(Extra("cosmic_ray", 'pip install "seqopt[mutation]"'),),
-)
 
 if __name__ == "__main__":
-    CLAIM.main()
+    sys.exit(main())

@@ -8,14 +8,14 @@ from fnmatch import fnmatch
 
 import pytest
 
-from experiments.robustness.mutation_testing import MODULES, files
 from tests.builders import ROOT
+from tests.quality.mutation_testing import MODULES, files, holds, stored
 
 pytest.importorskip("cosmic_ray")
 
-from experiments.robustness.parts import mutants as made
-from experiments.robustness.parts.equivalents import EQUIVALENT, reason
-from experiments.robustness.parts.mutants import Mutant, mutants, path_of
+from tests.quality import mutants as made
+from tests.quality.equivalents import EQUIVALENT, reason
+from tests.quality.mutants import Mutant, mutants, path_of
 
 TEXT = '''"""A module."""
 from __future__ import annotations
@@ -91,9 +91,35 @@ def test_every_reason_is_that_of_a_line():
         ), known
 
 
+@pytest.mark.parametrize(
+    ("column", "value"),
+    [
+        ("as_it_is", "killed"),
+        ("with_a_broken_line", "survived"),
+        ("equivalent_but_killed", 1),
+        ("survived", 10**4),
+    ],
+)
+def test_the_check_of_the_stored_rows_can_fail(column, value):
+    table, survivors = stored()
+    assert holds(table, survivors)
+    assert not holds(table.assign(**{column: value}), survivors)
+    assert not holds(table, survivors.assign(reason="none could"))
+    named = survivors[survivors["reason"] != ""]
+    assert not holds(table, survivors.drop(index=named.index[0]))
+
+
+@pytest.mark.slow
+def test_a_quick_run_kills_enough():
+    words = [sys.executable, "-W", "error", "-m", "tests.quality.mutation_testing", "--quick"]
+    done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "mutants killed" in done.stdout.splitlines()[-1]
+
+
 OUTCOMES = """
-from experiments.robustness.parts.mutant_trials import limit, preload, trial
-from experiments.robustness.parts.mutants import path_of
+from tests.quality.mutant_trials import limit, preload, trial
+from tests.quality.mutants import path_of
 preload()
 module, tests = "seqopt.placement.ranks", ["tests/placement/test_criteria.py"]
 text = path_of(module).read_text(encoding="utf-8")
