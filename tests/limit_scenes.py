@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from experiments.harness.walls import running_bond
+from experiments.harness.scenes import running_bond
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.scene.arch import ArchShape, arch_scene

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.harness.walls import running_bond
+from experiments.harness.scenes import running_bond
 from seqopt.engines.diagnosis import WELL, Finding, diagnose
 from seqopt.engines.eigenvalues import LEAST_DIAGONAL, UNRESISTED, spectrum
 from seqopt.engines.frame import FrameEngine

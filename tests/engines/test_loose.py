@@ -8,8 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.engines.parts.grip_sets import grip_sets
-from experiments.harness.walls import running_bond
+from experiments.harness.scenes import grip_sets, running_bond
 from seqopt.engines.diagnosis import Finding, diagnose
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import NAMES, Want, grip_columns

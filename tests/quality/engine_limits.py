@@ -33,7 +33,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import NullLocator
 
-from experiments.harness.plotting import save_figure
+from experiments.harness.results import save_figure
 from seqopt.arrays import Floats, Ints
 from seqopt.engines.diagnosis import WELL
 from seqopt.engines.eigenvalues import UNRESISTED, spectrum

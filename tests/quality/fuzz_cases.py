@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from experiments.harness.walls import running_bond
+from experiments.harness.scenes import running_bond
 from seqopt.network.build import build_network
 from seqopt.placement.formulation import formulation_names
 from seqopt.scene.arch import ArchShape, arch_scene

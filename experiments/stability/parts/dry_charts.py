@@ -1,13 +1,71 @@
-"""The figure of `experiments.stability.failing_steps`: by bricks placed, and as arches grow."""
+"""Figures of `experiments.stability.dry_map`: what stands, is built dry, and needs which bond."""
 
 from __future__ import annotations
 
+import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 
 from seqopt.contact.mortar import EPOXY
 from seqopt.report.style import GRAY, SMALL, dress, looks, name_panels, new_figure, plain, styled
+
+
+@styled
+def grips_chart(table: pd.DataFrame) -> Figure:
+    figure = new_figure(3.4)
+    share, work = figure.subplots(1, 2)
+    for name, style in looks(table["case"].unique()).items():
+        rows = table[table["case"] == name]
+        line = style.line() | {"lw": 1.1, "ms": 4, "label": name}
+        share.plot(rows["bricks"], 100 * rows["stand"] / rows["sets"], **line)
+        work.semilogy(rows["bricks"], rows["solved"].clip(lower=1), **line)
+    sets = table.drop_duplicates("bricks")
+    work.semilogy(sets["bricks"], sets["sets"], color=GRAY, lw=2, label="all sets of grips")
+    share.set(xlabel="bricks placed", title="sets of grips that stand [%]", ylim=(0, 104))
+    work.set(xlabel="bricks placed", title="linear programs solved")
+    plain(work.yaxis)
+    dress(share, work)
+    name_panels(share, work)
+    figure.legend(*work.get_legend_handles_labels(), loc="outside lower center", ncols=4)
+    return figure
+
+
+DARK = 0.52  # from where figures are white
+LARGEST = 0.7  # payload over the arch's weight at the end of the scale
+
+
+@styled
+def map_chart(table: pd.DataFrame) -> Figure:
+    """Draw a panel per thickness and number of robots: friction over bricks."""
+    thicknesses, robots = (sorted(table[c].unique()) for c in ("thickness_m", "robots"))
+    figure = new_figure(6.6)
+    axes = figure.subplots(len(thicknesses), len(robots), sharex=True, sharey=True, squeeze=False)
+    for row, thickness in zip(axes, thicknesses, strict=True):
+        for axis, count in zip(row, robots, strict=True):
+            part = table[(table["thickness_m"] == thickness) & (table["robots"] == count)]
+            cells = part.pivot_table(index="friction", columns="bricks", values="least_payload")
+            least = np.ma.masked_invalid(cells.to_numpy())
+            image = axis.imshow(least, origin="lower", vmin=0.2, vmax=LARGEST, cmap="viridis_r")
+            axis.set_facecolor("0.85")
+            for i, j in np.ndindex(*cells.shape):
+                value = cells.iloc[i, j]
+                text = f"{value:.2f}" if np.isfinite(value) else "–"
+                ink = "white" if DARK < value < np.inf else "black"
+                axis.text(j, i, text, ha="center", va="center", fontsize=SMALL, color=ink)
+            axis.set_xticks(range(cells.shape[1]), [str(n) for n in cells.columns])
+            axis.set_yticks(range(cells.shape[0]), [f"{f:g}" for f in cells.index])
+            if axis in axes[0]:
+                axis.set_title(f"{count} robots")
+            if axis in axes[-1]:
+                axis.set_xlabel("bricks of the arch")
+        row[0].set_ylabel(f"{1e3 * thickness:g} mm thick\ncoefficient of friction")
+    figure.colorbar(image, ax=axes, label="least payload over the weight of the arch", shrink=0.6)
+    none = Patch(color="0.85", label="no payload up to four times the weight is enough")
+    figure.legend(handles=[none], loc="outside lower right")
+    return figure
+
 
 ORDINARY = 0.10e6  # Pa: flexural bond of general-purpose mortar, EN 1996-1-1, 3.6.4
 LIMITS = {"D_max_1e-3mm": 100.0, "M_sup_Nm": 30.0, "F_largest_N": 392.4}
@@ -23,7 +81,7 @@ LOOKS = looks(NAMES)
 
 
 @styled
-def chart(steps: pd.DataFrame, scale: pd.DataFrame) -> Figure:
+def failing_chart(steps: pd.DataFrame, scale: pd.DataFrame) -> Figure:
     figure = new_figure(6.6)
     (bond, shift), (force, size) = figure.subplots(2, 2)
     for name, style in LOOKS.items():

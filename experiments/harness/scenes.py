@@ -1,4 +1,4 @@
-"""Arches of any number of bricks."""
+"""Arches of any number of bricks, and walls in running bond, open between bricks."""
 
 from __future__ import annotations
 
@@ -6,10 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from seqopt.arrays import Ints
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.library.chain import chain
+from seqopt.scene.library.wall import WallShape, wall
+from seqopt.scene.parts import Robot
 from seqopt.scene.scene import Scene
 from seqopt.study.presets import ROBOTS
 
@@ -39,3 +42,35 @@ def longer(scene: Scene, times: float) -> Scene:
     )
     robots = [replace(robot, payload=times * robot.payload) for robot in ROBOTS]
     return arch_scene(shape, f"{count} bricks", robots=robots)
+
+
+SPRING = {
+    "along": (0.0, 0.0, 1.0),
+    "across": (1.0, 0.0, 0.0),
+    "translational_stiffness": (3e8, 2e8, 1e8),
+    "rotational_stiffness": (2e6, 1e6, 3e6),
+}
+
+
+def running_bond(columns: int, courses: int) -> Scene:
+    """Return a wall of courses, every second one shifted by half a brick, open between bricks.
+
+    Joints have one stiffness each, whatever their area: three different ones along their axes.
+    """
+    robots = tuple(Robot(name=f"rob{i}", payload=400.0) for i in (1, 2, 3))
+    scene = wall(WallShape(columns=columns, courses=courses), robots=robots)
+    beds = (joint for joint in scene.joints if abs(joint.along[2]) > 0.5)
+    return replace(
+        scene,
+        joints=tuple(replace(joint, **SPRING) for joint in beds),
+        grounds=tuple(replace(ground, **SPRING) for ground in scene.grounds),
+        provenance="",
+    )
+
+
+def grip_sets(net: Network, bricks: int, count: int) -> Ints:
+    """Return random sets of three different free nodes."""
+    blocked = net.scene.blocked_nodes
+    free = [n for b in net.scene.placed[:bricks] for n in b.nodes if n not in blocked]
+    rng = np.random.default_rng(0)
+    return np.array([rng.choice(free, 3, replace=False) for _ in range(count)])

@@ -1,4 +1,4 @@
-"""Claim: no degenerate problem tried is answered wrongly, and every refusal gives its reason.
+"""No degenerate problem tried is answered wrongly, and every refusal gives its reason.
 
 Method: every registered formulation solves small problems whose exact answer enumeration finds:
 ties, limits and budgets that bind or cannot be met, badly scaled or malformed costs. What comes
@@ -11,32 +11,33 @@ back is one of
 - rejected: it answered, and the certificate found the answer wrong. The linear program ends so
   where its flow mixes choices under a budget; its bound stands.
 
-The claim holds if nothing is *wrong*: an answer where there is none, a value below the exact one, a
+Asked is that nothing is *wrong*: an answer where there is none, a value below the exact one, a
 bound above it, a certified value above it where the formulation promises the optimum, "infeasible"
-or a refusal without ground, an exception that is none of these; and if whatever is not answered
+or a refusal without ground, an exception that is none of these; and that whatever is not answered
 says why. Where several choices are optimal,
 a second table says which was taken.
 
 Inputs: random whole costs (20 draws), and the three-robot loop on an arch of seven bricks. Command:
-``python -m experiments.placement.degenerate_placement [--quick]``. Writes
-``experiments/results/degenerate_placement.csv``.
+``python -m tests.quality.degenerate [--draws N] [--small]``; the exit status is 1 if anything
+speaks against it.
 """
 
 from __future__ import annotations
 
+import argparse
+import sys
 from collections import Counter
+from collections.abc import Sequence
 
 import numpy as np
 import pandas as pd
 
-from experiments.harness.claim import Claim, Finding, Options
-from experiments.harness.plotting import RESULTS
-from experiments.placement.parts.degenerate_cases import CASES, Case, Size, enumerated
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.placement.certificate import judge as certified
 from seqopt.placement.fitting import require_fit
 from seqopt.placement.formulation import Formulation, FormulationKind, formulations
 from seqopt.placement.interface import PlacementProblem
+from tests.quality.degenerate_cases import CASES, Case, Size, enumerated
 
 FULL, SMALL = Size(5, 4, 7), Size(3, 3, 6)
 DRAWS = 20
@@ -123,22 +124,6 @@ def pivot(table: pd.DataFrame, column: str) -> str:
     return wide.reindex(columns=list(formulations())).to_string(na_rep="-")
 
 
-def experiment(options: Options) -> Finding:
-    quick: bool = options.quick
-    size, draws = (SMALL, 2) if quick else (FULL, DRAWS)
-    table = pd.DataFrame([r for n, case in CASES.items() for r in outcomes(n, case, size, draws)])
-    print(pivot(table, "status"))
-    print("\nwhich of several optima")
-    print(pivot(table[table["chosen"].isin(["first", "between", "last"])], "chosen"))
-    if not quick:
-        RESULTS.mkdir(exist_ok=True)
-        table.to_csv(RESULTS / "degenerate_placement.csv", index=False, float_format="%.9g")
-    found = faults(table)
-    for fault in found:
-        print(f"against it: {fault}")
-    return Finding(not found)
-
-
 def faults(table: pd.DataFrame) -> list[str]:
     """Return what speaks against the claim: wrong answers, and refusals without a reason."""
     silent = table["status"].isin(UNANSWERED) & (table["message"].fillna("").str.strip() == "")
@@ -149,7 +134,24 @@ def faults(table: pd.DataFrame) -> list[str]:
     ]
 
 
-CLAIM = Claim(experiment, quick="smaller problems, nothing written")
+def main(arguments: Sequence[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--draws", type=int, default=DRAWS, help="of every case")
+    parser.add_argument("--small", action="store_true", help="smaller problems")
+    options = parser.parse_args(arguments)
+    size = SMALL if options.small else FULL
+    rows = [
+        row for name, case in CASES.items() for row in outcomes(name, case, size, options.draws)
+    ]
+    table = pd.DataFrame(rows)
+    print(pivot(table, "status"))
+    print("\nwhich of several optima")
+    print(pivot(table[table["chosen"].isin(["first", "between", "last"])], "chosen"))
+    found = faults(table)
+    for fault in found:
+        print(f"against it: {fault}")
+    return int(bool(found))
+
 
 if __name__ == "__main__":
-    CLAIM.main()
+    sys.exit(main())
