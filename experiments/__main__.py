@@ -20,13 +20,11 @@ from concurrent.futures import ThreadPoolExecutor, as_completed
 
 import pandas as pd
 
-from experiments.harness.catalog import claims, modules
-from experiments.harness.claim import MISSING, PREFIX, ClaimError
-from experiments.harness.plotting import HOME, RESULTS
+from experiments.harness.claim import MISSING, PREFIX, ClaimError, claims, modules
+from experiments.harness.results import HOME, ONE_CORE, RESULTS
 
 STORE = RESULTS / "verdicts.csv"
 TOGETHER = 2  # experiments at a time, a core each, where no time is a result
-ONE_CORE = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 
 
 def run(name: str, *arguments: str) -> tuple[str, float]:

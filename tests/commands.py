@@ -5,7 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 
-from experiments.harness.catalog import HOME, modules
+from experiments.harness.claim import HOME, modules
 
 
 def run(name, *arguments):

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from hypothesis import strategies as st
 
-from experiments.harness.walls import running_bond
+from experiments.harness.scenes import running_bond
 from seqopt.placement.costs import Budget, LayeredCosts
 from seqopt.placement.interface import CostProblem
 from seqopt.scene.arch import ArchShape, arch_scene

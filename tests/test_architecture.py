@@ -10,7 +10,7 @@ from tokenize import COMMENT, DEDENT, ENDMARKER, INDENT, NEWLINE, NL, generate_t
 import networkx as nx
 import pytest
 
-from experiments.harness.catalog import claims
+from experiments.harness.claim import claims
 from seqopt.cli.arguments import COMMANDS
 from seqopt.showing import DISPLAYS
 
@@ -311,9 +311,9 @@ def test_claims_stand_apart_from_their_parts():
 @pytest.mark.parametrize(
     ("a", "b"),
     [
-        ("experiments.engines.engine_limits", "experiments.engines.engine_speed"),
-        ("experiments.engines.engine_limits", "experiments.peers.parts.chain"),
-        ("experiments.harness.runs", "experiments.engines.parts.grip_sets"),
+        ("experiments.engines.fidelity_ladder", "experiments.engines.engine_speed"),
+        ("experiments.engines.fidelity_ladder", "experiments.peers.parts.chain"),
+        ("experiments.harness.runs", "experiments.peers.parts.chain"),
     ],
 )
 def test_an_experiment_that_reaches_across_is_seen(a, b):

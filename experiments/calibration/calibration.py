@@ -27,7 +27,6 @@ experiments.calibration.calibration [--quick]``. Writes ``experiments/results/ca
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from itertools import product
 
 import numpy as np
@@ -35,10 +34,17 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from experiments.calibration.parts.barrel_vaults import (
+    BED,
+    LAWS,
     LINES,
+    MEASURES,
     PLACES,
+    Law,
     Vault,
     chain,
+    errors,
+    fit,
+    laws,
     load_stiffness,
     planar_parts,
     scene,
@@ -58,9 +64,8 @@ from experiments.calibration.parts.calibration_spread import (
     threshold,
     whole,
 )
-from experiments.calibration.parts.laws import BED, LAWS, MEASURES, Law, errors, fit, laws
 from experiments.harness.claim import Claim, Finding, Options
-from experiments.harness.plotting import RESULTS, save_all, stored
+from experiments.harness.results import stored
 from seqopt.arrays import Floats
 
 
@@ -147,9 +152,12 @@ def experiment(options: Options) -> Finding:
     print(bed.drop(columns=["law", "measure"]).to_string(index=False, float_format="%.3g"))
     beside = comparison(models)
     print(beside.to_string(index=False, float_format="%.2f", na_rep=""))
-    if not quick:
-        save(table, fits, models, beside)
-    return Finding(holds(fits, beside) and bool(fits["engine_gap"].max() <= 1e-9))
+    good = holds(fits, beside) and bool(fits["engine_gap"].max() <= 1e-9)
+    if quick:
+        return Finding(good)
+    kept = fits.drop(columns="engine_gap")  # rounding, another on every machine
+    tables = {"": table, "_fits": kept, "_comparison": beside, **spread(models[BED])}
+    return Finding(good, tables={f"calibration{end}": rows for end, rows in tables.items()})
 
 
 def holds(fits: pd.DataFrame, beside: pd.DataFrame) -> bool:
@@ -161,23 +169,14 @@ def holds(fits: pd.DataFrame, beside: pd.DataFrame) -> bool:
     return bool(leads and open_still)
 
 
-def save(
-    table: pd.DataFrame, fits: pd.DataFrame, models: dict[str, Law], beside: pd.DataFrame
-) -> None:
-    RESULTS.mkdir(exist_ok=True)
-    bed = models[BED]
+def spread(bed: Law) -> dict[str, pd.DataFrame]:
+    """Return what else is stored of the bed of springs, by the ends of the tables' names."""
     scan, single, other = readings(), entries(), geometries(bed.tests)
     print(summary(scan))
     bounds = rotational(bed.tests)
     for frame in (single, other, bounds):
         print(frame.to_string(index=False, float_format="%.4g"))
-    kept = fits.drop(columns="engine_gap")  # rounding, another on every machine
-    frames = {"": table, "_fits": kept, "_readings": scan, "_entries": single, "_geometry": other}
-    frames |= {"_comparison": beside, "_routes": bounds}
-    for end, frame in frames.items():
-        path = RESULTS / f"calibration{end}.csv"
-        frame.to_csv(path, index=False, float_format="%.4g", lineterminator="\n")
-    save_all(PICTURES)
+    return {"_readings": scan, "_entries": single, "_geometry": other, "_routes": bounds}
 
 
 def picture() -> Figure:
@@ -200,10 +199,12 @@ def picture() -> Figure:
     )
 
 
-PICTURES: dict[str, Callable[[], Figure]] = {
-    "calibration.png": picture,
-}
-CLAIM = Claim(experiment, quick="no readings, nothing written", pictures=PICTURES)
+CLAIM = Claim(
+    experiment,
+    digits=4,
+    quick="no readings, nothing written",
+    pictures={"calibration.png": picture},
+)
 
 if __name__ == "__main__":
     CLAIM.main()

@@ -49,26 +49,24 @@ from scipy.optimize import least_squares
 
 from experiments.calibration.parts.arch_numbers import (
     BRICKS,
+    FITTED,
+    NUMBERS,
     OFFSETS,
+    PERCENTILES,
     PLAN_ANGLES,
     SHAPE,
     VARIANTS,
     Free,
+    beside_shipped,
+    holds,
     report,
     scene_of,
+    scores,
     start_of,
     starting_guess,
 )
-from experiments.calibration.parts.arch_scores import (
-    FITTED,
-    NUMBERS,
-    PERCENTILES,
-    beside_shipped,
-    holds,
-    scores,
-)
 from experiments.harness.claim import Claim, Finding, Option, Options
-from experiments.harness.plotting import HOME, RESULTS
+from experiments.harness.results import HOME, RESULTS
 from experiments.harness.yardstick import VALUES, errors, percentiles
 from seqopt.arrays import Floats
 from seqopt.engines.rigid.compliance import ComplianceEngine
@@ -241,17 +239,16 @@ def experiment(options: Options) -> Finding | None:
     scene, fitted = scene_of(numbers, groups), report(numbers, groups)
     table = beside_shipped(fitted, scene)
     print(table.to_string(index=False, float_format="%.4g", na_rep=""))
-    if not options.quick:
-        path = RESULTS / "identify_arch25_refit.csv"
-        table.to_csv(path, index=False, float_format="%.4g", lineterminator="\n")
     if options.write and not options.quick:
         save_scene(scene, SCENE)
         fitted.to_csv(NUMBERS, index=False, float_format="%.6g", lineterminator="\n")
-    return Finding(holds(table, quick=options.quick), f": {len(numbers)} numbers")
+    good, count = holds(table, quick=options.quick), f": {len(numbers)} numbers"
+    return Finding(good, count, {"identify_arch25_refit": table})
 
 
 CLAIM = Claim(
     experiment,
+    digits={"identify_arch25_refit": 4},
     quick="two evaluations, nothing written",
     options=(
         Option("--full", "two starts, 40 evaluations"),

@@ -14,7 +14,7 @@ Writes ``experiments/results/contact_steps.csv`` and ``docs/figures/contact_step
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -25,7 +25,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from experiments.harness.claim import Claim, Finding, Options
-from experiments.harness.plotting import RESULTS, save_all, stored
+from experiments.harness.results import drawn
 from seqopt.contact.mortar import DRY
 from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.interface import Engine, Want
@@ -143,17 +143,15 @@ def experiment(options: Options) -> Finding:
     )
     wrong = table[rests & ~stands]
     print(f"steps that rest and are not proven to stand: {len(wrong)}")
-    if not quick:
-        RESULTS.mkdir(exist_ok=True)
-        table.to_csv(RESULTS / "contact_steps.csv", index=False, float_format="%.4g")
-        save_all(PICTURES)
-    return Finding(holds(table))
+    return Finding(holds(table), tables={"contact_steps": table})
 
 
-PICTURES: dict[str, Callable[[], Figure]] = {
-    "contact_steps.png": lambda: chart(stored("contact_steps")),
-}
-CLAIM = Claim(experiment, quick="ten steps, nothing written", pictures=PICTURES)
+CLAIM = Claim(
+    experiment,
+    digits=4,
+    quick="ten steps, nothing written",
+    pictures={"contact_steps.png": drawn(chart, "contact_steps")},
+)
 
 if __name__ == "__main__":
     CLAIM.main()

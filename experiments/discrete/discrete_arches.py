@@ -25,19 +25,18 @@ and ``arches_lmgc90.csv`` to ``experiments/results`` and ``docs/figures/discrete
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
 from itertools import product
 
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
+from experiments.discrete.parts.arch_pads import JOINTS, STEPS, Reading, readings
 from experiments.discrete.parts.arches_lmgc90 import PAD, READINGS, error, moved, witness
 from experiments.discrete.parts.discrete_chart import chart
-from experiments.discrete.parts.pad_readings import JOINTS, STEPS, Reading, readings
 from experiments.harness.claim import Claim, Finding, Option, Options
 from experiments.harness.lmgc90 import python_with_lmgc90
-from experiments.harness.plotting import RESULTS, save_all, stored
+from experiments.harness.results import RESULTS, stored
 from seqopt.arrays import Floats
 from seqopt.contact.elastic_limits import find_elastic_limits
 from seqopt.contact.mortar import EPOXY
@@ -225,10 +224,7 @@ def experiment(options: Options) -> Finding:
     if not options.quick:
         seen, source = witness_rows(engine, steps, python_with_lmgc90(options.lmgc90))
         report_witness(seen, source, steps)
-        RESULTS.mkdir(exist_ok=True)
-        table.to_csv(RESULTS / "discrete_arches.csv", index=False, float_format="%.4g")
-        save_all(PICTURES)
-    return Finding(holds(table, study))
+    return Finding(holds(table, study), tables={"discrete_arches": table})
 
 
 def picture() -> Figure:
@@ -244,14 +240,12 @@ def picture() -> Figure:
     return chart(errors, best.loc[nearest], study, stored("arches_lmgc90"), NEAR)
 
 
-PICTURES: dict[str, Callable[[], Figure]] = {
-    "discrete_arches.png": picture,
-}
 CLAIM = Claim(
     experiment,
+    digits=4,
     quick="two arches, nothing written",
     options=(Option("--lmgc90", "a Python with compas_lmgc90", sys.executable),),
-    pictures=PICTURES,
+    pictures={"discrete_arches.png": picture},
 )
 
 if __name__ == "__main__":

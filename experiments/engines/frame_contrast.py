@@ -14,14 +14,12 @@ Writes ``experiments/results/frame_contrast.csv`` and ``docs/figures/frame_contr
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
 from experiments.harness.claim import Claim, Finding, Options
-from experiments.harness.plotting import RESULTS, save_all, stored
+from experiments.harness.results import drawn
 from seqopt.engines.frame import CONTRAST, FrameEngine
 from seqopt.engines.interface import Engine, Fields, grip_columns
 from seqopt.engines.rigid.compliance import ComplianceEngine
@@ -111,11 +109,7 @@ def experiment(options: Options) -> Finding:
     print(table.to_string(index=False, float_format="%.2g"))
     gap = direct_gap(steps, fast)
     print(f"direct solve of the same rigid bricks: {gap:.2g}")
-    if not quick:
-        RESULTS.mkdir(exist_ok=True)
-        table.to_csv(RESULTS / "frame_contrast.csv", index=False, float_format="%.3g")
-        save_all(PICTURES)
-    return Finding(holds(table, gap))
+    return Finding(holds(table, gap), tables={"frame_contrast": table})
 
 
 def holds(table: pd.DataFrame, gap: float) -> bool:
@@ -127,10 +121,12 @@ def holds(table: pd.DataFrame, gap: float) -> bool:
     return bool(best <= min(5e-6, worst.min()) and bad.all() and gap <= 1e-9)
 
 
-PICTURES: dict[str, Callable[[], Figure]] = {
-    "frame_contrast.png": lambda: chart(stored("frame_contrast")),
-}
-CLAIM = Claim(experiment, quick="few states, nothing written", pictures=PICTURES)
+CLAIM = Claim(
+    experiment,
+    digits=3,
+    quick="few states, nothing written",
+    pictures={"frame_contrast.png": drawn(chart, "frame_contrast")},
+)
 
 if __name__ == "__main__":
     CLAIM.main()

@@ -28,30 +28,137 @@ import json
 import tempfile
 import warnings
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from experiments.exchange.parts.outside_chart import chart
-from experiments.exchange.parts.outside_files import ELSEWHERE, SAMPLES, Outside, find
 from experiments.harness.claim import Claim, Extra, Finding, Option, Options
-from experiments.harness.plotting import RESULTS, save_all
+from experiments.harness.results import RESULTS
 from formulations.limit_analysis import compile_equilibrium
 from seqopt.cli.main import main
 from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import EPOXY
 from seqopt.errors import SceneWarning
 from seqopt.network.build import build_network
-from seqopt.scene.imports.formats import read_content, sniffed
+from seqopt.report.draw import View, draw_bricks
+from seqopt.report.style import new_figure, styled
+from seqopt.scene.imports.content import Given
+from seqopt.scene.imports.formats import import_scene, read_content, sniffed
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.exports.formats import EXPORTS, read_folder
 from seqopt.sequence.steps import Step
 from seqopt.stability.assessment import Verdict, bonded, verdict_of
 from seqopt.stability.prover import Prover
+
+WHEEL = "compas_cra 0.8.0"
+COMMITS = {
+    "compas_assembly": "53f8969d",
+    "compas_dem": "559107e",
+    "compas_timber": "ab12122a3d",
+    "conmech": "9f24230",
+    "sequencer_benchmark": "f6fe47e",
+}
+
+
+@dataclass(frozen=True)
+class Outside:
+    """A file of others, and the words that ``seqopt import`` needs beside it."""
+
+    source: str
+    path: str
+    words: tuple[str, ...] = ("--unit", "m", "--density", "2400")
+
+    @property
+    def name(self) -> str:
+        """Short, and its own among all."""
+        return f"{self.source.split()[0]}: {self.path}"
+
+
+def _sample(name: str, supports: str = "", *words: str) -> Outside:
+    given = ("--supports", supports) if supports else ()
+    plain = ("--unit", "m", "--density", "2400")
+    return Outside(WHEEL, f"{name}.json", (*plain, *given, *words))
+
+
+SAMPLES = (
+    *(
+        _sample(name, "0,1")
+        for name in ("A", "H", "bridge", "type-a", "type-b", "type-c", "type-d")
+    ),
+    *(_sample(f"shelf{part}", "0") for part in ("", "-s1", "-s2", "-s3", "-stable")),
+    *(_sample(f"{kind}", "0") for kind in ("concave-short", "concave-long", "curve-3-blocks")),
+    *(_sample(f"cube-curve-{kind}", "0") for kind in ("short", "tall")),
+    _sample("cubes", "0"),
+    _sample("snake", "0", "--gap", "0.01"),
+    _sample("armadillo"),  # it marks no supports, and nothing in it stands level
+    _sample("armadillo_cra"),  # it marks them
+)
+LARGE = ("--unit", "m")  # with a density of its own
+TIMBER = ("--unit", "mm", "--density", "450")
+ELSEWHERE = (
+    *(
+        Outside("compas_assembly", f"docs/examples/{name}_assembly.json")
+        for name in ("arch", "stack", "wall", "crossvault", "dome", "two-blocks")
+    ),
+    *(
+        Outside("compas_assembly", f"data/__temp/{name}.json")
+        for name in ("wall_courses", "wall_interfaces", "dome", "curvedwall", "stack", "ursula")
+    ),
+    Outside("compas_assembly", "data/__temp/amiens_internet.json"),
+    Outside("compas_dem", "data/dem_crossvault.json"),
+    Outside("compas_dem", "scripts/DEM_Analysis_References/Barrel_Vault/DEM_model.json", LARGE),
+    Outside("compas_dem", "scripts/DEM_Analysis_References/Barrel_Vault/DEM_problem.json", LARGE),
+    Outside("compas_dem", "data/wall.obj"),
+    Outside("compas_dem", "data/dome.obj"),
+    Outside("compas_dem", "data/ursula.obj"),
+    Outside("compas_dem", "data/pavillionvault/blocks.json"),
+    Outside("compas_timber", "data/model_test.json", TIMBER),
+    Outside(
+        "compas_timber",
+        "examples/structural/reciprocal_2_dev0.json",
+        ("--unit", "m", "--density", "450"),
+    ),
+    *(
+        Outside("conmech", f"tests/test_data/{name}.json", ())
+        for name in ("four-frame", "tower_3D", "topopt-100", "mgz_flat_beam")
+    ),
+    Outside("sequencer_benchmark", "data/benchmark/benchmark-1/opt-holistic/108693.json", ()),
+)
+
+
+def find(outside: Outside, folder: str) -> Path | None:
+    """Return where a file is, if it is: in the wheel, or below a folder of repositories."""
+    home = Path(folder, outside.source)
+    if outside.source == WHEEL:
+        home = Path(import_module("compas_cra").SAMPLE)
+    path = home / outside.path
+    return path if path.is_file() and (folder or outside.source == WHEEL) else None
+
+
+SHOWN = (("bridge", "0,1", 14), ("shelf", "0", 10), ("snake", "0", 3), ("armadillo_cra", "", 270))
+
+
+@styled
+def chart() -> Figure:
+    """Return four assemblies, the last one after three quarters of its blocks."""
+    folder = Path(import_module("compas_cra").SAMPLE)
+    figure = new_figure(4.6)
+    panels = figure.subplots(2, 2).ravel()
+    for panel, (name, supports, bricks) in zip(panels, SHOWN, strict=True):
+        keys = supports.split(",") if supports else None
+        gap = 0.01 if name == "snake" else None
+        given = Given(unit="m", density=2400.0, supports=keys, gap=gap)
+        scene = import_scene(folder / f"{name}.json", given=given)
+        draw_bricks(panel, build_network(scene), bricks, View(azimuth=35, elevation=25))
+        panel.set_title(f"{name.removesuffix('_cra')}: {bricks} of {len(scene.bricks)} blocks")
+    return figure
+
 
 STORE = RESULTS / "outside_assemblies.csv"
 PLAN, LACKS = "plan", "lacks"
@@ -195,21 +302,18 @@ def experiment(options: Options) -> Finding:
         if not options.quick:
             store(pd.DataFrame(rows))  # file by file: a run that ends early keeps what it found
     if not options.quick:
-        save_all(PICTURES)
+        CLAIM.redraw(say=False)
     table = pd.DataFrame(rows) if options.quick else pd.read_csv(STORE)
     plans = int((table["outcome"] == PLAN).sum())
     return Finding(holds(table, 1 if options.quick else LEAST), f": {plans} of {len(table)} plans")
 
 
-PICTURES: dict[str, Callable[[], Figure]] = {
-    "outside_assemblies.png": chart,
-}
 CLAIM = Claim(
     experiment,
     quick="three samples, nothing written",
     options=(Option("--files", "folder of clones of the repositories named", ""),),
     needs=(Extra("compas_cra", "pip install 'seqopt[witness]'"),),
-    pictures=PICTURES,
+    pictures={"outside_assemblies.png": chart},
 )
 
 if __name__ == "__main__":

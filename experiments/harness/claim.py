@@ -8,7 +8,7 @@ An experiment ends with
         CLAIM.main()
 
 where ``experiment`` takes the options and returns a `Finding`. The first paragraph of the module's
-text is what is claimed.
+text is what is claimed, with others that begin so where several claims share what they rest on.
 """
 
 from __future__ import annotations
@@ -19,10 +19,15 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
+from importlib import import_module
 from importlib.util import find_spec
+from pathlib import Path
 from typing import TYPE_CHECKING
 
+from experiments.harness.results import HOME, save_figure, save_table
+
 if TYPE_CHECKING:
+    import pandas as pd
     from matplotlib.figure import Figure
 
 Options = argparse.Namespace
@@ -45,26 +50,33 @@ class Times(Enum):
 
 @dataclass(frozen=True)
 class Finding:
-    """What a run finds, said in its verdict.
-
-    Attributes
-    ----------
-    holds : bool
-        Whether the claim does.
-    note : str
-        What follows the words, with the mark that separates it.
-    """
+    """What a run finds: whether the claim holds, what follows that word, and tables to store."""
 
     holds: bool
     note: str = ""
+    tables: Mapping[str, pd.DataFrame] = field(default_factory=dict)
 
     def __str__(self) -> str:
         return f"{'holds' if self.holds else 'does not hold'}{self.note}"
 
 
-def on_this_run(*, holds: bool) -> Finding:
+def on_this_run(*, holds: bool, **tables: pd.DataFrame) -> Finding:
     """Return a verdict on times: another run may find otherwise."""
-    return Finding(holds, "" if holds else " on this run")
+    return Finding(holds, "" if holds else " on this run", tables)
+
+
+def told(parts: Mapping[str, bool]) -> bool:
+    """Print whether each part of a claim holds; return whether all do."""
+    for text, true in parts.items():
+        print(f"{'yes' if true else 'NO'}: {text}")
+    return all(parts.values())
+
+
+def none_of(faults: Sequence[str]) -> bool:
+    """Print what speaks against a claim; return whether nothing does."""
+    for fault in faults:
+        print(f"against it: {fault}")
+    return not faults
 
 
 @dataclass(frozen=True)
@@ -74,6 +86,19 @@ class Option:
     flag: str
     help: str
     default: str | None = None
+
+
+ONLY = Option("--only", "one part of the claim alone, by its name in the method", "")
+
+
+def together(options: Options, **parts: Callable[[Options], Finding]) -> Finding:
+    """Run the parts of a claim, or the one that is asked for; return what they find together."""
+    if options.only and options.only not in parts:
+        raise SystemExit(f"--only: there is no part {options.only!r}; give one of {[*parts]}")
+    found = [part(options) for name, part in parts.items() if options.only in ("", name)]
+    notes = dict.fromkeys(one.note for one in found)
+    tables = {name: table for one in found for name, table in one.tables.items()}
+    return Finding(all(one.holds for one in found), "".join(notes), tables)
 
 
 @dataclass(frozen=True)
@@ -88,21 +113,12 @@ class Extra:
 class Claim:
     """What an experiment declares.
 
-    Attributes
-    ----------
-    experiment : callable
-        Runs it; None instead of a verdict where an option asks for something else.
-    quick : str
-        What ``--quick`` leaves out.
-    times : Times
-        An experiment whose times are a result runs alone.
-    options : tuple of Option
-        Beyond ``--quick``.
-    needs : tuple of Extra
-        Without one of these it ends with exit status 2.
-    pictures : mapping of str to callable
-        What draws each figure of the documentation from stored results alone, by file name:
-        ``--redraw`` does, and runs nothing.
+    ``experiment`` runs it: a finding, or None where an option asks for something else. Unless
+    ``quick``, which is what ``--quick`` leaves out, the tables of the finding are stored, floats
+    with so many ``digits``. ``pictures`` are what draws the figures of the documentation from
+    stored results alone, by file name: they are drawn anew after a run, and ``--redraw`` draws them
+    and runs nothing. Without what it ``needs`` a run ends with exit status 2; one whose ``times``
+    are a result runs alone.
     """
 
     experiment: Callable[[Options], Finding | None]
@@ -111,6 +127,7 @@ class Claim:
     options: tuple[Option, ...] = ()
     needs: tuple[Extra, ...] = ()
     pictures: Mapping[str, Callable[[], Figure]] = field(default_factory=dict)
+    digits: int | Mapping[str, int] | None = None
 
     @property
     def module(self) -> str:
@@ -124,11 +141,12 @@ class Claim:
 
     @property
     def text(self) -> str:
-        """What is claimed: the first paragraph of the module's text."""
+        """What is claimed: the first paragraph of the module's text, and others that begin so."""
         text = inspect.getdoc(sys.modules[self.module]) or ""
         if not text.startswith(START):
             raise ClaimError(f"{self.module}: its text starts with {text[:20]!r}, not {START!r}")
-        return text.split("\n\n")[0].removeprefix(START).replace("\n", " ")
+        parts = [part for part in text.split("\n\n") if part.startswith(START)]
+        return " ".join(part.removeprefix(START) for part in parts).replace("\n", " ")
 
     def parse(self, arguments: Sequence[str] | None = None) -> Options:
         """Return the options of a command line, that of the process by default."""
@@ -154,14 +172,57 @@ class Claim:
             if find_spec(extra.module) is None:
                 print(f"{extra.module} is not installed: {extra.install}")
                 sys.exit(MISSING)
-        verdict = self.experiment(options)
-        if verdict is not None:
-            print(f"{PREFIX}{verdict}")
+        finding = self.experiment(options)
+        if finding is None:
+            return
+        if not options.quick and finding.tables:
+            for name, table in finding.tables.items():
+                own = self.digits.get(name) if isinstance(self.digits, Mapping) else self.digits
+                save_table(table, name, own)
+            self.redraw(say=False)
+        print(f"{PREFIX}{finding}")
 
-    def redraw(self) -> None:
+    def redraw(self, *, say: bool = True) -> None:
         """Draw the figures of the documentation from stored results."""
-        from experiments.harness.plotting import save_figure  # noqa: PLC0415  # an extra
-
         for name, draw in self.pictures.items():
             save_figure(draw(), name)
-            print(f"drawn: {name}")
+            if say:
+                print(f"drawn: {name}")
+
+
+def modules(home: Path = HOME) -> dict[str, str]:
+    """Return the modules that make claims, dotted, by their plain names in alphabetical order.
+
+    Raises
+    ------
+    ClaimError
+        If there are none, or if two have one name.
+    """
+    found: dict[str, str] = {}
+    for path in (*home.glob("*.py"), *home.glob("*/*.py")):
+        if path.stem.startswith("__") or path.parent.name == "harness":
+            continue
+        module = ".".join(path.relative_to(home.parent).with_suffix("").parts)
+        if path.stem in found:
+            raise ClaimError(f"two experiments are named {path.stem}: {found[path.stem]}, {module}")
+        found[path.stem] = module
+    if not found:
+        raise ClaimError(f"no experiments found in {home}: one per file in a folder by topic")
+    return dict(sorted(found.items()))
+
+
+def claims() -> dict[str, Claim]:
+    """Return what every experiment declares, by its plain name.
+
+    Raises
+    ------
+    ClaimError
+        If one declares nothing, or as `modules` does.
+    """
+    out = {}
+    for name, module in modules().items():
+        claim = getattr(import_module(module), "CLAIM", None)
+        if not isinstance(claim, Claim):
+            raise ClaimError(f"{module} declares no CLAIM: what makes none belongs in parts")
+        out[name] = claim
+    return out

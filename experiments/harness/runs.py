@@ -23,7 +23,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from experiments.harness.arches import longer
+from experiments.harness.scenes import longer
 from seqopt.engines.auto import AutoEngine
 from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.frame import FrameEngine

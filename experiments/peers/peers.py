@@ -21,7 +21,6 @@ Inputs: the shipped scene; seed 0; PyNiteFEA, openseespy and pyconmech if instal
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from functools import partial
 from typing import NamedTuple
 
@@ -30,23 +29,77 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from experiments.harness.claim import Claim, Finding, Options, Times
-from experiments.harness.plotting import RESULTS, save_all, stored
+from experiments.harness.results import stored
 from experiments.harness.timing import best
-from experiments.peers.parts.bounds import products
 from experiments.peers.parts.chain import Answer, Peer, chain_of
-from experiments.peers.parts.chart import BOUND, OURS, SPARSE, chart
 from experiments.peers.parts.frames import PACKAGES, missing_packages
 from experiments.peers.parts.loops import LOOPS, loop
-from experiments.peers.parts.paths import PATHS, SLOW
-from experiments.peers.parts.workload import SETTINGS, Case, workload
+from experiments.peers.parts.workload import PATHS, SETTINGS, SLOW, Case, products, workload
 from seqopt.arrays import Floats
 from seqopt.engines.interface import Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.placement.problem import Problem
+from seqopt.report.style import BLUE, GRAY, SMALL, VERMILION, name_panels, new_figure, plain, styled
 from seqopt.scene.scene_file import load_scene
 from seqopt.study.published import paper_models
+
+OURS, BOUND, SPARSE = "seqopt", "dense products", "sparse products"
+LABELS = {
+    OURS: "seqopt, fast engine",
+    "OpenSeesPy": "OpenSeesPy, stiff bars",
+    "PyNite": "PyNite, stiff bars",
+    "pyconmech": "pyconmech, stiff bars",
+    "SciPy bars, SuperLU": "SciPy loop, stiff bars, SuperLU",
+    "SciPy bars, banded": "SciPy loop, stiff bars, banded Cholesky",
+    "SciPy bricks, SuperLU": "SciPy loop, rigid bricks, SuperLU",
+    "SciPy bricks, banded": "SciPy loop, rigid bricks, banded Cholesky",
+}
+TITLES = {
+    "criterion": "what the criterion needs",
+    "all fields": "every edge force and node displacement",
+}
+
+
+@styled
+def chart(table: pd.DataFrame) -> Figure:
+    figure = new_figure(5.6)
+    whole = table[table["setting"] == "all fields"].sort_values("model_us", ascending=False)
+    order = [tool for tool in whole["tool"] if tool not in (BOUND, SPARSE)]
+    panels = figure.subplots(2, 1, sharex=True)
+    for axes, (setting, title) in zip(panels, TITLES.items(), strict=True):
+        part = table[table["setting"] == setting].set_index("tool")
+        least = float(part["model_us"][BOUND])
+        axes.axvline(least, color=GRAY, lw=0.8)
+        axes.annotate(
+            f"dense matrix products alone: {least:.1f} µs", (least, -0.75), (4, 0),
+            textcoords="offset points", va="center", fontsize=SMALL,
+        )  # fmt: skip
+        for row, tool in enumerate(order):
+            value, ratio = float(part["model_us"][tool]), float(part["ratio"][tool])
+            color, marker = (VERMILION, "D") if tool == OURS else (BLUE, "o")
+            axes.plot([0.5, value], [row, row], color=color, lw=1, zorder=1)
+            axes.plot(value, row, marker, color=color, ms=6)
+            text = f"{value:.1f} µs" if tool == OURS else f"{short(value)} µs, {short(ratio)} times"
+            axes.annotate(
+                text, (value, row), (8, 0), textcoords="offset points", va="center", fontsize=SMALL
+            )
+        axes.set(xscale="log", xlim=(0.5, 1e6), ylim=(len(order) - 0.4, -1.3), title=title)
+        axes.set_yticks(range(len(order)), [LABELS[tool] for tool in order])
+        axes.tick_params(axis="y", length=0)
+        axes.spines[["top", "right", "left"]].set_visible(False)
+        axes.minorticks_off()
+    plain(panels[1].xaxis)
+    panels[1].set_xlabel("time per structure analyzed [µs]")
+    name_panels(*panels)
+    return figure
+
+
+def short(value: float) -> str:
+    """Return two digits, or three of large numbers, with a mark for thousands."""
+    return f"{value:,.0f}" if value < 1000 else f"{float(f'{value:.3g}'):,.0f}"
+
 
 EXTRA = 'pip install "seqopt[peers]" openseespy'
 PACKAGE, LOOP = 60.0, 20.0  # times the engine's time
@@ -226,13 +279,10 @@ def experiment(options: Options) -> Finding:
     print(table.to_string(index=False, float_format="%.3g"))
     ways = paths(problem, [n for n in PATHS if not quick or n not in SLOW], 1 if quick else 5)
     print(ways.to_string(index=False, float_format="%.4g"))
-    if not quick and not lacking:  # stored rows of packages are not given up
-        RESULTS.mkdir(exist_ok=True)
-        both = pd.concat({"models": table, "placement": ways}, names=["part"]).reset_index(level=0)
-        both.to_csv(RESULTS / "peers.csv", index=False, float_format="%.4g")
-        save_all(PICTURES)
+    both = pd.concat({"models": table, "placement": ways}, names=["part"]).reset_index(level=0)
     without = f", without {', '.join(lacking)}; nothing stored" if lacking and not quick else ""
-    return Finding(judge(table, ways), without)
+    # stored rows of packages are not given up
+    return Finding(judge(table, ways), without, {} if lacking else {"peers": both})
 
 
 def picture() -> Figure:
@@ -241,11 +291,12 @@ def picture() -> Figure:
     return chart(both[both["part"] == "models"])
 
 
-PICTURES: dict[str, Callable[[], Figure]] = {
-    "peers.png": picture,
-}
 CLAIM = Claim(
-    experiment, quick="loops and paths, nothing written", times=Times.JUDGED, pictures=PICTURES
+    experiment,
+    digits=4,
+    quick="loops and paths, nothing written",
+    times=Times.JUDGED,
+    pictures={"peers.png": picture},
 )
 
 if __name__ == "__main__":

@@ -32,19 +32,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from experiments.harness.claim import Claim, Finding, Options
-from experiments.harness.plotting import RESULTS, save_all, stored
-from experiments.placement.parts.scenarios import (
-    GRIDS,
-    POSITION,
-    STIFFNESS,
-    WEIGHT,
-    perturbed,
-    scenarios,
-)
-from experiments.placement.parts.sensitivity_chart import chart
+from experiments.harness.results import drawn
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network
 from seqopt.placement.formulation import find_formulation
@@ -53,11 +45,125 @@ from seqopt.placement.ranking import move_costs, rank_of
 from seqopt.placement.requirements import Criterion
 from seqopt.placement.scales import SceneFacts
 from seqopt.placement.solving import solve
+from seqopt.report.style import dress, looks, new_figure, styled
+from seqopt.report.wording import in_words
+from seqopt.scene.scenarios import shifted, stiffened, weighed
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.study.presets import CLOSEST, EQUATIONS, WEIGHTED, WORST_RATIO
+
+Grids = dict[str, tuple[float, ...]]
+FACTORS = (1 / 3, 1 / 2, 2 / 3, 3 / 2, 2.0, 3.0)
+SHARES = (-0.10, -0.05, -0.02, 0.02, 0.05, 0.10)
+GRIDS: Grids = {  # kind of perturbation and its sizes
+    "nominal": (0.0,),
+    "stiffness, all": FACTORS,
+    "stiffness, translational": FACTORS,
+    "stiffness, rotational": FACTORS,
+    "stiffness, each joint": (1.1, 1.25, 1.5, 2.0, 3.0),
+    "weight, all": SHARES,
+    "weight, each brick": (0.01, 0.02, 0.05, 0.10),
+    "position, each": (0.0005, 0.001, 0.002),
+}
+STIFFNESS, WEIGHT, POSITION = "stiffness, each joint", "weight, each brick", "position, each"
+AT_RANDOM = (STIFFNESS, WEIGHT, POSITION)
+ALIKE = {  # powers of the factor: translational, rotational
+    "stiffness, all": np.array([[1.0], [1.0]]),
+    "stiffness, translational": np.array([[1.0], [0.0]]),
+    "stiffness, rotational": np.array([[0.0], [1.0]]),
+}
+
+
+def perturbed(scene: Scene, kind: str, size: float, seed: int) -> Scene:
+    """Return the scene of one scenario."""
+    rng = np.random.default_rng(seed)
+    springs, bricks = len(scene.joints) + len(scene.grounds), len(scene.bricks)
+    if kind.startswith("stiffness"):
+        powers = rng.uniform(-1, 1, (2, springs)) if kind == STIFFNESS else ALIKE[kind]
+        return stiffened(scene, *np.broadcast_to(size**powers, (2, springs)))
+    if kind.startswith("weight"):
+        shares = rng.uniform(-size, size, bricks) if kind == WEIGHT else np.full(bricks, size)
+        return weighed(scene, 1 + shares)
+    return shifted(scene, size, rng) if kind == POSITION else scene
+
+
+def scenarios(grids: Grids, seeds: int) -> Iterator[tuple[str, float, int]]:
+    """Yield kind, size and seed of every scenario, the nominal one first."""
+    for kind, sizes in grids.items():
+        for size in sizes:
+            for seed in range(seeds if kind in AT_RANDOM else 1):
+                yield kind, size, seed
+
+
+PANELS: dict[str, tuple[tuple[str, bool, Callable[[float], float]], ...]] = {
+    "stiffness, every joint\nat random|within a factor of": ((STIFFNESS, True, float),),
+    "stiffness, all joints alike:\ntranslational (hollow:\nrotational)|"
+    "factor (hollow: divided by)": (
+        ("stiffness, translational", True, float),
+        ("stiffness, rotational", False, lambda size: 1 / size),
+    ),
+    "both stiffnesses,\nall joints alike|factor": (("stiffness, all", True, float),),
+    "weight, every brick at\nrandom (hollow: all alike)|within %": (
+        (WEIGHT, True, lambda size: 100 * size),
+        ("weight, all", False, lambda size: abs(100 * size)),
+    ),
+    "position, every brick\nand joint at random|within mm": (
+        (POSITION, True, lambda size: 1000 * size),
+    ),
+}  # title and abscissa, and what is drawn: kind, filled or not, from size to abscissa
+ROWS = {
+    "changed": "moves of the exact plan\nthat change [%]",
+    "changed_in_window": "first places of one move\nthat change [%]",
+    "relative_regret": "what the plan made for the\nnominal arch gives up [%]",
+}
+
+
+def curve(table: pd.DataFrame, kind: str, change: Callable[[float], float]) -> pd.DataFrame:
+    """Return the means of a kind of scenario over the abscissa, in %, the nominal one included."""
+    rows = table[table["kind"] == kind]
+    nominal = table[table["kind"] == "nominal"].assign(size=1.0 if "stiffness" in kind else 0.0)
+    both = pd.concat([rows, nominal])
+    return 100 * both.groupby(both["size"].map(change).round(6))[list(ROWS)].mean()
+
+
+@styled
+def chart(table: pd.DataFrame) -> Figure:
+    """Draw a row of panels per kind of change, and a column per measure of a decision."""
+    figure = new_figure(9.4)
+    axes = figure.subplots(len(PANELS), len(ROWS), sharex="row", sharey="col")
+    for line, (title, kinds) in zip(axes, PANELS.items(), strict=True):
+        for criterion, look in looks(table["criterion"].unique()).items():
+            mine = table[table["criterion"] == criterion]
+            for kind, filled, change in kinds:
+                means = curve(mine, kind, change)
+                style = look.line() | ({} if filled else {"mfc": "white", "lw": 0.8})
+                label = in_words(criterion) if filled else None
+                for panel, name in zip(line, ROWS, strict=True):
+                    panel.plot(means.index, means[name], label=label, **style)
+        words, abscissa = title.split("|")
+        line[0].set_ylabel(words)
+        line[1].set_xlabel(abscissa)
+        if "factor" in abscissa:
+            _factors(line[0], wide="all joints" in words)
+    for panel, name in zip(axes[0], ROWS.values(), strict=True):
+        panel.set_title(name)
+        panel.set_ylim(bottom=-0.04 * panel.get_ylim()[1])  # a line of zeros stays in sight
+    dress(*axes.ravel())
+    handles, labels = axes[0, 0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=2)
+    return figure
+
+
+def _factors(panel: Axes, *, wide: bool) -> None:
+    """Give a logarithmic axis of factors its ticks."""
+    panel.set_xscale("log")
+    ticks = {1 / 3: "1/3", 1 / 2: "1/2", 1.0: "1", 2.0: "2", 3.0: "3"}
+    shown = ticks if wide else {1.0: "1", 1.5: "1.5", 2.0: "2", 3.0: "3"}
+    panel.set_xticks([*shown], [*shown.values()])
+    panel.set_xticks([], minor=True)
+
 
 TESTED: tuple[Criterion, ...] = (EQUATIONS, CLOSEST, WEIGHTED, WORST_RATIO)
 ALSO = ("T_max", "M_sup", "D_max", "F_move", "F_largest", "F_rob1", "F_rob2", "F_rob3")
@@ -149,17 +255,15 @@ def experiment(options: Options) -> Finding:
     mean["changed_least"], mean["changed_most"] = groups["changed"].min(), groups["changed"].max()
     mean.insert(0, "scenarios", groups.size())
     print(mean.to_string(float_format="%.4f", na_rep="-"))
-    if not quick:
-        RESULTS.mkdir(exist_ok=True)
-        table.to_csv(RESULTS / "decision_sensitivity.csv", index=False, float_format="%.6g")
-        save_all(PICTURES)
-    return Finding(holds(table))
+    return Finding(holds(table), tables={"decision_sensitivity": table})
 
 
-PICTURES: dict[str, Callable[[], Figure]] = {
-    "decision_sensitivity.png": lambda: chart(stored("decision_sensitivity")),
-}
-CLAIM = Claim(experiment, quick="few scenarios, nothing written", pictures=PICTURES)
+CLAIM = Claim(
+    experiment,
+    digits=6,
+    quick="few scenarios, nothing written",
+    pictures={"decision_sensitivity.png": drawn(chart, "decision_sensitivity")},
+)
 
 if __name__ == "__main__":
     CLAIM.main()

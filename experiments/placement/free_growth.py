@@ -17,18 +17,12 @@ Writes ``experiments/results/free_growth.csv`` and ``docs/figures/free_growth.pn
 
 from __future__ import annotations
 
-import json
-import os
-import subprocess
-import sys
-from collections.abc import Callable
-
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
 from experiments.harness.claim import Claim, Finding, Options, Times, on_this_run
-from experiments.harness.plotting import RESULTS, save_all, stored
+from experiments.harness.results import apart, drawn
 from seqopt.report.style import GRAY, SMALL, dress, look, new_figure, plain, styled
 
 SIZES = {3: (7, 13, 25, 49, 73, 97, 145), 4: (7, 13, 25, 37, 49, 73), 5: (7, 13, 19, 25)}
@@ -37,21 +31,6 @@ SOLVED = {3: 145, 4: 73, 5: 19}  # bricks up to which a plan is proven, by robot
 STEEPEST = {3: 3.0, 4: 4.0}  # exponents of time that are claimed
 FROM = 25  # bricks from which on exponents are fitted
 MOST = 2048.0  # MB
-
-
-def run_apart(bricks: int, robots: int) -> dict[str, object]:
-    """Return the row of a run in a process of its own."""
-    threads = {f"{library}_NUM_THREADS": "1" for library in ("OPENBLAS", "OMP", "MKL")}
-    module = "experiments.placement.parts.free_growth_run"
-    done = subprocess.run(
-        [sys.executable, "-m", module, str(bricks), str(robots)],
-        env=os.environ | threads,
-        capture_output=True,
-        check=True,
-        text=True,
-    )
-    row: dict[str, object] = json.loads(done.stdout.splitlines()[-1])
-    return row
 
 
 def exponents(table: pd.DataFrame, column: str) -> dict[int, float]:
@@ -104,22 +83,21 @@ def chart(table: pd.DataFrame) -> Figure:
 
 def experiment(options: Options) -> Finding:
     sizes = QUICK if options.quick else SIZES
-    rows = [run_apart(bricks, robots) for robots, counts in sizes.items() for bricks in counts]
+    module = "experiments.placement.parts.free_growth_run"
+    rows = [apart(module, bricks, robots) for robots, counts in sizes.items() for bricks in counts]
     table = pd.DataFrame(rows)
     print(table.to_string(index=False, float_format="%.4g"))
     for column in ("states", "models", "seconds"):
         print("exponents of", column, exponents(table, column))
-    if not options.quick:
-        table.to_csv(RESULTS / "free_growth.csv", index=False, float_format="%.4g")
-        save_all(PICTURES)
-    return on_this_run(holds=holds(table))
+    return on_this_run(holds=holds(table), free_growth=table)
 
 
-PICTURES: dict[str, Callable[[], Figure]] = {
-    "free_growth.png": lambda: chart(stored("free_growth")),
-}
 CLAIM = Claim(
-    experiment, quick="small arches, nothing written", times=Times.SHOWN, pictures=PICTURES
+    experiment,
+    digits=4,
+    quick="small arches, nothing written",
+    times=Times.SHOWN,
+    pictures={"free_growth.png": drawn(chart, "free_growth")},
 )
 
 if __name__ == "__main__":

@@ -25,18 +25,192 @@ and ``docs/figures/robust_placement.png``.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from experiments.harness.arches import half_circle
 from experiments.harness.claim import Claim, Finding, Options, Times, on_this_run
-from experiments.harness.plotting import RESULTS, save_all, stored
-from experiments.placement.parts.robust_chart import chart
-from experiments.placement.parts.robust_runs import Effort, judged, references, rows
+from experiments.harness.results import drawn, stored
+from experiments.harness.scenes import half_circle
+from formulations.scenario_program import solve_program
+from seqopt.engines.registry import make_engine
+from seqopt.network.build import build_network
+from seqopt.placement.in_order import solve_in_order
+from seqopt.placement.interface import Aim
+from seqopt.placement.problem import Problem, pose
+from seqopt.placement.requirements import Criterion
+from seqopt.placement.robust_aim import WORST_PEAK, WORST_TOTAL, RobustAim, cvar
+from seqopt.placement.robust_plan import RobustPlan, solve_robust
+from seqopt.placement.robust_problem import RobustProblem, robust
+from seqopt.placement.scenario_arcs import Choice
+from seqopt.placement.solving import solve
+from seqopt.placement.step_quantile import least_quantile
+from seqopt.placement.unseen import judge_unseen
+from seqopt.placement.watch import Watch
+from seqopt.report.style import BLUE, GRAY, VERMILION, dress, new_figure, styled
+from seqopt.scene.scenarios import scenarios
+from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import load_scene
+from seqopt.sequence.three_robots import three_robot_loop
+from seqopt.study.presets import EQUATIONS, WEIGHTED, WORST_RATIO
+
+AIMS: dict[RobustAim, Criterion] = {
+    WORST_PEAK: WORST_RATIO,
+    WORST_TOTAL: WEIGHTED,
+    cvar(0.9): WEIGHTED,
+    cvar(0.5): WEIGHTED,
+}
+UNSEEN_SEED = 1000  # no plan is made with it
+TAIL = cvar(0.9)
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How many scenarios there are, how often, and how long a program may take."""
+
+    counts: tuple[int, ...]
+    seeds: int
+    unseen: int
+    limit: float
+
+
+def posed(scene: Scene, criterion: Criterion) -> Problem:
+    network = build_network(scene)
+    return pose(make_engine("compliance", network), three_robot_loop(network), criterion)
+
+
+def over_draws(problem: Problem, count: int, seed: int) -> RobustProblem:
+    """Return the problem over so many scenarios, costs computed."""
+    scene = problem.schedule.scene
+    found = robust(problem, scenarios(scene, count=count, seed=seed), WORST_PEAK)
+    assert found.costs
+    return found
+
+
+def made(scene: Scene, effort: Effort) -> Iterator[dict[str, object]]:
+    """Yield a row for every aim, seed and count of scenarios."""
+    for criterion in (WORST_RATIO, WEIGHTED):
+        problem = posed(scene, criterion)
+        unseen = over_draws(problem, effort.unseen, UNSEEN_SEED)
+        for seed in range(effort.seeds):
+            most = over_draws(problem, max(effort.counts), seed)
+            for aim in (aim for aim, own in AIMS.items() if own is criterion):
+                for count in effort.counts:
+                    plan = solve_robust(most.under(aim).first(count))
+                    row = {"aim": str(aim), "criterion": criterion.name, "seed": seed}
+                    yield row | {"scenarios": count} | measured(plan, unseen)
+
+
+def measured(plan: RobustPlan, unseen: RobustProblem) -> dict[str, object]:
+    """Return what a plan is worth where it was made and elsewhere."""
+    trial = judge_unseen(plan, unseen).summary()
+    return {
+        "objective": plan.objective,
+        "gap": plan.gap,
+        "gap_by_weights": (plan.objective - plan.proven) / plan.objective,
+        "solve_s": plan.seconds["solve"],
+        **{f"{name}_{who}": trial[name][who] for name in trial for who in trial[name]},
+    }
+
+
+def references(scene: Scene, count: int, limit: float) -> pd.DataFrame:
+    """Return the integer programs beside the cuts: values, bounds and times."""
+    found = []
+    most = over_draws(posed(scene, WEIGHTED), count, 0)
+    for aim in (WORST_TOTAL, TAIL):
+        plan = solve_robust(most.under(aim))
+        start = time.perf_counter()
+        told = solve_program(most.layered(Aim.SUM), aim.most(count), whole=True, watch=Watch(limit))
+        row = {"aim": str(aim), "scenarios": count, "objective": plan.objective}
+        row |= {"bound": plan.bound, "solve_s": plan.seconds["solve"]}
+        row |= {"program": told.value, "program_bound": told.bound}
+        found.append(row | {"program_s": time.perf_counter() - start, "limit_s": limit})
+    return pd.DataFrame(found)
+
+
+def plans(scene: Scene, count: int) -> dict[str, Choice]:
+    """Return a choice for every way to say what is good."""
+    ranks, total, worst = (posed(scene, c) for c in (EQUATIONS, WEIGHTED, WORST_RATIO))
+    peaks, totals = (over_draws(problem, count, 0) for problem in (worst, total))
+    return {
+        "rank": solve(ranks, "overlap_dp").selection.choice,
+        "sum": solve(total, "overlap_dp").selection.choice,
+        "worst": solve(worst, "minimax").selection.choice,
+        "worst, then sum": solve_in_order([(worst, Aim.PEAK), (total, Aim.SUM)]).choice,
+        "all but a tenth of the steps": least_quantile(worst, 0.1).choice,
+        "robust, worst peak": solve_robust(peaks).choice,
+        "robust, worst total": solve_robust(totals.under(WORST_TOTAL)).choice,
+        "robust, cvar=0.9": solve_robust(totals.under(TAIL)).choice,
+    }
+
+
+def judged(scene: Scene, count: int, unseen: int) -> pd.DataFrame:
+    """Return every plan judged by every measure."""
+    ranks, total, worst = (posed(scene, c) for c in (EQUATIONS, WEIGHTED, WORST_RATIO))
+    peaks, totals = (over_draws(problem, unseen, UNSEEN_SEED) for problem in (worst, total))
+    steps = [(c.moves, worst.step_costs(c)) for c in worst.evaluation.steps]
+
+    def tenth(choice: Choice) -> float:
+        costs = np.sort([costs[tuple(choice[m] for m in moves)] for moves, costs in steps])
+        return float(costs[::-1][int(0.1 * len(costs) + 1e-9)])
+
+    return pd.DataFrame(
+        {
+            "plan": name,
+            "ranks": ranks.sums.cost(choice),
+            "sum": total.sums.cost(choice),
+            "worst": worst.peaks.worst(choice),
+            "tenth": tenth(choice),
+            "unseen_peak": WORST_PEAK.value(peaks.values(choice, Aim.PEAK)),
+            "unseen_peak_median": float(np.median(peaks.values(choice, Aim.PEAK))),
+            "unseen_total": WORST_TOTAL.value(totals.values(choice, Aim.SUM)),
+            "unseen_tail": TAIL.value(totals.values(choice, Aim.SUM)),
+        }
+        for name, choice in plans(scene, count).items()
+    )
+
+
+TITLES = {
+    "worst-peak": "worst step, worst scenario",
+    "worst-total": "sum, worst scenario",
+    "cvar=0.9": "sum, mean of the worst tenth",
+}
+
+
+@styled
+def chart(table: pd.DataFrame) -> Figure:
+    """Draw what plans are worth in unseen scenarios, over how many they were made for."""
+    figure = new_figure(3.4)
+    panels = figure.subplots(1, len(TITLES))
+    for panel, (aim, title) in zip(panels, TITLES.items(), strict=True):
+        draw(panel, table[table["aim"] == aim])
+        panel.set(title=title, xlabel="scenarios the plan is made for", xscale="log")
+        counts = sorted(table["scenarios"].unique())
+        panel.set_xticks(counts, [str(count) for count in counts])
+        panel.set_xticks([], minor=True)
+        panel.set_xlim(counts[0] / 1.4, counts[-1] * 1.4)
+        dress(panel)
+    panels[0].set_ylabel("cost in unseen scenarios")
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=4)
+    return figure
+
+
+def draw(panel: Axes, rows: pd.DataFrame) -> None:
+    """Draw one aim: every seed as a point, their mean, and what it is measured by."""
+    panel.plot(rows["scenarios"], rows["unseen_robust"], "o", color=BLUE, mfc="white",
+               label="robust plan, each draw")  # fmt: skip
+    mean = rows.groupby("scenarios")["unseen_robust"].mean()
+    panel.plot(mean.index, mean, "-", color=BLUE, label="its mean")
+    nominal, known = rows["unseen_nominal"].iloc[0], rows["unseen_knows_it"].iloc[0]
+    panel.axhline(nominal, color=VERMILION, ls="--", label="nominal plan")
+    panel.axhline(known, color=GRAY, ls=":", lw=2, label="plan that knows each scenario")
+
 
 FULL = Effort(counts=(10, 30, 100), seeds=3, unseen=100, limit=60.0)
 QUICK = Effort(counts=(3, 6), seeds=2, unseen=5, limit=5.0)
@@ -46,7 +220,7 @@ PROVEN, SAME, FASTER = 1e-6, 1e-5, 10
 
 
 def holds(table: pd.DataFrame, programs: pd.DataFrame) -> bool:
-    """Return whether the claim holds on rows of `rows` and `references`."""
+    """Return whether the claim holds on rows of `made` and `references`."""
     enough = table[table["scenarios"] >= ENOUGH]
     peaks, totals = (
         enough[(enough["aim"] == "worst-peak") == is_peak] for is_peak in (True, False)
@@ -70,7 +244,7 @@ def experiment(options: Options) -> Finding:
     quick: bool = options.quick
     scene = half_circle(6).scene if quick else load_scene("arch25")
     effort = QUICK if quick else FULL
-    table = pd.DataFrame(rows(scene, effort))
+    table = pd.DataFrame(made(scene, effort))
     programs = references(scene, min(ENOUGH, max(effort.counts)), effort.limit)
     beside = judged(scene, min(ENOUGH, max(effort.counts)), effort.unseen)
     print(table.groupby(["aim", "scenarios"], sort=False).mean(numeric_only=True).T.to_string())
@@ -78,20 +252,16 @@ def experiment(options: Options) -> Finding:
     if quick:  # six bricks say little: the stored rows are judged
         known = (stored(f"robust_{name}") for name in ("placement", "programs"))
         return Finding(holds(*known), ": stored rows")
-    for name, found in (("placement", table), ("programs", programs), ("judged", beside)):
-        found.to_csv(RESULTS / f"robust_{name}.csv", index=False, float_format="%.6g")
-    save_all(PICTURES)
-    return on_this_run(holds=holds(table, programs))
+    tables = {"robust_placement": table, "robust_programs": programs, "robust_judged": beside}
+    return on_this_run(holds=holds(table, programs), **tables)
 
 
-PICTURES: dict[str, Callable[[], Figure]] = {
-    "robust_placement.png": lambda: chart(stored("robust_placement")),
-}
 CLAIM = Claim(
     experiment,
+    digits=6,
     quick="six bricks, the stored rows judged, nothing written",
     times=Times.SHOWN,
-    pictures=PICTURES,
+    pictures={"robust_placement.png": drawn(chart, "robust_placement")},
 )
 
 if __name__ == "__main__":

@@ -23,27 +23,25 @@ experiments.placement.speed_accuracy [--quick] [--fresh]``. Writes ``experiments
 
 from __future__ import annotations
 
-import json
-import os
 import platform
 import subprocess
-import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from importlib.metadata import version
 from itertools import product
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from matplotlib.figure import Figure
 
-from experiments.harness.claim import Claim, Finding, Option, Options, Times, on_this_run
-from experiments.harness.plotting import RESULTS, save_figure
-from experiments.harness.plotting import stored as table_of
-from experiments.harness.profiles import shifted_mean
+from experiments.harness.claim import Claim, Finding, Option, Options, Times, on_this_run, told
+from experiments.harness.results import RESULTS, apart, drawn
 from experiments.harness.runs import NO_PROOF, REFERENCE, contenders
-from experiments.placement.parts.growth_charts import worst_step_chart
-from experiments.placement.parts.speed_charts import headline, profile_charts
+from experiments.placement.parts.speed_charts import (
+    headline,
+    profile_charts,
+    shifted_mean,
+    worst_step_chart,
+)
 from experiments.placement.parts.worst_ratios import WAYS
 from seqopt.study.presets import CLOSEST, EQUATIONS, WEIGHTED, WORST_RATIO
 
@@ -84,12 +82,9 @@ def measure(spec: Spec, limit: float = LIMIT) -> list[dict[str, object]]:
     """Return the rows of one process, or rows that are charged its limit."""
     scene, engine, criterion, repeats = spec
     try:
-        done = apart("experiments.harness.runs", *spec[:3], str(repeats), limit=limit)
-        rows = json.loads(done.stdout) if done.returncode == 0 else []
-        status = "failed"
-    except subprocess.TimeoutExpired:
-        rows, status = [], "time limit"
-    if not rows:
+        rows = apart("experiments.harness.runs", *spec, limit=limit)
+    except subprocess.SubprocessError as error:
+        status = "time limit" if isinstance(error, subprocess.TimeoutExpired) else "failed"
         charged = {"status": status, "total": limit, "gap": 1.0}
         base = {"scene": scene, "engine": engine, "criterion": criterion}
         rows = [
@@ -101,19 +96,10 @@ def measure(spec: Spec, limit: float = LIMIT) -> list[dict[str, object]]:
     return [row | about for row in rows]
 
 
-def apart(module: str, *words: str, limit: float) -> subprocess.CompletedProcess[str]:
-    """Return how a module ended that ran in a process of its own on one core."""
-    env = os.environ | {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
-    command = [sys.executable, "-m", module, *words]
-    return subprocess.run(
-        command, capture_output=True, text=True, check=False, env=env, timeout=limit
-    )
-
-
 def ratios_of(ways: Iterable[str]) -> pd.DataFrame:
     """Return a row for every way to a plan of the reference arch, loop and free schedule."""
     module = "experiments.placement.parts.worst_ratios"
-    rows = [json.loads(apart(module, way, limit=LIMIT).stdout) for way in ways]
+    rows = [apart(module, way, limit=LIMIT) for way in ways]
     return pd.DataFrame(rows).assign(version=version("seqopt"))
 
 
@@ -221,26 +207,19 @@ def experiment(options: Options) -> Finding:
         ratios = ratios_of(QUICK_WAYS if options.quick else WAYS)
     print(ratios.to_string(index=False, float_format="%.4g"))
     parts = holds(runs) | free_pays(ratios)
-    for text, true in parts.items():
-        print(f"{'yes' if true else 'NO'}: {text}")
-    if not options.quick:
-        table.to_csv(RESULTS / "speed_accuracy.csv", index=False, float_format="%.4g")
-        ratios.to_csv(RATIOS, index=False, float_format="%.6g")
-        for name, draw in PICTURES.items():
-            save_figure(draw(), name)
-    return on_this_run(holds=all(parts.values()))
+    return on_this_run(holds=told(parts), speed_accuracy=table, worst_ratios=ratios)
 
 
-PICTURES: dict[str, Callable[[], Figure]] = {
-    "speed_accuracy.png": lambda: headline(table_of("runs")),
-    "worst_step.png": lambda: worst_step_chart(table_of("runs"), table_of("worst_ratios")),
-    "profiles.png": lambda: profile_charts(table_of("runs")),
-}
 CLAIM = Claim(
     experiment,
+    digits={"speed_accuracy": 4, "worst_ratios": 6},
     quick="one small arch, nothing written",
     times=Times.JUDGED,
-    pictures=PICTURES,
+    pictures={
+        "speed_accuracy.png": drawn(headline, "runs"),
+        "worst_step.png": drawn(worst_step_chart, "runs", "worst_ratios"),
+        "profiles.png": drawn(profile_charts, "runs"),
+    },
     options=(Option("--fresh", "repeat runs that are stored"),),
 )
 

@@ -26,36 +26,162 @@ Inputs: the shipped scene and plan. Command: ``python -m experiments.placement.s
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from typing import TypeVar
 
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from experiments.harness.claim import Claim, Finding, Options
-from experiments.harness.plotting import RESULTS, save_all, stored
-from experiments.placement.parts.staged_chart import chart
-from experiments.placement.parts.step_by_step import (
-    choose,
-    from_scratch,
-    nothing_yet,
-    staged,
-    worst_ratio,
-)
-from seqopt.engines.interface import Fields
+from experiments.harness.claim import Claim, Finding, Options, told
+from experiments.harness.results import drawn
+from seqopt.engines.interface import Engine, Fields
 from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.engines.rigid.ungripped import Ungripped, ungripped_system
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.placement.problem import pose
 from seqopt.placement.solving import solve
-from seqopt.responses.quantities import RESPONSES, TO_1E_3MM, lengths
-from seqopt.responses.staged import Placing, staged_fields
+from seqopt.report.style import BLUE, INK, VERMILION, dress, new_figure, styled
+from seqopt.responses.quantities import CHOSEN_BY, RESPONSES, TO_1E_3MM, lengths
+from seqopt.responses.staged import Placing, StagedState, next_state, staged_fields, state_fields
 from seqopt.responses.table import step_fields
 from seqopt.scene.scene_file import load_scene
+from seqopt.sequence.schedule import OpenGrip, OpenStep, Schedule
 from seqopt.sequence.steps import Step
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.sequence.two_robots import METHODS
 from seqopt.study.presets import EQUATIONS, PUBLISHED_BEST
 from seqopt.study.published import published_plan
+
+History = TypeVar("History")
+Advance = Callable[[History, Step], tuple[History, Fields]]
+"""Takes what came before and a step; returns what has come then, and the step's fields."""
+
+
+def worst_ratio(network: Network, fields: Fields, limits: tuple[tuple[str, float], ...]) -> float:
+    """Return the largest ratio of a response of one grip set to its limit."""
+    found = {"F_largest": lengths(fields.grip_force).max(axis=1, initial=0.0)}
+    names = [name for name, _ in limits if name not in found]
+    found |= {name: CHOSEN_BY[name].of(network, fields) for name in names}
+    return max(float(found[name][0]) / limit for name, limit in limits)
+
+
+def from_scratch(engine: Engine) -> Advance[None]:
+    """Return how an engine goes on: it knows nothing of the steps before."""
+    return lambda _, step: (None, step_fields(engine, step))
+
+
+def staged_way(network: Network, placing: Placing) -> Advance[StagedState]:
+    """Return how a staged analysis goes on."""
+    parts: dict[int, Ungripped] = {}
+
+    def advance(before: StagedState, step: Step) -> tuple[StagedState, Fields]:
+        if step.bricks not in parts:
+            parts[step.bricks] = ungripped_system(network, step.bricks)
+        after = next_state(parts[step.bricks], before, step, placing)
+        return after, state_fields(parts[step.bricks], after)
+
+    return advance
+
+
+def nothing_yet(network: Network) -> StagedState:
+    """Return the state before the first brick."""
+    return StagedState(0, np.zeros(0), np.zeros((len(network.springs.since), 6)), np.zeros(0))
+
+
+def choose(
+    schedule: Schedule, advance: Advance[History], start: History, cost: Callable[[Fields], float]
+) -> tuple[int, ...]:
+    """Return a node for every move; of two as good the first.
+
+    A move is judged by the worst step from the one in which it takes its grip to the one before
+    the next move takes its own.
+    """
+    history, nodes = start, []
+    for step in schedule.steps[: schedule.moves[0].step - 1 if schedule.moves else None]:
+        history, _ = advance(history, _closed(step, []))
+    for number in range(len(schedule.moves)):
+        ways = [
+            (*_until_next(schedule, [*nodes, node], advance, history, cost), node)
+            for node in _free(schedule, number, nodes)
+        ]
+        _, history, node = min(ways, key=lambda way: way[0])
+        nodes.append(node)
+    return tuple(nodes)
+
+
+def _until_next(
+    schedule: Schedule,
+    nodes: list[int],
+    advance: Advance[History],
+    history: History,
+    cost: Callable[[Fields], float],
+) -> tuple[float, History]:
+    """Return the worst cost of the steps that the last of the nodes decides, and what then is."""
+    worst = 0.0
+    for step in _decided(schedule, len(nodes) - 1):
+        history, fields = advance(history, _closed(step, nodes))
+        worst = max(worst, cost(fields))
+    return worst, history
+
+
+def _decided(schedule: Schedule, number: int) -> Iterator[OpenStep]:
+    """Yield the steps from a move to the next one."""
+    ends = [move.step for move in schedule.moves[1:]] + [len(schedule.steps) + 1]
+    yield from schedule.steps[schedule.moves[number].step - 1 : ends[number] - 1]
+
+
+def _free(schedule: Schedule, number: int, nodes: list[int]) -> list[int]:
+    """Return the candidates of a move that the move before does not hold at the same time."""
+    step = schedule.steps[schedule.moves[number].step - 1]
+    taken = {nodes[move] for move in step.moves if move < number}
+    return [node for node in schedule.moves[number].candidates if node not in taken]
+
+
+def _closed(step: OpenStep, nodes: list[int]) -> Step:
+    grips = tuple(nodes[g.move] if isinstance(g, OpenGrip) else g for g in step.grips)
+    return Step(step.number, step.kind, step.bricks, grips)
+
+
+SHOWN = {
+    "cantilever": "cantilever method, two robots",
+    "three-robot, published": "published plan, three robots",
+}
+LABELS = {
+    "F_largest_N": "largest robot\nforce [N]",
+    "M_sup_Nm": "support moment\nM_sup [N m]",
+    "T_max_N": "largest tension\nT_max [N]",
+    "D_max_1e-3mm": "largest displacement\nD_max [1e-3 mm]",
+}
+STYLES = {
+    "scratch": (BLUE, "-", "every step from scratch"),
+    "fitted": (VERMILION, "--", "staged, bricks fitted to the deformed structure"),
+    "planned": (INK, ":", "staged, bricks where they are planned (the same forces)"),
+}
+
+
+@styled
+def chart(table: pd.DataFrame) -> Figure:
+    """Draw a row of panels per response, and a column per build."""
+    figure = new_figure(7.6)
+    axes = figure.subplots(len(LABELS), len(SHOWN), sharex="col", sharey="row")
+    for cells, name in zip(axes.T, SHOWN, strict=True):
+        mine = table[table["method"] == name]
+        for cell, column in zip(cells, LABELS, strict=True):
+            for analysis, (color, dash, text) in STYLES.items():
+                if analysis == "planned" and column != "D_max_1e-3mm":
+                    continue  # the same forces
+                rows = mine[mine["analysis"] == analysis]
+                cell.plot(rows["step"], rows[column], color=color, ls=dash, lw=1.2, label=text)
+        cells[0].set_title(SHOWN[name])
+        cells[-1].set_xlabel("step")
+    for cell, label in zip(axes[:, 0], LABELS.values(), strict=True):
+        cell.set_ylabel(label)
+    dress(*axes.ravel())
+    handles, texts = axes[-1, 0].get_legend_handles_labels()
+    figure.legend(handles, texts, loc="outside lower center", ncols=2)
+    return figure
+
 
 PUBLISHED = "three-robot, published"
 SCRATCH = "scratch"
@@ -119,7 +245,7 @@ def choices(engine: ComplianceEngine) -> pd.DataFrame:
     nodes = {SCRATCH: choose(schedule, from_scratch(engine), None, cost)}
     start = nothing_yet(network)
     for placing in Placing:
-        nodes[placing.value] = choose(schedule, staged(network, placing), start, cost)
+        nodes[placing.value] = choose(schedule, staged_way(network, placing), start, cost)
     out = pd.DataFrame({"move": range(1, len(schedule.moves) + 1)})
     for way, chosen in nodes.items():
         steps = schedule.fill(chosen)
@@ -176,23 +302,15 @@ def experiment(options: Options) -> Finding:
     print(summary(table).to_string(float_format="%.4g"))
     print(chosen.to_string(index=False, float_format="%.4g"))
     parts = holds(table, chosen)
-    for text, true in parts.items():
-        print(f"{'yes' if true else 'NO'}: {text}")
-    if not options.quick:
-        RESULTS.mkdir(exist_ok=True)
-        table.to_csv(RESULTS / "staged_construction.csv", index=False, float_format="%.5g")
-        chosen.to_csv(RESULTS / "staged_choice.csv", index=False, float_format="%.5g")
-        save_all(PICTURES)
-    return Finding(all(parts.values()))
+    tables = {"staged_construction": table, "staged_choice": chosen}
+    return Finding(told(parts), tables=tables)
 
 
-PICTURES: dict[str, Callable[[], Figure]] = {
-    "staged_construction.png": lambda: chart(stored("staged_construction")),
-}
 CLAIM = Claim(
     experiment,
+    digits=5,
     quick="two-robot methods and the published plan alone, nothing written",
-    pictures=PICTURES,
+    pictures={"staged_construction.png": drawn(chart, "staged_construction")},
 )
 
 if __name__ == "__main__":

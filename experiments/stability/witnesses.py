@@ -42,17 +42,15 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
-from matplotlib.figure import Figure
 
-from experiments.harness.claim import Claim, Extra, Finding, Option, Options, Times
+from experiments.harness.claim import Claim, Extra, Finding, Option, Options, Times, none_of
 from experiments.harness.lmgc90 import python_with_lmgc90
-from experiments.harness.plotting import RESULTS, save_all
 from experiments.stability.parts.blocks import ring, stack
+from experiments.stability.parts.witness_chart import LARGEST, differing, picture, words
 from experiments.stability.parts.witness_cra import (
     SAMPLES,
     coupled,
@@ -62,7 +60,6 @@ from experiments.stability.parts.witness_cra import (
 )
 from experiments.stability.parts.witness_lmgc90 import moved_by
 from experiments.stability.parts.witness_scenes import Scene, arch, incline, scene_of
-from experiments.stability.parts.witness_verdicts import LARGEST, differing, picture, words
 from seqopt.contact.mortar import Mortar
 from seqopt.stability.assessment import Verdict, bonded, verdict_of
 from seqopt.stability.limit_analysis import compile_equilibrium
@@ -260,29 +257,19 @@ def experiment(options: Options) -> Finding:
     ratio = None if options.quick else times.loc[times["case"] == LARGEST, "ratio"].max()
     found = faults(table, witnesses, ratio)
     if python:  # rows of a witness are not given up because it is not there
-        RESULTS.mkdir(exist_ok=True)
-        table.to_csv(RESULTS / "witnesses.csv", index=False, float_format="%.3g")
-        save_all(PICTURES)
-    for fault in found:
-        print(f"against it: {fault}")
-    alone = (
-        ""
-        if python
-        else ", by one witness: LMGC90 was not asked or is not installed; nothing stored"
-    )
-    return Finding(not found, alone)
+        return Finding(none_of(found), tables={"witnesses": table})
+    alone = ", by one witness: LMGC90 was not asked or is not installed; nothing stored"
+    return Finding(none_of(found), alone)
 
 
-PICTURES: dict[str, Callable[[], Figure]] = {
-    "witnesses.png": picture,
-}
 CLAIM = Claim(
     experiment,
+    digits=3,
     quick="few cases, nothing written",
     times=Times.SHOWN,
     options=(Option("--lmgc90", "a Python with compas_lmgc90", sys.executable),),
     needs=(Extra("compas_cra", 'pip install "seqopt[witness]"'),),
-    pictures=PICTURES,
+    pictures={"witnesses.png": picture},
 )
 
 if __name__ == "__main__":

@@ -19,18 +19,16 @@ experiments.study.paper_counterparts [--quick]``. Writes
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import cache, partial
 
 import pandas as pd
 from matplotlib.figure import Figure
 
-from experiments.harness.claim import Claim, Finding, Options
-from experiments.harness.plotting import FIGURES, RESULTS, save_all, stored
+from experiments.harness.claim import Claim, Finding, Options, none_of
+from experiments.harness.results import FIGURES, save_table, stored
 from experiments.study.parts.counterpart_charts import drawn
-from experiments.study.parts.counterpart_models import Ours, ours
 from experiments.study.parts.counterpart_page import DISAGREES, TITLES, page, statement, verdict
-from experiments.study.parts.counterpart_rows import tabulate
+from experiments.study.parts.counterpart_rows import Ours, ours, tabulate
 from experiments.study.parts.paper_items import ITEMS, Item
 
 KNOWN = {"fig:secant_stiff", "table:model_results", "table:validation_results"}
@@ -57,16 +55,10 @@ def experiment(options: Options) -> Finding:
     for item in items:
         print(statement(item, table[table["id"] == item.label]))
     if not quick:
-        RESULTS.mkdir(exist_ok=True)
-        path = RESULTS / "paper_counterparts.csv"
-        table.to_csv(path, index=False, float_format="%.6g", lineterminator="\n")
-        table = pd.read_csv(path)  # captions tell what is stored
-        save_all(PICTURES)
+        save_table(table, "paper_counterparts", CLAIM.digits)
+        table = stored("paper_counterparts")  # captions tell what is stored
         (FIGURES.parent / "counterparts.md").write_text(page(table), encoding="utf-8")
-    found = faults(items, table)
-    for fault in found:
-        print(f"against it: {fault}")
-    return Finding(not found)
+    return Finding(none_of(faults(items, table)), tables={"paper_counterparts": table})
 
 
 @cache
@@ -80,10 +72,12 @@ def picture(name: str) -> Figure:
     return drawn(name, stored("paper_counterparts"), model())
 
 
-PICTURES: dict[str, Callable[[], Figure]] = {
-    f"counterpart_{name}.png": partial(picture, name) for name in TITLES
-}
-CLAIM = Claim(experiment, quick="a few items, nothing written", pictures=PICTURES)
+CLAIM = Claim(
+    experiment,
+    digits=6,
+    quick="a few items, nothing written",
+    pictures={f"counterpart_{name}.png": partial(picture, name) for name in TITLES},
+)
 
 if __name__ == "__main__":
     CLAIM.main()

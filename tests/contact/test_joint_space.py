@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.harness.walls import running_bond
+from experiments.harness.scenes import running_bond
 from seqopt.contact.faces import bare_assembly, distance_beside
 from seqopt.contact.mortar import DRY
 from seqopt.engines.auto import AutoEngine

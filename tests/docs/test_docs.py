@@ -10,9 +10,8 @@ import sys
 import pandas as pd
 import pytest
 
-from experiments.harness.plotting import RESULTS
+from experiments.harness.results import RESULTS, markdown, two
 from experiments.harness.stated import stated
-from experiments.harness.wording import markdown, two
 from seqopt.cli.main import main
 from seqopt.placement.formulation import exhibits, formulations
 from tests.browser import browsed

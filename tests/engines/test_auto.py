@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.harness.walls import running_bond
+from experiments.harness.scenes import running_bond
 from seqopt.contact.elastic_limits import find_elastic_limits
 from seqopt.contact.mortar import DRY, EPOXY, Mortar
 from seqopt.engines.auto import _BEYOND, _IN_PLANE, AutoEngine, Level

@@ -8,8 +8,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from experiments.engines.parts.limit_scenes import LOOSE_AT, chain, loosened
-from experiments.engines.parts.reference_chain import solve_exactly
 from seqopt.engines.interface import _NAMES, Want, grip_columns
 from seqopt.engines.planar import PlanarEngine
 from seqopt.engines.rigid import compliance, trial
@@ -22,6 +20,8 @@ from seqopt.engines.rigid.response_maps import loads_of
 from seqopt.engines.rigid.trial import _CANCEL, cancels, solve_batch
 from seqopt.network.build import build_network
 from tests.builders import from_both_sides, six_bricks, small_arch
+from tests.limit_scenes import LOOSE_AT, chain, loosened
+from tests.reference_chain import solve_exactly
 
 KINDS = ("translational_stiffness", "rotational_stiffness")
 BOTH_SIDES = [(6, 15, 25), (9, 14, 26)]  # of the loose joint

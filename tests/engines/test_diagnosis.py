@@ -7,9 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.engines.parts.limit_scenes import HELD, LOOSE_AT, chain, loosened, without_joint
-from experiments.engines.parts.reference_chain import solve_exactly
-from experiments.harness.walls import running_bond
+from experiments.harness.scenes import running_bond
 from seqopt.engines.diagnosis import (
     _LEAST_DIAGONAL,
     UNRESISTED,
@@ -24,6 +22,8 @@ from seqopt.engines.interface import Want, grip_columns
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.engines.rigid.mixed import mixed_system, solve_dense, ungripped_system
 from seqopt.network.build import build_network
+from tests.limit_scenes import HELD, LOOSE_AT, chain, loosened, without_joint
+from tests.reference_chain import solve_exactly
 
 
 def places(net, bricks, grips):

@@ -7,9 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from experiments.engines.parts.grip_sets import grip_sets
-from experiments.harness.arches import half_circle
-from experiments.harness.walls import running_bond
+from experiments.harness.scenes import grip_sets, half_circle, running_bond
 from seqopt.engines.interface import _NAMES, Want, grip_columns
 from seqopt.engines.rigid import compliance, growth, trial
 from seqopt.engines.rigid.compliance import ComplianceEngine, Kept

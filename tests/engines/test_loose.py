@@ -8,10 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.engines.parts.grip_sets import grip_sets
-from experiments.engines.parts.limit_scenes import HELD, chain, loosened, without_joint
-from experiments.engines.parts.reference_chain import solve_exactly
-from experiments.harness.walls import running_bond
+from experiments.harness.scenes import grip_sets, running_bond
 from seqopt.engines.diagnosis import Finding, diagnose
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import _NAMES, Want, grip_columns
@@ -33,6 +30,8 @@ from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.study.presets import EQUATIONS
 from tests.builders import all_nodes, block, hinged, on_soft_ground, six_bricks, torsion_free
+from tests.limit_scenes import HELD, chain, loosened, without_joint
+from tests.reference_chain import solve_exactly
 
 NONE = np.zeros((1, 0), dtype=int)
 TWISTED = 12  # the joint of arch25 that acts from 14 bricks on

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.harness.walls import running_bond
+from experiments.harness.scenes import running_bond
 from seqopt.engines.basis import SPACE
 from seqopt.engines.interface import _NAMES, FLAGS, Want, grip_columns
 from seqopt.engines.planar import PlanarEngine

@@ -7,8 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.engines.parts.limit_scenes import HELD, LOOSE_AT, chain, loosened
-from experiments.engines.parts.reference_chain import solve_exactly
 from seqopt.engines.interface import Want, grip_columns
 from seqopt.engines.rigid import trial
 from seqopt.engines.rigid.compliance import ComplianceEngine
@@ -19,6 +17,8 @@ from seqopt.engines.rigid.trial import solve_batch
 from seqopt.errors import MechanismError, SolverError
 from seqopt.network.build import build_network
 from tests.builders import hinged, six_bricks
+from tests.limit_scenes import HELD, LOOSE_AT, chain, loosened
+from tests.reference_chain import solve_exactly
 
 
 def error(net, fields, row, grips):

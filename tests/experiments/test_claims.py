@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from experiments.harness.catalog import claims
-from experiments.harness.claim import Times
+from experiments.harness.claim import Times, claims
 from tests.builders import ROOT
 from tests.commands import run
 

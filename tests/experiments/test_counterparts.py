@@ -9,7 +9,6 @@ import pandas as pd
 import pytest
 
 from experiments.study.paper_counterparts import KNOWN, faults
-from experiments.study.parts.counterpart_models import ours
 from experiments.study.parts.counterpart_page import (
     AGREES,
     DISAGREES,
@@ -18,7 +17,7 @@ from experiments.study.parts.counterpart_page import (
     page,
     verdict,
 )
-from experiments.study.parts.counterpart_rows import COUNTERPARTS, cell, tabulate
+from experiments.study.parts.counterpart_rows import COUNTERPARTS, cell, ours, tabulate
 from experiments.study.parts.paper_items import ITEMS
 from tests.builders import ROOT
 

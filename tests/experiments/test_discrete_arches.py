@@ -16,10 +16,16 @@ from experiments.discrete.discrete_arches import (
     within_limits,
     witness_rows,
 )
-from experiments.discrete.parts.arch_pads import AtCorners, pads_at_corners
+from experiments.discrete.parts.arch_pads import (
+    CORNERS,
+    STEPS,
+    AtCorners,
+    Reading,
+    pads_at_corners,
+    readings,
+)
 from experiments.discrete.parts.arches_lmgc90 import error, moved
-from experiments.discrete.parts.pad_readings import CORNERS, STEPS, Reading, readings
-from experiments.harness.plotting import RESULTS
+from experiments.harness.results import RESULTS
 from seqopt.engines.discrete.engine import Across, Pinch, pad_stiffness
 from seqopt.sequence.two_robots import sequential
 from seqopt.study.presets import STUDY_PADS

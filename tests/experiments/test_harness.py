@@ -14,12 +14,25 @@ import pandas as pd
 import pytest
 
 from experiments.__main__ import TOGETHER, claims, main, run, run_all
-from experiments.harness.catalog import modules
-from experiments.harness.claim import Claim, ClaimError, Extra, Finding, Option, on_this_run
-from experiments.harness.profiles import data_profile, pareto, performance_profile, shifted_mean
+from experiments.harness.claim import (
+    Claim,
+    ClaimError,
+    Extra,
+    Finding,
+    Option,
+    modules,
+    on_this_run,
+)
 from experiments.harness.runs import ENGINES, NO_PROOF, REFERENCE, rows
-from experiments.placement.parts.growth_charts import worst_step_chart
-from experiments.placement.parts.speed_charts import headline, profile_charts
+from experiments.placement.parts.speed_charts import (
+    data_profile,
+    headline,
+    pareto,
+    performance_profile,
+    profile_charts,
+    shifted_mean,
+    worst_step_chart,
+)
 from experiments.placement.speed_accuracy import (
     COMPARED,
     KEY,
@@ -175,7 +188,7 @@ def test_all_claims_are_listed():
         [sys.executable, "-m", "experiments"], cwd=ROOT, capture_output=True, text=True, check=True
     ).stdout.splitlines()
     assert [line.split()[0] for line in listed] == list(claims())
-    assert {"engine_speed", "failing_steps", "speed_accuracy"} <= set(claims())
+    assert {"engine_speed", "dry_map", "speed_accuracy"} <= set(claims())
     assert "blocks" not in claims()
 
 
@@ -195,7 +208,7 @@ def test_no_claims_are_an_error_and_not_an_empty_list(tmp_path, monkeypatch, cap
     (tmp_path / "engines" / "parts" / "chart.py").touch()
     with pytest.raises(ClaimError, match="no experiments found in"):
         modules(tmp_path)
-    monkeypatch.setattr("experiments.harness.catalog.modules", lambda: modules(tmp_path))
+    monkeypatch.setattr("experiments.harness.claim.modules", lambda: modules(tmp_path))
     for arguments in ([], ["all", "--quick"]):
         monkeypatch.setattr("sys.argv", ["experiments", *arguments])
         assert main() == 1
@@ -211,8 +224,8 @@ def test_two_experiments_of_one_name_are_an_error(tmp_path):
 
 
 def test_a_module_among_the_claims_that_declares_none_is_an_error(monkeypatch):
-    helper = "experiments.engines.parts.grip_sets"
-    monkeypatch.setattr("experiments.harness.catalog.modules", lambda: {"grip_sets": helper})
+    helper = "experiments.harness.scenes"
+    monkeypatch.setattr("experiments.harness.claim.modules", lambda: {"scenes": helper})
     with pytest.raises(ClaimError, match=f"{helper} declares no CLAIM"):
         claims()
 

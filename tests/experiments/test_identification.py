@@ -21,7 +21,7 @@ from experiments.calibration.parts.arch_numbers import (
     scene_of,
     start_of,
 )
-from experiments.harness.plotting import RESULTS
+from experiments.harness.results import RESULTS
 from seqopt.study.tables import printed_steps
 
 

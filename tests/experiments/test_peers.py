@@ -12,8 +12,7 @@ from experiments.peers import peers
 from experiments.peers.parts.chain import chain_of
 from experiments.peers.parts.frames import MODULES, PACKAGES, missing_packages
 from experiments.peers.parts.loops import LOOPS, kept, loop
-from experiments.peers.parts.paths import PATHS, by_linprog, by_networkx
-from experiments.peers.parts.workload import Case, workload
+from experiments.peers.parts.workload import PATHS, Case, by_linprog, by_networkx, workload
 from experiments.peers.peers import difference
 from seqopt.engines.interface import Want, grip_columns
 from seqopt.placement.costs import LayeredCosts

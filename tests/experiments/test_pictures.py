@@ -9,12 +9,14 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from experiments.figures import PICTURES
-from experiments.harness.catalog import claims
-from experiments.harness.plotting import FIGURES
+from experiments.harness.claim import claims
+from experiments.harness.results import FIGURES
 from seqopt.report.style import DPI, WIDTH, dress, looks, new_figure, styled
 from tests.pictures import flaws, texts
+from tests.quality.engine_limits import picture as limits_picture
 
 DRAWN = {name: draw for claim in claims().values() for name, draw in claim.pictures.items()}
+DRAWN["engine_limits.png"] = limits_picture
 LONG = {"calibration.png", "outside_assemblies.png", "dry_map.png", "decision_sensitivity.png"}
 ELSEWHERE = {"report.png"}  # of a browser
 TOUCHING = 1.5  # pixels that texts may share
@@ -76,7 +78,7 @@ def test_stored_figures_are_of_this_style():
 
 
 def test_redraw_writes_figures_and_runs_nothing(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr("experiments.harness.plotting.FIGURES", tmp_path)
+    monkeypatch.setattr("experiments.harness.results.FIGURES", tmp_path)
     claim = claims()["frame_contrast"]
     claim.main(["--redraw"])
     assert [path.name for path in tmp_path.iterdir()] == [*claim.pictures]

@@ -8,8 +8,6 @@ import cvxpy as cp
 import numpy as np
 import pytest
 
-from experiments.placement.degenerate_placement import MALFORMED, judge, outcomes
-from experiments.placement.parts.degenerate_cases import CASES, Size, capped, costs, opposed, whole
 from formulations import solvers
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.placement.certificate import certify
@@ -18,6 +16,8 @@ from seqopt.placement.flow import LayeredFlow
 from seqopt.placement.formulation import Formulation, FormulationKind, Selection, formulations
 from seqopt.placement.interface import Aim, CostProblem
 from seqopt.placement.solving import solve
+from tests.quality.degenerate import MALFORMED, judge, outcomes
+from tests.quality.degenerate_cases import CASES, Size, capped, costs, opposed, whole
 
 ALL = formulations()
 SMALL = Size(3, 3, 6)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 
-from experiments.harness.walls import running_bond
+from experiments.harness.scenes import running_bond
 from seqopt.network.build import build_network
 from seqopt.network.network import PartKind
 from tests.strategies import arches

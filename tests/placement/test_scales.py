@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import seqopt
-from experiments.harness.walls import running_bond
+from experiments.harness.scenes import running_bond
 from seqopt.cli.main import main
 from seqopt.contact.mortar import bond_mortar
 from seqopt.engines.rigid.compliance import ComplianceEngine

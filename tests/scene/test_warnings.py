@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from experiments.harness.walls import running_bond
+from experiments.harness.scenes import running_bond
 from seqopt.cli.main import main
 from seqopt.errors import SceneWarning
 from seqopt.scene.arch import ArchShape, arch_scene

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from experiments.harness.walls import running_bond
+from experiments.harness.scenes import running_bond
 from seqopt.errors import StepError
 from seqopt.network.build import build_network
 from seqopt.scene.arch import ArchShape, arch_scene

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from experiments.harness.walls import running_bond
+from experiments.harness.scenes import running_bond
 from seqopt.errors import StepError
 from seqopt.sequence.schedule import thin
 from seqopt.sequence.three_robots import SCHEDULES, three_robot_loop

@@ -15,8 +15,17 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from experiments.calibration.parts.barrel_vaults import Vault, chain, planar_parts
-from experiments.calibration.parts.laws import BED, LAWS, MEASURES, Law, errors, fit
+from experiments.calibration.parts.barrel_vaults import (
+    BED,
+    LAWS,
+    MEASURES,
+    Law,
+    Vault,
+    chain,
+    errors,
+    fit,
+    planar_parts,
+)
 from seqopt.arrays import Floats
 
 LEVEL = 0.95

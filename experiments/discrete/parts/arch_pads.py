@@ -11,7 +11,8 @@ blocks rest.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,12 +23,12 @@ from seqopt.contact.assembly import Assembly
 from seqopt.contact.elastic_limits import opening_maps
 from seqopt.contact.faces import bare_assembly, step_assembly
 from seqopt.contact.mortar import EPOXY
-from seqopt.engines.discrete.engine import DiscreteEngine, Pinch
+from seqopt.engines.discrete.engine import Across, DiscreteEngine, Pinch
 from seqopt.engines.discrete.system import BedStiffness, System, build_system
 from seqopt.engines.interface import Fields, Want
 from seqopt.network.network import GROUND, Network
 from seqopt.sequence.steps import Step
-from seqopt.study.presets import STUDY_BED
+from seqopt.study.presets import STUDY_BED, STUDY_PADS
 
 STIFFER = 10  # contacts per pad: its joint over those between bricks, as in section 3.2.3
 CLEAR = 1e-3  # m, between a pad's plane and the joints' corners: on one plane, facets would merge
@@ -151,3 +152,46 @@ def ground_forces(assembly: Assembly, corner_force: Floats) -> Floats:
     force = np.einsum("ki,kij->kj", corner_force, assembly.axes[assembly.contact])
     total = np.stack([np.bincount(assembly.contact, weights=x) for x in force.T], axis=1)
     return np.asarray(total[assembly.bodies[:, 0] == GROUND])
+
+
+PADS = (0.012, 0.02, 0.03)  # m
+CORNERS = "springs at corners"
+JOINTS = {
+    "as printed": STUDY_BED,
+    "tangential as normal": BedStiffness(STUDY_BED.normal, STUDY_BED.normal),
+    "halves in series": BedStiffness(STUDY_BED.normal / 2, STUDY_BED.tangential / 2),
+    CORNERS: STUDY_BED,
+}
+STEPS = {17: 33, 18: 35, 23: 45, 24: 47}  # steps of the sequential method, by bricks
+
+
+@dataclass(frozen=True)
+class Reading:
+    """One way to read the paper's model: how the robot holds, and what a joint is."""
+
+    joint: str = "as printed"
+    pinch: Pinch | None = None
+
+    @classmethod
+    def of(cls, grip: str, side: float, joint: str) -> Reading:
+        """Return the reading that the tables call so, from its pads' side in mm."""
+        across = [a for a in Across if grip.endswith(a.name.lower())]
+        return cls(joint, Pinch(across[0], STUDY_PADS, side=1e-3 * side) if across else None)
+
+    @property
+    def grip(self) -> str:
+        """What the tables call it."""
+        return "node" if self.pinch is None else f"pads, {self.pinch.across.name.lower()}"
+
+    def engine(self, net: Network) -> DiscreteEngine:
+        """Return the discrete elements so read."""
+        if self.joint != CORNERS:
+            return DiscreteEngine(net, bed=JOINTS[self.joint], pinch=self.pinch)
+        pinch = None if self.pinch is None else pads_at_corners(self.pinch)
+        return AtCorners(net, bed=STUDY_BED, pinch=pinch)
+
+
+def readings() -> list[Reading]:
+    """Return all readings of the table."""
+    pinches = [Pinch(across, STUDY_PADS, side=side) for across, side in product(Across, PADS)]
+    return [Reading(joint, pinch) for pinch, joint in product((None, *pinches), JOINTS)]

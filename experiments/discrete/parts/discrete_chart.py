@@ -20,11 +20,7 @@ from seqopt.report.style import (
 )
 
 PANELS = {"as printed": "even", "springs at corners": "corners"}  # joints, and as LMGC90 has them
-COLORS = {
-    "node": (BLUE, "o"),
-    "pads, width": (VERMILION, "^"),
-    "pads, thickness": (ORANGE, "v"),
-}
+COLORS = {"node": (BLUE, "o"), "pads, width": (VERMILION, "^"), "pads, thickness": (ORANGE, "v")}
 DASHES = (":", "-", "--")  # of the sizes of pads, in ascending order
 NAMES = {
     "node": "node held",

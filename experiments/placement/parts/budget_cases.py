@@ -131,10 +131,7 @@ def main(bricks: int, criterion: str, case: str, formulation: str, limit: float)
         os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
     problem = posed(bricks, criterion, case)
     found = row(problem, formulation, limit)
-    found |= {
-        "budgets": len(problem.budgets),
-        "memory_MB": peak_memory() / 2**20,
-    }
+    found |= {"budgets": len(problem.budgets), "memory_MB": peak_memory() / 2**20}
     print(json.dumps(found))
 
 

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from experiments.harness.wording import two
+from experiments.harness.results import stored, two
 from experiments.stability.parts.witness_cra import SOUND, TORN
 from seqopt.report.style import SMALL, dress, name_panels, new_figure, styled
 from seqopt.stability.assessment import Verdict
@@ -116,3 +116,30 @@ def _density(axes: Axes, table: pd.DataFrame) -> None:
     axes.set_title("one arch of 25 blocks")
     axes.tick_params(length=0)
     axes.spines[:].set_visible(False)
+
+
+LARGEST = "armadillo_cra"
+
+
+def words(table: pd.DataFrame, witness: str) -> pd.Series:
+    """Return a witness's verdicts; RBE's open ones as its constraints without tension have it."""
+    if witness != "rbe":
+        return table[witness].replace("", OPEN)
+    return table["rbe"].where(table["rbe"] != OPEN, table["no_tension"])
+
+
+def differing(table: pd.DataFrame, witness: str) -> set[tuple[str, str]]:
+    """Return where a witness decides otherwise than we."""
+    word = words(table, witness)
+    differs = (word != OPEN) & (word != table["ours"])
+    return {(case, witness) for case in table.loc[differs, "case"]}
+
+
+def picture() -> Figure:
+    """Return the figure from stored rows; times are those of the run that they tell."""
+    table = stored("witnesses")
+    words_of = ["rbe", "no_tension", "cra", "lmgc90"]
+    table[words_of] = table[words_of].fillna("")
+    times = table[table["case"].isin([LARGEST, "bridge"])]
+    differ = set().union(*(differing(table, witness) for witness in ("rbe", "lmgc90")))
+    return chart(table, times, {case for case, _ in differ})

@@ -10,21 +10,20 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 
-from experiments.study.parts.counterpart_axes import (
+from experiments.study.parts.counterpart_model_charts import (
     OFF,
     OURS,
     STUDY,
+    discrete,
+    geometry,
     number_of,
     of,
     pair,
     tidy,
-)
-from experiments.study.parts.counterpart_model_charts import discrete, geometry, vault_tests
-from experiments.study.parts.counterpart_models import (
-    Ours,
+    vault_tests,
 )
 from experiments.study.parts.counterpart_page import NEAR, caption
-from experiments.study.parts.counterpart_rows import LOOP, RESPONSES, plan_rows
+from experiments.study.parts.counterpart_rows import LOOP, RESPONSES, Ours, plan_rows
 from seqopt.engines.interface import Want
 from seqopt.report.draw import ROBOT_COLORS, View, draw_bricks, draw_grips
 from seqopt.report.style import INK, SMALL, new_figure, plain, styled

@@ -10,17 +10,42 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from experiments.calibration.parts.barrel_vaults import Vault, chain, vaults
-from experiments.discrete.parts.pad_readings import STEPS
-from experiments.study.parts.counterpart_axes import OURS, STUDY, number_of, of, pair, tidy
-from experiments.study.parts.counterpart_models import (
+from experiments.discrete.parts.arch_pads import STEPS
+from experiments.study.parts.counterpart_rows import (
     Ours,
     arch_corners,
     bed_of_springs,
     node_displacements,
 )
 from seqopt.report.draw import View, draw_bricks
-from seqopt.report.style import look, plain
+from seqopt.report.style import BLUE, INK, VERMILION, dress, look, plain
 from seqopt.study.tables import printed
+
+OURS, STUDY, OFF = BLUE, "#222222", VERMILION
+
+
+def of(table: pd.DataFrame, label: str, quantity: str = "") -> pd.DataFrame:
+    """Return the rows of an item, or of one of its quantities."""
+    rows = table[table["id"] == label]
+    return rows[rows["quantity"] == quantity] if quantity else rows
+
+
+def number_of(rows: pd.DataFrame) -> pd.Series:
+    """Return the numbers at the end of where the rows are: steps, tests, bricks."""
+    return rows["at"].str.extract(r"(\d+)")[0].astype(int)
+
+
+def tidy(axes: Axes) -> None:
+    dress(axes)
+
+
+def pair(axes: Axes, x: object, rows: pd.DataFrame, color: str = OURS, name: str = "") -> None:
+    """Draw our values filled and printed ones around them; marks differ by color."""
+    ours, ring = {OFF: ("^", "^"), INK: ("s", "s")}.get(color, (".", "o"))
+    axes.plot(x, rows["ours"], ours, ms=4, color=color, ls="none", label=f"{name}here")
+    axes.plot(x, rows["printed"], ring, ms=8, mfc="none", mew=1, color=color, ls="none",
+              label=f"{name}printed")  # fmt: skip
+
 
 BARS: tuple[dict[str, Any], ...] = (
     {"color": "k"},

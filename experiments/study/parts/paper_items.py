@@ -90,7 +90,7 @@ ITEMS = (
     Item("fig:2rob_methods", "Figure 9", "4", "both two-robot sequences at bricks 17 to 19",
          "sequences", parts=("fig:two_robot_methods",)),
     Item("table:sequential_twist", "Table 4", "4.1", "the eight twisting steps", "twisting",
-         "stability.failing_steps"),
+         "stability.dry_map"),
     Item("fig:sequential_twist", "Figure 10", "4.1", "lever arm; displaced shape at step 35",
          "twisting", "figures", ("fig:sequential_twist_offcenter", "fig:sequential_twist_35"),
          why="The lever arm is the support moment divided by the robot force after the crown. The "

@@ -1,0 +1,76 @@
+"""Arches of any number of bricks, and walls in running bond, open between bricks."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from seqopt.arrays import Ints
+from seqopt.network.build import build_network
+from seqopt.network.network import Network
+from seqopt.scene.arch import ArchShape, arch_scene
+from seqopt.scene.library.chain import chain
+from seqopt.scene.library.wall import WallShape, wall
+from seqopt.scene.parts import Robot
+from seqopt.scene.scene import Scene
+from seqopt.study.presets import ROBOTS
+
+
+def half_circle(count: int) -> Network:
+    """Return the network of an arch that turns from upright to upright."""
+    return build_network(chain(count, robots=ROBOTS))
+
+
+def longer(scene: Scene, times: float) -> Scene:
+    """Return an arch of the same shape and bricks, about as many times longer.
+
+    The line of the reference arch, without its twists; 24 bricks more each time end in the brick
+    that lies along.
+    """
+    joints = [scene.grounds[0].position, *(j.position for j in scene.joints)]
+    line = np.array([*joints, scene.grounds[1].position])
+    chord = np.diff(line, axis=0)
+    angle = np.unwrap(np.arctan2(chord[:, 2], chord[:, 0]))
+    count = round(24 * times) + 1
+    pitch = np.interp(np.linspace(0, 1, count), np.linspace(0, 1, len(angle)), angle)
+    joint = scene.joints[0]
+    shape = ArchShape(
+        pitch=pitch.tolist(),
+        translational_stiffness=joint.translational_stiffness,
+        rotational_stiffness=joint.rotational_stiffness,
+    )
+    robots = [replace(robot, payload=times * robot.payload) for robot in ROBOTS]
+    return arch_scene(shape, f"{count} bricks", robots=robots)
+
+
+SPRING = {
+    "along": (0.0, 0.0, 1.0),
+    "across": (1.0, 0.0, 0.0),
+    "translational_stiffness": (3e8, 2e8, 1e8),
+    "rotational_stiffness": (2e6, 1e6, 3e6),
+}
+
+
+def running_bond(columns: int, courses: int) -> Scene:
+    """Return a wall of courses, every second one shifted by half a brick, open between bricks.
+
+    Joints have one stiffness each, whatever their area: three different ones along their axes.
+    """
+    robots = tuple(Robot(name=f"rob{i}", payload=400.0) for i in (1, 2, 3))
+    scene = wall(WallShape(columns=columns, courses=courses), robots=robots)
+    beds = (joint for joint in scene.joints if abs(joint.along[2]) > 0.5)
+    return replace(
+        scene,
+        joints=tuple(replace(joint, **SPRING) for joint in beds),
+        grounds=tuple(replace(ground, **SPRING) for ground in scene.grounds),
+        provenance="",
+    )
+
+
+def grip_sets(net: Network, bricks: int, count: int) -> Ints:
+    """Return random sets of three different free nodes."""
+    blocked = net.scene.blocked_nodes
+    free = [n for b in net.scene.placed[:bricks] for n in b.nodes if n not in blocked]
+    rng = np.random.default_rng(0)
+    return np.array([rng.choice(free, 3, replace=False) for _ in range(count)])

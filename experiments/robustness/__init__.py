@@ -1,1 +1,0 @@
-"""Claims about what happens to input that is wrong, odd or cut off."""

@@ -1,0 +1,216 @@
+"""Degenerate placement problems: ties, limits and budgets that bind, bad scales, bad input."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from dataclasses import fields as dataclass_fields
+from itertools import pairwise, product
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from experiments.harness.scenes import half_circle
+from seqopt.arrays import Floats
+from seqopt.engines.interface import Engine, Fields, Want
+from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.network.network import Network
+from seqopt.placement.costs import Budget, LayeredCosts
+from seqopt.placement.criteria import WorstRatio
+from seqopt.placement.interface import Aim, CostProblem, PlacementProblem
+from seqopt.placement.problem import Problem, pose
+from seqopt.placement.requirements import Criterion, Limit
+from seqopt.sequence.three_robots import three_robot_loop
+from seqopt.study.presets import EQUATIONS, RESOLUTION
+
+COARSE = replace(
+    EQUATIONS, name="coarse", resolution=tuple((name, 100 * size) for name, size in RESOLUTION)
+)
+FORCE = WorstRatio("force", (("F_largest", 1.0),))
+
+
+@dataclass(frozen=True)
+class Size:
+    """How large the problems are: moves, candidates of each, bricks of the arch."""
+
+    moves: int
+    candidates: int
+    bricks: int
+
+    @property
+    def sizes(self) -> tuple[int, ...]:
+        """The candidates of every move."""
+        return (self.candidates,) * self.moves
+
+
+Rng = np.random.Generator
+Case = Callable[[Size, Rng], PlacementProblem]
+
+
+def enumerated(problem: PlacementProblem, aim: Aim) -> tuple[float, list[tuple[int, ...]]]:
+    """Return the best value over all combinations within limits and budgets, and who reaches it."""
+    worth = problem.sums.cost if aim is Aim.SUM else problem.peaks.worst
+    values: dict[tuple[int, ...], float] = {
+        choice: worth(choice)
+        for choice in product(*map(range, problem.sums.sizes))
+        if all(budget.slack(choice) >= -1e-9 for budget in problem.budgets)
+    }
+    best = min(values.values(), default=np.inf)
+    if not np.isfinite(best):
+        return np.inf, []
+    first = next(choice for choice, value in values.items() if value == best)
+    size = max(abs(part) for part in problem.sums.parts(first))
+    return best, [c for c, value in values.items() if value - best <= 1e-12 * size]
+
+
+def costs(sizes: tuple[int, ...], draw: Callable[[tuple[int, ...]], Floats]) -> CostProblem:
+    """Return a problem with costs drawn by shape; nothing is shared before the first move."""
+    shared = (np.zeros((1, sizes[0])), *(draw(pair) for pair in pairwise(sizes)))
+    return CostProblem(LayeredCosts(tuple(draw((size,)) for size in sizes), shared))
+
+
+def whole(sizes: tuple[int, ...], rng: Rng, scale: float = 1.0, least: int = 0) -> CostProblem:
+    """Return a problem with random whole costs, times a scale."""
+    return costs(sizes, lambda shape: scale * rng.integers(least, 10, shape).astype(float))
+
+
+def mixed(size: Size, rng: Rng) -> CostProblem:
+    """Return a problem with costs from 1e-9 to 1e9; the best choice has only small ones."""
+
+    def draw(shape: tuple[int, ...]) -> Floats:
+        return np.asarray(rng.integers(1, 10, shape) * 10.0 ** rng.choice([-9, 9], shape))
+
+    return costs(size.sizes, draw)
+
+
+def rounded(size: Size, rng: Rng) -> CostProblem:
+    """Return costs that are equal but for the rounding of their sums, the larger ones first."""
+    same = rng.permutation([0.1 + 0.2, *[0.3] * (size.candidates - 1)])
+    return costs(size.sizes, lambda shape: np.broadcast_to(same, shape))
+
+
+def one_left(size: Size, rng: Rng) -> CostProblem:
+    """Return a problem in which one candidate per move is allowed."""
+    problem = whole(size.sizes, rng)
+    kept = rng.integers(size.candidates, size=size.moves)
+    single = tuple(
+        np.where(np.arange(size.candidates) == k, cost, np.inf)
+        for k, cost in zip(kept, problem.sums.single, strict=True)
+    )
+    return CostProblem(LayeredCosts(single, problem.sums.shared))
+
+
+def dead_end(size: Size, rng: Rng) -> CostProblem:
+    """Return a problem whose candidates are all allowed, but no pair of the last two moves is."""
+    sums = whole(size.sizes, rng).sums
+    return CostProblem(
+        LayeredCosts(sums.single, (*sums.shared[:-1], np.full_like(sums.shared[-1], np.inf)))
+    )
+
+
+def altered(size: Size, rng: Rng, value: float) -> CostProblem:
+    """Return a problem with one cost replaced."""
+    sums = whole(size.sizes, rng).sums
+    first = sums.single[0].copy()
+    first[0] = value
+    return CostProblem(LayeredCosts((first, *sums.single[1:]), sums.shared))
+
+
+def capped(size: Size, rng: Rng, amount: float, share: float) -> CostProblem:
+    """Return a problem with a budget of which candidate ``j`` takes ``j`` times an amount.
+
+    The bound is a share of what the best choice without it takes; the dearest candidates take least
+    or the budget would bind nothing.
+    """
+    problem = whole(size.sizes, rng)
+    takes = tuple(
+        amount * np.argsort(np.argsort(-single)).astype(float) for single in problem.sums.single
+    )
+    budget = Budget("use", takes, tuple(np.zeros_like(s) for s in problem.sums.shared), np.inf)
+    spent = budget.spent(enumerated(problem, Aim.SUM)[1][0])
+    return replace(problem, budgets=(replace(budget, bound=share * spent),))
+
+
+def opposed(size: Size, rng: Rng, total: float) -> CostProblem:
+    """Return a problem with two budgets that every candidate takes one or the other of.
+
+    Their bounds add up to the number of moves times ``total``.
+    """
+    problem = whole(size.sizes, rng)
+    first = tuple((np.arange(n) % 2).astype(float) for n in size.sizes)
+    second = tuple(1.0 - amounts for amounts in first)
+    none = tuple(np.zeros_like(s) for s in problem.sums.shared)
+    bound = 0.5 * size.moves * total
+    budgets = (Budget("odd", first, none, bound), Budget("even", second, none, bound))
+    return replace(problem, budgets=budgets)
+
+
+def arch(size: Size, criterion: Criterion, limits: tuple[Limit, ...] = ()) -> Problem:
+    """Return the problem of the three-robot loop on a small arch."""
+    engine = ComplianceEngine(half_circle(size.bricks))
+    return pose(engine, three_robot_loop(engine.network), criterion, limits)
+
+
+def flat(size: Size, _: Rng) -> Problem:
+    """Return a problem in which all possible choices respond equally."""
+    engine = Even(ComplianceEngine(half_circle(size.bricks)))
+    return pose(engine, three_robot_loop(engine.network), EQUATIONS)
+
+
+class Even:
+    """An engine whose answers are all alike."""
+
+    def __init__(self, engine: Engine) -> None:
+        self.engine = engine
+
+    @property
+    def network(self) -> Network:
+        """The engine's network."""
+        return self.engine.network
+
+    def solve(self, bricks: int, grips: ArrayLike, want: Want = Want.RESPONSES) -> Fields:
+        """Return fields of sevens."""
+        fields = self.engine.solve(bricks, grips, want)
+        sevens = {
+            f.name: np.full_like(getattr(fields, f.name), 7.0) for f in dataclass_fields(fields)
+        }
+        return Fields(**sevens)
+
+
+def tight(size: Size, _: Rng) -> Problem:
+    """Return a problem whose limit is the least force with which it can be built."""
+    least, __ = enumerated(arch(size, FORCE), Aim.PEAK)
+    return arch(size, FORCE, (Limit("F_largest", least),))
+
+
+CASES: dict[str, Case] = {
+    "ranks tie after rounding": lambda size, _: arch(size, COARSE),
+    "flat criterion": flat,
+    "equal costs": lambda size, _: costs(size.sizes, lambda shape: np.full(shape, 5.0)),
+    "all costs zero": lambda size, _: costs(size.sizes, np.zeros),
+    "equal but for rounding": rounded,
+    "negative costs": lambda size, rng: whole(size.sizes, rng, least=-9),
+    "one move": lambda size, rng: whole((size.candidates,), rng),
+    "one candidate per move": lambda size, rng: whole((1,) * size.moves, rng),
+    "one candidate left by limits": one_left,
+    "limit met exactly": tight,
+    "limit nobody meets": lambda size, _: arch(size, FORCE, (Limit("F_largest", 0.0),)),
+    "no pair allowed": dead_end,
+    "all costs infinite": lambda size, _: costs(size.sizes, lambda shape: np.full(shape, np.inf)),
+    "one cost infinite": lambda size, rng: altered(size, rng, np.inf),
+    "one cost NaN": lambda size, rng: altered(size, rng, np.nan),
+    "one cost -inf": lambda size, rng: altered(size, rng, -np.inf),
+    "costs 1e-9": lambda size, rng: whole(size.sizes, rng, 1e-9),
+    "costs 1e9": lambda size, rng: whole(size.sizes, rng, 1e9),
+    "costs 1e-9 and 1e9": mixed,
+    "costs 1e308": lambda size, rng: whole(size.sizes, rng, 1e307, 9),
+    "budget binds exactly": lambda size, rng: capped(size, rng, 0.1, 1.0),
+    "budget binds": lambda size, rng: capped(size, rng, 1.0, 0.6),
+    "budget binds, amounts 1e-9": lambda size, rng: capped(size, rng, 1e-9, 0.6),
+    "budget binds, amounts 1e9": lambda size, rng: capped(size, rng, 1e9, 0.6),
+    "budget leaves one choice": lambda size, rng: capped(size, rng, 1.0, 0.0),
+    "budget cannot be met": lambda size, rng: capped(size, rng, 1.0, -1.0),
+    "budgets met by mixtures only": lambda size, rng: opposed(size, rng, 1.0),
+    "budgets not met by mixtures": lambda size, rng: opposed(size, rng, 0.9),
+    "budget amount NaN": lambda size, rng: capped(size, rng, np.nan, 1.0),
+}

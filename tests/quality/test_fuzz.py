@@ -1,0 +1,119 @@
+"""Input changed at random, at small size; and the judge of it, which must see faults."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from tests.quality import fuzz_judge
+from tests.quality.fuzz import BLOCKS, _left, holds, is_clean, killed, main, summary
+from tests.quality.fuzz_cases import Mutator
+from tests.quality.fuzz_judge import judge, judged, run
+
+CASES = 120
+
+
+@pytest.fixture(scope="module")
+def mutator():
+    return Mutator()
+
+
+@pytest.mark.slow
+def test_a_small_run_of_the_command_finds_no_fault(capsys):
+    assert main(["--cases", "60", "--kills", "2"]) == 0
+    assert capsys.readouterr().out.splitlines()[-1] == "no fault: 60 cases, 2 kills"
+
+
+@pytest.mark.slow
+def test_changed_input_leaves_no_fault_and_one_that_would_is_told():
+    rows = list(run(0, CASES))
+    assert [row for row in rows if row["fault"]] == []
+    cases, kills = pd.DataFrame(rows), pd.DataFrame({"left": ["whole"], "signal": ["SIGKILL"]})
+    assert holds(summary(cases), kills)
+    assert not holds(summary(cases.assign(fault=["any", *[""] * (CASES - 1)])), kills)
+    assert not holds(summary(cases), kills.assign(left="a part"))
+    assert {row["kind"] for row in rows} == {"scene", "plan", "words", "nothing"}
+    assert {row["status"] for row in rows} >= {0, 2, 3}
+
+
+@pytest.mark.parametrize("number", [5793, 17131])  # bricks of 1e9 m: no answer was finite
+def test_cases_that_were_faults_are_none_now(mutator, number):
+    assert judge(mutator.case(number)).fault == ""
+
+
+def test_cases_are_their_numbers(mutator):
+    assert [Mutator().case(n) for n in range(20)] == [mutator.case(n) for n in range(20)]
+    assert len({mutator.case(n) for n in range(200)}) > 150
+
+
+def case_of(mutator, *words):
+    return replace(
+        next(c for c in map(mutator.case, range(99)) if c.kind == "nothing"), words=words
+    )
+
+
+def test_a_traceback_is_seen(mutator, monkeypatch):
+    def fails(_):
+        raise ZeroDivisionError
+
+    monkeypatch.setattr(fuzz_judge, "main", fails)
+    assert judge(case_of(mutator, "scene")).fault.startswith("traceback: ZeroDivisionError")
+
+
+@pytest.mark.parametrize(
+    ("does", "seen"),
+    [
+        (lambda: 7, "status 7"),
+        (lambda: 2, "status 2 without a reason"),
+        (lambda: Path(".left").touch() or 0, "left over"),
+        (lambda: Path("scene.json").write_text("", encoding="utf-8") or 0, "input was changed"),
+        (lambda: print("\x1b[2J") or 0, "steers a terminal"),
+    ],
+)
+def test_an_end_that_is_wrong_is_seen(mutator, monkeypatch, does, seen):
+    monkeypatch.setattr(fuzz_judge, "main", lambda _: does())
+    assert seen in judge(case_of(mutator, "scene")).fault
+
+
+@pytest.mark.parametrize("lost", ["T_max", "F_rob1_N"])
+def test_a_result_that_is_not_finite_is_seen(mutator, monkeypatch, lost):
+    case = case_of(mutator, "analyze", "scene.json", "--method", "sequential")
+    assert judge(case).fault == ""
+    text = "step,type,bricks,rob1_brick,rob1_node,F_rob1_N,F_sup_N,M_sup_Nm,F_min_N,F_max_N,F_avg_N"
+    text += ",T_pct,D_max_1e-3mm,D_avg_1e-3mm,D_std_1e-3mm\n1,place,1,1,1,{},1,1,1,{},1,1,1,1,1\n"
+    cells = ("", 1) if lost == "F_rob1_N" else (1, "inf")
+    monkeypatch.setattr(fuzz_judge, "main", lambda _: print(text.format(*cells), end="") or 0)
+    said = "a robot that grips has no force" if lost == "F_rob1_N" else "response is not finite"
+    assert said in judge(case).fault
+
+
+def test_a_hang_is_seen():
+    """Nothing is as fast as a millisecond."""
+    (row,) = judged(0, 1, longest=1e-3)
+    assert row["fault"] == "hangs: more than 0.001 s"
+
+
+def test_a_part_of_a_folder_is_seen(tmp_path):
+    assert _left(tmp_path / "none", BLOCKS) == "nothing"
+    (tmp_path / "0").mkdir()
+    for name in BLOCKS[1:]:
+        (tmp_path / "0" / name).write_bytes(np.zeros(500_000, np.uint8).tobytes())
+    assert _left(tmp_path, BLOCKS) == "a part"
+    (tmp_path / "0" / BLOCKS[0]).write_bytes(b"")
+    assert _left(tmp_path, BLOCKS) == "a part"
+    (tmp_path / "0" / BLOCKS[0]).write_bytes(bytes(500_000))
+    assert _left(tmp_path, BLOCKS) == "whole"
+    (tmp_path / ".hidden").mkdir()
+    assert _left(tmp_path, BLOCKS) == "whole, and a hidden folder"
+    assert not is_clean({"left": "a part", "signal": "SIGKILL"})
+    assert not is_clean({"left": "whole, and a hidden folder", "signal": "SIGTERM"})
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", range(6))
+def test_a_program_that_is_killed_leaves_nothing_or_a_whole(number):
+    assert is_clean(killed("optimize" if number % 2 else "write", number))
