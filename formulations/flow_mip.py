@@ -34,6 +34,7 @@ from seqopt.graph.graph import Graph
 from seqopt.graph.paths import fewest_moves, tied
 from seqopt.placement.watch import Watch
 
+
 def choose(graph: Graph, watch: Watch) -> Choice:
     """Return the best path; where time is over, the best one so far."""
     path, bounds = fewest_moves(graph), list[float]()
@@ -68,7 +69,7 @@ def _minimize(
     if peak:
         into = (costs, (graph.target, np.arange(len(costs))))
         entered = sparse.csc_array(into, shape=(graph.states, flow.shape[1]))
-        rows.append(sparse.hstack([entered, -np.ones((graph.states, 1))]))
+        rows.append(sparse.hstack([entered, sparse.csc_array(-np.ones((graph.states, 1)))]))
         below += [0.0] * graph.states
     return minimize_rows(
         np.eye(1, flow.shape[1] + 1, flow.shape[1])[0] if peak else np.pad(costs, (0, ends + 1)),

@@ -36,6 +36,7 @@ from seqopt.work.progress import Stage, Tell
 WIDTH = 50  # new states of a brick count from which the narrow search goes on
 COPIES = 2.0  # of what is kept, that are needed at once while it grows
 
+_Values = tuple[float, ...]
 Watching = Callable[[Explorer], None]
 Search = Callable[[FreeProblem], ScheduleSelection]
 
@@ -184,7 +185,7 @@ def best_label(graph: Graph, to_go: Floats, watch: Watch) -> Choice:
     ends, ahead, peaks = graph.ends.tolist(), to_go.tolist(), graph.peaks
     least = tuple(ahead[0])
     heap = [(least, 0, (0.0,) * len(peaks), 0, -1)]
-    kept: list[list[tuple[float, ...]]] = [[] for _ in ends]
+    kept: list[list[_Values]] = [[] for _ in ends]
     popped: list[tuple[int, int]] = []  # state, and which label it continues
     best, last = (np.inf,) * len(peaks), -1
     while heap:
@@ -198,18 +199,20 @@ def best_label(graph: Graph, to_go: Floats, watch: Watch) -> Choice:
         if ends[state]:
             best, last = taken, len(popped) - 1
         for move in range(starts[state], starts[state + 1]):
-            pairs = zip(peaks, taken, amounts[move], strict=True)
-            more = tuple([max(a, b) if peak else a + b for peak, a, b in pairs])
-            to = targets[move]
-            bound = tuple(
-                [max(a, b) if peak else a + b for peak, a, b in zip(peaks, more, ahead[to])]
-            )
+            to, more = targets[move], _and(peaks, taken, amounts[move])
+            bound = _and(peaks, more, ahead[to])
             if _improves(bound, best) and not _beaten(bound, kept[to]):
                 heappush(heap, (bound, move, more, to, len(popped) - 1))
     return Choice(_back(popped, last), best)
 
 
-def _improves(bound: tuple[float, ...], best: tuple[float, ...]) -> bool:
+def _and(peaks: Sequence[bool], first: Sequence[float], then: Sequence[float]) -> _Values:
+    """Return what goals take of two parts of a path together."""
+    pairs = zip(peaks, first, then, strict=True)
+    return tuple([max(a, b) if peak else a + b for peak, a, b in pairs])
+
+
+def _improves(bound: _Values, best: _Values) -> bool:
     """Return whether values are below the best in a goal, and not above it in those before."""
     for value, least in zip(bound, best, strict=True):
         if tied(value) < least:
@@ -219,7 +222,7 @@ def _improves(bound: tuple[float, ...], best: tuple[float, ...]) -> bool:
     return False
 
 
-def _beaten(bound: tuple[float, ...], others: list[tuple[float, ...]]) -> bool:
+def _beaten(bound: _Values, others: list[_Values]) -> bool:
     """Return whether one of others is nowhere above."""
     return any(all(map(le, other, bound)) for other in others)
 
