@@ -7,17 +7,20 @@ import time
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, NamedTuple
 
 import cvxpy as cp
 import highspy
 import numpy as np
 
+from seqopt.arrays import Floats
 from seqopt.errors import InfeasibleError, SolverError
 from seqopt.placement.watch import Watch
 
 GAPS = {"mip_rel_gap": 1e-9, "mip_abs_gap": 1e-9}  # of integer programs
 HIGHS_ENDS = {"kOptimal": cp.OPTIMAL, "kInfeasible": cp.INFEASIBLE}
+EXACTLY = 1e-10  # by how much programs given as arrays may be off
 STOPS = ("kTimeLimit", "kInterrupt")
 
 
@@ -137,6 +140,64 @@ def minimize_whole(
     results = {"solution": solver.getSolution(), "info": info, "model_status": "kOptimal"}
     program.unpack_results(results | {"run_time": solver.getRunTime()}, chain, inverse)
     return Optimum(float(program.value), seconds, bound, int(info.mip_node_count), stopped)
+
+
+class Point(NamedTuple):
+    """How HiGHS ended, in its words, and with what."""
+
+    end: str
+    values: Floats
+    multipliers: Floats
+    bound: float
+
+
+def minimize_rows(
+    cost: Floats, rows: Any, right: Floats, *, watch: Watch, whole: int = 0, equations: int = -1
+) -> Point:
+    """Solve a program whose arrays are given, by HiGHS.
+
+    Parameters
+    ----------
+    cost : (n,) float
+    rows : (m, n) sparse float
+    right : (m,) float
+        What equations are equal to; inequalities, which come after them, are no more.
+    watch : Watch
+        Says when to stop.
+    whole : int, optional
+        How many of the first variables are 0 or 1; all are from 0 on.
+    equations : int, optional
+        How many of the rows are equations; all by default.
+
+    Returns
+    -------
+    Point
+        Its end ``kInfeasible``, ``kOptimal`` or one of `STOPS`; its values are none (0,) where
+        nothing was found.
+
+    Raises
+    ------
+    SolverError
+        If it ends in any other way.
+    """
+    dims = SimpleNamespace(zero=len(right) if equations < 0 else equations)
+    data = {"A": rows, "b": right, "c": cost, "dims": dims, "bool_vars_idx": range(whole)}
+    solver = _loaded(data | {"lower_bounds": np.zeros(len(cost))}, whole=whole > 0)
+    if not whole:
+        solver.setOptionValue("solver", "ipm")  # ends in a vertex, on large graphs far sooner
+    for name in ("primal_feasibility", "dual_feasibility", "mip_feasibility"):
+        solver.setOptionValue(f"{name}_tolerance", EXACTLY)
+    _listen(solver, watch, float)
+    end = _end(solver, watch.left)
+    if end not in (*HIGHS_ENDS, *STOPS):
+        _require_optimum(end, cp.HIGHS, feasible=True)
+    found, info = solver.getSolution(), solver.getInfo()
+    bound, known = float(info.mip_dual_bound), math.isfinite(info.objective_function_value)
+    if not whole:
+        known = end == "kOptimal"
+        bound = float(info.objective_function_value) if known else -math.inf
+    values = np.array(found.col_value if known and end != "kInfeasible" else [])
+    return Point(end, values, np.array(found.row_dual), bound)
 
 
 def anatomy(program: cp.Problem) -> tuple[Size, float]:

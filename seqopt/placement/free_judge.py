@@ -63,6 +63,8 @@ def judge_schedule(
     selection: ScheduleSelection,
     steps: Sequence[Step],
     hint: Hint | None = None,
+    *,
+    exact: bool = True,
 ) -> ScheduleCertificate:
     """Check a free schedule from the problem's own data, without the search.
 
@@ -76,11 +78,13 @@ def judge_schedule(
     hint : mapping of int to (n, c) int, optional
         States that a search visited, by brick count; only the time that the proof takes depends on
         them.
+    exact : bool, optional
+        Whether values are promised as the least; else only bounds that were claimed are.
 
     Raises
     ------
     SolverError
-        If a value is not what was claimed, a limit is exceeded, or a better plan exists.
+        If a value is not what was claimed, a limit is exceeded, or a plan is better than promised.
     StepError
         If a step breaks a rule.
     """
@@ -98,7 +102,8 @@ def judge_schedule(
     if problem.budgets:
         return _within_budgets(problem, selection, values, proof)
     bounds = _bounds(problem, proof, values)
-    for goal, value, bound in zip(problem.goals, values, bounds, strict=True):
+    promised = values if exact else selection.bound
+    for goal, value, bound in zip(problem.goals, promised, bounds, strict=True):
         if not goal.of_margins and not bound >= value - BELOW * abs(value):
             raise SolverError(f"{goal}: {value:.9g} is promised as the least; a plan has less")
     gaps = [(v - b) / (abs(v) or 1.0) for v, b in zip(values, bounds, strict=True)]

@@ -15,7 +15,7 @@ from seqopt.contact.mortar import Mortar
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import provenance
 from seqopt.errors import InfeasibleError
-from seqopt.placement.formulation import Formulation
+from seqopt.placement.formulation import Formulation, FormulationKind
 from seqopt.placement.free_goals import judged_by
 from seqopt.placement.free_infeasible import confirmed
 from seqopt.placement.free_judge import TOLERANCE, ScheduleCertificate, judge_schedule
@@ -87,13 +87,17 @@ class FreePlan(ShownBuild):
 
     @property
     def status(self) -> str:
-        """``optimal``, ``feasible`` where the search ended early, or ``unproven``.
+        """``optimal``, ``unproven``, or ``feasible``.
 
+        The last where the search ended early, or a heuristic's plan is not proven to be the best.
         A margin of stability is optimal within the gap, which ``worth`` and the summary name.
         """
         if self.selection.stopped:
             return "feasible"
-        return "unproven" if self.certificate is None else "optimal"
+        if self.certificate is None:
+            return "unproven"
+        exact = self.formulation.kind is FormulationKind.EXACT
+        return "optimal" if exact or self.certificate.gap <= TOLERANCE else "feasible"
 
     @property
     def objective(self) -> dict[str, float]:
@@ -272,7 +276,8 @@ def solve_free(
         options["progress"]("proving that no plan is better")
     steps = steps_of(twin.space, selection.states)
     hint = dict(enumerate(selection.visited))
-    certificate = judge_schedule(twin, selection, steps, hint) if proof else None
+    exact = formulation.kind is FormulationKind.EXACT
+    certificate = judge_schedule(twin, selection, steps, hint, exact=exact) if proof else None
     problem.certified.update(twin.certified)
     seconds = {"solve": solved - start, "verify": time.perf_counter() - solved}
     return FreePlan(problem, formulation, selection, certificate, steps, seconds)

@@ -1,0 +1,201 @@
+"""Conformance: what every formulation of the free schedule that finds a plan does."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+
+from formulations.on_graph import Choice, on_graph
+from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.errors import InfeasibleError, ProblemError, SolverError, TimeUpError
+from seqopt.graph.paths import fewest_moves, lexicographic
+from seqopt.network.build import build_network
+from seqopt.placement.formulation import FormulationKind
+from seqopt.placement.free_problem import pose_free
+from seqopt.placement.free_states import explore
+from seqopt.placement.requirements import Limit
+from seqopt.placement.schedule_formulation import (
+    Finds,
+    find_schedule_formulation,
+    schedule_formulation_names,
+)
+from seqopt.placement.solving import solve
+from seqopt.placement.watch import Watch
+from seqopt.sequence.free_rules import FreeRules, with_robots
+from tests.brute_force import ONES, best_values
+from tests.builders import small_arch
+from tests.strategies import free_builds
+
+ALL = {name: find_schedule_formulation(name) for name in schedule_formulation_names(Finds.PLAN)}
+EXACT = [name for name, found in ALL.items() if found.kind is FormulationKind.EXACT]
+AIMS = ("minmax", "minmax,steps", "sum", "steps,minmax", "regrips,sum(T_max)", "travel")
+slow = pytest.mark.slow
+every = pytest.mark.parametrize("name", ALL)
+SIZES = [(4, 2), (5, 2), (4, 3), pytest.param((7, 2), marks=slow), pytest.param((6, 3), marks=slow)]
+
+
+@cache
+def small(bricks=4, robots=2):
+    """The engine and the rules of a small arch."""
+    scene = with_robots(small_arch(bricks), robots)
+    return ComplianceEngine(build_network(scene)), FreeRules(least_grips=1)
+
+
+@cache
+def known(size, aim):
+    return best_values(*small(*size), aim)
+
+
+def posed(aim, size=(4, 2), **words):
+    return pose_free(*small(*size), ONES, aim, **words)
+
+
+def check(name, problem, best):
+    """An exact one finds what brute force does, a heuristic nothing better; both are judged."""
+    if best is None:
+        with pytest.raises(InfeasibleError, match="free schedule: "):
+            solve(problem, ALL[name])
+        return
+    plan = solve(problem, ALL[name])
+    found, proof = plan.selection, plan.certificate
+    assert proof.objective == pytest.approx(found.objective)
+    assert proof.bound[0] == pytest.approx(best[0])
+    if name in EXACT:
+        assert found.objective == pytest.approx(best, rel=1e-7)
+        assert found.bound == pytest.approx(best, rel=1e-7)
+        assert (plan.status, proof.gap <= 1e-9) == ("optimal", True)
+    else:
+        worse = np.array(found.objective) - best
+        assert (np.abs(worse) < 1e-9).all() or worse[np.abs(worse) > 1e-9][0] > 0
+        assert set(found.bound) == {-np.inf}
+        assert plan.status == ("optimal" if proof.gap < 1e-6 else "feasible")
+
+
+@every
+@pytest.mark.parametrize("aim", AIMS)
+@pytest.mark.parametrize("size", SIZES)
+def test_it_agrees_with_brute_force(name, aim, size):
+    check(name, posed(aim, size), known(size, aim))
+
+
+@given(build=free_builds(most_bricks=4, most_robots=3))
+@settings(max_examples=8, deadline=None)
+def test_all_agree_with_brute_force_under_any_rules(build):
+    engine, rules = ComplianceEngine(build_network(build[0])), build[1]
+    for aim in ("minmax,steps", "regrips,sum"):
+        best = best_values(engine, rules, aim)
+        for name in ALL:
+            check(name, pose_free(engine, rules, ONES, aim), best)
+
+
+@every
+def test_limits_that_leave_no_plan_are_said(name):
+    check(name, posed("minmax", limits=[Limit("F_largest", 1.0)]), None)
+
+
+@every
+def test_what_does_not_fit_gets_one_line(name):
+    for option, value in {"speed": 2, **dict.fromkeys(ALL[name].options, 0)}.items():
+        said = "speed: " if option == "speed" else "option|no plan was found yet; give more"
+        with pytest.raises((ProblemError, TimeUpError), match=said) as caught:
+            solve(posed("minmax"), name, **{option: value})
+        assert "\n" not in str(caught.value)
+    with pytest.raises(ProblemError, match="name bond, friction and tilt before all others"):
+        solve(posed("minmax,bond"), name)
+
+
+@every
+def test_an_interrupt_leaves_a_plan_or_is_passed_on(name):
+    for after in (1, 4, 6):
+        told = []
+
+        def interrupt(stage, told=told, after=after):
+            told.append(stage)
+            if len(told) == after:
+                raise KeyboardInterrupt
+
+        try:
+            plan = solve(posed("minmax"), name, progress=interrupt, proof=False)
+        except KeyboardInterrupt:
+            continue
+        assert after > 4
+        assert (plan.selection.stopped == "interrupt") == (plan.status == "feasible")
+
+
+@every
+@pytest.mark.parametrize(
+    "aim", ["minmax,steps", pytest.param("bond,steps", marks=slow), pytest.param("sum", marks=slow)]
+)
+def test_states_stand_where_they_must(name, aim):
+    words = {"stands": "bond=3000"} if aim != "bond,steps" else {}
+    own, first = (solve(posed(aim, **words), each) for each in (name, "schedule_search"))
+    if words:
+        assert set(own.stability()["verdict"]) == {"stands"}
+    if name in EXACT:
+        assert own.selection.objective == pytest.approx(first.selection.objective)
+    else:
+        assert own.selection.objective >= first.selection.objective
+
+
+def graph_of(aim):
+    found = explore(posed(aim, (5, 2)))
+    found.refine()
+    return found.graph().graph
+
+
+@pytest.mark.parametrize("name", ["flow_lp", "flow_mip", "best_first", "path_labels"])
+@pytest.mark.parametrize("aim", ["minmax,steps", "sum"])
+def test_where_time_is_over_a_bound_is_left(name, aim, monkeypatch):
+    """Whatever is claimed of the first goals is no more than the least."""
+
+    class Late(Watch):
+        def __init__(self, *_):
+            super().__init__(0.0)
+
+    monkeypatch.setattr("formulations.on_graph.watched", lambda *_: lambda _: None)
+    monkeypatch.setattr("formulations.on_graph.Watch", Late)
+    plan, best = solve(posed(aim, (5, 2)), name), known((5, 2), aim)
+    assert (plan.status, plan.selection.stopped) == ("feasible", "time")
+    assert plan.selection.bound[0] <= best[0] * (1 + 1e-9)
+    assert plan.selection.objective >= best or plan.selection.objective == pytest.approx(best)
+
+
+def shortest(graph, watch):
+    """The negative control: a path of fewest moves, promised as the best in whatever is asked."""
+    path = fewest_moves(graph)
+    return Choice(path, (np.inf,) * len(graph.peaks))
+
+
+def test_a_formulation_that_promises_too_much_is_seen():
+    problem = posed("sum", (4, 3))
+    liar = on_graph("shortest", "fewest moves", shortest)
+    with pytest.raises(SolverError, match=r"sum: .* is promised as the least; a plan has less"):
+        solve(problem, liar)
+    with pytest.raises(SolverError, match=r"sum: .* is promised as the least; a plan has less"):
+        solve(problem, replace(liar, kind=FormulationKind.HEURISTIC))
+
+
+def test_a_heuristic_that_promises_nothing_is_shown_with_its_gap():
+    modest = on_graph(
+        "modest", "fewest moves", lambda g, _: Choice(fewest_moves(g)), FormulationKind.HEURISTIC
+    )
+    problem, best = posed("sum", (4, 3)), known((4, 3), "sum")[0]
+    plan = solve(problem, modest)
+    value = plan.certificate.objective[0]
+    assert value > best * (1 + 1e-6)
+    assert plan.certificate.bound[0] == pytest.approx(best)
+    assert plan.certificate.gap == pytest.approx((value - best) / value)
+    assert plan.status == "feasible"
+    assert f"feasible within {plan.certificate.gap:.2g}" in plan.worth
+    assert solve(problem, modest, proof=False).status == "unproven"
+
+
+def test_a_formulation_of_twenty_lines_is_one_of_them():
+    own = on_graph("own", "what there is", lambda graph, _: Choice(*lexicographic(graph)))
+    assert solve(posed("minmax,steps"), own).selection.objective == pytest.approx(
+        known((4, 2), "minmax,steps")
+    )
