@@ -36,16 +36,15 @@ from seqopt.placement.free_front import FreeFront
 from seqopt.placement.free_problem import pose_free
 from seqopt.placement.front import find_front
 from seqopt.placement.loop_front import LoopFront
+from seqopt.report.charts import draw_responses, front_figure
 from seqopt.report.comparison import method_tables
 from seqopt.report.draw import (
     View,
     draw_bricks,
     draw_grips,
     draw_network,
-    draw_responses,
     force_key,
 )
-from seqopt.report.fronts import front_figure
 from seqopt.report.style import BLUE, DPI, GRAY, GREEN, VERMILION, new_figure, plain, styled
 from seqopt.report.wording import in_words
 from seqopt.scene.boxes import boxes

@@ -20,14 +20,14 @@ from seqopt.errors import ExtraError
 from seqopt.files import write_text
 
 DISPLAYS = {
-    "card": "seqopt.report.cards",
-    "thumbnails": "seqopt.report.thumbnails",
+    "card": "seqopt.report.notebook",
     "scene_picture": "seqopt.report.pictures",
     "network_picture": "seqopt.report.pictures",
-    "steps_picture": "seqopt.report.step_pictures",
+    "steps_picture": "seqopt.report.pictures",
+    "tilt_picture": "seqopt.report.pictures",
     "gantt_picture": "seqopt.report.gantt",
-    "Film": "seqopt.report.film",
-    "build_page": "seqopt.report.build_page",
+    "Film": "seqopt.report.pictures",
+    "build_page": "seqopt.report.pages",
 }
 """The functions that draw, by name, and the module of each."""
 

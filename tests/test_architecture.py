@@ -35,7 +35,8 @@ ROOMS = (
 SOLVERS = {"cvxpy", "clarabel", "highspy"}
 SOLVER_HOME = "formulations"
 SHARED = {  # what formulations may import
-    *("formulations.cones", "formulations.solvers", "formulations.whole_program")
+    *("formulations.cones", "formulations.on_graph"),
+    *("formulations.solvers", "formulations.whole_program"),
 }
 MECHANICS = {"network.mechanics", "engines.rigid"}  # not for the frame
 LINES, LINES_OF_A_FUNCTION = 300, 50  # of code; imports, docstrings and comments aside

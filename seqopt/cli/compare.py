@@ -28,7 +28,7 @@ from seqopt.cli.values import parse_robots
 from seqopt.engines.registry import provenance
 from seqopt.network.build import build_network
 from seqopt.report.comparison import Comparison, compare
-from seqopt.report.plan_pages import PAGE, comparison_page
+from seqopt.report.pages import PAGE, comparison_page
 from seqopt.report.text import format_details
 from seqopt.responses.linear_range import builds_in_words
 

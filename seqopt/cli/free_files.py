@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from seqopt.cli.asked import scene_file
 from seqopt.files import csv_text
 from seqopt.placement.free_plan import FreePlan
-from seqopt.report.plan_pages import PAGE, plan_page
+from seqopt.report.pages import PAGE, plan_page
 
 
 def free_files(

@@ -21,7 +21,7 @@ from seqopt.placement.formulation import End, find_formulation
 from seqopt.placement.plan import Plan
 from seqopt.placement.problem import Problem
 from seqopt.placement.solving import solve
-from seqopt.report.plan_pages import PAGE, plan_page
+from seqopt.report.pages import PAGE, plan_page
 from seqopt.sequence.free_rules import FREE
 from seqopt.sequence.schedule import Schedule
 from seqopt.study.published import paper_models

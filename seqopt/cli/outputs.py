@@ -14,7 +14,7 @@ from seqopt.files import csv_text, require_apart, require_folder, write_folder
 from seqopt.placement.plan import Plan
 from seqopt.placement.watch import trace_rows
 from seqopt.report.comparison import Comparison
-from seqopt.report.plan_pages import PAGE
+from seqopt.report.pages import PAGE
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import builtin_scenes, dump_scene
 

@@ -33,9 +33,8 @@ from seqopt.placement.free_goals import judged_by
 from seqopt.placement.free_problem import FreeProblem
 from seqopt.placement.front import Front, FrontProblem, find_front, pick
 from seqopt.placement.loop_front import LoopFront
-from seqopt.report.fronts import shown_table, worst_of
-from seqopt.report.methods import method_tables
-from seqopt.report.plan_pages import PAGE, front_page
+from seqopt.report.comparison import method_tables, shown_table, worst_of
+from seqopt.report.pages import PAGE, front_page
 from seqopt.responses.linear_range import LinearRange, builds_in_words
 from seqopt.responses.table import analyze
 from seqopt.sequence.free_rules import FREE
@@ -228,7 +227,7 @@ def _picture(front: Front, methods: Mapping[str, pd.DataFrame]) -> Mapping[str, 
     """Return the chart of a Pareto set by file name, if it can be drawn."""
     if figure_notes():
         return {}
-    from seqopt.report.fronts import front_figure  # noqa: PLC0415  # matplotlib is an extra
+    from seqopt.report.charts import front_figure  # noqa: PLC0415  # matplotlib is an extra
     from seqopt.report.style import picture_files  # noqa: PLC0415
 
     return picture_files("pareto", front_figure(front, methods))

@@ -12,7 +12,7 @@ from seqopt.cli.facts import scene_facts
 from seqopt.cli.outputs import figure_notes, keep_apart
 from seqopt.files import require_folder, write_folder, write_text
 from seqopt.network.build import build_network
-from seqopt.report.plan_pages import PAGE, folder_builds, folder_page
+from seqopt.report.pages import PAGE, folder_builds, folder_page
 
 DESCRIPTION = (
     "Write a page with a step viewer of the plans in a folder: the structure in three dimensions, "
@@ -67,7 +67,7 @@ def run(options: argparse.Namespace) -> Answer:
     engine = asked_engine(options, build_network(scene))
     write_text(path, folder_page(engine, options.folder))
     if options.figures in written:
-        from seqopt.report.plan_figures import plan_figures  # noqa: PLC0415  # needs an extra
+        from seqopt.report.charts import plan_figures  # noqa: PLC0415  # needs an extra
 
         options.tell("drawing figures")
         write_folder(options.figures, plan_figures(engine, folder_builds(engine, options.folder)))

@@ -149,7 +149,7 @@ class ShownBuild(Shown):
 
         Returns
         -------
-        seqopt.report.film.Film
+        seqopt.report.pictures.Film
             A notebook plays the film; ``save("build.gif")`` writes it to a file.
 
         Raises

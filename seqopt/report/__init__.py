@@ -16,8 +16,7 @@ this page does not import.
 arch25: 25 bricks; largest response of any step
 """
 
-from seqopt.report.comparison import Comparison, compare, largest
-from seqopt.report.methods import method_tables
+from seqopt.report.comparison import Comparison, compare, largest, method_tables
 from seqopt.report.text import format_comparison
 
 __all__ = ["Comparison", "compare", "format_comparison", "largest", "method_tables"]

@@ -1,17 +1,24 @@
-"""Charts of a comparison of methods and formulations (extra ``plot``)."""
+"""Charts of comparisons, of plans and of Pareto sets (extra ``plot``)."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
+from matplotlib.ticker import LogFormatter, MaxNLocator, ScalarFormatter
 
+from seqopt.engines.interface import Engine
+from seqopt.placement.front import Front
 from seqopt.placement.plan import Plan
-from seqopt.report.along import draw_responses, merged, worst_steps
-from seqopt.report.comparison import LARGEST, Comparison
+from seqopt.report.comparison import LARGEST, Comparison, in_shown_unit, worst_of
+from seqopt.report.gantt import gantt_picture
+from seqopt.report.page import Build
+from seqopt.report.pictures import steps_picture
 from seqopt.report.style import (
     BLUE,
     GRAY,
@@ -20,10 +27,11 @@ from seqopt.report.style import (
     dress,
     looks,
     new_figure,
+    picture_files,
     plain,
     styled,
 )
-from seqopt.report.wording import typed
+from seqopt.report.wording import in_words, typed
 from seqopt.study.published import PUBLISHED
 
 EXACT = 1e-7  # %: gaps below are rounding
@@ -45,21 +53,27 @@ COLUMNS = {
 }
 ROW = 0.21  # inches of a bar
 PRINTED = "plan published by Bruun et al., its responses computed here"
+MARKS = 12  # along a line, so that lines are told apart without their color
+LABELS = {
+    "F_largest": "largest grip force [N]",
+    "M_sup": "support moment M_sup [N m]",
+    "T_max": "tension T_max [N]",
+    "C_max": "compression C_max [N]",
+    "D_max": "displacement D_max [1e-3 mm]",
+    "steps": "steps of the plan",
+    "regrips": "regrips",
+    "bond": "bond needed [kPa]",
+    "friction": "friction needed",
+    "tilt": "tilt survived [deg]",
+}
+MARKERS = "sD^vP*"
+IN_A_ROW = 2  # charts
+LEAST = 0.01  # share of its numbers that an axis spans at least
+FAR = 2.5  # a method so much worse than the set makes an axis logarithmic
 
 
 def comparison_figures(result: Comparison) -> dict[str, Figure]:
-    """Return the figures of a comparison.
-
-    Parameters
-    ----------
-    result : Comparison
-        Of a scene that has a loop of its robots.
-
-    Returns
-    -------
-    dict of str to matplotlib.figure.Figure
-        By file name, without an ending.
-    """
+    """Return the figures of a comparison of a scene that has a loop of its robots."""
     return {
         "maxima": _maxima(result),
         "responses": responses_figure(result.tables),
@@ -91,13 +105,7 @@ def _maxima(result: Comparison) -> Figure:
 
 @styled
 def responses_figure(builds: Mapping[str, pd.DataFrame]) -> Figure:
-    """Return the largest responses at every number of bricks, a line a build.
-
-    Parameters
-    ----------
-    builds : mapping of str to pandas.DataFrame
-        By name, as `seqopt.analyze` makes them; equal ones share a line.
-    """
+    """Return the largest responses at every number of bricks; equal builds share a line."""
     plans = merged(builds)
     tables = {_together(names): worst_steps(builds[one]) for one, names in plans.items()}
     figure = new_figure(6.6 + 0.2 * len(tables))
@@ -149,18 +157,9 @@ def _gaps(result: Comparison) -> Figure:
 
 @styled
 def trace_figure(plans: Sequence[Plan]) -> Figure:
-    """Return a figure of choices and bounds against time.
+    """Return the choices and bounds of plans for one problem against time.
 
-    Parameters
-    ----------
-    plans : sequence of Plan
-        Of one problem, each by another formulation.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Values of choices filled, bounds hollow and gray, as steps over the time since a
-        formulation began.
+    Choices are filled, bounds hollow, as steps over the time since a formulation began.
     """
     figure = new_figure(3.6)
     axes = figure.subplots()
@@ -185,3 +184,134 @@ def trace_figure(plans: Sequence[Plan]) -> Figure:
     dress(axes)
     axes.legend()
     return figure
+
+
+def draw_responses(
+    axes: Sequence[Axes], tables: Mapping[str, pd.DataFrame], columns: Mapping[str, str]
+) -> None:
+    """Draw responses along the build: one labeled column of the tables on each of the axes.
+
+    A step stands at the share of the build that it ends, so that methods of different length align.
+    """
+    styles = looks(tables)
+    ended = {name: _ended(table) for name, table in tables.items()}
+    for axis, (column, label) in zip(axes, columns.items(), strict=True):
+        for number, (name, table) in enumerate(tables.items()):
+            every = max(1, len(table) // MARKS)
+            axis.plot(
+                ended[name],
+                table[column],
+                label=name,
+                lw=1.2,
+                ms=4.5,
+                mfc="white",
+                markevery=(number % every, every),
+                **styles[name].line(),
+            )
+        axis.set_ylabel(label)
+        dress(axis)
+    axes[-1].set_xlabel("bricks placed")
+    axes[0].legend(frameon=False, ncols=min(len(tables), 4), fontsize=SMALL)
+
+
+def _ended(table: pd.DataFrame) -> pd.Series[float]:
+    """Return where every step stands along the build: at the bricks placed when it ends."""
+    steps = table.groupby("bricks")
+    return table["bricks"] - 1 + (steps.cumcount() + 1) / steps["step"].transform("count")
+
+
+def worst_steps(table: pd.DataFrame) -> pd.DataFrame:
+    """Return the largest responses while each number of bricks stands, a row for each."""
+    return table.select_dtypes("number").groupby("bricks").max().reset_index()
+
+
+def merged(tables: Mapping[str, pd.DataFrame]) -> dict[str, tuple[str, ...]]:
+    """Return the names of tables by the first with the same numbers: a line would hide another."""
+    out: dict[str, tuple[str, ...]] = {}
+    for name, table in tables.items():
+        twin = next((first for first in out if _same(tables[first], table)), name)
+        out[twin] = (*out.get(twin, ()), name)
+    return out
+
+
+def _same(one: pd.DataFrame, other: pd.DataFrame) -> bool:
+    numbers = [table.select_dtypes("number") for table in (one, other)]
+    return numbers[0].shape == numbers[1].shape and bool(
+        np.allclose(numbers[0], numbers[1], equal_nan=True)
+    )
+
+
+@styled
+def front_figure(
+    front: Front,
+    methods: Mapping[str, pd.DataFrame],
+    beside: Mapping[str, pd.DataFrame] | None = None,
+) -> Figure:
+    """Return the chart of a Pareto set: its first number against each of the others.
+
+    The tables of methods (see `seqopt.analyze`) are marked by name, those of other Pareto sets
+    beside it by hollow circles.
+    """
+    table = front.table
+    names = [str(name) for name in table.columns if name not in ("steps", "regrips")] + ["steps"]
+    first, others = names[0], names[1:] or ["regrips"]
+    across = min(len(others), IN_A_ROW)
+    down = -(-len(others) // across)
+    figure = new_figure(0.8 + 2.5 * down)
+    panels = figure.subplots(down, across, squeeze=False).ravel()
+    marks = {name: worst_of(rows) | {"steps": len(rows)} for name, rows in methods.items()}
+    for axes, name in zip(panels, others, strict=False):
+        for label, other in (beside or {}).items():
+            ways = (in_shown_unit(other[c], c) for c in (first, name))
+            axes.plot(*ways, "o", ms=4, mfc="none", mec=GRAY, mew=0.8, label=f"{label}, its set")
+        x, y = (in_shown_unit(table[c], c) for c in (first, name))
+        dots = axes.scatter(x, y, c=table["steps"], cmap="viridis", s=18, zorder=2)
+        _mark(axes, marks, (first, name))
+        axes.set(xlabel=LABELS.get(first, first), ylabel=LABELS.get(name, name))
+        if axes.get_ylim()[1] > FAR * float(pd.Series(y).max()):
+            axes.set_yscale("log")
+            axes.yaxis.set_major_formatter(LogFormatter())
+            axes.yaxis.set_minor_formatter(LogFormatter(minor_thresholds=(2, 0.5)))
+        _widen(axes)
+        dress(axes)
+    for axes in panels[len(others) :]:
+        axes.set_axis_off()
+    words: dict[str, Any] = {"label": "points of the set: steps of the plan"}
+    words["ticks"] = MaxNLocator(integer=True)
+    figure.colorbar(dots, ax=list(panels), shrink=0.7, **words)
+    handles, labels = panels[0].get_legend_handles_labels()
+    if handles:
+        figure.legend(handles, labels, loc="outside lower center", ncols=4)
+    return figure
+
+
+def _mark(axes: Axes, marks: Mapping[str, Mapping[str, float]], names: tuple[str, str]) -> None:
+    """Mark where methods stand that make no choice."""
+    for marker, (method, worst) in zip(MARKERS, marks.items(), strict=False):
+        if all(name in worst for name in names):
+            at = [in_shown_unit(worst[name], name) for name in names]
+            look: dict[str, Any] = {"color": VERMILION, "mfc": "none", "ms": 8, "ls": "none"}
+            axes.plot(*at, marker, label=in_words(method), zorder=3, mew=2, **look)
+
+
+def _widen(axes: Axes) -> None:
+    """Keep rounding from looking like a trade-off: axes span a hundredth of what they show."""
+    for axis in (axes.xaxis, axes.yaxis):
+        low, high = axis.get_view_interval()
+        middle, least = (low + high) / 2, LEAST * max(abs(low), abs(high))
+        if axis.get_scale() == "linear" and high - low < least:
+            axis.set_view_interval(middle - least / 2, middle + least / 2, ignore=True)
+        if axis.get_scale() == "linear":
+            axis.set_major_formatter(ScalarFormatter(useOffset=False))
+
+
+def plan_figures(engine: Engine, builds: Sequence[Build]) -> dict[str, bytes]:
+    """Return figures of plans as PNG and SVG, by file name: steps, grips, and all responses."""
+    scene = engine.network.scene
+    files: dict[str, bytes] = {}
+    for build in builds:
+        files |= picture_files(f"{build.name}_steps", steps_picture(engine, build.steps))
+        grips = gantt_picture(scene, build.steps, build.table)
+        files |= picture_files(f"{build.name}_grips", grips)
+    tables = {build.name: build.table for build in builds}
+    return files | picture_files("responses", responses_figure(tables))

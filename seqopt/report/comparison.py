@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,11 +10,13 @@ import pandas as pd
 
 from seqopt.arrays import Terse
 from seqopt.engines.interface import Engine
-from seqopt.errors import ProblemError, StepError
+from seqopt.errors import ProblemError, SeqoptError, StepError
 from seqopt.placement.certificate import least_sum
 from seqopt.placement.costs import TINY
+from seqopt.placement.criteria import RankSum, WorstRatio
 from seqopt.placement.formulation import formulations
 from seqopt.placement.free_plan import FreePlan
+from seqopt.placement.free_problem import pose_free
 from seqopt.placement.interface import Aim
 from seqopt.placement.objectives import under_both
 from seqopt.placement.plan import Plan
@@ -23,22 +25,24 @@ from seqopt.placement.promises import overloads
 from seqopt.placement.ranking import rank_choice
 from seqopt.placement.requirements import Criterion
 from seqopt.placement.solving import on_the_way, solve
-from seqopt.report.free_row import free_criterion, free_plan, free_row
-from seqopt.report.methods import idle_note, method_tables
 from seqopt.responses.linear_range import Departure, LinearRange
-from seqopt.responses.quantities import RESPONSES, robot_response
+from seqopt.responses.quantities import CHOSEN_BY, RESPONSES, robot_response
 from seqopt.responses.resources import Resources
-from seqopt.responses.table import force_column
+from seqopt.responses.table import analyze, force_column
 from seqopt.scene.scene import Scene
-from seqopt.sequence.free_rules import FREE
+from seqopt.sequence.free_rules import FREE, FreeRules
 from seqopt.sequence.schedule_file import MOST, find_schedule
+from seqopt.sequence.steps import AnyStep, idle_robots
 from seqopt.sequence.three_robots import modified_sequential
+from seqopt.sequence.two_robots import METHODS, degeneration
 from seqopt.study.published import (
     IRREGULARITIES,
     PUBLISHED,
+    is_reference_arch,
     paper_models,
     printed_maxima,
     published_choice,
+    published_plan,
 )
 from seqopt.work.progress import Stage, Tell
 
@@ -57,22 +61,16 @@ COLUMNS = [
     "solve_seconds",
 ]
 CLOSED = "no choice"  # the problem of a sequence without open grips
+PATIENCE = 10.0  # s, after which the best plan so far is the row
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LoopFacts(Terse):
     """What the formulations of one loop have in common.
 
-    Attributes
-    ----------
-    method : str
-        Of the schedule, as ``three-robot``.
-    seconds : mapping of str to float
-        What all of them share: ``respond`` (computing responses) and ``rank`` (costs).
-    paper_models : tuple of int or None
-        Models that Bruun et al. count, for three robots: cascading, full overlap.
-    ranks : pandas.DataFrame or None
-        Where the published plan's nodes rank, move by move; see `rank_choice`.
+    The ``seconds`` that all of them share are those to ``respond`` (computing responses) and to
+    ``rank`` (costs); ``paper_models`` are what Bruun et al. count for three robots, cascading and
+    with full overlap; ``ranks`` says where the published plan's nodes rank, see `rank_choice`.
     """
 
     method: str
@@ -163,13 +161,13 @@ def compare(
     tables |= {name: plan.responses() for name, plan in plans.items()}
     rows |= {name: _row(plan) for name, plan in plans.items()}
     loop = None if problem is None else _facts(problem, rows, robots)
-    own = free_criterion(criterion, [largest(scene, tables[str(name)]) for name in maxima])
-    free, why_not = free_plan(engine, own, robots, progress)
+    own = _free_criterion(criterion, [largest(scene, tables[str(name)]) for name in maxima])
+    free, why_not = _free_plan(engine, own, robots, progress)
     notes += [why_not] if why_not else []
     if free is not None:
-        tables[FREE], rows[FREE] = free.responses(), free_row(free)
+        tables[FREE], rows[FREE] = free.responses(), _free_row(free)
     if problem is not None:
-        notes += idle_note(scene, f"{problem.schedule.method} loop", problem.schedule.steps)
+        notes += _idle_note(scene, f"{problem.schedule.method} loop", problem.schedule.steps)
     notes += _add_largest(scene, rows, tables)
     left = LinearRange(engine).of_builds(tables)
     table = _table(rows, left)
@@ -303,3 +301,128 @@ def _published_ranks(
     rows[PUBLISHED].update(problem=problem.schedule.method, objective=value, gap=gap)
     rows[PUBLISHED].update(under_both(problem, choice))
     return rank_choice(problem, choice)
+
+
+def method_tables(
+    engine: Engine, robots: Sequence[str] = ()
+) -> tuple[dict[str, pd.DataFrame], list[str]]:
+    """Return the responses of every method without open grips, and of the published plan.
+
+    Parameters
+    ----------
+    engine : Engine
+        What computes responses; it has the scene.
+    robots : sequence of str, optional
+        Names of those that take part, the first two of which are taken.
+
+    Returns
+    -------
+    tables : dict of str to pandas.DataFrame
+        By method, as `seqopt.analyze` makes them; the published plan for its own arch only.
+    notes : list of str
+        Why other methods cannot build the scene or are not what they are called, and which robots
+        never grip.
+
+    Raises
+    ------
+    StepError
+        If no method can build it.
+    """
+    scene = engine.network.scene
+    tables: dict[str, pd.DataFrame] = {}
+    refused: dict[str, StepError] = {}
+    notes: list[str] = []
+    for name, method in METHODS.items():
+        try:
+            steps = method(engine.network, robots[:2])
+        except StepError as error:
+            refused[name] = error
+            continue
+        tables[name] = analyze(engine, steps)
+        why = degeneration(engine.network, name)
+        notes += [f"{name}: {why}"] if why else []
+        notes += _idle_note(scene, name, steps)
+    if not tables:
+        raise next(iter(refused.values()))
+    if is_reference_arch(scene):
+        tables[PUBLISHED] = analyze(engine, published_plan(scene))
+    refusals = [f"{name}: not possible here; {error}" for name, error in refused.items()]
+    return tables, refusals + notes
+
+
+def _idle_note(scene: Scene, name: str, steps: Iterable[AnyStep]) -> list[str]:
+    """Return a note that names the robots which never grip, or none."""
+    idle = idle_robots(scene, steps)
+    return [f"{name}: {', '.join(idle)} never grip{'s' * (len(idle) == 1)}"] if idle else []
+
+
+def _free_criterion(criterion: Criterion, rows: Sequence[Mapping[str, float]]) -> Criterion:
+    """Return the criterion of a comparison, or what takes the place of ranks in a free schedule.
+
+    States have no ranks: below 1, the worst ratio to the largest responses of these rows means that
+    the free schedule is better than all of them in everything.
+    """
+    if not isinstance(criterion, RankSum):
+        return criterion
+    names = {"F_largest": "F_rob", "M_sup": "M_sup", "T_max": "T_max", "D_max": "D_max"}
+    units = {"D_max": 1e-6}  # m of 1e-3 mm
+    least = {
+        name: units.get(name, 1.0) * min(row[shown] for row in rows) or 1.0
+        for name, shown in names.items()
+    }
+    return WorstRatio("worst-ratio-to-rows", tuple(least.items()))
+
+
+def _free_plan(
+    engine: Engine, criterion: Criterion, robots: Sequence[str], progress: Tell
+) -> tuple[FreePlan | None, str]:
+    """Return the shortest free schedule with the smallest worst step, or why there is none."""
+    try:
+        rules = FreeRules(robots=tuple(robots))
+        problem = pose_free(engine, rules, criterion, "minmax,steps")
+        return solve(problem, "schedule_search", time_limit=PATIENCE, progress=progress), ""
+    except SeqoptError as error:
+        return None, f"{FREE}: {error}"
+
+
+def _free_row(plan: FreePlan) -> dict[str, object]:
+    """Return what a free schedule is worth, for a row: its objective is its worst step."""
+    bound, value = plan.selection.bound[0], plan.selection.objective[0]
+    return {
+        "problem": FREE,
+        "objective": value,
+        "gap": (value - bound) / (abs(value) or 1.0),  # without weight all responses are zero
+        "models": plan.problem.models,
+        "seconds": sum(plan.seconds.values()),
+        "solve_seconds": plan.seconds["solve"],
+    }
+
+
+def worst_of(table: pd.DataFrame) -> dict[str, float]:
+    """Return the worst responses of any step of a table from `seqopt.analyze`, SI units."""
+    nodes = [str(c).removesuffix("_node") for c in table.columns if str(c).endswith("_node")]
+    columns = [c for c in table.columns if any(c in (f"F_{n}_N", f"F_[{n}]_N") for n in nodes)]
+    out = {"F_largest": float(table[columns].abs().max().max())}
+    for name in ("M_sup", "T_max", "D_max"):
+        out[name] = float(table[CHOSEN_BY[name].column].max()) / CHOSEN_BY[name].scale
+    return out
+
+
+def in_shown_unit(value: pd.Series[float] | float, name: str) -> pd.Series[float] | float:
+    """Return a number of a Pareto set, SI units, in the unit in which it is shown."""
+    if name == "tilt":
+        return value * (-180.0 / np.pi) + 90.0
+    if name == "bond":
+        return value / 1e3
+    return value * CHOSEN_BY[name].scale if name in CHOSEN_BY else value
+
+
+def shown_table(table: pd.DataFrame) -> pd.DataFrame:
+    """Return the table of a Pareto set with the tilt that is survived, in degrees.
+
+    In the set a tilt is how far it is from a right angle, rad.
+    """
+    if "tilt" not in table:
+        return table.copy()
+    out = table.assign(tilt=in_shown_unit(table["tilt"], "tilt"))
+    return out.rename(columns={"tilt": "tilt_survived_deg"})

@@ -1,34 +1,45 @@
-"""Pictures of a partial structure: bricks, network, grips, and how they move."""
+"""Pictures of a partial structure: bricks, network, grips, and how they move (extra ``plot``).
+
+Bricks are drawn from the farthest to the nearest. Sorting faces by depth fails where a long one
+lies beside a short one. Of two convex bodies that a plane parts, the one on the viewer's side of it
+is drawn last; among the bodies that hide each other in the picture this gives an order, unless they
+do so in a circle. Where several planes part two bodies and disagree, neither hides the other:
+bricks that are corbelled touch along an edge, where any of the planes alone could name the wrong
+one.
+"""
 
 from __future__ import annotations
 
+import heapq
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import PolyCollection
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.lines import Line2D
+from matplotlib.patheffects import withStroke
 
-from seqopt.arrays import Floats
-from seqopt.network.network import Network
-from seqopt.report.along import draw_responses
-from seqopt.report.network_picture import draw_network, force_key
-from seqopt.report.occlusion import drawing_order
-from seqopt.report.style import SMALL
-from seqopt.report.view import HALO, View, frame
+from seqopt.arrays import Floats, Ints
+from seqopt.network.network import Network, PartKind
+from seqopt.report.style import BLUE, SMALL, VERMILION
 from seqopt.scene.blocks import vertices_of
 from seqopt.scene.boxes import boxes
 from seqopt.scene.parts import Brick
 from seqopt.scene.shape import normal_of
 
-__all__ = [
-    "View",
-    "draw_bricks",
-    "draw_grips",
-    "draw_network",
-    "draw_responses",
-    "force_key",
-]
-
+HALO = (withStroke(linewidth=2.5, foreground="white"),)
+POINTS = 9.0  # from a mark to the middle of its number
+SHARE = 0.026  # of the picture's size that this is, about
+WIDE = 1.5  # of a number over its height
+ANGLES = np.radians(np.arange(0, 360, 15))
+EDGES = ((0, 4), (0, 2), (0, 1))  # corners of a box along its length, width and thickness
+EVEN = 1e-9  # share of a direction toward the viewer that is none
+TOUCH = 1e-6  # share of a box's size up to which boxes that touch are parted
+INK, TENSION, COMPRESSION = "#2b2b2b", VERMILION, BLUE
+THIN, THICK = 1.2, 7.0  # points: edges without force, and with the largest
+SPARE = 0.3  # share of a node's area where the colors of edges count
 Faces = tuple[tuple[int, ...], ...]
 Color = tuple[float, float, float, float]
 FACES: Faces = ((0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (1, 3, 7, 5))
@@ -38,6 +49,236 @@ ROBOT_COLORS = ("#0b7a75", "#7b2d8b", "#b35900", "#444444")
 ROBOT_MARKERS = "XPDs"
 LINE = 11.0  # points from one line of text to the next
 NEAR_UP, NEAR_ASIDE = 0.08, 0.3  # share of a picture within which labels are neighbors
+
+
+@dataclass(frozen=True)
+class View:
+    """A parallel projection, from an azimuth (-y towards +x) and an elevation in degrees."""
+
+    azimuth: float = 25.0
+    elevation: float = 15.0
+
+    def axes(self) -> Floats:
+        """Return the unit vectors to the right, up and towards the viewer, (3, 3)."""
+        a, e = np.radians([self.azimuth, self.elevation])
+        right = np.array([np.cos(a), np.sin(a), 0.0])
+        toward = np.array([np.sin(a) * np.cos(e), -np.cos(a) * np.cos(e), np.sin(e)])
+        return np.stack([right, np.cross(toward, right), toward])
+
+
+def _frame(axes: Axes) -> None:
+    """Fit axes to a picture, which has none."""
+    axes.set_aspect("equal")
+    axes.autoscale_view()
+    axes.set_axis_off()
+
+
+def aside(marks: Floats, segments: Sequence[Floats]) -> list[tuple[float, float]]:
+    """Return how far beside its mark (n, 2) every label stands, to the right and up, in points.
+
+    Each takes the direction in which the nearest line, mark or label before it is farthest.
+    """
+    reach = SHARE * float(np.ptp(marks, axis=0).max())
+    around = np.stack([np.cos(ANGLES), np.sin(ANGLES)], axis=1)
+    ends = np.asarray(segments, dtype=float).reshape(-1, 2, 2)
+    placed: list[Floats] = []
+    out = []
+    for mark in marks:
+        spots = mark + reach * around
+        room = _from_lines(spots, ends)
+        for other in placed:
+            apart = np.linalg.norm((spots - other) / [WIDE, 1.0], axis=1)
+            room = np.minimum(room, apart)
+        best = int(room.argmax())
+        placed.append(spots[best])
+        x, y = (POINTS * around[best]).tolist()
+        out.append((x, y))
+    return out
+
+
+def _from_lines(spots: Floats, ends: Floats) -> Floats:
+    """Return how far spots (n, 2) are from the nearest of lines between ends (E, 2, 2)."""
+    start, along = ends[:, 0], ends[:, 1] - ends[:, 0]
+    away = spots[:, None] - start
+    length = np.maximum((along**2).sum(axis=1), np.finfo(float).tiny)
+    share = np.clip((away * along).sum(axis=2) / length, 0.0, 1.0)
+    return np.asarray(np.linalg.norm(away - share[..., None] * along, axis=2).min(axis=1))
+
+
+def drawing_order(corners: Floats, toward: Floats) -> list[int]:
+    """Return the indices of boxes with corners (n, 8, 3) from the farthest to the nearest.
+
+    ``toward`` has unit vectors to the right, up and toward the viewer (3, 3). Boxes that hide each
+    other in a circle, or share room, stand in the order of their middles.
+
+    Examples
+    --------
+    >>> low, high = np.zeros((8, 3)), np.zeros((8, 3))
+    >>> low[4:, 0] = low[[2, 3, 6, 7], 1] = low[1::2, 2] = 1.0
+    >>> high = low + [0.0, 0.0, 1.0]
+    >>> drawing_order(np.array([high, low]), np.eye(3))
+    [1, 0]
+    """
+    seen = corners @ toward.T
+    pairs = _overlapping(seen[..., :2])
+    behind: list[set[int]] = [set() for _ in corners]
+    hides: list[list[int]] = [[] for _ in corners]
+    for (i, j), side in zip(pairs.tolist(), _in_front(seen, pairs).tolist(), strict=True):
+        if side:
+            far, near = (i, j) if side > 0 else (j, i)
+            behind[near].add(far)
+            hides[far].append(near)
+    return _sorted_by_depth(seen[..., 2].mean(axis=1).tolist(), behind, hides)
+
+
+def _sorted_by_depth(
+    depth: list[float], behind: list[set[int]], hides: list[list[int]]
+) -> list[int]:
+    """Return all in an order, the farthest first; a circle starts at its farthest."""
+    ready = [(depth[i], i) for i, waits in enumerate(behind) if not waits]
+    heapq.heapify(ready)
+    order, left = [], dict.fromkeys(range(len(depth)))
+    while left:
+        i = heapq.heappop(ready)[1] if ready else min(left, key=lambda k: depth[k])
+        if i not in left:
+            continue
+        del left[i]
+        order.append(i)
+        for near in hides[i]:
+            behind[near].discard(i)
+            if not behind[near] and near in left:
+                heapq.heappush(ready, (depth[near], near))
+    return order
+
+
+def _overlapping(seen: Floats) -> Ints:
+    """Return the pairs (P, 2) whose rectangles around them overlap in the picture."""
+    low, high = seen.min(axis=1), seen.max(axis=1)
+    over = (low[:, None] < high[None]).all(axis=2)
+    return np.argwhere(np.triu(over & over.T, 1)).astype(np.int64)
+
+
+def _in_front(seen: Floats, pairs: Ints) -> Ints:
+    """Return 1 where the second box of a pair lies in front of the first, -1 behind it, else 0."""
+    a, b = pairs.T
+    edges = np.stack([seen[:, j] - seen[:, i] for i, j in EDGES], axis=1)
+    normals = np.stack(
+        [np.cross(edges[:, i], edges[:, j]) for i, j in combinations(range(3), 2)], 1
+    )
+    across = np.cross(edges[a][:, :, None], edges[b][:, None]).reshape(-1, 9, 3)
+    axes = np.concatenate([normals[a], normals[b], across], axis=1)
+    size = np.linalg.norm(axes, axis=2, keepdims=True)
+    axes = np.divide(axes, size, out=np.zeros_like(axes), where=size > EVEN * size.max(initial=1.0))
+    first, second = (axes @ seen[which].transpose(0, 2, 1) for which in (a, b))
+    ahead = second.min(axis=2) - first.max(axis=2)  # how far the second lies along each axis
+    behind = first.min(axis=2) - second.max(axis=2)
+    known = np.linalg.norm(axes, axis=2) > 0.5  # not the product of edges that are parallel
+    apart = np.where(known, np.maximum(ahead, behind), -np.inf)
+    touch = TOUCH * np.linalg.norm(edges[a], axis=2).max(axis=1, keepdims=True)
+    parts = apart >= np.minimum(apart.max(axis=1, keepdims=True), -touch)
+    sign = np.where(ahead >= behind, 1, -1)
+    facing = np.where(np.abs(axes[..., 2]) > EVEN, sign * np.sign(axes[..., 2]), 0)
+    nearest = np.where(parts, facing, 2).min(axis=1)
+    farthest = np.where(parts, facing, -2).max(axis=1)
+    return np.asarray(np.where(nearest == farthest, nearest, 0).astype(np.int64))
+
+
+def draw_network(  # noqa: PLR0913  # what is drawn, and how, each by its name
+    axes: Axes,
+    network: Network,
+    bricks: int,
+    view: View,
+    *,
+    displacement: Floats | None = None,
+    magnify: float = 1.0,
+    edge_force: Floats | None = None,
+    largest_force: float | None = None,
+    numbers: bool = False,
+) -> None:
+    """Draw nodes and edges of the first bricks, in place or moved.
+
+    The displacement of every node (N, 3), m, is drawn so many times larger; the axial force of
+    every edge (E,), N, tension positive, colors it and sets its width, of which the largest force
+    is the widest, as `force_key` says. Numbers are those of the nodes that robots may hold.
+    """
+    nodes, edges = network.count_nodes(bricks), network.count_edges(bricks)
+    points = network.node_position[:nodes].copy()
+    if displacement is not None:
+        points += magnify * displacement
+    seen = points @ view.axes()[:2].T
+    segments = list(seen[network.edge_nodes[:edges]])
+    axes.add_collection(_lines(segments, edge_force, largest_force))
+    _draw_nodes(axes, network.node_kind[:nodes], seen, 1.0 if edge_force is None else SPARE)
+    if numbers:
+        _write_numbers(axes, network, seen, segments)
+    _frame(axes)
+
+
+def _write_numbers(axes: Axes, network: Network, seen: Floats, segments: Sequence[Floats]) -> None:
+    """Write the numbers of the nodes that robots may hold beside what is seen (N, 2)."""
+    inner = np.flatnonzero(network.node_kind[: len(seen)] == PartKind.INNER.value)
+    for i, shift in zip(inner, aside(seen[inner], segments), strict=True):
+        axes.annotate(
+            str(network.node_name[i]),
+            seen[i],
+            shift,
+            textcoords="offset points",
+            fontsize=SMALL,
+            ha="center",
+            va="center",
+            path_effects=HALO,
+            zorder=4,
+        )
+
+
+def _lines(
+    segments: list[Floats], edge_force: Floats | None, largest: float | None
+) -> LineCollection:
+    """Return edges (E) of (2, 2), colored by their forces (E,) if given."""
+    if edge_force is None:
+        return LineCollection(segments, colors=INK, linewidths=1.2)
+    size = largest or np.abs(edge_force).max() or 1.0
+    colors = [TENSION if force > 0 else COMPRESSION for force in edge_force]
+    widths = THIN + (THICK - THIN) * np.abs(edge_force) / size
+    return LineCollection(segments, colors=colors, linewidths=widths.tolist())
+
+
+def force_key(largest_force: float) -> list[Line2D]:
+    """Return entries of a legend for color and width of edges, up to the force drawn widest, N."""
+    kinds = [
+        Line2D([], [], color=color, lw=THICK / 2, label=name)
+        for color, name in ((TENSION, "tension"), (COMPRESSION, "compression"))
+    ]
+    return kinds + [
+        Line2D(
+            [],
+            [],
+            color=INK,
+            lw=THIN + (THICK - THIN) * share,
+            label=f"{share * largest_force:.0f} N",
+        )
+        for share in (0.1, 0.5, 1.0)
+    ]
+
+
+def _draw_nodes(axes: Axes, kind: Ints, seen: Floats, size_by: float) -> None:
+    """Draw nodes of given kinds (N,) where they are seen (N, 2)."""
+    for which, marker, size, face in (
+        (PartKind.INNER, "o", 9, INK),
+        (PartKind.JOINT, "o", 12, "white"),
+        (PartKind.BASE, "s", 36, INK),
+    ):
+        at = seen[kind == which]
+        axes.scatter(
+            at[:, 0],
+            at[:, 1],
+            s=size_by * size,
+            marker=marker,
+            c=face,
+            edgecolors=INK,
+            zorder=3,
+            linewidths=0.7,
+        )
 
 
 def draw_bricks(  # noqa: PLR0913  # what is drawn, and how, each by its name
@@ -53,24 +294,8 @@ def draw_bricks(  # noqa: PLR0913  # what is drawn, and how, each by its name
 ) -> None:
     """Draw the first bricks, boxes or not, shaded, in place or moved.
 
-    Parameters
-    ----------
-    axes : matplotlib.axes.Axes
-        To draw on.
-    network : Network
-        Of the scene.
-    bricks : int
-        How many, in build order.
-    view : View
-        From where.
-    twist : (b, 6) float, optional
-        Translation and rotation of every brick, m and rad.
-    magnify : float
-        How many times larger the motion is drawn.
-    alpha : float
-        Opacity, from 0 to 1.
-    marked : collection of int
-        Names of bricks that are drawn in another color.
+    The twist of every brick (b, 6), m and rad, is drawn so many times larger; bricks of marked
+    names have another color.
     """
     boxed = _moved(network, bricks, twist, magnify)
     polygons, colors = [], []
@@ -83,23 +308,11 @@ def draw_bricks(  # noqa: PLR0913  # what is drawn, and how, each by its name
             red, green, blue = (_light(points, face) * own).tolist()
             colors.append((red, green, blue, alpha))
     _fill(axes, polygons, colors, alpha)
-    frame(axes)
+    _frame(axes)
 
 
 def draw_grips(axes: Axes, network: Network, grips: Sequence[int | None], view: View) -> None:
-    """Mark the nodes that robots hold.
-
-    Parameters
-    ----------
-    axes : matplotlib.axes.Axes
-        To draw on.
-    network : Network
-        Of the scene.
-    grips : sequence of (int or None)
-        Node that each of the scene's robots holds.
-    view : View
-        From where.
-    """
+    """Mark the nodes that the scene's robots hold, each beside its name."""
     at = {
         i: view.axes()[:2] @ np.array(network.scene.node_position(node))
         for i, node in enumerate(grips)

@@ -16,8 +16,7 @@ from matplotlib.patches import Patch, Rectangle
 
 from seqopt.arrays import Floats
 from seqopt.errors import StepError
-from seqopt.report.picture import new_picture
-from seqopt.report.style import SMALL, styled
+from seqopt.report.style import SMALL, new_picture, styled
 from seqopt.responses.table import force_column
 from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import Hold, holds
@@ -38,22 +37,7 @@ def gantt_picture(
     responses: pd.DataFrame | None = None,
     shown: tuple[int, int | None] = (1, None),
 ) -> Figure:
-    """Return the grips of a build over its steps, a lane per robot and a bar per grip.
-
-    Parameters
-    ----------
-    scene : Scene
-    steps : sequence of Step or OpenStep
-    responses : pandas.DataFrame, optional
-        Of the steps, as `seqopt.analyze` makes them: bars are shaded by the force of the grip.
-    shown : tuple of (int, int or None), optional
-        Numbers of the first and the last step that are drawn.
-
-    Raises
-    ------
-    StepError
-        If there are no such steps.
-    """
+    """Return the grips of a build over its steps, a lane per robot and a bar per grip."""
     first, last = _range(len(steps), *shown)
     width = float(np.clip(PER_STEP * (last - first + 1) + 1.6, LEAST, MOST))
     figure = new_picture(width, 0.62 * len(scene.robots) + 1.2)

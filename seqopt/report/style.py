@@ -16,12 +16,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
-
-from seqopt.report.picture import new_picture
 
 WIDTH = 7.36  # inches: the column of text of the site at 100 pixels an inch
 DPI = 200  # two pixels of the file for each one that the site shows
+NOTEBOOK_DPI = 110
 SMALL, BODY = 8.0, 9.0  # points
 BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, INK = (
     "#0072B2",
@@ -64,17 +64,25 @@ PARAMETERS: Any = {
 styled = mpl.rc_context(PARAMETERS)  # a decorator of what draws; others keep their own settings
 
 
+class _Picture(Figure):
+    """A figure that pyplot does not manage: it is shown once, where it is returned."""
+
+    def _repr_png_(self) -> bytes:
+        """Return the figure as a PNG."""
+        buffer = io.BytesIO()
+        self.savefig(buffer, format="png", dpi=NOTEBOOK_DPI)
+        return buffer.getvalue()
+
+
+def new_picture(width: float, height: float, *, constrained: bool = True) -> Figure:
+    """Return an empty figure, inches, that a notebook shows where it is returned."""
+    layout = ConstrainedLayoutEngine(h_pad=0.08, w_pad=0.06) if constrained else None
+    return _Picture(figsize=(width, height), layout=layout)
+
+
 @dataclass(frozen=True)
 class Look:
-    """How one series is drawn.
-
-    Attributes
-    ----------
-    color : str
-    marker : str
-    dashes : str or tuple
-        A line style of matplotlib.
-    """
+    """How one series is drawn."""
 
     color: str
     marker: str
@@ -85,13 +93,7 @@ class Look:
         return {"color": self.color, "marker": self.marker, "ls": self.dashes}
 
     def mark(self, *, filled: bool = True) -> dict[str, Any]:
-        """Return arguments of `matplotlib.axes.Axes.plot` for marks alone.
-
-        Parameters
-        ----------
-        filled : bool, optional
-            Whether the marks are filled.
-        """
+        """Return arguments of `matplotlib.axes.Axes.plot` for marks alone."""
         face = self.color if filled else "white"
         return {"color": self.color, "marker": self.marker, "ls": "none", "mfc": face}
 
@@ -115,15 +117,7 @@ def looks(names: Iterable[str]) -> dict[str, Look]:
 
 
 def new_figure(height: float, width: float = WIDTH) -> Figure:
-    """Return an empty figure that needs no screen, and that a notebook shows.
-
-    Parameters
-    ----------
-    height : float
-        Inches.
-    width : float, optional
-        Inches; as wide as the site shows it by default.
-    """
+    """Return an empty figure, inches, as wide as the site shows it by default."""
     figure = new_picture(width, height, constrained=False)
     figure.set_layout_engine("constrained")
     return figure
@@ -140,11 +134,6 @@ def plain(*axes: Axis) -> None:
     """Write the numbers of logarithmic axes as people do: 0.01, 1, 500.
 
     Between two decades also 2 and 5 are labeled, where fewer than three would be.
-
-    Parameters
-    ----------
-    *axes : matplotlib.axis.Axis
-        With their limits as they stay.
     """
     for axis in axes:
         low, high = axis.get_view_interval()
@@ -172,19 +161,7 @@ def name_panels(*panels: Axes) -> None:
 
 @styled
 def picture_files(name: str, figure: Figure) -> dict[str, bytes]:
-    """Return a figure as PNG and as SVG, by file name.
-
-    Parameters
-    ----------
-    name : str
-        Without an ending.
-    figure : matplotlib.figure.Figure
-
-    Returns
-    -------
-    dict of str to bytes
-        The same bytes whenever the figure is the same.
-    """
+    """Return a figure as PNG and as SVG by file name, always with the same bytes."""
     out = {}
     for ending, about in (("png", {"Software": None}), ("svg", {"Date": None})):
         buffer = io.BytesIO()

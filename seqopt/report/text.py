@@ -42,19 +42,7 @@ def format_comparison(comparison: Comparison, scene: Scene, criterion: Criterion
 
 
 def format_details(comparison: Comparison, scene: Scene) -> str:
-    """Return the force of every robot, plans under both objectives of ranks, and published ranks.
-
-    Parameters
-    ----------
-    comparison : Comparison
-    scene : Scene
-        Which was compared.
-
-    Returns
-    -------
-    str
-        Of many lines, of at most 80 columns.
-    """
+    """Return forces of robots, plans under both objectives of ranks, and published ranks."""
     return "\n\n".join([_methods(comparison, scene), *_expert(comparison)])
 
 

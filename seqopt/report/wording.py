@@ -32,11 +32,6 @@ WORDS = {
 def in_words(name: str) -> str:
     """Return what a method or formulation is called, or its name where nobody gave it words.
 
-    Parameters
-    ----------
-    name : str
-        As it is typed.
-
     Examples
     --------
     >>> in_words("overlap_dp"), in_words("my_own")
@@ -47,11 +42,6 @@ def in_words(name: str) -> str:
 
 def typed(name: str) -> str:
     """Return words for a method or formulation, with what is typed behind where it differs.
-
-    Parameters
-    ----------
-    name : str
-        As it is typed.
 
     Examples
     --------

@@ -8,7 +8,8 @@ import pytest
 
 from seqopt.engines.interface import Want
 from seqopt.network.build import build_network
-from seqopt.report.draw import View, draw_bricks, draw_grips, draw_network, draw_responses
+from seqopt.report.charts import draw_responses
+from seqopt.report.draw import View, draw_bricks, draw_grips, draw_network
 from seqopt.responses.table import analyze
 from seqopt.sequence.two_robots import METHODS
 from tests.blocks import with_shapes

@@ -7,8 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seqopt.report.draw import View
-from seqopt.report.occlusion import drawing_order
+from seqopt.report.draw import View, drawing_order
 from seqopt.scene.boxes import boxes
 from seqopt.scene.library import WallShape, wall
 from seqopt.scene.scene_file import load_scene

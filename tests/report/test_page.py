@@ -20,10 +20,8 @@ from seqopt.files import csv_text
 from seqopt.network.build import build_network
 from seqopt.report import page
 from seqopt.report.comparison import compare
-from seqopt.report.page import report_page
-from seqopt.report.page_builds import OVER
-from seqopt.report.page_data import LARGEST, Build, Scatter, build_data, structure_data
-from seqopt.report.plan_pages import comparison_page, plan_page
+from seqopt.report.page import LARGEST, Build, Scatter, build_data, report_page, structure_data
+from seqopt.report.pages import OVER, comparison_page, plan_page
 from seqopt.responses.table import analyze
 from seqopt.scene.blocks import block_brick
 from seqopt.scene.imports.contacts import face_ground, flat_face

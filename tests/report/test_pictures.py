@@ -9,8 +9,7 @@ from PIL import Image
 
 from seqopt.errors import FileError, StepError
 from seqopt.placement.given_sequence import GivenSequence
-from seqopt.report.film import Film
-from seqopt.report.step_pictures import spread_steps
+from seqopt.report.pictures import Film, spread_steps
 from seqopt.sequence.two_robots import sequential
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import combinations
+from types import SimpleNamespace
 
 import matplotlib as mpl
 import numpy as np
@@ -11,9 +12,8 @@ import pandas as pd
 import pytest
 from matplotlib.colors import to_rgb
 
-from seqopt.report.along import merged, worst_steps
-from seqopt.report.front_chart import drawn
-from seqopt.report.labels import POINTS, aside
+from seqopt.report.charts import front_figure, merged, worst_steps
+from seqopt.report.draw import POINTS, aside
 from seqopt.report.style import COLORS, look, looks, new_figure, picture_files, plain, styled
 from seqopt.report.wording import WORDS, in_words, typed
 from tests.pictures import flaws
@@ -121,6 +121,11 @@ def test_equal_tables_are_one_line():
     assert worst_steps(table)["M"].tolist() == [3.0, 2.0]
 
 
+def front_of(table):
+    """A Pareto set of which only the table counts."""
+    return SimpleNamespace(table=table)
+
+
 def test_the_chart_of_a_pareto_set_marks_methods_and_names_them():
     rng = np.random.default_rng(1)
     names = ["F_largest", "M_sup", "T_max", "D_max", "steps"]
@@ -134,7 +139,9 @@ def test_the_chart_of_a_pareto_set_marks_methods_and_names_them():
             "D_max_1e-3mm": 9.0,
         }
     )
-    figure = drawn(table, {"sequential": method, "cantilever": method}, {"loop": table})
+    figure = front_figure(
+        front_of(table), {"sequential": method, "cantilever": method}, {"loop": table}
+    )
     assert len(figure.axes) == 4 + 1  # and the scale of colors
     (legend,) = figure.legends
     assert [text.get_text() for text in legend.get_texts()] == [
@@ -147,7 +154,7 @@ def test_rounding_does_not_look_like_a_trade_off():
     table = pd.DataFrame(
         {"F_largest": [100.0, 200.0], "M_sup": [3.0, 3.0 + 1e-12], "steps": [9, 9]}
     )
-    axes, *_ = drawn(table, {}, {}).axes
+    axes, *_ = front_figure(front_of(table), {}, {}).axes
     low, high = axes.get_ylim()
     assert 0.01 < high - low < 0.1
     assert axes.get_xlim()[1] - axes.get_xlim()[0] > 100

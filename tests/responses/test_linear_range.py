@@ -14,7 +14,7 @@ from seqopt.engines.interface import Want
 from seqopt.engines.registry import make_engine
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network
-from seqopt.report.cards import card
+from seqopt.report.notebook import card
 from seqopt.responses.linear_range import _STRAIN, LinearRange
 from seqopt.responses.staged import staged_fields
 from seqopt.responses.table import analyze, response_table

@@ -1,4 +1,4 @@
-"""What a notebook shows of a value: a small table and, with matplotlib, a small picture.
+"""What a notebook shows of a value: a small table and, with matplotlib, small pictures.
 
 The table has the notebook's own colors, so that it can be read on a dark background too; pictures
 have a white background. Nothing slow is computed for the display.
@@ -6,10 +6,12 @@ have a white background. Nothing slow is computed for the display.
 
 from __future__ import annotations
 
+import io
 from base64 import b64encode
 from collections.abc import Callable, Mapping
 from functools import singledispatch
 from html import escape
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -22,7 +24,7 @@ from seqopt.placement.requirements import Limit
 from seqopt.placement.robust_problem import RobustProblem
 from seqopt.placement.shown_build import ShownBuild
 from seqopt.report.comparison import largest
-from seqopt.report.page_builds import WORDS
+from seqopt.report.pages import WORDS
 from seqopt.report.wording import typed
 from seqopt.responses.linear_range import OUTSIDE, REMEDY
 from seqopt.responses.quantities import number_text
@@ -30,94 +32,102 @@ from seqopt.scene.boxes import boxes
 from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import Schedule
 from seqopt.showing import display
-from seqopt.stability.assessment import Stability
+from seqopt.stability.assessment import Stability, Verdict
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 Rows = Mapping[str, object]
-SMALL = 60  # bricks up to which the responses of a plan are computed to be shown
+SMALL = 60  # bricks up to which responses of a plan are computed and several steps drawn
+DPI = 90
+COLORS = 128  # of a picture: a quarter of the bytes; an octree keeps colors of small areas
+WIDTH = 4.5  # of a structure, inches
+STEPS = 34  # of a build whose grips are drawn
+
+
+class Card(NamedTuple):
+    """What there is to show of a value: a title, rows of a table by name, and what draws it."""
+
+    title: str
+    rows: Rows
+    draw: Callable[[], list[Figure]] = list
 
 
 def card(value: object) -> str:
     """Return a table of a value and small pictures of it, as HTML.
 
-    Parameters
-    ----------
-    value : object
-        A scene, network, schedule, problem, plan or stability.
-
-    Returns
-    -------
-    str
-        Without pictures where matplotlib is not installed.
+    Without pictures where matplotlib is not installed.
     """
-    title, rows = facts(value)
+    shown = facts(value)
+    title = escape(shown.title)
     cells = "".join(
         f'<tr><th style="text-align:left;vertical-align:top">{escape(name)}</th>'
         f'<td style="text-align:left">{escape(str(content))}</td></tr>'
-        for name, content in rows.items()
+        for name, content in shown.rows.items()
+    )
+    try:
+        pictures = [b64encode(_small(figure)).decode() for figure in shown.draw()]
+    except ExtraError:
+        pictures = []
+    images = "".join(
+        f'<img alt="{title}" src="data:image/png;base64,{png}" '
+        'style="display:block;max-width:100%;height:auto;background:#fff;border-radius:6px;'
+        'margin-bottom:0.5em">'
+        for png in pictures
     )
     return (
         '<div style="display:flex;flex-wrap:wrap;gap:1em;align-items:flex-start">'
-        f'<table><thead><tr><th colspan="2" style="text-align:left">{escape(title)}</th></tr>'
+        f'<table><thead><tr><th colspan="2" style="text-align:left">{title}</th></tr>'
         f"</thead><tbody>{cells}</tbody></table>"
-        f'<div style="flex:1 1 20em;min-width:0">{_images(value, title)}</div></div>'
+        f'<div style="flex:1 1 20em;min-width:0">{images}</div></div>'
     )
 
 
-def _images(value: object, title: str) -> str:
-    """Return the pictures of a value; nothing where matplotlib is not installed."""
-    try:
-        draw: Callable[[object], list[bytes]] = display("thumbnails")
-    except ExtraError:
-        return ""
-    return "".join(
-        f'<img alt="{escape(title)}" src="data:image/png;base64,{b64encode(png).decode()}" '
-        'style="display:block;max-width:100%;height:auto;background:#fff;border-radius:6px;'
-        'margin-bottom:0.5em">'
-        for png in draw(value)
-    )
+def _small(figure: Figure) -> bytes:
+    """Return a figure as a small PNG of few colors."""
+    from PIL import Image  # noqa: PLC0415  # comes with matplotlib, an extra
+
+    large, small = io.BytesIO(), io.BytesIO()
+    figure.savefig(large, format="png", dpi=DPI)
+    picture = Image.open(large).convert("RGB")
+    picture.quantize(COLORS, Image.Quantize.FASTOCTREE).save(small, format="png", optimize=True)
+    return small.getvalue()
 
 
 @singledispatch
-def facts(value: object) -> tuple[str, Rows]:
-    """Return what a value is, in a few words, and what there is to say about it.
-
-    Returns
-    -------
-    title : str
-    rows : mapping of str to object
-        Of the table, by name.
-    """
-    return type(value).__name__, {"": repr(value)}
+def facts(value: object) -> Card:
+    """Return what there is to show of a value."""
+    return Card(type(value).__name__, {"": repr(value)})
 
 
 @facts.register
-def _scene(value: Scene) -> tuple[str, Rows]:
+def _scene(value: Scene) -> Card:
     corners = boxes(value.bricks).corners().reshape(-1, 3)
-    size = " × ".join(f"{length:.3g}" for length in np.ptp(corners, axis=0))
-    return f"Scene {value.name}", {
+    by_payload: dict[float, list[str]] = {}
+    for robot in value.robots:
+        by_payload.setdefault(robot.payload, []).append(robot.name)
+    rows = {
         "bricks": len(value.bricks),
         "joints": len(value.joints),
         "supports": len(value.grounds),
-        "size, m": size,
+        "size, m": " × ".join(f"{length:.3g}" for length in np.ptp(corners, axis=0)),
         "mass, kg": f"{sum(brick.mass for brick in value.bricks):.4g}",
-        "robots": _robots(value),
+        "robots": "; ".join(
+            f"{', '.join(names)}: payload {load:.4g} N" for load, names in by_payload.items()
+        ),
         "nodes that may be held": 2 * len(value.bricks) - len(value.blocked_nodes),
     }
+    return Card(f"Scene {value.name}", rows, lambda: _of_scene(value))
 
 
-def _robots(scene: Scene) -> str:
-    by_payload: dict[float, list[str]] = {}
-    for robot in scene.robots:
-        by_payload.setdefault(robot.payload, []).append(robot.name)
-    return "; ".join(
-        f"{', '.join(names)}: payload {payload:.4g} N" for payload, names in by_payload.items()
-    )
+def _of_scene(scene: Scene) -> list[Figure]:
+    return [display("scene_picture")(scene, width=WIDTH)]
 
 
 @facts.register
-def _network(value: Network) -> tuple[str, Rows]:
+def _network(value: Network) -> Card:
     supports = len(value.springs.support)
-    return f"Network of {value.scene.name}", {
+    rows = {
         "bricks": len(value.inner),
         "nodes": len(value.node_kind),
         "of these to hold": 2 * len(value.inner) - len(value.scene.blocked_nodes),
@@ -125,10 +135,12 @@ def _network(value: Network) -> tuple[str, Rows]:
         "springs of joints": len(value.springs.since) - supports,
         "springs of supports": supports,
     }
+    name = f"Network of {value.scene.name}"
+    return Card(name, rows, lambda: [display("network_picture")(value, width=WIDTH)])
 
 
 @facts.register
-def _schedule(value: Schedule) -> tuple[str, Rows]:
+def _schedule(value: Schedule) -> Card:
     counts = [len(move.candidates) for move in value.moves]
     rows: dict[str, object] = {
         "scene": value.scene.name,
@@ -140,33 +152,36 @@ def _schedule(value: Schedule) -> tuple[str, Rows]:
         rows["choices of all grips"] = f"10^{np.log10(counts).sum():.0f}"
     if value.left_out:
         rows["left out"] = value.left_out
-    return f"Schedule {value.method}", rows
+    steps = (1, min(len(value.steps), STEPS))
+    draw = lambda: [display("gantt_picture")(value.scene, value.steps, None, steps)]  # noqa: E731
+    return Card(f"Schedule {value.method}", rows, draw)
 
 
 @facts.register
-def _problem(value: Problem) -> tuple[str, Rows]:
-    title, rows = _schedule(value.schedule)
-    return f"Problem: which nodes to hold ({title[0].lower()}{title[1:]})", {
-        **rows,
+def _problem(value: Problem) -> Card:
+    title, rows, draw = _schedule(value.schedule)
+    more = {
         "criterion": value.criterion.name,
         "limits": _limits(value.limits),
         "budgets": ", ".join(budget.name for budget in value.budgets) or "none",
         "engine": repr(value.engine),
     }
+    name = f"Problem: which nodes to hold ({title[0].lower()}{title[1:]})"
+    return Card(name, {**rows, **more}, draw)
 
 
 @facts.register
-def _robust_problem(value: RobustProblem) -> tuple[str, Rows]:
-    _, rows = _problem(value.nominal)
-    extras = {"scenarios": len(value.scenes), "aim over them": str(value.aim)}
-    return "Problem over scenarios: which nodes to hold", {**rows, **extras}
+def _robust_problem(value: RobustProblem) -> Card:
+    _, rows, draw = _problem(value.nominal)
+    more = {"scenarios": len(value.scenes), "aim over them": str(value.aim)}
+    return Card("Problem over scenarios: which nodes to hold", {**rows, **more}, draw)
 
 
 @facts.register
-def _free_problem(value: FreeProblem) -> tuple[str, Rows]:
+def _free_problem(value: FreeProblem) -> Card:
     scene, columns = value.network.scene, value.space.kinds
     team = sorted(robot for kind in columns for robot in kind.robots)
-    return f"Problem of the {value.title}: who does what next, and where", {
+    rows = {
         "scene": scene.name,
         "bricks": len(scene.bricks),
         "robots": ", ".join(scene.robots[robot].name for robot in team),
@@ -176,15 +191,15 @@ def _free_problem(value: FreeProblem) -> tuple[str, Rows]:
         "every step must stand": "yes" if value.standing is not None else "not asked",
         "engine": repr(value.engine),
     }
+    name = f"Problem of the {value.title}: who does what next, and where"
+    return Card(name, rows, lambda: _of_scene(scene))
 
 
 @facts.register
-def _order_problem(value: OrderProblem) -> tuple[str, Rows]:
-    _, rows = _free_problem(value.free)
-    return "Problem of the order: which brick next, by whom, and where", {
-        **rows,
-        "orders": value.among.value,
-    }
+def _order_problem(value: OrderProblem) -> Card:
+    _, rows, draw = _free_problem(value.free)
+    name = "Problem of the order: which brick next, by whom, and where"
+    return Card(name, {**rows, "orders": value.among.value}, draw)
 
 
 def _limits(limits: tuple[Limit, ...]) -> str:
@@ -192,25 +207,26 @@ def _limits(limits: tuple[Limit, ...]) -> str:
 
 
 @facts.register
-def _build(value: ShownBuild) -> tuple[str, Rows]:
+def _build(value: ShownBuild) -> Card:
     try:
         scene = value.engine.network.scene
     except ProblemError:  # costs alone were given
-        return "Plan", {"": repr(value)}
-    criterion = _criterion(value)
+        return Card("Plan", {"": repr(value)})
     small = len(scene.bricks) <= SMALL
-    rows: dict[str, object] = {
-        **(_outside(value) if small else {"linear range": "see departures: not computed here"}),
-        "found by": typed(value.title),
-        **({"criterion": criterion} if criterion else {}),
-        "result": value.worth,
-        "steps": len(value.steps),
-    }
+    rows: dict[str, object] = {}
+    if not small:
+        rows["linear range"] = "see departures: not computed here"
+    elif left := "; ".join(map(str, value.departures)):
+        rows[OUTSIDE] = f"{left}. {REMEDY}"
+    rows["found by"] = typed(value.title)
+    if criterion := _criterion(value):
+        rows["criterion"] = criterion
+    rows |= {"result": value.worth, "steps": len(value.steps)}
     if small:
         rows |= _worst(value)
     if value.seconds:
         rows["time to find it, s"] = f"{sum(value.seconds.values()):.3g}"
-    return f"Plan for {scene.name}", rows
+    return Card(f"Plan for {scene.name}", rows, lambda: _of_build(value, small=small))
 
 
 def _criterion(value: ShownBuild) -> str:
@@ -219,12 +235,6 @@ def _criterion(value: ShownBuild) -> str:
     for inner in ("nominal", "free"):  # of problems over scenarios and orders
         problem = getattr(problem, inner, problem)
     return "" if problem is None else str(problem.criterion.name)
-
-
-def _outside(value: ShownBuild) -> Rows:
-    """Return how responses leave the linear range, if they do."""
-    left = "; ".join(map(str, value.departures))
-    return {OUTSIDE: f"{left}. {REMEDY}"} if left else {}
 
 
 def _worst(value: ShownBuild) -> Rows:
@@ -239,8 +249,21 @@ def _worst(value: ShownBuild) -> Rows:
     return rows
 
 
+def _of_build(value: ShownBuild, *, small: bool) -> list[Figure]:
+    """Return pictures of some steps and, of a small build, of its first grips."""
+    draw, count = display("steps_picture"), len(value.steps)
+    from seqopt.report.pictures import spread_steps  # noqa: PLC0415  # matplotlib is an extra
+
+    if not small:
+        return [draw(value.engine, value.steps, count // 2 + 1)]
+    return [
+        draw(value.engine, value.steps, spread_steps(value.steps, 3)),
+        value.gantt(1, min(count, STEPS)),
+    ]
+
+
 @facts.register
-def _stability(value: Stability) -> tuple[str, Rows]:
+def _stability(value: Stability) -> Card:
     rows: dict[str, object] = {
         "verdict": value.verdict.value,
         "bond needed, Pa": f"{value.bond:.4g}",
@@ -254,4 +277,7 @@ def _stability(value: Stability) -> tuple[str, Rows]:
     if value.first_block:
         joint = f", joint {value.first_contact}" if value.first_contact else ""
         rows["fails first"] = f"block {value.first_block}{joint}"
-    return f"Stability: {value.verdict.value}", rows
+    title = f"Stability: {value.verdict.value}"
+    if value.verdict is not Verdict.STANDS:
+        return Card(title, rows)
+    return Card(title, rows, lambda: [display("tilt_picture")(value)])
