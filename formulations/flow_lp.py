@@ -10,10 +10,10 @@ With moves :math:`a = (u, v)` that take :math:`c_a`, for a goal that is a sum,
    \begin{cases} 1 & s \text{ the start} \\ 0 & \text{else, but at ends} \end{cases}
 
 whose matrix is totally unimodular: the optimum is a path. With the multipliers :math:`\pi_s` of its
-rows, paths of moves with :math:`c_a = \pi_u - \pi_v` are the best ones, and only these moves are
-left for the next goal. The largest amount on a path is no linear function of :math:`y`: where an
-epigraph :math:`t \ge c_a y_a` bounds it, half a unit each on two paths costs half. Of a peak
-therefore the least :math:`t` is found by bisection for which
+rows, paths of moves with :math:`c_a = \pi_u - \pi_v` that end where :math:`\pi_s = 0` are the best
+ones, and only these are left for the next goal. The largest amount on a path is no linear function
+of :math:`y`: where an epigraph :math:`t \ge c_a y_a` bounds it, half a unit each on two paths costs
+half. Of a peak therefore the least :math:`t` is found by bisection for which
 
 .. math::
 
@@ -24,12 +24,14 @@ has a solution. Where it has none, the multipliers that prove this are a cut.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from formulations.on_graph import Choice, on_graph, unit_flow, worth
 from formulations.solvers import STOPS, minimize_rows
 from seqopt.graph.graph import Graph
-from seqopt.graph.paths import TIED, fewest_moves
+from seqopt.graph.paths import TIED, fewest_moves, tied
 from seqopt.placement.watch import Watch
 
 
@@ -52,8 +54,11 @@ def _least_sum(graph: Graph, goal: int, watch: Watch) -> tuple[Graph, float, boo
     found = minimize_rows(costs, rows, right, watch=watch)
     if found.end in STOPS:
         return graph, -np.inf, True
-    left = costs - rows.T @ found.multipliers
-    return graph.only(left[: len(graph.source)] <= TIED), scale * found.bound, False
+    best = costs - rows.T @ found.multipliers <= TIED
+    moves, ends = np.split(best, [len(graph.source)])
+    kept = graph.ends.copy()
+    kept[graph.ends] = ends  # a build that ends elsewhere takes more
+    return replace(graph.only(moves), ends=kept), scale * found.bound, False
 
 
 def _least_peak(graph: Graph, goal: int, watch: Watch) -> tuple[Graph, float, bool]:
@@ -68,7 +73,7 @@ def _least_peak(graph: Graph, goal: int, watch: Watch) -> tuple[Graph, float, bo
         if end in STOPS:
             return graph.only(amounts <= levels[high]), float(levels[low]), True
         low, high = (middle + 1, high) if end == "kInfeasible" else (low, middle)
-    return graph.only(amounts <= levels[high]), float(levels[high]), False
+    return graph.only(amounts <= tied(levels[high])), float(levels[high]), False
 
 
 FORMULATION = on_graph("flow_lp", "a unit flow of states, linear programs", choose)

@@ -124,7 +124,7 @@ def _chosen(
         wide.refine()
         graph, states = wide.graph()
         with answered(watch.interrupt):
-            choice = choose(_on_paths(graph), watch)
+            choice = choose(on_paths(graph), watch)
     except (StopError, KeyboardInterrupt) as stop:
         return plan_by_then(first, stop)
     stopped = ("interrupt" if watch.interrupted else "time") * choice.stopped
@@ -138,7 +138,7 @@ def _chosen(
     return replace(found, bound=bound, stopped=stopped)
 
 
-def _on_paths(graph: Graph) -> Graph:
+def on_paths(graph: Graph) -> Graph:
     """Return the graph with the moves that are on paths from the start to an end."""
     to_end = np.isfinite(distances(graph, np.ones(len(graph.source)), back=True))
     return graph.only(reached(graph)[graph.source] & to_end[graph.target])

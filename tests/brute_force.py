@@ -92,7 +92,7 @@ def whole_graph(engine, rules, *, last=False):
 def least_peak(graph, start, costs):
     """The least worst cost of any path, by trying every value that occurs."""
     for value in sorted({*costs.values()}):
-        kept = [n for n in graph if n == "end" or costs[n] <= value]
+        kept = [n for n in graph if n == "end" or costs[n] <= value * (1 + 1e-9)]
         if start in kept and nx.has_path(graph.subgraph(kept), start, "end"):
             return value, graph.subgraph(kept)
     return None

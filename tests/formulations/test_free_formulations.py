@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from importlib import import_module
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 
-from formulations.on_graph import Choice, on_graph
+from formulations.on_graph import Choice, on_graph, on_paths, worth
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError, TimeUpError
 from seqopt.graph.paths import fewest_moves, lexicographic
@@ -27,7 +28,8 @@ from seqopt.placement.solving import solve
 from seqopt.placement.watch import Watch
 from seqopt.sequence.free_rules import FreeRules, with_robots
 from tests.brute_force import ONES, best_values
-from tests.builders import small_arch
+from tests.builders import from_both_sides, small_arch
+from tests.random_graphs import graphs, simple_paths, values_of
 from tests.strategies import free_builds
 
 ALL = {name: find_schedule_formulation(name) for name in schedule_formulation_names(Finds.PLAN)}
@@ -82,14 +84,30 @@ def test_it_agrees_with_brute_force(name, aim, size):
     check(name, posed(aim, size), known(size, aim))
 
 
+SYMMETRIC = with_robots(from_both_sides(2, "VL"), 2)  # its peaks are equal but for rounding
+
+
 @given(build=free_builds(most_bricks=4, most_robots=3))
-@settings(max_examples=8, deadline=None)
+@example(build=(SYMMETRIC, FreeRules(least_grips=0, newest="free")))
+@settings(max_examples=8)
 def test_all_agree_with_brute_force_under_any_rules(build):
     engine, rules = ComplianceEngine(build_network(build[0])), build[1]
     for aim in ("minmax,steps", "regrips,sum"):
         best = best_values(engine, rules, aim)
         for name in ALL:
             check(name, pose_free(engine, rules, ONES, aim), best)
+
+
+@pytest.mark.parametrize("module", ["path_dp", "path_labels", "best_first", "flow_lp", "flow_mip"])
+@given(graph=graphs())
+@settings(max_examples=30)
+def test_it_finds_the_best_path_of_any_graph(module, graph):
+    graph = on_paths(graph)
+    found = sorted(values_of(graph, moves) for moves in simple_paths(graph))
+    if found:
+        choice = import_module(f"formulations.{module}").choose(graph, Watch(np.inf))
+        assert worth(graph, choice.path) == pytest.approx(found[0])
+        assert choice.bounds == pytest.approx(found[0])
 
 
 @every
