@@ -37,8 +37,8 @@ FREE_WORDS = ("rules", *RULES)
 """Options that the free schedule alone has."""
 STATE_WORDS = ("aim", "stands")
 """Options with which states of a build are chosen, of whatever schedule, and no candidates."""
-LOOP_WORDS = ("workers", "executor", "cache")
-"""Options that go with costs of candidates alone."""
+SHARING = ("workers", "executor", "cache")
+"""Options of `seqopt.responses.Resources` that no formulation of states has."""
 
 
 @dataclass(frozen=True)
@@ -163,10 +163,6 @@ def _pose(
     found = load_scene(scene) if isinstance(scene, str | Path) else scene
     made, free = in_order(found, options.pop("order", None)), _kind(schedule) == FREE
     states = free or any(word in options for word in STATE_WORDS)
-    if states:
-        what = "the free schedule has" if free else "aim and stands have"
-        loop = (*LOOP_WORDS, "candidates") if free else LOOP_WORDS
-        _refuse(options, loop, f"{what} no such option; leave it out")
     if free and isinstance(options.get("robots"), int):
         made = with_robots(made, options.pop("robots"))
     if not free:
@@ -177,6 +173,7 @@ def _pose(
         rules = _free_rules(options) if free else _open(engine, schedule, options)
         words = {name: options.pop(name, None) for name in STATE_WORDS}
         problem = posed_free(engine, asked[0], limits=limits, rules=rules, **words)
+        problem = replace(problem, resources=_resources(options, SHARING))
         if caps := parse_caps(options.pop("budgets", ())):
             problem = within(problem, caps)
     else:
@@ -238,8 +235,13 @@ def _open(
 
 def _means(options: dict[str, Any]) -> tuple[Sequence[str], Resources]:
     """Take out of options what they say of budgets and resources."""
-    given = {field.name for field in fields(Resources)} & options.keys()
-    return options.pop("budgets", ()), Resources(**{name: options.pop(name) for name in given})
+    names = [field.name for field in fields(Resources)]
+    return options.pop("budgets", ()), _resources(options, names)
+
+
+def _resources(options: dict[str, Any], names: Sequence[str]) -> Resources:
+    """Take out of options what they say of resources."""
+    return Resources(**{name: options.pop(name) for name in names if name in options})
 
 
 def _free_rules(options: dict[str, Any]) -> FreeRules:

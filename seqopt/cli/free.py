@@ -18,7 +18,7 @@ from seqopt.cli.asked import (
 from seqopt.cli.criteria import parse_criterion
 from seqopt.cli.facts import scene_facts
 from seqopt.cli.free_files import free_files
-from seqopt.cli.means import parse_size
+from seqopt.cli.means import parse_resources, parse_size
 from seqopt.cli.order import SEARCH, optimize_order
 from seqopt.cli.outputs import require_out, write_outputs, written_to
 from seqopt.cli.posing import asked_schedule
@@ -127,10 +127,8 @@ def require_loop(options: argparse.Namespace) -> None:
 def _require_free(options: argparse.Namespace) -> None:
     """Raise an error if options that the free schedule does not have are given with it."""
     free = options.schedule == FREE
-    unknown: tuple[str, ...] = ("cache", "ranked", "among")
-    unknown += ("candidates",) if free else ("rule",)
+    unknown: tuple[str, ...] = ("ranked", "among", "candidates" if free else "rule")
     given = [name for name in unknown if getattr(options, name)]
-    given += ["workers"] if options.workers != "1" and options.order != SEARCH else []
     if given:
         raise ProblemError(
             f"--{given[0].replace('_', '-')}: "
@@ -163,5 +161,7 @@ def asked_free(options: argparse.Namespace) -> tuple[Scene, FreeProblem]:
         rules = asked_schedule(options, engine.network)
     limits, stands = parse_limits(options.limit, scene), parse_standing(options)
     problem = posed_free(engine, criterion, options.aim, rules=rules, limits=limits, stands=stands)
+    if options.command == "optimize":
+        problem = replace(problem, resources=parse_resources(options))
     caps = parse_caps(getattr(options, "budget", ()))
     return scene, within(problem, caps) if caps else problem

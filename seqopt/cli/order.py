@@ -10,7 +10,6 @@ from seqopt.cli.asked import exceeded, level_notes, strictly
 from seqopt.cli.facts import scene_facts
 from seqopt.cli.free_files import free_files
 from seqopt.cli.layout import wrapped
-from seqopt.cli.means import parse_resources
 from seqopt.cli.outputs import require_out, write_outputs, written_to
 from seqopt.cli.status import Status
 from seqopt.cli.values import parse_numbers, parse_time_limit
@@ -54,7 +53,7 @@ def optimize_order(options: argparse.Namespace, free: FreeProblem) -> Answer:
         formulation,
         proof=not options.no_proof,
         progress=within(options.tell, limit),
-        resources=parse_resources(options),
+        resources=free.resources,
         **{"seconds": limit, **whole},
     )
     report = found.summary()

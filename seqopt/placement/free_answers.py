@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-from functools import reduce
-from operator import or_
 from typing import NamedTuple
 
 import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
-from seqopt.engines.interface import Want
-from seqopt.errors import MechanismError
 from seqopt.placement.free_goals import LARGEST, Goal
 from seqopt.placement.free_problem import FreeProblem
 from seqopt.placement.requirements import state_costs
-from seqopt.responses.quantities import CHOSEN_BY, lengths
-
-BATCH = 2048  # grip sets whose fields are held at once
+from seqopt.responses.blocks import Block
+from seqopt.responses.grip_sets import solve_sets
 
 
 class Answers(NamedTuple):
@@ -51,10 +46,7 @@ def ask(problem: FreeProblem, bricks: int, grips: Ints, most: float = np.inf) ->
     """
     if problem.each:
         return _worst(problem, bricks, grips, most)
-    parts = [_asked(problem, bricks, grips[:0])]
-    for start in range(0, len(grips), BATCH):
-        parts.append(_asked(problem, bricks, grips[start : start + BATCH]))
-    return Answers(*map(np.concatenate, zip(*parts, strict=True)))
+    return _asked(problem, bricks, grips)
 
 
 def _worst(problem: FreeProblem, bricks: int, grips: Ints, most: float) -> Answers:
@@ -70,25 +62,13 @@ def _worst(problem: FreeProblem, bricks: int, grips: Ints, most: float) -> Answe
 
 
 def _asked(problem: FreeProblem, bricks: int, grips: Ints) -> Answers:
-    """Return the same of a few sets; those that leave something loose are found by halving."""
-    if not len(grips):
-        shapes = (0, len(problem.goals)), grips.shape, (0,)
-        return Answers(np.zeros(shapes[0]), np.zeros(shapes[1]), np.zeros(0, dtype=bool))
-    named = [CHOSEN_BY[name] for name in problem.named if name != LARGEST]
-    want = reduce(or_, (response.needs for response in named), Want(0))
-    try:
-        fields = problem.engine.solve(bricks, grips, want)
-    except MechanismError:
-        if len(grips) == 1:
-            worth = np.full((1, len(problem.goals)), np.inf)
-            return Answers(worth, np.full(grips.shape, np.inf), np.zeros(1, dtype=bool))
-        half = len(grips) // 2
-        halves = [_asked(problem, bricks, part) for part in (grips[:half], grips[half:])]
-        return Answers(*map(np.concatenate, zip(*halves, strict=True)))
-    found = {r.name: r.of(problem.network, fields) for r in named}
-    forces = lengths(fields.grip_force)
+    """Return the same of one scenario; nothing that is kept anywhere is believed."""
+    names = tuple(name for name in problem.named if name != LARGEST)
+    block = Block(bricks, grips, names, screen=False)
+    rows = solve_sets(problem.engine, block, problem.resources)
+    found, forces = dict(zip(names, rows.T, strict=False)), rows[:, len(names) :]
     found[LARGEST] = forces.max(axis=1, initial=0.0)
-    fit = np.ones(len(grips), dtype=bool)
+    fit = np.asarray(np.isfinite(rows).all(axis=1))
     for limit in problem.limits:
         fit &= ~limit.exceeded(found.get(limit.response, np.zeros(len(grips))))
     worth = np.column_stack([_costs(problem, goal, found, bricks, fit) for goal in problem.goals])

@@ -27,11 +27,13 @@ from seqopt.placement.schedule_formulation import ScheduleFormulation, find_sche
 from seqopt.placement.schedule_selection import ScheduleSelection, with_numbers
 from seqopt.placement.shown_build import ShownBuild
 from seqopt.placement.standing_proof import certified
+from seqopt.responses.resources import HERE
 from seqopt.responses.table import analyze
 from seqopt.sequence.free_rules import FREE, Ending
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import Step, StepKind, idle_robots
 from seqopt.stability.assessment import stability_table
+from seqopt.work.workers import keep
 
 COUNTED = ("each", "sets", "screened", "stability")  # of a problem: they know what was computed
 
@@ -269,6 +271,18 @@ def solve_free(
     """
     formulation = find_schedule_formulation(formulation)
     formulation.require_options(options)
+    with keep(problem.resources.executor, problem.resources.workers):
+        return _solved(problem, formulation, options, proof=proof)
+
+
+def _solved(
+    problem: FreeProblem,
+    formulation: ScheduleFormulation,
+    options: Mapping[str, Any],
+    *,
+    proof: bool,
+) -> FreePlan:
+    """Return the plan of a formulation, judged."""
     start, twin = time.perf_counter(), replace(problem)  # which no formulation can reach
     selection = _selected(formulation, problem, twin, options)
     solved = time.perf_counter()
@@ -283,6 +297,11 @@ def solve_free(
     return FreePlan(problem, formulation, selection, certificate, steps, seconds)
 
 
+def _judged(problem: FreeProblem) -> FreeProblem:
+    """Return what a formulation must not change; who works for it may."""
+    return replace(problem, resources=HERE)
+
+
 def _selected(
     formulation: ScheduleFormulation,
     problem: FreeProblem,
@@ -293,7 +312,7 @@ def _selected(
     start, name = time.perf_counter(), formulation.name
     solve = partial(formulation.solve, problem, **options)
     try:
-        selection = called(name, lambda: problem, ScheduleSelection, solve)
+        selection = called(name, partial(_judged, problem), ScheduleSelection, solve)
     except InfeasibleError:
         left = float(options.get("seconds", math.inf)) - (time.perf_counter() - start)
         raise confirmed(twin, name, left) from None

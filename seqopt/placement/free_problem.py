@@ -27,6 +27,7 @@ from seqopt.placement.scenario_engines import engine_for, require_alike
 from seqopt.placement.standing import Standing, StandingSets
 from seqopt.responses.grip_sets import GripSets
 from seqopt.responses.quantities import robot_response
+from seqopt.responses.resources import HERE, Resources
 from seqopt.scene.checks import short
 from seqopt.scene.scene import Scene
 from seqopt.sequence.free_rules import FreeRules
@@ -67,6 +68,8 @@ class FreeProblem(Shown):
     scenarios : tuple of Engine
         Of the same scene in other states of the world: what is largest in any of them counts, and
         limits and standing hold in all. By default that of ``engine`` alone.
+    resources : Resources
+        Who solves grip sets, and where answers are kept; the proof believes none of these.
     """
 
     engine: Engine
@@ -78,6 +81,7 @@ class FreeProblem(Shown):
     settled: tuple[Standing, ...] = ()
     budgets: tuple[float, ...] = ()
     scenarios: tuple[Engine, ...] = ()
+    resources: Resources = HERE
 
     def __repr__(self) -> str:
         caps = zip(self.goals[len(self.aims) :], self.budgets, strict=True)
@@ -156,14 +160,15 @@ class FreeProblem(Shown):
     @cached_property
     def sets(self) -> GripSets:
         """Responses of grip sets, those of the engine that are named; the forces come with them."""
-        return GripSets(self.engine, [name for name in self.named if name != LARGEST])
+        names = [name for name in self.named if name != LARGEST]
+        return GripSets(self.engine, names, self.resources)
 
     @cached_property
     def screened(self) -> GripSets:
         """The same with six digits, to choose by: enough where only worst values count."""
         if any(goal.of_states and goal.measure is not Measure.PEAK for goal in self.goals):
             return self.sets
-        return GripSets(self.engine, self.sets.names, screen=True)
+        return GripSets(self.engine, self.sets.names, self.resources, screen=True)
 
     @property
     def models(self) -> int:

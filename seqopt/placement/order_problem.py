@@ -112,7 +112,8 @@ class OrderProblem(Shown):
 
     def judging(self, order: Order) -> FreeProblem:
         """Return the free schedule of one order with the goal that orders are judged by alone."""
-        return replace(self.at(order), goals=self.free.goals[:1])
+        alone = self.free.resources.alone()  # orders are shared out, not their grip sets
+        return replace(self.at(order), goals=self.free.goals[:1], resources=alone)
 
     def at(self, order: Order) -> FreeProblem:
         """Return the free schedule of one order."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pickle
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import partial
 
 import numpy as np
@@ -74,7 +74,7 @@ def trying(problem: OrderProblem, *, elsewhere: bool) -> Callable[[Trial], float
     """
     if not elsewhere:
         return partial(worth, problem)
-    free = problem.free
+    free = replace(problem.free, resources=problem.free.resources.alone())
     rest = {f.name: getattr(free, f.name) for f in fields(free) if f.name != "engine"}
     try:
         content = pickle.dumps((rest, problem.among))

@@ -92,7 +92,8 @@ def solve(
     proof : bool, optional
         False: ``cascade`` or ``rank_search`` solve only models that they need; no gap is known.
     lazy : bool, optional
-        Solve only the models that the proof needs; for exact formulations without budgets.
+        Solve only the models that the proof needs; for exact formulations without budgets. Free
+        schedules, and states of others, always do.
     time_limit : float, optional
         Seconds of choosing after which it returns its best choice and a bound, as at an interrupt;
         without proof, of all it does, and an error names the moves that were chosen by then.
@@ -144,7 +145,8 @@ def _solve_free(
     """Return the plan of a free schedule."""
     options |= {} if run.progress is None else {"progress": run.progress}
     options |= {} if math.isinf(run.time_limit) else {"seconds": run.time_limit}
-    options |= {"lazy": True} if run.lazy else {}
+    if run.lazy:  # it is at any rate
+        require_proof(run.proof)
     return solve_free(problem, formulation, proof=run.proof, **options)
 
 

@@ -48,11 +48,13 @@ class Block(FrozenValue):
     bricks: int  # how many bricks stand
     grips: Ints  # (S, r); nodes held
     names: tuple[str, ...]  # responses of `seqopt.responses.quantities.CHOSEN_BY`
+    screen: bool = True  # whether six digits are enough
 
     @cached_property
     def key(self) -> str:
         """Its content, condensed."""
-        mark = hashlib.sha256(repr((self.bricks, self.names, self.grips.shape)).encode())
+        exact = () if self.screen else ("exact",)
+        mark = hashlib.sha256(repr((self.bricks, self.names, self.grips.shape, *exact)).encode())
         mark.update(self.grips.astype("<i8").tobytes())
         return mark.hexdigest()
 
@@ -90,7 +92,8 @@ def answer(engine: Engine, block: Block) -> Answers:
     Raises `MechanismError`, `SolverError` as the engine does.
     """
     asked = [CHOSEN_BY[name] for name in block.names]
-    want = reduce(or_, (response.needs for response in asked), Want.SCREEN)
+    digits = Want.SCREEN if block.screen else Want(0)
+    want = reduce(or_, (response.needs for response in asked), digits)
     before = Counter(tally_of(engine))
     with one_thread():  # as many threads everywhere: sums in other orders differ in the last bit
         fields = engine.solve(block.bricks, block.grips, want)

@@ -7,17 +7,27 @@ solved in batches, each of them once.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import reduce
-from operator import or_
+from dataclasses import replace
+from functools import partial
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from seqopt.arrays import Floats, Ints
-from seqopt.engines.interface import Engine, Want
+from seqopt.engines.interface import Engine
 from seqopt.errors import MechanismError
 from seqopt.responses.batches import BLOCK
-from seqopt.responses.quantities import CHOSEN_BY, lengths, require_finite
+from seqopt.responses.blocks import (
+    Answers,
+    Block,
+    Shipment,
+    Store,
+    answer,
+    engine_of,
+    open_store,
+    pack,
+)
+from seqopt.responses.resources import HERE, Resources
+from seqopt.work.workers import hire, map_ordered
 
 
 class KnownRows:
@@ -72,7 +82,8 @@ class GripSets:
     """The responses of grip sets of one scene.
 
     ``engine``: what solves them; ``names``: responses of `seqopt.responses.quantities.CHOSEN_BY`
-    that are wanted; ``screen``: whether six digits are enough, to choose by.
+    that are wanted; ``resources``: who solves them, and where answers are kept; ``screen``: whether
+    six digits are enough, to choose by.
 
     Examples
     --------
@@ -85,11 +96,17 @@ class GripSets:
     ((2, 1), (2, 2), 2)
     """
 
-    def __init__(self, engine: Engine, names: Sequence[str], *, screen: bool = False) -> None:
-        self._engine = engine
-        self._names = tuple(names)
-        digits = Want.SCREEN if screen else Want(0)
-        self._want = reduce(or_, (CHOSEN_BY[name].needs for name in names), digits)
+    def __init__(
+        self,
+        engine: Engine,
+        names: Sequence[str],
+        resources: Resources = HERE,
+        *,
+        screen: bool = False,
+    ) -> None:
+        self._engine, self._resources = engine, resources
+        self._names, self._screen = tuple(names), screen
+        self._store: Store | None = None
         self._known = KnownRows()
         scene = engine.network.scene
         self._number = np.array([0, *(node for brick in scene.placed for node in brick.nodes)])
@@ -146,27 +163,59 @@ class GripSets:
 
     def _solve(self, bricks: int, nodes: Ints) -> Floats:
         """Return responses and forces of sets, (S, R + r)."""
-        parts = [
-            self._block(bricks, self._number[nodes[start : start + BLOCK]])
-            for start in range(0, len(nodes), BLOCK)
-        ]
-        width = len(self._names) + nodes.shape[1]
-        return np.concatenate([np.zeros((0, width)), *parts])
+        if self._store is None:
+            self._store = open_store(self._resources.cache, self._engine)
+        sets = Block(bricks, self._number[nodes], self._names, self._screen)
+        return solve_sets(self._engine, sets, self._resources, self._store)
 
-    def _block(self, bricks: int, grips: ArrayLike) -> Floats:
-        """Return the same of a few sets of node numbers; those that leave something loose apart."""
-        grips = np.asarray(grips)
-        try:
-            fields = self._engine.solve(bricks, grips, self._want)
-        except MechanismError:
-            if len(grips) == 1:
-                return np.full((1, len(self._names) + grips.shape[1]), np.inf)
-            half = len(grips) // 2
-            halves = [self._block(bricks, part) for part in (grips[:half], grips[half:])]
-            return np.concatenate(halves)
-        columns = [CHOSEN_BY[name].of(self._engine.network, fields) for name in self._names]
-        forces = lengths(fields.grip_force)
-        for name, values in zip(self._names, columns, strict=True):
-            require_finite(name, values, bricks)
-        require_finite("grip force", forces, bricks)
-        return np.column_stack([*columns, forces])
+
+_SHARED = 64  # least sets of a task
+
+
+def solve_sets(
+    engine: Engine, sets: Block, resources: Resources = HERE, store: Store | None = None
+) -> Floats:
+    """Return the responses of grip sets, then the forces of grips; infinite where a part is loose.
+
+    ``sets``: with one brick count; ``resources``: who solves them; ``store``: what is known. Result
+    (S, R + r): SI units. Raises `SolverError`, `WorkerError`.
+    """
+    grips, alone = sets.grips, resources.executor is None and resources.workers == 1
+    most = BLOCK if alone and store is None else min(BLOCK, max(_SHARED, len(grips) // 32))
+    parts = [replace(sets, grips=grips[at : at + most]) for at in range(0, len(grips), most)]
+    workers = (resources.executor, resources.workers) if len(parts) > 1 else (None, 1)
+
+    def known(part: Block) -> Floats | None:
+        found = None if store is None else store.find(part)
+        return None if found is None else _columns(part, found)
+
+    def done(part: Block, rows: Floats) -> None:
+        if store is not None and np.isfinite(rows).all():
+            columns = rows.T
+            values = dict(zip(part.names, columns, strict=False))
+            store.keep(part, Answers(values, columns[len(values) :].T))
+
+    with hire(*workers) as crew:
+        solved = partial(_sent, pack(engine)) if crew is not None else partial(_solved, engine)
+        rows = [*map_ordered(solved, parts, crew, known, done)]
+    return np.concatenate([np.zeros((0, len(sets.names) + grips.shape[1])), *rows])
+
+
+def _sent(shipment: Shipment, part: Block) -> Floats:
+    return _solved(engine_of(shipment), part)
+
+
+def _solved(engine: Engine, part: Block) -> Floats:
+    """Return what is known of a few sets; those that leave something loose are found by halving."""
+    try:
+        return _columns(part, answer(engine, part))
+    except MechanismError:
+        count = len(part.grips)
+        if count == 1:
+            return np.full((1, len(part.names) + part.grips.shape[1]), np.inf)
+        halves = part.grips[: count // 2], part.grips[count // 2 :]
+        return np.concatenate([_solved(engine, replace(part, grips=half)) for half in halves])
+
+
+def _columns(part: Block, found: Answers) -> Floats:
+    return np.column_stack([*(found.values[name] for name in part.names), found.forces])

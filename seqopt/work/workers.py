@@ -18,6 +18,7 @@ import warnings
 from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
 from contextlib import contextmanager, suppress
+from contextvars import ContextVar
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
@@ -268,7 +269,10 @@ def hire(
     Crew or None
         None where there is but this process.
     """
-    if executor is not None:
+    kept = _KEPT.get()
+    if kept is not None and not lanes:
+        yield kept
+    elif executor is not None:
         known = getattr(executor, "_max_workers", None)
         most = known if isinstance(known, int) else _UNKNOWN
         yield _Given(executor, workers if workers > 1 else most)
@@ -282,6 +286,20 @@ def hire(
         processes.end(now=False)
     else:
         yield None
+
+
+_KEPT: ContextVar[Crew | None] = ContextVar("_KEPT", default=None)
+
+
+@contextmanager
+def keep(executor: Executor | None = None, workers: int = 1) -> Iterator[None]:
+    """Hire workers once for all who `hire` some within a with block, without lanes."""
+    with hire(executor, workers) as crew:
+        before = _KEPT.set(crew)
+        try:
+            yield
+        finally:
+            _KEPT.reset(before)
 
 
 _Task = TypeVar("_Task")

@@ -427,7 +427,7 @@ def test_the_short_cut_does_what_the_long_way_does():
         ({"criterion": "equations-2-3"}, "equations-2-3: it ranks the choices of a move"),
         ({"formulation": "overlap_dp"}, "'overlap_dp' is not a formulation of the free schedule"),
         ({"formulation": "pareto_zones"}, "one plan is asked for; use .*schedule_search"),
-        ({"workers": 2}, "option workers: the free schedule has no such"),
+        ({"workers": 0}, "workers is 0; give a whole number from 1"),
         ({"rules": {"regrips": 0}}, "rules {'regrips': 0}: give a seqopt.FreeRules"),
         ({"robots": 9}, "9 robots: the free schedule takes two to 5"),
         ({"robots": "rob9"}, "robot 'rob9' does not exist; give some of rob1"),

@@ -240,5 +240,3 @@ def test_what_does_not_go_together_is_said_in_a_line():
         seqopt.pose(engine, schedule, ONES)
     with pytest.raises(ProblemError, match="ranks the choices of a move"):
         pose_free(engine, schedule, seqopt.CRITERIA["equations-2-3"], "sum")
-    with pytest.raises(ProblemError, match="option workers: aim and stands have no such option"):
-        seqopt.optimize(small_arch(4), "three-robot", ONES, aim="sum", workers=2)
