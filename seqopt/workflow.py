@@ -33,7 +33,7 @@ from seqopt.sequence.schedule_file import find_schedule
 from seqopt.study.presets import EQUATIONS, find_criterion
 
 RULES = tuple(field.name for field in fields(FreeRules) if field.name != "robots")
-FREE_WORDS = ("rules", *RULES)
+FREE_WORDS = ("rules", *(name for name in RULES if name != "candidates"))
 """Options that the free schedule alone has."""
 STATE_WORDS = ("aim", "stands")
 """Options with which states of a build are chosen, of whatever schedule, and no candidates."""

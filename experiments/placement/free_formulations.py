@@ -1,10 +1,10 @@
 """Claim: all exact formulations of the free schedule that end within a minute find the same plan.
 
-From 11 bricks on the programs of a solver take at least three times as long as the search by
-thresholds, and on 25 bricks ten times, or they do not end. Of the exact ones that search computes
-the fewest responses where the worst step counts.
+On 25 bricks a linear program takes at least twice and an integer program twenty times as long as
+the search by thresholds, or it does not end. Of the exact ones that search computes the fewest
+responses where the worst step counts.
 
-Method: the arch of the paper and shorter ones of its shape, three robots, criterion
+Method: the arch of the paper, shorter and longer ones of its shape, three robots, criterion
 `worst-ratio-published`, the smallest worst step and then the fewest steps, and the least sum. Each
 formulation solves a problem posed anew, in one process, responses among its processor time; of
 those that take less than five seconds the best of three rounds counts. What a minute leaves open is
@@ -38,11 +38,11 @@ from seqopt.placement.solving import solve
 from seqopt.sequence.free_rules import FreeRules
 from seqopt.study.presets import CRITERIA
 
-SIZES = ("chain7", "chain11", "chain15", "arch25")
+SIZES = ("chain7", "chain11", "chain15", "arch25", "chain49", "chain97")
 AIMS = ("minmax,steps", "sum")
 PATIENCE, SHORT = 60.0, 5.0  # s after which one is stopped; below which it is run three times
-SEARCH, PROGRAMS = "schedule_search", ("flow_lp", "flow_mip")
-SLOWER = {11: 3.0, 25: 10.0}  # how many times as long programs take, from a brick count on
+SEARCH, SLOWER = "schedule_search", {"flow_lp": 2.0, "flow_mip": 20.0}  # on so many bricks:
+ON = 25
 CLOSE = 1e-6
 
 
@@ -83,21 +83,25 @@ def row(scene: str, aim: str, name: str, rounds: int) -> dict[str, object]:
 
 def agree(table: pd.DataFrame) -> bool:
     """Return whether exact ones that ended have the same values, and no plan is better."""
-    best = table[table["formulation"] == SEARCH]
-    both = table.merge(best, on=["bricks", "aim"], suffixes=("", "_best"))
-    off = both["value"] / both["value_best"] - 1
-    ended = (both["kind"] == FormulationKind.EXACT.value) & (both["status"] == "optimal")
-    same = (off.abs() <= CLOSE) & ((both["steps"] == both["steps_best"]) | (both["aim"] == "sum"))
-    return bool((off >= -CLOSE).all() and same[ended].all())
+    ended = (table["kind"] == FormulationKind.EXACT.value) & (table["status"] == "optimal")
+    exact = table[ended].groupby(["bricks", "aim"])
+    values, steps = exact["value"], exact["steps"]
+    same = (values.max() <= values.min() * (1 + CLOSE)) & (steps.max() == steps.min())
+    worst = values.max().rename("worst").reset_index()
+    both = table.merge(worst, on=["bricks", "aim"])
+    return bool(same.all() and (both["value"] >= both["worst"] * (1 - CLOSE)).all())
 
 
 def slower(table: pd.DataFrame) -> bool:
     """Return whether programs are as much slower than the search as is claimed, or do not end."""
-    times = table.pivot_table("seconds", ["bricks", "aim"], "formulation")
-    ratios = times[[*PROGRAMS]].div(times[SEARCH], axis=0)
-    own = ratios[table.pivot_table("gap", ["bricks", "aim"], "formulation")[[*PROGRAMS]] <= CLOSE]
-    bricks = own.index.get_level_values("bricks")
-    return all(not (own[bricks >= least] < most).any(axis=None) for least, most in SLOWER.items())
+    on = table[(table["bricks"] == ON)]
+    times = on.pivot_table("seconds", "aim", "formulation")
+    ended = on[on["status"] == "optimal"].groupby(["aim", "formulation"]).size()
+    return all(
+        (aim, name) not in ended or times.loc[aim, name] >= least * times.loc[aim, SEARCH]
+        for name, least in SLOWER.items()
+        for aim in times.index
+    )
 
 
 def fewest(table: pd.DataFrame) -> bool:
@@ -115,10 +119,14 @@ def holds(table: pd.DataFrame) -> bool:
 def experiment(options: Options) -> Finding:
     names = schedule_formulation_names(Finds.PLAN)
     sizes, rounds = (SIZES[:1], 1) if options.quick else (SIZES, 3)
-    rows = []
+    rows: list[dict[str, object]] = []
+    late = set[tuple[str, str]]()
     for scene in sizes:
         for aim in AIMS:
-            rows += [row(scene, aim, name, rounds) for name in names]
+            for name in names:
+                if (aim, name) not in late:
+                    rows.append(row(scene, aim, name, rounds))
+                    late |= {(aim, name)} if rows[-1]["seconds"] > 0.9 * PATIENCE else set()
     table = pd.DataFrame(rows)
     print(table.to_string(index=False, float_format="%.4g"))
     if not options.quick:

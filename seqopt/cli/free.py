@@ -127,7 +127,7 @@ def require_loop(options: argparse.Namespace) -> None:
 def _require_free(options: argparse.Namespace) -> None:
     """Raise an error if options that the free schedule does not have are given with it."""
     free = options.schedule == FREE
-    unknown: tuple[str, ...] = ("ranked", "among", "candidates" if free else "rule")
+    unknown: tuple[str, ...] = ("ranked", "among", *(() if free else ("rule",)))
     given = [name for name in unknown if getattr(options, name)]
     if given:
         raise ProblemError(
@@ -153,6 +153,8 @@ def asked_free(options: argparse.Namespace) -> tuple[Scene, FreeProblem]:
     if not free and (options.rule or options.robots.isdecimal()):
         raise StepError(f"--schedule {options.schedule}: rules and a count of robots go with free")
     rules: FreeRules | Schedule = parse_rules(options.rule, names if free else ())
+    if free and getattr(options, "candidates", None):
+        rules = replace(rules, candidates=options.candidates)
     criterion = None
     if options.criteria is not None:
         criterion = parse_criterion(options.criteria, options.crown)

@@ -8,7 +8,7 @@ RULES = (
     "least_grips=N (2; from the second brick on), newest=either|placing|free (where the newest "
     "brick is held), regrips=N|any (between two bricks), placers=NAME,NAME|any, "
     "payload=kept|ignored, ending=held|released|one-by-one (how robots leave the finished "
-    "structure)"
+    "structure), candidates=near:JOINTS|within:METERS|all (as --candidates)"
 )
 
 

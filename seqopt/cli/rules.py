@@ -14,7 +14,7 @@ from seqopt.placement.standing import Standing
 from seqopt.sequence.free_rules import FreeRules
 
 COUNTS = ("least_grips", "regrips")
-RULES = ("newest", "payload", "ending", "placers", *COUNTS)
+RULES = ("newest", "payload", "ending", "placers", "candidates", *COUNTS)
 
 
 def parse_standing(options: argparse.Namespace) -> Standing | None:
@@ -70,6 +70,8 @@ def parse_rules(texts: Sequence[str], robots: tuple[str, ...]) -> FreeRules:
                 given[name] = None
         elif name == "placers":
             given[name] = () if value == "any" else parse_robots(value)
+        elif name == "candidates":
+            given[name] = "" if value == "all" else value
         else:
             given[name] = value
     return FreeRules(**given)  # type: ignore[arg-type]

@@ -85,7 +85,8 @@ class FreePlan(ShownBuild):
         values = ", ".join(f"{name} {value:.6g}" for name, value in self.objective.items())
         gap = 0.0 if self.certificate is None else self.certificate.gap
         left = f" within {gap:.2g}" if TOLERANCE < gap < float("inf") else ""
-        return f"{values}, {self.status}{left}"
+        among = self.problem.among
+        return f"{values}, {self.status}{left}{among and f' among candidates {among}'}"
 
     @property
     def status(self) -> str:

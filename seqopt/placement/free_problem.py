@@ -115,6 +115,12 @@ class FreeProblem(Shown):
         return self.rules
 
     @property
+    def among(self) -> str:
+        """Which candidates alone are looked at, in words; empty for all."""
+        rules = self.rules
+        return rules.left_out if isinstance(rules, Schedule) else rules.candidates
+
+    @property
     def title(self) -> str:
         """What it is about, where plans stand beside each other."""
         return f"{self.rules.method} schedule" if isinstance(self.rules, Schedule) else FREE_TITLE

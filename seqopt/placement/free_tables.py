@@ -48,7 +48,7 @@ class Follows(NamedTuple):
 class _Places(NamedTuple):
     """Places that count with so many bricks: lists by robot, and rows over places."""
 
-    reach: list[list[int]]  # that robots may hold
+    reach: list[list[int]]  # that robots may take hold of
     newest: list[list[int]]  # at which they hold the newest brick
     holds: Bools  # the same as rows
     parts: list[Bools]  # of bricks that nothing ties to the ground
@@ -85,7 +85,7 @@ class RuleTables:
         """Return the places that count with so many bricks, looked up once."""
         if bricks not in self._known:
             book, robots = self._book, range(self.robots)
-            reach = [[self._place[n] for n in book.reached[r, bricks]] for r in book.team]
+            reach = [[self._place[n] for n in book.takes[r, bricks]] for r in book.team]
             newest = [
                 [self._place[n] for n in (book.newest_nodes[r, bricks] if bricks else ())]
                 for r in book.team

@@ -38,6 +38,16 @@ class RuleBook:
         return {(r, b): reachable(scene, scene.robots[r], b) for r in self.team for b in counts}
 
     @cached_property
+    def takes(self) -> dict[tuple[int, int], tuple[int, ...]]:
+        """By robot and brick count, the nodes of bricks that stand that it may take hold of."""
+        counts = range(len(self.network.scene.placed) + 1)
+        near = [self.rules.near(self.network.scene, b) for b in counts]
+        return {
+            (r, b): tuple(n for n in nodes if n in near[b])
+            for (r, b), nodes in self.reached.items()
+        }
+
+    @cached_property
     def newest_nodes(self) -> dict[tuple[int, int], tuple[int, ...]]:
         """By robot and brick count, at which nodes it holds the newest brick."""
         out = {}
@@ -94,7 +104,7 @@ class RuleBook:
     def _held(self, bricks: int, grips: Grips) -> Iterator[Grips]:
         """Yield the grips after one more is taken, which breaks no rule."""
         for robot in self.team:
-            for node in self.reached[robot, bricks] if grips[robot] is None else ():
+            for node in self.takes[robot, bricks] if grips[robot] is None else ():
                 if node not in grips:
                     yield _with(grips, robot, node)
 

@@ -11,6 +11,7 @@ from seqopt.errors import StepError, did_you_mean
 from seqopt.scene.checks import short
 from seqopt.scene.parts import Robot
 from seqopt.scene.scene import Scene
+from seqopt.sequence.near import Near
 
 FREE = "free"  # the schedule that is no list of steps
 _MOST_ROBOTS = 5
@@ -59,6 +60,9 @@ class FreeRules:
         Most grips taken between two bricks, besides those that place; by default any number.
     ending : Ending or str
         How the build ends.
+    candidates : str
+        Where bricks that stand may be taken hold of: ``near:6`` or ``within:1.5``, as of
+        `seqopt.sequence.near.Near`; by default wherever robots reach.
 
     Raises
     ------
@@ -78,6 +82,7 @@ class FreeRules:
     payload: Payload = Payload.KEPT
     regrips: int | None = None
     ending: Ending = Ending.RELEASED
+    candidates: str = ""
 
     def __post_init__(self) -> None:
         for name, kind in (("newest", Newest), ("payload", Payload), ("ending", Ending)):
@@ -87,6 +92,15 @@ class FreeRules:
         object.__setattr__(self, "least_grips", _count("least_grips", self.least_grips, 0))
         if self.regrips is not None:
             object.__setattr__(self, "regrips", _count("regrips", self.regrips, 0))
+        if self.candidates:
+            object.__setattr__(self, "candidates", Near(self.candidates).rule)
+
+    def near(self, scene: Scene, bricks: int) -> frozenset[int]:
+        """Return the nodes of bricks that stand, of so many, that may be taken hold of."""
+        nodes = [node for brick in scene.placed[:bricks] for node in brick.nodes]
+        if not self.candidates:
+            return frozenset(nodes)
+        return frozenset(Near(self.candidates).nodes(scene, bricks, nodes))
 
     def team(self, scene: Scene) -> tuple[int, ...]:
         """Return which of a scene's robots take part.
@@ -129,6 +143,7 @@ class FreeRules:
             "payload": self.payload.value,
             "regrips": "any" if self.regrips is None else self.regrips,
             "ending": self.ending.value,
+            "candidates": self.candidates or "all",
         }
 
     def loosened(self) -> Iterator[tuple[str, FreeRules]]:
@@ -142,12 +157,17 @@ class FreeRules:
         if self.regrips is not None:
             yield f"regrips={self.regrips + 1}", replace(self, regrips=self.regrips + 1)
             yield "regrips=any", replace(self, regrips=None)
-        if self.placers:
-            yield "placers=any", replace(self, placers=())
-        if self.payload is Payload.KEPT:
-            yield "payload=ignored", replace(self, payload=Payload.IGNORED)
-        if self.ending is not Ending.HELD:
-            yield "ending=held", replace(self, ending=Ending.HELD)
+        for name, value, said in _LOOSEST:
+            if getattr(self, name) != value:
+                yield f"{name}={said}", replace(self, **{name: value})  # type: ignore[arg-type]
+
+
+_LOOSEST = (
+    ("candidates", "", "all"),
+    ("placers", (), "any"),
+    ("payload", Payload.IGNORED, "ignored"),
+    ("ending", Ending.HELD, "held"),
+)  # rules that are loosened as a whole, and how a user says so
 
 
 def with_robots(scene: Scene, count: int) -> Scene:

@@ -275,9 +275,9 @@ class FreeSpace(Terse):
         if self.rules.regrips is not None:
             able &= states[:, -1] < self.rules.regrips
         rows = np.flatnonzero(able)
-        parts = []
+        parts, near = [], self._near(bricks)
         for k, kind in enumerate(self.kinds):
-            parts += self._take(k, states[rows], np.flatnonzero(kind.reach[: 2 * bricks]))
+            parts += self._take(k, states[rows], near[kind.reach[near]])
         moves = _join_moves(parts, states)
         if self._counts:
             moves.states[:, -1] += 1
@@ -339,6 +339,20 @@ class FreeSpace(Terse):
         bare = (moves.states[:, : self.robots] <= 0).all(axis=1)
         moves.states[bare, : self.robots] = 0
         return moves
+
+    def _near(self, bricks: int) -> Ints:
+        """Return the nodes of bricks that stand that may be taken hold of, from 0."""
+        if not self.rules.candidates:
+            return np.arange(2 * bricks)
+        if bricks not in self._near_of:
+            near = self.rules.near(self.network.scene, bricks)
+            numbers = node_numbers(self.network)[: 2 * bricks]
+            self._near_of[bricks] = np.flatnonzero([node in near for node in numbers])
+        return self._near_of[bricks]
+
+    @cached_property
+    def _near_of(self) -> dict[int, Ints]:
+        return {}
 
     @property
     def _free_grips(self) -> tuple[int, Floats | None]:

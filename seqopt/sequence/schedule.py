@@ -7,20 +7,18 @@ the whole, however it is found.
 
 from __future__ import annotations
 
-import math
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from numbers import Integral
 from typing import TYPE_CHECKING
 
-import networkx as nx
 import pandas as pd
 
 from seqopt.arrays import Terse
-from seqopt.errors import StepError, did_you_mean
+from seqopt.errors import StepError
 from seqopt.scene.scene import Scene
+from seqopt.sequence.near import Near
 from seqopt.sequence.steps import AnyStep, Step, StepKind, check_sequence
 from seqopt.showing import Shown, display
 
@@ -247,17 +245,11 @@ class Schedule(Shown):
         return check_sequence(self.scene, steps)
 
 
-_RULE = re.compile(r"(near|within):([0-9]+\.?[0-9]*|\.[0-9]+)")
-_NEWEST = 2  # bricks that make the working end: a build from both ends has two of them
-
-
 def thin(schedule: Schedule, rule: str) -> Schedule:
     """Return a schedule with the candidates near the working end alone.
 
-    ``rule``: ``near:12`` keeps the nodes of bricks that at most 12 joints part from the bricks
-    placed last, ``within:1.5`` the nodes at most 1.5 m from these bricks' centroids. Where a rule
-    keeps none, the nearest stay. Result: that says what was left out; the same where nothing is.
-    Raises `StepError` if there is no such rule.
+    ``rule``: as of `seqopt.sequence.near.Near`. Where it keeps none, the nearest stay. Result: that
+    says what was left out; the same where nothing is. Raises `StepError` if there is no such rule.
 
     Examples
     --------
@@ -266,43 +258,13 @@ def thin(schedule: Schedule, rule: str) -> Schedule:
     >>> thin(schedule, "near:3").left_out
     'near:3 keeps 173 of 492 candidates'
     """
-    found = _RULE.fullmatch(rule.strip()) if isinstance(rule, str) else None
-    if found is None:
-        hint = did_you_mean(str(rule).partition(":")[0], ("near", "within"))
-        raise StepError(f"candidates {rule!r}{hint}: give near:JOINTS or within:METERS, as near:12")
-    distance = _joints_away if found[1] == "near" else _meters_away
-    most, scene = float(found[2]), schedule.scene
-    moves = tuple(_thinned(move, distance(scene, move.bricks), most) for move in schedule.moves)
+    near, scene = Near(rule), schedule.scene
+    moves = tuple(
+        replace(move, candidates=near.nodes(scene, move.bricks, move.candidates))
+        for move in schedule.moves
+    )
     kept, all_ = (sum(len(m.candidates) for m in some) for some in (moves, schedule.moves))
     if kept == all_:
         return schedule
-    said = f"{found[0]} keeps {kept:,} of {all_:,} candidates"
+    said = f"{near.rule} keeps {kept:,} of {all_:,} candidates"
     return replace(schedule, moves=moves, left_out=said)
-
-
-def _thinned(move: Move, away: dict[int, float], most: float) -> Move:
-    """Return a move with the candidates that are near, or the nearest."""
-    limit = max(most, min(away.get(node, math.inf) for node in move.candidates))
-    near = tuple(node for node in move.candidates if away.get(node, math.inf) <= limit)
-    return replace(move, candidates=near)
-
-
-def _joints_away(scene: Scene, bricks: int) -> dict[int, float]:
-    """Return how many joints part the nodes of placed bricks from the newest."""
-    placed = scene.placed[:bricks]
-    names = {brick.name for brick in placed}
-    graph: nx.Graph[int] = nx.Graph()
-    graph.add_nodes_from(names)
-    graph.add_edges_from(joint.bricks for joint in scene.joints if names.issuperset(joint.bricks))
-    newest = {brick.name for brick in placed[-_NEWEST:]}
-    away = nx.multi_source_dijkstra_path_length(graph, newest)
-    return {n: float(away.get(b.name, math.inf)) for b in placed for n in b.nodes}
-
-
-def _meters_away(scene: Scene, bricks: int) -> dict[int, float]:
-    """Return how far the nodes of placed bricks are from the centroids of the newest, m."""
-    placed = scene.placed[:bricks]
-    ends = [brick.position for brick in placed[-_NEWEST:]]
-    return {
-        n: min(math.dist(b.node_position(n), end) for end in ends) for b in placed for n in b.nodes
-    }
