@@ -50,11 +50,13 @@ def distance(scene, first, second):
     return float(np.linalg.norm(np.subtract(*map(scene.node_position, (first, second)))))
 
 
-def whole_graph(engine, rules, *, last=False):
+def whole_graph(engine, rules, *, last=False, allow=None):
     """Every labeled state with its four responses, the steps between them, start and ends.
 
-    A state may also say which node each robot held last; steps then say how far robots go.
+    A state may also say which node each robot held last; steps then say how far robots go. Which
+    states are allowed may be said by a function of brick count and grips, as of `allowed`.
     """
+    allow = partial(allowed, engine, rules) if allow is None else allow
     book, scene = RuleBook(engine.network, rules), engine.network.scene
     none = (None,) * len(scene.robots)
     start = (0, none, 0, none)
@@ -71,7 +73,7 @@ def whole_graph(engine, rules, *, last=False):
             after = (bricks, grips, count, held if last else none)
             if after not in graph:
                 if (bricks, grips) not in known:
-                    known[bricks, grips] = allowed(engine, rules, bricks, grips)
+                    known[bricks, grips] = allow(bricks, grips)
                 worst = known[bricks, grips]
                 if worst is None:
                     continue

@@ -21,11 +21,10 @@ def add_rules(takes: Takes) -> None:
         metavar="NAME=VALUE",
         help=f"what robots may do: {RULES}; may be repeated",
     )
-    _add_standing(takes)
 
 
-def _add_standing(takes: Takes) -> None:
-    """Add what demands that every state of a free schedule stands."""
+def add_standing(takes: Takes) -> None:
+    """Add what demands that every state stands."""
     takes.add_argument(
         "--stands",
         metavar="MORTAR",

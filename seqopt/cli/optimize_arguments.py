@@ -17,7 +17,7 @@ from seqopt.cli.common_arguments import (
     strict_argument,
     time_argument,
 )
-from seqopt.cli.free_arguments import add_rules
+from seqopt.cli.free_arguments import add_rules, add_standing
 from seqopt.placement.formulation import formulation_names
 from seqopt.sequence.free_rules import FREE
 from seqopt.sequence.three_robots import SCHEDULES
@@ -35,7 +35,8 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     form = group(command, "what is printed")
     strict_argument(form)
     form_arguments(form)
-    _free(group(command, "with --schedule free"))
+    _states(group(command, "what plans are compared by, state after state, with any schedule"))
+    add_rules(group(command, "with --schedule free"))
     criterion_arguments(group(command, "what a step costs (advanced)"))
     engine_arguments(group(command, "how responses are computed (advanced)"))
     _search(group(command, "how far the search goes (advanced)"))
@@ -50,7 +51,8 @@ def _basic(takes: Takes) -> None:
         metavar="NAME",
         help=f"which mathematical program chooses: {', '.join(formulation_names())} (default: "
         f"{_USUAL.formulation}, which is exact and the fastest, or {_USUAL.with_budgets} with "
-        "--budget); --schedule free and --robust have their own",
+        f"--budget); with --aim or --schedule free: {DEFAULTS[FREE].formulation} (default) or "
+        "another over states, as path_dp, path_beam or flow_lp; --robust without these has its own",
     )
     takes.add_argument(
         "--schedule",
@@ -75,20 +77,22 @@ def _budget(takes: Takes) -> None:
         help="cap on a total over the build, with the formulations labels, lagrangian, overlap_mip "
         "and overlap_lp: travel=0.8 (of what the optimum without budgets travels), travel=3.5m, "
         "steps_over:F_largest=250:10 (at most 10 open steps over 250 N), robot_use:rob1=100:5 (at "
-        "most 5 in which rob1 carries over 100 N); may be repeated",
+        "most 5 in which rob1 carries over 100 N); with --aim or --schedule free: steps=N, "
+        "regrips=N, travel=METERS or sum(RESPONSE)=VALUE; may be repeated",
     )
 
 
-def _free(takes: Takes) -> None:
+def _states(takes: Takes) -> None:
     takes.add_argument(
         "--aim",
         metavar="NAME,NAME",
         help="what is to be as small as possible, the most important first: minmax (the worst step "
         "by the criterion, by default worst-ratio), sum, steps, regrips, travel, bond, friction, "
-        "tilt, a response, or sum(RESPONSE) (default: minmax); with --order search, the best order "
-        "of the bricks is found too",
+        "tilt, a response, or sum(RESPONSE) (free: by default minmax; other schedules: by default "
+        "the total of what their moves cost); with --order search, the best order of the bricks is "
+        "found too",
     )
-    add_rules(takes)
+    add_standing(takes)
 
 
 def _search(takes: Takes) -> None:
@@ -109,13 +113,15 @@ def _search(takes: Takes) -> None:
         "--lazy",
         action="store_true",
         help="with an exact formulation: compute only the responses that the proof needs; stopped "
-        "before it is done, it leaves its best choice and a bound",
+        "before it is done, it leaves its best choice and a bound; with --aim or --schedule free "
+        "it is done at any rate",
     )
     takes.add_argument(
         "--candidates",
         metavar="RULE",
         help="look at fewer nodes per move: near:12 for those at most 12 joints from the newest "
-        "bricks, within:1.5 for those at most 1.5 m from them; makes any formulation a heuristic",
+        "bricks, within:1.5 for those at most 1.5 m from them; makes any formulation a heuristic "
+        "(free: of grips on bricks that stand; what is proven holds among these)",
     )
 
 

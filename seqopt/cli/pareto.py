@@ -21,7 +21,7 @@ from seqopt.cli.common_arguments import (
 )
 from seqopt.cli.facts import scene_facts
 from seqopt.cli.free import asked_free
-from seqopt.cli.free_arguments import add_rules
+from seqopt.cli.free_arguments import add_rules, add_standing
 from seqopt.cli.outputs import figure_notes, write_outputs, written_to
 from seqopt.cli.values import parse_numbers, parse_robots
 from seqopt.engines.interface import Engine
@@ -85,7 +85,9 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     basic.add_argument("--out", type=Path, metavar="DIR", required=True, help="folder to write")
     _choice(group(command, "which plan is picked, and when the search ends"))
     form_arguments(group(command, "what is printed"))
-    add_rules(group(command, "with --schedule free"))
+    free = group(command, "with --schedule free")
+    add_rules(free)
+    add_standing(free)
     engine_arguments(group(command, "how responses are computed (advanced)"))
     command.set_defaults(criteria=None, crown=None)
 

@@ -19,7 +19,7 @@ from seqopt.arrays import Floats, Ints
 from seqopt.errors import InfeasibleError
 from seqopt.graph.duality import ROUNDING, least_sum
 from seqopt.graph.graph import Graph
-from seqopt.graph.paths import distances, tied
+from seqopt.graph.paths import TIED, distances, tied
 
 ROUNDS = 60  # of cutting planes
 CLOSED = 1e-9  # share of a value to which prices are the best
@@ -193,8 +193,8 @@ def budget_bounds(
         paid = graph.amounts[:, [c for c, _ in limited]] @ price
         rounding = ROUNDING * len(graph.source) * float(price @ np.abs(taken))
         if graph.peaks[goal]:
-            part = graph.only(amounts < claimed[goal])
-            least = least_sum(part, paid[amounts < claimed[goal]])
+            better = amounts < claimed[goal] - TIED * abs(claimed[goal])
+            least = least_sum(graph.only(better), paid[better])
             no_path = least == np.inf or least > price @ taken + rounding
             out.append(claimed[goal] if no_path else -np.inf)
             graph = graph.only(amounts <= tied(values[goal]))

@@ -171,7 +171,7 @@ def plan_values(
     Returns
     -------
     tuple of float
-        SI units.
+        SI units. Over scenarios the largest, but ways, which are those of the scene itself.
 
     Raises
     ------
@@ -180,7 +180,13 @@ def plan_values(
     """
     if problem.each:
         worth = [plan_values(each, steps, claimed) for each in problem.each]
-        return tuple(np.max(worth, axis=0).tolist())
+        worst = np.max(worth, axis=0).tolist()
+        if any(goal.measure is Measure.TRAVEL for goal in problem.goals):  # as it is planned
+            worst = [
+                travel_of(problem, steps) if goal.measure is Measure.TRAVEL else value
+                for goal, value in zip(problem.goals, worst, strict=True)
+            ]
+        return tuple(worst)
     table = analyze(problem.engine, steps)
     columns = state_columns(problem, table)
     _require_limits(problem, columns)
