@@ -150,7 +150,7 @@ def _of_one(problem: FreeProblem, options: tuple[float, float]) -> float:
 
     What is below the former is enough to be looked at, where that plan is allowed in all.
     """
-    first = problem.each[0]
+    first = replace(problem.each[0], goals=problem.aims, budgets=())  # budgets are of the scene
     found = narrow(first, WIDTH, lambda _: None)
     ceiling = np.inf if found is None else found.objective[0]
     one = _best(first, Explorer(FreeStates(first)), (ceiling, options[1]), [])

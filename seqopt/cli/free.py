@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from seqopt.cli.answer import Answer
@@ -32,9 +33,11 @@ from seqopt.placement.asked_budgets import parse_caps
 from seqopt.placement.free_judge import plan_values
 from seqopt.placement.free_plan import FreePlan
 from seqopt.placement.free_problem import FreeProblem, within
+from seqopt.placement.robust_aim import RobustAim
 from seqopt.placement.robust_problem import robust
 from seqopt.placement.schedule_formulation import find_schedule_formulation
 from seqopt.placement.solving import solve
+from seqopt.scene.orders import in_order
 from seqopt.scene.scenarios import Scenarios
 from seqopt.scene.scene import Scene
 from seqopt.sequence.free_rules import FREE, FreeRules, with_robots
@@ -51,17 +54,21 @@ def optimize_free(options: argparse.Namespace) -> Answer:
         Of the command ``optimize``.
     """
     _require_free(options)
-    if options.order == SEARCH:
-        options.order = None
-        return optimize_order(options, asked_free(options)[1])
-    formulation = find_schedule_formulation(options.formulation or DEFAULTS[FREE].formulation)
-    numbers = parse_numbers("--option", options.option, formulation.options)
+    sought, options.order = (
+        options.order == SEARCH,
+        None if options.order == SEARCH else options.order,
+    )
     aim = None if options.robust is None else asked_aim(options, ())
     scene, problem = asked_free(options)
     unseen = None
     if aim is not None:
         known, unseen = asked_scenarios(options, scene)
         problem = robust(problem, known, aim)
+    if sought:
+        judged = None if unseen is None else partial(_out_of_sample, aim, unseen)
+        return optimize_order(options, problem, judged)
+    formulation = find_schedule_formulation(options.formulation or DEFAULTS[FREE].formulation)
+    numbers = parse_numbers("--option", options.option, formulation.options)
     require_out(options)
     whole = {name: type(formulation.options[name])(value) for name, value in numbers.items()}
     limit = parse_time_limit(options.time_limit)
@@ -71,7 +78,7 @@ def optimize_free(options: argparse.Namespace) -> Answer:
     plan = solve(problem, formulation, time_limit=limit, progress=options.tell, **how)
     table, report = plan.responses(), plan.summary()
     if unseen is not None:
-        report |= {"robust": str(aim), "unseen": _out_of_sample(plan, unseen)}
+        report |= _out_of_sample(aim, unseen, plan)
     said = f"{', '.join(map(str, problem.goals))}; {plan.status}"
     written = write_outputs(options, lambda: free_files(plan, report, plan.title, said))
     stopped = plan.selection.stopped == "interrupt"
@@ -86,14 +93,16 @@ def optimize_free(options: argparse.Namespace) -> Answer:
     return strictly(answer, options, over, plan.departures)
 
 
-def _out_of_sample(plan: FreePlan, unseen: Scenarios) -> dict[str, object]:
+def _out_of_sample(aim: RobustAim | None, unseen: Scenarios, plan: FreePlan) -> dict[str, object]:
     """Return the worst values of a plan in scenarios that it was not chosen by."""
-    judged = robust(replace(plan.problem, scenarios=(), limits=()), unseen, "worst-peak")
+    order = plan.problem.network.scene.build_order
+    scenes = [in_order(scene, order) for scene in unseen.scenes]
+    judged = robust(replace(plan.problem, scenarios=(), limits=()), scenes, "worst-peak")
     judged = replace(judged, standing=None, settled=())
     goals = tuple(goal for goal in judged.goals if not goal.of_margins)
     values = plan_values(replace(judged, goals=goals), plan.steps) if goals else ()
     worst = {str(goal): value for goal, value in zip(goals, values, strict=True)}
-    return {**unseen.settings, "worst": worst}
+    return {"robust": str(aim), "unseen": {**unseen.settings, "worst": worst}}
 
 
 def _said(plan: FreePlan, options: argparse.Namespace) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
 from dataclasses import replace
 
 from seqopt.cli.answer import Answer
@@ -14,6 +15,7 @@ from seqopt.cli.outputs import require_out, write_outputs, written_to
 from seqopt.cli.status import Status
 from seqopt.cli.values import parse_numbers, parse_time_limit
 from seqopt.errors import ProblemError
+from seqopt.placement.free_plan import FreePlan
 from seqopt.placement.free_problem import FreeProblem
 from seqopt.placement.order_plan import OrderPlan, solve_order
 from seqopt.placement.order_problem import OrderProblem
@@ -23,7 +25,11 @@ from seqopt.work.progress import within
 SEARCH = "search"  # the order that is sought
 
 
-def optimize_order(options: argparse.Namespace, free: FreeProblem) -> Answer:
+def optimize_order(
+    options: argparse.Namespace,
+    free: FreeProblem,
+    judged: Callable[[FreePlan], dict[str, object]] | None = None,
+) -> Answer:
     """Find the order whose best free schedule is best, and write its plan.
 
     Parameters
@@ -32,6 +38,8 @@ def optimize_order(options: argparse.Namespace, free: FreeProblem) -> Answer:
         Of the command ``optimize``.
     free : FreeProblem
         In the scene's own order.
+    judged : callable, optional
+        Returns what else is to be said of the plan that is found.
 
     Raises
     ------
@@ -56,11 +64,12 @@ def optimize_order(options: argparse.Namespace, free: FreeProblem) -> Answer:
         resources=free.resources,
         **{"seconds": limit, **whole},
     )
-    report = found.summary()
+    report = found.summary() | ({} if judged is None else judged(found.plan))
     written = write_outputs(
         options, lambda: free_files(found.plan, report, "best order", _said(found))
     )
-    return replace(_answer(options, found, formulation.name), written=written)
+    answer = _answer(options, found, formulation.name)
+    return replace(answer, facts={**answer.facts, "summary": report}, written=written)
 
 
 def _answer(options: argparse.Namespace, found: OrderPlan, name: str) -> Answer:

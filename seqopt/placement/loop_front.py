@@ -120,9 +120,11 @@ class LoopFront:
             least = self._least(k, allowed, paired)
             if not np.isfinite(least):
                 return None
+            point[k] = least = max(
+                least, self._floor[k]
+            )  # less in a step that is open gains nothing
             allowed = [ok & (s[..., k] <= least) for ok, s in zip(allowed, single, strict=True)]
             paired = [ok & (s[..., k] <= least) for ok, s in zip(paired, shared, strict=True)]
-            point[k] = max(least, self._floor[k])
         return point, _first(allowed, paired)
 
     def _least(self, k: int, allowed: Sequence[Bools], paired: Sequence[Bools]) -> float:

@@ -8,6 +8,7 @@ from enum import Enum
 from functools import cached_property
 
 from seqopt.arrays import FrozenValue
+from seqopt.engines.interface import Engine
 from seqopt.engines.registry import make_engine, recipe_of
 from seqopt.errors import ProblemError
 from seqopt.network.build import build_network
@@ -57,6 +58,11 @@ class OrderProblem(Shown):
         if goal.measure is not Measure.PEAK or goal.of_margins:
             raise ProblemError(
                 f"aim {goal}: an order is chosen by a worst step; name minmax or a response first"
+            )
+        if self.free.budgets:
+            raise ProblemError(
+                f"budget {self.free.goals[-1]}: an order is chosen by its worst step alone; leave "
+                "it out, or give an order"
             )
         if recipe_of(self.free.engine) is None:
             raise ProblemError(
@@ -117,11 +123,15 @@ class OrderProblem(Shown):
 
     def at(self, order: Order) -> FreeProblem:
         """Return the free schedule of one order."""
-        recipe = recipe_of(self.free.engine)
-        assert recipe is not None
-        network = build_network(self.scene, order)
-        engine = make_engine(recipe.engine, network, **recipe.options)  # type: ignore[arg-type]
-        return replace(self.free, engine=engine)
+        engine, *others = (_anew(e, order) for e in (self.free.engine, *self.free.scenarios))
+        return replace(self.free, engine=engine, scenarios=tuple(others))
+
+
+def _anew(engine: Engine, order: Order) -> Engine:
+    """Return an engine of the same kind for the same scene in another order."""
+    recipe, network = recipe_of(engine), build_network(engine.network.scene, order)
+    assert recipe is not None
+    return make_engine(recipe.engine, network, **recipe.options)  # type: ignore[arg-type]
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -75,9 +75,11 @@ def trying(problem: OrderProblem, *, elsewhere: bool) -> Callable[[Trial], float
     if not elsewhere:
         return partial(worth, problem)
     free = replace(problem.free, resources=problem.free.resources.alone())
-    rest = {f.name: getattr(free, f.name) for f in fields(free) if f.name != "engine"}
+    sent = ("engine", "scenarios")
+    rest = {f.name: getattr(free, f.name) for f in fields(free) if f.name not in sent}
+    others = tuple(map(pack, free.scenarios))
     try:
-        content = pickle.dumps((rest, problem.among))
+        content = pickle.dumps((rest, others, problem.among))
     except Exception as error:  # whatever objects of others may raise
         raise ProblemError(
             f"criterion {free.criterion.name}: it cannot be sent to other processes ({error}); "
@@ -87,5 +89,6 @@ def trying(problem: OrderProblem, *, elsewhere: bool) -> Callable[[Trial], float
 
 
 def _sent(shipment: Shipment, content: bytes, trial: Trial) -> float:
-    rest, among = pickle.loads(content)  # our own, from `trying`
+    rest, others, among = pickle.loads(content)  # our own, from `trying`
+    rest["scenarios"] = tuple(map(engine_of, others))
     return worth(OrderProblem(FreeProblem(engine=engine_of(shipment), **rest), among), trial)

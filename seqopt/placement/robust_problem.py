@@ -204,8 +204,9 @@ def _scenes(scenes: Scenarios | Sequence[Scene]) -> tuple[Scene, ...]:
 def _worst_of(scenes: Scenarios | Sequence[Scene], aim: object) -> tuple[Scene, ...]:
     """Return scenarios whose worst states count, as they do where states are chosen."""
     if aim != WORST_PEAK:
+        said = aim if isinstance(aim, RobustAim) else short(aim)
         raise ProblemError(
-            f"robust aim {short(aim)}: where states are chosen, worst steps count; give worst-peak"
+            f"robust aim {said}: where states are chosen, worst steps count; give worst-peak"
         )
     return _scenes(scenes)
 

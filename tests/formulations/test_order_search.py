@@ -15,13 +15,14 @@ from formulations.order_search import FORMULATION
 from seqopt.contact.mortar import find_mortar
 from seqopt.errors import InfeasibleError, ProblemError, SolverError, TimeUpError
 from seqopt.placement.criteria import WorstRatio
-from seqopt.placement.free_problem import pose_free
+from seqopt.placement.free_problem import pose_free, within
 from seqopt.placement.order_bound import whole_bound
 from seqopt.placement.order_plan import solve_order
 from seqopt.placement.order_problem import OrderProblem, OrderSelection
 from seqopt.placement.order_proof import finds_better_order
 from seqopt.placement.order_work import trying
 from seqopt.placement.own_criterion import StepCost
+from seqopt.placement.robust_problem import robust
 from seqopt.placement.schedule_formulation import find_schedule_formulation
 from seqopt.placement.solving import solve
 from seqopt.placement.standing import Standing
@@ -70,6 +71,22 @@ def check_against_brute_force(scene, rules, aim="minmax"):
 @settings(max_examples=4, deadline=None)
 def test_it_equals_brute_force(build):
     check_against_brute_force(*build)
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_the_worst_of_scenarios_equals_brute_force(workers):
+    """Another order is the best where the worst of some scenarios counts, and it is found."""
+    scene = small_arch(4)
+    some = seqopt.scenarios(scene, count=3, density=0.9, seed=5)
+    nominal = posed(scene)
+    problem = replace(nominal, free=robust(nominal.free, some, "worst-peak"))
+    worths = brute_force(problem)
+    found = solve_order(problem, FORMULATION, resources=Resources(workers=workers))
+    assert found.status == "optimal"
+    assert found.selection.objective == pytest.approx(min(worths.values()), rel=1e-8)
+    assert found.selection.objective > 1.01 * min(brute_force(nominal).values())
+    with pytest.raises(ProblemError, match="an order is chosen by its worst step alone"):
+        replace(nominal, free=within(nominal.free, {"regrips": 1}))
 
 
 @given(build=free_builds(most_bricks=4, most_robots=3))

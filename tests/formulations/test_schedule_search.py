@@ -31,7 +31,7 @@ from seqopt.placement.loop_front import LoopFront
 from seqopt.placement.requirements import Limit
 from seqopt.placement.schedule_formulation import Finds, find_schedule_formulation
 from seqopt.sequence.free_rules import FreeRules, with_robots
-from seqopt.sequence.three_robots import three_robot_loop
+from seqopt.sequence.three_robots import modified_sequential, three_robot_loop
 from tests.brute_force import FOUR, ONES, least_peak, peaks, whole_graph
 from tests.builders import small_arch
 from tests.strategies import free_builds
@@ -404,6 +404,24 @@ def test_the_front_of_the_loop_holds_its_best_peak(engine25):
     )
     least = np.ceil(alone.certificate.objective / 5) * 5
     assert front.table["F_largest"].min() == pytest.approx(least)
+
+
+@pytest.mark.parametrize("count", [5, 6, 7])
+def test_the_pareto_set_of_a_schedule_with_closed_steps_equals_brute_force(count):
+    """Where a step without an open grip decides, less in the open ones is worth nothing."""
+    engine = ComplianceEngine(build_network(small_arch(count)))
+    loop = modified_sequential(engine.network)
+    front = find_front(LoopFront(engine, loop, ("T_max", "F_largest")))
+    alone = LoopFront(engine, loop, ("T_max", "F_largest"))
+    plans = product(*(range(len(move.candidates)) for move in loop.moves))
+    values = {tuple(alone.values(alone.steps(plan), None).round(6)) for plan in plans}
+    kept = {
+        each
+        for each in values
+        if not any(o != each and (np.array(o) <= each).all() for o in values)
+    }
+    assert front.complete
+    assert {tuple(row) for row in front.table[["T_max", "F_largest"]].round(6).to_numpy()} == kept
 
 
 def test_the_short_cut_does_what_the_long_way_does():

@@ -1,0 +1,150 @@
+"""Claim: every schedule goes with every aim, limit, formulation and means, or one line says why.
+
+The reasons are in the problem: ranks need candidates, totals of scenarios are no totals of worst
+states, and an order is chosen by a worst step.
+
+Method: the command line is run for every pair of a schedule and something that goes with it, on an
+arch of seven bricks of the shape of the paper's. Either a plan ends in a value, which is stored, or
+an error of one line, which is stored too. What is expected to be refused is listed here: one more
+or one less, and the claim does not hold. Whether values are right is tested elsewhere, against every
+plan of small builds.
+
+Inputs: the shipped scenes. Command: ``python -m experiments.placement.composing [--quick]``. Writes
+``experiments/results/composing.csv``.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import tempfile
+from contextlib import redirect_stderr, redirect_stdout
+from pathlib import Path
+
+import pandas as pd
+
+from experiments.harness.claim import Claim, Finding, Options, Times
+from experiments.harness.runs import scene_named
+from seqopt.cli.main import main
+from seqopt.scene.scene_file import save_scene
+
+SCENE = "chain7"
+OPEN = """step,type,bricks,rob1_node,rob2_node,rob3_node
+1,place,1,?,,
+2,place,2,?,?,
+3,place,3,?,?,?
+4,release,3,,?,?
+5,place,4,?,?,?
+6,release,4,?,,?
+7,place,5,?,?,?
+8,release,5,?,?,
+9,place,6,?,?,?
+10,release,6,,?,?
+11,place,7,?,?,?
+"""
+SCHEDULES = {
+    "three-robot": ["--schedule", "three-robot"],
+    "modified-sequential": ["--schedule", "modified-sequential"],
+    "own, up to three grips open": ["--schedule", "own.csv"],
+    "free": ["--schedule", "free"],
+    "free, order sought": ["--schedule", "free", "--order", "search", "--option", "most=2000"],
+}
+WORTH = ["--criteria", "worst-ratio-published"]
+STATES = ["--aim", "minmax"]
+SCENARIOS = ["--scenarios", "2", "--unseen", "1"]
+GOES = {
+    "the total of its moves, by ranks": [],
+    "sum": [*WORTH, "--aim", "sum"],
+    "minmax": [*WORTH, "--aim", "minmax"],
+    "minmax, then steps": [*WORTH, "--aim", "minmax,steps"],
+    "a response": ["--aim", "T_max"],
+    "steps": ["--aim", "steps"],
+    "regrips": ["--aim", "regrips"],
+    "travel": ["--aim", "travel"],
+    "friction": ["--stands", "bond=3e4", "--aim", "friction"],
+    "a limit": [*WORTH, *STATES, "--limit", "F_largest=500"],
+    "a budget": [*WORTH, *STATES, "--budget", "travel=20"],
+    "standing": [*WORTH, *STATES, "--stands", "bond=3e4"],
+    "the worst step of scenarios": [*WORTH, *STATES, "--robust", "worst-peak", *SCENARIOS],
+    "the worst total of scenarios": [*WORTH, "--robust", "worst-total", *SCENARIOS],
+    "the mean of the worst scenarios": [*WORTH, "--robust", "cvar=0.5", *SCENARIOS],
+    "candidates": [*WORTH, *STATES, "--candidates", "near:2"],
+    "a time limit": [*WORTH, *STATES, "--time-limit", "60"],
+    "lazily": [*WORTH, *STATES, "--lazy"],
+    "workers": [*WORTH, *STATES, "--workers", "2"],
+    "a folder of answers": [*WORTH, *STATES, "--cache", "answers"],
+    "path_dp": [*WORTH, *STATES, "--formulation", "path_dp"],
+    "path_labels": [*WORTH, *STATES, "--formulation", "path_labels"],
+    "path_beam": [*WORTH, *STATES, "--formulation", "path_beam"],
+    "best_first": [*WORTH, *STATES, "--formulation", "best_first"],
+    "flow_lp": [*WORTH, *STATES, "--formulation", "flow_lp"],
+    "flow_mip": [*WORTH, *STATES, "--formulation", "flow_mip"],
+    "overlap_dp": [*WORTH, "--formulation", "overlap_dp"],
+    "rank_search": ["--formulation", "rank_search"],
+    "Pareto": ["pareto", "--aim", "T_max,F_largest"],
+}
+ORDERS = "free, order sought"
+REFUSED: dict[str, set[str]] = {}
+
+
+def refused() -> set[tuple[str, str]]:
+    """Return the pairs that are expected to be refused."""
+    return {(schedule, word) for word, some in REFUSED.items() for schedule in some}
+
+
+def cell(folder: Path, schedule: list[str], words: list[str]) -> tuple[float | None, str]:
+    """Return the first value of a plan, or the line that says why there is none."""
+    command = "pareto" if words[:1] == ["pareto"] else "optimize"
+    rest = [word.replace("answers", str(folder / "answers")) for word in words]
+    place = [word.replace("own.csv", str(folder / "own.csv")) for word in schedule]
+    out = ["--out", str(folder / "front")] if command == "pareto" else []
+    given = [command, str(folder / "scene.json"), *place, *rest[command == "pareto" :], *out]
+    printed, said = io.StringIO(), io.StringIO()
+    with redirect_stdout(printed), redirect_stderr(said):
+        try:
+            code = main([*given, "--json"])
+        except SystemExit as end:  # of the parser of arguments
+            code = int(end.code or 0)
+    if code:
+        return None, said.getvalue().strip().splitlines()[-1].removeprefix("seqopt: error: ")
+    return _value(json.loads(printed.getvalue())), ""
+
+
+def _value(answer: dict[str, object]) -> float:
+    """Return the first value that an answer names."""
+    summary = answer.get("summary")
+    found = summary.get("objective") if isinstance(summary, dict) else None
+    if isinstance(found, dict):
+        return float(next(iter(found.values())))
+    return float(found) if isinstance(found, int | float) else float("nan")
+
+
+def experiment(options: Options) -> Finding:
+    goes = {word: GOES[word] for word in ("minmax", "steps", "a budget")} if options.quick else GOES
+    rows = []
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        save_scene(scene_named(SCENE), folder / "scene.json")
+        (folder / "own.csv").write_text(OPEN, encoding="utf-8")
+        for schedule, place in SCHEDULES.items():
+            for word, words in goes.items():
+                value, why = cell(folder, place, words)
+                rows.append({"schedule": schedule, "with": word, "value": value, "reason": why})
+    table = pd.DataFrame(rows)
+    print(table.to_string(index=False, float_format="%.6g"))
+    return Finding(holds(table), tables={"composing": table})
+
+
+def holds(table: pd.DataFrame) -> bool:
+    """Return whether what is refused is what is expected, each in a line that says something."""
+    no = table[table["value"].isna() & table["reason"].fillna("").ne("")]
+    asked = {*zip(table["schedule"], table["with"], strict=True)}
+    pairs = {*zip(no["schedule"], no["with"], strict=True)}
+    whole = (table["value"].notna() | table["reason"].fillna("").ne("")).all()
+    return bool(whole) and pairs == refused() & asked
+
+
+CLAIM = Claim(experiment, quick="three columns, nothing written", times=Times.NONE)
+
+if __name__ == "__main__":
+    CLAIM.main()
