@@ -406,7 +406,7 @@ def test_the_front_of_the_loop_holds_its_best_peak(engine25):
     assert front.table["F_largest"].min() == pytest.approx(least)
 
 
-@pytest.mark.parametrize("count", [5, 6, 7])
+@pytest.mark.parametrize("count", [5, 6])
 def test_the_pareto_set_of_a_schedule_with_closed_steps_equals_brute_force(count):
     """Where a step without an open grip decides, less in the open ones is worth nothing."""
     engine = ComplianceEngine(build_network(small_arch(count)))
@@ -415,11 +415,8 @@ def test_the_pareto_set_of_a_schedule_with_closed_steps_equals_brute_force(count
     alone = LoopFront(engine, loop, ("T_max", "F_largest"))
     plans = product(*(range(len(move.candidates)) for move in loop.moves))
     values = {tuple(alone.values(alone.steps(plan), None).round(6)) for plan in plans}
-    kept = {
-        each
-        for each in values
-        if not any(o != each and (np.array(o) <= each).all() for o in values)
-    }
+    others = {each: np.array([o for o in values if o != each]) for each in values}
+    kept = {each for each, some in others.items() if not (some <= each).all(axis=1).any()}
     assert front.complete
     assert {tuple(row) for row in front.table[["T_max", "F_largest"]].round(6).to_numpy()} == kept
 
