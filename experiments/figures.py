@@ -35,7 +35,6 @@ from seqopt.network.build import build_network
 from seqopt.placement.free_front import FreeFront
 from seqopt.placement.free_problem import pose_free
 from seqopt.placement.front import find_front
-from seqopt.placement.loop_front import LoopFront
 from seqopt.report.charts import draw_responses, front_figure
 from seqopt.report.comparison import method_tables
 from seqopt.report.draw import (
@@ -258,14 +257,9 @@ def printed_against_computed(engine: Engine) -> Figure:
 def free_front(engine: Engine) -> Figure:
     """Draw the Pareto sets of the free schedule and of the loop, and the methods of the paper."""
     names = [*ROUNDED]
-    free = pose_free(engine, FreeRules(), WORST_RATIO, ",".join(names))
-    fronts = [
-        find_front(problem)
-        for problem in (
-            FreeFront(free, ROUNDED),
-            LoopFront(engine, three_robot_loop(engine.network), names, rounding=ROUNDED),
-        )
-    ]
+    rules = FreeRules(), three_robot_loop(engine.network)
+    posed = [pose_free(engine, each, WORST_RATIO, ",".join(names)) for each in rules]
+    fronts = [find_front(FreeFront(problem, ROUNDED)) for problem in posed]
     methods = method_tables(engine)[0]
     return front_figure(fronts[0], methods, {"three-robot loop": fronts[1].table})
 

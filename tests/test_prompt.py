@@ -14,7 +14,6 @@ from seqopt.errors import SceneError
 from seqopt.placement.budgets import travel
 from seqopt.placement.free_front import FreeFront
 from seqopt.placement.front import find_front
-from seqopt.placement.loop_front import LoopFront
 from seqopt.placement.order_plan import solve_order
 from seqopt.placement.order_problem import OrderProblem
 from seqopt.placement.unseen import judge_unseen
@@ -45,7 +44,8 @@ def met(problem25):
     drawn = seqopt.scenarios(small, count=2, seed=1)
     posed = seqopt.optimize(small, criterion="worst-ratio").problem
     robust = seqopt.solve_robust(seqopt.robust(posed, drawn, "worst-peak"))
-    loop = LoopFront(posed.engine, posed.schedule, ["F_largest", "M_sup"])
+    words = posed.criterion, "F_largest,M_sup"
+    loop = FreeFront(seqopt.pose_free(posed.engine, posed.schedule, *words))
     aims = seqopt.pose_free(posed.engine, seqopt.FreeRules(), posed.criterion, "F_largest,steps")
     values = [plan, lean, free, robust, free.report()]
     values += [judge_unseen(robust, drawn), drawn, loop, find_front(loop), FreeFront(aims)]

@@ -168,7 +168,7 @@ def asked_free(options: argparse.Namespace) -> tuple[Scene, FreeProblem]:
     if options.criteria is not None:
         criterion = parse_criterion(options.criteria, options.crown)
     engine = asked_engine(options, build_network(scene))
-    if not free and options.command == "optimize":
+    if not free:
         rules = asked_schedule(options, engine.network)
     limits, stands = parse_limits(options.limit, scene), parse_standing(options)
     problem = posed_free(engine, criterion, options.aim, rules=rules, limits=limits, stands=stands)

@@ -23,7 +23,7 @@ from seqopt.cli.facts import scene_facts
 from seqopt.cli.free import asked_free
 from seqopt.cli.free_arguments import add_rules, add_standing
 from seqopt.cli.outputs import figure_notes, write_outputs, written_to
-from seqopt.cli.values import parse_numbers, parse_robots
+from seqopt.cli.values import parse_numbers
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import provenance
 from seqopt.errors import ProblemError, StepError, did_you_mean
@@ -31,14 +31,12 @@ from seqopt.files import csv_text, require_folder
 from seqopt.placement.free_front import FreeFront
 from seqopt.placement.free_goals import judged_by
 from seqopt.placement.free_problem import FreeProblem
-from seqopt.placement.front import Front, FrontProblem, find_front, pick
-from seqopt.placement.loop_front import LoopFront
+from seqopt.placement.front import Front, find_front, pick
 from seqopt.report.comparison import method_tables, shown_table, worst_of
 from seqopt.report.pages import PAGE, front_page
 from seqopt.responses.linear_range import LinearRange, builds_in_words
 from seqopt.responses.table import analyze
 from seqopt.sequence.free_rules import FREE
-from seqopt.sequence.schedule_file import find_schedule
 from seqopt.sequence.steps import Step
 from seqopt.sequence.three_robots import SCHEDULES
 from seqopt.work.progress import told, within
@@ -129,9 +127,7 @@ def run(options: argparse.Namespace) -> Answer:
     require_folder(options.out)
     scene, free = asked_free(options)
     rounding = parse_numbers("--round", options.round, dict.fromkeys(map(str, free.goals)))
-    problem: FrontProblem = FreeFront(free, rounding)
-    if options.schedule != FREE:
-        problem = _loop(options, free, rounding)
+    problem = FreeFront(free, rounding)
     seconds = float(options.seconds)
     front = find_front(problem, seconds=seconds, progress=within(options.tell, seconds))
     methods = _methods(free.engine)
@@ -159,17 +155,6 @@ def run(options: argparse.Namespace) -> Answer:
         notes=(*level_notes(free.engine), *figure_notes()),
     )
     return marked(answer, left)
-
-
-def _loop(
-    options: argparse.Namespace, free: FreeProblem, rounding: Mapping[str, float]
-) -> FrontProblem:
-    names = [goal.response for goal in free.goals]
-    if not all(names):
-        raise ProblemError(f"--aim {options.aim}: a schedule of given steps has responses only")
-    robots = parse_robots(options.robots)
-    schedule = find_schedule(free.network, options.schedule, robots)
-    return LoopFront(free.engine, schedule, names, free.limits, rounding)
 
 
 def _methods(engine: Engine) -> dict[str, pd.DataFrame]:

@@ -40,4 +40,5 @@ def asked_problem(options: argparse.Namespace) -> Problem:
 def asked_schedule(options: argparse.Namespace, network: Network) -> Schedule:
     """Return the schedule with open grips that a command is asked for."""
     schedule = find_schedule(network, options.schedule, parse_robots(options.robots))
-    return schedule if options.candidates is None else thin(schedule, options.candidates)
+    rule = getattr(options, "candidates", None)
+    return schedule if rule is None else thin(schedule, rule)

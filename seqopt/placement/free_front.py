@@ -1,4 +1,4 @@
-"""The Pareto set of a free schedule: its states below bounds, and whether they connect."""
+"""The Pareto set of a schedule: its states below bounds, and whether they connect."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ EDGE = 1e-9  # of a rounding step: how far above a multiple a value still counts
 
 
 class FreeFront:
-    """The free schedule of a problem whose goals are all to be small at once.
+    """The schedule of a problem whose goals are all to be small at once.
 
     Parameters
     ----------
     problem : FreeProblem
-        Its goals are responses, margins of stability, steps and regrips.
+        Its goals are responses, margins of stability, and of a free schedule steps and regrips.
     rounding : mapping of str to float, optional
         What numbers are rounded up to multiples of, by name, SI units; none by default.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import replace
 from itertools import pairwise, product
 
@@ -17,7 +18,7 @@ from seqopt.contact.mortar import EPOXY
 from seqopt.engines.auto import AutoEngine, Level
 from seqopt.engines.interface import Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.errors import InfeasibleError, ProblemError, SolverError, TimeUpError
+from seqopt.errors import InfeasibleError, ProblemError, SolverError, StepError, TimeUpError
 from seqopt.graph.paths import fewest_moves, keep_best, reached
 from seqopt.network.build import build_network
 from seqopt.placement.criteria import WorstRatio
@@ -27,7 +28,6 @@ from seqopt.placement.free_judge import judge_schedule, plan_values
 from seqopt.placement.free_problem import pose_free
 from seqopt.placement.free_states import explore
 from seqopt.placement.front import find_front, pick, upper_bounds
-from seqopt.placement.loop_front import LoopFront
 from seqopt.placement.requirements import Limit
 from seqopt.placement.schedule_formulation import Finds, find_schedule_formulation
 from seqopt.sequence.free_rules import FreeRules, with_robots
@@ -396,8 +396,8 @@ def test_steps_can_be_among_what_is_to_be_small(arch, engine25):
 
 def test_the_front_of_the_loop_holds_its_best_peak(engine25):
     loop = three_robot_loop(engine25.network)
-    names = [name for name, _ in seqopt.CRITERIA["worst-ratio-published"].limits]
-    front = find_front(LoopFront(engine25, loop, names[:2], rounding={"F_largest": 5.0}))
+    posed = pose_free(engine25, loop, ONES, "F_largest,M_sup")
+    front = find_front(FreeFront(posed, rounding={"F_largest": 5.0}))
     assert front.complete
     alone = seqopt.solve(
         seqopt.pose(engine25, loop, WorstRatio("F", (("F_largest", 1.0),))), "minimax"
@@ -411,10 +411,11 @@ def test_the_pareto_set_of_a_schedule_with_closed_steps_equals_brute_force(count
     """Where a step without an open grip decides, less in the open ones is worth nothing."""
     engine = ComplianceEngine(build_network(small_arch(count)))
     loop = modified_sequential(engine.network)
-    front = find_front(LoopFront(engine, loop, ("T_max", "F_largest")))
-    alone = LoopFront(engine, loop, ("T_max", "F_largest"))
-    plans = product(*(range(len(move.candidates)) for move in loop.moves))
-    values = {tuple(alone.values(alone.steps(plan), None).round(6)) for plan in plans}
+    problem = pose_free(engine, loop, ONES, "T_max,F_largest")
+    front, values = find_front(FreeFront(problem)), set()
+    for nodes in product(*(move.candidates for move in loop.moves)):
+        with contextlib.suppress(StepError):
+            values.add(tuple(np.round(plan_values(problem, loop.fill(nodes)), 6)))
     others = {each: np.array([o for o in values if o != each]) for each in values}
     kept = {each for each, some in others.items() if not (some <= each).all(axis=1).any()}
     assert front.complete
