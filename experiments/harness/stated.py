@@ -6,6 +6,10 @@ holds the README, which is read as it is, to the same rows.
 
 from __future__ import annotations
 
+from collections.abc import Hashable
+from typing import Any
+
+import numpy as np
 import pandas as pd
 
 from experiments.harness.results import RESULTS, markdown, two
@@ -105,7 +109,51 @@ def stated() -> dict[str, str]:
         | _heuristics(runs, gaps)
         | _shapes(pd.read_csv(RESULTS / "program_shapes.csv"))
         | _outside(pd.read_csv(RESULTS / "outside_assemblies.csv"))
+        | _composing(pd.read_csv(RESULTS / "composing.csv"))
+        | {"free_formulations_table": _free_formulations()}
     )
+
+
+PLAIN = r"^(?:[a-z ]+ )?[^ ]+: |^[^ ]+ (?=finds)|^'[^ ]+ (?=is not)"  # what a reason is about
+
+
+def _composing(table: pd.DataFrame) -> dict[str, str]:
+    """Return which schedule goes with what, and the reasons where one does not."""
+    plain = table["reason"].str.replace(PLAIN, "", regex=True).str.partition(";")[0]
+    reasons = [*dict.fromkeys(plain.dropna())]
+    said = plain.map({why: f"({k})" for k, why in enumerate(reasons, start=1)})
+    cells = table.assign(cell=said.fillna("yes")).set_index(["with", "schedule"])["cell"]
+    schedules, words = table["schedule"].unique(), table["with"].unique()
+    rows = [[word, *(cells[word, schedule] for schedule in schedules)] for word in words]
+    numbered = [f"{k}. {why}" for k, why in enumerate(reasons, start=1)]
+    return {
+        "composing_table": markdown(["", *schedules], rows),
+        "composing_reasons": "\n".join(numbered),
+        "composing_cells": str(len(table)),
+        "composing_no": str(int(table["reason"].notna().sum())),
+    }
+
+
+def _free_formulations() -> str:
+    """Return a row per formulation of the free schedule: times, or gaps where a minute ended."""
+    table = pd.read_csv(RESULTS / "free_formulations.csv")
+    rows = []
+    for name, own in table.groupby("formulation", sort=False):
+        for aim, part in own.groupby("aim", sort=False):
+            by = part.set_index("bricks").to_dict("index")
+            cells = [_minute(by.get(count)) for count in sorted(table["bricks"].unique())]
+            rows.append([f"`{name}`", part["kind"].iloc[0], str(aim), *cells])
+    counts = (f"{n} bricks" for n in sorted(table["bricks"].unique()))
+    return markdown(["formulation", "kind", "aim", *counts], rows)
+
+
+def _minute(row: dict[Hashable, Any] | None) -> str:
+    """Return how long a plan took, and how far from the best it may be."""
+    if row is None:
+        return "not asked"
+    gap = "" if row["gap"] < 1e-6 else f", gap {two(100 * row['gap'])} %"
+    gap = gap if np.isfinite(row["gap"]) else ", no bound"
+    return f"{two(row['seconds'])} s{gap}"
 
 
 def _outside(table: pd.DataFrame) -> dict[str, str]:

@@ -54,7 +54,7 @@ WORTH = ["--criteria", "worst-ratio-published"]
 STATES = ["--aim", "minmax"]
 SCENARIOS = ["--scenarios", "2", "--unseen", "1"]
 GOES = {
-    "the total of its moves, by ranks": [],
+    "as it is": [],
     "sum": [*WORTH, "--aim", "sum"],
     "minmax": [*WORTH, "--aim", "minmax"],
     "minmax, then steps": [*WORTH, "--aim", "minmax,steps"],
@@ -84,13 +84,23 @@ GOES = {
     "rank_search": ["--formulation", "rank_search"],
     "Pareto": ["pareto", "--aim", "T_max,F_largest"],
 }
-ORDERS = "free, order sought"
-REFUSED: dict[str, set[str]] = {}
+OWN, FREE, ORDERS = [*SCHEDULES][2:]
+REFUSED = {
+    (OWN,): ["as it is"],
+    (OWN, FREE, ORDERS): [
+        *("overlap_dp", "rank_search"),  # they need moves with candidates
+        *("the worst total of scenarios", "the mean of the worst scenarios"),
+    ],
+    (ORDERS,): [
+        *("sum", "steps", "regrips", "travel", "friction", "a budget", "Pareto"),
+        *("path_dp", "path_labels", "path_beam", "best_first", "flow_lp", "flow_mip"),
+    ],
+}
 
 
 def refused() -> set[tuple[str, str]]:
     """Return the pairs that are expected to be refused."""
-    return {(schedule, word) for word, some in REFUSED.items() for schedule in some}
+    return {(one, word) for some, words in REFUSED.items() for one in some for word in words}
 
 
 def cell(folder: Path, schedule: list[str], words: list[str]) -> tuple[float | None, str]:

@@ -53,6 +53,11 @@ class _Found(NamedTuple):
     prices: Floats
 
 
+class _Path(NamedTuple):
+    states: tuple[int, ...]
+    amounts: Floats  # of its moves
+
+
 def within_budgets(graph: Graph, caps: Sequence[float]) -> Within:
     """Return a path that is good in one goal after the other, its last columns within caps.
 
@@ -63,48 +68,68 @@ def within_budgets(graph: Graph, caps: Sequence[float]) -> Within:
     """
     goals = len(graph.peaks) - len(caps)
     limited = [*zip(range(goals, len(graph.peaks)), caps, strict=True)]
-    bounds, prices = [], []
+    bounds, prices, best = [], [], None
     for goal in range(goals):
         if graph.peaks[goal]:
-            graph, bound, price = _least_worst(graph, goal, limited)
+            bound, price, way = _least_worst(graph, goal, limited)
         else:
             found = _least_sum(graph, graph.amounts[:, goal], limited)
-            if found.moves is None:
-                raise InfeasibleError("no path is within all budgets")
-            bound, price = found.bound, found.prices
-            limited.append((goal, float(graph.amounts[found.moves, goal].sum())))
+            bound, price, way = found.bound, found.prices, _path(graph, found.moves)
+        best = _better(graph, goal, way, best)
+        if best is None:
+            raise InfeasibleError("no path is within all budgets")
+        if graph.peaks[goal]:
+            graph = graph.only(graph.amounts[:, goal] <= tied(_taken(graph, best)[goal]))
+        else:
+            limited.append((goal, _taken(graph, best)[goal]))
         bounds.append(bound)
         prices.append(tuple(price.tolist()))
-    moves = _least_sum(graph, np.ones(len(graph.source)), limited).moves
-    if moves is None:
+    short = _path(graph, _least_sum(graph, np.ones(len(graph.source)), limited).moves)
+    best = min(filter(None, (short, best)), key=lambda path: len(path.states), default=None)
+    if best is None:
         raise InfeasibleError("no path is within all budgets")
-    taken = graph.amounts[moves]
-    values = np.where(graph.peaks, taken.max(axis=0, initial=0.0), taken.sum(axis=0)).tolist()
+    values = _taken(graph, best)
     least = [min(b, v) for b, v in zip(bounds, values, strict=False)]
-    path = tuple(graph.target[moves].tolist())
-    return Within(path, tuple(values), (*least, *values[goals:]), tuple(prices))
+    return Within(best.states, values, (*least, *values[goals:]), tuple(prices))
+
+
+def _path(graph: Graph, moves: Ints | None) -> _Path | None:
+    if moves is None:
+        return None
+    return _Path(tuple(graph.target[moves].tolist()), graph.amounts[moves])
+
+
+def _taken(graph: Graph, path: _Path) -> tuple[float, ...]:
+    """Return what every column takes of a path."""
+    worst, total = path.amounts.max(axis=0, initial=0.0), path.amounts.sum(axis=0)
+    return tuple(np.where(graph.peaks, worst, total).tolist())
+
+
+def _better(graph: Graph, goal: int, first: _Path | None, other: _Path | None) -> _Path | None:
+    """Return the path that takes less; the first one of two alike."""
+    paths = filter(None, (first, other))
+    return min(paths, key=lambda path: _taken(graph, path)[goal], default=None)
 
 
 def _least_worst(
     graph: Graph, goal: int, limited: Sequence[tuple[int, float]]
-) -> tuple[Graph, float, Floats]:
-    """Return the moves below the least worst amount of a path within caps, and its bound."""
+) -> tuple[float, Floats, _Path | None]:
+    """Return a bound on the worst amount of paths within caps, its prices, and the best path."""
     amounts = graph.amounts[:, goal]
     levels = np.unique(amounts)
     low, high, proven, prices = 0, len(levels), 0, np.ones(len(limited))
+    way: _Path | None = None
     while low < high:
         middle = (low + high) // 2
         part = graph.only(amounts <= levels[middle])
         found = _least_sum(part, np.zeros(len(part.source)), limited)
         if found.moves is not None:
-            high = middle
+            high, way = middle, _path(part, found.moves)
             continue
         low = middle + 1
         if found.bound > 0:
             proven, prices = low, found.prices
-    if low == len(levels):
-        raise InfeasibleError("no path is within all budgets")
-    return graph.only(amounts <= tied(float(levels[low]))), float(levels[proven]), prices
+    return float(levels[min(proven, len(levels) - 1)]), prices, way
 
 
 def _least_sum(graph: Graph, costs: Floats, limited: Sequence[tuple[int, float]]) -> _Found:
@@ -191,7 +216,7 @@ def budget_bounds(
         amounts, price = graph.amounts[:, goal], np.maximum(prices[goal], 0.0)
         taken = np.array([cap for _, cap in limited])
         paid = graph.amounts[:, [c for c, _ in limited]] @ price
-        rounding = ROUNDING * len(graph.source) * float(price @ np.abs(taken))
+        rounding = ROUNDING * graph.states * float(price @ np.abs(taken))  # of the longest path
         if graph.peaks[goal]:
             better = amounts < claimed[goal] - TIED * abs(claimed[goal])
             least = least_sum(graph.only(better), paid[better])

@@ -92,14 +92,15 @@ class FreePlan(ShownBuild):
     def status(self) -> str:
         """``optimal``, ``unproven``, or ``feasible``.
 
-        The last where the search ended early, or a heuristic's plan is not proven to be the best.
+        The last where the search ended early, or it is not proven that no plan is better, as of
+        heuristics or where prices of budgets leave something open.
         A margin of stability is optimal within the gap, which ``worth`` and the summary name.
         """
         if self.selection.stopped:
             return "feasible"
         if self.certificate is None:
             return "unproven"
-        exact = self.formulation.kind is FormulationKind.EXACT
+        exact = self.formulation.kind is FormulationKind.EXACT and not self.problem.budgets
         return "optimal" if exact or self.certificate.gap <= TOLERANCE else "feasible"
 
     @property

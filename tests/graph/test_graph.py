@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.graph import Explorer, Graph, lexicographic
+from seqopt.graph.budgets import budget_bounds, within_budgets
 from seqopt.graph.duality import lexicographic_bounds, sum_bound
 from seqopt.graph.explore import Moves
 from seqopt.graph.paths import distances, reached
@@ -178,3 +179,24 @@ def test_a_narrow_visit_keeps_the_best():
     narrow = Explorer(space, width=1)
     assert narrow.rise()
     assert len(narrow.graph().states[1][2]) == 4  # one of every round
+
+
+@given(graph=graphs(goals=3), cap=st.integers(0, 6))
+@few
+def test_a_path_within_a_budget_is_found_and_bounded(graph, cap):
+    graph = replace(graph, peaks=(*graph.peaks[:2], False))
+    values = sorted(values_of(graph, moves) for moves in simple_paths(graph))
+    able = [each for each in values if each[2] <= cap]
+    if not able:
+        with pytest.raises(InfeasibleError, match="no path is within all budgets"):
+            within_budgets(graph, (cap,))
+        return
+    found = within_budgets(graph, (cap,))
+    assert found.values[2] <= cap
+    assert found.values in able
+    assert found.values[:2] >= able[0][:2]
+    assert found.bounds[0] <= able[0][0] * (1 + 1e-9)
+    if graph.peaks[0]:
+        assert found.values[0] == found.bounds[0] == able[0][0]
+    proven = budget_bounds(graph, found.values, found.bounds, ((cap,), found.prices))
+    assert proven[0] >= found.bounds[0] - 1e-6 * abs(found.bounds[0])
