@@ -120,6 +120,7 @@ PLAIN = r"^(?:[a-z ]+ )?[^ ]+: |^[^ ]+ (?=finds)|^'[^ ]+ (?=is not)"  # what a r
 def _composing(table: pd.DataFrame) -> dict[str, str]:
     """Return which schedule goes with what, and the reasons where one does not."""
     plain = table["reason"].str.replace(PLAIN, "", regex=True).str.partition(";")[0]
+    plain = plain.str.partition(" (did")[0]
     reasons = [*dict.fromkeys(plain.dropna())]
     said = plain.map({why: f"({k})" for k, why in enumerate(reasons, start=1)})
     cells = table.assign(cell=said.fillna("yes")).set_index(["with", "schedule"])["cell"]

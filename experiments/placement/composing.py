@@ -4,12 +4,12 @@ What is refused has its reason in the problem: ranks and costs of moves need can
 scenarios are no totals of worst states, and an order is chosen by a worst step.
 
 Method: the command line is run for every pair of a schedule and something that goes with it, on an
-arch of seven bricks of the shape of the paper's. Either a plan ends in a value, which is stored, or
+arch of seven bricks. Either a plan ends in a value, which is stored, or
 an error of one line, which is stored too. What is expected to be refused is listed here: one more
 or one less, and the claim does not hold. Whether values are right is tested elsewhere, against
 every plan of small builds.
 
-Inputs: the shipped scenes. Command: ``python -m experiments.placement.composing [--quick]``. Writes
+Inputs: none. Command: ``python -m experiments.placement.composing [--quick]``. Writes
 ``experiments/results/composing.csv``.
 """
 
@@ -25,11 +25,9 @@ from typing import Any
 import pandas as pd
 
 from experiments.harness.claim import Claim, Finding, Options, Times
-from experiments.harness.runs import scene_named
 from seqopt.cli.main import main
-from seqopt.scene.scene_file import save_scene
 
-SCENE = "chain7"
+SCENE = "chain:bricks=7"
 OPEN = """step,type,bricks,rob1_node,rob2_node,rob3_node
 1,place,1,?,,
 2,place,2,?,?,
@@ -109,7 +107,7 @@ def cell(folder: Path, schedule: list[str], words: list[str]) -> tuple[float | N
     rest = [word.replace("answers", str(folder / "answers")) for word in words]
     place = [word.replace("own.csv", str(folder / "own.csv")) for word in schedule]
     out = ["--out", str(folder / "front")] if command == "pareto" else []
-    given = [command, str(folder / "scene.json"), *place, *rest[command == "pareto" :], *out]
+    given = [command, SCENE, *place, *rest[command == "pareto" :], *out]
     printed, said = io.StringIO(), io.StringIO()
     with redirect_stdout(printed), redirect_stderr(said):
         try:
@@ -134,7 +132,6 @@ def experiment(options: Options) -> Finding:
     rows = []
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        save_scene(scene_named(SCENE), folder / "scene.json")
         (folder / "own.csv").write_text(OPEN, encoding="utf-8")
         for schedule, place in SCHEDULES.items():
             for word, words in goes.items():

@@ -92,8 +92,7 @@ def solve(
     proof : bool, optional
         False: ``cascade`` or ``rank_search`` solve only models that they need; no gap is known.
     lazy : bool, optional
-        Solve only the models that the proof needs; for exact formulations without budgets. Free
-        schedules, and states of others, always do.
+        Solve only the models that the proof needs, as is always done where states are chosen.
     time_limit : float, optional
         Seconds of choosing after which it returns its best choice and a bound, as at an interrupt;
         without proof, of all it does, and an error names the moves that were chosen by then.

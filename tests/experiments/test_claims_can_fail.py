@@ -20,8 +20,10 @@ from experiments.harness.claim import claims
 from experiments.harness.results import stored
 from experiments.peers import peers
 from experiments.placement import (
+    composing,
     decision_sensitivity,
     formulation_cost,
+    free_formulations,
     free_growth,
     heuristic_gaps,
     robust_placement,
@@ -150,6 +152,16 @@ CHECKS = {
         outside_assemblies.holds,
         ("outside_assemblies",),
         *("said", "feasible", {"file": "bridge.json"}),
+    ),
+    "composing": Check(
+        composing.holds,
+        ("composing",),
+        *("value", 1.0, {"schedule": "free", "with": "overlap_dp"}),
+    ),
+    "free_formulations": Check(
+        free_formulations.holds,
+        ("free_formulations",),
+        *("value", 0.83, {"bricks": 25, "formulation": "path_beam", "aim": "minmax,steps"}),
     ),
     "paper_counterparts": Check(
         lambda table: not paper_counterparts.faults(NUMBERED, table),
