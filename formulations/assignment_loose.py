@@ -30,15 +30,7 @@ from seqopt.placement.watch import Watch
 def write(problem: PlacementProblem) -> WholeProgram:
     """Return the program of a problem.
 
-    Parameters
-    ----------
-    problem : PlacementProblem
-        Its sums are used.
-
-    Raises
-    ------
-    InfeasibleError
-        If no choice is allowed.
+    ``problem``: its sums are used. Raises `InfeasibleError` if no choice is allowed.
     """
     costs = problem.sums
     costs.continuable()
@@ -102,24 +94,9 @@ def _both(pairs: np.ndarray, count: int) -> sparse.csr_array:
 def solve(problem: PlacementProblem, *, watch: Watch | None = None) -> Selection:
     """Return the exact optimum.
 
-    Parameters
-    ----------
-    problem : PlacementProblem
-        Its sums are used.
-    watch : Watch, optional
-        Says when to stop, and is told what is found.
-
-    Returns
-    -------
-    Selection
-        With a bound.
-
-    Raises
-    ------
-    InfeasibleError
-        If no choice is allowed.
-    SolverError
-        If the solver ends without an optimum.
+    ``problem``: its sums are used; ``watch``: says when to stop, and is told what is found. Result:
+    with a bound. Raises `InfeasibleError` if no choice is allowed; `SolverError` if the solver ends
+    without an optimum.
     """
     return solve_whole(problem, write(problem), Aim.SUM, watch)
 

@@ -27,26 +27,9 @@ from seqopt.placement.watch import Watch
 def solve(problem: PlacementProblem, *, watch: Watch | None = None, width: int = 5) -> Selection:
     """Return the best choice found with a beam.
 
-    Parameters
-    ----------
-    problem : PlacementProblem
-        Its sums are used.
-    watch : Watch, optional
-        Says when to stop, and is told what is found.
-    width : int
-        How many partial choices are kept, from 1.
-
-    Returns
-    -------
-    Selection
-        Without a bound.
-
-    Raises
-    ------
-    InfeasibleError
-        If no choice is allowed.
-    ProblemError
-        If the width is below 1.
+    ``problem``: its sums are used; ``watch``: says when to stop, and is told what is found;
+    ``width``: how many partial choices are kept, from 1. Result: without a bound. Raises
+    `InfeasibleError` if no choice is allowed; `ProblemError` if the width is below 1.
     """
     if width < 1:
         raise ProblemError(f"beam: width is {width}; give a whole number from 1")

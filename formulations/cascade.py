@@ -39,26 +39,10 @@ def solve(
 ) -> Selection:
     """Return the choices of the cascade.
 
-    Parameters
-    ----------
-    problem : PlacementProblem
-        Its sums are used.
-    watch : Watch, optional
-        Says when to stop, and is told what is found.
-    charge : str
-        Which of two moves answers for the step that they share: ``later`` or ``earlier``.
-
-    Returns
-    -------
-    Selection
-        Without a bound.
-
-    Raises
-    ------
-    InfeasibleError
-        If no choice is allowed.
-    ProblemError
-        If the charge is neither.
+    ``problem``: its sums are used; ``watch``: says when to stop, and is told what is found;
+    ``charge``: which of two moves answers for the step that they share: ``later`` or ``earlier``.
+    Result: without a bound. Raises `InfeasibleError` if no choice is allowed; `ProblemError` if the
+    charge is neither.
     """
     if charge not in CHARGES:
         raise ProblemError(f"cascade: charge is {charge!r}; give one of {', '.join(CHARGES)}")

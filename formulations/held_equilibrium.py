@@ -56,12 +56,7 @@ OPTIONS: dict[str, Any] = {
 class HeldEquilibrium:
     """The program of one assembly and case; call it with payloads.
 
-    Parameters
-    ----------
-    assembly : Assembly
-        Its grips are all that may ever be held.
-    case : Case
-        What is asked.
+    ``assembly``: its grips are all that may ever be held; ``case``: what is asked.
     """
 
     def __init__(self, assembly: Assembly, case: Case) -> None:
@@ -168,17 +163,8 @@ class HeldEquilibrium:
     def __call__(self, payload: Floats, enough: Enough) -> Answer:
         """Return the solver's answer for payloads.
 
-        Parameters
-        ----------
-        payload : (G,) float
-            N; zero where nobody holds.
-        enough : callable
-            Says of an answer whether the program need not be refined.
-
-        Returns
-        -------
-        Answer
-            Claimed, not proven.
+        ``payload`` (G,): n; zero where nobody holds; ``enough``: says of an answer whether the
+        program need not be refined. Result: claimed, not proven.
         """
         if len(self._owner) > GROWN * self._first:
             self._start()
@@ -258,16 +244,7 @@ class HeldEquilibrium:
 def compile_held(assembly: Assembly, case: Case) -> HeldProgram:
     """Return the program of an assembly and a case.
 
-    Parameters
-    ----------
-    assembly : Assembly
-        Its grips are all that may ever be held.
-    case : Case
-        What is asked.
-
-    Returns
-    -------
-    HeldProgram
-        To be called with payloads.
+    ``assembly``: its grips are all that may ever be held; ``case``: what is asked. Result: to be
+    called with payloads.
     """
     return HeldEquilibrium(assembly, case)

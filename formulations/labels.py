@@ -79,28 +79,11 @@ def solve(
 ) -> Selection:
     """Return the exact optimum within the budgets, or the best choice that was met.
 
-    Parameters
-    ----------
-    problem : PlacementProblem
-        Its sums and budgets are used.
-    watch : Watch, optional
-        Says when to stop, and is told what is found.
-    most : int
-        How many labels are kept at a move, from 1.
-
-    Returns
-    -------
-    Selection
-        With bound and prices. It has stopped early if more labels than ``most`` were needed.
-
-    Raises
-    ------
-    InfeasibleError
-        If no choice is allowed, or none is within all budgets.
-    ProblemError
-        If ``most`` is below 1.
-    SolverError
-        If it had to stop before it met any choice within the budgets.
+    ``problem``: its sums and budgets are used; ``watch``: says when to stop, and is told what is
+    found; ``most``: how many labels are kept at a move, from 1. Result: with bound and prices. It
+    has stopped early if more labels than ``most`` were needed. Raises `InfeasibleError` if no
+    choice is allowed, or none is within all budgets; `ProblemError` if ``most`` is below 1;
+    `SolverError` if it had to stop before it met any choice within the budgets.
     """
     if most < 1:
         raise ProblemError(f"labels: most is {most}; give a whole number from 1")

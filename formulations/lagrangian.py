@@ -44,19 +44,9 @@ ROUNDS = 3  # of doing so
 def solve(problem: PlacementProblem, *, watch: Watch | None = None) -> Selection:
     """Return the best choice that was met, with bound and prices.
 
-    Parameters
-    ----------
-    problem : PlacementProblem
-        Its sums and budgets are used.
-    watch : Watch, optional
-        Says when to stop, and is told what is found.
-
-    Raises
-    ------
-    InfeasibleError
-        If no choice is allowed, or prices prove that none is within all budgets.
-    SolverError
-        If no choice within the budgets was met; there may be one.
+    ``problem``: its sums and budgets are used; ``watch``: says when to stop, and is told what is
+    found. Raises `InfeasibleError` if no choice is allowed, or prices prove that none is within all
+    budgets; `SolverError` if no choice within the budgets was met; there may be one.
     """
     watch = watch or Watch()
     paths = priced_paths(problem)

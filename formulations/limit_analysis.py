@@ -36,10 +36,7 @@ class Equilibrium:
 
     Its columns are z, three forces at every corner, and three at every grip.
 
-    Parameters
-    ----------
-    assembly : Assembly
-        Blocks, the faces at which they touch, and grips.
+    ``assembly``: blocks, the faces at which they touch, and grips.
     """
 
     def __init__(self, assembly: Assembly) -> None:

@@ -25,22 +25,8 @@ from seqopt.placement.watch import Watch
 def solve(problem: PlacementProblem, *, watch: Watch | None = None) -> Selection:
     """Return a choice whose worst cost is least.
 
-    Parameters
-    ----------
-    problem : PlacementProblem
-        Its peaks are used.
-    watch : Watch, optional
-        Says when to stop, and is told what is found.
-
-    Returns
-    -------
-    Selection
-        Its bound is its value.
-
-    Raises
-    ------
-    InfeasibleError
-        If no choice is allowed.
+    ``problem``: its peaks are used; ``watch``: says when to stop, and is told what is found.
+    Result: its bound is its value. Raises `InfeasibleError` if no choice is allowed.
     """
     costs = problem.peaks
     costs.continuable()

@@ -26,15 +26,7 @@ from seqopt.placement.watch import Watch
 def write(problem: PlacementProblem) -> WholeProgram:
     """Return the program of a problem.
 
-    Parameters
-    ----------
-    problem : PlacementProblem
-        Its peaks are used.
-
-    Raises
-    ------
-    InfeasibleError
-        If no choice is allowed.
+    ``problem``: its peaks are used. Raises `InfeasibleError` if no choice is allowed.
     """
     flow, bound = flow_of_peaks(problem)
     arcs = cp.Variable(len(flow.cost), boolean=True)
@@ -48,24 +40,9 @@ def write(problem: PlacementProblem) -> WholeProgram:
 def solve(problem: PlacementProblem, *, watch: Watch | None = None) -> Selection:
     """Return a choice whose worst cost is least.
 
-    Parameters
-    ----------
-    problem : PlacementProblem
-        Its peaks are used.
-    watch : Watch, optional
-        Says when to stop, and is told what is found.
-
-    Returns
-    -------
-    Selection
-        With a bound.
-
-    Raises
-    ------
-    InfeasibleError
-        If no choice is allowed.
-    SolverError
-        If the solver ends without an optimum.
+    ``problem``: its peaks are used; ``watch``: says when to stop, and is told what is found.
+    Result: with a bound. Raises `InfeasibleError` if no choice is allowed; `SolverError` if the
+    solver ends without an optimum.
     """
     return solve_whole(problem, write(problem), Aim.PEAK, watch)
 

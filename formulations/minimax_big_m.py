@@ -36,15 +36,7 @@ from seqopt.placement.watch import Watch
 def write(problem: PlacementProblem) -> WholeProgram:
     """Return the program of a problem.
 
-    Parameters
-    ----------
-    problem : PlacementProblem
-        Its peaks are used.
-
-    Raises
-    ------
-    InfeasibleError
-        If no choice is allowed.
+    ``problem``: its peaks are used. Raises `InfeasibleError` if no choice is allowed.
     """
     costs = problem.peaks
     costs.continuable()
@@ -99,24 +91,9 @@ def _both(pair: tuple[np.ndarray, ...], starts: np.ndarray, count: int) -> spars
 def solve(problem: PlacementProblem, *, watch: Watch | None = None) -> Selection:
     """Return a choice whose worst cost is least.
 
-    Parameters
-    ----------
-    problem : PlacementProblem
-        Its peaks are used.
-    watch : Watch, optional
-        Says when to stop, and is told what is found.
-
-    Returns
-    -------
-    Selection
-        With a bound.
-
-    Raises
-    ------
-    InfeasibleError
-        If no choice is allowed.
-    SolverError
-        If the solver ends without an optimum.
+    ``problem``: its peaks are used; ``watch``: says when to stop, and is told what is found.
+    Result: with a bound. Raises `InfeasibleError` if no choice is allowed; `SolverError` if the
+    solver ends without an optimum.
     """
     return solve_whole(problem, write(problem), Aim.PEAK, watch)
 

@@ -45,14 +45,9 @@ Search = Callable[[FreeProblem], ScheduleSelection]
 class Choice(NamedTuple):
     """A path through a graph, and what its formulation claims of it.
 
-    Attributes
-    ----------
-    path : tuple of int
-        Its states, the start left out; none where no path was found in time.
-    bounds : tuple of float
-        What no path stays below in the first goals, those before each being at their values.
-    stopped : bool
-        Whether time was over before all was found.
+    ``path``: its states, the start left out; none where no path was found in time; ``bounds``: what
+    no path stays below in the first goals, those before each being at their values; ``stopped``:
+    whether time was over before all was found.
     """
 
     path: tuple[int, ...]
@@ -72,22 +67,12 @@ def on_graph(
 ) -> ScheduleFormulation:
     """Return the formulation of the free schedule that chooses a path through the graph of states.
 
-    Parameters
-    ----------
-    name, summary : str
-        What it is called, and what it does in a few words.
-    choose : callable
-        Returns a `Choice` of a graph whose moves are all on paths from the start to an end; stops
-        when a `seqopt.placement.watch.Watch` says so.
-    kind : FormulationKind, optional
-        What it promises.
-
-    Returns
-    -------
-    ScheduleFormulation
-        It takes no budgets; its options are ``seconds`` and ``max_memory``. If its first goal is a
-        peak, the graph has the states below that of a first plan, by a narrow search. Where time or
-        memory ends early, that plan is returned.
+    ``name``, ``summary``: what it is called, and what it does in a few words; ``choose``: returns a
+    `Choice` of a graph whose moves are all on paths from the start to an end; stops when a
+    `seqopt.placement.watch.Watch` says so; ``kind``: what it promises. Result: it takes no budgets;
+    its options are ``seconds`` and ``max_memory``. If its first goal is a peak, the graph has the
+    states below that of a first plan, by a narrow search. Where time or memory ends early, that
+    plan is returned.
     """
 
     def solve(
@@ -154,11 +139,7 @@ def worth(graph: Graph, path: Sequence[int]) -> tuple[float, ...]:
 def unit_flow(graph: Graph) -> tuple[sparse.csc_array, Floats]:
     """Return what leaves states (n,) by a flow, and what does: one from the start, at an end.
 
-    Returns
-    -------
-    matrix : (n, m + e) float
-        By move, then by state in which a build may end.
-    right : (n,) float
+    Results: ``matrix`` (n, m + e): by move, then by state in which a build may end; ``right`` (n,).
     """
     ends, moves = np.flatnonzero(graph.ends), np.arange(len(graph.source))
     ones = np.ones(len(moves) + len(ends))
@@ -172,12 +153,7 @@ def unit_flow(graph: Graph) -> tuple[sparse.csc_array, Floats]:
 def best_label(graph: Graph, to_go: Floats, watch: Watch) -> Choice:
     """Return the best path by labels: of every state the vectors of goals that none other beats.
 
-    Parameters
-    ----------
-    graph : Graph
-    to_go : (n, g) float
-        What every goal takes at least from a state to an end, and no move makes less.
-    watch : Watch
+    ``to_go`` (n, g): what every goal takes at least from a state to an end, and no move makes less.
 
     Notes
     -----

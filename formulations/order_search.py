@@ -113,25 +113,12 @@ def solve(
 ) -> OrderSelection:
     """Return the best order, or a good one and a bound.
 
-    Parameters
-    ----------
-    problem : OrderProblem
-    most : int, optional
-        Pairs of a set of bricks and a newest one, up to which all orders are looked at.
-    tries : int, optional
-        How many orders are tried where there are more.
-    seed : int, optional
-        In which turn.
-    seconds : float, optional
-        After which the best order found is returned.
-    resources : Resources, optional
-        Who is told how far it is, and who tries orders where not all are looked at; what is found
-        does not depend on it.
-
-    Raises
-    ------
-    InfeasibleError, ProblemError, TimeUpError
-        If no order has a plan; a number is none, or no plan was found by the end of the search.
+    ``most``: pairs of a set of bricks and a newest one, up to which all orders are looked at;
+    ``tries``: how many orders are tried where there are more; ``seed``: in which turn; ``seconds``:
+    after which the best order found is returned; ``resources``: who is told how far it is, and who
+    tries orders where not all are looked at; what is found does not depend on it. Raises
+    `InfeasibleError`, `ProblemError`, `TimeUpError` if no order has a plan; a number is none, or no
+    plan was found by the end of the search.
     """
     if most < 0 or tries < 0:
         raise ProblemError(f"options most={most}, tries={tries}: give whole numbers from 0 on")

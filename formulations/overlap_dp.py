@@ -27,22 +27,8 @@ from seqopt.placement.watch import Watch
 def solve(problem: PlacementProblem, *, watch: Watch | None = None) -> Selection:
     """Return the exact optimum of the sum over the build.
 
-    Parameters
-    ----------
-    problem : PlacementProblem
-        Its sums are used.
-    watch : Watch, optional
-        Says when to stop, and is told what is found.
-
-    Returns
-    -------
-    Selection
-        Its bound is its value.
-
-    Raises
-    ------
-    InfeasibleError
-        If no choice is allowed.
+    ``problem``: its sums are used; ``watch``: says when to stop, and is told what is found. Result:
+    its bound is its value. Raises `InfeasibleError` if no choice is allowed.
     """
     watch = watch or Watch()
     costs = problem.sums

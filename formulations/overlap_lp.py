@@ -29,24 +29,10 @@ from seqopt.placement.watch import Watch
 def solve(problem: PlacementProblem, *, watch: Watch | None = None) -> Selection:
     """Return the choice that the largest flow follows.
 
-    Parameters
-    ----------
-    problem : PlacementProblem
-        Its sums and budgets are used.
-    watch : Watch, optional
-        Says when to stop, and is told what is found.
-
-    Returns
-    -------
-    Selection
-        With a bound, and the price of every budget.
-
-    Raises
-    ------
-    InfeasibleError
-        If no choice is allowed, or no flow is within all budgets.
-    SolverError
-        If the solver ends without an optimum, or stops and no choice is at hand.
+    ``problem``: its sums and budgets are used; ``watch``: says when to stop, and is told what is
+    found. Result: with a bound, and the price of every budget. Raises `InfeasibleError` if no
+    choice is allowed, or no flow is within all budgets; `SolverError` if the solver ends without an
+    optimum, or stops and no choice is at hand.
     """
     watch = watch or Watch()
     flow = layered_flow(problem)

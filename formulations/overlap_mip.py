@@ -25,15 +25,8 @@ from seqopt.placement.watch import Watch
 def write(problem: PlacementProblem) -> WholeProgram:
     """Return the program of a problem.
 
-    Parameters
-    ----------
-    problem : PlacementProblem
-        Its sums and budgets are used.
-
-    Raises
-    ------
-    InfeasibleError
-        If no choice is allowed, or none is within one of the budgets.
+    ``problem``: its sums and budgets are used. Raises `InfeasibleError` if no choice is allowed, or
+    none is within one of the budgets.
     """
     flow = layered_flow(problem)
     arcs = cp.Variable(len(flow.cost), boolean=True)
@@ -48,24 +41,10 @@ def write(problem: PlacementProblem) -> WholeProgram:
 def solve(problem: PlacementProblem, *, watch: Watch | None = None) -> Selection:
     """Return the exact optimum within the budgets.
 
-    Parameters
-    ----------
-    problem : PlacementProblem
-        Its sums and budgets are used.
-    watch : Watch, optional
-        Says when to stop, and is told what is found.
-
-    Returns
-    -------
-    Selection
-        With a bound.
-
-    Raises
-    ------
-    InfeasibleError
-        If no choice is allowed, or none is within all budgets.
-    SolverError
-        If the solver ends without an optimum, or stops and no choice is at hand.
+    ``problem``: its sums and budgets are used; ``watch``: says when to stop, and is told what is
+    found. Result: with a bound. Raises `InfeasibleError` if no choice is allowed, or none is within
+    all budgets; `SolverError` if the solver ends without an optimum, or stops and no choice is at
+    hand.
     """
     return solve_whole(problem, write(problem), Aim.SUM, watch)
 

@@ -36,18 +36,8 @@ def solve(
 ) -> FrontSelection:
     """Return all vectors that no plan dominates, and a plan for each.
 
-    Parameters
-    ----------
-    problem : FrontProblem
-    seconds : float, optional
-        After which the points found are returned.
-    progress : callable, optional
-        Told in a few words how far the search is.
-
-    Returns
-    -------
-    FrontSelection
-        Complete unless time was up or the search was interrupted.
+    ``seconds``: after which the points found are returned; ``progress``: told in a few words how
+    far the search is. Result: complete unless time was up or the search was interrupted.
     """
     end = time.perf_counter() + seconds
     zones = np.full((1, len(problem.names)), np.inf)
@@ -75,16 +65,8 @@ def solve(
 def split(zones: Floats, point: Floats) -> Floats:
     """Return the search zones that are left once a point is found.
 
-    Parameters
-    ----------
-    zones : (n, k) float
-        Their upper bounds.
-    point : (k,) float
-
-    Returns
-    -------
-    (m, k) float
-        None of them lies in another one.
+    ``zones`` (n, k): their upper bounds; ``point`` (k,). Result (m, k): None of them lies in
+    another one.
     """
     inside = (point < zones).all(axis=1)
     kept = zones[~inside]

@@ -48,27 +48,11 @@ def solve(
 ) -> ScheduleSelection:
     """Return a plan through the states of a beam.
 
-    Parameters
-    ----------
-    problem : FreeProblem
-    width : int, optional
-        How many new states of a brick count are kept, from 1.
-    seconds, max_memory : float, optional
-        After which, or above how many bytes, it ends without a plan.
-    progress : callable, optional
-        Told as a `seqopt.work.Stage` how far it is.
-
-    Returns
-    -------
-    ScheduleSelection
-        Without a bound, but of margins of stability.
-
-    Raises
-    ------
-    InfeasibleError
-        If no plan is allowed.
-    ProblemError, TimeUpError
-        If the width is not positive, or memory or time is up.
+    ``width``: how many new states of a brick count are kept, from 1; ``seconds``, ``max_memory``:
+    after which, or above how many bytes, it ends without a plan; ``progress``: told as a
+    `seqopt.work.Stage` how far it is. Result: without a bound, but of margins of stability. Raises
+    `InfeasibleError` if no plan is allowed; `ProblemError`, `TimeUpError` if the width is not
+    positive, or memory or time is up.
     """
     if width < 1:
         raise ProblemError(f"option width={width}: give a whole number from 1 on")

@@ -36,26 +36,10 @@ MOST = 20_000_000  # combinations in one enumeration: 160 MB
 def solve(problem: PlacementProblem, *, watch: Watch | None = None, horizon: int = 2) -> Selection:
     """Return the committed choices.
 
-    Parameters
-    ----------
-    problem : PlacementProblem
-        Its sums are used.
-    watch : Watch, optional
-        Says when to stop, and is told what is found.
-    horizon : int
-        How many moves are enumerated at once, from 1.
-
-    Returns
-    -------
-    Selection
-        Without a bound.
-
-    Raises
-    ------
-    InfeasibleError
-        If no choice is allowed.
-    ProblemError
-        If the horizon is below 1, or there are more combinations than `MOST`.
+    ``problem``: its sums are used; ``watch``: says when to stop, and is told what is found;
+    ``horizon``: how many moves are enumerated at once, from 1. Result: without a bound. Raises
+    `InfeasibleError` if no choice is allowed; `ProblemError` if the horizon is below 1, or there
+    are more combinations than `MOST`.
     """
     watch = watch or Watch()
     costs = problem.sums

@@ -32,14 +32,8 @@ from seqopt.placement.watch import Watch
 class Reference:
     """What the program says.
 
-    Attributes
-    ----------
-    value : float
-        Of the program, in the unit of the costs.
-    bound : float
-        On it, as the solver says.
-    choice : tuple of int
-        The choice that the largest part of the flow takes.
+    ``value``: of the program, in the unit of the costs; ``bound``: on it, as the solver says;
+    ``choice``: the choice that the largest part of the flow takes.
     """
 
     value: float
@@ -52,23 +46,10 @@ def solve_program(
 ) -> Reference:
     """Return the least worst or tail total over scenarios, or a bound on it.
 
-    Parameters
-    ----------
-    layers : sequence of LayeredCosts
-        Of every scenario, for the same moves.
-    most : float
-        The largest weight of a scenario: 1 for the worst total.
-    whole : bool
-        Whether choices are whole; if not, the value is a bound.
-    watch : Watch, optional
-        Says when to stop.
-
-    Raises
-    ------
-    InfeasibleError
-        If no choice is allowed in all scenarios.
-    SolverError
-        If the solver ends without an optimum.
+    ``layers``: of every scenario, for the same moves; ``most``: the largest weight of a scenario: 1
+    for the worst total; ``whole``: whether choices are whole; if not, the value is a bound;
+    ``watch``: says when to stop. Raises `InfeasibleError` if no choice is allowed in all scenarios;
+    `SolverError` if the solver ends without an optimum.
     """
     flow = _flow(layers)
     scale = max(float(np.abs(np.array(flow.amounts) * np.array(flow.units)[:, None]).max()), TINY)

@@ -70,32 +70,14 @@ def solve(
 ) -> ScheduleSelection:
     """Return the best free schedule.
 
-    Parameters
-    ----------
-    problem : FreeProblem
-    width : int, optional
-        From how many new states of a brick count the narrow search goes on.
-    growth : float, optional
-        By how much the threshold rises from one search to the next, over itself.
-    seconds : float, optional
-        After which the best plan found is returned, and what is proven by then.
-    max_memory : float, optional
-        Bytes that states, moves and responses may take, about; then likewise. By default as many as
-        are free.
-    progress : callable, optional
-        Told as a `seqopt.work.Stage` how far each pass through the bricks is.
-
-    Returns
-    -------
-    ScheduleSelection
-        Its bounds are its values, unless time or memory was used up or it was interrupted.
-
-    Raises
-    ------
-    InfeasibleError
-        If no plan is allowed.
-    ProblemError, TimeUpError
-        If the width is not positive, or memory or time is up before any plan is found.
+    ``width``: from how many new states of a brick count the narrow search goes on; ``growth``: by
+    how much the threshold rises from one search to the next, over itself; ``seconds``: after which
+    the best plan found is returned, and what is proven by then; ``max_memory``: bytes that states,
+    moves and responses may take, about; then likewise. By default as many as are free.
+    ``progress``: told as a `seqopt.work.Stage` how far each pass through the bricks is. Result: its
+    bounds are its values, unless time or memory was used up or it was interrupted. Raises
+    `InfeasibleError` if no plan is allowed; `ProblemError`, `TimeUpError` if the width is not
+    positive, or memory or time is up before any plan is found.
     """
     if width < 1 or not growth > 1:
         raise ProblemError(

@@ -28,18 +28,10 @@ STOPS = ("kTimeLimit", "kInterrupt")
 class Optimum:
     """What a solver found.
 
-    Attributes
-    ----------
-    value : float
-        Of the objective; infinite where it was stopped before it had any solution.
-    compile_seconds : float
-        What cvxpy took to write the program down for the solver, s.
-    bound : float
-        On the objective, as the solver says.
-    nodes : int
-        Of its search tree.
-    stopped : bool
-        Whether its time was over, or it was interrupted.
+    ``value``: of the objective; infinite where it was stopped before it had any solution;
+    ``compile_seconds``: what cvxpy took to write the program down for the solver, s; ``bound``: on
+    the objective, as the solver says; ``nodes``: of its search tree; ``stopped``: whether its time
+    was over, or it was interrupted.
     """
 
     value: float
@@ -62,22 +54,11 @@ class Size:
 def minimize(program: cp.Problem, *, feasible: bool, time_limit: float = math.inf) -> Optimum:
     """Solve a linear program by Clarabel.
 
-    Parameters
-    ----------
-    program : cvxpy.Problem
-        Its variables take the values of the optimum.
-    feasible : bool
-        Whether the program is known to have a solution.
-    time_limit : float, optional
-        After which it stops with nothing, s.
-
-    Raises
-    ------
-    InfeasibleError
-        If the solver proves that nothing is within all budgets.
-    SolverError
-        If it ends in any other way than with an optimum or at its limit, or calls a program
-        infeasible that is not.
+    ``program``: its variables take the values of the optimum; ``feasible``: whether the program is
+    known to have a solution; ``time_limit``: after which it stops with nothing, s. Raises
+    `InfeasibleError` if the solver proves that nothing is within all budgets; `SolverError` if it
+    ends in any other way than with an optimum or at its limit, or calls a program infeasible that
+    is not.
     """
     limit = {"time_limit": time_limit} if math.isfinite(time_limit) else {}
     try:
@@ -103,21 +84,10 @@ def minimize_whole(
 ) -> Optimum:
     """Solve an integer program by HiGHS.
 
-    Parameters
-    ----------
-    program : cvxpy.Problem
-        Its variables take the values of the best solution, if there is one.
-    feasible : bool
-        Whether the program is known to have a solution.
-    watch : Watch, optional
-        Says when to stop, and is told values and bounds as they are found.
-    told : callable, optional
-        Turns a value of the program into the unit that the watch is told.
-
-    Raises
-    ------
-    InfeasibleError, SolverError
-        As `minimize`.
+    ``program``: its variables take the values of the best solution, if there is one; ``feasible``:
+    whether the program is known to have a solution; ``watch``: says when to stop, and is told
+    values and bounds as they are found; ``told``: turns a value of the program into the unit that
+    the watch is told. Raises `InfeasibleError`, `SolverError` as `minimize`.
     """
     watch = watch or Watch()
     start = time.perf_counter()
@@ -156,29 +126,12 @@ def minimize_rows(
 ) -> Point:
     """Solve a program whose arrays are given, by HiGHS.
 
-    Parameters
-    ----------
-    cost : (n,) float
-    rows : (m, n) sparse float
-    right : (m,) float
-        What equations are equal to; inequalities, which come after them, are no more.
-    watch : Watch
-        Says when to stop.
-    whole : int, optional
-        How many of the first variables are 0 or 1; all are from 0 on.
-    equations : int, optional
-        How many of the rows are equations; all by default.
-
-    Returns
-    -------
-    Point
-        Its end ``kInfeasible``, ``kOptimal`` or one of `STOPS`; its values are none (0,) where
-        nothing was found.
-
-    Raises
-    ------
-    SolverError
-        If it ends in any other way.
+    ``cost`` (n,); ``rows`` ((m, n) sparse float); ``right`` (m,): what equations are equal to;
+    inequalities, which come after them, are no more; ``watch``: says when to stop; ``whole``: how
+    many of the first variables are 0 or 1; all are from 0 on; ``equations``: how many of the rows
+    are equations; all by default. Result: its end ``kInfeasible``, ``kOptimal`` or one of `STOPS`;
+    its values are none (0,) where nothing was found. Raises `SolverError` if it ends in any other
+    way.
     """
     dims = SimpleNamespace(zero=len(right) if equations < 0 else equations)
     data = {"A": rows, "b": right, "c": cost, "dims": dims, "bool_vars_idx": range(whole)}
@@ -203,10 +156,7 @@ def minimize_rows(
 def anatomy(program: cp.Problem) -> tuple[Size, float]:
     """Return how large an integer program is, and the bound of its linear relaxation.
 
-    Raises
-    ------
-    SolverError
-        If the relaxation is not solved.
+    Raises `SolverError` if the relaxation is not solved.
     """
     data, _, inverse = program.get_problem_data(cp.HIGHS)
     solver = _loaded(data, whole=False)

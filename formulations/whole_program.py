@@ -24,19 +24,10 @@ Choice = tuple[int, ...]
 class WholeProgram:
     """A program with whole variables, and what its solution means.
 
-    Attributes
-    ----------
-    program : cvxpy.Problem
-        Costs are scaled.
-    whole : cvxpy.Variable
-        Those that a choice is read from.
-    choice : callable
-        Returns the choice that their values stand for.
-    bound : callable
-        Returns a lower bound in the unit of the costs for the value of the program, lower by what
-        the solver may be off.
-    feasible : bool, optional
-        Whether a choice is known to be allowed.
+    ``program``: costs are scaled; ``whole``: those that a choice is read from; ``choice``: returns
+    the choice that their values stand for; ``bound``: returns a lower bound in the unit of the
+    costs for the value of the program, lower by what the solver may be off; ``feasible``: whether a
+    choice is known to be allowed.
     """
 
     program: cp.Problem
@@ -51,27 +42,10 @@ def solve_whole(
 ) -> Selection:
     """Return the choice that a program finds.
 
-    Parameters
-    ----------
-    problem : PlacementProblem
-        Its costs are asked what the choice is worth.
-    written : WholeProgram
-    aim : Aim
-        What it minimizes.
-    watch : Watch, optional
-        Says when to stop, and is told what is found.
-
-    Returns
-    -------
-    Selection
-        With a bound.
-
-    Raises
-    ------
-    InfeasibleError
-        If no choice is within all budgets.
-    SolverError
-        If the solver ends without an optimum, or stops and no choice is at hand.
+    ``problem``: its costs are asked what the choice is worth; ``aim``: what it minimizes;
+    ``watch``: says when to stop, and is told what is found. Result: with a bound. Raises
+    `InfeasibleError` if no choice is within all budgets; `SolverError` if the solver ends without
+    an optimum, or stops and no choice is at hand.
     """
     optimum = minimize_whole(
         written.program, feasible=written.feasible, watch=watch or Watch(), told=written.bound
@@ -88,10 +62,7 @@ def solve_whole(
 def largest_of_each(sizes: Sequence[int]) -> Callable[[Floats], Choice]:
     """Return what reads a choice from assignments of the candidates of every move.
 
-    Parameters
-    ----------
-    sizes : sequence of int
-        How many candidates every move has.
+    ``sizes``: how many candidates every move has.
     """
     ends = np.cumsum(sizes)[:-1]
     return lambda picks: tuple(int(np.argmax(part)) for part in np.split(picks, ends))
@@ -100,12 +71,7 @@ def largest_of_each(sizes: Sequence[int]) -> Callable[[Floats], Choice]:
 def below(scale: float, least: float = 0.0) -> Callable[[float], float]:
     """Return what turns the value of a program into a bound.
 
-    Parameters
-    ----------
-    scale : float
-        By which costs are divided.
-    least : float, optional
-        What was taken off them before.
+    ``scale``: by which costs are divided; ``least``: what was taken off them before.
     """
     return lambda value: least + scale * (value - ACCURACY * max(abs(value), 1.0))
 
@@ -113,11 +79,7 @@ def below(scale: float, least: float = 0.0) -> Callable[[float], float]:
 def worst_pairs(costs: LayeredCosts) -> tuple[list[Floats], float]:
     """Return the worst cost of every pair of every move, and the least of them if negative.
 
-    Returns
-    -------
-    worst : list of (C_k-1, C_k) float
-    least : float
-        Else zero.
+    Results: ``worst`` (list of (C_k-1, C_k) float); ``least``: else zero.
     """
     worst = [np.maximum(d, c) for d, c in zip(costs.shared, costs.single, strict=True)]
     return worst, min(0.0, *(float(part.min()) for part in worst))
@@ -126,22 +88,8 @@ def worst_pairs(costs: LayeredCosts) -> tuple[list[Floats], float]:
 def flow_of_peaks(problem: PlacementProblem) -> tuple[LayeredFlow, Callable[[float], float]]:
     """Return the flow whose arcs cost the worst of every pair, and what bounds the least of these.
 
-    Parameters
-    ----------
-    problem : PlacementProblem
-        Its peaks are used.
-
-    Returns
-    -------
-    flow : LayeredFlow
-        Of costs that are none below zero.
-    bound : callable
-        Of `WholeProgram`.
-
-    Raises
-    ------
-    InfeasibleError
-        If no choice is allowed.
+    ``problem``: its peaks are used. Results: ``flow``: of costs that are none below zero;
+    ``bound``: of `WholeProgram`. Raises `InfeasibleError` if no choice is allowed.
     """
     worst, least = worst_pairs(problem.peaks)
     nothing = tuple(np.zeros(size) for size in problem.peaks.sizes)

@@ -20,10 +20,7 @@ AGAIN = 0.05  # s after which an interrupt that was lost is raised again
 def run() -> int:
     """Run the command of the shell; an interrupt while it starts is one too.
 
-    Returns
-    -------
-    int
-        The exit status.
+    Result: the exit status.
     """
     try:
         _open_streams()

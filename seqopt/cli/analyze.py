@@ -89,10 +89,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> Answer:
     """Analyze every step of a sequence.
 
-    Parameters
-    ----------
-    options : argparse.Namespace
-        Of the command.
+    ``options``: of the command.
     """
     keep_apart(options, options.out, options.fields)
     scene = asked_scene(options)

@@ -20,24 +20,12 @@ from seqopt.cli.terminal import complain, note, show, show_text
 class Answer:
     """What a command answers.
 
-    Attributes
-    ----------
-    facts : mapping of str to object
-        What there is to know, for scripts: values, mappings, sequences and tables.
-    text : str
-        The same for people: lines on standard output.
-    headings : tuple of str
-        Lines of the text that are headings.
-    data : str
-        A table as CSV that goes to standard output, where no file is written for it.
-    written : tuple of pathlib.Path
-        Files and folders that were written.
-    notes : tuple of str
-        What else is worth knowing: lines on standard error.
-    failures : tuple of str
-        What went wrong although there is an answer: lines on standard error.
-    status : Status
-        How the command ended.
+    ``facts``: what there is to know, for scripts: values, mappings, sequences and tables; ``text``:
+    the same for people: lines on standard output; ``headings``: lines of the text that are
+    headings; ``data``: a table as CSV that goes to standard output, where no file is written for
+    it; ``written``: files and folders that were written; ``notes``: what else is worth knowing:
+    lines on standard error; ``failures``: what went wrong although there is an answer: lines on
+    standard error; ``status``: how the command ended.
     """
 
     facts: Mapping[str, object]
@@ -52,16 +40,8 @@ class Answer:
     def document(self, command: str) -> dict[str, object]:
         """Return what scripts are told.
 
-        Parameters
-        ----------
-        command : str
-            Its name.
-
-        Returns
-        -------
-        dict of str to object
-            Ready for JSON: the facts between ``command``, ``seqopt`` (the version) and ``written``,
-            ``notes``, ``failures``, ``exit_status``.
+        ``command``: its name. Result: ready for JSON: the facts between ``command``, ``seqopt``
+        (the version) and ``written``, ``notes``, ``failures``, ``exit_status``.
         """
         return {
             "command": command,
@@ -77,16 +57,7 @@ class Answer:
 def print_answer(answer: Answer, options: argparse.Namespace) -> Status:
     """Print an answer in the form that is asked for.
 
-    Parameters
-    ----------
-    answer : Answer
-    options : argparse.Namespace
-        With ``command``, ``json`` and ``quiet``.
-
-    Returns
-    -------
-    Status
-        Of the answer.
+    ``options``: with ``command``, ``json`` and ``quiet``. Result: of the answer.
     """
     if options.json:
         show(json.dumps(answer.document(options.command), indent=2, allow_nan=False) + "\n")
@@ -114,16 +85,9 @@ def _print_text(answer: Answer) -> None:
 def plain(value: object) -> object:
     """Return a value as JSON can hold it, numbers with all of their digits.
 
-    Parameters
-    ----------
-    value : object
-        Also numpy's values and arrays, tables, paths and members of enumerations.
-
-    Returns
-    -------
-    object
-        What is not known (NaN) as null, what is infinite as the text ``inf`` or ``-inf``; a table
-        as a list of rows.
+    ``value``: also numpy's values and arrays, tables, paths and members of enumerations. Result:
+    what is not known (NaN) as null, what is infinite as the text ``inf`` or ``-inf``; a table as a
+    list of rows.
 
     Examples
     --------

@@ -24,13 +24,9 @@ def _layout(prog: str) -> argparse.HelpFormatter:
 class Command:
     """A command, whose module is loaded when it is asked for.
 
-    Attributes
-    ----------
-    about : str
-        What it does, in a few words.
-    module : str
-        Of `seqopt.cli`: it has ``add_arguments``, ``run``, ``DESCRIPTION``, ``EXAMPLES``, and
-        ``USAGE`` where it has more options than a reader takes in at once.
+    ``about``: what it does, in a few words; ``module``: of `seqopt.cli`: it has ``add_arguments``,
+    ``run``, ``DESCRIPTION``, ``EXAMPLES``, and ``USAGE`` where it has more options than a reader
+    takes in at once.
     """
 
     about: str
@@ -82,16 +78,9 @@ class _Parser(argparse.ArgumentParser):
 def parser(asked: str | None = None) -> argparse.ArgumentParser:
     """Return the parser of the command line.
 
-    Parameters
-    ----------
-    asked : str, optional
-        The one command whose arguments it takes, so that nothing else is loaded; by default all.
-
-    Returns
-    -------
-    argparse.ArgumentParser
-        ``command`` names what is to be run. A wrong word ends the program with status
-        `seqopt.cli.status.Status.BAD_INPUT`.
+    ``asked``: the one command whose arguments it takes, so that nothing else is loaded; by default
+    all. Result: ``command`` names what is to be run. A wrong word ends the program with status
+    `seqopt.cli.status.Status.BAD_INPUT`.
     """
     whole = _Parser(
         prog="seqopt",
@@ -129,14 +118,6 @@ def _fill(command: argparse.ArgumentParser, module: ModuleType) -> None:
 def asked_command(words: Sequence[str]) -> str:
     """Return the command that words ask for.
 
-    Parameters
-    ----------
-    words : sequence of str
-        After ``seqopt``.
-
-    Returns
-    -------
-    str
-        Empty if there is none.
+    ``words``: after ``seqopt``. Result: empty if there is none.
     """
     return next((word for word in words if not word.startswith("-")), "")

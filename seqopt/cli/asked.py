@@ -36,10 +36,7 @@ from seqopt.work.progress import told
 def asked_scene(options: argparse.Namespace) -> Scene:
     """Return the scene that a command is asked for, in the order that it is asked for.
 
-    Parameters
-    ----------
-    options : argparse.Namespace
-        With ``scene`` and ``order``.
+    ``options``: with ``scene`` and ``order``.
     """
     if options.order == "search":
         raise ProblemError(
@@ -51,14 +48,7 @@ def asked_scene(options: argparse.Namespace) -> Scene:
 def scene_file(scene: Scene) -> dict[str, bytes | str]:
     """Return the scene that a plan is for, by file name: plans name bricks by how many stand.
 
-    Parameters
-    ----------
-    scene : Scene
-        In the order in which it is built.
-
-    Returns
-    -------
-    dict of str to (bytes or str)
+    ``scene``: in the order in which it is built. Result (dict of str to (bytes or str)).
     """
     return {"scene.json": dump_scene(scene)}
 
@@ -66,16 +56,7 @@ def scene_file(scene: Scene) -> dict[str, bytes | str]:
 def asked_engine(options: argparse.Namespace, network: Network) -> Engine:
     """Return the engine that a command is asked for.
 
-    Parameters
-    ----------
-    options : argparse.Namespace
-        With ``engine`` and ``mortar``.
-    network : Network
-
-    Raises
-    ------
-    SceneError
-        If the scene is not for it.
+    ``options``: with ``engine`` and ``mortar``. Raises `SceneError` if the scene is not for it.
     """
     mortar = None if options.mortar is None else MORTARS[options.mortar]
     try:
@@ -87,10 +68,7 @@ def asked_engine(options: argparse.Namespace, network: Network) -> Engine:
 def level_notes(engine: Engine) -> tuple[str, ...]:
     """Return which levels an engine that picks them took, and why.
 
-    Returns
-    -------
-    tuple of str
-        None of other engines.
+    Result: None of other engines.
     """
     if not isinstance(engine, AutoEngine):
         return ()
@@ -112,10 +90,7 @@ def posed_notes(problem: Problem | FreeProblem) -> tuple[str, ...]:
 def idle_notes(scene: Scene, steps: Sequence[AnyStep]) -> tuple[str, ...]:
     """Return the robots that never grip, in words.
 
-    Returns
-    -------
-    tuple of str
-        Of one note, or none.
+    Result: of one note, or none.
     """
     idle = idle_robots(scene, steps)
     return (f"robots: {', '.join(idle)} never grip{'s' * (len(idle) == 1)}",) if idle else ()
@@ -124,11 +99,7 @@ def idle_notes(scene: Scene, steps: Sequence[AnyStep]) -> tuple[str, ...]:
 def exceeded(scene: Scene, *tables: pd.DataFrame) -> tuple[str, ...]:
     """Return the payloads that are exceeded, in words.
 
-    Parameters
-    ----------
-    scene : Scene
-    *tables : pandas.DataFrame
-        Responses of steps.
+    ``*tables``: responses of steps.
     """
     return tuple(str(excess) for table in tables for excess in overloads(scene, table))
 
@@ -153,15 +124,8 @@ def strictly(
 ) -> Answer:
     """Return an answer with the payloads that are exceeded, and the status of ``--strict``.
 
-    Parameters
-    ----------
-    answer : Answer
-    options : argparse.Namespace
-        With ``strict``.
-    over : sequence of str
-        From `exceeded`.
-    outside : sequence of Departure or str, optional
-        How results leave the linear range.
+    ``options``: with ``strict``; ``over``: from `exceeded`; ``outside``: how results leave the
+    linear range.
     """
     answer = marked(answer, outside)
     answer = replace(answer, facts={**answer.facts, "payloads_exceeded": list(over)})
@@ -177,22 +141,9 @@ def step_answers(
 ) -> Iterator[tuple[Step, Fields]]:
     """Return steps with their fields, each from scratch or with what earlier ones lock in.
 
-    Parameters
-    ----------
-    options : argparse.Namespace
-        With ``staged``, where bricks are set down or None, ``engine``, and ``tell``, which is told
-        how far it is.
-    engine : Engine
-    steps : sequence of Step
-
-    Returns
-    -------
-    iterator of (Step, Fields)
-
-    Raises
-    ------
-    SceneError
-        If a staged analysis is asked of another engine than the one of rigid bricks.
+    ``options``: with ``staged``, where bricks are set down or None, ``engine``, and ``tell``, which
+    is told how far it is. Result (iterator of (Step, Fields)). Raises `SceneError` if a staged
+    analysis is asked of another engine than the one of rigid bricks.
     """
     if options.staged is None:
         return ((step, step_fields(engine, step)) for step in told("steps", steps, options.tell))
@@ -208,16 +159,8 @@ def step_answers(
 def timely(answers: Iterator[tuple[Step, Fields]], seconds: float) -> Iterator[tuple[Step, Fields]]:
     """Yield the answers that come in time.
 
-    Parameters
-    ----------
-    answers : iterator of (Step, Fields)
-        From `step_answers`.
-    seconds : float
-        From the first one that is asked for.
-
-    Yields
-    ------
-    (Step, Fields)
+    ``answers`` (iterator of (Step, Fields)): from `step_answers`; ``seconds``: from the first one
+    that is asked for. Yield (Step, Fields).
     """
     end = time.perf_counter() + seconds
     while True:

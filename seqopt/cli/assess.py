@@ -66,10 +66,7 @@ def _strength(takes: Takes) -> None:
 def run(options: argparse.Namespace) -> Answer:
     """Assess every step of a sequence; the table is written whatever the verdicts.
 
-    Parameters
-    ----------
-    options : argparse.Namespace
-        Of the command.
+    ``options``: of the command.
     """
     keep_apart(options, options.out)
     scene = asked_scene(options)

@@ -19,12 +19,7 @@ Takes: TypeAlias = argparse._ActionsContainer  # a parser, or a group of its arg
 def group(command: argparse.ArgumentParser, title: str, about: str | None = None) -> Takes:
     """Return a group of arguments, which help shows under a title.
 
-    Parameters
-    ----------
-    command : argparse.ArgumentParser
-    title : str
-    about : str, optional
-        A sentence below it.
+    ``about``: a sentence below it.
     """
     return command.add_argument_group(title, about)
 
@@ -97,11 +92,7 @@ def strict_argument(takes: Takes) -> None:
 def time_argument(takes: Takes, said: str) -> None:
     """Add the argument that says when a command ends.
 
-    Parameters
-    ----------
-    takes : argparse._ActionsContainer
-    said : str
-        What it leaves.
+    ``said``: what it leaves.
     """
     takes.add_argument("--time-limit", metavar="SECONDS", help=said)
 
@@ -109,11 +100,7 @@ def time_argument(takes: Takes, said: str) -> None:
 def robots_argument(takes: Takes, whose: str) -> None:
     """Add the argument that names robots.
 
-    Parameters
-    ----------
-    takes : argparse._ActionsContainer
-    whose : str
-        What they take part in, for the help.
+    ``whose``: what they take part in, for the help.
     """
     takes.add_argument(
         "--robots",

@@ -70,10 +70,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> Answer:
     """Compare all ways to build a scene.
 
-    Parameters
-    ----------
-    options : argparse.Namespace
-        Of the command.
+    ``options``: of the command.
     """
     scene = asked_scene(options)
     engine = asked_engine(options, build_network(scene))

@@ -32,12 +32,7 @@ MODIFIED = "modified-sequential"
 class Told:
     """A comparison in words.
 
-    Attributes
-    ----------
-    text : str
-        All lines.
-    headings : tuple of str
-        Those that are headings.
+    ``text``: all lines; ``headings``: those that are headings.
     """
 
     text: str
@@ -47,13 +42,7 @@ class Told:
 def tell_comparison(comparison: Comparison, scene: Scene, criterion: Criterion) -> Told:
     """Return what a comparison found, its columns explained and its notes in order.
 
-    Parameters
-    ----------
-    comparison : Comparison
-    scene : Scene
-        Which was compared.
-    criterion : Criterion
-        With which the formulations were compared.
+    ``scene``: which was compared; ``criterion``: with which the formulations were compared.
     """
     blocks = [
         [f"{scene.name}: {len(scene.bricks)} bricks, {len(scene.robots)} robots"],
@@ -113,17 +102,8 @@ def _cells(comparison: Comparison, name: str, row: pd.Series[float]) -> Iterator
 def printed_largest(comparison: Comparison, name: str) -> dict[str, float]:
     """Return the largest responses of a method as the paper prints them.
 
-    Parameters
-    ----------
-    comparison : Comparison
-    name : str
-        Of a method.
-
-    Returns
-    -------
-    dict of str to float
-        By ``F_rob`` [N], ``M_sup`` [N m], ``T_max`` [N] and ``D_max`` [1e-3 mm]; empty where the
-        paper prints none.
+    ``name``: of a method. Result: by ``F_rob`` [N], ``M_sup`` [N m], ``T_max`` [N] and ``D_max``
+    [1e-3 mm]; empty where the paper prints none.
     """
     if comparison.printed is None or name not in comparison.maxima:
         return {}
@@ -221,10 +201,7 @@ def _notes(comparison: Comparison) -> Iterator[list[str]]:
 def title_of(problem: str) -> str:
     """Return what a problem is called above its rows.
 
-    Parameters
-    ----------
-    problem : str
-        Of a comparison's table.
+    ``problem``: of a comparison's table.
 
     Examples
     --------

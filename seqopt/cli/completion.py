@@ -51,10 +51,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> Answer:
     """Return the script with which a shell completes words of seqopt.
 
-    Parameters
-    ----------
-    options : argparse.Namespace
-        Of the command.
+    ``options``: of the command.
     """
     script = shtab.complete(completed(parser()), options.shell)
     return Answer(facts={"shell": options.shell, "script": script}, data=script + "\n")
@@ -63,10 +60,7 @@ def run(options: argparse.Namespace) -> Answer:
 def completed(whole: argparse.ArgumentParser) -> argparse.ArgumentParser:
     """Return a parser whose arguments know what may follow them.
 
-    Parameters
-    ----------
-    whole : argparse.ArgumentParser
-        Of all commands; it is changed.
+    ``whole``: of all commands; it is changed.
     """
     known = {name: words(names) for name, names in _names().items()}
     known |= {
@@ -123,17 +117,8 @@ def _names() -> dict[str, list[str]]:
 def words(names: Iterable[str], *, files: bool = False) -> dict[str, object]:
     """Return how each shell completes one of some words, as shtab takes it.
 
-    Parameters
-    ----------
-    names : iterable of str
-        Without blanks.
-    files : bool, optional
-        Whether the path of a file will do too.
-
-    Returns
-    -------
-    dict of str to object
-        By shell, with functions for bash and zsh as its ``preamble``.
+    ``names``: without blanks; ``files``: whether the path of a file will do too. Result: by shell,
+    with functions for bash and zsh as its ``preamble``.
     """
     listed = " ".join(names)
     name = f"_seqopt_{sha256(listed.encode()).hexdigest()[:8]}"

@@ -21,10 +21,7 @@ BETWEEN = re.compile(r",(?![^\[]*\])")  # a comma that is not in brackets
 def asked_criterion(options: argparse.Namespace) -> Criterion:
     """Return the criterion that a command is asked for.
 
-    Parameters
-    ----------
-    options : argparse.Namespace
-        With ``criteria``, ``crown``, ``ranked`` and ``among``.
+    ``options``: with ``criteria``, ``crown``, ``ranked`` and ``among``.
     """
     usual = DEFAULTS["any other"].criterion.name
     criterion = parse_criterion(options.criteria or usual, options.crown)
@@ -34,18 +31,9 @@ def asked_criterion(options: argparse.Namespace) -> Criterion:
 def parse_criterion(text: str, crown: str | None = None) -> Criterion:
     """Return a criterion by name, or a rank sum of named responses with weights.
 
-    Parameters
-    ----------
-    text : str
-        A name of `seqopt.CRITERIA`, or responses as ``T_max,M_sup=2``; a weight is 1 by default.
-    crown : str, optional
-        Bricks placed at the crown, or ``none``.
-
-    Raises
-    ------
-    ProblemError
-        If there is no such criterion or response, a weight is not positive, or the criterion has
-        no crown.
+    ``text``: a name of `seqopt.CRITERIA`, or responses as ``T_max,M_sup=2``; a weight is 1 by
+    default; ``crown``: bricks placed at the crown, or ``none``. Raises `ProblemError` if there is
+    no such criterion or response, a weight is not positive, or the criterion has no crown.
     """
     if crown is not None:
         named = CRITERIA.get(text)
@@ -66,16 +54,9 @@ def parse_criterion(text: str, crown: str | None = None) -> Criterion:
 def rank_otherwise(criterion: Criterion, ranked: str | None, among: str | None) -> Criterion:
     """Return a criterion of ranks with what it ranks among.
 
-    Parameters
-    ----------
-    criterion : Criterion
-    ranked, among : str, optional
-        Values of `seqopt.placement.ranks.Ranked` and `seqopt.placement.ranks.Among`.
-
-    Raises
-    ------
-    ProblemError
-        If either is given and the criterion has no ranks.
+    ``ranked``, ``among``: values of `seqopt.placement.ranks.Ranked` and
+    `seqopt.placement.ranks.Among`. Raises `ProblemError` if either is given and the criterion has
+    no ranks.
     """
     if ranked is None and among is None:
         return criterion

@@ -37,10 +37,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> Answer:
     """Write the plan of a folder in a format of others.
 
-    Parameters
-    ----------
-    options : argparse.Namespace
-        Of the command.
+    ``options``: of the command.
     """
     inputs = [options.folder / name for name in ("scene.json", "plan.csv")]
     require_apart([options.out], [*inputs, *filter(None, [options.source])])

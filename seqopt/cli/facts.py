@@ -11,10 +11,7 @@ from seqopt.scene.scene import Scene
 def scene_facts(scene: Scene) -> dict[str, object]:
     """Return what a scene is called, and how large it is.
 
-    Returns
-    -------
-    dict of str to object
-        ``name``, ``bricks``, ``joints``, ``ground_ends`` and the names of ``robots``.
+    Result: ``name``, ``bricks``, ``joints``, ``ground_ends`` and the names of ``robots``.
     """
     return {
         "name": scene.name,
@@ -28,11 +25,8 @@ def scene_facts(scene: Scene) -> dict[str, object]:
 def network_facts(network: Network) -> dict[str, object]:
     """Return how large the network of a scene is, what it weighs, and what its robots can do.
 
-    Returns
-    -------
-    dict of str to object
-        ``nodes`` and ``edges`` of the whole structure, ``weight_N``, ``payloads_N`` and ``reaches``
-        by robot, ``provenance``.
+    Result: ``nodes`` and ``edges`` of the whole structure, ``weight_N``, ``payloads_N`` and
+    ``reaches`` by robot, ``provenance``.
     """
     scene = network.scene
     count = len(scene.bricks)

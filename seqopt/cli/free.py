@@ -48,10 +48,7 @@ from seqopt.workflow import DEFAULTS, posed_free
 def optimize_free(options: argparse.Namespace) -> Answer:
     """Choose every step of a free schedule, and write the plan.
 
-    Parameters
-    ----------
-    options : argparse.Namespace
-        Of the command ``optimize``.
+    ``options``: of the command ``optimize``.
     """
     _require_free(options)
     sought, options.order = (
@@ -117,15 +114,7 @@ def _said(plan: FreePlan, options: argparse.Namespace) -> str:
 def require_loop(options: argparse.Namespace) -> None:
     """Raise an error if options that only the free schedule has are given without it.
 
-    Parameters
-    ----------
-    options : argparse.Namespace
-        Of the command ``optimize``.
-
-    Raises
-    ------
-    ProblemError
-        Naming the option.
+    ``options``: of the command ``optimize``. Raises `ProblemError`, naming the option.
     """
     for name in ("rule", "tilt", "friction"):
         if getattr(options, name):
@@ -149,10 +138,7 @@ def _require_free(options: argparse.Namespace) -> None:
 def asked_free(options: argparse.Namespace) -> tuple[Scene, FreeProblem]:
     """Return the scene with its robots, and the problem of its free schedule.
 
-    Parameters
-    ----------
-    options : argparse.Namespace
-        Of the command ``optimize`` or ``pareto``.
+    ``options``: of the command ``optimize`` or ``pareto``.
     """
     scene = asked_scene(options)
     names = parse_robots(options.robots)

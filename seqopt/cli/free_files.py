@@ -16,18 +16,8 @@ def free_files(
 ) -> dict[str, bytes | str]:
     """Return the files of a free schedule by name.
 
-    Parameters
-    ----------
-    plan : FreePlan
-    summary : mapping of str to object
-    name : str
-        What the plan is called on its page.
-    said : str
-        What it is worth, in words.
-
-    Returns
-    -------
-    dict of str to (bytes or str)
+    ``name``: what the plan is called on its page; ``said``: what it is worth, in words. Result
+    (dict of str to (bytes or str)).
     """
     table = plan.responses()
     files: dict[str, bytes | str] = {

@@ -26,12 +26,7 @@ MISSING = "the following arguments are required"
 def nearest(message: str, options: Iterable[str]) -> str:
     """Return a hint at the word that was probably meant, or nothing.
 
-    Parameters
-    ----------
-    message : str
-        Of the parser.
-    options : iterable of str
-        That its commands have.
+    ``message``: of the parser; ``options``: that its commands have.
 
     Examples
     --------
@@ -55,14 +50,7 @@ def nearest(message: str, options: Iterable[str]) -> str:
 def first_wrong(message: str, given: Sequence[str], options: Sequence[str]) -> str:
     """Return a message about a missing argument, or one about a mistyped option that explains it.
 
-    Parameters
-    ----------
-    message : str
-        Of the parser.
-    given : sequence of str
-        The words that it was given.
-    options : sequence of str
-        That it has.
+    ``message``: of the parser; ``given``: the words that it was given; ``options``: that it has.
 
     Examples
     --------

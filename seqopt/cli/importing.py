@@ -76,10 +76,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> Answer:
     """Read an assembly of others, and write it as a scene.
 
-    Parameters
-    ----------
-    options : argparse.Namespace
-        Of the command.
+    ``options``: of the command.
     """
     require_apart([options.out], [options.file])
     options.tell("reading the file")

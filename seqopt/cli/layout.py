@@ -14,10 +14,7 @@ STYLES = {"heading": "1", "bad": "1;31", "doubt": "33"}  # of terminals: bold, b
 def columns() -> int:
     """Return how many columns text may take: those of the terminal, 80 where there is none.
 
-    Returns
-    -------
-    int
-        ``COLUMNS`` of the environment wins; no less than 40 and no more than 100.
+    Result: ``COLUMNS`` of the environment wins; no less than 40 and no more than 100.
     """
     return min(max(shutil.get_terminal_size((80, 24)).columns, NARROWEST), WIDEST)
 
@@ -25,19 +22,9 @@ def columns() -> int:
 def wrapped(text: str, width: int | None = None, first: str = "", rest: str | None = None) -> str:
     """Return a text as lines that fit the terminal.
 
-    Parameters
-    ----------
-    text : str
-    width : int, optional
-        Columns; those of the terminal by default.
-    first, rest : str, optional
-        What the first line and all others begin with; the latter by default blanks as wide as the
-        former.
-
-    Returns
-    -------
-    str
-        Words longer than a line, as paths, stay whole.
+    ``width``: columns; those of the terminal by default; ``first``, ``rest``: what the first line
+    and all others begin with; the latter by default blanks as wide as the former. Result: words
+    longer than a line, as paths, stay whole.
 
     Examples
     --------
@@ -66,11 +53,8 @@ def is_terminal(stream: TextIO | None) -> bool:
 def colored(stream: TextIO | None) -> bool:
     """Return whether a stream takes colors.
 
-    Returns
-    -------
-    bool
-        Not where ``NO_COLOR`` is set in the environment; where ``FORCE_COLOR`` is; else if it is a
-        terminal that can.
+    Result: not where ``NO_COLOR`` is set in the environment; where ``FORCE_COLOR`` is; else if it
+    is a terminal that can.
     """
     if os.environ.get("NO_COLOR"):
         return False
@@ -82,13 +66,7 @@ def colored(stream: TextIO | None) -> bool:
 def painted(text: str, style: str, stream: TextIO | None) -> str:
     r"""Return text in a style where a stream takes colors, else as it is.
 
-    Parameters
-    ----------
-    text : str
-    style : str
-        A key of `STYLES`.
-    stream : file or None
-        To which it will be written.
+    ``style``: a key of `STYLES`; ``stream``: to which it will be written.
 
     Examples
     --------

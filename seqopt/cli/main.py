@@ -17,15 +17,8 @@ from seqopt.errors import SeqoptError
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command.
 
-    Parameters
-    ----------
-    arguments : sequence of str, optional
-        The words after ``seqopt``; by default those of the shell.
-
-    Returns
-    -------
-    int
-        The exit status, a `seqopt.cli.status.Status`. An error is one line on standard error.
+    ``arguments``: the words after ``seqopt``; by default those of the shell. Result: the exit
+    status, a `seqopt.cli.status.Status`. An error is one line on standard error.
     """
     try:
         status = _run(sys.argv[1:] if arguments is None else arguments)
@@ -43,10 +36,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def load(words: Sequence[str]) -> None:
     """Load the libraries of a command, which would meet its interrupts if they came later.
 
-    Parameters
-    ----------
-    words : sequence of str
-        After ``seqopt``; where they name no command nothing is loaded.
+    ``words``: after ``seqopt``; where they name no command nothing is loaded.
     """
     asked = asked_command(words)
     if asked in COMMANDS:

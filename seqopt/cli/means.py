@@ -17,17 +17,8 @@ MOST_WORKERS = 1024
 def parse_resources(options: argparse.Namespace, progress: Tell | None = None) -> Resources:
     """Return what a computation may use.
 
-    Parameters
-    ----------
-    options : argparse.Namespace
-        With ``workers``, ``cache`` and ``max_memory``.
-    progress : callable, optional
-        Told how far it is.
-
-    Raises
-    ------
-    ProblemError
-        If a number is none that can be meant.
+    ``options``: with ``workers``, ``cache`` and ``max_memory``; ``progress``: told how far it is.
+    Raises `ProblemError` if a number is none that can be meant.
     """
     if not options.workers.isdecimal() or not 1 <= int(options.workers) <= MOST_WORKERS:
         raise ProblemError(
@@ -40,15 +31,8 @@ def parse_resources(options: argparse.Namespace, progress: Tell | None = None) -
 def parse_size(text: str) -> float:
     """Return a number of bytes.
 
-    Parameters
-    ----------
-    text : str
-        As ``2GB``, ``500 MB`` or ``1.5GiB``; bytes without a unit.
-
-    Raises
-    ------
-    ProblemError
-        If it is none.
+    ``text``: as ``2GB``, ``500 MB`` or ``1.5GiB``; bytes without a unit. Raises `ProblemError` if
+    it is none.
 
     Examples
     --------

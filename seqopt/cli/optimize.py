@@ -52,10 +52,7 @@ add_arguments = optimize_arguments.add_arguments
 def run(options: argparse.Namespace) -> Answer:
     """Choose every open grip of a build, and write the plan.
 
-    Parameters
-    ----------
-    options : argparse.Namespace
-        Of the command ``optimize``.
+    ``options``: of the command ``optimize``.
     """
     if options.robust is None:
         require_no_scenarios(options)

@@ -32,19 +32,9 @@ def optimize_order(
 ) -> Answer:
     """Find the order whose best free schedule is best, and write its plan.
 
-    Parameters
-    ----------
-    options : argparse.Namespace
-        Of the command ``optimize``.
-    free : FreeProblem
-        In the scene's own order.
-    judged : callable, optional
-        Returns what else is to be said of the plan that is found.
-
-    Raises
-    ------
-    ProblemError
-        If an option does not go with it.
+    ``options``: of the command ``optimize``; ``free``: in the scene's own order; ``judged``:
+    returns what else is to be said of the plan that is found. Raises `ProblemError` if an option
+    does not go with it.
     """
     if options.max_memory is not None:
         raise ProblemError(

@@ -29,9 +29,7 @@ def figure_notes() -> tuple[str, ...]:
 def comparison_files(result: Comparison) -> dict[str, bytes | str]:
     """Return the tables of a comparison by file name, and its figures if they can be drawn.
 
-    Returns
-    -------
-    dict of str to (bytes or str)
+    Result (dict of str to (bytes or str)).
     """
     files: dict[str, bytes | str] = {
         "comparison.csv": result.table.to_csv(float_format="%.6g"),
@@ -52,18 +50,8 @@ def comparison_files(result: Comparison) -> dict[str, bytes | str]:
 def plan_files(plan: Plan, scene: Scene, report: Mapping[str, object]) -> dict[str, bytes | str]:
     """Return the tables of a plan, its summary and its scene, by file name.
 
-    Parameters
-    ----------
-    plan : Plan
-    scene : Scene
-        That it is for.
-    report : mapping of str to object
-        The summary, ready for JSON.
-
-    Returns
-    -------
-    dict of str to (bytes or str)
-        With what was found at which time, unless no proof was asked for.
+    ``scene``: that it is for; ``report``: the summary, ready for JSON. Result (dict of str to
+    (bytes or str)): with what was found at which time, unless no proof was asked for.
     """
     files: dict[str, bytes | str] = {
         "plan.csv": csv_text(plan.responses()),
@@ -99,22 +87,9 @@ def write_outputs(
 ) -> tuple[Path, ...]:
     """Write the folder that a command was asked for, whole, if it was asked for one.
 
-    Parameters
-    ----------
-    options : argparse.Namespace
-        With ``out``, the folder or None, ``tell``, and what the command reads.
-    files : callable
-        Returns contents by file name.
-
-    Returns
-    -------
-    tuple of pathlib.Path
-        The folder, or nothing.
-
-    Raises
-    ------
-    FileError
-        If one would overwrite what the command reads, or the folder cannot be written.
+    ``options``: with ``out``, the folder or None, ``tell``, and what the command reads; ``files``:
+    returns contents by file name. Result: the folder, or nothing. Raises `FileError` if one would
+    overwrite what the command reads, or the folder cannot be written.
     """
     if options.out is None:
         return ()
@@ -128,15 +103,7 @@ def write_outputs(
 def require_out(options: argparse.Namespace) -> None:
     """Raise an error, before anything is computed, if the folder asked for cannot be written.
 
-    Parameters
-    ----------
-    options : argparse.Namespace
-        With ``out``, the folder or None.
-
-    Raises
-    ------
-    FileError
-        Naming it.
+    ``options``: with ``out``, the folder or None. Raises `FileError`, naming it.
     """
     if options.out is not None:
         require_folder(options.out)
@@ -145,17 +112,8 @@ def require_out(options: argparse.Namespace) -> None:
 def keep_apart(options: argparse.Namespace, *outputs: Path | None) -> None:
     """Raise an error if outputs are one file, or one that the command reads.
 
-    Parameters
-    ----------
-    options : argparse.Namespace
-        Of the command.
-    *outputs : pathlib.Path or None
-        What it is to write.
-
-    Raises
-    ------
-    FileError
-        Naming the file.
+    ``options``: of the command; ``*outputs``: what it is to write. Raises `FileError`, naming the
+    file.
     """
     require_apart([path for path in outputs if path is not None], inputs(options))
 
@@ -163,10 +121,7 @@ def keep_apart(options: argparse.Namespace, *outputs: Path | None) -> None:
 def inputs(options: argparse.Namespace) -> list[Path]:
     """Return the files that a command reads.
 
-    Parameters
-    ----------
-    options : argparse.Namespace
-        Of the command.
+    ``options``: of the command.
     """
     scene = None if options.scene in builtin_scenes() else options.scene
     named = (scene, getattr(options, "plan", None), getattr(options, "schedule", None))

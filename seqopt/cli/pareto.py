@@ -119,10 +119,7 @@ def _choice(takes: Takes) -> None:
 def run(options: argparse.Namespace) -> Answer:
     """Find all plans that no other beats in every aim, and write them.
 
-    Parameters
-    ----------
-    options : argparse.Namespace
-        Of the command.
+    ``options``: of the command.
     """
     require_folder(options.out)
     scene, free = asked_free(options)

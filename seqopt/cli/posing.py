@@ -21,10 +21,7 @@ from seqopt.workflow import posed
 def asked_problem(options: argparse.Namespace) -> Problem:
     """Return the problem that the command ``optimize`` is asked for.
 
-    Parameters
-    ----------
-    options : argparse.Namespace
-        Of the command.
+    ``options``: of the command.
     """
     criterion = asked_criterion(options)
     scene = asked_scene(options)

@@ -48,10 +48,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> Answer:
     """Write the page of the plans in a folder.
 
-    Parameters
-    ----------
-    options : argparse.Namespace
-        Of the command.
+    ``options``: of the command.
     """
     own = options.folder / "scene.json"
     if own.is_file():  # plans go with the scene that stands beside them

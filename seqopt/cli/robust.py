@@ -38,15 +38,7 @@ SPREADS = ("stiffness", "density", "position")
 def require_no_scenarios(options: argparse.Namespace) -> None:
     """Raise an error if options of scenarios are given without an aim over them.
 
-    Parameters
-    ----------
-    options : argparse.Namespace
-        Of the command ``optimize``.
-
-    Raises
-    ------
-    ProblemError
-        Naming the option.
+    ``options``: of the command ``optimize``. Raises `ProblemError`, naming the option.
     """
     for name in ALONE:
         if getattr(options, name):
@@ -59,10 +51,7 @@ def require_no_scenarios(options: argparse.Namespace) -> None:
 def optimize_robust(options: argparse.Namespace) -> Answer:
     """Choose every open grip of a build over scenarios, judge the plan on others, and write it.
 
-    Parameters
-    ----------
-    options : argparse.Namespace
-        Of the command ``optimize``.
+    ``options``: of the command ``optimize``.
     """
     aim = asked_aim(options, NOT_WITH)
     limit = parse_time_limit(options.time_limit)

@@ -20,15 +20,8 @@ RULES = ("newest", "payload", "ending", "placers", "candidates", *COUNTS)
 def parse_standing(options: argparse.Namespace) -> Standing | None:
     """Return what is demanded of the stability of states.
 
-    Parameters
-    ----------
-    options : argparse.Namespace
-        With ``stands``, ``tilt`` (degrees) and ``friction``.
-
-    Raises
-    ------
-    ProblemError, SceneError
-        If there is no such mortar, or a number is none.
+    ``options``: with ``stands``, ``tilt`` (degrees) and ``friction``. Raises `ProblemError`,
+    `SceneError` if there is no such mortar, or a number is none.
     """
     if options.stands is None:
         given = [name for name in ("tilt", "friction") if getattr(options, name) is not None]
@@ -46,17 +39,8 @@ def parse_standing(options: argparse.Namespace) -> Standing | None:
 def parse_rules(texts: Sequence[str], robots: tuple[str, ...]) -> FreeRules:
     """Return rules from words.
 
-    Parameters
-    ----------
-    texts : sequence of str
-        Each ``NAME=VALUE``.
-    robots : tuple of str
-        Those that take part; none for all.
-
-    Raises
-    ------
-    StepError
-        If there is no such rule, or its value is none.
+    ``texts``: each ``NAME=VALUE``; ``robots``: those that take part; none for all. Raises
+    `StepError` if there is no such rule, or its value is none.
     """
     given: dict[str, object] = {"robots": robots}
     for text in texts:

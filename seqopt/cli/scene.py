@@ -46,10 +46,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> Answer:
     """Describe a scene and export it, or list all that there are.
 
-    Parameters
-    ----------
-    options : argparse.Namespace
-        Of the command.
+    ``options``: of the command.
     """
     if options.list:
         return _list(options)

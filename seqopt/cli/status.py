@@ -29,10 +29,7 @@ class Status(IntEnum):
 def status_of(error: BaseException) -> Status:
     """Say in a line on standard error what went wrong, and return the exit status.
 
-    Parameters
-    ----------
-    error : BaseException
-        An error of seqopt, of the system, of memory, or an interrupt.
+    ``error``: an error of seqopt, of the system, of memory, or an interrupt.
     """
     if isinstance(error, KeyboardInterrupt):
         complain(f"seqopt: interrupted{f'; {error}' if str(error) else ''}")

@@ -37,16 +37,8 @@ def steps_arguments(takes: Takes) -> None:
 def asked_steps(scene: Scene, options: argparse.Namespace) -> tuple[Step, ...]:
     """Return the closed sequence that a command is asked for.
 
-    Parameters
-    ----------
-    scene : Scene
-    options : argparse.Namespace
-        With ``method``, ``plan`` and ``robots``.
-
-    Raises
-    ------
-    SceneError, StepError
-        If the method is not for the scene, or robots are named beside a plan.
+    ``options``: with ``method``, ``plan`` and ``robots``. Raises `SceneError`, `StepError` if the
+    method is not for the scene, or robots are named beside a plan.
     """
     robots = parse_robots(options.robots)
     if robots and options.method not in METHODS:

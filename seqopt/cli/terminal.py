@@ -27,11 +27,7 @@ BEGIN = re.compile(
 def harmless(text: str, kept: str = "") -> str:
     r"""Return text in which what steers a terminal is replaced by its code.
 
-    Parameters
-    ----------
-    text : str
-    kept : str, optional
-        Controls that stay.
+    ``kept``: controls that stay.
 
     Examples
     --------
@@ -48,15 +44,7 @@ def harmless(text: str, kept: str = "") -> str:
 def show(text: str) -> None:
     """Write a result to standard output.
 
-    Parameters
-    ----------
-    text : str
-        With the end of its last line.
-
-    Raises
-    ------
-    FileError
-        If standard output is closed.
+    ``text``: with the end of its last line. Raises `FileError` if standard output is closed.
     """
     if sys.stdout is None:
         raise FileError("standard output is closed, and there is a result to write; open it")
@@ -66,17 +54,9 @@ def show(text: str) -> None:
 def show_text(text: str, headings: Sequence[str] = ()) -> None:
     """Write lines for people to standard output.
 
-    Parameters
-    ----------
-    text : str
-        A line or several, without the end of the last; a terminal has long ones wrapped.
-    headings : sequence of str, optional
-        Lines of it that stand out on a terminal.
-
-    Raises
-    ------
-    FileError
-        If standard output is closed.
+    ``text``: a line or several, without the end of the last; a terminal has long ones wrapped;
+    ``headings``: lines of it that stand out on a terminal. Raises `FileError` if standard output is
+    closed.
     """
     if is_terminal(sys.stdout):
         fits = columns()
@@ -92,10 +72,7 @@ def show_text(text: str, headings: Sequence[str] = ()) -> None:
 def complain(text: str) -> None:
     """Print what went wrong on standard error, or nothing where that is closed or full.
 
-    Parameters
-    ----------
-    text : str
-        One line, which stays one unless a person looks at it: a terminal has it wrapped.
+    ``text``: one line, which stays one unless a person looks at it: a terminal has it wrapped.
     """
     _write_line(text, "bad")
 
@@ -130,10 +107,7 @@ def _for_people(text: str, style: str) -> str:
 def flush() -> None:
     """Write what standard output still holds back.
 
-    Raises
-    ------
-    OSError
-        If it cannot be written; what is left is given up.
+    Raises `OSError` if it cannot be written; what is left is given up.
     """
     try:
         if sys.stdout is not None:
@@ -152,10 +126,7 @@ def silence(stream: TextIO) -> None:
 def quiet_numbers(*, quiet: bool = False) -> Iterator[None]:
     """Print warnings about a scene as a line each; what is not finite is an error of its own.
 
-    Parameters
-    ----------
-    quiet : bool, optional
-        Whether to leave out warnings about a scene too.
+    ``quiet``: whether to leave out warnings about a scene too.
     """
     import numpy as np  # noqa: PLC0415  # help needs none of it
 

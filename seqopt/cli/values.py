@@ -27,10 +27,7 @@ RESPONSES = (*CHOICE_RESPONSES, "F_each")
 def parse_robots(text: str) -> tuple[str, ...]:
     """Return names of robots from words.
 
-    Parameters
-    ----------
-    text : str
-        Names with commas between them; nothing for none.
+    ``text``: names with commas between them; nothing for none.
     """
     return tuple(name.strip() for name in text.split(",")) if text else ()
 
@@ -38,17 +35,8 @@ def parse_robots(text: str) -> tuple[str, ...]:
 def parse_limits(texts: Sequence[str], scene: Scene) -> tuple[Limit, ...]:
     """Return limits from words.
 
-    Parameters
-    ----------
-    texts : sequence of str
-        Each ``payload`` or ``RESPONSE=VALUE``, SI units.
-    scene : Scene
-        Whose robots have the payloads.
-
-    Raises
-    ------
-    ProblemError
-        If there is no such response, or a value is not positive.
+    ``texts``: each ``payload`` or ``RESPONSE=VALUE``, SI units; ``scene``: whose robots have the
+    payloads. Raises `ProblemError` if there is no such response, or a value is not positive.
     """
     out: list[Limit] = []
     for text in texts:
@@ -63,15 +51,7 @@ def parse_limits(texts: Sequence[str], scene: Scene) -> tuple[Limit, ...]:
 def parse_time_limit(text: str | None) -> float:
     """Return seconds from words.
 
-    Returns
-    -------
-    float
-        Infinite where none are given.
-
-    Raises
-    ------
-    ProblemError
-        If it is no number from 0.
+    Result: infinite where none are given. Raises `ProblemError` if it is no number from 0.
     """
     return math.inf if text is None else number_word(text, "--time-limit", zero="allowed")
 
@@ -81,19 +61,9 @@ def parse_numbers(
 ) -> dict[str, float]:
     """Return positive numbers by name from words.
 
-    Parameters
-    ----------
-    where : str
-        The argument, for messages.
-    texts : sequence of str
-        Each ``NAME=VALUE``.
-    known : mapping of str to object, optional
-        Names that there are; any by default.
-
-    Raises
-    ------
-    ProblemError
-        If there is no such name, or a value is not positive.
+    ``where``: the argument, for messages; ``texts``: each ``NAME=VALUE``; ``known``: names that
+    there are; any by default. Raises `ProblemError` if there is no such name, or a value is not
+    positive.
     """
     out: dict[str, float] = {}
     for text in texts:
@@ -108,21 +78,9 @@ def parse_numbers(
 def parse_options(formulation: Formulation | str, texts: Sequence[str]) -> dict[str, Any]:
     """Return the options of a formulation from words.
 
-    Parameters
-    ----------
-    formulation : Formulation or str
-        Whose ``solve`` says which options there are and of which type.
-    texts : sequence of str
-        Each ``NAME=VALUE``.
-
-    Returns
-    -------
-    dict of str to (int or str)
-
-    Raises
-    ------
-    ProblemError
-        If there is no such option, or a value is not of its type.
+    ``formulation``: whose ``solve`` says which options there are and of which type; ``texts``: each
+    ``NAME=VALUE``. Result (dict of str to (int or str)). Raises `ProblemError` if there is no such
+    option, or a value is not of its type.
     """
     formulation = as_formulation(formulation)
     known = formulation.options
@@ -147,16 +105,8 @@ def parse_options(formulation: Formulation | str, texts: Sequence[str]) -> dict[
 def parse_mortar(options: argparse.Namespace) -> Mortar:
     """Return the named mortar with the numbers that are given instead of its own.
 
-    Parameters
-    ----------
-    options : argparse.Namespace
-        With ``mortar``, and ``friction`` (no unit), ``tensile_strength`` and ``cohesion`` (Pa) as
-        text, or None.
-
-    Raises
-    ------
-    ProblemError
-        If a number is negative, or none.
+    ``options``: with ``mortar``, and ``friction`` (no unit), ``tensile_strength`` and ``cohesion``
+    (Pa) as text, or None. Raises `ProblemError` if a number is negative, or none.
     """
     base = MORTARS[options.mortar]
     given = {
@@ -170,14 +120,7 @@ def parse_mortar(options: argparse.Namespace) -> Mortar:
 def split_word(text: str) -> tuple[str, str]:
     """Return a response, whose brackets may hold anything, and the number after it.
 
-    Parameters
-    ----------
-    text : str
-        As ``NAME=VALUE``, or a name alone.
-
-    Returns
-    -------
-    (str, str)
+    ``text``: as ``NAME=VALUE``, or a name alone. Result (str, str).
     """
     end = text.rfind("]") + 1
     name, _, number = text[end:].partition("=")
@@ -187,16 +130,7 @@ def split_word(text: str) -> tuple[str, str]:
 def response_word(name: str, where: str) -> str:
     """Return the name of a response if there is one of it.
 
-    Parameters
-    ----------
-    name : str
-    where : str
-        The argument, for messages.
-
-    Raises
-    ------
-    ProblemError
-        If there is none.
+    ``where``: the argument, for messages. Raises `ProblemError` if there is none.
     """
     if name not in RESPONSES and not name.startswith("F_"):
         names = (*CRITERIA, *RESPONSES) if where == "--criteria" else ("payload", *CHOICE_RESPONSES)
@@ -209,17 +143,8 @@ def response_word(name: str, where: str) -> str:
 def number_word(text: str, where: str, zero: str = "") -> float:
     """Return a positive number from a word.
 
-    Parameters
-    ----------
-    text, where : str
-        The word; the argument, for messages.
-    zero : str, optional
-        Anything where zero is a number too.
-
-    Raises
-    ------
-    ProblemError
-        If it is none.
+    ``text``, ``where``: the word; the argument, for messages; ``zero``: anything where zero is a
+    number too. Raises `ProblemError` if it is none.
     """
     try:
         value = float(text)

@@ -27,10 +27,7 @@ class Watcher:
     A stage whose share is known has a bar and the time left; of any other the time that it took so
     far is shown. Nothing is shown unless standard error is a terminal, nor in the first second.
 
-    Parameters
-    ----------
-    shows : bool, optional
-        False to show nothing at all.
+    ``shows``: False to show nothing at all.
 
     Examples
     --------
@@ -69,10 +66,7 @@ class Watcher:
     def __call__(self, told: object) -> None:
         """Take note of what is being done.
 
-        Parameters
-        ----------
-        told : Stage or object
-            A stage with its share, or words.
+        ``told``: a stage with its share, or words.
         """
         if not self._shows:
             return

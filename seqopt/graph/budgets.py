@@ -29,16 +29,9 @@ DEAREST = 1e6  # largest price, over what a path takes per unit of the budget
 class Within(NamedTuple):
     """A path within budgets.
 
-    Attributes
-    ----------
-    path : tuple of int
-        Its states, the start left out.
-    values : tuple of float
-        What every column takes of it, the budgets' last.
-    bounds : tuple of float
-        What no path within them stays below, goals before it being at their values.
-    prices : tuple of tuple of float
-        By goal, of the budgets and of the sums before it, that prove its bound.
+    ``path``: its states, the start left out; ``values``: what every column takes of it, the
+    budgets' last; ``bounds``: what no path within them stays below, goals before it being at their
+    values; ``prices``: by goal, of the budgets and of the sums before it, that prove its bound.
     """
 
     path: tuple[int, ...]
@@ -61,10 +54,7 @@ class _Path(NamedTuple):
 def within_budgets(graph: Graph, caps: Sequence[float]) -> Within:
     """Return a path that is good in one goal after the other, its last columns within caps.
 
-    Raises
-    ------
-    InfeasibleError
-        If no path is found.
+    Raises `InfeasibleError` if no path is found.
     """
     goals = len(graph.peaks) - len(caps)
     limited = [*zip(range(goals, len(graph.peaks)), caps, strict=True)]
@@ -200,14 +190,9 @@ def budget_bounds(
 ) -> tuple[float, ...]:
     """Return what no path within budgets stays below, by prices: checked with arithmetic alone.
 
-    Parameters
-    ----------
-    graph : Graph
-        Its last columns are limited.
-    values, claimed : sequence of float
-        Of a path, and the bounds that are claimed for worst amounts.
-    priced : tuple
-        Caps of the last columns; by goal, prices of these and of the sums before it.
+    ``graph``: its last columns are limited; ``values``, ``claimed``: of a path, and the bounds that
+    are claimed for worst amounts; ``priced``: caps of the last columns; by goal, prices of these
+    and of the sums before it.
     """
     caps, prices = priced
     goals = len(graph.peaks) - len(caps)

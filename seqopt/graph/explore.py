@@ -19,14 +19,9 @@ BAND = 1e-5  # share of a value within which six digits do not decide
 class Moves(NamedTuple):
     """Moves from states of one part to states of one part.
 
-    Attributes
-    ----------
-    source : (m,) int
-        Row of the state that each leads from, among those that were asked for.
-    states : (m, c) int
-        The states that they lead to.
-    taken : (m, k) float
-        What they take of amounts that are about moves.
+    ``source`` (m,): row of the state that each leads from, among those that were asked for;
+    ``states`` (m, c): the states that they lead to; ``taken`` (m, k): what they take of amounts
+    that are about moves.
     """
 
     source: Ints

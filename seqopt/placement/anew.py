@@ -27,19 +27,9 @@ def require_anew(
 ) -> None:
     """Raise an error if a choice leads to other responses than its problem has from a cache.
 
-    Parameters
-    ----------
-    problem : Problem
-    choice : sequence of int
-        A candidate for every move.
-    met : sequence of (Problem, sequence of int), optional
-        Where its own responses are not computed: problems with all of its steps, and the choices
-        in these.
-
-    Raises
-    ------
-    FileError
-        If a response of a step is another one when it is computed anew.
+    ``choice``: a candidate for every move; ``met`` (sequence of (Problem, sequence of int)): where
+    its own responses are not computed: problems with all of its steps, and the choices in these.
+    Raises `FileError` if a response of a step is another one when it is computed anew.
     """
     evaluation, cache = problem.evaluation, problem.evaluation.resources.cache
     if cache is None:

@@ -30,17 +30,9 @@ FORMS = "travel=0.8, travel=3.5m, steps_over:F_largest=250:10 or robot_use:rob1=
 class AskedBudget:
     """A budget as it is asked for.
 
-    Attributes
-    ----------
-    words : str
-    response : str
-        Whose steps over a level are counted; empty for the way that robots go.
-    level : float
-        SI units.
-    bound : float
-        How much there is, or a share of what the optimum without budgets takes.
-    share : bool
-        Whether it is one.
+    ``response``: whose steps over a level are counted; empty for the way that robots go; ``level``:
+    SI units; ``bound``: how much there is, or a share of what the optimum without budgets takes;
+    ``share``: whether it is one.
     """
 
     words: str
@@ -52,11 +44,7 @@ class AskedBudget:
     def of(self, problem: Problem, bound: float) -> Budget:
         """Return the budget for a problem.
 
-        Parameters
-        ----------
-        problem : Problem
-        bound : float
-            How much there is, in its unit.
+        ``bound``: how much there is, in its unit.
         """
         if not self.response:
             return travel(problem, bound)
@@ -66,18 +54,10 @@ class AskedBudget:
 def parse_budgets(texts: Sequence[str] | str) -> tuple[AskedBudget, ...]:
     """Return budgets from words.
 
-    Parameters
-    ----------
-    texts : sequence of str, or str
-        One or several, each ``travel=BOUND``, ``steps_over:RESPONSE=LEVEL:BOUND`` or
-        ``robot_use:ROBOT=LEVEL:BOUND``, SI units. A bound of travel is a share of what the optimum
-        without budgets travels, or in meters, as ``3.5m``; other bounds are numbers of steps, or
-        shares, as ``0.8x``.
-
-    Raises
-    ------
-    ProblemError
-        If one has another form, or stands there twice.
+    ``texts``: one or several, each ``travel=BOUND``, ``steps_over:RESPONSE=LEVEL:BOUND`` or
+    ``robot_use:ROBOT=LEVEL:BOUND``, SI units. A bound of travel is a share of what the optimum
+    without budgets travels, or in meters, as ``3.5m``; other bounds are numbers of steps, or
+    shares, as ``0.8x``. Raises `ProblemError` if one has another form, or stands there twice.
     """
     texts = (texts,) if isinstance(texts, str) else texts
     if not isinstance(texts, Sequence) or not all(isinstance(text, str) for text in texts):
@@ -106,10 +86,7 @@ def _parse(text: str) -> AskedBudget:
 def parse_caps(texts: Sequence[str] | str) -> dict[str, float]:
     """Return caps on totals of states from words: ``travel=3.5m``, ``regrips=2``, ``sum(T_max)=9``.
 
-    Raises
-    ------
-    ProblemError
-        If one has another form, or stands there twice.
+    Raises `ProblemError` if one has another form, or stands there twice.
     """
     out: dict[str, float] = {}
     for text in (texts,) if isinstance(texts, str) else texts:
@@ -135,11 +112,7 @@ def _positive(text: str, words: str) -> float:
 def with_budgets(problem: Problem, asked: Sequence[AskedBudget]) -> Problem:
     """Return a problem with budgets; shares are those of its optimum without any.
 
-    Parameters
-    ----------
-    problem : Problem
-        Posed with the responses that the budgets name.
-    asked : sequence of AskedBudget
+    ``problem``: posed with the responses that the budgets name.
     """
     budgets: list[Budget] = []
     for each in asked:

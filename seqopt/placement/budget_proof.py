@@ -70,21 +70,10 @@ def least_within(
 ) -> float:
     """Return a bound on what any choice within the budgets costs.
 
-    Parameters
-    ----------
-    problem : PlacementProblem
-        Its sums and budgets are used.
-    value : float
-        Of a choice within the budgets; no higher bound is looked for.
-    claimed : mapping of str to float
-        Prices of budgets from which the search for better ones starts; it need not name any.
-    scale : float
-        The size of the costs that the choice meets.
-
-    Returns
-    -------
-    float
-        At most ``value``.
+    ``problem``: its sums and budgets are used; ``value``: of a choice within the budgets; no higher
+    bound is looked for; ``claimed``: prices of budgets from which the search for better ones
+    starts; it need not name any; ``scale``: the size of the costs that the choice meets. Result: at
+    most ``value``.
     """
     case, given = _case(problem, value, claimed, scale)
     prices, bound = _climbed(case, given)

@@ -18,26 +18,10 @@ from seqopt.sequence.schedule import OpenGrip
 def steps_over(problem: Problem, response: str, level: float, bound: float) -> Budget:
     """Return a bound on the number of open steps in which a response exceeds a level.
 
-    Parameters
-    ----------
-    problem : Problem
-        Whose choices the budget is for.
-    response : str
-        Among those that the problem evaluates (``also`` of `seqopt.pose`).
-    level : float
-        SI units.
-    bound : float
-        How many steps may exceed it.
-
-    Returns
-    -------
-    Budget
-        Each choice, and each pair, takes the number of its steps that exceed the level.
-
-    Raises
-    ------
-    ProblemError
-        If the problem does not evaluate the response.
+    ``problem``: whose choices the budget is for; ``response``: among those that the problem
+    evaluates (``also`` of `seqopt.pose`); ``level``: SI units; ``bound``: how many steps may exceed
+    it. Result: each choice, and each pair, takes the number of its steps that exceed the level.
+    Raises `ProblemError` if the problem does not evaluate the response.
     """
     single, shared = _empty(problem)
     for choices in chain.from_iterable(problem.evaluation.levels()):
@@ -54,26 +38,9 @@ def steps_over(problem: Problem, response: str, level: float, bound: float) -> B
 def robot_use(problem: Problem, robot: str, force: float, bound: float) -> Budget:
     """Return a bound on the number of open steps in which a robot carries more than a force.
 
-    Parameters
-    ----------
-    problem : Problem
-        Whose choices the budget is for; it evaluates the robot's force.
-    robot : str
-        Name of the robot.
-    force : float
-        N.
-    bound : float
-        How many steps there may be.
-
-    Returns
-    -------
-    Budget
-        As of `steps_over`.
-
-    Raises
-    ------
-    ProblemError
-        If the problem does not evaluate the force of this robot.
+    ``problem``: whose choices the budget is for; it evaluates the robot's force; ``robot``: name of
+    the robot; ``force``: n; ``bound``: how many steps there may be. Result: as of `steps_over`.
+    Raises `ProblemError` if the problem does not evaluate the force of this robot.
     """
     return steps_over(problem, robot_response(robot), force, bound)
 
@@ -81,18 +48,9 @@ def robot_use(problem: Problem, robot: str, force: float, bound: float) -> Budge
 def travel(problem: Problem, bound: float) -> Budget:
     """Return a bound on the distance that robots travel to chosen grips and on to their next ones.
 
-    Parameters
-    ----------
-    problem : Problem
-        Whose choices the budget is for.
-    bound : float
-        m.
-
-    Returns
-    -------
-    Budget
-        Each choice takes straight lines between its node and the given nodes that its robot holds
-        before and after, each pair the line between its two nodes; m.
+    ``problem``: whose choices the budget is for; ``bound``: m. Result: each choice takes straight
+    lines between its node and the given nodes that its robot holds before and after, each pair the
+    line between its two nodes; m.
     """
     single, shared = _empty(problem)
     schedule = problem.schedule

@@ -65,20 +65,9 @@ class Certificate(FrozenValue):
 def certify(problem: PlacementProblem, selection: Selection, aim: Aim) -> Certificate:
     """Check a selection from the problem's data, without the solver.
 
-    Parameters
-    ----------
-    problem : PlacementProblem
-        What was solved.
-    selection : Selection
-        What a formulation claims.
-    aim : Aim
-        Whether the sum or the peak of the costs was minimized.
-
-    Raises
-    ------
-    SolverError
-        If the choice is not one candidate per move, is not allowed, exceeds a budget, or is not
-        worth what was claimed.
+    ``problem``: what was solved; ``selection``: what a formulation claims; ``aim``: whether the sum
+    or the peak of the costs was minimized. Raises `SolverError` if the choice is not one candidate
+    per move, is not allowed, exceeds a budget, or is not worth what was claimed.
     """
     costs = aim.costs(problem)
     value = _value(costs, selection.choice, aim)
@@ -112,19 +101,9 @@ def certify(problem: PlacementProblem, selection: Selection, aim: Aim) -> Certif
 def certify_partial(costs: PartialCosts, selection: Selection, objective: float) -> Certificate:
     """Check a selection of which not all pairs are known, from those that are.
 
-    Parameters
-    ----------
-    costs : PartialCosts
-        What was looked at.
-    selection : Selection
-        What is claimed.
-    objective : float
-        The costs of the steps that the selection meets, solved again.
-
-    Raises
-    ------
-    SolverError
-        If the selection is not worth what was claimed, or its bound is not that of the pairs.
+    ``costs``: what was looked at; ``selection``: what is claimed; ``objective``: the costs of the
+    steps that the selection meets, solved again. Raises `SolverError` if the selection is not worth
+    what was claimed, or its bound is not that of the pairs.
     """
     scale = max(abs(objective), TINY)
     if not abs(objective - selection.objective) <= TOLERANCE * scale:
@@ -160,16 +139,7 @@ def _value(costs: LayeredCosts, choice: tuple[int, ...], aim: Aim) -> float:
 def least(costs: LayeredCosts, aim: Aim) -> float:
     """Return the least value of any choice, ignoring budgets.
 
-    Parameters
-    ----------
-    costs : LayeredCosts
-    aim : Aim
-        Takes `least_sum` or `least_peak`.
-
-    Returns
-    -------
-    float
-        Infinite if no choice is allowed.
+    ``aim``: takes `least_sum` or `least_peak`. Result: infinite if no choice is allowed.
     """
     return least_sum(costs) if aim is Aim.SUM else least_peak(costs)
 
@@ -177,10 +147,7 @@ def least(costs: LayeredCosts, aim: Aim) -> float:
 def least_sum(costs: LayeredCosts) -> float:
     """Return the least sum that any choice reaches, budgets aside: forward, move by move.
 
-    Returns
-    -------
-    float
-        Infinite if no choice is allowed.
+    Result: infinite if no choice is allowed.
     """
     reached = np.zeros(1)
     for single, shared in zip(costs.single, costs.shared, strict=True):
@@ -194,10 +161,7 @@ def least_peak(costs: LayeredCosts) -> float:
     A value is reached if the choices whose costs do not exceed it connect the first move to the
     last.
 
-    Returns
-    -------
-    float
-        Infinite if no choice is allowed.
+    Result: infinite if no choice is allowed.
     """
     levels = np.unique(np.concatenate([a.ravel() for a in (*costs.single, *costs.shared)]))
     low, high = 0, len(levels) - 1
@@ -222,20 +186,9 @@ def judge(
 ) -> Certificate:
     """Certify a selection, and check what its formulation promises.
 
-    Parameters
-    ----------
-    problem : PlacementProblem
-        What was solved.
-    selection : Selection
-        What the formulation claims.
-    formulation : Formulation or str
-        What made the selection.
-
-    Raises
-    ------
-    SolverError
-        If the certificate fails, or without budgets a formulation that is no heuristic and ran to
-        its end misses the optimum.
+    ``problem``: what was solved; ``selection``: what the formulation claims; ``formulation``: what
+    made the selection. Raises `SolverError` if the certificate fails, or without budgets a
+    formulation that is no heuristic and ran to its end misses the optimum.
     """
     formulation = as_formulation(formulation)
     certificate = certify(problem, selection, formulation.aim)

@@ -19,15 +19,8 @@ PROVEN = 1 - 1e-6  # of a choice that costs nothing and is said to cost this muc
 def smallest_conflict(problem: PlacementProblem) -> tuple[Budget, ...]:
     """Return as few budgets as possible that no choice keeps together.
 
-    Parameters
-    ----------
-    problem : PlacementProblem
-        Its sums say which choices are allowed.
-
-    Returns
-    -------
-    tuple of Budget
-        Empty if no set of budgets is proven to conflict.
+    ``problem``: its sums say which choices are allowed. Result: empty if no set of budgets is
+    proven to conflict.
     """
     for count in range(1, len(problem.budgets) + 1):
         for some in combinations(problem.budgets, count):
@@ -50,16 +43,7 @@ def _conflict(costs: LayeredCosts, budgets: tuple[Budget, ...]) -> bool:
 def least_spent(costs: LayeredCosts, budget: Budget) -> float:
     """Return the least that an allowed choice takes of a budget.
 
-    Parameters
-    ----------
-    costs : LayeredCosts
-        Say which choices are allowed.
-    budget : Budget
-
-    Returns
-    -------
-    float
-        In its unit.
+    ``costs``: say which choices are allowed. Result: in its unit.
     """
     pairs = ((budget.single, costs.single), (budget.shared, costs.shared))
     single, shared = (
@@ -72,12 +56,8 @@ def least_spent(costs: LayeredCosts, budget: Budget) -> float:
 def refusal(problem: PlacementProblem, name: str) -> InfeasibleError:
     """Return the error that says which budgets no choice keeps, or that this is claimed alone.
 
-    Parameters
-    ----------
-    problem : PlacementProblem
-        Some choice is allowed, and it is claimed that none is within all budgets.
-    name : str
-        Of the formulation that claims it.
+    ``problem``: some choice is allowed, and it is claimed that none is within all budgets;
+    ``name``: of the formulation that claims it.
     """
     found = smallest_conflict(problem)
     if not found:

@@ -77,15 +77,8 @@ class LayeredCosts(FrozenValue):
     def parts(self, choice: Sequence[int]) -> list[float]:
         """Return the costs that a choice meets.
 
-        Parameters
-        ----------
-        choice : sequence of int
-            A candidate for every move.
-
-        Returns
-        -------
-        list of 2K float
-            Move by move, the single cost and the one shared with the move before.
+        ``choice``: a candidate for every move. Result: move by move, the single cost and the one
+        shared with the move before.
         """
         out, before = [], 0
         for single, shared, now in zip(self.single, self.shared, choice, strict=True):
@@ -96,45 +89,22 @@ class LayeredCosts(FrozenValue):
     def cost(self, choice: Sequence[int]) -> float:
         """Return the total cost of a choice.
 
-        Parameters
-        ----------
-        choice : sequence of int
-            A candidate for every move.
-
-        Returns
-        -------
-        float
-            Infinite if the choice is not allowed.
+        ``choice``: a candidate for every move. Result: infinite if the choice is not allowed.
         """
         return sum(self.parts(choice))
 
     def worst(self, choice: Sequence[int]) -> float:
         """Return the largest cost that a choice meets.
 
-        Parameters
-        ----------
-        choice : sequence of int
-            A candidate for every move.
-
-        Returns
-        -------
-        float
-            Infinite if the choice is not allowed.
+        ``choice``: a candidate for every move. Result: infinite if the choice is not allowed.
         """
         return max(self.parts(choice))
 
     def continuable(self) -> tuple[Bools, ...]:
         """Return which candidates are allowed and can be continued to the last move.
 
-        Returns
-        -------
-        tuple of (C_k,) bool
-            An array for every move.
-
-        Raises
-        ------
-        InfeasibleError
-            Naming the move at which the last possible choice ends.
+        Result (tuple of (C_k,) bool): an array for every move. Raises `InfeasibleError`, naming the
+        move at which the last possible choice ends.
         """
         reached = np.ones(1, dtype=bool)
         for k, (single, shared) in enumerate(zip(self.single, self.shared, strict=True), start=1):
@@ -173,21 +143,10 @@ def _values(costs: Floats) -> Floats:
 class Budget(FrozenValue):
     """A bound on a total over the build.
 
-    Parameters
-    ----------
-    name : str
-        What is capped, with its unit.
-    single : tuple of (C_k,) float
-        What each choice takes of the budget: finite.
-    shared : tuple of (C_{k-1}, C_k) float
-        What each pair takes of it: finite.
-    bound : float
-        Infinite if there is no cap.
-
-    Raises
-    ------
-    ProblemError
-        If a shape is wrong, an amount is not finite, or the bound is NaN or -inf.
+    ``name``: what is capped, with its unit; ``single`` (tuple of (C_k,) float): what each choice
+    takes of the budget: finite; ``shared`` (tuple of (C_{k-1}, C_k) float): what each pair takes of
+    it: finite; ``bound``: infinite if there is no cap. Raises `ProblemError` if a shape is wrong,
+    an amount is not finite, or the bound is NaN or -inf.
     """
 
     name: str
@@ -209,32 +168,16 @@ class Budget(FrozenValue):
     def spent(self, choice: Sequence[int]) -> float:
         """Return what a choice takes of the budget.
 
-        Parameters
-        ----------
-        choice : sequence of int
-            A candidate for every move.
-
-        Returns
-        -------
-        float
-            In the unit of the budget.
+        ``choice``: a candidate for every move. Result: in the unit of the budget.
         """
         return LayeredCosts(self.single, self.shared).cost(choice)
 
     def slack(self, choice: Sequence[int]) -> float:
         """Return what a choice leaves of the budget, as a share.
 
-        Parameters
-        ----------
-        choice : sequence of int
-            A candidate for every move.
-
-        Returns
-        -------
-        float
-            What is left over the larger of the bound and the amounts taken, all without sign, so
-            that amounts that cancel count in full. Negative beyond the bound; zero if nothing is
-            left, one if there is no cap.
+        ``choice``: a candidate for every move. Result: what is left over the larger of the bound
+        and the amounts taken, all without sign, so that amounts that cancel count in full. Negative
+        beyond the bound; zero if nothing is left, one if there is no cap.
         """
         taken = LayeredCosts(self.single, self.shared).parts(choice)
         left = self.bound - sum(taken)

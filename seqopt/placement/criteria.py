@@ -29,25 +29,16 @@ class RankSum(Terse):
     before they are ranked, so that differences without meaning decide nothing. A robot that does
     not grip ranks all choices equal. Source: equations (1) to (3) of Bruun et al.
 
-    Parameters
-    ----------
-    name : str
-        What the criterion is called.
-    before, after : tuple of (str, float)
-        Weight of every response in moves before the crown and from it on.
-    crown : float, optional
-        Brick count of a move from which ``after`` holds, `NEVER` if it does not; by default that at
-        which the scene's build reaches its crown.
-    delay : int
-        How many bricks after the scene's crown ``after`` begins to hold.
-    resolution : tuple of (str, float), optional
-        What a response is rounded to, by its first letter: N, N m, m. By default `ROUNDED` in the
-        scene's own units, so that density, length, stiffness and units of force change no choice.
-    ranked : Ranked
-        In a step with two open moves ranks run over all pairs, scaled down to as many as the later
-        move has candidates, or over its candidates given the choice before.
-    among : Among
-        Whether a node that the choice before makes impossible is ranked in later steps.
+    ``name``: what the criterion is called; ``before``, ``after`` (tuple of (str, float)): weight of
+    every response in moves before the crown and from it on; ``crown``: brick count of a move from
+    which ``after`` holds, `NEVER` if it does not; by default that at which the scene's build
+    reaches its crown; ``delay``: how many bricks after the scene's crown ``after`` begins to hold;
+    ``resolution`` (tuple of (str, float)): what a response is rounded to, by its first letter: N, N
+    m, m. By default `ROUNDED` in the scene's own units, so that density, length, stiffness and
+    units of force change no choice. ``ranked``: in a step with two open moves ranks run over all
+    pairs, scaled down to as many as the later move has candidates, or over its candidates given the
+    choice before; ``among``: whether a node that the choice before makes impossible is ranked in
+    later steps.
     """
 
     name: str
@@ -71,25 +62,15 @@ class RankSum(Terse):
     def wanted(self, bricks: int) -> tuple[str, ...]:
         """Return the responses that it needs of a move.
 
-        Parameters
-        ----------
-        bricks : int
-            Bricks placed when the move is made; decides between ``before`` and ``after``.
-
-        Returns
-        -------
-        tuple of str
-            Names of responses.
+        ``bricks``: bricks placed when the move is made; decides between ``before`` and ``after``.
+        Result: names of responses.
         """
         return tuple(name for name, _ in self._terms(bricks))
 
     def for_scene(self, facts: SceneFacts) -> RankSum:
         """Return the criterion with everything that it takes from a scene filled in.
 
-        Parameters
-        ----------
-        facts : SceneFacts
-            Of the scene.
+        ``facts``: of the scene.
         """
         crown = self.crown
         if self.before == self.after:
@@ -111,19 +92,10 @@ class RankSum(Terse):
     def costs(self, responses: ChoiceResponses, bricks: int, choices: int) -> Floats:
         """Return the weighted mean of the ranks.
 
-        Parameters
-        ----------
-        responses : mapping of str to (C,) or (C, D) float
-            As in `Criterion.costs`.
-        bricks : int
-            Bricks placed at the move that decides the step.
-        choices : int
-            How many candidates that move has; ranks run from 1 to it.
-
-        Returns
-        -------
-        (C,) or (C, D) float
-            NaN where a choice is impossible.
+        ``responses`` (mapping of str to (C,) or (C, D) float): as in `Criterion.costs`; ``bricks``:
+        bricks placed at the move that decides the step; ``choices``: how many candidates that move
+        has; ranks run from 1 to it. Result ((C,) or (C, D) float): NaN where a choice is
+        impossible.
         """
         terms = self._terms(bricks)
         total: Floats = np.zeros_like(responses[terms[0][0]])
@@ -141,13 +113,9 @@ class RankSum(Terse):
 class WeightedSum(Terse):
     """A weighted sum of responses, each divided by a scale of its own.
 
-    Parameters
-    ----------
-    name : str
-        What the criterion is called.
-    terms : tuple of (str, float, float or None)
-        Response, weight, scale (N, N m or m). By default (None) the scale is the least that any
-        fixed method of the scene reaches of the response's largest value.
+    ``name``: what the criterion is called; ``terms`` (tuple of (str, float, float or None)):
+    response, weight, scale (N, N m or m). By default (None) the scale is the least that any fixed
+    method of the scene reaches of the response's largest value.
     """
 
     name: str
@@ -162,25 +130,14 @@ class WeightedSum(Terse):
     def wanted(self, bricks: int) -> tuple[str, ...]:
         """Return the responses that it needs.
 
-        Parameters
-        ----------
-        bricks : int
-            Without effect: it needs the same for every move.
-
-        Returns
-        -------
-        tuple of str
-            Names of responses.
+        ``bricks``: without effect: it needs the same for every move. Result: names of responses.
         """
         return tuple(name for name, _, _ in self.terms)
 
     def for_scene(self, facts: SceneFacts) -> WeightedSum:
         """Return the criterion with everything that it takes from a scene filled in.
 
-        Parameters
-        ----------
-        facts : SceneFacts
-            Of the scene.
+        ``facts``: of the scene.
         """
         terms = spell_out(self.terms, facts.robots)
         scaled = tuple(
@@ -192,17 +149,9 @@ class WeightedSum(Terse):
     def costs(self, responses: ChoiceResponses, bricks: int, choices: int) -> Floats:
         """Return the weighted sums.
 
-        Parameters
-        ----------
-        responses : mapping of str to (C,) or (C, D) float
-            As in `Criterion.costs`.
-        bricks, choices : int
-            Without effect.
-
-        Returns
-        -------
-        (C,) or (C, D) float
-            NaN where a choice is impossible.
+        ``responses`` (mapping of str to (C,) or (C, D) float): as in `Criterion.costs`; ``bricks``,
+        ``choices``: without effect. Result ((C,) or (C, D) float): NaN where a choice is
+        impossible.
         """
         parts = [
             weight / known(scale, self.name) * present(responses[name])
@@ -215,13 +164,9 @@ class WeightedSum(Terse):
 class WorstRatio(Terse):
     """The largest ratio of a response to its limit: a step is as bad as its worst response.
 
-    Parameters
-    ----------
-    name : str
-        What the criterion is called.
-    limits : tuple of (str, float or None)
-        Response and limit (N, N m or m). By default (None) the limit is the least that any fixed
-        method of the scene reaches of the response's largest value.
+    ``name``: what the criterion is called; ``limits`` (tuple of (str, float or None)): response and
+    limit (N, N m or m). By default (None) the limit is the least that any fixed method of the scene
+    reaches of the response's largest value.
     """
 
     name: str
@@ -235,25 +180,14 @@ class WorstRatio(Terse):
     def wanted(self, bricks: int) -> tuple[str, ...]:
         """Return the responses that it needs.
 
-        Parameters
-        ----------
-        bricks : int
-            Without effect: it needs the same for every move.
-
-        Returns
-        -------
-        tuple of str
-            Names of responses.
+        ``bricks``: without effect: it needs the same for every move. Result: names of responses.
         """
         return tuple(name for name, _ in self.limits)
 
     def for_scene(self, facts: SceneFacts) -> WorstRatio:
         """Return the criterion with everything that it takes from a scene filled in.
 
-        Parameters
-        ----------
-        facts : SceneFacts
-            Of the scene.
+        ``facts``: of the scene.
         """
         limits = spell_out(self.limits, facts.robots)
         name = named(self.name, facts, [scale for _, scale in limits])
@@ -263,17 +197,9 @@ class WorstRatio(Terse):
     def costs(self, responses: ChoiceResponses, bricks: int, choices: int) -> Floats:
         """Return the largest ratios.
 
-        Parameters
-        ----------
-        responses : mapping of str to (C,) or (C, D) float
-            As in `Criterion.costs`.
-        bricks, choices : int
-            Without effect.
-
-        Returns
-        -------
-        (C,) or (C, D) float
-            1 where a response is at its limit; NaN where a choice is impossible.
+        ``responses`` (mapping of str to (C,) or (C, D) float): as in `Criterion.costs`; ``bricks``,
+        ``choices``: without effect. Result ((C,) or (C, D) float): 1 where a response is at its
+        limit; NaN where a choice is impossible.
         """
         parts = [present(responses[name]) / known(limit, self.name) for name, limit in self.limits]
         return np.asarray(np.max(np.stack(parts), axis=0))

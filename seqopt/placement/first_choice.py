@@ -18,28 +18,10 @@ def stopped(
 ) -> Selection:
     """Return an allowed choice that took no search, with a bound that took none.
 
-    Parameters
-    ----------
-    problem : PlacementProblem
-    aim : Aim
-        What to minimize.
-    bound : float, optional
-        A better one that is known.
-    why : str, optional
-        What to say where no choice within the budgets is at hand.
-
-    Returns
-    -------
-    Selection
-        With the cheapest candidate of each move that leads on; where budgets forbid it, with the
-        choice that takes least of one of them.
-
-    Raises
-    ------
-    InfeasibleError
-        If no choice is allowed.
-    SolverError
-        If none of these is within all budgets.
+    ``aim``: what to minimize; ``bound``: a better one that is known; ``why``: what to say where no
+    choice within the budgets is at hand. Result: with the cheapest candidate of each move that
+    leads on; where budgets forbid it, with the choice that takes least of one of them. Raises
+    `InfeasibleError` if no choice is allowed; `SolverError` if none of these is within all budgets.
     """
     costs = aim.costs(problem)
     for choice in _choices(problem, costs):

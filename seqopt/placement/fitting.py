@@ -18,10 +18,8 @@ def require_fit(
 ) -> None:
     """Raise an error unless a formulation can solve a problem and has the given options.
 
-    Raises
-    ------
-    ProblemError
-        If the problem has budgets that the formulation does not take, or an option is not its own.
+    Raises `ProblemError` if the problem has budgets that the formulation does not take, or an
+    option is not its own.
     """
     formulation = as_formulation(formulation)
     if problem.budgets and not formulation.takes_budgets:
@@ -39,16 +37,7 @@ def require_fit(
 def require_time(formulation: Formulation, time_limit: float) -> None:
     """Raise an error unless a time limit is one, and the formulation can keep it.
 
-    Parameters
-    ----------
-    formulation : Formulation
-    time_limit : float
-        s.
-
-    Raises
-    ------
-    ProblemError
-        If it is no time, or the formulation takes none.
+    ``time_limit``: s. Raises `ProblemError` if it is no time, or the formulation takes none.
     """
     if not isinstance(time_limit, Real) or not time_limit >= 0:
         raise ProblemError(f"time_limit is {short(time_limit)}; give seconds from 0")
@@ -59,9 +48,7 @@ def require_time(formulation: Formulation, time_limit: float) -> None:
 def require_proof(proof: object) -> None:
     """Raise an error where a lazy search is to leave out the proof, which is all it is for.
 
-    Raises
-    ------
-    ProblemError
+    Raises `ProblemError`.
     """
     if not proof:
         raise ProblemError("a lazy search proves what it finds; leave out lazy, or ask for a proof")

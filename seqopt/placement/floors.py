@@ -11,10 +11,7 @@ from seqopt.placement.requirements import Criterion
 def floor_of(criterion: Criterion) -> float | None:
     """Return what a step costs at least, from zero.
 
-    Returns
-    -------
-    float or None
-        None where costs may be negative, depend on what else is looked at, or are not known.
+    Result: None where costs may be negative, depend on what else is looked at, or are not known.
     """
     match criterion:
         case RankSum(ranked=Ranked.CONDITIONAL, among=Among.ALL):

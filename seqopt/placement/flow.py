@@ -28,29 +28,14 @@ ACCURACY = 1e-7  # how far a reported optimum may lie above the true one, relati
 class LayeredFlow(FrozenValue):
     """A unit flow over the A allowed arcs of a problem.
 
-    Attributes
-    ----------
-    cost : (A,) float
-        Of every arc, its end included, over ``scale``.
-    scale : float
-        The largest cost.
-    balance : (R, A) sparse
-        What leaves the source (row 0) and every candidate except those of the last move, less what
-        arrives.
-    source : (R,) float
-        What must be left over: 1 at the source.
-    amounts : tuple of (A,) float
-        What every arc takes of each budget, over the budget's unit.
-    caps : tuple of float
-        How much there is of each budget, in its unit.
-    units : tuple of float
-        The power of ten by which the amounts of each budget are divided.
-    names : tuple of str
-        Of the budgets.
-    allowed : tuple of (C_{k-1}, C_k) bool
-        Which pairs have an arc, move by move.
-    feasible : bool
-        Whether a choice is known to be within all budgets.
+    ``cost`` (A,): of every arc, its end included, over ``scale``; ``scale``: the largest cost;
+    ``balance`` ((R, A) sparse): what leaves the source (row 0) and every candidate except those of
+    the last move, less what arrives; ``source`` (R,): what must be left over: 1 at the source;
+    ``amounts`` (tuple of (A,) float): what every arc takes of each budget, over the budget's unit;
+    ``caps``: how much there is of each budget, in its unit; ``units``: the power of ten by which
+    the amounts of each budget are divided; ``names``: of the budgets; ``allowed`` (tuple of
+    (C_{k-1}, C_k) bool): which pairs have an arc, move by move; ``feasible``: whether a choice is
+    known to be within all budgets.
     """
 
     cost: Floats
@@ -70,15 +55,7 @@ class LayeredFlow(FrozenValue):
         Where costs tie an interior-point flow is a mixture; every arc it uses lies on an optimal
         path.
 
-        Parameters
-        ----------
-        flow : (A,) float
-            Of every arc, from 0 to 1.
-
-        Returns
-        -------
-        tuple of int
-            A candidate for every move.
+        ``flow`` (A,): of every arc, from 0 to 1. Result: a candidate for every move.
         """
         ends = np.cumsum([mask.sum() for mask in self.allowed])[:-1]
         now = 0
@@ -93,15 +70,8 @@ class LayeredFlow(FrozenValue):
     def bound(self, optimum: float) -> float:
         """Return a lower bound on the cost of any choice.
 
-        Parameters
-        ----------
-        optimum : float
-            A solver's, in scaled costs.
-
-        Returns
-        -------
-        float
-            In the unit of the costs; lower by what the solver may be off.
+        ``optimum``: a solver's, in scaled costs. Result: in the unit of the costs; lower by what
+        the solver may be off.
         """
         value = optimum * self.scale
         return value - ACCURACY * max(abs(value), self.scale)
@@ -109,15 +79,7 @@ class LayeredFlow(FrozenValue):
     def prices(self, duals: Sequence[float]) -> dict[str, float]:
         """Return what one more unit of each budget would save.
 
-        Parameters
-        ----------
-        duals : sequence of float
-            Of the scaled caps.
-
-        Returns
-        -------
-        dict of str to float
-            By budget: cost per unit of the budget.
+        ``duals``: of the scaled caps. Result: by budget: cost per unit of the budget.
         """
         pairs = zip(self.names, self.units, duals, strict=True)
         return {name: float(self.scale / unit * dual) for name, unit, dual in pairs}
@@ -126,17 +88,9 @@ class LayeredFlow(FrozenValue):
 def layered_flow(problem: PlacementProblem) -> LayeredFlow:
     """Return the flow of a problem.
 
-    Parameters
-    ----------
-    problem : PlacementProblem
-        Its sums and budgets are used.
-
-    Raises
-    ------
-    InfeasibleError
-        If no choice is allowed, or none is within one of the budgets.
-    ProblemError
-        If a budget is not for the moves and candidates of the problem.
+    ``problem``: its sums and budgets are used. Raises `InfeasibleError` if no choice is allowed, or
+    none is within one of the budgets; `ProblemError` if a budget is not for the moves and
+    candidates of the problem.
     """
     costs = problem.sums
     costs.continuable()
@@ -165,12 +119,8 @@ def layered_flow(problem: PlacementProblem) -> LayeredFlow:
 def within_each(problem: PlacementProblem) -> bool:
     """Return whether a choice is known to be within all budgets; each is tried on its own.
 
-    Raises
-    ------
-    InfeasibleError
-        If no choice is within one of them.
-    ProblemError
-        If one is not for the moves and candidates of the problem.
+    Raises `InfeasibleError` if no choice is within one of them; `ProblemError` if one is not for
+    the moves and candidates of the problem.
     """
     costs = problem.sums
     known = True

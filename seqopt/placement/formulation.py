@@ -48,22 +48,12 @@ class End(Enum):
 class Selection(FrozenValue):
     """A candidate per move, and what the formulation claims about it.
 
-    Attributes
-    ----------
-    choice : tuple of int
-        Index of the chosen node among each move's candidates, from 0.
-    objective : float
-        Claimed value, in the unit of the criterion.
-    bound : float
-        Claimed lower bound, budgets included; minus infinity if none.
-    prices : mapping of str to float
-        Dual value of each budget: the rate at which one more unit would lower the bound.
-    compile_seconds : float
-        Part of the time to solve that went into writing the program down for a solver, s.
-    end : End
-        Whether it ended early.
-    trace : tuple of Finding
-        What it knew at which time: choices and bounds.
+    ``choice``: index of the chosen node among each move's candidates, from 0; ``objective``:
+    claimed value, in the unit of the criterion; ``bound``: claimed lower bound, budgets included;
+    minus infinity if none; ``prices``: dual value of each budget: the rate at which one more unit
+    would lower the bound; ``compile_seconds``: part of the time to solve that went into writing the
+    program down for a solver, s; ``end``: whether it ended early; ``trace``: what it knew at which
+    time: choices and bounds.
     """
 
     choice: tuple[int, ...]
@@ -143,10 +133,7 @@ class Formulation:
 def formulation_names() -> tuple[str, ...]:
     """Return the names of all registered formulations, without loading any.
 
-    Returns
-    -------
-    tuple of str
-        In alphabetical order.
+    Result: in alphabetical order.
     """
     return tuple(sorted(plugins(GROUP)))
 
@@ -174,10 +161,7 @@ def exhibits() -> dict[str, Formulation]:
     They solve what `formulations` solve, by programs that are there to be looked at. Comparisons
     leave them out.
 
-    Returns
-    -------
-    dict of str to Formulation
-        By name, in alphabetical order.
+    Result: by name, in alphabetical order.
     """
     return {name: _load(entry) for name, entry in sorted(plugins(EXHIBITS).items())}
 
@@ -201,15 +185,8 @@ def _load(entry: EntryPoint) -> Formulation:
 def find_formulation(name: str) -> Formulation:
     """Return a formulation by name.
 
-    Parameters
-    ----------
-    name : str
-        One of `formulation_names`, or of an exhibit.
-
-    Raises
-    ------
-    ProblemError
-        If there is none of that name; the message lists those there are.
+    ``name``: one of `formulation_names`, or of an exhibit. Raises `ProblemError` if there is none
+    of that name; the message lists those there are.
     """
     found = plugins(EXHIBITS) | plugins(GROUP)
     if name not in found:
@@ -222,10 +199,7 @@ def find_formulation(name: str) -> Formulation:
 def as_formulation(given: Formulation | str) -> Formulation:
     """Return a formulation, by name or itself.
 
-    Raises
-    ------
-    ProblemError
-        If it is neither.
+    Raises `ProblemError` if it is neither.
     """
     if isinstance(given, Formulation):
         return given

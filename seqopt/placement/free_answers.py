@@ -17,14 +17,9 @@ from seqopt.responses.grip_sets import solve_sets
 class Answers(NamedTuple):
     """What is known of grip sets.
 
-    Attributes
-    ----------
-    worth : (S, g) float
-        What every goal takes of them; zero of one that is about moves or margins.
-    forces : (S, r) float
-        Of their grips, N.
-    fit : (S,) bool
-        Which hang together and are within all limits.
+    ``worth`` (S, g): what every goal takes of them; zero of one that is about moves or margins;
+    ``forces`` (S, r): of their grips, N; ``fit`` (S,): which hang together and are within all
+    limits.
     """
 
     worth: Floats
@@ -35,14 +30,8 @@ class Answers(NamedTuple):
 def ask(problem: FreeProblem, bricks: int, grips: Ints, most: float = np.inf) -> Answers:
     """Return what is known about grip sets, computed again by the engine.
 
-    Parameters
-    ----------
-    problem : FreeProblem
-    bricks : int
-    grips : (S, r) int
-        Nodes held.
-    most : float, optional
-        Over scenarios, what the first goal takes more of in one is not asked of the next.
+    ``grips`` (S, r): nodes held; ``most``: over scenarios, what the first goal takes more of in one
+    is not asked of the next.
     """
     if problem.each:
         return _worst(problem, bricks, grips, most)

@@ -21,17 +21,8 @@ from seqopt.sequence.free_rules import Ending
 def steps_with(problem: FreeProblem, regrips: Floats, held: Ints) -> Floats:
     """Return how many steps plans have.
 
-    Parameters
-    ----------
-    problem : FreeProblem
-    regrips : (n,) float
-        Infinite where there is no plan.
-    held : (n,) int
-        How many grips are held at the end, or before the last step where that lets all go.
-
-    Returns
-    -------
-    (n,) float
+    ``regrips`` (n,): infinite where there is no plan; ``held`` (n,): how many grips are held at the
+    end, or before the last step where that lets all go. Result (n,).
     """
     released = problem.free_rules.ending is not Ending.HELD
     return np.asarray(2 * problem.space.levels + 2 * regrips - held + released)
@@ -40,12 +31,7 @@ def steps_with(problem: FreeProblem, regrips: Floats, held: Ints) -> Floats:
 def with_held(problem: FreeProblem, graph: Graph, held: Bools) -> Graph:
     """Return a graph whose paths end in some states, or let all go in them last.
 
-    Parameters
-    ----------
-    problem : FreeProblem
-    graph : Graph
-    held : (n,) bool
-        Which states hold as many grips as wanted.
+    ``held`` (n,): which states hold as many grips as wanted.
     """
     if problem.free_rules.ending is Ending.HELD:
         return replace(graph, ends=graph.ends & held)

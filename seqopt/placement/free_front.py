@@ -30,17 +30,9 @@ EDGE = 1e-9  # of a rounding step: how far above a multiple a value still counts
 class FreeFront:
     """The schedule of a problem whose goals are all to be small at once.
 
-    Parameters
-    ----------
-    problem : FreeProblem
-        Its goals are responses, margins of stability, and of a free schedule steps and regrips.
-    rounding : mapping of str to float, optional
-        What numbers are rounded up to multiples of, by name, SI units; none by default.
-
-    Raises
-    ------
-    ProblemError
-        If the goals are others, or a rounding is no positive number.
+    ``problem``: its goals are responses, margins of stability, and of a free schedule steps and
+    regrips; ``rounding``: what numbers are rounded up to multiples of, by name, SI units; none by
+    default. Raises `ProblemError` if the goals are others, or a rounding is no positive number.
     """
 
     def __init__(self, problem: FreeProblem, rounding: Mapping[str, float] | None = None) -> None:
@@ -85,15 +77,7 @@ class FreeFront:
     def best_below(self, bounds: Floats) -> tuple[Floats, object] | None:
         """Return a plan that none beats among those below bounds.
 
-        Parameters
-        ----------
-        bounds : (k,) float
-
-        Returns
-        -------
-        point : (k,) float
-        plan : object
-            None for both where there is no plan.
+        ``bounds`` (k,). Results: ``point`` (k,); ``plan``: None for both where there is no plan.
         """
         below = self._below(bounds)
         if not below.ends[reached(below)].any():
@@ -138,9 +122,7 @@ class FreeFront:
     def is_empty_below(self, bounds: Floats) -> bool:
         """Return whether there is no plan below bounds, by distances from the empty site.
 
-        Parameters
-        ----------
-        bounds : (k,) float
+        ``bounds`` (k,).
         """
         graph = self._below(bounds)
         if not self._counted:
@@ -169,25 +151,14 @@ class FreeFront:
     def steps(self, plan: object) -> tuple[Step, ...]:
         """Return the checked steps of a plan.
 
-        Parameters
-        ----------
-        plan : tuple of tuple of int
-            Its states.
+        ``plan``: its states.
         """
         return steps_of(self._problem.space, plan)  # type: ignore[arg-type]
 
     def values(self, steps: Sequence[Step], claimed: Floats) -> Floats:
         """Return the goals' values of a sequence, from the responses of its steps.
 
-        Parameters
-        ----------
-        steps : sequence of Step
-        claimed : (k,) float
-            The values with which margins of stability are compared.
-
-        Returns
-        -------
-        (k,) float
+        ``claimed`` (k,): the values with which margins of stability are compared. Result (k,).
         """
         return rounded_up(
             np.array(plan_values(self._problem, steps, claimed.tolist())), self._round
@@ -197,14 +168,7 @@ class FreeFront:
 def rounding_steps(names: Sequence[str], rounding: Mapping[str, float] | None) -> Floats:
     """Return what every number is rounded up to multiples of; zero where it is not.
 
-    Returns
-    -------
-    (k,) float
-
-    Raises
-    ------
-    ProblemError
-        If a name is none of these, or a step is no positive number.
+    Result (k,). Raises `ProblemError` if a name is none of these, or a step is no positive number.
     """
     for name, step in (rounding or {}).items():
         if name not in names or not 0 < step < np.inf:
@@ -218,15 +182,7 @@ def rounded_up(values: Floats, steps: Floats) -> Floats:
 
     What differs by less than ten digits is the same: no plan is better by an error of rounding.
 
-    Parameters
-    ----------
-    values : (..., k) float
-    steps : (k,) float
-        Zero where no step is given.
-
-    Returns
-    -------
-    (..., k) float
+    ``values`` (..., k); ``steps`` (k,): zero where no step is given. Result (..., k).
     """
     safe = np.where(steps > 0, steps, 1.0)
     size = np.abs(np.where((values != 0) & np.isfinite(values), values, 1.0))

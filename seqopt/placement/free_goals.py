@@ -31,11 +31,8 @@ class Measure(Enum):
 class Goal:
     """A quantity that a free schedule minimizes.
 
-    Parameters
-    ----------
-    measure : Measure
-    response : str, optional
-        Whose peak or sum it is, or a margin of stability; that of the criterion if none is named.
+    ``response``: whose peak or sum it is, or a margin of stability; that of the criterion if none
+    is named.
     """
 
     measure: Measure
@@ -60,10 +57,7 @@ class Goal:
     def shown(self, value: float) -> float:
         """Return a value as people read it: of a tilt, how much is survived, in degrees.
 
-        Parameters
-        ----------
-        value : float
-            SI units; of a tilt, how far it is from a right angle.
+        ``value``: SI units; of a tilt, how far it is from a right angle.
         """
         return degrees(pi / 2 - value) if self.response == "tilt" else value
 
@@ -71,10 +65,7 @@ class Goal:
 def judged_by(goals: Sequence[Goal], criterion: Criterion) -> dict[str, object]:
     """Return the criterion with its numbers, for a summary.
 
-    Returns
-    -------
-    dict of str to object
-        ``criterion`` is None where every goal names a response of its own, or is about moves.
+    Result: ``criterion`` is None where every goal names a response of its own, or is about moves.
     """
     if not any(goal.of_states and not goal.response for goal in goals):
         return {"criterion": None}
@@ -84,18 +75,11 @@ def judged_by(goals: Sequence[Goal], criterion: Criterion) -> dict[str, object]:
 def parse_goals(text: str) -> tuple[Goal, ...]:
     """Return goals from words, the most important first.
 
-    Parameters
-    ----------
-    text : str
-        ``minmax`` (the worst of the criterion), ``sum`` (over all steps), ``steps``, ``regrips``,
-        ``travel``, a response (its worst) or ``sum(RESPONSE)``, with commas between them; also
-        ``bond`` and ``friction`` (the least with which every state stands) and ``tilt`` (the
-        largest that every state survives).
-
-    Raises
-    ------
-    ProblemError
-        If there is no such goal, or one stands there twice.
+    ``text``: ``minmax`` (the worst of the criterion), ``sum`` (over all steps), ``steps``,
+    ``regrips``, ``travel``, a response (its worst) or ``sum(RESPONSE)``, with commas between them;
+    also ``bond`` and ``friction`` (the least with which every state stands) and ``tilt`` (the
+    largest that every state survives). Raises `ProblemError` if there is no such goal, or one
+    stands there twice.
 
     Examples
     --------

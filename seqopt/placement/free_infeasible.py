@@ -33,18 +33,8 @@ class _LateError(Exception):
 def confirmed(problem: FreeProblem, name: str, seconds: float = np.inf) -> SeqoptError:
     """Return the error that says why no plan is allowed, once it is proven that none is.
 
-    Parameters
-    ----------
-    problem : FreeProblem
-    name : str
-        Of the formulation that says so.
-    seconds : float, optional
-        After which what is not proven is called claimed, and no more help is sought.
-
-    Returns
-    -------
-    InfeasibleError or SolverError
-        The latter where a plan is allowed.
+    ``name``: of the formulation that says so; ``seconds``: after which what is not proven is called
+    claimed, and no more help is sought. Result: the latter where a plan is allowed.
     """
     end, capped = time.perf_counter() + seconds, problem.goals[len(problem.aims) :]
     steps = replace(_with_any_margin(problem), goals=(*STEPS, *capped))
@@ -94,19 +84,10 @@ def _in_time(end: float, _: Explorer) -> None:
 def why_impossible(problem: FreeProblem, seconds: float = np.inf) -> str:
     """Return why no plan is allowed, in a line.
 
-    Parameters
-    ----------
-    problem : FreeProblem
-        Which has no plan.
-    seconds : float, optional
-        After which it says what it found by then.
-
-    Returns
-    -------
-    str
-        Naming the brick at which it stops and what opens a way: a rule to loosen, or how far a
-        limit has to be raised. An engine that has a ``rigid`` one leaves this to it: what is tried
-        here may be far beyond what joints carry, where discrete elements take seconds a state.
+    ``problem``: which has no plan; ``seconds``: after which it says what it found by then. Result:
+    naming the brick at which it stops and what opens a way: a rule to loosen, or how far a limit
+    has to be raised. An engine that has a ``rigid`` one leaves this to it: what is tried here may
+    be far beyond what joints carry, where discrete elements take seconds a state.
     """
     problem = replace(problem, engine=getattr(problem.engine, "rigid", problem.engine))
     problem = _with_any_margin(problem)
@@ -191,18 +172,9 @@ def _enough(problem: FreeProblem, way: str, look: Look) -> str:
 def worst_least(problem: FreeProblem, response: str, look: Look = explore) -> float:
     """Return the least worst value of a response that a plan within the other limits reaches.
 
-    Parameters
-    ----------
-    problem : FreeProblem
-    response : str
-        One of `seqopt.placement.free_goals.STATE_RESPONSES`, or ``bond``.
-    look : callable, optional
-        Returns the states that a problem's plans may pass.
-
-    Returns
-    -------
-    float
-        SI units; infinite if there is no plan.
+    ``response``: one of `seqopt.placement.free_goals.STATE_RESPONSES`, or ``bond``; ``look``:
+    returns the states that a problem's plans may pass. Result: SI units; infinite if there is no
+    plan.
     """
     found = look(replace(problem, goals=(Goal(Measure.PEAK, response),)))
     return least_peak(found.graph().graph, 0) if found.whole else np.inf

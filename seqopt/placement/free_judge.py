@@ -38,18 +38,11 @@ TOLERANCE = 1e-6  # over the size of a value: how far a claim may be from what t
 class ScheduleCertificate(FrozenValue):
     """The values of a free schedule with bounds, checked from the problem's data alone.
 
-    Attributes
-    ----------
-    objective : tuple of float
-        The value of every goal, recomputed.
-    bound : tuple of float
-        What no plan stays below, goals before it being at their values; minus infinity where
-        nothing is proven.
-    gap : float
-        The largest of the differences of both, over the size of the values; infinite where nothing
-        is proven. Margins of stability leave what `seqopt.placement.standing.NARROW` says.
-    states : int
-        How many states the proof looked at.
+    ``objective``: the value of every goal, recomputed; ``bound``: what no plan stays below, goals
+    before it being at their values; minus infinity where nothing is proven; ``gap``: the largest of
+    the differences of both, over the size of the values; infinite where nothing is proven. Margins
+    of stability leave what `seqopt.placement.standing.NARROW` says. ``states``: how many states the
+    proof looked at.
     """
 
     objective: tuple[float, ...]
@@ -68,25 +61,11 @@ def judge_schedule(
 ) -> ScheduleCertificate:
     """Check a free schedule from the problem's own data, without the search.
 
-    Parameters
-    ----------
-    problem : FreeProblem
-    selection : ScheduleSelection
-        What a formulation claims.
-    steps : sequence of Step
-        Of the selection, checked in the scene.
-    hint : mapping of int to (n, c) int, optional
-        States that a search visited, by brick count; only the time that the proof takes depends on
-        them.
-    exact : bool, optional
-        Whether values are promised as the least; else only bounds that were claimed are.
-
-    Raises
-    ------
-    SolverError
-        If a value is not what was claimed, a limit is exceeded, or a plan is better than promised.
-    StepError
-        If a step breaks a rule.
+    ``selection``: what a formulation claims; ``steps``: of the selection, checked in the scene;
+    ``hint`` (mapping of int to (n, c) int): states that a search visited, by brick count; only the
+    time that the proof takes depends on them; ``exact``: whether values are promised as the least;
+    else only bounds that were claimed are. Raises `SolverError` if a value is not what was claimed,
+    a limit is exceeded, or a plan is better than promised; `StepError` if a step breaks a rule.
     """
     if isinstance(problem.rules, Schedule):
         check_scheduled(problem.rules, steps)
@@ -161,22 +140,10 @@ def plan_values(
 ) -> tuple[float, ...]:
     """Return what goals take of a sequence, from the responses of its steps.
 
-    Parameters
-    ----------
-    problem : FreeProblem
-    steps : sequence of Step
-    claimed : sequence of float, optional
-        The value of every goal; margins of stability are compared with these, and taken from them.
-
-    Returns
-    -------
-    tuple of float
-        SI units. Over scenarios the largest, but ways, which are those of the scene itself.
-
-    Raises
-    ------
-    SolverError
-        If a step exceeds a limit, does not stand as is demanded, or has less of a margin.
+    ``claimed``: the value of every goal; margins of stability are compared with these, and taken
+    from them. Result: SI units. Over scenarios the largest, but ways, which are those of the scene
+    itself. Raises `SolverError` if a step exceeds a limit, does not stand as is demanded, or has
+    less of a margin.
     """
     if problem.each:
         worth = [plan_values(each, steps, claimed) for each in problem.each]
@@ -226,15 +193,7 @@ def _margins(problem: FreeProblem, steps: Sequence[Step]) -> Mapping[str, float]
 def state_columns(problem: FreeProblem, table: pd.DataFrame) -> Mapping[str, np.ndarray]:
     """Return the named responses of a table of steps, SI units.
 
-    Parameters
-    ----------
-    problem : FreeProblem
-    table : pandas.DataFrame
-        From `seqopt.analyze`.
-
-    Returns
-    -------
-    dict of str to (n,) float
+    ``table``: from `seqopt.analyze`. Result (dict of str to (n,) float).
     """
     forces = table[[force_column(robot) for robot in problem.network.scene.robots]].abs()
     out = {LARGEST: forces.max(axis=1).fillna(0.0).to_numpy(float)}
@@ -249,10 +208,7 @@ def state_columns(problem: FreeProblem, table: pd.DataFrame) -> Mapping[str, np.
 def travel_of(problem: FreeProblem, steps: Sequence[Step]) -> float:
     """Return how far robots go from one grip to the next.
 
-    Returns
-    -------
-    float
-        m; straight lines.
+    Result: m; straight lines.
     """
     scene, total = problem.network.scene, 0.0
     for robot in range(len(scene.robots)):

@@ -29,12 +29,9 @@ Tables: TypeAlias = RuleTables | ScheduleTables
 class Asked(NamedTuple):
     """What states must keep to.
 
-    Attributes
-    ----------
-    values : sequence of float
-        Of goals; the first that is about no margin bounds states, if it is about a worst step.
-    margins : sequence of float or None
-        With which states must stand, as is demanded and by the first goals; None does not ask.
+    ``values``: of goals; the first that is about no margin bounds states, if it is about a worst
+    step; ``margins``: with which states must stand, as is demanded and by the first goals; None
+    does not ask.
     """
 
     values: Sequence[float] = ()
@@ -44,14 +41,8 @@ class Asked(NamedTuple):
 class Closed(NamedTuple):
     """States of one level that may be passed.
 
-    Attributes
-    ----------
-    codes : (n,) int
-    states : (n, c) int
-    values : (n, g) float
-        What goals take of them.
-    follows : list of Follows
-        What the rules allow after them, by rows of these states.
+    ``codes`` (n,); ``states`` (n, c); ``values`` (n, g): what goals take of them; ``follows``: what
+    the rules allow after them, by rows of these states.
     """
 
     codes: Ints
@@ -63,14 +54,8 @@ class Closed(NamedTuple):
 class Passable:
     """Which states may be passed, with responses that the engine computes again.
 
-    Attributes
-    ----------
-    tables : RuleTables
-    fallen : dict of int to (n,) int
-        Codes of states that are proven to fall, by brick count.
-    stands : StandingProof
-    margins : int
-        How many goals are about margins; they come first.
+    ``fallen`` (dict of int to (n,) int): codes of states that are proven to fall, by brick count;
+    ``margins``: how many goals are about margins; they come first.
     """
 
     def __init__(self, problem: FreeProblem) -> None:
@@ -87,13 +72,8 @@ class Passable:
     def closed(self, level: int, entries: Ints, asked: Asked) -> Closed:
         """Return the states that are reached from some without placing a brick.
 
-        Parameters
-        ----------
-        level : int
-        entries : (n, c) int
-            Some of them perhaps more than once.
-        asked : Asked
-            As of `valued`, which says which ones may be passed.
+        ``entries`` (n, c): some of them perhaps more than once; ``asked``: as of `valued`, which
+        says which ones may be passed.
         """
         seen, count, fresh = np.zeros(0, dtype=np.int64), 0, entries
         parts = [Closed(seen, entries[:0], np.zeros((0, len(self.problem.goals))), [])]
@@ -120,16 +100,7 @@ class Passable:
     def valued(self, level: int, states: Ints, asked: Asked) -> tuple[Floats, Bools]:
         """Return what goals take of states, and which ones a better plan could pass.
 
-        Parameters
-        ----------
-        level : int
-        states : (n, c) int
-        asked : Asked
-
-        Returns
-        -------
-        values : (n, g) float
-        ok : (n,) bool
+        ``states`` (n, c). Results: ``values`` (n, g); ``ok`` (n,).
         """
         goals = self.problem.goals
         if not level:

@@ -42,20 +42,9 @@ COUNTED = ("each", "sets", "screened", "stability")  # of a problem: they know w
 class FreePlan(ShownBuild):
     """A free schedule: every step of the build, and the values of its goals.
 
-    Attributes
-    ----------
-    problem : FreeProblem
-        What was solved.
-    formulation : ScheduleFormulation
-        What solved it.
-    selection : ScheduleSelection
-        The states, and what the formulation claims of them.
-    certificate : ScheduleCertificate or None
-        Their checked values; None without a proof.
-    steps : tuple of Step
-        Checked.
-    seconds : mapping of str to float
-        By stage, s: solve (responses among it), verify.
+    ``problem``: what was solved; ``formulation``: what solved it; ``selection``: the states, and
+    what the formulation claims of them; ``certificate``: their checked values; None without a
+    proof; ``steps``: checked; ``seconds``: by stage, s: solve (responses among it), verify.
     """
 
     problem: FreeProblem
@@ -122,20 +111,14 @@ class FreePlan(ShownBuild):
     def table(self) -> pd.DataFrame:
         """Return what was chosen: every grip.
 
-        Returns
-        -------
-        pandas.DataFrame
-            As of `grips`.
+        Result: as of `grips`.
         """
         return self.grips()
 
     def responses(self) -> pd.DataFrame:
         """Return the responses of every step.
 
-        Returns
-        -------
-        pandas.DataFrame
-            As of `seqopt.analyze`.
+        Result: as of `seqopt.analyze`.
         """
         return self._responses.copy()
 
@@ -146,15 +129,8 @@ class FreePlan(ShownBuild):
     def stability(self, mortar: Mortar | str | None = None) -> pd.DataFrame:
         """Return whether every step stands and by which margins, by the cone program.
 
-        Parameters
-        ----------
-        mortar : Mortar or str, optional
-            Of all joints; by default that which was demanded, or dry.
-
-        Returns
-        -------
-        pandas.DataFrame
-            As of `seqopt.stability.assessment.stability_table`.
+        ``mortar``: of all joints; by default that which was demanded, or dry. Result: as of
+        `seqopt.stability.assessment.stability_table`.
         """
         if mortar is not None:
             return super().stability(mortar)
@@ -163,13 +139,10 @@ class FreePlan(ShownBuild):
     def summary(self) -> dict[str, object]:
         """Return the summary of the plan, ready for JSON.
 
-        Returns
-        -------
-        dict
-            ``aims`` with ``objective`` and ``bound`` by name and the ``gap``; the rules; how many
-            ``steps`` there are, ``steps_before_release`` without those that let all go at the end,
-            ``regrips``; ``models_evaluated`` (grip sets solved), ``seconds`` and more, as of
-            `Plan.summary`.
+        Result: ``aims`` with ``objective`` and ``bound`` by name and the ``gap``; the rules; how
+        many ``steps`` there are, ``steps_before_release`` without those that let all go at the end,
+        ``regrips``; ``models_evaluated`` (grip sets solved), ``seconds`` and more, as of
+        `Plan.summary`.
         """
         problem, chosen = self.problem, self.selection
         goals = [str(goal) for goal in problem.aims]
@@ -252,24 +225,11 @@ def solve_free(
 ) -> FreePlan:
     """Solve the problem of a free schedule, and judge the answer.
 
-    Parameters
-    ----------
-    problem : FreeProblem
-    formulation : ScheduleFormulation or str
-        One of another kind is refused.
-    proof : bool, optional
-        False leaves out the proof that no plan is better; the plan's own values are not checked.
-    **options
-        Of the formulation; ``progress`` is told in a few words how far it is.
-
-    Raises
-    ------
-    InfeasibleError
-        Naming the brick at which it stops, and the rule or limit whose loosening opens a way.
-    ProblemError
-        If there is no such formulation or option.
-    SolverError
-        If the answer is not what its formulation claims.
+    ``formulation``: one of another kind is refused; ``proof``: False leaves out the proof that no
+    plan is better; the plan's own values are not checked; ``**options``: of the formulation;
+    ``progress`` is told in a few words how far it is. Raises `InfeasibleError`, naming the brick at
+    which it stops, and the rule or limit whose loosening opens a way; `ProblemError` if there is no
+    such formulation or option; `SolverError` if the answer is not what its formulation claims.
     """
     formulation = find_schedule_formulation(formulation)
     formulation.require_options(options)

@@ -46,30 +46,16 @@ BAND = 1e-5  # share of a value within which six digits do not decide
 class FreeProblem(Shown):
     """The problem of the free schedule of a scene; everything is computed when first needed.
 
-    Attributes
-    ----------
-    engine : Engine
-        What computes responses.
-    rules : FreeRules or Schedule
-        Which moves are possible: those that rules allow, or those that choose the open grips of a
-        schedule, however many are open in a step.
-    criterion : Criterion
-        What a step costs, for the goals that name no response.
-    goals : tuple of Goal
-        What to minimize, the most important first.
-    limits : tuple of Limit
-        What no step may exceed.
-    standing : Standing or None
-        That every state must stand, if it is demanded.
-    settled : tuple of Standing
-        Margins that every state must have as well.
-    budgets : tuple of float
-        Caps on the sums of as many last goals, which are not to be made small but kept within.
-    scenarios : tuple of Engine
-        Of the same scene in other states of the world: what is largest in any of them counts, and
-        limits and standing hold in all. By default that of ``engine`` alone.
-    resources : Resources
-        Who solves grip sets, and where answers are kept; the proof believes none of these.
+    ``engine``: what computes responses; ``rules``: which moves are possible: those that rules
+    allow, or those that choose the open grips of a schedule, however many are open in a step;
+    ``criterion``: what a step costs, for the goals that name no response; ``goals``: what to
+    minimize, the most important first; ``limits``: what no step may exceed; ``standing``: that
+    every state must stand, if it is demanded; ``settled``: margins that every state must have as
+    well; ``budgets``: caps on the sums of as many last goals, which are not to be made small but
+    kept within; ``scenarios``: of the same scene in other states of the world: what is largest in
+    any of them counts, and limits and standing hold in all. By default that of ``engine`` alone.
+    ``resources``: who solves grip sets, and where answers are kept; the proof believes none of
+    these.
     """
 
     engine: Engine
@@ -195,19 +181,9 @@ class FreeProblem(Shown):
     ) -> tuple[Mapping[str, Floats], Bools]:
         """Return the named responses of states, and which states are within all limits.
 
-        Parameters
-        ----------
-        level : int
-        states : (n, c) int
-            As in `seqopt.sequence.free_space`.
-        rough : bool, optional
-            Whether six digits are enough, except for what is close to a limit.
-
-        Returns
-        -------
-        responses : dict of str to (n,) float
-            SI units.
-        within : (n,) bool
+        ``states`` (n, c): as in `seqopt.sequence.free_space`; ``rough``: whether six digits are
+        enough, except for what is close to a limit. Results: ``responses`` (dict of str to (n,)
+        float): SI units; ``within`` (n,).
         """
         held, bricks = self.space.held(states), self.space.bricks_at(level)
         answers, forces = (self.screened if rough else self.sets).answers(bricks, held)
@@ -241,21 +217,10 @@ class FreeProblem(Shown):
     ) -> tuple[Floats, Bools]:
         """Return what goals take of states, and which states are within all limits.
 
-        Parameters
-        ----------
-        level : int
-        states : (n, c) int
-        rough : bool, optional
-            Whether six digits are enough.
-        most : float, optional
-            Over scenarios, a state of which the first goal takes more is not asked further: its
-            values are then those of some scenarios.
-
-        Returns
-        -------
-        values : (n, g) float
-            A column for every goal; zero for one that is about moves, or about margins.
-        within : (n,) bool
+        ``states`` (n, c); ``rough``: whether six digits are enough; ``most``: over scenarios, a
+        state of which the first goal takes more is not asked further: its values are then those of
+        some scenarios. Results: ``values`` (n, g): a column for every goal; zero for one that is
+        about moves, or about margins; ``within`` (n,).
         """
         if self.each:
             asked = [partial(p.values, level, rough=rough) for p in self.each]
@@ -280,17 +245,7 @@ class FreeProblem(Shown):
 
         What stands, and by what margin, is asked only of states that nothing else rules out.
 
-        Parameters
-        ----------
-        level : int
-        states : (n, c) int
-        most : float, optional
-            As of `values`.
-
-        Returns
-        -------
-        values : (n, g) float
-        within : (n,) bool
+        ``states`` (n, c); ``most``: as of `values`. Results: ``values`` (n, g); ``within`` (n,).
         """
         if self.each:
             asked = [partial(p.standing_values, level) for p in self.each]
@@ -311,14 +266,7 @@ class FreeProblem(Shown):
     def stand(self, level: int, states: Ints) -> Bools:
         """Return which states are proven to stand as is demanded.
 
-        Parameters
-        ----------
-        level : int
-        states : (n, c) int
-
-        Returns
-        -------
-        (n,) bool
+        ``states`` (n, c). Result (n,).
         """
         if self.each:
             return np.asarray(np.all([p.stand(level, states) for p in self.each], axis=0))
@@ -444,16 +392,8 @@ def pose_free(
 def within(problem: FreeProblem, caps: Mapping[str, float]) -> FreeProblem:
     """Return a problem whose plans keep totals over the build within caps.
 
-    Parameters
-    ----------
-    problem : FreeProblem
-    caps : mapping of str to float
-        ``steps``, ``regrips``, ``travel`` (m) or ``sum(RESPONSE)``, and how much each may be.
-
-    Raises
-    ------
-    ProblemError
-        If something is no total, or a cap is no number from 0.
+    ``caps``: ``steps``, ``regrips``, ``travel`` (m) or ``sum(RESPONSE)``, and how much each may be.
+    Raises `ProblemError` if something is no total, or a cap is no number from 0.
 
     Examples
     --------

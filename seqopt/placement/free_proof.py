@@ -29,17 +29,9 @@ Hint = Mapping[int, Ints]  # states that a search visited, by brick count
 class Proof:
     """What no free schedule stays below, by independent rules and new responses.
 
-    Parameters
-    ----------
-    problem : FreeProblem
-    hint : mapping of int to (n, c) int, optional
-        States that are likely to be passed, by brick count, as of
-        `seqopt.sequence.free_space.FreeSpace`; only time depends on them.
-
-    Attributes
-    ----------
-    states : int
-        How many states a better plan could pass.
+    ``hint`` (mapping of int to (n, c) int): states that are likely to be passed, by brick count, as
+    of `seqopt.sequence.free_space.FreeSpace`; only time depends on them; ``states``: how many
+    states a better plan could pass.
     """
 
     def __init__(self, problem: FreeProblem, hint: Hint | None = None) -> None:
@@ -50,15 +42,8 @@ class Proof:
     def bounds(self, values: Sequence[float]) -> tuple[float, ...]:
         """Return what no plan stays below in every goal, those before it being at their values.
 
-        Parameters
-        ----------
-        values : sequence of float
-            Of every goal; what is said of margins of stability means nothing.
-
-        Returns
-        -------
-        tuple of float
-            Infinite where there is no plan.
+        ``values``: of every goal; what is said of margins of stability means nothing. Result:
+        infinite where there is no plan.
         """
         while True:
             levels = _Levels(self._passable, self._told, Asked(values))
@@ -85,10 +70,7 @@ class Proof:
 
         States must stand if that is demanded.
 
-        Parameters
-        ----------
-        margins : sequence of float, optional
-            Of the first goals.
+        ``margins``: of the first goals.
         """
         graph = _Levels(self._passable, self._told, Asked((), margins)).graph()
         self.states = max(self.states, graph.states)

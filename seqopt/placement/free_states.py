@@ -20,13 +20,8 @@ class FreeStates:
 
     Moves take a column each: whether they are regrips, and how far robots go, m.
 
-    Attributes
-    ----------
-    problem : FreeProblem
-    regrips : bool
-        Whether robots may take grips on bricks that stand.
-    standing : bool
-        Whether it is asked of every state that it stands, and by which margins.
+    ``regrips``: whether robots may take grips on bricks that stand; ``standing``: whether it is
+    asked of every state that it stands, and by which margins.
     """
 
     problem: FreeProblem
@@ -88,17 +83,8 @@ class FreeStates:
 def move_amounts(problem: FreeProblem, values: Floats, taken: Floats) -> Floats:
     """Return what goals take of moves, (m, g).
 
-    Parameters
-    ----------
-    problem : FreeProblem
-    values : (m, g) float
-        What they take of the states that the moves lead to.
-    taken : (m, 2) float
-        Whether the moves are regrips, and how far robots go, m.
-
-    Returns
-    -------
-    (m, g) float
+    ``values`` (m, g): what they take of the states that the moves lead to; ``taken`` (m, 2):
+    whether the moves are regrips, and how far robots go, m. Result (m, g).
     """
     out = values.copy()
     for k, goal in enumerate(problem.goals):
@@ -119,15 +105,9 @@ def explore(
 ) -> Explorer:
     """Return the states of a free schedule below a ceiling that stand as is demanded.
 
-    Parameters
-    ----------
-    problem : FreeProblem
-    ceiling : float, optional
-        The first goal must not take more of a state, where it is about a peak.
-    width : int, optional
-        From how many new states of a brick count the search goes on, and without regrips.
-    tell : callable, optional
-        Called after every level; may raise to end the search.
+    ``ceiling``: the first goal must not take more of a state, where it is about a peak; ``width``:
+    from how many new states of a brick count the search goes on, and without regrips; ``tell``:
+    called after every level; may raise to end the search.
     """
     asked = bool(problem.demands) or any(goal.of_margins for goal in problem.goals)
     space = FreeStates(problem, regrips=width is None, standing=asked)

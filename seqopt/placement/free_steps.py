@@ -15,18 +15,9 @@ from seqopt.sequence.steps import Step, StepKind, check_sequence
 def steps_of(space: FreeSpace | ScheduleSpace, states: Sequence[Sequence[int]]) -> tuple[Step, ...]:
     """Return the checked steps that lead from one state to the next.
 
-    Parameters
-    ----------
-    space : FreeSpace or ScheduleSpace
-    states : sequence of sequence of int
-        As of a `seqopt.placement.schedule_selection.ScheduleSelection`.
-
-    Raises
-    ------
-    SolverError
-        If the states are none of this space.
-    StepError
-        If no single step leads from one state to the next.
+    ``states``: as of a `seqopt.placement.schedule_selection.ScheduleSelection`. Raises
+    `SolverError` if the states are none of this space; `StepError` if no single step leads from one
+    state to the next.
     """
     if isinstance(space, ScheduleSpace):
         return scheduled_steps(space, states)

@@ -24,18 +24,9 @@ PAIRS = 1_000_000  # of states and places that are looked at together
 class Follows(NamedTuple):
     """What follows from states by steps of one kind.
 
-    Attributes
-    ----------
-    level : int
-        How many bricks stand then, or steps of a schedule were taken.
-    source : (m,) int
-        The row of the state before.
-    states : (m, c) int
-        Some of them more than once.
-    regrip : bool
-        Whether a grip is taken on a brick that stands.
-    way : (m,) float
-        How far the robot goes that takes a grip, m.
+    ``level``: how many bricks stand then, or steps of a schedule were taken; ``source`` (m,): the
+    row of the state before; ``states`` (m, c): some of them more than once; ``regrip``: whether a
+    grip is taken on a brick that stands; ``way`` (m,): how far the robot goes that takes a grip, m.
     """
 
     level: int
@@ -57,13 +48,8 @@ class _Places(NamedTuple):
 class RuleTables:
     """A book of rules for many states at once.
 
-    Parameters
-    ----------
-    book : RuleBook
-    groups : sequence of tuple of int
-        Robots that could change places, by their indices: of these the entries are sorted.
-    parks : bool, optional
-        Whether it counts where a free robot was last.
+    ``groups``: robots that could change places, by their indices: of these the entries are sorted;
+    ``parks``: whether it counts where a free robot was last.
     """
 
     def __init__(
@@ -113,9 +99,7 @@ class RuleTables:
     def start(self) -> Ints:
         """Return the state before the first brick.
 
-        Returns
-        -------
-        (1, c) int
+        Result (1, c).
         """
         columns = self.robots + (self._rules.regrips is not None)
         return np.zeros((1, columns), dtype=np.int32)

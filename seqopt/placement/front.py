@@ -101,14 +101,8 @@ class FrontProblem(Protocol):
 class FrontSelection(FrozenValue):
     """The points of a Pareto set, and what its formulation claims of them.
 
-    Attributes
-    ----------
-    points : (n, k) float
-        SI units.
-    plans : tuple of object
-        One for every point.
-    stopped : str
-        Why the search ended before the set was complete; empty if it did not.
+    ``points`` (n, k): SI units; ``plans``: one for every point; ``stopped``: why the search ended
+    before the set was complete; empty if it did not.
     """
 
     points: Floats
@@ -120,17 +114,10 @@ class FrontSelection(FrozenValue):
 class Front(Terse):
     """A Pareto set whose points are checked.
 
-    Attributes
-    ----------
-    table : pandas.DataFrame
-        A row per point, by the first number: the numbers that are to be small, SI units, then
-        ``steps`` and ``regrips`` of its plan where they are none of these.
-    steps : tuple of tuple of Step
-        The plan of every row.
-    complete : bool
-        Whether it was proven that no further point exists.
-    seconds : mapping of str to float
-        By stage, s: solve, verify.
+    ``table``: a row per point, by the first number: the numbers that are to be small, SI units,
+    then ``steps`` and ``regrips`` of its plan where they are none of these; ``steps``: the plan of
+    every row; ``complete``: whether it was proven that no further point exists; ``seconds``: by
+    stage, s: solve, verify.
     """
 
     table: pd.DataFrame
@@ -152,21 +139,9 @@ def find_front(
 ) -> Front:
     """Return the Pareto set of a problem, its points recomputed and its completeness judged.
 
-    Parameters
-    ----------
-    problem : FrontProblem
-    formulation : ScheduleFormulation or str
-    seconds : float, optional
-        After which the points found are returned.
-    progress : callable, optional
-        Told how far it is, in a few words or as a `seqopt.work.Stage`.
-
-    Raises
-    ------
-    InfeasibleError
-        If no plan is allowed.
-    SolverError
-        If a plan is not worth what is claimed, or the set lacks a point.
+    ``seconds``: after which the points found are returned; ``progress``: told how far it is, in a
+    few words or as a `seqopt.work.Stage`. Raises `InfeasibleError` if no plan is allowed;
+    `SolverError` if a plan is not worth what is claimed, or the set lacks a point.
     """
     start = time.perf_counter()
     formulation = find_schedule_formulation(formulation, Finds.FRONT)
@@ -237,13 +212,7 @@ def upper_bounds(points: Floats) -> Floats:
     Points are taken by their last number, ascending; up to the next one only those before it
     count, so that the corners are those of sets with one number less.
 
-    Parameters
-    ----------
-    points : (n, k) float
-
-    Returns
-    -------
-    (m, k) float
+    ``points`` (n, k). Result (m, k).
     """
     if points.shape[1] == 1:
         return np.array([[points.min(initial=np.inf)]])
@@ -279,24 +248,9 @@ def _table(problem: FrontProblem, points: Floats, plans: Sequence[Sequence[Step]
 def pick(table: pd.DataFrame, least: str, under: Mapping[str, float] | None = None) -> int:
     """Return the row of a Pareto set with the least of one number among those below bounds.
 
-    Parameters
-    ----------
-    table : pandas.DataFrame
-        Of a `Front`.
-    least : str
-        A column.
-    under : mapping of str to float, optional
-        What columns must stay below, SI units.
-
-    Returns
-    -------
-    int
-        Its place, from 0; of several the first.
-
-    Raises
-    ------
-    ProblemError
-        If there is no such column, or no row is below all bounds.
+    ``table``: of a `Front`; ``least``: a column; ``under``: what columns must stay below, SI units.
+    Result: its place, from 0; of several the first. Raises `ProblemError` if there is no such
+    column, or no row is below all bounds.
     """
     under = dict(under or {})
     for name in (least, *under):

@@ -72,19 +72,13 @@ class GivenSequence(ShownBuild):
     def table(self) -> pd.DataFrame:
         """Return every grip.
 
-        Returns
-        -------
-        pandas.DataFrame
-            As of `grips`.
+        Result: as of `grips`.
         """
         return self.grips()
 
     def responses(self) -> pd.DataFrame:
         """Return the responses of every step.
 
-        Returns
-        -------
-        pandas.DataFrame
-            As of `seqopt.analyze`.
+        Result: as of `seqopt.analyze`.
         """
         return analyze(self.engine, self.steps)

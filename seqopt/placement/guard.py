@@ -27,27 +27,10 @@ def called(
 ) -> Result:
     """Return what a formulation returns, if that is what it should be.
 
-    Parameters
-    ----------
-    name : str
-        Of the formulation.
-    judged : callable
-        Returns what its answer is judged by.
-    kind : type
-        What it has to return.
-    solve : callable
-        Calls it.
-
-    Returns
-    -------
-    object
-        Of that kind.
-
-    Raises
-    ------
-    SolverError
-        If it raises anything but an error of seqopt or an interrupt, returns something else, or
-        changes what it is judged by.
+    ``name``: of the formulation; ``judged``: returns what its answer is judged by; ``kind``: what
+    it has to return; ``solve``: calls it. Result: of that kind. Raises `SolverError` if it raises
+    anything but an error of seqopt or an interrupt, returns something else, or changes what it is
+    judged by.
     """
     with unchanged(name, judged):
         try:
@@ -67,17 +50,8 @@ def called(
 def unchanged(name: str, judged: Callable[[], object]) -> Iterator[None]:
     """Require that values stay what they are while a formulation works.
 
-    Parameters
-    ----------
-    name : str
-        Of the formulation.
-    judged : callable
-        Returns them.
-
-    Raises
-    ------
-    SolverError
-        If one does not, also where the formulation fails.
+    ``name``: of the formulation; ``judged``: returns them. Raises `SolverError` if one does not,
+    also where the formulation fails.
     """
     before = checksum(judged())
     try:
@@ -93,10 +67,7 @@ def unchanged(name: str, judged: Callable[[], object]) -> Iterator[None]:
 def readable(name: str) -> Iterator[None]:
     """Say that a formulation failed where what it returned cannot be read.
 
-    Parameters
-    ----------
-    name : str
-        Of the formulation.
+    ``name``: of the formulation.
     """
     try:
         yield

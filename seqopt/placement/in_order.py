@@ -22,12 +22,7 @@ from seqopt.placement.objectives import TIED, on_a_least_path
 class InOrder:
     """The best choice for several aims in order of importance.
 
-    Attributes
-    ----------
-    choice : tuple of int
-        A candidate for every move.
-    values : tuple of float
-        Its value for every aim.
+    ``choice``: a candidate for every move; ``values``: its value for every aim.
     """
 
     choice: tuple[int, ...]
@@ -39,18 +34,10 @@ def solve_in_order(goals: Sequence[tuple[PlacementProblem, Aim]]) -> InOrder:
 
     Exact, sums that differ by less than `seqopt.placement.objectives.TIED` counting as equal.
 
-    Parameters
-    ----------
-    goals : sequence of (PlacementProblem, Aim)
-        Problems of the same moves, each under its own criterion, and whether its sum or its peak is
-        to minimize; the most important first.
-
-    Raises
-    ------
-    InfeasibleError
-        If no choice is allowed by all problems.
-    ProblemError
-        If there is no goal, problems have other moves or candidates, or one has budgets.
+    ``goals`` (sequence of (PlacementProblem, Aim)): problems of the same moves, each under its own
+    criterion, and whether its sum or its peak is to minimize; the most important first. Raises
+    `InfeasibleError` if no choice is allowed by all problems; `ProblemError` if there is no goal,
+    problems have other moves or candidates, or one has budgets.
 
     Examples
     --------

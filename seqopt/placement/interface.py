@@ -28,10 +28,7 @@ class Aim(Enum):
     def costs(self, problem: PlacementProblem) -> LayeredCosts:
         """Return the costs of a problem that this aim is about.
 
-        Returns
-        -------
-        LayeredCosts
-            Its sums or its peaks.
+        Result: its sums or its peaks.
         """
         return problem.sums if self is Aim.SUM else problem.peaks
 
@@ -134,53 +131,28 @@ class CostProblem(FrozenValue):
     def conditional(self, move: int, before: int) -> Floats:
         """Return the shared costs of a move's candidates, the choice before being made.
 
-        Parameters
-        ----------
-        move, before : int
-            A move, and the candidate chosen for the move before it.
-
-        Returns
-        -------
-        (C_k,) float
+        ``move``, ``before``: a move, and the candidate chosen for the move before it. Result
+        (C_k,).
         """
         return np.asarray(self.sums.shared[move][before])
 
     def nodes(self, choice: Sequence[int]) -> tuple[int, ...]:
         """Return the choice: candidates are their own names.
 
-        Parameters
-        ----------
-        choice : sequence of int
-            A candidate for every move.
+        ``choice``: a candidate for every move.
         """
         return tuple(choice)
 
     def steps(self, choice: Sequence[int]) -> tuple[Step, ...]:
         """Return no steps.
 
-        Parameters
-        ----------
-        choice : sequence of int
-            A candidate for every move.
-
-        Returns
-        -------
-        tuple of Step
-            Empty.
+        ``choice``: a candidate for every move. Result: empty.
         """
         return ()
 
     def seconds(self, aim: Aim) -> Mapping[str, float]:
         """Return no times: the costs are given.
 
-        Parameters
-        ----------
-        aim : Aim
-            Sums or peaks.
-
-        Returns
-        -------
-        mapping of str to float
-            Empty.
+        ``aim``: sums or peaks. Result: empty.
         """
         return {}

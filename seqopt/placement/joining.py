@@ -13,12 +13,7 @@ from seqopt.placement.costs import LayeredCosts
 class Joined:
     """The costs of all choices, steps of the same moves joined as they come.
 
-    Parameters
-    ----------
-    sizes : sequence of int
-        How many candidates every move has.
-    join : numpy.ufunc
-        ``numpy.add`` or ``numpy.maximum``.
+    ``sizes``: how many candidates every move has; ``join``: ``numpy.add`` or ``numpy.maximum``.
     """
 
     def __init__(self, sizes: Sequence[int], join: np.ufunc) -> None:
@@ -29,11 +24,7 @@ class Joined:
     def add(self, moves: tuple[int, ...], costs: Floats) -> None:
         """Join the costs of a step.
 
-        Parameters
-        ----------
-        moves : tuple of int
-            Open in it: one, or two neighboring ones.
-        costs : (C,) or (C, D) float
+        ``moves``: open in it: one, or two neighboring ones; ``costs`` ((C,) or (C, D) float).
         """
         finite = costs[np.isfinite(costs)]
         self._least = min(self._least, float(finite.min(initial=np.inf)))
@@ -45,29 +36,21 @@ class Joined:
     def singles(self) -> tuple[Floats, ...]:
         """Return the costs of each move's candidates where it alone is open.
 
-        Returns
-        -------
-        tuple of (C_k,) float
-            `least` where it never is.
+        Result (tuple of (C_k,) float): `least` where it never is.
         """
         return tuple(self.single(k) for k in range(len(self._sizes)))
 
     def single(self, move: int) -> Floats:
         """Return the costs of a move's candidates where it alone is open.
 
-        Returns
-        -------
-        (C_k,) float
+        Result (C_k,).
         """
         return self._of((move,), (self._sizes[move],))
 
     def layered(self) -> LayeredCosts:
         """Return the costs of single choices and of pairs.
 
-        Returns
-        -------
-        LayeredCosts
-            Pairs of moves that share no step take no memory.
+        Result: pairs of moves that share no step take no memory.
         """
         pairs = zip([1, *self._sizes[:-1]], self._sizes, strict=True)
         shared = tuple(self._of((k - 1, k), pair) for k, pair in enumerate(pairs))

@@ -13,10 +13,7 @@ from seqopt.sequence.schedule import Schedule
 def robots_of(engine: Engine, schedule: Schedule, criterion: Criterion) -> list[str]:
     """Return the names of a schedule's robots if all is what it should be, and grips are open.
 
-    Raises
-    ------
-    ProblemError
-        If one is something else, or no grip is open.
+    Raises `ProblemError` if one is something else, or no grip is open.
     """
     _require_kinds(engine, schedule, criterion)
     if not schedule.moves:

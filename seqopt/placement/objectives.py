@@ -27,13 +27,9 @@ TIED = 1e-9  # sums of ranks this close, relative to the least, are equal
 class GapParts:
     """The gap of a choice to the exact optimum, split in two parts.
 
-    Attributes
-    ----------
-    short_sight : float
-        Against an exact optimum of the conditional objective, both charged as the problem does:
-        what is lost by not looking ahead. Negative where looking ahead would not have served.
-    objective : float
-        What that optimum itself gives up: the change of objective.
+    ``short_sight``: against an exact optimum of the conditional objective, both charged as the
+    problem does: what is lost by not looking ahead. Negative where looking ahead would not have
+    served. ``objective``: what that optimum itself gives up: the change of objective.
     """
 
     short_sight: float
@@ -48,16 +44,8 @@ class GapParts:
 def under(problem: Problem, ranked: Ranked) -> Problem | None:
     """Return a problem with its ranks taken another way.
 
-    Parameters
-    ----------
-    problem : Problem
-        Whose responses are shared.
-    ranked : Ranked
-
-    Returns
-    -------
-    Problem or None
-        None if the criterion has no ranks, or responses are not kept that others would need.
+    ``problem``: whose responses are shared. Result: None if the criterion has no ranks, or
+    responses are not kept that others would need.
     """
     if not isinstance(problem.criterion, RankSum):
         return None
@@ -72,16 +60,8 @@ def under(problem: Problem, ranked: Ranked) -> Problem | None:
 def under_both(problem: Problem, choice: Sequence[int]) -> dict[str, float | None]:
     """Return the value of a choice under both objectives.
 
-    Parameters
-    ----------
-    problem : Problem
-    choice : sequence of int
-        A candidate for every move.
-
-    Returns
-    -------
-    dict of str to (float or None)
-        ``pairs`` and ``conditional``; None if the criterion has no ranks.
+    ``choice``: a candidate for every move. Result (dict of str to (float or None)): ``pairs`` and
+    ``conditional``; None if the criterion has no ranks.
     """
     found = {ranked.value: under(problem, ranked) for ranked in Ranked}
     return {name: None if p is None else p.sums.cost(choice) for name, p in found.items()}
@@ -90,18 +70,9 @@ def under_both(problem: Problem, choice: Sequence[int]) -> dict[str, float | Non
 def split_gap(problem: Problem, choice: Sequence[int]) -> GapParts | None:
     """Return the gap of a choice, in two parts.
 
-    Parameters
-    ----------
-    problem : Problem
-        Its sums are what choices are charged.
-    choice : sequence of int
-        A candidate for every move.
-
-    Returns
-    -------
-    GapParts or None
-        Over the sum of the costs that the choice meets; None if the criterion has no ranks, or no
-        choice is allowed.
+    ``problem``: its sums are what choices are charged; ``choice``: a candidate for every move.
+    Result: over the sum of the costs that the choice meets; None if the criterion has no ranks, or
+    no choice is allowed.
     """
     conditional = under(problem, Ranked.CONDITIONAL)
     if conditional is None:
@@ -117,15 +88,7 @@ def split_gap(problem: Problem, choice: Sequence[int]) -> GapParts | None:
 def least_among_least(first: LayeredCosts, second: LayeredCosts) -> float:
     """Return the least second cost of the choices whose first cost is least.
 
-    Parameters
-    ----------
-    first, second : LayeredCosts
-        Of the same choices.
-
-    Returns
-    -------
-    float
-        Infinite if no choice is allowed.
+    ``first``, ``second``: of the same choices. Result: infinite if no choice is allowed.
     """
     arcs = [shared + single for shared, single in zip(first.shared, first.single, strict=True)]
     reached, ways = np.zeros(1), []
@@ -143,17 +106,9 @@ def least_among_least(first: LayeredCosts, second: LayeredCosts) -> float:
 def on_a_least_path(arcs: Sequence[Floats], ways: Sequence[Floats], most: float) -> list[Bools]:
     """Return which pairs lie on a path of at most a cost, move by move.
 
-    Parameters
-    ----------
-    arcs : sequence of (C_{k-1}, C_k) float
-        What a pair and its later choice cost together.
-    ways : sequence of (C_{k-1},) float
-        The least cost up to every candidate of the move before.
-    most : float
-
-    Returns
-    -------
-    list of (C_{k-1}, C_k) bool
+    ``arcs`` (sequence of (C_{k-1}, C_k) float): what a pair and its later choice cost together;
+    ``ways`` (sequence of (C_{k-1},) float): the least cost up to every candidate of the move
+    before. Result (list of (C_{k-1}, C_k) bool).
     """
     to_go = np.zeros(arcs[-1].shape[1])
     out = []

@@ -21,10 +21,7 @@ def whole_bound(problem: OrderProblem) -> float:
 
     Every plan of every order passes such a state, and the one in which nobody holds if it ends so.
 
-    Returns
-    -------
-    float
-        Minus infinity where there are too many grip sets to look at.
+    Result: minus infinity where there are too many grip sets to look at.
     """
     free = problem.judging(problem.scene.build_order)
     numbers = node_numbers(free.network)

@@ -38,18 +38,10 @@ ENDED = ("time", "interrupt")  # searches that were told to end: nothing more is
 class OrderPlan(ShownBuild):
     """A build order, its best plan, and a bound on all other orders.
 
-    Attributes
-    ----------
-    problem : OrderProblem
-        What was solved.
-    selection : OrderSelection
-        What the formulation claims.
-    plan : FreePlan
-        The best of this order, with its own certificate.
-    seconds : mapping of str to float
-        By stage, s: ``order``, those of the plan, ``order_proof``.
-    proven : bool
-        Whether it is proven that no order stays below the bound; else it is claimed.
+    ``problem``: what was solved; ``selection``: what the formulation claims; ``plan``: the best of
+    this order, with its own certificate; ``seconds``: by stage, s: ``order``, those of the plan,
+    ``order_proof``; ``proven``: whether it is proven that no order stays below the bound; else it
+    is claimed.
     """
 
     problem: OrderProblem
@@ -84,20 +76,14 @@ class OrderPlan(ShownBuild):
     def responses(self) -> pd.DataFrame:
         """Return the responses of every step.
 
-        Returns
-        -------
-        pandas.DataFrame
-            As of `seqopt.analyze`.
+        Result: as of `seqopt.analyze`.
         """
         return self.plan.responses()
 
     def table(self) -> pd.DataFrame:
         """Return what was chosen: every grip.
 
-        Returns
-        -------
-        pandas.DataFrame
-            As of `grips`.
+        Result: as of `grips`.
         """
         return self.grips()
 
@@ -133,12 +119,9 @@ class OrderPlan(ShownBuild):
     def summary(self) -> dict[str, object]:
         """Return a summary, ready for JSON.
 
-        Returns
-        -------
-        dict
-            That of the plan, and ``order``, ``orders`` (among which), ``order_status``,
-            ``order_bound`` (on the first aim, of any order), ``order_bound_proven`` (else it is
-            claimed), ``order_evaluated`` and ``order_stopped``.
+        Result: that of the plan, and ``order``, ``orders`` (among which), ``order_status``,
+        ``order_bound`` (on the first aim, of any order), ``order_bound_proven`` (else it is
+        claimed), ``order_evaluated`` and ``order_stopped``.
         """
         return {
             **self.plan.summary(),
@@ -166,25 +149,11 @@ def solve_order(
 
     The plan is computed again for this one order and judged by its own certificate.
 
-    Parameters
-    ----------
-    problem : OrderProblem
-    formulation : ScheduleFormulation or str
-    proof : bool, optional
-        False leaves out the proofs that the order has no better plan, and that no order is better.
-    progress : callable, optional
-        Told in a few words how far it is.
-    resources : Resources, optional
-        Who tries orders; what is found does not depend on it.
-    **options
-        Of the formulation.
-
-    Raises
-    ------
-    InfeasibleError, ProblemError
-        If no order has a plan; there is no such formulation or option.
-    SolverError
-        If the order is none that was asked for or not worth what is claimed, or another is better.
+    ``proof``: False leaves out the proofs that the order has no better plan, and that no order is
+    better; ``progress``: told in a few words how far it is; ``resources``: who tries orders; what
+    is found does not depend on it; ``**options``: of the formulation. Raises `InfeasibleError`,
+    `ProblemError` if no order has a plan; there is no such formulation or option; `SolverError` if
+    the order is none that was asked for or not worth what is claimed, or another is better.
     """
     found = find_schedule_formulation(formulation, Finds.ORDER)
     found.require_options(options)

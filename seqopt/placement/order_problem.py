@@ -33,16 +33,9 @@ class OrderProblem(Shown):
     The value of an order is the first goal of its best plan; the criterion keeps the numbers that
     it has in the scene's own order.
 
-    Parameters
-    ----------
-    free : FreeProblem
-        In the scene's own order, of `seqopt.pose_free`; its first goal is about a worst step.
-    among : Orders or str, optional
-
-    Raises
-    ------
-    ProblemError
-        If the first goal is another, the engine was not made by name, or there are no such orders.
+    ``free``: in the scene's own order, of `seqopt.pose_free`; its first goal is about a worst step.
+    Raises `ProblemError` if the first goal is another, the engine was not made by name, or there
+    are no such orders.
     """
 
     free: FreeProblem
@@ -92,10 +85,7 @@ class OrderProblem(Shown):
     def next_bricks(self, placed: frozenset[int]) -> tuple[int, ...]:
         """Return the bricks that may be placed next.
 
-        Parameters
-        ----------
-        placed : frozenset of int
-            Names of those that stand.
+        ``placed``: names of those that stand.
         """
         left = [name for name in self.scene.build_order if name not in placed]
         if self.among is Orders.ANY:
@@ -109,10 +99,7 @@ class OrderProblem(Shown):
     def allows(self, order: Sequence[int]) -> bool:
         """Return whether an order is one of those among which the best is sought.
 
-        Parameters
-        ----------
-        order : sequence of int
-            Names of all bricks.
+        ``order``: names of all bricks.
         """
         return all(b in self.next_bricks(frozenset(order[:k])) for k, b in enumerate(order))
 
@@ -138,19 +125,11 @@ def _anew(engine: Engine, order: Order) -> Engine:
 class OrderSelection(FrozenValue):
     """An order, and what its formulation claims of it.
 
-    Attributes
-    ----------
-    order : tuple of int
-        Names of all bricks.
-    objective : float
-        Claimed value of the first goal of its best plan.
-    bound : float
-        Claimed lower bound over all orders; the value itself where it is proven the least.
-    evaluated : int
-        How many orders, or sets of bricks with a newest one, were looked at.
-    stopped : str
-        Why the search ended before all was proven: ``size``, ``time`` or ``interrupt``; empty if it
-        did not.
+    ``order``: names of all bricks; ``objective``: claimed value of the first goal of its best plan;
+    ``bound``: claimed lower bound over all orders; the value itself where it is proven the least;
+    ``evaluated``: how many orders, or sets of bricks with a newest one, were looked at;
+    ``stopped``: why the search ended before all was proven: ``size``, ``time`` or ``interrupt``;
+    empty if it did not.
     """
 
     order: Order

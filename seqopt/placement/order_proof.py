@@ -37,20 +37,9 @@ def finds_better_order(
 ) -> bool | None:
     """Return whether some order has a plan whose worst step is below a value.
 
-    Parameters
-    ----------
-    problem : OrderProblem
-    value : float
-        Of the first goal.
-    most : int, optional
-        Up to how many sets of bricks with a newest one are looked at.
-    end : float, optional
-        Until when, as of `time.perf_counter`.
-
-    Returns
-    -------
-    bool or None
-        None where it is not known, because there are more sets or time is over.
+    ``value``: of the first goal; ``most``: up to how many sets of bricks with a newest one are
+    looked at; ``end``: until when, as of `time.perf_counter`. Result: None where it is not known,
+    because there are more sets or time is over.
     """
     if _of_the_whole(problem) >= value:
         return False

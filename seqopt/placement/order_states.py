@@ -30,13 +30,8 @@ class TooManySetsError(Exception):
 class OrderStates:
     """The states of a free schedule in all orders, a part for every set of bricks and newest brick.
 
-    Attributes
-    ----------
-    problem : OrderProblem
-    most : int
-        How many parts there may be.
-    parts : dict of Key to FreeStates
-        Those that were looked at, each in an order that begins with its set.
+    ``most``: how many parts there may be; ``parts``: those that were looked at, each in an order
+    that begins with its set.
     """
 
     problem: OrderProblem

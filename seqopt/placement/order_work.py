@@ -24,12 +24,7 @@ NARROW = 50  # states of a brick count with which an order is tried first
 class Trial:
     """An order to be tried.
 
-    Attributes
-    ----------
-    order : tuple of int
-        Names of all bricks.
-    ceiling : float
-        What it must stay below.
+    ``order``: names of all bricks; ``ceiling``: what it must stay below.
     """
 
     order: Order
@@ -39,10 +34,7 @@ class Trial:
 def worth(problem: OrderProblem, trial: Trial) -> float:
     """Return the first goal of the best plan of an order.
 
-    Returns
-    -------
-    float
-        Infinite where no plan of it stays below the ceiling.
+    Result: infinite where no plan of it stays below the ceiling.
     """
     judged, ceiling, found = problem.judging(trial.order), trial.ceiling, np.inf
     for width in (NARROW, None):
@@ -56,21 +48,9 @@ def worth(problem: OrderProblem, trial: Trial) -> float:
 def trying(problem: OrderProblem, *, elsewhere: bool) -> Callable[[Trial], float]:
     """Return the function that tries orders.
 
-    Parameters
-    ----------
-    problem : OrderProblem
-    elsewhere : bool
-        Whether it is to be sent to other processes: then with the scene, not with an engine.
-
-    Returns
-    -------
-    callable
-        Takes a trial, returns its `worth`.
-
-    Raises
-    ------
-    ProblemError, SceneError
-        If a criterion or an engine of one's own cannot be sent.
+    ``elsewhere``: whether it is to be sent to other processes: then with the scene, not with an
+    engine. Result: takes a trial, returns its `worth`. Raises `ProblemError`, `SceneError` if a
+    criterion or an engine of one's own cannot be sent.
     """
     if not elsewhere:
         return partial(worth, problem)

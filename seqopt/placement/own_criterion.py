@@ -83,25 +83,14 @@ class StepCost:
     def wanted(self, bricks: int) -> tuple[str, ...]:
         """Return the responses that it needs.
 
-        Parameters
-        ----------
-        bricks : int
-            Without effect: it needs the same for every move.
-
-        Returns
-        -------
-        tuple of str
-            Names of responses.
+        ``bricks``: without effect: it needs the same for every move. Result: names of responses.
         """
         return self.responses
 
     def for_scene(self, facts: SceneFacts) -> StepCost:
         """Return the criterion with ``F_each`` spelled out for the scene's robots.
 
-        Parameters
-        ----------
-        facts : SceneFacts
-            Of the scene.
+        ``facts``: of the scene.
         """
         terms = spell_out(tuple((name,) for name in self.responses), facts.robots)
         return replace(self, responses=tuple(name for (name,) in terms))
@@ -109,24 +98,10 @@ class StepCost:
     def costs(self, responses: ChoiceResponses, bricks: int, choices: int) -> Floats:
         """Return what the function makes of the responses.
 
-        Parameters
-        ----------
-        responses : mapping of str to (C,) or (C, D) float
-            As in `Criterion.costs`.
-        bricks : int
-            Bricks placed at the move that decides the step.
-        choices : int
-            Without effect.
-
-        Returns
-        -------
-        (C,) or (C, D) float
-            NaN where a choice is impossible.
-
-        Raises
-        ------
-        ProblemError
-            If the function fails, or returns another shape or what is no number.
+        ``responses`` (mapping of str to (C,) or (C, D) float): as in `Criterion.costs`; ``bricks``:
+        bricks placed at the move that decides the step; ``choices``: without effect. Result ((C,)
+        or (C, D) float): NaN where a choice is impossible. Raises `ProblemError` if the function
+        fails, or returns another shape or what is no number.
         """
         given = {name: present(responses[name]) for name in self.responses}
         impossible = np.isnan(np.stack([*given.values()])).any(axis=0)

@@ -46,16 +46,9 @@ EQUAL = 1e-9  # of a value: two that differ by less are one, found in another or
 class PairSearch:
     """What a search among pairs found.
 
-    Attributes
-    ----------
-    costs : PartialCosts
-        All that it looked at.
-    selection : Selection
-        The best choice of which all pairs are known; its trace tells how choice and bound met.
-    along : WindowSearch
-        The steps that the choice meets, move by move, to be solved anew.
-    models : int
-        How many models were solved.
+    ``costs``: all that it looked at; ``selection``: the best choice of which all pairs are known;
+    its trace tells how choice and bound met; ``along``: the steps that the choice meets, move by
+    move, to be solved anew; ``models``: how many models were solved.
     """
 
     costs: PartialCosts
@@ -78,23 +71,10 @@ class PairSearch:
 def search_pairs(problem: Problem, formulation: Formulation, watch: Watch) -> PairSearch:
     """Solve a problem exactly, looking only at pairs that could be better than what is known.
 
-    Parameters
-    ----------
-    problem : Problem
-        Its own responses are not computed.
-    formulation : Formulation
-        Exact; it is given what is known.
-    watch : Watch
-        Says when to stop, and is told every better choice and bound.
-
-    Raises
-    ------
-    InfeasibleError
-        If no choice is allowed.
-    ProblemError
-        If the formulation is not exact, there are budgets, or costs have no floor.
-    TimeUpError
-        If it is stopped before a choice is known.
+    ``problem``: its own responses are not computed; ``formulation``: exact; it is given what is
+    known; ``watch``: says when to stop, and is told every better choice and bound. Raises
+    `InfeasibleError` if no choice is allowed; `ProblemError` if the formulation is not exact, there
+    are budgets, or costs have no floor; `TimeUpError` if it is stopped before a choice is known.
     """
     floor = _floor(problem, formulation)
     walk = _Pairs(problem, formulation.aim, floor)

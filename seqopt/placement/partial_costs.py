@@ -22,17 +22,10 @@ from seqopt.placement.interface import Aim
 class PartialCosts(FrozenValue):
     """Costs of single choices, and of those pairs that were looked at.
 
-    Attributes
-    ----------
-    single : tuple of (C_k,) float
-        As of `LayeredCosts`.
-    rows : tuple of mapping of int to (C_k,) float
-        For every move, by the candidate of the move before, what its candidates cost in the steps
-        that the two share; NaN where that was not looked at. Empty for the first move.
-    floor : float
-        What any pair costs at least.
-    aim : Aim
-        Whether costs add up or the largest counts.
+    ``single`` (tuple of (C_k,) float): as of `LayeredCosts`; ``rows`` (tuple of mapping of int to
+    (C_k,) float): for every move, by the candidate of the move before, what its candidates cost in
+    the steps that the two share; NaN where that was not looked at. Empty for the first move.
+    ``floor``: what any pair costs at least; ``aim``: whether costs add up or the largest counts.
     """
 
     single: tuple[Floats, ...]
@@ -96,15 +89,7 @@ class PartialCosts(FrozenValue):
     def promise(self, move: int) -> Floats:
         """Return the least that a choice can cost by a candidate of the move before, from its row.
 
-        Parameters
-        ----------
-        move : int
-            From 1.
-
-        Returns
-        -------
-        (C_{k-1},) float
-            Infinite where the row is known.
+        ``move``: from 1. Result (C_{k-1},): infinite where the row is known.
         """
         out = self.join(self.reached[move - 1], self.join(self.floor, self.to_go[move].min()))
         out[list(self.rows[move])] = np.inf
@@ -113,9 +98,7 @@ class PartialCosts(FrozenValue):
     def worth_a_look(self, move: int, before: int) -> Bools:
         """Return which candidates of a move, after one of the move before, could still be better.
 
-        Returns
-        -------
-        (C_k,) bool
+        Result (C_k,).
         """
         least = self.join(self.reached[move - 1][before], self.join(self.floor, self.to_go[move]))
         return np.asarray(least < self.best)
@@ -123,12 +106,8 @@ class PartialCosts(FrozenValue):
     def known(self) -> tuple[LayeredCosts, tuple[tuple[int, ...], ...]]:
         """Return the costs of choices of which all pairs are known.
 
-        Returns
-        -------
-        costs : LayeredCosts
-            Over the candidates that are left.
-        candidates : tuple of tuple of int
-            Of every move, which of its candidates they are.
+        Results: ``costs``: over the candidates that are left; ``candidates``: of every move, which
+        of its candidates they are.
         """
         last = tuple(range(len(self.single[-1])))
         left = (*(tuple(sorted(rows)) for rows in self.rows[1:]), last)

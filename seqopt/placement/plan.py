@@ -148,15 +148,8 @@ class Plan(ShownBuild):
     def responses(self) -> pd.DataFrame:
         """Return the responses of every step and the robots whose grips were chosen in it.
 
-        Returns
-        -------
-        pandas.DataFrame
-            A row per step; the columns of `seqopt.analyze`, and ``optimized_robot``.
-
-        Raises
-        ------
-        ProblemError
-            If the problem is given by its costs alone; so do the tables below.
+        Result: a row per step; the columns of `seqopt.analyze`, and ``optimized_robot``. Raises
+        `ProblemError` if the problem is given by its costs alone; so do the tables below.
         """
         return self._responses.copy()
 
@@ -173,13 +166,10 @@ class Plan(ShownBuild):
     def table(self) -> pd.DataFrame:
         """Return what was chosen for every move, what it costs and how it ranks.
 
-        Returns
-        -------
-        pandas.DataFrame
-            A row per move. Columns: ``move``, ``step``, ``to_step`` (the last in which the node is
-            held), ``bricks``, ``robot``, ``brick``, ``node``, ``largest_force_N``, ``candidates``
-            (how many there were); then ``single_cost``, ``shared_cost`` and ``rank_in_window``, or
-            without proof ``cost`` and the ``margin`` to the next candidate.
+        Result: a row per move. Columns: ``move``, ``step``, ``to_step`` (the last in which the node
+        is held), ``bricks``, ``robot``, ``brick``, ``node``, ``largest_force_N``, ``candidates``
+        (how many there were); then ``single_cost``, ``shared_cost`` and ``rank_in_window``, or
+        without proof ``cost`` and the ``margin`` to the next candidate.
         """
         chosen = moves_table(self._posed, self.selection.choice, self.grips())
         worth = pd.DataFrame([*self._worths()])
@@ -204,11 +194,8 @@ class Plan(ShownBuild):
     def alternatives(self) -> pd.DataFrame:
         """Return the responses and the cost of every choice that was evaluated.
 
-        Returns
-        -------
-        pandas.DataFrame
-            A row per choice, by step; ``second_node`` where two moves are open. SI units. Where
-            the responses of all choices are not kept, those that go with the plan's choices before.
+        Result: a row per choice, by step; ``second_node`` where two moves are open. SI units. Where
+        the responses of all choices are not kept, those that go with the plan's choices before.
         """
         return alternatives(self._posed, self.selection.choice, self.search)
 
@@ -227,11 +214,8 @@ class Plan(ShownBuild):
     def objectives(self) -> dict[str, dict[str, float | None] | None]:
         """Return the sum of ranks under both objectives, and the two parts of a heuristic's gap.
 
-        Returns
-        -------
-        dict
-            ``objectives`` as of `under_both`; ``gap_parts`` with ``short_sight`` and ``objective``,
-            as of `split_gap`, for heuristics. None without proof or without ranks.
+        Result: ``objectives`` as of `under_both`; ``gap_parts`` with ``short_sight`` and
+        ``objective``, as of `split_gap`, for heuristics. None without proof or without ranks.
         """
         none: dict[str, dict[str, float | None] | None] = {"objectives": None, "gap_parts": None}
         if self.certificate is None or self.search is not None:
@@ -249,20 +233,16 @@ class Plan(ShownBuild):
     def summary(self) -> dict[str, object]:
         """Return the summary of the plan, ready for JSON.
 
-        Returns
-        -------
-        dict
-            Names of scene, schedule, formulation and criterion; ``candidates``, all or a heuristic
-            choice of them; ``status`` (``optimal``, ``claimed optimal`` where the proof is left to
-            a solver, both ``among these`` where candidates were left out, ``feasible`` or
-            ``unproven``), ``objective``, ``bound``, ``gap``, ``claimed_gap``; of criteria of
-            ranks the sums under both ``objectives`` and of heuristics the two ``gap_parts`` (see
-            `seqopt.placement.objectives`), null without proof; of every one of the ``budgets`` what
-            is there, spent and what one more unit would save; whether it ``ended`` ``done``, was
-            ``stopped`` before that or ``interrupted``; the limits of the linear range that are left
-            and the payloads that are exceeded; ``idle_robots``, which never grip;
-            ``models_evaluated`` and ``seconds``; the ``engine`` and ``versions`` (see
-            `seqopt.engines.registry`).
+        Result: names of scene, schedule, formulation and criterion; ``candidates``, all or a
+        heuristic choice of them; ``status`` (``optimal``, ``claimed optimal`` where the proof is
+        left to a solver, both ``among these`` where candidates were left out, ``feasible`` or
+        ``unproven``), ``objective``, ``bound``, ``gap``, ``claimed_gap``; of criteria of ranks the
+        sums under both ``objectives`` and of heuristics the two ``gap_parts`` (see
+        `seqopt.placement.objectives`), null without proof; of every one of the ``budgets`` what is
+        there, spent and what one more unit would save; whether it ``ended`` ``done``, was
+        ``stopped`` before that or ``interrupted``; the limits of the linear range that are left and
+        the payloads that are exceeded; ``idle_robots``, which never grip; ``models_evaluated`` and
+        ``seconds``; the ``engine`` and ``versions`` (see `seqopt.engines.registry`).
         """
         schedule, proof = self._posed.schedule, self.certificate
         status = "unproven"

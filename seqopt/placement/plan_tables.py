@@ -15,20 +15,10 @@ from seqopt.responses.choices import StepChoices
 def moves_table(problem: Problem, choice: Sequence[int], grips: pd.DataFrame) -> pd.DataFrame:
     """Return what was chosen for every move, for how long, and with which force.
 
-    Parameters
-    ----------
-    problem : Problem
-    choice : sequence of int
-        The candidate that is taken for every move.
-    grips : pandas.DataFrame
-        Of the plan, as of `seqopt.responses.table.grips_table`.
-
-    Returns
-    -------
-    pandas.DataFrame
-        A row per move. Columns: ``move``, ``step``, ``to_step`` (the last in which the node is
-        held), ``bricks``, ``robot``, ``brick``, ``node``, ``largest_force_N`` and ``candidates``
-        (how many there were).
+    ``choice``: the candidate that is taken for every move; ``grips``: of the plan, as of
+    `seqopt.responses.table.grips_table`. Result: a row per move. Columns: ``move``, ``step``,
+    ``to_step`` (the last in which the node is held), ``bricks``, ``robot``, ``brick``, ``node``,
+    ``largest_force_N`` and ``candidates`` (how many there were).
     """
     schedule = problem.schedule
     held = {(row["robot"], row["from_step"]): row for row in grips.to_dict("records")}
@@ -54,16 +44,8 @@ def moves_table(problem: Problem, choice: Sequence[int], grips: pd.DataFrame) ->
 def choice_table(problem: Problem, choices: StepChoices) -> pd.DataFrame:
     """Return raw responses and cost of every choice in a step.
 
-    Parameters
-    ----------
-    problem : Problem
-    choices : StepChoices
-        One of ``problem.evaluation.steps``.
-
-    Returns
-    -------
-    pandas.DataFrame
-        A row per choice, labeled by its nodes; SI units.
+    ``choices``: one of ``problem.evaluation.steps``. Result: a row per choice, labeled by its
+    nodes; SI units.
     """
     axes = next(iter(choices.responses.values())).ndim
     moves = [problem.schedule.moves[m] for m in choices.moves[-axes:]]
@@ -78,18 +60,9 @@ def alternatives(
 ) -> pd.DataFrame:
     """Return raw responses and cost of every choice that was looked at.
 
-    Parameters
-    ----------
-    problem : Problem
-    choice : tuple of int
-        The candidate that a plan takes for every move.
-    search : WindowSearch or None
-        What was looked at along the choice, where not all models were solved.
-
-    Returns
-    -------
-    pandas.DataFrame
-        As of `seqopt.placement.plan.Plan.alternatives`.
+    ``choice``: the candidate that a plan takes for every move; ``search``: what was looked at along
+    the choice, where not all models were solved. Result: as of
+    `seqopt.placement.plan.Plan.alternatives`.
     """
     parts = []
     for posed, choices, before in _looked_at(problem, choice, search):

@@ -24,20 +24,9 @@ def compared(
 ) -> StepChoices:
     """Return a step as its choices are compared: for itself, or after every choice before.
 
-    Parameters
-    ----------
-    choices : StepChoices
-        With one open move, or two.
-    schedule : Schedule
-    criterion : Criterion
-    after : int, optional
-        The candidate chosen for the move before, where responses are (C_k,) of that choice.
-
-    Returns
-    -------
-    StepChoices
-        The same, or over pairs with responses (C_{k-1}, C_k), NaN where both would be one node; of
-        one choice before (C_k,).
+    ``choices``: with one open move, or two; ``after``: the candidate chosen for the move before,
+    where responses are (C_k,) of that choice. Result: the same, or over pairs with responses
+    (C_{k-1}, C_k), NaN where both would be one node; of one choice before (C_k,).
     """
     among = getattr(criterion, "among", Among.ALL)
     move = choices.moves[-1]
@@ -57,16 +46,8 @@ def _meets(schedule: Schedule, move: int) -> bool:
 def spread_over_pairs(choices: StepChoices, criterion: Criterion) -> Criterion:
     """Return the criterion by which a step as it is compared is judged.
 
-    Parameters
-    ----------
-    choices : StepChoices
-        From `compared`.
-    criterion : Criterion
-
-    Returns
-    -------
-    Criterion
-        That ranks row by row if one open move was spread over pairs.
+    ``choices``: from `compared`. Result: that ranks row by row if one open move was spread over
+    pairs.
     """
     if len(choices.moves) == len(choices.step.moves) or not isinstance(criterion, RankSum):
         return criterion

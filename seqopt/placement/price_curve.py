@@ -25,25 +25,11 @@ def price_curve(
 ) -> pd.DataFrame:
     """Solve a problem for several bounds of a budget.
 
-    Parameters
-    ----------
-    problem : PlacementProblem
-        Its own budgets stay.
-    budget : Budget
-        Whatever its bound is.
-    bounds : sequence of float
-        How much there is of it, in its unit.
-    formulation : Formulation or str
-        One that takes budgets.
-    **options
-        Of `seqopt.solve` and of the formulation.
-
-    Returns
-    -------
-    pandas.DataFrame
-        A row per bound. Columns: ``bound``, ``objective``, ``proven`` (the certificate's lower
-        bound), ``gap``, ``spent`` and ``price``, the cost that one more unit would save (the slope
-        of the relaxation, downward); NaN where no choice is within the budgets.
+    ``problem``: its own budgets stay; ``budget``: whatever its bound is; ``bounds``: how much there
+    is of it, in its unit; ``formulation``: one that takes budgets; ``**options``: of `seqopt.solve`
+    and of the formulation. Result: a row per bound. Columns: ``bound``, ``objective``, ``proven``
+    (the certificate's lower bound), ``gap``, ``spent`` and ``price``, the cost that one more unit
+    would save (the slope of the relaxation, downward); NaN where no choice is within the budgets.
     """
     rows = [_row(problem, replace(budget, bound=bound), formulation, options) for bound in bounds]
     columns = ["bound", "objective", "proven", "gap", "spent", "price"]

@@ -27,14 +27,8 @@ EPS = float(np.finfo(float).eps)
 class Path:
     """A choice, what it costs and what it takes.
 
-    Attributes
-    ----------
-    choice : tuple of int
-        A candidate for every move.
-    cost : float
-        Scaled.
-    over : (B,) float
-        What it takes of every budget, less its cap; scaled.
+    ``choice``: a candidate for every move; ``cost``: scaled; ``over`` (B,): what it takes of every
+    budget, less its cap; scaled.
     """
 
     choice: tuple[int, ...]
@@ -51,20 +45,11 @@ class Path:
 class PricedPaths:
     """The paths through the candidates of all moves.
 
-    Attributes
-    ----------
-    arcs : tuple of (C_{k-1}, C_k) float
-        Cost of every pair with its end, over ``scale``.
-    amounts : tuple of (B, C_{k-1}, C_k) float
-        What it takes of every budget that has a bound, over the budget's unit.
-    caps : (B,) float
-        How much there is of each, in its unit, and what sums may be off by.
-    scale : float
-        By which costs are divided.
-    units : (B,) float
-        By which amounts are.
-    names : tuple of str
-        Of the budgets.
+    ``arcs`` (tuple of (C_{k-1}, C_k) float): cost of every pair with its end, over ``scale``;
+    ``amounts`` (tuple of (B, C_{k-1}, C_k) float): what it takes of every budget that has a bound,
+    over the budget's unit; ``caps`` (B,): how much there is of each, in its unit, and what sums may
+    be off by; ``scale``: by which costs are divided; ``units`` (B,): by which amounts are;
+    ``names``: of the budgets.
     """
 
     arcs: tuple[Floats, ...]
@@ -82,10 +67,7 @@ class PricedPaths:
     def path(self, choice: Sequence[int]) -> Path:
         """Return a choice with what it costs and takes.
 
-        Parameters
-        ----------
-        choice : sequence of int
-            A candidate for every move.
+        ``choice``: a candidate for every move.
         """
         pairs = list(zip((0, *choice[:-1]), choice, strict=True))
         cost = sum(float(arc[pair]) for arc, pair in zip(self.arcs, pairs, strict=True))
@@ -95,17 +77,9 @@ class PricedPaths:
     def to_go(self, prices: Floats) -> tuple[list[Floats], list[Floats]]:
         """Return the priced arcs, and the least priced cost from every candidate to the end.
 
-        Parameters
-        ----------
-        prices : (B,) float
-            Scaled.
-
-        Returns
-        -------
-        priced : list of (C_{k-1}, C_k) float
-            The arcs.
-        rest : list of (C_k,) float
-            From the source, (1,), then for every move; zero at the last.
+        ``prices`` (B,): scaled. Results: ``priced`` (list of (C_{k-1}, C_k) float): the arcs;
+        ``rest`` (list of (C_k,) float): from the source, (1,), then for every move; zero at the
+        last.
         """
         priced = [
             arc + np.tensordot(prices, a, 1) for arc, a in zip(self.arcs, self.amounts, strict=True)
@@ -118,16 +92,8 @@ class PricedPaths:
     def cheapest(self, prices: Floats) -> tuple[Path, float]:
         """Return the path that is cheapest at given prices, and the bound that they prove.
 
-        Parameters
-        ----------
-        prices : (B,) float
-            Scaled.
-
-        Returns
-        -------
-        path : Path
-        bound : float
-            Scaled; no choice within the budgets costs less, however sums are rounded.
+        ``prices`` (B,): scaled. Results: ``bound``: scaled; no choice within the budgets costs
+        less, however sums are rounded.
         """
         priced, rest = self.to_go(prices)
         choice: list[int] = []
@@ -140,10 +106,7 @@ class PricedPaths:
     def named(self, prices: Floats) -> dict[str, float]:
         """Return prices by budget, in the unit of the criterion per unit of the budget.
 
-        Parameters
-        ----------
-        prices : (B,) float
-            Scaled.
+        ``prices`` (B,): scaled.
         """
         worth = self.scale * prices / self.units
         return {name: float(price) for name, price in zip(self.names, worth, strict=True)}
@@ -152,17 +115,9 @@ class PricedPaths:
 def priced_paths(problem: PlacementProblem) -> PricedPaths:
     """Return the paths of a problem.
 
-    Parameters
-    ----------
-    problem : PlacementProblem
-        Its sums and budgets are used.
-
-    Raises
-    ------
-    InfeasibleError
-        If no choice is allowed, or none is within one of the budgets.
-    ProblemError
-        If a budget is not for the moves and candidates of the problem.
+    ``problem``: its sums and budgets are used. Raises `InfeasibleError` if no choice is allowed, or
+    none is within one of the budgets; `ProblemError` if a budget is not for the moves and
+    candidates of the problem.
     """
     costs = problem.sums
     costs.continuable()

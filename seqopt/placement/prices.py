@@ -21,14 +21,8 @@ WIDEST = 1e12  # prices that are thought of at most, in scaled units
 class Priced:
     """What prices tell of a problem.
 
-    Attributes
-    ----------
-    prices : (B,) float
-        Those with the highest bound, scaled.
-    bound : float
-        Which they prove; scaled.
-    paths : tuple of Path
-        The cheapest at all prices that were tried, different ones.
+    ``prices`` (B,): those with the highest bound, scaled; ``bound``: which they prove; scaled;
+    ``paths``: the cheapest at all prices that were tried, different ones.
     """
 
     prices: Floats
@@ -48,18 +42,9 @@ def best_prices(paths: PricedPaths, watch: Watch) -> Priced:
     Every path is a plane over the prices; their lowest is a concave roof, of which the highest
     point is asked for next, in turn with the middle between it and the best prices so far.
 
-    Parameters
-    ----------
-    paths : PricedPaths
-    watch : Watch
-        Is told bounds and choices.
-
-    Raises
-    ------
-    InfeasibleError
-        If prices prove that no choice, and no mixture of choices, keeps the budgets.
-    SolverError
-        If the highest point of the roof is not found.
+    ``watch``: is told bounds and choices. Raises `InfeasibleError` if prices prove that no choice,
+    and no mixture of choices, keeps the budgets; `SolverError` if the highest point of the roof is
+    not found.
     """
     ask, reach = np.zeros(len(paths.caps)), 1.0
     best, bound, found = ask, -np.inf, {}

@@ -109,15 +109,7 @@ class Problem(Shown):
     def seconds(self, aim: Aim) -> Mapping[str, float]:
         """Return what computing the costs of an aim took.
 
-        Parameters
-        ----------
-        aim : Aim
-            Sums or peaks.
-
-        Returns
-        -------
-        mapping of str to float
-            ``respond`` (responses) and ``rank`` (costs), s.
+        ``aim``: sums or peaks. Result: ``respond`` (responses) and ``rank`` (costs), s.
         """
         ranked = self._sums[1] if aim is Aim.SUM else self._peaks[1]
         return {"respond": self.evaluation.seconds, "rank": ranked}
@@ -127,14 +119,8 @@ class Problem(Shown):
 
         Ranks are those among the candidates of this move alone.
 
-        Parameters
-        ----------
-        move, before : int
-            A move, and the candidate chosen for the move before it.
-
-        Returns
-        -------
-        (C_k,) float
+        ``move``, ``before``: a move, and the candidate chosen for the move before it. Result
+        (C_k,).
         """
         out = np.zeros(len(self.schedule.moves[move].candidates))
         for choices in self.window_choices(move, before):
@@ -146,16 +132,9 @@ class Problem(Shown):
     def window_choices(self, move: int, before: int) -> tuple[StepChoices, ...]:
         """Return the steps that a move decides, for its candidates alone.
 
-        Parameters
-        ----------
-        move, before : int
-            A move, and the candidate chosen for the move before it.
-
-        Returns
-        -------
-        tuple of StepChoices
-            In order, with responses (C_k,); those of steps shared with the move before are of that
-            choice. Computed again if the responses of all choices are not kept.
+        ``move``, ``before``: a move, and the candidate chosen for the move before it. Result: in
+        order, with responses (C_k,); those of steps shared with the move before are of that choice.
+        Computed again if the responses of all choices are not kept.
         """
         if self.evaluation.streams:
             return window_anew(self.evaluation, move, before)
@@ -173,16 +152,8 @@ class Problem(Shown):
     def step_costs(self, choices: StepChoices, rows: slice | int = slice(None)) -> Floats:
         """Return the costs of a step's choices, infinite where they are not allowed.
 
-        Parameters
-        ----------
-        choices : StepChoices
-        rows : int, optional
-            Fixes the earlier move of a shared step to one candidate: costs, ranks included, are
-            then those among the candidates of the later move alone.
-
-        Returns
-        -------
-        (C,) or (C, D) float
+        ``rows``: fixes the earlier move of a shared step to one candidate: costs, ranks included,
+        are then those among the candidates of the later move alone. Result ((C,) or (C, D) float).
         """
         responses = {name: values[rows] for name, values in choices.responses.items()}
         move = self.schedule.moves[choices.moves[-1]]
@@ -196,35 +167,21 @@ class Problem(Shown):
     def table(self) -> pd.DataFrame:
         """Return what is to be chosen.
 
-        Returns
-        -------
-        pandas.DataFrame
-            A row per open grip; as of `seqopt.sequence.schedule.Schedule.table`.
+        Result: a row per open grip; as of `seqopt.sequence.schedule.Schedule.table`.
         """
         return self.schedule.table()
 
     def nodes(self, choice: Sequence[int]) -> tuple[int, ...]:
         """Return the nodes that a choice stands for.
 
-        Parameters
-        ----------
-        choice : sequence of int
-            A candidate for every move.
+        ``choice``: a candidate for every move.
         """
         return tuple(m.candidates[c] for m, c in zip(self.schedule.moves, choice, strict=True))
 
     def steps(self, choice: Sequence[int]) -> tuple[Step, ...]:
         """Return the checked steps of the schedule with a choice.
 
-        Parameters
-        ----------
-        choice : sequence of int
-            A candidate for every move.
-
-        Raises
-        ------
-        StepError
-            If a step is impossible.
+        ``choice``: a candidate for every move. Raises `StepError` if a step is impossible.
         """
         return self.schedule.fill(self.nodes(choice))
 

@@ -22,15 +22,8 @@ from seqopt.sequence.steps import Step
 class Excess:
     """A limit that some steps of a build exceed.
 
-    Attributes
-    ----------
-    limit : Limit
-    steps : tuple of int
-        Numbers of the steps.
-    largest : float
-        The largest value in them, SI units.
-    robot : str
-        Whose payload it is; empty for other limits.
+    ``steps``: numbers of the steps; ``largest``: the largest value in them, SI units; ``robot``:
+    whose payload it is; empty for other limits.
     """
 
     limit: Limit
@@ -53,18 +46,8 @@ class Excess:
 def excesses(scene: Scene, table: pd.DataFrame, limits: Sequence[Limit]) -> tuple[Excess, ...]:
     """Return the limits that steps exceed.
 
-    Parameters
-    ----------
-    scene : Scene
-    table : pandas.DataFrame
-        Responses of the steps, from `seqopt.analyze`.
-    limits : sequence of Limit
-        One on ``F_move``, which only open steps have, is left out.
-
-    Returns
-    -------
-    tuple of Excess
-        In the order of the limits.
+    ``table``: responses of the steps, from `seqopt.analyze`; ``limits``: one on ``F_move``, which
+    only open steps have, is left out. Result: in the order of the limits.
     """
     out = []
     for limit in limits:
@@ -81,16 +64,7 @@ def excesses(scene: Scene, table: pd.DataFrame, limits: Sequence[Limit]) -> tupl
 def overloads(scene: Scene, table: pd.DataFrame) -> tuple[Excess, ...]:
     """Return the payloads that steps exceed; see `excesses`.
 
-    Parameters
-    ----------
-    scene : Scene
-    table : pandas.DataFrame
-        From `seqopt.analyze`.
-
-    Returns
-    -------
-    tuple of Excess
-        In the order of the robots.
+    ``table``: from `seqopt.analyze`. Result: in the order of the robots.
     """
     names = {robot_response(robot.name): robot.name for robot in scene.robots}
     found = excesses(scene, table, payload_limits(scene))
@@ -100,18 +74,9 @@ def overloads(scene: Scene, table: pd.DataFrame) -> tuple[Excess, ...]:
 def response_along(scene: Scene, table: pd.DataFrame, name: str) -> np.ndarray:
     """Return a response of every step as limits name it.
 
-    Parameters
-    ----------
-    scene : Scene
-    table : pandas.DataFrame
-        From `seqopt.analyze`.
-    name : str
-        ``T_max``, ``C_max``, ``M_sup``, ``D_max``, ``F_largest`` or ``F_`` and a robot's name.
-
-    Returns
-    -------
-    (steps,) float
-        SI units, sizes without sign; NaN where the robot does not grip.
+    ``table``: from `seqopt.analyze`; ``name``: ``T_max``, ``C_max``, ``M_sup``, ``D_max``,
+    ``F_largest`` or ``F_`` and a robot's name. Result (steps,): SI units, sizes without sign; NaN
+    where the robot does not grip.
     """
     if name == "C_max":
         return np.asarray(np.maximum(-table[RESPONSES["F_min"].column].to_numpy(float), 0.0))
@@ -129,10 +94,7 @@ def response_along(scene: Scene, table: pd.DataFrame, name: str) -> np.ndarray:
 def require_possible(problem: Problem) -> None:
     """Raise an error if a step without an open grip exceeds a limit: no choice can keep it.
 
-    Raises
-    ------
-    InfeasibleError
-        Naming the limit, the value and the steps.
+    Raises `InfeasibleError`, naming the limit, the value and the steps.
     """
     fixed = [_closed(step) for step in problem.schedule.steps if not step.moves]
     if not (problem.limits and fixed):

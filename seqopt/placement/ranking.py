@@ -25,18 +25,9 @@ def move_costs(problem: Problem, move: int, before: int, without: int | None = N
     The search of a single move (equation 1 of Bruun et al.): each step of the window is ranked over
     the candidates of this move alone.
 
-    Parameters
-    ----------
-    problem : Problem
-        Whose responses are evaluated if they are not yet.
-    move, before : int
-        A move, and the candidate chosen for the move before it.
-    without : int, optional
-        A candidate to leave out, which then costs infinity.
-
-    Returns
-    -------
-    (C_k,) float
+    ``problem``: whose responses are evaluated if they are not yet; ``move``, ``before``: a move,
+    and the candidate chosen for the move before it; ``without``: a candidate to leave out, which
+    then costs infinity. Result (C_k,).
     """
     total = np.zeros(len(problem.schedule.moves[move].candidates))
     for choices in problem.window_choices(move, before):
@@ -50,12 +41,8 @@ def move_costs(problem: Problem, move: int, before: int, without: int | None = N
 def rank_of(costs: Floats, chosen: int) -> int:
     """Return the rank of a candidate: 1 if none costs less.
 
-    Parameters
-    ----------
-    costs : (C,) float
-        Equal if they differ by less than ``TIED`` of the largest.
-    chosen : int
-        Index of the candidate.
+    ``costs`` (C,): equal if they differ by less than ``TIED`` of the largest; ``chosen``: index of
+    the candidate.
     """
     return int((costs < costs[chosen] - _tie(costs)).sum()) + 1
 
@@ -67,20 +54,11 @@ def _tie(costs: Floats) -> float:
 def rank_moves(problem: Problem, choice: Sequence[int]) -> pd.DataFrame:
     """Return where the chosen candidates rank, and how reliable the first rank of each move is.
 
-    Parameters
-    ----------
-    problem : Problem
-    choice : sequence of int
-        A candidate for every move.
-
-    Returns
-    -------
-    pandas.DataFrame
-        A row per move. Columns: ``move``, ``step``, ``bricks``, ``robot``, ``node`` (chosen),
-        ``rank`` (1 if none is better), ``winner`` (the node that ranks first), ``margin`` (cost
-        from first to second), ``tied`` (candidates that share the first rank),
-        ``turned_by_candidates`` (others whose absence changes the winner) and
-        ``turned_by_criteria`` (responses whose absence does).
+    ``choice``: a candidate for every move. Result: a row per move. Columns: ``move``, ``step``,
+    ``bricks``, ``robot``, ``node`` (chosen), ``rank`` (1 if none is better), ``winner`` (the node
+    that ranks first), ``margin`` (cost from first to second), ``tied`` (candidates that share the
+    first rank), ``turned_by_candidates`` (others whose absence changes the winner) and
+    ``turned_by_criteria`` (responses whose absence does).
     """
     rows = []
     for k, move in enumerate(problem.schedule.moves):
@@ -161,19 +139,11 @@ def _without_one(criterion: Criterion, bricks: int) -> Iterator[tuple[str, Crite
 def rank_choice(problem: Problem, choice: Sequence[int]) -> pd.DataFrame:
     """Return where chosen nodes rank, move by move, the choice before each being fixed.
 
-    Parameters
-    ----------
-    problem : Problem
-    choice : sequence of int
-        A candidate for every move.
-
-    Returns
-    -------
-    pandas.DataFrame
-        A row per move. Columns: ``move``, ``step``, ``bricks``, ``robot``, ``node``,
-        ``candidates`` (how many there are), ``first_in_window`` (the node that ranks first), and
-        three ranks: ``rank_in_window`` of the move alone, ``rank_overlap`` with the least sum of
-        costs to the end of the build added, ``rank_peak`` with the least worst cost to the end.
+    ``choice``: a candidate for every move. Result: a row per move. Columns: ``move``, ``step``,
+    ``bricks``, ``robot``, ``node``, ``candidates`` (how many there are), ``first_in_window`` (the
+    node that ranks first), and three ranks: ``rank_in_window`` of the move alone, ``rank_overlap``
+    with the least sum of costs to the end of the build added, ``rank_peak`` with the least worst
+    cost to the end.
     """
     sums = _to_go(problem.sums, np.add)
     peaks = _to_go(problem.peaks, np.maximum)

@@ -26,18 +26,9 @@ class Among(Enum):
 def ranks_of(values: Floats, choices: int, ranked: Ranked) -> Floats:
     """Return mean ranks of the choices in a step.
 
-    Parameters
-    ----------
-    values : (C,) or (C, D) float
-        As in `scaled_ranks`.
-    choices : int
-        How many candidates the move has that decides the step.
-    ranked : Ranked
-        What pairs are ranked among.
-
-    Returns
-    -------
-    (C,) or (C, D) float
+    ``values`` ((C,) or (C, D) float): as in `scaled_ranks`; ``choices``: how many candidates the
+    move has that decides the step; ``ranked``: what pairs are ranked among. Result ((C,) or (C, D)
+    float).
     """
     if values.ndim == 2 and ranked is Ranked.CONDITIONAL:
         return row_ranks(values, choices)
@@ -47,17 +38,9 @@ def ranks_of(values: Floats, choices: int, ranked: Ranked) -> Floats:
 def row_ranks(values: Floats, choices: int) -> Floats:
     """Return mean ranks, from 1, of values rounded to whole numbers, every row for itself.
 
-    Parameters
-    ----------
-    values : (C, D) float
-        In units of their resolution; NaN where a choice is impossible.
-    choices : int
-        All ranks are the mean of 1 and this where all values are NaN.
-
-    Returns
-    -------
-    (C, D) float
-        As `scaled_ranks` of each row; NaN stays NaN where any value is known.
+    ``values`` (C, D): in units of their resolution; NaN where a choice is impossible; ``choices``:
+    all ranks are the mean of 1 and this where all values are NaN. Result (C, D): as `scaled_ranks`
+    of each row; NaN stays NaN where any value is known.
     """
     known = np.isfinite(values)
     if not known.any():
@@ -80,17 +63,9 @@ def row_ranks(values: Floats, choices: int) -> Floats:
 def scaled_ranks(values: Floats, choices: int) -> Floats:
     """Return mean ranks of values rounded to whole numbers.
 
-    Parameters
-    ----------
-    values : (C,) or (C, D) float
-        In units of their resolution; NaN where a choice is impossible.
-    choices : int
-        Ranks over pairs are scaled so that they run from 1 to this.
-
-    Returns
-    -------
-    (C,) or (C, D) float
-        NaN stays NaN, except that all ranks are equal where all values are NaN.
+    ``values`` ((C,) or (C, D) float): in units of their resolution; NaN where a choice is
+    impossible; ``choices``: ranks over pairs are scaled so that they run from 1 to this. Result
+    ((C,) or (C, D) float): NaN stays NaN, except that all ranks are equal where all values are NaN.
     """
     flat = values.ravel()
     known = np.isfinite(flat)
@@ -107,13 +82,7 @@ def mean_ranks(values: Floats) -> Floats:
 
     As `scipy.stats.rankdata`, in a fifth of its time for the few values of a step.
 
-    Parameters
-    ----------
-    values : (n,) float
-
-    Returns
-    -------
-    (n,) float
+    ``values`` (n,). Result (n,).
     """
     order = np.argsort(values)
     ordered = values[order]

@@ -119,14 +119,7 @@ class Limit:
     def exceeded(self, values: Floats) -> Bools:
         """Return where values of the response exceed the limit.
 
-        Parameters
-        ----------
-        values : (...) float
-            NaN, as of a robot that does not grip, exceeds nothing.
-
-        Returns
-        -------
-        (...) bool
+        ``values`` (...): NaN, as of a robot that does not grip, exceeds nothing. Result (...).
         """
         return np.asarray(values > self.bound + LIMIT_TOLERANCE * abs(self.bound))
 
@@ -134,14 +127,7 @@ class Limit:
 def as_limits(given: Sequence[Limit] | Limit) -> tuple[Limit, ...]:
     """Return limits, one or several.
 
-    Parameters
-    ----------
-    given : sequence of Limit, or Limit
-
-    Raises
-    ------
-    ProblemError
-        If it is something else.
+    Raises `ProblemError` if it is something else.
     """
     limits = (given,) if isinstance(given, Limit) else given
     if not isinstance(limits, Sequence) or not all(isinstance(each, Limit) for each in limits):
@@ -155,10 +141,7 @@ def as_limits(given: Sequence[Limit] | Limit) -> tuple[Limit, ...]:
 def payload_limits(scene: Scene) -> tuple[Limit, ...]:
     """Return limits that keep every robot of a scene within its payload.
 
-    Returns
-    -------
-    tuple of Limit
-        One for every robot, N.
+    Result: one for every robot, N.
     """
     return tuple(Limit(robot_response(robot.name), robot.payload) for robot in scene.robots)
 
@@ -167,14 +150,8 @@ def payload_limits(scene: Scene) -> tuple[Limit, ...]:
 class ResponsesAsked(Terse):
     """The responses that criterion, limits and further wishes ask for.
 
-    Attributes
-    ----------
-    criterion : Criterion
-        What a step costs.
-    limits : tuple of Limit
-        What no open step may exceed.
-    also : tuple of str
-        Responses that are asked for beside these.
+    ``criterion``: what a step costs; ``limits``: what no open step may exceed; ``also``: responses
+    that are asked for beside these.
     """
 
     criterion: Criterion
@@ -184,10 +161,7 @@ class ResponsesAsked(Terse):
     def __call__(self, bricks: int) -> frozenset[str]:
         """Return their names for a move.
 
-        Parameters
-        ----------
-        bricks : int
-            Bricks placed when the move is made.
+        ``bricks``: bricks placed when the move is made.
         """
         named = {*self.criterion.wanted(bricks), *(limit.response for limit in self.limits)}
         return frozenset(named | {*self.also})
@@ -198,24 +172,9 @@ def state_costs(
 ) -> Floats:
     """Return what states cost; steps can be added to a plan, so none may cost less than nothing.
 
-    Parameters
-    ----------
-    criterion : Criterion
-    found : mapping of str to (n,) float
-        Responses of the states, SI units.
-    bricks : int
-    possible : (n,) bool
-        Which states count.
-
-    Returns
-    -------
-    (n,) float
-        Infinite where a state does not count.
-
-    Raises
-    ------
-    ProblemError
-        If a state that counts costs less than zero.
+    ``found`` (mapping of str to (n,) float): responses of the states, SI units; ``possible`` (n,):
+    which states count. Result (n,): infinite where a state does not count. Raises `ProblemError` if
+    a state that counts costs less than zero.
     """
     costs = np.where(possible, criterion.costs(found, bricks, len(possible)), np.inf)
     if (costs < 0).any():

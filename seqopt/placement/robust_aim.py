@@ -27,18 +27,10 @@ class RobustKind(Enum):
 class RobustAim:
     """What to minimize over scenarios, all of which are equally likely.
 
-    Parameters
-    ----------
-    kind : RobustKind
-        The largest cost of any step in any scenario; the largest total over the build of any
-        scenario; or the mean total of the worst scenarios (conditional value at risk).
-    level : float, optional
-        Of the last: the share of scenarios that is left out, from 0 (the mean over all) to below 1.
-
-    Raises
-    ------
-    ProblemError
-        If the level is none.
+    ``kind``: the largest cost of any step in any scenario; the largest total over the build of any
+    scenario; or the mean total of the worst scenarios (conditional value at risk); ``level``: of
+    the last: the share of scenarios that is left out, from 0 (the mean over all) to below 1. Raises
+    `ProblemError` if the level is none.
 
     Examples
     --------
@@ -72,15 +64,8 @@ class RobustAim:
     def most(self, count: int) -> float:
         """Return the largest weight of a scenario in the mean of the worst.
 
-        Parameters
-        ----------
-        count : int
-            How many scenarios there are.
-
-        Returns
-        -------
-        float
-            One over how many scenarios the mean is of; one where the worst alone counts.
+        ``count``: how many scenarios there are. Result: one over how many scenarios the mean is of;
+        one where the worst alone counts.
         """
         if self.kind is not RobustKind.CVAR:
             return 1.0
@@ -89,10 +74,7 @@ class RobustAim:
     def ordered_weights(self, count: int) -> Floats:
         """Return the weights of scenarios from the worst to the best.
 
-        Returns
-        -------
-        (count,) float
-            They add up to one.
+        Result (count,): they add up to one.
         """
         most = self.most(count)
         weights = np.clip(1.0 - most * np.arange(count), 0.0, most)
@@ -101,23 +83,14 @@ class RobustAim:
     def value(self, values: Floats) -> float:
         """Return one value from the values of all scenarios.
 
-        Parameters
-        ----------
-        values : (S,) float
-            A total or a peak for every scenario.
+        ``values`` (S,): a total or a peak for every scenario.
         """
         return float(self.each(np.asarray(values, dtype=float)[None])[0])
 
     def each(self, values: Floats) -> Floats:
         """Return one value from every row of values.
 
-        Parameters
-        ----------
-        values : (n, S) float
-
-        Returns
-        -------
-        (n,) float
+        ``values`` (n, S). Result (n,).
         """
         weights = self.ordered_weights(values.shape[1])
         used = int(np.count_nonzero(weights))
@@ -133,11 +106,8 @@ WORST_TOTAL = RobustAim(RobustKind.WORST_TOTAL)
 def cvar(level: float) -> RobustAim:
     """Return the aim of the mean total over the worst scenarios.
 
-    Parameters
-    ----------
-    level : float
-        Share of the scenarios that is left out, from 0 to below 1: 0.9 is the mean of the worst
-        tenth.
+    ``level``: share of the scenarios that is left out, from 0 to below 1: 0.9 is the mean of the
+    worst tenth.
     """
     return RobustAim(RobustKind.CVAR, level)
 
@@ -145,15 +115,8 @@ def cvar(level: float) -> RobustAim:
 def parse_robust(text: str) -> RobustAim:
     """Return an aim from words.
 
-    Parameters
-    ----------
-    text : str
-        ``worst-peak``, ``worst-total`` or as ``cvar=0.9``.
-
-    Raises
-    ------
-    ProblemError
-        If it is none of these.
+    ``text``: ``worst-peak``, ``worst-total`` or as ``cvar=0.9``. Raises `ProblemError` if it is
+    none of these.
     """
     known = {str(aim): aim for aim in (WORST_PEAK, WORST_TOTAL)}
     if text in known:

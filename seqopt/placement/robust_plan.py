@@ -37,25 +37,13 @@ CHOOSES = {Aim.PEAK: "minimax", Aim.SUM: "overlap_dp"}  # of one scenario, and o
 class RobustPlan(ShownBuild):
     """A plan for many scenarios, and its value over them.
 
-    Attributes
-    ----------
-    problem : RobustProblem
-        What was solved.
-    choice : tuple of int
-        A candidate for every move.
-    steps : tuple of Step
-        The schedule with every move at its chosen node, checked.
-    objective : float
-        The value of the aim over the scenarios, computed again from their costs.
-    bound : float
-        On the objective of any choice.
-    proven : float
-        The part of the bound that weights of scenarios prove by one dynamic program, computed
-        again; of peaks it is the whole bound. The rest was closed by search.
-    weights : (S,) float
-        Of the scenarios, as they prove it; of peaks the scenario where the plan is worst.
-    seconds : mapping of str to float
-        By stage, s: respond, solve, verify.
+    ``problem``: what was solved; ``choice``: a candidate for every move; ``steps``: the schedule
+    with every move at its chosen node, checked; ``objective``: the value of the aim over the
+    scenarios, computed again from their costs; ``bound``: on the objective of any choice;
+    ``proven``: the part of the bound that weights of scenarios prove by one dynamic program,
+    computed again; of peaks it is the whole bound. The rest was closed by search. ``weights`` (S,):
+    of the scenarios, as they prove it; of peaks the scenario where the plan is worst; ``seconds``:
+    by stage, s: respond, solve, verify.
     """
 
     problem: RobustProblem
@@ -88,10 +76,7 @@ class RobustPlan(ShownBuild):
     def responses(self) -> pd.DataFrame:
         """Return the responses of every step in the nominal scene.
 
-        Returns
-        -------
-        pandas.DataFrame
-            As of `seqopt.analyze`.
+        Result: as of `seqopt.analyze`.
         """
         return analyze(self.engine, self.steps)
 
@@ -114,10 +99,8 @@ class RobustPlan(ShownBuild):
     def table(self) -> pd.DataFrame:
         """Return what was chosen for every move.
 
-        Returns
-        -------
-        pandas.DataFrame
-            As of `seqopt.placement.plan_tables.moves_table`; forces are those of the nominal scene.
+        Result: as of `seqopt.placement.plan_tables.moves_table`; forces are those of the nominal
+        scene.
         """
         return moves_table(self.problem.nominal, self.choice, self.grips())
 

@@ -31,14 +31,8 @@ class RobustProblem(Shown):
 
     Nothing is computed before it is asked for. Limits hold in every scenario.
 
-    Attributes
-    ----------
-    nominal : Problem
-        Of the scene as it is drawn; its criterion, with its numbers, holds in every scenario.
-    scenes : tuple of Scene
-        The scenarios.
-    aim : RobustAim
-        What to minimize over them.
+    ``nominal``: of the scene as it is drawn; its criterion, with its numbers, holds in every
+    scenario; ``scenes``: the scenarios; ``aim``: what to minimize over them.
     """
 
     nominal: Problem
@@ -79,10 +73,7 @@ class RobustProblem(Shown):
     def first(self, count: int) -> RobustProblem:
         """Return the problem of the first scenarios alone; costs that are known stay known.
 
-        Parameters
-        ----------
-        count : int
-            How many, from 1.
+        ``count``: how many, from 1.
         """
         return self._kept(replace(self, scenes=self.scenes[: max(count, 1)]))
 
@@ -95,37 +86,22 @@ class RobustProblem(Shown):
     def values(self, choice: Sequence[int], aim: Aim) -> Floats:
         """Return the value of a choice in every scenario.
 
-        Parameters
-        ----------
-        choice : sequence of int
-            A candidate for every move.
-        aim : Aim
-            Its total, or its largest cost.
-
-        Returns
-        -------
-        (S,) float
-            Infinite where it exceeds a limit.
+        ``choice``: a candidate for every move; ``aim``: its total, or its largest cost. Result
+        (S,): infinite where it exceeds a limit.
         """
         return np.array([aim.worth(costs, choice) for costs in self.layered(aim)])
 
     def layered(self, aim: Aim) -> tuple[LayeredCosts, ...]:
         """Return the costs that an aim is about, scenario by scenario.
 
-        Parameters
-        ----------
-        aim : Aim
-            Sums or peaks.
+        ``aim``: sums or peaks.
         """
         return tuple(c.sums if aim is Aim.SUM else c.peaks for c in self.costs)
 
     def steps(self, choice: Sequence[int]) -> tuple[Step, ...]:
         """Return the checked steps of the build; see `Problem.steps`.
 
-        Parameters
-        ----------
-        choice : sequence of int
-            A candidate for every move.
+        ``choice``: a candidate for every move.
         """
         return self.nominal.steps(choice)
 
@@ -216,15 +192,7 @@ def largest_of(layers: Sequence[LayeredCosts]) -> LayeredCosts:
 
     The largest cost that a choice meets in any of them is the largest that it meets in this one.
 
-    Parameters
-    ----------
-    layers : sequence of LayeredCosts
-        Of the same moves.
-
-    Raises
-    ------
-    InfeasibleError
-        If no choice is allowed in all of them.
+    ``layers``: of the same moves. Raises `InfeasibleError` if no choice is allowed in all of them.
     """
     single = tuple(map(_largest, zip(*(each.single for each in layers), strict=True)))
     shared = tuple(map(_largest, zip(*(each.shared for each in layers), strict=True)))

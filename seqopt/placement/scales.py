@@ -41,14 +41,8 @@ choices speak for such a rounding.
 class Units:
     """A force (N), a moment (N m) and a displacement (m) that grow as a scene's responses do.
 
-    Attributes
-    ----------
-    force : float
-        The mean weight of a brick.
-    moment : float
-        That weight at the mean length of a brick.
-    displacement : float
-        That weight over the median stiffness of the joints against translation.
+    ``force``: the mean weight of a brick; ``moment``: that weight at the mean length of a brick;
+    ``displacement``: that weight over the median stiffness of the joints against translation.
     """
 
     force: float
@@ -58,10 +52,7 @@ class Units:
     def of(self, response: str) -> float:
         """Return the unit of a response, by its first letter.
 
-        Returns
-        -------
-        float
-            N, N m or m.
+        Result: n, N m or m.
         """
         units = {
             "F": self.force,
@@ -76,10 +67,7 @@ class Units:
 def scene_units(network: Network) -> Units:
     """Return the units of a scene.
 
-    Returns
-    -------
-    Units
-        Each 1 where the scene has no weight or no stiffness.
+    Result: each 1 where the scene has no weight or no stiffness.
     """
     weight = float(np.linalg.norm(network.weight, axis=1).mean()) or 1.0
     length = float(np.mean([max(brick.dimensions) for brick in network.scene.bricks]))
@@ -91,11 +79,8 @@ def scene_units(network: Network) -> Units:
 def own_scales(network: Network) -> Mapping[str, float]:
     """Return scales that every scene has, for one that no fixed method builds.
 
-    Returns
-    -------
-    mapping of str to float
-        SI units: of grip forces the smallest payload; of ``T_max`` the weight of the structure, of
-        ``M_sup`` this at its size, of ``D_max`` what it moves a chain of a joint for every brick.
+    Result: SI units: of grip forces the smallest payload; of ``T_max`` the weight of the structure,
+    of ``M_sup`` this at its size, of ``D_max`` what it moves a chain of a joint for every brick.
     """
     scene, units = network.scene, scene_units(network)
     count = len(scene.bricks)
@@ -118,10 +103,7 @@ def crown(scene: Scene) -> float:
     The crown is the first of the highest bricks, by their centroids, if the build rises to it and
     comes down again after it.
 
-    Returns
-    -------
-    float
-        `NEVER` where the build ends at its highest level, as that of a wall.
+    Result: `NEVER` where the build ends at its highest level, as that of a wall.
     """
     height = np.array([brick.position for brick in scene.placed]) @ np.array(scene.up)
     level = LEVEL * max(float(np.ptp(height)), *scene.placed[0].dimensions)
@@ -134,10 +116,7 @@ def crown(scene: Scene) -> float:
 class SceneFacts:
     """What criteria may ask of a scene, each computed when it is first asked for.
 
-    Parameters
-    ----------
-    engine : Engine
-        Computes the responses of the scene's fixed methods.
+    ``engine``: computes the responses of the scene's fixed methods.
     """
 
     engine: Engine

@@ -23,13 +23,9 @@ BETTER = 1e-12  # by which a value is better than another, over the size of both
 class ScenarioArcs(FrozenValue):
     """Costs of pairs in all scenarios.
 
-    Attributes
-    ----------
-    aim : RobustAim
-    arcs : tuple of (S, C_{k-1}, C_k) float
-        What a pair and its later choice cost together; zero where they are not allowed.
-    shut : tuple of (C_{k-1}, C_k) bool
-        Which pairs are not allowed in some scenario.
+    ``arcs`` (tuple of (S, C_{k-1}, C_k) float): what a pair and its later choice cost together;
+    zero where they are not allowed; ``shut`` (tuple of (C_{k-1}, C_k) bool): which pairs are not
+    allowed in some scenario.
     """
 
     aim: RobustAim
@@ -44,14 +40,7 @@ class ScenarioArcs(FrozenValue):
     def totals(self, choice: Sequence[int]) -> Floats:
         """Return the total of a choice in every scenario.
 
-        Parameters
-        ----------
-        choice : sequence of int
-            An allowed candidate for every move.
-
-        Returns
-        -------
-        (S,) float
+        ``choice``: an allowed candidate for every move. Result (S,).
         """
         before = (0, *choice[:-1])
         parts = [arc[:, i, j] for arc, i, j in zip(self.arcs, before, choice, strict=True)]
@@ -60,16 +49,9 @@ class ScenarioArcs(FrozenValue):
     def to_go(self, weights: Floats) -> tuple[list[Floats], list[Floats]]:
         """Return weighted costs of pairs, and the least from every candidate to the last move.
 
-        Parameters
-        ----------
-        weights : (S,) float
-
-        Returns
-        -------
-        costs : list of (C_{k-1}, C_k) float
-            Infinite for pairs that are not allowed.
-        to_go : list of (C_{k-1},) float
-            One more than there are moves: of the start, and after every move.
+        ``weights`` (S,). Results: ``costs`` (list of (C_{k-1}, C_k) float): infinite for pairs that
+        are not allowed; ``to_go`` (list of (C_{k-1},) float): one more than there are moves: of the
+        start, and after every move.
         """
         costs = [
             np.where(shut, np.inf, np.tensordot(weights, arc, 1))
@@ -83,13 +65,7 @@ class ScenarioArcs(FrozenValue):
     def cheapest(self, weights: Floats) -> tuple[Choice, float]:
         """Return the choice of least weighted total, and that total.
 
-        Parameters
-        ----------
-        weights : (S,) float
-
-        Returns
-        -------
-        (tuple of int, float)
+        ``weights`` (S,). Result (tuple of int, float).
         """
         costs, rest = self.to_go(weights)
         choice: list[int] = []
@@ -100,16 +76,7 @@ class ScenarioArcs(FrozenValue):
     def improved(self, choice: Choice) -> tuple[Choice, float]:
         """Return what a choice becomes by changing the one move that helps most, again and again.
 
-        Parameters
-        ----------
-        choice : tuple of int
-            An allowed one.
-
-        Returns
-        -------
-        choice : tuple of int
-        value : float
-            What the aim makes of its totals.
+        ``choice``: an allowed one. Results: ``value``: what the aim makes of its totals.
         """
         totals = self.totals(choice)
         value = self.aim.value(totals)
@@ -139,11 +106,7 @@ class ScenarioArcs(FrozenValue):
 def scenario_arcs(layers: Sequence[LayeredCosts], aim: RobustAim) -> ScenarioArcs:
     """Return the costs of pairs in all scenarios.
 
-    Parameters
-    ----------
-    layers : sequence of LayeredCosts
-        One for every scenario, of the same moves.
-    aim : RobustAim
+    ``layers``: one for every scenario, of the same moves.
     """
     arcs, shut = [], []
     for k in range(len(layers[0].single)):

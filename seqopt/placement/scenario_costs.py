@@ -28,14 +28,9 @@ from seqopt.work.workers import Crew, hire, map_ordered
 class ScenarioCosts(FrozenValue):
     """What the choices of a schedule cost in one scenario.
 
-    Attributes
-    ----------
-    sums, peaks : LayeredCosts
-        As of `seqopt.placement.problem.Problem`; infinite where a limit is exceeded.
-    models : int
-        How many different models were solved.
-    seconds : float
-        That solving them took, s.
+    ``sums``, ``peaks``: as of `seqopt.placement.problem.Problem`; infinite where a limit is
+    exceeded; ``models``: how many different models were solved; ``seconds``: that solving them
+    took, s.
     """
 
     sums: LayeredCosts
@@ -48,20 +43,9 @@ class ScenarioCosts(FrozenValue):
 class ScenarioTask:
     """One scenario, as it is sent to a worker.
 
-    Attributes
-    ----------
-    name : str
-        For messages.
-    recipe : Recipe
-        Of its engine.
-    schedule : Schedule
-        The nominal one, whose steps and candidates hold in every scenario.
-    criterion : Criterion
-        With the numbers of the nominal scene.
-    limits : tuple of Limit
-    also : tuple of str
-        Responses that are evaluated beside those that these name.
-    resources : Resources
+    ``name``: for messages; ``recipe``: of its engine; ``schedule``: the nominal one, whose steps
+    and candidates hold in every scenario; ``criterion``: with the numbers of the nominal scene;
+    ``also``: responses that are evaluated beside those that these name.
     """
 
     name: str
@@ -84,16 +68,8 @@ class ScenarioTask:
 def tasks_of(problem: Problem, scenes: Sequence[Scene]) -> tuple[ScenarioTask, ...]:
     """Return the tasks of scenarios.
 
-    Parameters
-    ----------
-    problem : Problem
-        The nominal one.
-    scenes : sequence of Scene
-
-    Raises
-    ------
-    ProblemError
-        If the engine was not made by name, so that nobody knows how to make it for another scene.
+    ``problem``: the nominal one. Raises `ProblemError` if the engine was not made by name, so that
+    nobody knows how to make it for another scene.
     """
     asked = problem.evaluation.wanted
     also = asked.also if isinstance(asked, ResponsesAsked) else ()
@@ -117,24 +93,10 @@ def scenario_costs(
 ) -> tuple[tuple[ScenarioCosts, ...], float]:
     """Return the costs in every scenario, and what they took.
 
-    Parameters
-    ----------
-    tasks : sequence of ScenarioTask
-    resources : Resources
-        A worker takes one scenario after the other.
-
-    Returns
-    -------
-    costs : tuple of ScenarioCosts
-    seconds : float
-        From the first to the last, s.
-
-    Raises
-    ------
-    InfeasibleError
-        If a step without an open grip exceeds a limit in a scenario.
-    MechanismError, SolverError, WorkerError
-        As engines and workers do, the scenario named.
+    ``resources``: a worker takes one scenario after the other. Results: ``seconds``: from the first
+    to the last, s. Raises `InfeasibleError` if a step without an open grip exceeds a limit in a
+    scenario; `MechanismError`, `SolverError`, `WorkerError` as engines and workers do, the scenario
+    named.
     """
     start = time.perf_counter()
     progress = Progress("scenarios", len(tasks), resources.progress)

@@ -28,13 +28,7 @@ IMPROVED = 50  # choices met that are improved move by move first
 class Searched:
     """The best choice, and a bound on all.
 
-    Attributes
-    ----------
-    choice : tuple of int
-    value : float
-        What the aim makes of its totals.
-    bound : float
-        On the value of any choice.
+    ``value``: what the aim makes of its totals; ``bound``: on the value of any choice.
     """
 
     choice: Choice
@@ -54,15 +48,8 @@ class _Layer:
 def close_gap(arcs: ScenarioArcs, weighed: Weighed, watch: Watch, width: int = WIDTH) -> Searched:
     """Return the best choice as far as it can be found, with a bound.
 
-    Parameters
-    ----------
-    arcs : ScenarioArcs
-    weighed : Weighed
-        Of `best_weights`.
-    watch : Watch
-        Says when to stop, and is told what is found.
-    width : int, optional
-        How many beginnings are kept after every move.
+    ``weighed``: of `best_weights`; ``watch``: says when to stop, and is told what is found;
+    ``width``: how many beginnings are kept after every move.
     """
     choice, value = weighed.choice, weighed.value
     for start in sorted(weighed.met, key=lambda c: arcs.aim.value(arcs.totals(c)))[:IMPROVED]:

@@ -32,18 +32,9 @@ CLOSE = 1e-9  # distance of bound and roof treated as zero, over their size
 class Weighed:
     """What weights tell of a problem.
 
-    Attributes
-    ----------
-    weights : (S,) float
-        Those with the highest bound.
-    bound : float
-        Which they prove.
-    choice : tuple of int
-        The best that was met.
-    value : float
-        What the aim makes of its totals.
-    met : tuple of tuple of int
-        All choices that were met.
+    ``weights`` (S,): those with the highest bound; ``bound``: which they prove; ``choice``: the
+    best that was met; ``value``: what the aim makes of its totals; ``met``: all choices that were
+    met.
     """
 
     weights: Floats
@@ -56,17 +47,8 @@ class Weighed:
 def best_weights(arcs: ScenarioArcs, watch: Watch) -> Weighed:
     """Return the weights whose bound is highest, and the best choice met on the way.
 
-    Parameters
-    ----------
-    arcs : ScenarioArcs
-        Some choice is allowed.
-    watch : Watch
-        Is told choices and bounds.
-
-    Raises
-    ------
-    SolverError
-        If the highest point below the planes is not found.
+    ``arcs``: some choice is allowed; ``watch``: is told choices and bounds. Raises `SolverError` if
+    the highest point below the planes is not found.
     """
     count = arcs.scenarios
     ask = best = np.full(count, 1.0 / count)

@@ -27,17 +27,9 @@ class Finds(Enum):
 class ScheduleFormulation:
     """A way to solve the free schedule.
 
-    Attributes
-    ----------
-    name, summary : str
-        What it is called, and what it does in a few words.
-    kind : FormulationKind
-        What it promises.
-    solve : callable
-        Takes the problem and named options, returns a `ScheduleSelection`, or of a Pareto set a
-        `seqopt.placement.front.FrontSelection`.
-    finds : Finds, optional
-        Which of the two.
+    ``name``, ``summary``: what it is called, and what it does in a few words; ``kind``: what it
+    promises; ``solve``: takes the problem and named options, returns a `ScheduleSelection`, or of a
+    Pareto set a `seqopt.placement.front.FrontSelection`; ``finds``: which of the two.
     """
 
     name: str
@@ -62,15 +54,8 @@ class ScheduleFormulation:
     def require_options(self, given: Iterable[str]) -> None:
         """Raise an error unless options are of this formulation.
 
-        Parameters
-        ----------
-        given : iterable of str
-            Their names; ``progress`` need not be listed.
-
-        Raises
-        ------
-        ProblemError
-            Naming the one that is not.
+        ``given``: their names; ``progress`` need not be listed. Raises `ProblemError`, naming the
+        one that is not.
         """
         for name in given:
             if name not in (*self.options, "progress"):
@@ -81,15 +66,7 @@ class ScheduleFormulation:
 def schedule_formulation_names(*finds: Finds) -> tuple[str, ...]:
     """Return the names of the formulations of the free schedule that answer something.
 
-    Parameters
-    ----------
-    *finds : Finds
-        What.
-
-    Returns
-    -------
-    tuple of str
-        In alphabetical order.
+    ``*finds``: what. Result: in alphabetical order.
 
     Examples
     --------
@@ -104,17 +81,9 @@ def find_schedule_formulation(
 ) -> ScheduleFormulation:
     """Return a formulation of the free schedule, by name or itself.
 
-    Parameters
-    ----------
-    given : ScheduleFormulation or str
-        A formulation of another kind is refused.
-    finds : Finds, optional
-        What it has to answer.
-
-    Raises
-    ------
-    ProblemError
-        If there is none of that name, or it is something else, or answers something else.
+    ``given``: a formulation of another kind is refused; ``finds``: what it has to answer. Raises
+    `ProblemError` if there is none of that name, or it is something else, or answers something
+    else.
 
     Examples
     --------

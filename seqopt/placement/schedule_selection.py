@@ -17,24 +17,15 @@ CLOSE = 1e-6  # over a value: how far a bound may be above it by rounding
 class ScheduleSelection(FrozenValue):
     """A free schedule, and what its formulation claims of it.
 
-    Attributes
-    ----------
-    states : tuple of tuple of int
-        After every step: how many bricks stand, then the node that each robot holds, as a place in
-        build order from 1; robots of one kind stand together, 0 for one that is free.
-    objective : tuple of float
-        Claimed value of every goal.
-    bound : tuple of float
-        Claimed lower bound of every goal, those before it being at their values.
-    visited : tuple of (n, c) int
-        States that a better plan could pass, by brick count, if the formulation knows them: the
-        proof looks at these together, and depends on them in nothing but its time.
-    prices : tuple of tuple of float
-        By goal, what a unit of every budget and of every sum before it is worth: they prove the
-        bounds where there are budgets.
-    stopped : str
-        Why the search ended before all was proven: ``time``, ``memory`` or ``interrupt``; empty if
-        it did not.
+    ``states``: after every step: how many bricks stand, then the node that each robot holds, as a
+    place in build order from 1; robots of one kind stand together, 0 for one that is free;
+    ``objective``: claimed value of every goal; ``bound``: claimed lower bound of every goal, those
+    before it being at their values; ``visited`` (tuple of (n, c) int): states that a better plan
+    could pass, by brick count, if the formulation knows them: the proof looks at these together,
+    and depends on them in nothing but its time; ``prices``: by goal, what a unit of every budget
+    and of every sum before it is worth: they prove the bounds where there are budgets; ``stopped``:
+    why the search ended before all was proven: ``time``, ``memory`` or ``interrupt``; empty if it
+    did not.
     """
 
     states: tuple[tuple[int, ...], ...]
@@ -48,18 +39,8 @@ class ScheduleSelection(FrozenValue):
 def with_numbers(name: str, found: ScheduleSelection, goals: int) -> ScheduleSelection:
     """Return a selection with numbers where numbers belong.
 
-    Parameters
-    ----------
-    name : str
-        Of the formulation that made it.
-    found : ScheduleSelection
-    goals : int
-        How many goals there are.
-
-    Raises
-    ------
-    SolverError
-        If a number is none, or there are too few.
+    ``name``: of the formulation that made it; ``goals``: how many goals there are. Raises
+    `SolverError` if a number is none, or there are too few.
     """
     with readable(name):
         states = tuple(tuple(operator.index(n) for n in state) for state in found.states)

@@ -21,12 +21,7 @@ from seqopt.sequence.steps import Step, StepKind
 class ScheduleTables:
     """The holds of a schedule for many states at once.
 
-    Parameters
-    ----------
-    schedule : Schedule
-    network : Network
-    parks : bool, optional
-        Whether it counts where a free robot was last.
+    ``parks``: whether it counts where a free robot was last.
     """
 
     def __init__(self, schedule: Schedule, network: Network, *, parks: bool = False) -> None:

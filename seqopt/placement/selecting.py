@@ -24,28 +24,11 @@ def select(
 ) -> Selection:
     """Return the selection of a formulation, with numbers where numbers belong.
 
-    Parameters
-    ----------
-    formulation : Formulation
-    problem : PlacementProblem
-    watch : Watch, optional
-        Handed to the formulation if it takes one; the trace is read from it. An interrupt is then
-        told to it, so that the formulation ends with the best choice so far.
-    **options
-        Of the formulation.
-
-    Returns
-    -------
-    Selection
-        Claimed, not proven.
-
-    Raises
-    ------
-    ProblemError, SolverError
-        As the formulation does; a `SolverError` also if it raises anything else, or returns
-        something that is no selection.
-    KeyboardInterrupt
-        If it was interrupted and no choice was at hand.
+    ``watch``: handed to the formulation if it takes one; the trace is read from it. An interrupt is
+    then told to it, so that the formulation ends with the best choice so far. ``**options``: of the
+    formulation. Result: claimed, not proven. Raises `ProblemError`, `SolverError` as the
+    formulation does; a `SolverError` also if it raises anything else, or returns something that is
+    no selection; `KeyboardInterrupt` if it was interrupted and no choice was at hand.
     """
     watch = watch or Watch()
     ends = answered(watch.interrupt) if formulation.watched else nullcontext()

@@ -59,27 +59,17 @@ class ShownBuild(Shown):
     def grips(self) -> pd.DataFrame:
         """Return every grip of the build, for as long as it lasts.
 
-        Returns
-        -------
-        pandas.DataFrame
-            A row per grip, by first step: ``robot``, ``from_step``, ``to_step``, ``brick``,
-            ``node``, ``places`` (whether the robot places the brick with it), ``largest_force_N``
-            and ``at_step``, the step of that force.
+        Result: a row per grip, by first step: ``robot``, ``from_step``, ``to_step``, ``brick``,
+        ``node``, ``places`` (whether the robot places the brick with it), ``largest_force_N`` and
+        ``at_step``, the step of that force.
         """
         return grips_table(self.engine.network.scene, self.steps, self.responses())
 
     def stability(self, mortar: Mortar | str) -> pd.DataFrame:
         """Return whether every step stands with a mortar, and by which margins.
 
-        Parameters
-        ----------
-        mortar : Mortar or str
-            Of all joints; or its name, ``dry`` or ``epoxy``.
-
-        Returns
-        -------
-        pandas.DataFrame
-            As of `seqopt.stability.assessment.stability_table`.
+        ``mortar``: of all joints; or its name, ``dry`` or ``epoxy``. Result: as of
+        `seqopt.stability.assessment.stability_table`.
         """
         results = assess_steps(self.engine.network, self.steps, mortar)
         return stability_table(self.steps, results)
@@ -89,26 +79,11 @@ class ShownBuild(Shown):
     ) -> Figure:
         """Draw steps of the build: bricks, and which robot holds which node.
 
-        Parameters
-        ----------
-        step : int or sequence of int, optional
-            Numbers of steps, from 1; by default six that are spread over the build.
-        forces : bool, optional
-            Whether to draw the network, colored by axial force, instead of the bricks.
-        magnify : float, optional
-            How many times larger displacements are drawn than they are; by default not at all.
-
-        Returns
-        -------
-        matplotlib.figure.Figure
-            A notebook shows it; ``savefig`` writes it to a file.
-
-        Raises
-        ------
-        ExtraError
-            If matplotlib is not installed (extra ``plot``).
-        StepError
-            If there is no such step.
+        ``step``: numbers of steps, from 1; by default six that are spread over the build;
+        ``forces``: whether to draw the network, colored by axial force, instead of the bricks;
+        ``magnify``: how many times larger displacements are drawn than they are; by default not at
+        all. Result: a notebook shows it; ``savefig`` writes it to a file. Raises `ExtraError` if
+        matplotlib is not installed (extra ``plot``); `StepError` if there is no such step.
         """
         figure: Figure = display("steps_picture")(
             self.engine, self.steps, step, forces=forces, magnify=magnify
@@ -121,17 +96,9 @@ class ShownBuild(Shown):
         Every bar names its brick and its node, says whether the robot places the brick or holds it,
         and is shaded by the force of the grip.
 
-        Parameters
-        ----------
-        first, last : int, optional
-            Numbers of the first and the last step that are drawn; by default all.
-
-        Raises
-        ------
-        ExtraError
-            If matplotlib is not installed (extra ``plot``).
-        StepError
-            If there are no such steps.
+        ``first``, ``last``: numbers of the first and the last step that are drawn; by default all.
+        Raises `ExtraError` if matplotlib is not installed (extra ``plot``); `StepError` if there
+        are no such steps.
         """
         scene, responses = self.engine.network.scene, self.responses()
         figure: Figure = display("gantt_picture")(scene, self.steps, responses, (first, last))
@@ -140,22 +107,9 @@ class ShownBuild(Shown):
     def animate(self, *, forces: bool = False, magnify: float = 0.0, seconds: float = 0.4) -> Any:
         """Return the build as a film, with one picture per step.
 
-        Parameters
-        ----------
-        forces, magnify : optional
-            As of `plot`.
-        seconds : float, optional
-            How long a step is shown, s.
-
-        Returns
-        -------
-        seqopt.report.pictures.Film
-            A notebook plays the film; ``save("build.gif")`` writes it to a file.
-
-        Raises
-        ------
-        ExtraError
-            If matplotlib is not installed (extra ``plot``).
+        ``forces``, ``magnify``: as of `plot`; ``seconds``: how long a step is shown, s. Result: a
+        notebook plays the film; ``save("build.gif")`` writes it to a file. Raises `ExtraError` if
+        matplotlib is not installed (extra ``plot``).
         """
         return display("Film")(self.engine, self.steps, forces, magnify, seconds)
 
@@ -165,21 +119,9 @@ class ShownBuild(Shown):
         The page also has tables and charts. If the scene is small, the fixed methods are shown
         next to the plan.
 
-        Parameters
-        ----------
-        *others : plan
-            Other plans for the same scene, to compare side by side.
-
-        Returns
-        -------
-        Page
-            A notebook shows it; ``save("report.html")`` writes it to a file, and ``open()`` shows
-            it in a browser.
-
-        Raises
-        ------
-        ProblemError
-            If another plan is for another scene.
+        ``*others``: other plans for the same scene, to compare side by side. Result: a notebook
+        shows it; ``save("report.html")`` writes it to a file, and ``open()`` shows it in a browser.
+        Raises `ProblemError` if another plan is for another scene.
         """
         page: Page = display("build_page")(self, *others)
         return page

@@ -152,10 +152,7 @@ def _solve_free(
 def on_the_way(plan: Plan) -> Plan:
     """Return a plan, for whoever has more to do than to solve; an interrupt ends that too.
 
-    Raises
-    ------
-    KeyboardInterrupt
-        If its formulation was interrupted.
+    Raises `KeyboardInterrupt` if its formulation was interrupted.
     """
     if plan.selection.end is End.INTERRUPTED:
         raise KeyboardInterrupt

@@ -30,17 +30,8 @@ NARROW = {"bond": (0.02, 0.0), "friction": (0.0, 2.0**-6), "tilt": (0.0, 2e-3)}
 class Standing:
     """The demand that every state of a schedule is proven to stand, robots within payload.
 
-    Parameters
-    ----------
-    mortar : Mortar or str
-        Of all joints; or its name.
-    tilt : float, optional
-        That every state must survive in every direction, rad.
-
-    Raises
-    ------
-    ProblemError
-        If the tilt is none that anything survives.
+    ``mortar``: of all joints; or its name; ``tilt``: that every state must survive in every
+    direction, rad. Raises `ProblemError` if the tilt is none that anything survives.
 
     Examples
     --------
@@ -59,12 +50,7 @@ class Standing:
     def demanding(self, name: str, value: float) -> Standing:
         """Return the demand that a margin is no worse than a value, and nothing else.
 
-        Parameters
-        ----------
-        name : str
-            One of `MARGINS`.
-        value : float
-            As goals count it.
+        ``name``: one of `MARGINS`; ``value``: as goals count it.
         """
         if name == "tilt":
             return Standing(self.mortar, max(0.0, pi / 2 - value))
@@ -81,10 +67,7 @@ class Standing:
     def described(self) -> dict[str, float]:
         """Return the demand, ready for JSON.
 
-        Returns
-        -------
-        dict
-            Friction, strengths (Pa) and tilt (degrees).
+        Result: friction, strengths (Pa) and tilt (degrees).
         """
         return {
             "friction": self.mortar.friction,
@@ -104,25 +87,10 @@ def without_implied(demands: Sequence[Standing]) -> tuple[Standing, ...]:
 class StandingSets:
     """Which grip sets of a scene stand, and by what margins; each is looked at once.
 
-    Parameters
-    ----------
-    network : Network
-    standing : Standing
-        Margins are those of its mortar.
-    payloads : (k,) float
-        All that robots may have, N.
-    demands : sequence of Standing, optional
-        All of which what stands has to meet; by default the one.
-
-    Attributes
-    ----------
-    undecided : int
-        How many grip sets were neither proven to stand nor to fall.
-
-    Raises
-    ------
-    ProblemError
-        If a robot could hold anything.
+    ``standing``: margins are those of its mortar; ``payloads`` (k,): all that robots may have, N;
+    ``demands``: all of which what stands has to meet; by default the one; ``undecided``: how many
+    grip sets were neither proven to stand nor to fall. Raises `ProblemError` if a robot could hold
+    anything.
     """
 
     def __init__(
@@ -161,32 +129,15 @@ class StandingSets:
     def stand(self, bricks: int, held: Ints, payload: Floats) -> Bools:
         """Return which grip sets are proven to stand.
 
-        Parameters
-        ----------
-        bricks : int
-        held : (S, r) int
-            Nodes held, ascending, as places in build order counted from 1; zeros for none.
-        payload : (S, r) float
-            Largest force of each, N.
-
-        Returns
-        -------
-        (S,) bool
+        ``held`` (S, r): nodes held, ascending, as places in build order counted from 1; zeros for
+        none; ``payload`` (S, r): largest force of each, N. Result (S,).
         """
         return np.asarray(self._verdicts(bricks, held, payload) == STANDS)
 
     def may_stand(self, bricks: int, held: Ints, payload: Floats) -> Bools:
         """Return which grip sets are not proven to fall.
 
-        Parameters
-        ----------
-        bricks : int
-        held : (S, r) int
-        payload : (S, r) float
-
-        Returns
-        -------
-        (S,) bool
+        ``held`` (S, r); ``payload`` (S, r). Result (S,).
         """
         return np.asarray(self._verdicts(bricks, held, payload) != FALLS)
 
@@ -203,18 +154,8 @@ class StandingSets:
     def margins(self, name: str, bricks: int, held: Ints, payload: Floats) -> Floats:
         """Return between which values a margin of grip sets lies, as goals count it.
 
-        Parameters
-        ----------
-        name : str
-            One of `MARGINS`.
-        bricks : int
-        held : (S, r) int
-        payload : (S, r) float
-
-        Returns
-        -------
-        (S, 2) float
-            What is proven not to be enough, and what is proven to be.
+        ``name``: one of `MARGINS`; ``held`` (S, r); ``payload`` (S, r). Result (S, 2): what is
+        proven not to be enough, and what is proven to be.
         """
 
         def brackets(rows: Ints) -> Floats:
@@ -266,11 +207,7 @@ class StandingSets:
 def slack(name: str, value: float) -> float:
     """Return within what a margin is proven.
 
-    Parameters
-    ----------
-    name : str
-        One of `MARGINS`.
-    value : float
+    ``name``: one of `MARGINS`.
     """
     share, least = NARROW[name]
     return max(share * abs(value), least)

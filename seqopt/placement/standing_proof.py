@@ -20,11 +20,7 @@ SURE = 1e-3  # rad, or as a share: how far the cone program may be from what for
 class StandingProof:
     """Says which states a better plan could pass: what stands, and by which margin at best.
 
-    Parameters
-    ----------
-    problem : FreeProblem
-    payload : mapping of int to float
-        The most that every robot may carry, N.
+    ``payload``: the most that every robot may carry, N.
     """
 
     def __init__(self, problem: FreeProblem, payload: dict[int, float]) -> None:
@@ -43,19 +39,9 @@ class StandingProof:
     ) -> Bools:
         """Return which states are not proven to fall, or to lack a margin.
 
-        Parameters
-        ----------
-        bricks : int
-        held : (S, r) int
-            Nodes held, ascending, as places in build order counted from 1; zeros for none.
-        payload : (S, r) float
-            Largest force of each, N.
-        margins : sequence of float
-            Of the first goals.
-
-        Returns
-        -------
-        (S,) bool
+        ``held`` (S, r): nodes held, ascending, as places in build order counted from 1; zeros for
+        none; ``payload`` (S, r): largest force of each, N; ``margins``: of the first goals. Result
+        (S,).
         """
         out = np.ones(len(held), dtype=bool)
         for demand in self.asked(margins):
@@ -112,11 +98,8 @@ def certified(problem: FreeProblem, steps: Sequence[Step]) -> tuple[Stability, .
 def worst_margins(results: Sequence[Stability]) -> dict[str, float]:
     """Return the worst margins of any step, as goals count them.
 
-    Returns
-    -------
-    dict of str to float
-        ``bond`` (Pa), ``friction``, and how far ``tilt`` is from a right angle (rad); NaN where
-        nothing is proven of a step.
+    Result: ``bond`` (Pa), ``friction``, and how far ``tilt`` is from a right angle (rad); NaN where
+    nothing is proven of a step.
     """
     tilts = [result.tilt for result in results]
     return {
@@ -129,16 +112,7 @@ def worst_margins(results: Sequence[Stability]) -> dict[str, float]:
 def require_margin(name: str, claimed: float, proven: float) -> None:
     """Raise an error if a margin is worse than claimed by more than brackets are wide.
 
-    Parameters
-    ----------
-    name : str
-        One of `seqopt.placement.standing.MARGINS`.
-    claimed, proven : float
-
-    Raises
-    ------
-    SolverError
-        With both values.
+    ``name``: one of `seqopt.placement.standing.MARGINS`. Raises `SolverError`, with both values.
     """
     if not proven <= claimed + slack(name, claimed):
         raise SolverError(f"{name} is {proven:.6g}, not {claimed:.6g} as claimed")

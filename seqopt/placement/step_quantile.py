@@ -33,16 +33,9 @@ StepCosts = Sequence[tuple[tuple[int, ...], Floats]]
 class StepQuantile:
     """A choice whose open steps, except a few, keep the least level.
 
-    Attributes
-    ----------
-    choice : tuple of int
-        Of those that keep it, one with the fewest steps above, and then of least sum.
-    level : float
-        In the unit of the criterion.
-    above : int
-        How many steps cost more.
-    steps : int
-        How many open steps there are.
+    ``choice``: of those that keep it, one with the fewest steps above, and then of least sum;
+    ``level``: in the unit of the criterion; ``above``: how many steps cost more; ``steps``: how
+    many open steps there are.
     """
 
     choice: tuple[int, ...]
@@ -54,19 +47,9 @@ class StepQuantile:
 def least_quantile(problem: Problem, share: float = 0.1) -> StepQuantile:
     """Return the choice with the least level that no more than a share of open steps exceed.
 
-    Parameters
-    ----------
-    problem : Problem
-        Without budgets.
-    share : float, optional
-        Of the open steps, from 0 (the least peak) to below 1.
-
-    Raises
-    ------
-    InfeasibleError
-        If no choice is allowed.
-    ProblemError
-        If the share is none, or there are budgets.
+    ``problem``: without budgets; ``share``: of the open steps, from 0 (the least peak) to below 1.
+    Raises `InfeasibleError` if no choice is allowed; `ProblemError` if the share is none, or there
+    are budgets.
     """
     number = isinstance(share, Real) and not isinstance(share, bool)
     if not number or not 0 <= share < 1:

@@ -24,26 +24,11 @@ def best_margin(
 ) -> tuple[float, float, FreeProblem]:
     """Return the best value of the first goal, a margin, and what is left to choose at it.
 
-    Parameters
-    ----------
-    problem : FreeProblem
-        Whose first goal is about a margin.
-    tell : callable, optional
-        Called with the states that are reached; may raise to end the search.
-
-    Returns
-    -------
-    value : float
-        With which plans exist in which every state is proven to stand.
-    bound : float
-        With which none does.
-    rest : FreeProblem
-        Of the goals after it, with the demand that all stand with that value.
-
-    Raises
-    ------
-    InfeasibleError
-        If there is no plan, whatever the margin.
+    ``problem``: whose first goal is about a margin; ``tell``: called with the states that are
+    reached; may raise to end the search. Results: ``value``: with which plans exist in which every
+    state is proven to stand; ``bound``: with which none does; ``rest``: of the goals after it, with
+    the demand that all stand with that value. Raises `InfeasibleError` if there is no plan,
+    whatever the margin.
     """
     name = problem.goals[0].response
 
@@ -71,13 +56,7 @@ def best_margin(
 def with_margin(problem: FreeProblem, name: str, value: float) -> FreeProblem:
     """Return a problem in which every state must have a margin as well.
 
-    Parameters
-    ----------
-    problem : FreeProblem
-    name : str
-        One of `seqopt.placement.standing.MARGINS`.
-    value : float
-        As goals count it.
+    ``name``: one of `seqopt.placement.standing.MARGINS`; ``value``: as goals count it.
     """
     demand = (problem.standing or Standing()).demanding(name, value)
     return replace(problem, settled=(*problem.settled, demand))

@@ -21,15 +21,7 @@ Number = TypeVar("Number")
 def scale_of(facts: SceneFacts, response: str, given: float | None) -> float:
     """Return the scale of a response: that which is given, or the scene's.
 
-    Returns
-    -------
-    float
-        SI units.
-
-    Raises
-    ------
-    ProblemError
-        If none is given and the scene's methods give none.
+    Result: SI units. Raises `ProblemError` if none is given and the scene's methods give none.
     """
     if given is not None:
         return given
@@ -42,12 +34,7 @@ def scale_of(facts: SceneFacts, response: str, given: float | None) -> float:
 def named(name: str, facts: SceneFacts, given: Sequence[float | None]) -> str:
     """Return the name of a criterion, which says where its scales are not those of fixed methods.
 
-    Parameters
-    ----------
-    name : str
-    facts : SceneFacts
-    given : sequence of float or None
-        Its scales before it was posed, None where it takes them from the scene.
+    ``given``: its scales before it was posed, None where it takes them from the scene.
     """
     return name + facts.basis if None in given else name
 
@@ -55,21 +42,8 @@ def named(name: str, facts: SceneFacts, given: Sequence[float | None]) -> str:
 def known(number: Number | None, criterion: str) -> Number:
     """Return a number that must not be open any more.
 
-    Parameters
-    ----------
-    number : object or None
-    criterion : str
-        Whose number it is.
-
-    Returns
-    -------
-    object
-        The number.
-
-    Raises
-    ------
-    ProblemError
-        If it is None: the criterion was not posed for a scene.
+    ``criterion``: whose number it is. Result: the number. Raises `ProblemError` if it is None: the
+    criterion was not posed for a scene.
     """
     if number is None:
         raise ProblemError(f"criterion {criterion}: it is not posed for a scene; use seqopt.pose")
@@ -79,13 +53,7 @@ def known(number: Number | None, criterion: str) -> Number:
 def present(values: Floats) -> Floats:
     """Return the values, or zeros where the robot does not grip in any choice.
 
-    Parameters
-    ----------
-    values : (C,) or (C, D) float
-
-    Returns
-    -------
-    (C,) or (C, D) float
+    ``values`` ((C,) or (C, D) float). Result ((C,) or (C, D) float).
     """
     return np.zeros_like(values) if np.isnan(values).all() else values
 
@@ -93,16 +61,8 @@ def present(values: Floats) -> Floats:
 def spell_out(terms: tuple[Term, ...], robots: Sequence[str]) -> tuple[Term, ...]:
     """Return terms in which ``F_each`` stands once for every robot; all numbers are positive.
 
-    Parameters
-    ----------
-    terms : tuple of Term
-    robots : sequence of str
-        Their names.
-
-    Raises
-    ------
-    ProblemError
-        If there is no term, or a number of one is not positive and finite.
+    ``robots``: their names. Raises `ProblemError` if there is no term, or a number of one is not
+    positive and finite.
     """
     if not terms:
         raise ProblemError("a criterion of no response; name at least one, as T_max")
@@ -122,14 +82,6 @@ def spell_out(terms: tuple[Term, ...], robots: Sequence[str]) -> tuple[Term, ...
 def equal(*names: str) -> tuple[tuple[str, float], ...]:
     """Return equally weighted terms of a `RankSum`.
 
-    Parameters
-    ----------
-    *names : str
-        Responses.
-
-    Returns
-    -------
-    tuple of (str, float)
-        Each with weight 1.
+    ``*names``: responses. Result (tuple of (str, float)): each with weight 1.
     """
     return tuple((name, 1.0) for name in names)

@@ -30,17 +30,11 @@ PLANS = ("robust", "nominal", "knows_it")
 class Trial(Terse):
     """Plans, scenario by scenario.
 
-    Attributes
-    ----------
-    plan : RobustPlan
-        What was judged.
-    nominal : tuple of int
-        The exact optimum of the nominal scene, of the same aim in one scenario.
-    table : pandas.DataFrame
-        A row per scenario. Columns: ``set`` (``nominal``, ``optimized`` or ``unseen``),
-        ``scenario`` (from 1), then for each of the plans ``robust``, ``nominal`` and ``knows_it``
-        its ``_total`` and ``_peak`` there: infinite where it exceeds a limit, or nothing
-        keeps it. The last is the best of the aim in that scenario.
+    ``plan``: what was judged; ``nominal``: the exact optimum of the nominal scene, of the same aim
+    in one scenario; ``table``: a row per scenario. Columns: ``set`` (``nominal``, ``optimized`` or
+    ``unseen``), ``scenario`` (from 1), then for each of the plans ``robust``, ``nominal`` and
+    ``knows_it`` its ``_total`` and ``_peak`` there: infinite where it exceeds a limit, or nothing
+    keeps it. The last is the best of the aim in that scenario.
     """
 
     plan: RobustPlan
@@ -55,10 +49,7 @@ class Trial(Terse):
     def summary(self) -> dict[str, dict[str, float]]:
         """Return what the aim makes of every set of scenarios, ready for JSON.
 
-        Returns
-        -------
-        dict of str to dict of str to float
-            By set and plan; infinite numbers are left to the caller.
+        Result: by set and plan; infinite numbers are left to the caller.
         """
         aim = self.plan.problem.aim
         column = "peak" if aim.aim is Aim.PEAK else "total"
@@ -71,22 +62,9 @@ class Trial(Terse):
 def judge_unseen(plan: RobustPlan, scenes: RobustProblem | Scenarios | Sequence[Scene]) -> Trial:
     """Return the value of a plan in other scenarios, beside two plans for comparison.
 
-    Parameters
-    ----------
-    plan : RobustPlan
-    scenes : Scenarios or sequence of Scene
-        Not those it was made for: drawn with another seed. Or the problem over them, whose costs
-        may be known.
-
-    Returns
-    -------
-    Trial
-        Also of the nominal scene and of the scenarios that it was made for.
-
-    Raises
-    ------
-    ProblemError
-        As `seqopt.placement.robust_problem.robust`.
+    ``scenes``: not those it was made for: drawn with another seed. Or the problem over them, whose
+    costs may be known. Result: also of the nominal scene and of the scenarios that it was made for.
+    Raises `ProblemError` as `seqopt.placement.robust_problem.robust`.
     """
     problem = plan.problem
     nominal = problem.nominal

@@ -12,14 +12,8 @@ from dataclasses import dataclass
 class Finding:
     """What a formulation knew at a time.
 
-    Attributes
-    ----------
-    seconds : float
-        Since it began.
-    objective : float
-        Of the best choice so far; infinite where there was none.
-    bound : float
-        The highest proven; minus infinity where there was none.
+    ``seconds``: since it began; ``objective``: of the best choice so far; infinite where there was
+    none; ``bound``: the highest proven; minus infinity where there was none.
     """
 
     seconds: float
@@ -44,12 +38,7 @@ class Finding:
 class Watch:
     """A watch on one call of a formulation, which asks it for the time and tells it what it finds.
 
-    Parameters
-    ----------
-    time_limit : float, optional
-        After which the formulation is to stop, s.
-    progress : callable, optional
-        Told every finding.
+    ``time_limit``: after which the formulation is to stop, s; ``progress``: told every finding.
 
     Examples
     --------
@@ -111,10 +100,7 @@ class Watch:
     def tell(self, objective: float = math.inf, bound: float = -math.inf) -> None:
         """Take note of a choice or a bound; what is no better than before is passed over.
 
-        Parameters
-        ----------
-        objective, bound : float, optional
-            In the unit of the criterion.
+        ``objective``, ``bound``: in the unit of the criterion.
         """
         if objective < self.objective or bound > self.bound or not self._trace:
             best = min(objective, self.objective)
@@ -127,10 +113,7 @@ class Watch:
 def trace_rows(trace: Sequence[Finding]) -> list[dict[str, float]]:
     """Return a trace as rows of a table.
 
-    Returns
-    -------
-    list of dict of str to float
-        Columns ``seconds``, ``objective``, ``bound`` and ``gap``.
+    Result: columns ``seconds``, ``objective``, ``bound`` and ``gap``.
     """
     names = ("seconds", "objective", "bound", "gap")
     return [{name: getattr(found, name) for name in names} for found in trace]

@@ -31,14 +31,9 @@ from seqopt.sequence.schedule import Schedule
 class WindowSearch(Terse):
     """What a search move by move looked at, and what it chose.
 
-    Attributes
-    ----------
-    alone : Problem
-        The steps in which one move is open.
-    shared : tuple of Problem
-        Of every move, the steps shared with the move before, whose choice is made; it may be empty.
-    choice : tuple of int
-        The chosen candidate of every move.
+    ``alone``: the steps in which one move is open; ``shared``: of every move, the steps shared with
+    the move before, whose choice is made; it may be empty; ``choice``: the chosen candidate of
+    every move.
     """
 
     alone: Problem
@@ -59,14 +54,7 @@ class WindowSearch(Terse):
     def costs(self, move: int) -> Floats:
         """Return what the candidates of a move cost after the choices before it.
 
-        Parameters
-        ----------
-        move : int
-            Index of a move that was chosen.
-
-        Returns
-        -------
-        (C_k,) float
+        ``move``: index of a move that was chosen. Result (C_k,).
         """
         return np.asarray(self.alone.singles[move] + self.shared[move].singles[0])
 
@@ -76,27 +64,11 @@ def search_windows(problem: Problem, watch: Watch | None = None) -> WindowSearch
 
     Brick counts come in ascending order, each move being chosen as soon as its own steps are known.
 
-    Parameters
-    ----------
-    problem : Problem
-        Its own responses are not computed.
-    watch : Watch, optional
-        With the time limit; by default there is none.
-
-    Returns
-    -------
-    WindowSearch
-        With a choice for every move.
-
-    Raises
-    ------
-    SolverError
-        If a move has no candidate left after the choices before it, while others may have led on,
-        or if time is over before the last move is chosen.
-    MemoryShortError
-        If there is not the memory for what it looks at.
-    KeyboardInterrupt
-        With the nodes that were chosen so far as its text.
+    ``problem``: its own responses are not computed; ``watch``: with the time limit; by default
+    there is none. Result: with a choice for every move. Raises `SolverError` if a move has no
+    candidate left after the choices before it, while others may have led on, or if time is over
+    before the last move is chosen; `MemoryShortError` if there is not the memory for what it looks
+    at; `KeyboardInterrupt`, with the nodes that were chosen so far as its text.
     """
     walk = _Walk(problem)
     try:

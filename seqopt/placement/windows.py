@@ -17,21 +17,9 @@ def window(
 ) -> Schedule:
     """Return the steps that a move shares with the one before, as a schedule of that move alone.
 
-    Parameters
-    ----------
-    schedule : Schedule
-        With all moves open.
-    move : int
-        Index of a move.
-    nodes : sequence of int, or mapping of int to int
-        Chosen for the moves before; that of the last of them is asked for.
-    alone : bool, optional
-        Whether the steps in which the move alone is open belong to it too.
-
-    Returns
-    -------
-    Schedule
-        Of one move; without steps if it shares none.
+    ``schedule``: with all moves open; ``move``: index of a move; ``nodes``: chosen for the moves
+    before; that of the last of them is asked for; ``alone``: whether the steps in which the move
+    alone is open belong to it too. Result: of one move; without steps if it shares none.
     """
 
     def grip(held: int | OpenGrip | None) -> int | OpenGrip | None:
@@ -54,15 +42,7 @@ def possible_after(schedule: Schedule, move: int, before: int) -> Bools:
 
     Responses do not tell where all candidates are impossible: then nothing is known of any.
 
-    Parameters
-    ----------
-    schedule : Schedule
-    move, before : int
-        A move, and the candidate chosen for the move before it.
-
-    Returns
-    -------
-    (C_k,) bool
+    ``move``, ``before``: a move, and the candidate chosen for the move before it. Result (C_k,).
     """
     candidates = np.array(schedule.moves[move].candidates)
     if (move - 1, move) not in schedule.steps_of:
@@ -73,17 +53,8 @@ def possible_after(schedule: Schedule, move: int, before: int) -> Bools:
 def window_anew(evaluation: Evaluation, move: int, before: int) -> tuple[StepChoices, ...]:
     """Return the steps that a move decides, solved for its candidates alone.
 
-    Parameters
-    ----------
-    evaluation : Evaluation
-        Whose responses are not kept.
-    move, before : int
-        A move, and the candidate chosen for the move before it.
-
-    Returns
-    -------
-    tuple of StepChoices
-        In order.
+    ``evaluation``: whose responses are not kept; ``move``, ``before``: a move, and the candidate
+    chosen for the move before it. Result: in order.
     """
     schedule = evaluation.schedule
     nodes = {move - 1: schedule.moves[move - 1].candidates[before]} if move else {}
@@ -107,16 +78,7 @@ def by_move(steps: Sequence[StepChoices]) -> Mapping[int, Sequence[StepChoices]]
 def window_kept(decided: Sequence[StepChoices], before: int) -> tuple[StepChoices, ...]:
     """Return the steps that a move decides, for its candidates alone, from those of all choices.
 
-    Parameters
-    ----------
-    decided : sequence of StepChoices
-    before : int
-        The candidate chosen for the move before it.
-
-    Returns
-    -------
-    tuple of StepChoices
-        In order.
+    ``before``: the candidate chosen for the move before it. Result: in order.
     """
     out = []
     for choices in decided:
@@ -131,13 +93,8 @@ def pairs_as_moves(
 ) -> Schedule:
     """Return the steps of pairs as a schedule with a move for every row.
 
-    Parameters
-    ----------
-    schedule : Schedule
-    asked : sequence of (int, int)
-        A move, and a candidate of the move before it.
-    wanted : sequence of (c,) int
-        The candidates of the move that are looked at.
+    ``asked`` (sequence of (int, int)): a move, and a candidate of the move before it; ``wanted``
+    (sequence of (c,) int): the candidates of the move that are looked at.
     """
     moves, steps = [], []
     for n, ((k, before), some) in enumerate(zip(asked, wanted, strict=True)):

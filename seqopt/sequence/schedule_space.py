@@ -26,19 +26,9 @@ from seqopt.sequence.steps import Step, StepKind, check_sequence
 class ScheduleSpace(Terse):
     """The states of a schedule and the moves between them; a level for every step.
 
-    Parameters
-    ----------
-    network : Network
-    schedule : Schedule
-    caps : mapping of str to float
-        Largest force of a robot's grip, by its name, N; none of those that are not named.
-    parks : bool
-        Whether free robots stay where they were, for their travel.
-
-    Raises
-    ------
-    StepError
-        If the states cannot be numbered.
+    ``caps``: largest force of a robot's grip, by its name, N; none of those that are not named;
+    ``parks``: whether free robots stay where they were, for their travel. Raises `StepError` if the
+    states cannot be numbered.
     """
 
     network: Network

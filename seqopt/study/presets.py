@@ -79,15 +79,8 @@ Examples
 def find_criterion(criterion: Criterion | str) -> Criterion:
     """Return a criterion, by name or itself.
 
-    Parameters
-    ----------
-    criterion : Criterion or str
-        A criterion, or a name of `seqopt.CRITERIA`.
-
-    Raises
-    ------
-    ProblemError
-        If there is none of that name.
+    ``criterion``: a criterion, or a name of `seqopt.CRITERIA`. Raises `ProblemError` if there is
+    none of that name.
     """
     if not isinstance(criterion, str):
         return criterion

@@ -80,20 +80,8 @@ def published_plan(scene: Scene) -> tuple[Step, ...]:
 def published_choice(problem: Problem) -> tuple[int, ...]:
     """Return what the published plan chooses for the moves of the three-robot loop.
 
-    Parameters
-    ----------
-    problem : Problem
-        The loop on the arch of Bruun et al.
-
-    Returns
-    -------
-    tuple of int
-        Index of the published node among the candidates of every move.
-
-    Raises
-    ------
-    ValueError
-        If a published node is no candidate of its move.
+    ``problem``: the loop on the arch of Bruun et al. Result: index of the published node among the
+    candidates of every move. Raises `ValueError` if a published node is no candidate of its move.
     """
     scene = problem.schedule.scene
     plan = published_plan(scene)
@@ -111,15 +99,8 @@ def paper_models(schedule: Schedule) -> tuple[int, int]:
     They count 2n candidates for every brick count n from 3 to the last, four steps each, and 2n
     times 2(n-1) pairs for the shared one.
 
-    Parameters
-    ----------
-    schedule : Schedule
-        Of whose scene the bricks are counted.
-
-    Returns
-    -------
-    cascading, overlap : int
-        Models without and with all pairs in the shared steps.
+    ``schedule``: of whose scene the bricks are counted. Results: ``cascading``, ``overlap``: models
+    without and with all pairs in the shared steps.
     """
     counts = range(3, len(schedule.scene.bricks) + 1)
     cascading = sum(4 * 2 * n for n in counts)
