@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -17,7 +18,7 @@ from seqopt.placement.free_problem import FreeProblem
 from seqopt.placement.free_proof import Proof
 from seqopt.placement.free_states import explore
 from seqopt.placement.standing import Standing
-from seqopt.placement.sturdiest import WORST, with_margin
+from seqopt.placement.sturdiest import WORST, bisected, with_margin
 from seqopt.sequence.free_rules import FreeRules, Payload
 from seqopt.sequence.schedule import Schedule
 
@@ -158,9 +159,17 @@ def _pair(problem: FreeProblem, look: Look) -> str:
 def _enough(problem: FreeProblem, way: str, look: Look) -> str:
     """Return how far a limit has to be raised, where it is a limit that is loosened."""
     if way == STANDING and not any(demand.tilt for demand in problem.demands):
-        strong = (problem.standing or Standing()).demanding("bond", WORST["bond"])
-        least = worst_least(replace(problem, standing=strong, settled=()), "bond", look)
-        return f"a bond of {least:.4g} Pa" if np.isfinite(least) else way
+        own, bare = problem.standing or Standing(), replace(problem, settled=(), goals=STEPS)
+
+        def exists(bond: float) -> bool:
+            return look(replace(bare, standing=own.demanding("bond", bond))).whole
+
+        try:
+            enough = bisected("bond", exists)[1]
+        except InfeasibleError:
+            return way
+        digit = 10.0 ** (math.floor(math.log10(enough)) - 2) if enough else 1.0
+        return f"a bond of {math.ceil(enough / digit) * digit:.10g} Pa"
     found = [limit for limit in problem.limits if limit.response == way]
     if not found or way not in STATE_RESPONSES:
         return f"no limit on {way}" if found else way

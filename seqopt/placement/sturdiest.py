@@ -42,15 +42,24 @@ def best_margin(
 
     if problem.demands and not exists(WORST[name]):
         raise InfeasibleError("no plan of the free schedule stands as is demanded")
+    low, high = bisected(name, exists)
+    return high, low, demanding(high)
+
+
+def bisected(name: str, exists: Callable[[float], bool]) -> tuple[float, float]:
+    """Return two values of a margin, as close as is promised: no plan exists with the first.
+
+    ``exists``: whether one does with a value. Raises `InfeasibleError` if none does with any.
+    """
     if name != "tilt" and exists(0.0):
-        return 0.0, 0.0, demanding(0.0)
+        return 0.0, 0.0
     low, high = _around(exists, FIRST[name], WORST[name])
     while high - low > 0.6 * slack(name, high):  # the rest is for sets that stay open
         middle = (low + high) / 2
         if name == "bond":
             middle = (low * high) ** 0.5 if low else high / 16
         low, high = (low, middle) if exists(middle) else (middle, high)
-    return high, low, demanding(high)
+    return low, high
 
 
 def with_margin(problem: FreeProblem, name: str, value: float) -> FreeProblem:

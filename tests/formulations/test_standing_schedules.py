@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from math import pi, radians
 
@@ -29,6 +30,7 @@ from seqopt.placement.standing import Standing, StandingSets, without_implied
 from seqopt.responses.quantities import CHOSEN_BY, lengths
 from seqopt.sequence.free_check import RuleBook
 from seqopt.sequence.free_rules import FreeRules
+from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.stability.assessment import Verdict, bonded, verdict_of
 from seqopt.stability.limit_analysis import GAP
 from seqopt.stability.margins import Margins
@@ -233,6 +235,21 @@ def test_a_bond_that_opens_a_way_is_named():
     problem = replace(problem, standing=Standing(replace(DRY, friction=0.05)))
     with pytest.raises(InfeasibleError, match=r"it becomes possible with .*a bond of [\d.e+]+ Pa"):
         seqopt.solve(problem, "schedule_search")
+
+
+def test_the_bond_that_is_named_is_enough():
+    engine = ComplianceEngine(build_network(small_arch(6)))
+    loop = three_robot_loop(engine.network)
+    with pytest.raises(InfeasibleError, match="a bond of") as caught:
+        seqopt.solve(pose_free(engine, loop, ONES, "minmax", stands="dry"), "schedule_search")
+    said = float(re.search(r"a bond of ([\d.e+]+) Pa", str(caught.value))[1])
+    strong, weak = (
+        pose_free(engine, loop, ONES, "minmax", stands=f"bond={bond}")
+        for bond in (said, 0.9 * said)
+    )
+    assert seqopt.solve(strong, "schedule_search").status == "optimal"
+    with pytest.raises(InfeasibleError):
+        seqopt.solve(weak, "schedule_search")
 
 
 @pytest.mark.slow
