@@ -45,6 +45,7 @@ from formulations.on_graph import (
     watched,
 )
 from seqopt.errors import InfeasibleError, ProblemError
+from seqopt.graph.budgets import is_beyond
 from seqopt.graph.explore import Explorer
 from seqopt.graph.paths import distances
 from seqopt.placement.formulation import FormulationKind
@@ -97,9 +98,19 @@ def _search(problem: FreeProblem, options: tuple[int, float], tell: Watching) ->
     try:
         found = narrow(problem, options[0], tell) if options[0] else None
         ceiling = found.objective[0] if found else np.inf
+        if found is None and problem.budgets:
+            _require_room(problem, tell)
         return _best(problem, wide, (ceiling, options[1]), proven)
     except (StopError, KeyboardInterrupt) as stop:
         return _unproven(plan_by_then(found, stop), wide, proven[-1])
+
+
+def _require_room(problem: FreeProblem, tell: Watching) -> None:
+    """Raise an `InfeasibleError` if every plan exceeds a budget, before thresholds are tried."""
+    totals = problem.goals[len(problem.aims) :]
+    every = Explorer(FreeStates(replace(problem, goals=totals, budgets=())), tell=tell)
+    if every.rise() and is_beyond(every.graph().graph, problem.budgets):
+        raise InfeasibleError("no plan of the free schedule is within all budgets")
 
 
 def _best(
