@@ -33,7 +33,7 @@ import numpy as np
 from seqopt.errors import InfeasibleError, ProblemError, TimeUpError
 from seqopt.graph.explore import Explorer
 from seqopt.graph.parts import Visited
-from seqopt.graph.paths import Best, lexicographic, reached, tied
+from seqopt.graph.paths import keep_best, lexicographic, reached
 from seqopt.placement.formulation import FormulationKind
 from seqopt.placement.order_bound import whole_bound
 from seqopt.placement.order_problem import OrderProblem, OrderSelection
@@ -161,13 +161,15 @@ def _first_orders(problem: OrderProblem) -> Iterator[Order]:
 
 def _all_orders(search: _Search, most: int) -> bool:
     """Return whether all orders were looked at below a rising threshold; then the best is known."""
-    ceiling, threshold = search.value, search.value / FAR_BELOW
-    if np.isfinite(ceiling):
-        threshold = max(threshold, search.bound)
     space = OrderStates(search.problem, most)
+    ceiling, threshold = search.value, -np.inf
+    if not space.peaks[0]:  # no state is too dear
+        ceiling = threshold = np.finfo(float).max
+    elif np.isfinite(ceiling):
+        threshold = max(ceiling / FAR_BELOW, search.bound)
     found = Explorer(space, tell=search.tell_bricks)
     try:
-        while not found.rise(threshold if np.isfinite(threshold) else -np.inf):
+        while not found.rise(threshold):
             search.bound = max(search.bound, min(found.excluded, ceiling))
             if found.excluded == np.inf or threshold >= ceiling:
                 break
@@ -194,17 +196,18 @@ def _take_best(search: _Search, found: Explorer) -> None:
         if not found.refine(best.values):
             break
     if best.values[0] < search.value * (1 - BETTER):
-        keys = dict.fromkeys(part for _, part, _ in visited.of(_first_ending(visited, best)))
+        keys = dict.fromkeys(part for _, part, _ in visited.of(_first_ending(visited)))
         search.value = best.values[0]
         search.order = tuple(key[1] for key in keys)
 
 
-def _first_ending(visited: Visited, best: Best) -> tuple[int, ...]:
+def _first_ending(visited: Visited) -> tuple[int, ...]:
     """Return the best path that ends with the first brick: many orders are equally good."""
     graph, states = visited
-    ends = graph.ends & reached(graph, graph.amounts[:, 0] <= tied(best.values[0]))
+    kept = keep_best(graph, 0)[0]
+    ends = graph.ends & reached(kept)
     number = np.repeat([part[1] for _, part, _ in states], [len(rows) for _, _, rows in states])
-    return lexicographic(replace(graph, ends=ends & (number == number[ends].min()))).path
+    return lexicographic(replace(kept, ends=ends & (number == number[ends].min()))).path
 
 
 def _neighbors(search: _Search, tries: int, rng: np.random.Generator) -> None:

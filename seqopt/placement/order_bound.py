@@ -7,7 +7,7 @@ from itertools import combinations
 import numpy as np
 
 from seqopt.arrays import Floats, Ints
-from seqopt.placement.free_goals import LARGEST
+from seqopt.placement.free_goals import LARGEST, Measure
 from seqopt.placement.free_problem import FreeProblem
 from seqopt.placement.order_problem import OrderProblem
 from seqopt.sequence.free_rules import Ending
@@ -24,6 +24,8 @@ def whole_bound(problem: OrderProblem) -> float:
     Result: minus infinity where there are too many grip sets to look at.
     """
     free = problem.judging(problem.scene.build_order)
+    if free.goals[0].measure is not Measure.PEAK:
+        return -np.inf
     numbers = node_numbers(free.network)
     places = [i for i, n in enumerate(numbers, 1) if n not in problem.scene.blocked_nodes]
     least = -np.inf

@@ -12,7 +12,6 @@ from seqopt.engines.interface import Engine
 from seqopt.engines.registry import make_engine, recipe_of
 from seqopt.errors import ProblemError
 from seqopt.network.build import build_network
-from seqopt.placement.free_goals import Measure
 from seqopt.placement.free_problem import FreeProblem
 from seqopt.scene.orders import Order
 from seqopt.scene.scene import Scene
@@ -33,9 +32,8 @@ class OrderProblem(Shown):
     The value of an order is the first goal of its best plan; the criterion keeps the numbers that
     it has in the scene's own order.
 
-    ``free``: in the scene's own order, of `seqopt.pose_free`; its first goal is about a worst step.
-    Raises `ProblemError` if the first goal is another, the engine was not made by name, or there
-    are no such orders.
+    ``free``: in the scene's own order, of `seqopt.pose_free`; its first goal is no margin. Raises
+    `ProblemError` if it is one, the engine was not made by name, or there are no such orders.
     """
 
     free: FreeProblem
@@ -48,13 +46,14 @@ class OrderProblem(Shown):
             known = ", ".join(each.value for each in Orders)
             raise ProblemError(f"orders {self.among!r}: give one of {known}") from None
         goal = self.free.goals[0]
-        if goal.measure is not Measure.PEAK or goal.of_margins:
+        if goal.of_margins:
             raise ProblemError(
-                f"aim {goal}: an order is chosen by a worst step; name minmax or a response first"
+                f"aim {goal}: an order is not chosen by a margin; name minmax, a response, sum, "
+                "steps, regrips or travel first"
             )
         if self.free.budgets:
             raise ProblemError(
-                f"budget {self.free.goals[-1]}: an order is chosen by its worst step alone; leave "
+                f"budget {self.free.goals[-1]}: an order is chosen by its first aim alone; leave "
                 "it out, or give an order"
             )
         if recipe_of(self.free.engine) is None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import combinations
 from math import comb
 
@@ -17,6 +18,7 @@ import numpy as np
 from seqopt.arrays import Ints
 from seqopt.network.build import build_network
 from seqopt.placement.free_answers import ask
+from seqopt.placement.free_goals import Goal, Measure
 from seqopt.placement.free_passable import Asked, Passable, Tables
 from seqopt.placement.free_problem import FreeProblem
 from seqopt.placement.free_proof import BELOW
@@ -35,17 +37,25 @@ MOST_SETS = 200_000  # grip sets of the whole structure that are looked at
 def finds_better_order(
     problem: OrderProblem, value: float, *, most: int = MOST, end: float = np.inf
 ) -> bool | None:
-    """Return whether some order has a plan whose worst step is below a value.
+    """Return whether some order has a plan whose first goal is below a value.
 
     ``value``: of the first goal; ``most``: up to how many sets of bricks with a newest one are
-    looked at; ``end``: until when, as of `time.perf_counter`. Result: None where it is not known,
-    because there are more sets or time is over.
+    looked at; ``end``: until when, as of `time.perf_counter`. Result: None where it is not known:
+    there are more sets, time is over, or the goal adds up along a plan.
     """
+    if problem.free.goals[0].measure is not Measure.PEAK:  # what adds up is not proven
+        moves = replace(problem.free, goals=(Goal(Measure.STEPS),))
+        some = replace(problem, free=moves)
+        return None if np.isfinite(value) else _finds(some, value, most, end)
     if _of_the_whole(problem) >= value:
         return False
-    below = value  # further below than what is tied with it
     if np.isfinite(value):
-        below -= 4 * BELOW * abs(value)
+        value -= 4 * BELOW * abs(value)  # further below than what is tied with it
+    return _finds(problem, value, most, end)
+
+
+def _finds(problem: OrderProblem, below: float, most: int, end: float) -> bool | None:
+    """Return whether some order has a plan with states below a value; None if it is not known."""
     empty: Key = (frozenset(), 0)
     entries: dict[Key, list[Ints]] = {empty: []}
     looked = 0

@@ -8,14 +8,16 @@ with a brick less. An order is a way from the empty set to all bricks.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.graph.explore import Moves
+from seqopt.placement.free_goals import Measure
 from seqopt.placement.free_problem import FreeProblem
-from seqopt.placement.free_states import FreeStates
+from seqopt.placement.free_states import FreeStates, move_amounts
 from seqopt.placement.order_problem import OrderProblem
 from seqopt.sequence.free_space import node_numbers, sort_entries
 
@@ -45,8 +47,8 @@ class OrderStates:
 
     @property
     def peaks(self) -> tuple[bool, ...]:
-        """That the worst step counts."""
-        return (True,)
+        """Whether the worst step counts, or what all steps take."""
+        return (self.problem.free.goals[0].measure is Measure.PEAK,)
 
     def start(self) -> tuple[Key, Ints]:
         """Return the empty site."""
@@ -79,8 +81,12 @@ class OrderStates:
         return self._of(part).values(len(part[0]), states, rough=rough, most=most)
 
     def amounts(self, values: Floats, taken: Floats) -> Floats:
-        """Return what the first goal takes of moves: that of the states that they lead to."""
-        return values
+        """Return what the first goal takes of moves, (m, 1)."""
+        return move_amounts(self._first, values, taken)
+
+    @cached_property
+    def _first(self) -> FreeProblem:
+        return replace(self.problem.free, goals=self.problem.free.goals[:1])
 
     def ended(self, part: Key, states: Ints) -> Bools:
         """Return which states end the build."""
@@ -105,7 +111,8 @@ def _renumbered(old: FreeProblem, new: FreeProblem, states: Ints) -> Ints:
     place = {node: i for i, node in enumerate(node_numbers(new.network), start=1)}
     map_to = np.array([0, *(place[node] for node in node_numbers(old.network))])
     out, robots = states.copy(), old.space.robots
-    out[:, :robots] = map_to[states[:, :robots]]
+    nodes = states[:, :robots]  # negative where a free robot was last
+    out[:, :robots] = np.sign(nodes) * map_to[np.abs(nodes)]
     for first, end in new.space.slots:
         sort_entries(out, first, end)
     return out

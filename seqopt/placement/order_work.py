@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 
 from seqopt.errors import ProblemError
-from seqopt.graph.paths import least_peak
+from seqopt.graph.paths import keep_best
 from seqopt.placement.free_problem import FreeProblem
 from seqopt.placement.free_states import explore
 from seqopt.placement.order_problem import OrderProblem
@@ -41,7 +41,7 @@ def worth(problem: OrderProblem, trial: Trial) -> float:
         visited = explore(judged, ceiling, width)
         if visited.whole:
             visited.refine()
-            found = ceiling = least_peak(visited.graph().graph, 0)
+            found = ceiling = keep_best(visited.graph().graph, 0)[1]
     return found
 
 

@@ -248,7 +248,7 @@ def test_the_best_order_is_written_with_its_scene(capsys, tmp_path, arch):
             "--order search: only the free schedule has it",
         ),
         (["--schedule", "free", "--max-memory", "2GB"], "--max-memory: the search of orders has"),
-        (["--schedule", "free", "--aim", "steps"], "an order is chosen by a worst step"),
+        (["--schedule", "free", "--aim", "tilt"], "an order is not chosen by a margin"),
         (["--schedule", "free", "--option", "depth=3"], "depth"),
     ],
 )
