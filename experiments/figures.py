@@ -31,10 +31,10 @@ from experiments.harness.yardstick import VALUES
 from seqopt.arrays import Floats
 from seqopt.engines.interface import Engine, Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.graph.states.states import pose_free
 from seqopt.network.build import build_network
-from seqopt.placement.free_front import FreeFront
-from seqopt.placement.free_problem import pose_free
-from seqopt.placement.front import find_front
+from seqopt.plan.free_front import FreeFront
+from seqopt.plan.front import find_front
 from seqopt.report.charts import draw_responses, front_figure
 from seqopt.report.comparison import method_tables
 from seqopt.report.draw import (

@@ -10,12 +10,12 @@ import numpy as np
 
 from formulations.solvers import minimize_whole
 from seqopt.arrays import Floats
-from seqopt.placement.costs import LayeredCosts
-from seqopt.placement.first_choice import stopped
-from seqopt.placement.flow import ACCURACY, LayeredFlow, layered_flow
-from seqopt.placement.formulation import End, Selection
-from seqopt.placement.interface import Aim, CostProblem, PlacementProblem
-from seqopt.placement.watch import Watch
+from seqopt.graph.layers.costs import LayeredCosts
+from seqopt.graph.layers.interface import Aim, CostProblem, PlacementProblem
+from seqopt.plan.calling.first_choice import stopped
+from seqopt.plan.calling.flow import ACCURACY, LayeredFlow, layered_flow
+from seqopt.plan.calling.formulation import End, Selection
+from seqopt.plan.calling.watch import Watch
 
 Choice = tuple[int, ...]
 

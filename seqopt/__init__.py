@@ -28,19 +28,19 @@ if TYPE_CHECKING:
     from seqopt.engines.interface import Engine
     from seqopt.engines.registry import make_engine
     from seqopt.errors import SeqoptError
+    from seqopt.graph.layers.layers import pose
+    from seqopt.graph.scenarios.scenarios import robust
+    from seqopt.graph.states.states import pose_free
     from seqopt.network.build import build_network
     from seqopt.network.network import Network
-    from seqopt.placement.certificate import Certificate
-    from seqopt.placement.formulation import Formulation, formulations
-    from seqopt.placement.free_problem import pose_free
-    from seqopt.placement.given_sequence import GivenSequence
-    from seqopt.placement.own_criterion import StepCost
-    from seqopt.placement.plan import Plan
-    from seqopt.placement.problem import pose
-    from seqopt.placement.requirements import Limit
-    from seqopt.placement.robust_plan import solve_robust
-    from seqopt.placement.robust_problem import robust
-    from seqopt.placement.solving import solve
+    from seqopt.plan.calling.formulation import Formulation, formulations
+    from seqopt.plan.given import GivenSequence
+    from seqopt.plan.judge.certificate import Certificate
+    from seqopt.plan.plan import Plan
+    from seqopt.plan.robust_plan import solve_robust
+    from seqopt.plan.solving import solve
+    from seqopt.problem.own_criterion import StepCost
+    from seqopt.problem.requirements import Limit
     from seqopt.responses.table import analyze
     from seqopt.scene.arch import ArchShape, arch_scene
     from seqopt.scene.parts import Robot, Sphere
@@ -63,19 +63,19 @@ _HOMES = {
     "engines.interface": ("Engine",),
     "engines.registry": ("make_engine",),
     "errors": ("SeqoptError",),
+    "graph.layers.layers": ("pose",),
+    "graph.scenarios.scenarios": ("robust",),
+    "graph.states.states": ("pose_free",),
     "network.build": ("build_network",),
     "network.network": ("Network",),
-    "placement.certificate": ("Certificate",),
-    "placement.formulation": ("Formulation", "formulations"),
-    "placement.free_problem": ("pose_free",),
-    "placement.given_sequence": ("GivenSequence",),
-    "placement.own_criterion": ("StepCost",),
-    "placement.plan": ("Plan",),
-    "placement.problem": ("pose",),
-    "placement.requirements": ("Limit",),
-    "placement.robust_plan": ("solve_robust",),
-    "placement.robust_problem": ("robust",),
-    "placement.solving": ("solve",),
+    "plan.calling.formulation": ("Formulation", "formulations"),
+    "plan.given": ("GivenSequence",),
+    "plan.judge.certificate": ("Certificate",),
+    "plan.plan": ("Plan",),
+    "plan.robust_plan": ("solve_robust",),
+    "plan.solving": ("solve",),
+    "problem.own_criterion": ("StepCost",),
+    "problem.requirements": ("Limit",),
     "responses.table": ("analyze",),
     "scene.arch": ("ArchShape", "arch_scene"),
     "scene.parts": ("Robot", "Sphere"),

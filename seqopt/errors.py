@@ -105,3 +105,8 @@ def did_you_mean(given: object, known: Iterable[str]) -> str:
 def _likeness(one: str, other: str) -> float:
     """Return how much one word is like another, from 0 to 1."""
     return difflib.SequenceMatcher(None, one.lower(), other.lower()).ratio()
+
+
+def said(error: BaseException) -> str:
+    """Return the message of an error in one line."""
+    return " ".join(f"{type(error).__name__}: {error}".split())

@@ -12,16 +12,17 @@ from seqopt.contact.mortar import Mortar
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import USUAL, make_engine
 from seqopt.errors import ProblemError
+from seqopt.graph.layers.layers import Problem, pose
+from seqopt.graph.states.states import FreeProblem, pose_free, within
 from seqopt.network.build import build_network
-from seqopt.placement.asked_budgets import parse_budgets, parse_caps, with_budgets
-from seqopt.placement.criteria import WORST_OVER_METHODS
-from seqopt.placement.free_plan import FreePlan
-from seqopt.placement.free_problem import FreeProblem, pose_free, within
-from seqopt.placement.plan import Plan
-from seqopt.placement.problem import Problem, pose
-from seqopt.placement.requirements import Criterion, Limit
-from seqopt.placement.solving import solve
-from seqopt.placement.standing import Standing
+from seqopt.plan.free_plan import FreePlan
+from seqopt.plan.plan import Plan
+from seqopt.plan.shares import with_budgets
+from seqopt.plan.solving import solve
+from seqopt.problem.budgets import parse_budgets, parse_caps
+from seqopt.problem.criteria import WORST_OVER_METHODS
+from seqopt.problem.requirements import Criterion, Limit
+from seqopt.problem.standing import Standing
 from seqopt.responses.resources import HERE, Resources
 from seqopt.scene.checks import short
 from seqopt.scene.orders import in_order
@@ -194,7 +195,7 @@ def posed(
 
     ``engine``: what computes responses; it has the scene. ``schedule``: with the grips that are
     open. ``criterion``: as of `optimize`. ``limits``: as of `seqopt.pose`. ``budgets``: caps on
-    totals over the build, as of `seqopt.placement.asked_budgets.parse_budgets`. ``resources``: what
+    totals over the build, as of `seqopt.problem.budgets.parse_budgets`. ``resources``: what
     the computation may use.
     """
     asked = parse_budgets(budgets)

@@ -9,8 +9,8 @@ import numpy as np
 
 from seqopt.engines.interface import Want
 from seqopt.errors import MechanismError
-from seqopt.placement.criteria import WorstRatio
-from seqopt.placement.requirements import LIMIT_TOLERANCE
+from seqopt.problem.criteria import WorstRatio
+from seqopt.problem.requirements import LIMIT_TOLERANCE
 from seqopt.responses.quantities import CHOSEN_BY, lengths
 from seqopt.sequence.free_check import RuleBook
 from seqopt.sequence.free_rules import Payload

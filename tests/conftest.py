@@ -14,8 +14,8 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.graph.layers.layers import pose
 from seqopt.network.build import build_network
-from seqopt.placement.problem import pose
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.study.presets import EQUATIONS

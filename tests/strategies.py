@@ -8,8 +8,8 @@ import numpy as np
 from hypothesis import strategies as st
 
 from experiments.harness.scenes import running_bond
-from seqopt.placement.costs import Budget, LayeredCosts
-from seqopt.placement.interface import CostProblem
+from seqopt.graph.layers.costs import Budget, LayeredCosts
+from seqopt.graph.layers.interface import CostProblem
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.parts import Anywhere, Robot, Side, Sphere
 from seqopt.sequence.free_rules import FreeRules

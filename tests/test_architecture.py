@@ -22,10 +22,12 @@ ROOMS = (
     {"showing"},
     {"scene"},
     {"network"},
-    {"sequence", "contact", "graph"},
+    {"sequence", "contact"},
     {"engines", "stability"},
     {"responses"},
-    {"placement"},
+    {"problem"},
+    {"graph"},
+    {"plan"},
     {"study"},
     {"workflow"},
     {"report"},
@@ -35,7 +37,7 @@ ROOMS = (
 SOLVERS = {"cvxpy", "clarabel", "highspy"}
 SOLVER_HOME = "formulations"
 SHARED = {  # what formulations may import
-    *("formulations.cones", "formulations.on_graph"),
+    *("formulations.cones", "formulations.states.on_graph"),
     *("formulations.solvers", "formulations.whole_program"),
 }
 MECHANICS = {"network.mechanics", "engines.rigid"}  # not for the frame

@@ -11,12 +11,12 @@ import seqopt
 from seqopt.arrays import _LONGEST, Terse
 from seqopt.engines.registry import ENGINES
 from seqopt.errors import SceneError
-from seqopt.placement.budgets import travel
-from seqopt.placement.free_front import FreeFront
-from seqopt.placement.front import find_front
-from seqopt.placement.order_plan import solve_order
-from seqopt.placement.order_problem import OrderProblem
-from seqopt.placement.unseen import judge_unseen
+from seqopt.graph.layers.budgets import travel
+from seqopt.graph.orders.orders import OrderProblem
+from seqopt.plan.free_front import FreeFront
+from seqopt.plan.front import find_front
+from seqopt.plan.order_plan import solve_order
+from seqopt.plan.out_of_sample import judge_unseen
 from seqopt.report.comparison import compare
 from seqopt.scene.library import ArchForm, DomeShape, VaultShape
 from seqopt.stability.assessment import assess_steps

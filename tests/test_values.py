@@ -78,7 +78,7 @@ def values(arch25):
 
 
 def _compiled():
-    from formulations.limit_analysis import compile_equilibrium  # noqa: PLC0415  # brings a solver
+    from formulations.contact.limit_analysis import compile_equilibrium  # noqa: PLC0415  # brings a solver
 
     return compile_equilibrium
 

@@ -7,16 +7,16 @@ import pandas as pd
 import pytest
 
 import seqopt
-from seqopt.cli.values import parse_options
+from seqopt.cli.words.values import parse_options
 from seqopt.engines.auto import AutoEngine
 from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.planar import PlanarEngine
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import SeqoptError
-from seqopt.placement.certificate import judge
-from seqopt.placement.criteria import RankSum, WeightedSum, WorstRatio
-from seqopt.placement.fitting import require_fit
+from seqopt.plan.calling.fitting import require_fit
+from seqopt.plan.judge.certificate import judge
+from seqopt.problem.criteria import RankSum, WeightedSum, WorstRatio
 from seqopt.scene.parts import Anywhere, Robot
 from tests.builders import six_bricks
 

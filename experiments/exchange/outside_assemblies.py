@@ -39,7 +39,7 @@ from matplotlib.figure import Figure
 
 from experiments.harness.claim import Claim, Extra, Finding, Option, Options
 from experiments.harness.results import RESULTS
-from formulations.limit_analysis import compile_equilibrium
+from formulations.contact.limit_analysis import compile_equilibrium
 from seqopt.cli.main import main
 from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import EPOXY

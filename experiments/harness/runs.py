@@ -6,7 +6,7 @@ whatever engine it was made with; ``error`` is the largest difference of the eng
 the reference's, over the largest of each kind in its state. Times are medians of repeats; where
 there are several, one run before them does not count. Stages before the choice are shared by all
 formulations. One more row is the search that solves only the models it meets and proves nothing
-(`seqopt.placement.window_search`).
+(`seqopt.plan.search.window_search`).
 
 Command: ``python -m experiments.harness.runs SCENE ENGINE CRITERION REPEATS`` prints rows as JSON.
 """
@@ -29,14 +29,14 @@ from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import Engine
 from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.graph.layers.interface import Aim
+from seqopt.graph.layers.layers import Problem, pose
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
-from seqopt.placement.certificate import least
-from seqopt.placement.formulation import Formulation, formulations
-from seqopt.placement.interface import Aim
-from seqopt.placement.plan import Plan
-from seqopt.placement.problem import Problem, pose
-from seqopt.placement.solving import solve
+from seqopt.plan.calling.formulation import Formulation, formulations
+from seqopt.plan.judge.certificate import least
+from seqopt.plan.plan import Plan
+from seqopt.plan.solving import solve
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.three_robots import three_robot_loop

@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 
 from experiments.harness.results import RESULTS, markdown, two
-from seqopt.placement.formulation import formulations
+from seqopt.plan.calling.formulation import formulations
 
 FREE = {
     "overlap_dp": "the least sum (the default)",

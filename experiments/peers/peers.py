@@ -38,9 +38,9 @@ from experiments.peers.parts.workload import PATHS, SETTINGS, SLOW, Case, produc
 from seqopt.arrays import Floats
 from seqopt.engines.interface import Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.graph.layers.layers import Problem
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
-from seqopt.placement.problem import Problem
 from seqopt.report.style import BLUE, GRAY, SMALL, VERMILION, name_panels, new_figure, plain, styled
 from seqopt.scene.scene_file import load_scene
 from seqopt.study.published import paper_models

@@ -38,13 +38,13 @@ from matplotlib.figure import Figure
 from experiments.harness.claim import Claim, Finding, Options
 from experiments.harness.results import drawn
 from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.graph.layers.layers import Problem, pose
+from seqopt.graph.layers.ranking import move_costs, rank_of
 from seqopt.network.build import build_network
-from seqopt.placement.formulation import find_formulation
-from seqopt.placement.problem import Problem, pose
-from seqopt.placement.ranking import move_costs, rank_of
-from seqopt.placement.requirements import Criterion
-from seqopt.placement.scales import SceneFacts
-from seqopt.placement.solving import solve
+from seqopt.plan.calling.formulation import find_formulation
+from seqopt.plan.solving import solve
+from seqopt.problem.requirements import Criterion
+from seqopt.problem.scales import SceneFacts
 from seqopt.report.style import dress, looks, new_figure, styled
 from seqopt.report.wording import in_words
 from seqopt.scene.scenarios import shifted, stiffened, weighed

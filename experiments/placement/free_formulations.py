@@ -25,16 +25,16 @@ from experiments.harness.claim import Claim, Finding, Options, Times, on_this_ru
 from experiments.harness.results import RESULTS
 from experiments.harness.runs import scene_named
 from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.graph.states.states import pose_free
 from seqopt.network.build import build_network
-from seqopt.placement.formulation import FormulationKind
-from seqopt.placement.free_plan import FreePlan
-from seqopt.placement.free_problem import pose_free
-from seqopt.placement.schedule_formulation import (
+from seqopt.plan.calling.formulation import FormulationKind
+from seqopt.plan.calling.schedule_formulation import (
     Finds,
     find_schedule_formulation,
     schedule_formulation_names,
 )
-from seqopt.placement.solving import solve
+from seqopt.plan.free_plan import FreePlan
+from seqopt.plan.solving import solve
 from seqopt.sequence.free_rules import FreeRules
 from seqopt.study.presets import CRITERIA
 

@@ -24,11 +24,11 @@ from experiments.harness.claim import Claim, Finding, Options
 from experiments.harness.results import stored
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import StepError
+from seqopt.graph.layers.layers import pose
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
-from seqopt.placement.formulation import FormulationKind, formulations
-from seqopt.placement.problem import pose
-from seqopt.placement.solving import solve
+from seqopt.plan.calling.formulation import FormulationKind, formulations
+from seqopt.plan.solving import solve
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.study.presets import CRITERIA

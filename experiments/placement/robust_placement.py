@@ -37,21 +37,21 @@ from matplotlib.figure import Figure
 from experiments.harness.claim import Claim, Finding, Options, Times, on_this_run
 from experiments.harness.results import drawn, stored
 from experiments.harness.scenes import half_circle
-from formulations.scenario_program import solve_program
+from formulations.scenarios.scenario_program import solve_program
 from seqopt.engines.registry import make_engine
+from seqopt.graph.layers.interface import Aim
+from seqopt.graph.layers.layers import Problem, pose
+from seqopt.graph.scenarios.aims import WORST_PEAK, WORST_TOTAL, RobustAim, cvar
+from seqopt.graph.scenarios.arcs import Choice
+from seqopt.graph.scenarios.scenarios import RobustProblem, robust
 from seqopt.network.build import build_network
-from seqopt.placement.in_order import solve_in_order
-from seqopt.placement.interface import Aim
-from seqopt.placement.problem import Problem, pose
-from seqopt.placement.requirements import Criterion
-from seqopt.placement.robust_aim import WORST_PEAK, WORST_TOTAL, RobustAim, cvar
-from seqopt.placement.robust_plan import RobustPlan, solve_robust
-from seqopt.placement.robust_problem import RobustProblem, robust
-from seqopt.placement.scenario_arcs import Choice
-from seqopt.placement.solving import solve
-from seqopt.placement.step_quantile import least_quantile
-from seqopt.placement.unseen import judge_unseen
-from seqopt.placement.watch import Watch
+from seqopt.plan.calling.watch import Watch
+from seqopt.plan.out_of_sample import judge_unseen
+from seqopt.plan.robust_plan import RobustPlan, solve_robust
+from seqopt.plan.search.in_order import solve_in_order
+from seqopt.plan.search.step_quantile import least_quantile
+from seqopt.plan.solving import solve
+from seqopt.problem.requirements import Criterion
 from seqopt.report.style import BLUE, GRAY, VERMILION, dress, new_figure, styled
 from seqopt.scene.scenarios import scenarios
 from seqopt.scene.scene import Scene

@@ -37,10 +37,10 @@ from experiments.harness.results import drawn
 from seqopt.engines.interface import Engine, Fields
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.engines.rigid.ungripped import Ungripped, ungripped_system
+from seqopt.graph.layers.layers import pose
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
-from seqopt.placement.problem import pose
-from seqopt.placement.solving import solve
+from seqopt.plan.solving import solve
 from seqopt.report.style import BLUE, INK, VERMILION, dress, new_figure, styled
 from seqopt.responses.quantities import CHOSEN_BY, RESPONSES, TO_1E_3MM, lengths
 from seqopt.responses.staged import Placing, StagedState, next_state, staged_fields, state_fields

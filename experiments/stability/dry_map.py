@@ -70,15 +70,15 @@ from experiments.stability.parts.dry_models import (
     least_payload,
     reached,
 )
-from formulations.limit_analysis import compile_equilibrium
+from formulations.contact.limit_analysis import compile_equilibrium
 from seqopt.arrays import Ints
 from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import DRY, EPOXY, Mortar, bond_mortar
 from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.graph.layers.layers import pose
 from seqopt.network.build import build_network
 from seqopt.network.network import GROUND, Network
-from seqopt.placement.problem import pose
-from seqopt.placement.solving import solve
+from seqopt.plan.solving import solve
 from seqopt.responses.table import analyze, force_column
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.steps import Step

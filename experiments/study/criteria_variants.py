@@ -32,12 +32,12 @@ from experiments.harness.claim import Claim, Finding, Options
 from experiments.harness.results import drawn
 from seqopt.arrays import Floats
 from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.graph.layers.layers import Problem, pose
+from seqopt.graph.layers.ranking import TIED, rank_choice, rank_of
 from seqopt.network.build import build_network
-from seqopt.placement.criteria import RankSum
-from seqopt.placement.problem import Problem, pose
-from seqopt.placement.ranking import TIED, rank_choice, rank_of
-from seqopt.placement.ranks import mean_ranks
-from seqopt.placement.terms import equal
+from seqopt.problem.criteria import RankSum
+from seqopt.problem.ranks import mean_ranks
+from seqopt.problem.terms import equal
 from seqopt.report.style import BLUE, GRAY, GREEN, PURPLE, VERMILION, dress, new_figure, styled
 from seqopt.responses.choices import StepChoices
 from seqopt.scene.scene_file import load_scene

@@ -11,9 +11,9 @@ from types import ModuleType
 from typing import Any, NoReturn
 
 from seqopt.cli.hints import first_wrong, nearest
-from seqopt.cli.layout import columns, wrapped
+from seqopt.cli.saying.layout import columns, wrapped
+from seqopt.cli.saying.terminal import complain, show
 from seqopt.cli.status import Status
-from seqopt.cli.terminal import complain, show
 
 
 def _layout(prog: str) -> argparse.HelpFormatter:
@@ -38,16 +38,18 @@ class Command:
 
 
 COMMANDS = {
-    "compare": Command("show all ways to build a scene side by side", "compare"),
-    "optimize": Command("choose where robots hold, and write the plan", "optimize"),
-    "pareto": Command("find all plans that no other one beats in every aim", "pareto"),
-    "analyze": Command("compute forces and displacements in every step", "analyze"),
-    "assess": Command("prove which steps stand, and with what margins", "assess"),
-    "report": Command("make a page that shows plans step by step", "report"),
-    "scene": Command("check, describe, export or list scenes", "scene"),
-    "import": Command("make a scene of an assembly of COMPAS, a mesh or a table", "importing"),
-    "export": Command("write a plan in a format of others", "exporting"),
-    "completion": Command("let the shell complete words of seqopt", "completion"),
+    "compare": Command("show all ways to build a scene side by side", "commands.compare"),
+    "optimize": Command("choose where robots hold, and write the plan", "commands.optimize"),
+    "pareto": Command("find all plans that no other one beats in every aim", "commands.pareto"),
+    "analyze": Command("compute forces and displacements in every step", "commands.analyze"),
+    "assess": Command("prove which steps stand, and with what margins", "commands.assess"),
+    "report": Command("make a page that shows plans step by step", "commands.report"),
+    "scene": Command("check, describe, export or list scenes", "commands.scene"),
+    "import": Command(
+        "make a scene of an assembly of COMPAS, a mesh or a table", "commands.importing"
+    ),
+    "export": Command("write a plan in a format of others", "commands.exporting"),
+    "completion": Command("let the shell complete words of seqopt", "commands.completion"),
 }
 
 

@@ -6,11 +6,11 @@ import sys
 from collections.abc import Sequence
 from contextlib import suppress
 
-from seqopt.cli.answer import Answer, print_answer
 from seqopt.cli.arguments import COMMANDS, asked_command, parser
 from seqopt.cli.hints import EXAMPLES
+from seqopt.cli.saying.answer import Answer, print_answer
+from seqopt.cli.saying.terminal import flush, quiet_numbers, show, silence
 from seqopt.cli.status import Status, status_of
-from seqopt.cli.terminal import flush, quiet_numbers, show, silence
 from seqopt.errors import SeqoptError
 
 
@@ -40,7 +40,7 @@ def load(words: Sequence[str]) -> None:
     """
     asked = asked_command(words)
     if asked in COMMANDS:
-        import seqopt.cli.watcher  # noqa: F401, PLC0415  # of which help needs nothing
+        import seqopt.cli.saying.watcher  # noqa: F401, PLC0415  # of which help needs nothing
 
         COMMANDS[asked].load()
 
@@ -53,7 +53,7 @@ def _run(words: Sequence[str]) -> int:
         options = parser(asked_command(words)).parse_args(words)
     except SystemExit as stop:  # the parser has said why, or printed its help
         return int(stop.code or 0)
-    from seqopt.cli.watcher import Watcher  # noqa: PLC0415  # of which help needs nothing
+    from seqopt.cli.saying.watcher import Watcher  # noqa: PLC0415  # of which help needs nothing
 
     with quiet_numbers(quiet=options.quiet), Watcher(shows=not options.quiet) as options.tell:
         answer: Answer = COMMANDS[options.command].load().run(options)

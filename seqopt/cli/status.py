@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from enum import IntEnum
 
-from seqopt.cli.terminal import complain
+from seqopt.cli.saying.terminal import complain
 from seqopt.errors import (
     InfeasibleError,
     MechanismError,

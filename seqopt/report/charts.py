@@ -13,8 +13,8 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import LogFormatter, MaxNLocator, ScalarFormatter
 
 from seqopt.engines.interface import Engine
-from seqopt.placement.front import Front
-from seqopt.placement.plan import Plan
+from seqopt.plan.front import Front
+from seqopt.plan.plan import Plan
 from seqopt.report.comparison import LARGEST, Comparison, in_shown_unit, worst_of
 from seqopt.report.gantt import gantt_picture
 from seqopt.report.page import Build

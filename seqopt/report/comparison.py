@@ -11,20 +11,20 @@ import pandas as pd
 from seqopt.arrays import Terse
 from seqopt.engines.interface import Engine
 from seqopt.errors import ProblemError, SeqoptError, StepError
-from seqopt.placement.certificate import least_sum
-from seqopt.placement.costs import TINY
-from seqopt.placement.criteria import RankSum, WorstRatio
-from seqopt.placement.formulation import formulations
-from seqopt.placement.free_plan import FreePlan
-from seqopt.placement.free_problem import pose_free
-from seqopt.placement.interface import Aim
-from seqopt.placement.objectives import under_both
-from seqopt.placement.plan import Plan
-from seqopt.placement.problem import Problem, pose
-from seqopt.placement.promises import overloads
-from seqopt.placement.ranking import rank_choice
-from seqopt.placement.requirements import Criterion
-from seqopt.placement.solving import on_the_way, solve
+from seqopt.graph.layers.costs import TINY
+from seqopt.graph.layers.interface import Aim
+from seqopt.graph.layers.layers import Problem, pose
+from seqopt.graph.layers.objectives import under_both
+from seqopt.graph.layers.ranking import rank_choice
+from seqopt.graph.states.states import pose_free
+from seqopt.plan.calling.formulation import formulations
+from seqopt.plan.free_plan import FreePlan
+from seqopt.plan.judge.certificate import least_sum
+from seqopt.plan.plan import Plan
+from seqopt.plan.solving import on_the_way, solve
+from seqopt.problem.criteria import RankSum, WorstRatio
+from seqopt.problem.overloads import overloads
+from seqopt.problem.requirements import Criterion
 from seqopt.responses.linear_range import Departure, LinearRange
 from seqopt.responses.quantities import CHOSEN_BY, RESPONSES, robot_response
 from seqopt.responses.resources import Resources

@@ -16,13 +16,13 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from seqopt.errors import ExtraError, ProblemError
+from seqopt.graph.layers.layers import Problem
+from seqopt.graph.orders.orders import OrderProblem
+from seqopt.graph.scenarios.scenarios import RobustProblem
+from seqopt.graph.states.states import FreeProblem
 from seqopt.network.network import Network
-from seqopt.placement.free_problem import FreeProblem
-from seqopt.placement.order_problem import OrderProblem
-from seqopt.placement.problem import Problem
-from seqopt.placement.requirements import Limit
-from seqopt.placement.robust_problem import RobustProblem
-from seqopt.placement.shown_build import ShownBuild
+from seqopt.plan.build import ShownBuild
+from seqopt.problem.requirements import Limit
 from seqopt.report.comparison import largest
 from seqopt.report.pages import WORDS
 from seqopt.report.wording import typed

@@ -25,7 +25,7 @@ from seqopt.engines.interface import Engine, Want
 from seqopt.errors import ProblemError
 from seqopt.files import csv_text
 from seqopt.network.network import GROUND, Network, PartKind
-from seqopt.placement.promises import Excess, overloads
+from seqopt.problem.overloads import Excess, overloads
 from seqopt.responses.linear_range import OUTSIDE, Departure
 from seqopt.responses.quantities import number_text
 from seqopt.responses.table import force_column

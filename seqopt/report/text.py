@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 import pandas as pd
 
-from seqopt.placement.requirements import Criterion
+from seqopt.problem.requirements import Criterion
 from seqopt.report.comparison import LARGEST, Comparison, LoopFacts
 from seqopt.scene.scene import Scene
 

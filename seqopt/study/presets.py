@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from seqopt.engines.discrete.system import BedStiffness
 from seqopt.errors import ProblemError, did_you_mean
-from seqopt.placement.criteria import (
+from seqopt.problem.criteria import (
     OVER_METHODS,
     WORST_OVER_METHODS,
     RankSum,
     WeightedSum,
     WorstRatio,
 )
-from seqopt.placement.requirements import Criterion
-from seqopt.placement.terms import equal
+from seqopt.problem.requirements import Criterion
+from seqopt.problem.terms import equal
 from seqopt.scene.parts import Anywhere, Robot, Side
 
 ROBOTS = (

@@ -6,7 +6,7 @@ from importlib import resources
 
 import pandas as pd
 
-from seqopt.placement.problem import Problem
+from seqopt.graph.layers.layers import Problem
 from seqopt.responses.quantities import RESPONSES
 from seqopt.responses.table import support_columns
 from seqopt.scene.scene import Scene

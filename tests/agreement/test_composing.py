@@ -17,15 +17,15 @@ import seqopt
 from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import find_mortar
 from seqopt.errors import InfeasibleError, StepError
-from seqopt.placement.formulation import FormulationKind
-from seqopt.placement.free_problem import pose_free, within
-from seqopt.placement.requirements import LIMIT_TOLERANCE, Limit
-from seqopt.placement.robust_problem import robust
-from seqopt.placement.schedule_formulation import (
+from seqopt.graph.scenarios.scenarios import robust
+from seqopt.graph.states.states import pose_free, within
+from seqopt.plan.calling.formulation import FormulationKind
+from seqopt.plan.calling.schedule_formulation import (
     Finds,
     find_schedule_formulation,
     schedule_formulation_names,
 )
+from seqopt.problem.requirements import LIMIT_TOLERANCE, Limit
 from seqopt.sequence.free_rules import FreeRules, with_robots
 from seqopt.sequence.schedule import thin
 from seqopt.sequence.schedule_file import parse_schedule

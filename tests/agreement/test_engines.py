@@ -14,8 +14,8 @@ from seqopt.engines.interface import Want, grip_columns
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.engines.rigid.mixed import solve_dense
 from seqopt.errors import MechanismError, SolverError
+from seqopt.graph.layers.layers import pose
 from seqopt.network.build import build_network
-from seqopt.placement.problem import pose
 from seqopt.responses.table import step_fields
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.sequence.two_robots import METHODS

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from experiments.stability.parts.blocks import ring, stack
-from formulations.limit_analysis import compile_equilibrium
+from formulations.contact.limit_analysis import compile_equilibrium
 from seqopt.contact.mortar import Mortar
 from seqopt.stability.assessment import bonded
 from seqopt.stability.prover import Prover

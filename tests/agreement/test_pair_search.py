@@ -14,18 +14,18 @@ from hypothesis import strategies as st
 from seqopt.cli.main import main
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
+from seqopt.graph.layers.costs import LayeredCosts
+from seqopt.graph.layers.interface import Aim, CostProblem
+from seqopt.graph.layers.layers import pose
+from seqopt.graph.layers.partial_costs import PartialCosts, least_possible
 from seqopt.network.build import build_network
-from seqopt.placement.certificate import certify_partial
-from seqopt.placement.costs import LayeredCosts
-from seqopt.placement.formulation import End, Selection
-from seqopt.placement.interface import Aim, CostProblem
-from seqopt.placement.own_criterion import StepCost
-from seqopt.placement.partial_costs import PartialCosts, least_possible
-from seqopt.placement.problem import pose
-from seqopt.placement.ranks import Among, Ranked
-from seqopt.placement.requirements import Limit
-from seqopt.placement.solving import solve
-from seqopt.placement.window_search import search_windows
+from seqopt.plan.calling.formulation import End, Selection
+from seqopt.plan.judge.certificate import certify_partial
+from seqopt.plan.search.window_search import search_windows
+from seqopt.plan.solving import solve
+from seqopt.problem.own_criterion import StepCost
+from seqopt.problem.ranks import Among, Ranked
+from seqopt.problem.requirements import Limit
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.study.presets import EQUATIONS, WEIGHTED, WORST_RATIO
 from tests.builders import far_reaching

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, reject, settings
 from hypothesis import strategies as st
 
-from formulations.limit_analysis import compile_equilibrium
+from formulations.contact.limit_analysis import compile_equilibrium
 from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import DRY, Mortar, bond_mortar
 from seqopt.errors import SceneError

@@ -8,12 +8,12 @@ from hypothesis import given
 from seqopt.engines.interface import Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import SolverError, TimeUpError
+from seqopt.graph.layers.layers import pose
 from seqopt.network.build import build_network
-from seqopt.placement.problem import pose
-from seqopt.placement.requirements import Limit
-from seqopt.placement.solving import solve
-from seqopt.placement.watch import Watch
-from seqopt.placement.window_search import search_windows
+from seqopt.plan.calling.watch import Watch
+from seqopt.plan.search.window_search import search_windows
+from seqopt.plan.solving import solve
+from seqopt.problem.requirements import Limit
 from seqopt.responses.choices import window_models
 from seqopt.sequence.three_robots import SCHEDULES, three_robot_loop
 from seqopt.study.presets import CRITERIA, EQUATIONS, WEIGHTED

@@ -8,9 +8,9 @@ from contextlib import redirect_stdout
 
 import pytest
 
-from seqopt.cli.completion import words
+from seqopt.cli.commands.completion import words
 from seqopt.cli.main import main
-from seqopt.placement.formulation import formulation_names
+from seqopt.plan.calling.formulation import formulation_names
 
 ASK = {
     "bash": """

@@ -13,8 +13,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from seqopt.cli import analyze as analyze_command
 from seqopt.cli.arguments import parser
+from seqopt.cli.commands import analyze as analyze_command
 from seqopt.cli.main import main
 from seqopt.responses.table import analyze, step_fields
 from seqopt.scene.scene_file import save_scene

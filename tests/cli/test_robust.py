@@ -8,8 +8,8 @@ import math
 import pandas as pd
 import pytest
 
+from seqopt.cli.commands.robust import _plain
 from seqopt.cli.main import main
-from seqopt.cli.robust import _plain
 from seqopt.scene.scene_file import save_scene
 from tests.builders import six_bricks
 

@@ -9,11 +9,11 @@ import sys
 
 import pytest
 
-from seqopt.cli import watcher
-from seqopt.cli.layout import colored, columns, painted, wrapped
 from seqopt.cli.main import main
-from seqopt.cli.terminal import complain, note, show_text
-from seqopt.cli.watcher import Watcher
+from seqopt.cli.saying import watcher
+from seqopt.cli.saying.layout import colored, columns, painted, wrapped
+from seqopt.cli.saying.terminal import complain, note, show_text
+from seqopt.cli.saying.watcher import Watcher
 from seqopt.work.progress import Stage, told, within
 
 posix = pytest.mark.skipif(os.name != "posix", reason="terminals are POSIX's")

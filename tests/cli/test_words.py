@@ -10,7 +10,7 @@ import pytest
 
 import seqopt
 from seqopt.cli.arguments import COMMANDS, parser
-from seqopt.cli.completion import _commands
+from seqopt.cli.commands.completion import _commands
 from seqopt.cli.hints import EXAMPLES
 from seqopt.cli.main import main
 from tests.builders import ROOT

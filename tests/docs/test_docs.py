@@ -13,7 +13,7 @@ import pytest
 from experiments.harness.results import RESULTS, markdown, two
 from experiments.harness.stated import stated
 from seqopt.cli.main import main
-from seqopt.placement.formulation import exhibits, formulations
+from seqopt.plan.calling.formulation import exhibits, formulations
 from tests.browser import browsed
 from tests.builders import ROOT
 from tests.docs.site_links import broken

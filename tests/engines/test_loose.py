@@ -24,8 +24,8 @@ from seqopt.engines.rigid.refinement import Corrector, Refinement, held_operator
 from seqopt.engines.rigid.trial import solve_batch
 from seqopt.engines.rigid.ungripped import ungripped_system
 from seqopt.errors import MechanismError, SolverError
+from seqopt.graph.layers.layers import pose
 from seqopt.network.build import build_network
-from seqopt.placement.problem import pose
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.study.presets import EQUATIONS

@@ -14,7 +14,7 @@ from experiments.study.criteria_variants import (
     placed,
     rules,
 )
-from seqopt.placement.problem import pose
+from seqopt.graph.layers.layers import pose
 from seqopt.study.presets import EQUATIONS
 from seqopt.study.published import published_choice
 

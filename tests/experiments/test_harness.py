@@ -43,7 +43,7 @@ from experiments.placement.speed_accuracy import (
     specs,
     summarize,
 )
-from seqopt.placement.formulation import formulations
+from seqopt.plan.calling.formulation import formulations
 from tests.builders import ROOT
 
 STAGES = ["assemble", "respond", "rank", "compile", "solve", "verify"]

@@ -13,20 +13,20 @@ from hypothesis import strategies as st
 
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
+from seqopt.graph.layers.budgets import robot_use, steps_over, travel
+from seqopt.graph.layers.costs import Budget, LayeredCosts
+from seqopt.graph.layers.interface import Aim, CostProblem
+from seqopt.graph.layers.layers import pose
 from seqopt.network.build import build_network
-from seqopt.placement.budgets import robot_use, steps_over, travel
-from seqopt.placement.costs import Budget, LayeredCosts
-from seqopt.placement.formulation import (
+from seqopt.plan.calling.formulation import (
     End,
     FormulationKind,
     exhibits,
     find_formulation,
     formulations,
 )
-from seqopt.placement.interface import Aim, CostProblem
-from seqopt.placement.problem import pose
-from seqopt.placement.requirements import Limit
-from seqopt.placement.solving import solve
+from seqopt.plan.solving import solve
+from seqopt.problem.requirements import Limit
 from seqopt.sequence.three_robots import SCHEDULES, three_robot_loop
 from seqopt.study.presets import CRITERIA, EQUATIONS, WORST_RATIO
 from tests.builders import small_arch
@@ -173,7 +173,7 @@ def test_an_answer_stopped_early_is_allowed_and_its_bound_holds(name, problem, l
     best = brute_force(problem, formulation.aim)
     told = []
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("seqopt.placement.watch.time", Clock())
+        patch.setattr("seqopt.plan.calling.watch.time", Clock())
         plan, wrongly_refused = None, False
         try:
             plan = solve(problem, formulation, time_limit=float(limit), progress=told.append)

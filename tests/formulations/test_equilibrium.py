@@ -14,10 +14,10 @@ import cvxpy as cp
 import numpy as np
 import pytest
 
-import formulations.limit_analysis
+import formulations.contact.limit_analysis
 from experiments.stability.parts.blocks import stack
 from formulations.cones import CONE_OPTIONS, ENDS, SECONDS, solve_cones
-from formulations.limit_analysis import compile_equilibrium
+from formulations.contact.limit_analysis import compile_equilibrium
 from formulations.solvers import GAPS, minimize, minimize_whole
 from seqopt.stability.limit_analysis import CAP, Case, Claim, Sense, limits
 from tests.builders import held
@@ -193,13 +193,13 @@ def test_how_a_solver_says_that_it_ended(monkeypatch, status):
 
 def test_the_first_attempt_is_the_first_and_has_its_authors_scaling(monkeypatch):
     given = []
-    solved = formulations.limit_analysis.solve_cones
+    solved = formulations.contact.limit_analysis.solve_cones
 
     def attempted(*words):
         given.append(words[-1])
         return solved(*words)
 
-    monkeypatch.setattr("formulations.limit_analysis.solve_cones", attempted)
+    monkeypatch.setattr("formulations.contact.limit_analysis.solve_cones", attempted)
     program = compile_equilibrium(CUBE)
     for attempts in ((), (0,), (1,)):
         program(case(Sense.LARGEST), *attempts)

@@ -10,22 +10,22 @@ import numpy as np
 import pytest
 from hypothesis import example, given, settings
 
-from formulations.on_graph import Choice, on_graph, on_paths, worth
+from formulations.states.on_graph import Choice, on_graph, on_paths, worth
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError, TimeUpError
 from seqopt.graph.paths import fewest_moves, lexicographic
+from seqopt.graph.states.states import pose_free
+from seqopt.graph.states.visits import explore
 from seqopt.network.build import build_network
-from seqopt.placement.formulation import FormulationKind
-from seqopt.placement.free_problem import pose_free
-from seqopt.placement.free_states import explore
-from seqopt.placement.requirements import Limit
-from seqopt.placement.schedule_formulation import (
+from seqopt.plan.calling.formulation import FormulationKind
+from seqopt.plan.calling.schedule_formulation import (
     Finds,
     find_schedule_formulation,
     schedule_formulation_names,
 )
-from seqopt.placement.solving import solve
-from seqopt.placement.watch import Watch
+from seqopt.plan.calling.watch import Watch
+from seqopt.plan.solving import solve
+from seqopt.problem.requirements import Limit
 from seqopt.sequence.free_rules import FreeRules, with_robots
 from tests.brute_force import ONES, best_values
 from tests.builders import from_both_sides, small_arch
@@ -174,8 +174,8 @@ def test_where_time_is_over_a_bound_is_left(name, aim, monkeypatch):
         def __init__(self, *_):
             super().__init__(0.0)
 
-    monkeypatch.setattr("formulations.on_graph.watched", lambda *_: lambda _: None)
-    monkeypatch.setattr("formulations.on_graph.Watch", Late)
+    monkeypatch.setattr("formulations.states.on_graph.watched", lambda *_: lambda _: None)
+    monkeypatch.setattr("formulations.states.on_graph.Watch", Late)
     plan, best = solve(posed(aim, (5, 2)), name), known((5, 2), aim)
     assert (plan.status, plan.selection.stopped) == ("feasible", "time")
     assert plan.selection.bound[0] <= best[0] * (1 + 1e-9)

@@ -11,21 +11,21 @@ import pytest
 from hypothesis import given, settings
 
 import seqopt
-from formulations.order_search import FORMULATION
+from formulations.states.order_search import FORMULATION
 from seqopt.contact.mortar import find_mortar
 from seqopt.errors import InfeasibleError, ProblemError, SolverError, TimeUpError
-from seqopt.placement.criteria import WorstRatio
-from seqopt.placement.free_problem import pose_free, within
-from seqopt.placement.order_bound import whole_bound
-from seqopt.placement.order_plan import solve_order
-from seqopt.placement.order_problem import OrderProblem, OrderSelection
-from seqopt.placement.order_proof import finds_better_order
-from seqopt.placement.order_work import trying
-from seqopt.placement.own_criterion import StepCost
-from seqopt.placement.robust_problem import robust
-from seqopt.placement.schedule_formulation import find_schedule_formulation
-from seqopt.placement.solving import solve
-from seqopt.placement.standing import Standing
+from seqopt.graph.orders.bound import whole_bound
+from seqopt.graph.orders.orders import OrderProblem, OrderSelection
+from seqopt.graph.orders.work import trying
+from seqopt.graph.scenarios.scenarios import robust
+from seqopt.graph.states.states import pose_free, within
+from seqopt.plan.calling.schedule_formulation import find_schedule_formulation
+from seqopt.plan.judge.orders import finds_better_order
+from seqopt.plan.order_plan import solve_order
+from seqopt.plan.solving import solve
+from seqopt.problem.criteria import WorstRatio
+from seqopt.problem.own_criterion import StepCost
+from seqopt.problem.standing import Standing
 from seqopt.responses.resources import Resources
 from seqopt.scene.library.wall import WallShape, wall
 from seqopt.sequence.free_rules import FreeRules

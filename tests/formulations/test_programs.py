@@ -10,15 +10,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import formulations.beam
-import formulations.rank_search
+import formulations.layers.beam
+import formulations.layers.rank_search
 from formulations.solvers import anatomy, minimize, minimize_whole
 from seqopt.errors import InfeasibleError, ProblemError
-from seqopt.placement.costs import LayeredCosts
-from seqopt.placement.formulation import End, FormulationKind, Reads
-from seqopt.placement.formulation import formulations as registered
-from seqopt.placement.interface import Aim, CostProblem
-from seqopt.placement.watch import Watch
+from seqopt.graph.layers.costs import LayeredCosts
+from seqopt.graph.layers.interface import Aim, CostProblem
+from seqopt.plan.calling.formulation import End, FormulationKind, Reads
+from seqopt.plan.calling.formulation import formulations as registered
+from seqopt.plan.calling.watch import Watch
 from tests.strategies import problems
 
 ALL = registered()
@@ -216,9 +216,9 @@ def test_exact_ones_on_costs_of_any_sign(seed):
 def test_how_much_is_enumerated_at_once(monkeypatch):
     free = tuple(np.zeros(2) for _ in range(3))
     problem = CostProblem(LayeredCosts(free, (np.zeros((1, 2)), np.eye(2), np.eye(2))))
-    monkeypatch.setattr(formulations.rank_search, "MOST", 8)
+    monkeypatch.setattr(formulations.layers.rank_search, "MOST", 8)
     assert ALL["rank_search"].solve(problem, horizon=9).choice == (0, 1, 0)
-    monkeypatch.setattr(formulations.rank_search, "MOST", 7)
+    monkeypatch.setattr(formulations.layers.rank_search, "MOST", 7)
     assert ALL["rank_search"].solve(problem, horizon=2).choice == (0, 1, 0)
     with pytest.raises(ProblemError, match=r"8 combinations of 3 moves; .*\(at most 7e\+00 are"):
         ALL["rank_search"].solve(problem, horizon=9)
@@ -240,7 +240,7 @@ class Counting(Watch):
 def test_a_beam_says_whether_it_came_to_its_end():
     flat = [np.zeros((1, 2)), np.ones((2, 2)), np.ones((2, 2))]
     problem = CostProblem(LayeredCosts(single=[np.array([0.0, 1.0])] * 3, shared=flat))
-    beam = formulations.beam.solve
+    beam = formulations.layers.beam.solve
     assert beam(problem).end is End.DONE
     assert beam(problem, watch=Counting(4)).end is End.STOPPED  # the greedy search alone is done
     assert beam(problem, watch=Counting(1)).end is not End.DONE

@@ -20,16 +20,16 @@ from seqopt.engines.interface import Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError, StepError, TimeUpError
 from seqopt.graph.paths import fewest_moves, keep_best, reached
+from seqopt.graph.states.counts import steps_with, with_held
+from seqopt.graph.states.states import pose_free
+from seqopt.graph.states.visits import explore
 from seqopt.network.build import build_network
-from seqopt.placement.criteria import WorstRatio
-from seqopt.placement.free_counts import steps_with, with_held
-from seqopt.placement.free_front import FreeFront
-from seqopt.placement.free_judge import judge_schedule, plan_values
-from seqopt.placement.free_problem import pose_free
-from seqopt.placement.free_states import explore
-from seqopt.placement.front import find_front, pick, upper_bounds
-from seqopt.placement.requirements import Limit
-from seqopt.placement.schedule_formulation import Finds, find_schedule_formulation
+from seqopt.plan.calling.schedule_formulation import Finds, find_schedule_formulation
+from seqopt.plan.free_front import FreeFront
+from seqopt.plan.front import find_front, pick, upper_bounds
+from seqopt.plan.judge.schedules import judge_schedule, plan_values
+from seqopt.problem.criteria import WorstRatio
+from seqopt.problem.requirements import Limit
 from seqopt.sequence.free_rules import FreeRules, with_robots
 from seqopt.sequence.three_robots import modified_sequential, three_robot_loop
 from tests.brute_force import FOUR, ONES, least_peak, peaks, whole_graph
@@ -349,7 +349,7 @@ def test_a_time_limit_holds_while_it_is_asked_what_helps(monkeypatch, limit, sai
     """What is known by then is said."""
     engine = ComplianceEngine(build_network(small_arch(5)))
     problem = pose_free(engine, FreeRules(), ONES, "steps", [Limit("F_largest", 1.0)])
-    monkeypatch.setattr("seqopt.placement.free_infeasible.time", Clock())
+    monkeypatch.setattr("seqopt.plan.judge.infeasible.time", Clock())
     with pytest.raises(InfeasibleError, match=said):
         seqopt.solve(problem, "schedule_search", time_limit=limit)
 

@@ -14,11 +14,11 @@ from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import DRY, find_mortar
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError, StepError
+from seqopt.graph.states.states import pose_free, within
 from seqopt.network.build import build_network
-from seqopt.placement.criteria import WorstRatio
-from seqopt.placement.free_judge import judge_schedule
-from seqopt.placement.free_problem import pose_free, within
-from seqopt.placement.requirements import Limit
+from seqopt.plan.judge.schedules import judge_schedule
+from seqopt.problem.criteria import WorstRatio
+from seqopt.problem.requirements import Limit
 from seqopt.responses.quantities import CHOSEN_BY
 from seqopt.sequence.free_rules import with_robots
 from seqopt.sequence.schedule_file import parse_schedule

@@ -12,21 +12,21 @@ import pytest
 from hypothesis import given, reject, settings
 
 import seqopt
-from formulations.limit_analysis import compile_equilibrium
+from formulations.contact.limit_analysis import compile_equilibrium
 from seqopt.contact.faces import bare_assembly, step_assembly
 from seqopt.contact.mortar import DRY, find_mortar
 from seqopt.engines.interface import Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, MechanismError, ProblemError, SceneError, SolverError
+from seqopt.graph.states.states import pose_free
 from seqopt.network.build import build_network
-from seqopt.placement.criteria import WorstRatio
-from seqopt.placement.free_front import FreeFront
-from seqopt.placement.free_infeasible import worst_least
-from seqopt.placement.free_judge import judge_schedule
-from seqopt.placement.free_problem import pose_free
-from seqopt.placement.front import find_front
-from seqopt.placement.requirements import LIMIT_TOLERANCE
-from seqopt.placement.standing import Standing, StandingSets, without_implied
+from seqopt.plan.free_front import FreeFront
+from seqopt.plan.front import find_front
+from seqopt.plan.judge.infeasible import worst_least
+from seqopt.plan.judge.schedules import judge_schedule
+from seqopt.problem.criteria import WorstRatio
+from seqopt.problem.requirements import LIMIT_TOLERANCE
+from seqopt.problem.standing import Standing, StandingSets, without_implied
 from seqopt.responses.quantities import CHOSEN_BY, lengths
 from seqopt.sequence.free_check import RuleBook
 from seqopt.sequence.free_rules import FreeRules

@@ -24,11 +24,11 @@ from formulations.whole_program import (
     worst_pairs,
 )
 from seqopt.errors import InfeasibleError
-from seqopt.placement.costs import LayeredCosts
-from seqopt.placement.flow import ACCURACY
-from seqopt.placement.formulation import End
-from seqopt.placement.interface import CostProblem
-from seqopt.placement.watch import Watch
+from seqopt.graph.layers.costs import LayeredCosts
+from seqopt.graph.layers.interface import CostProblem
+from seqopt.plan.calling.flow import ACCURACY
+from seqopt.plan.calling.formulation import End
+from seqopt.plan.calling.watch import Watch
 
 PROGRAMS = {
     module.FORMULATION.name: module

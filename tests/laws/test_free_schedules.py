@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError
+from seqopt.graph.states.states import pose_free
 from seqopt.network.build import build_network
-from seqopt.placement.criteria import WorstRatio
-from seqopt.placement.free_problem import pose_free
-from seqopt.placement.solving import solve
+from seqopt.plan.solving import solve
+from seqopt.problem.criteria import WorstRatio
 from seqopt.scene.parts import Anywhere, Robot, Sphere
 from seqopt.sequence.free_rules import FreeRules
 from tests.builders import rescaled

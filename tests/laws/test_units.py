@@ -10,10 +10,10 @@ import pytest
 from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import DRY
 from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.graph.layers.layers import pose
 from seqopt.network.build import build_network
-from seqopt.placement.formulation import find_formulation
-from seqopt.placement.problem import pose
-from seqopt.placement.solving import solve
+from seqopt.plan.calling.formulation import find_formulation
+from seqopt.plan.solving import solve
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.sequence.two_robots import cantilever
 from seqopt.stability.assessment import assess

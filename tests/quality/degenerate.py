@@ -33,10 +33,10 @@ import numpy as np
 import pandas as pd
 
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
-from seqopt.placement.certificate import judge as certified
-from seqopt.placement.fitting import require_fit
-from seqopt.placement.formulation import Formulation, FormulationKind, formulations
-from seqopt.placement.interface import PlacementProblem
+from seqopt.graph.layers.interface import PlacementProblem
+from seqopt.plan.calling.fitting import require_fit
+from seqopt.plan.calling.formulation import Formulation, FormulationKind, formulations
+from seqopt.plan.judge.certificate import judge as certified
 from tests.quality.degenerate_cases import CASES, Case, Size, enumerated
 
 FULL, SMALL = Size(5, 4, 7), Size(3, 3, 6)

@@ -14,12 +14,12 @@ from experiments.harness.scenes import half_circle
 from seqopt.arrays import Floats
 from seqopt.engines.interface import Engine, Fields, Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.graph.layers.costs import Budget, LayeredCosts
+from seqopt.graph.layers.interface import Aim, CostProblem, PlacementProblem
+from seqopt.graph.layers.layers import Problem, pose
 from seqopt.network.network import Network
-from seqopt.placement.costs import Budget, LayeredCosts
-from seqopt.placement.criteria import WorstRatio
-from seqopt.placement.interface import Aim, CostProblem, PlacementProblem
-from seqopt.placement.problem import Problem, pose
-from seqopt.placement.requirements import Criterion, Limit
+from seqopt.problem.criteria import WorstRatio
+from seqopt.problem.requirements import Criterion, Limit
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.study.presets import EQUATIONS, RESOLUTION
 

@@ -46,15 +46,15 @@ TRIAL = "seqopt.engines.rigid.trial"
 OPERATOR = "seqopt.engines.rigid.operator"
 GROWTH = "seqopt.engines.rigid.growth"
 GRIPS = "seqopt.engines.rigid.grip_equations"
-COSTS, CERTIFICATE = "seqopt.placement.costs", "seqopt.placement.certificate"
-CRITERIA, RANKS = "seqopt.placement.criteria", "seqopt.placement.ranks"
+COSTS, CERTIFICATE = "seqopt.graph.layers.costs", "seqopt.plan.judge.certificate"
+CRITERIA, RANKS = "seqopt.problem.criteria", "seqopt.problem.ranks"
 LENGTHS = "both have a length: costs that have not are refused when they are made"
 EQUIVALENT = (
     *(
         Equivalent(module, line, "strict=True", "strict=False", why)
         for module, line, why in (
             ("formulations.*", "zip(", LENGTHS),
-            ("seqopt.placement.flow", "zip(", LENGTHS),
+            ("seqopt.plan.calling.flow", "zip(", LENGTHS),
             (COSTS, "enumerate(zip(", LENGTHS),
             (COSTS, "zip(self.single[-2::-1]", LENGTHS),
             (CERTIFICATE, "shared in zip(", LENGTHS),
@@ -70,17 +70,23 @@ EQUIVALENT = (
         "formulations.*", "if ", "shared[0][0]", "shared[0][-1]", "of one row the first is the last"
     ),
     Equivalent(
-        "formulations.rank_search", "while len(", "<", "!=", "no choice is longer than all moves"
+        "formulations.layers.rank_search",
+        "while len(",
+        "<",
+        "!=",
+        "no choice is longer than all moves",
     ),
     *(
         Equivalent(
-            "formulations.rank_search", "MOST", "20_000_000", size, "a bound on memory alone"
+            "formulations.layers.rank_search", "MOST", "20_000_000", size, "a bound on memory alone"
         )
         for size in ("20000001", "19999999")
     ),
-    Equivalent("formulations.cascade", "charge", "==", ">=", "it is later or earlier"),
-    Equivalent("formulations.cascade", "len(shared)", "<", "!=", "no move is beyond the last"),
-    Equivalent("formulations.minimax", "np.full(", "1", "2", "two equal ways are one"),
+    Equivalent("formulations.layers.cascade", "charge", "==", ">=", "it is later or earlier"),
+    Equivalent(
+        "formulations.layers.cascade", "len(shared)", "<", "!=", "no move is beyond the last"
+    ),
+    Equivalent("formulations.layers.minimax", "np.full(", "1", "2", "two equal ways are one"),
     Equivalent(COSTS, "== np.inf", "==", ">=", "nothing is larger than infinity"),
     Equivalent(COSTS, "== -np.inf", "==", "<=", "nothing is smaller than minus infinity"),
     Equivalent(COSTS, "out, before", "0", "-1", "of one row the first is the last"),
@@ -102,7 +108,9 @@ EQUIVALENT = (
     Equivalent(
         CERTIFICATE, "low, high", "- 1", "* 1", "the largest of all costs is never looked at"
     ),
-    Equivalent("seqopt.placement.flow", "known and", "== 1", "<= 1", "there is this one at least"),
+    Equivalent(
+        "seqopt.plan.calling.flow", "known and", "== 1", "<= 1", "there is this one at least"
+    ),
     *(
         Equivalent("formulations.cones", "SECONDS", "300.0", size, "when a solver has stalled")
         for size in ("299.0", "301.0")
@@ -177,7 +185,9 @@ EQUIVALENT = (
     Equivalent(GRIPS, "@cache", "@cache", "", "what is kept is made anew, and the same"),
     Equivalent(GROWTH, "AT_ONCE = 2**17", "2", "1", "how many are changed at a time"),
     Equivalent(COSTS, "given.flat[0]", "0", "-1", "all of these entries are one"),
-    Equivalent("formulations.beam", "len(met)", "==", ">=", "no more are met than were found"),
+    Equivalent(
+        "formulations.layers.beam", "len(met)", "==", ">=", "no more are met than were found"
+    ),
 )
 
 

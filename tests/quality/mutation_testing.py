@@ -53,21 +53,21 @@ RIGID = (
 CHOSEN = ("formulations/test_programs", "formulations/test_degenerate")
 STANDING = ("formulations/test_equilibrium", "validation/test_limit_analysis")
 PROOFS = {
-    "seqopt.placement.budget_proof": ("placement/test_proofs", "placement/test_budget_proof"),
-    "seqopt.placement.certificate": (
+    "seqopt.plan.judge.budget_proof": ("placement/test_proofs", "placement/test_budget_proof"),
+    "seqopt.plan.judge.certificate": (
         *("placement/test_certificate", "placement/test_values", "placement/test_proofs"),
         "agreement/test_pair_search",
     ),
-    "seqopt.placement.conflicts": ("placement/test_budget_proof", "placement/test_no_choice"),
+    "seqopt.plan.judge.conflicts": ("placement/test_budget_proof", "placement/test_no_choice"),
     "seqopt.graph.duality": ("graph/test_graph", "placement/test_free_proof"),
-    "seqopt.placement.free_proof": (
+    "seqopt.plan.judge.proof": (
         *("placement/test_proofs", "placement/test_free_proof", "placement/test_free_judge"),
     ),
-    "seqopt.placement.free_passable": ("placement/test_proofs", "placement/test_free_proof"),
-    "seqopt.placement.free_tables": ("placement/test_free_proof", "placement/test_proofs"),
-    "seqopt.placement.order_bound": ("formulations/test_order_search",),
-    "seqopt.placement.order_proof": ("placement/test_proofs", "formulations/test_order_search"),
-    "seqopt.placement.partial_costs": ("placement/test_proofs", "agreement/test_pair_search"),
+    "seqopt.plan.judge.passable": ("placement/test_proofs", "placement/test_free_proof"),
+    "seqopt.plan.judge.free_moves": ("placement/test_free_proof", "placement/test_proofs"),
+    "seqopt.graph.orders.bound": ("formulations/test_order_search",),
+    "seqopt.plan.judge.orders": ("placement/test_proofs", "formulations/test_order_search"),
+    "seqopt.graph.layers.partial_costs": ("placement/test_proofs", "agreement/test_pair_search"),
 }  # what says that nothing is better, or that there is nothing
 MODULES = {
     "seqopt.engines.rigid.compliance": (
@@ -81,21 +81,21 @@ MODULES = {
     "seqopt.engines.rigid.operator": RIGID,
     "seqopt.engines.rigid.grip_equations": RIGID,
     "seqopt.engines.rigid.growth": ("engines/test_operator", "engines/test_growth"),
-    "seqopt.placement.costs": ("placement/test_costs", "placement/test_values"),
+    "seqopt.graph.layers.costs": ("placement/test_costs", "placement/test_values"),
     **PROOFS,
-    "seqopt.placement.criteria": ("placement/test_criteria", "placement/test_problem"),
-    "seqopt.placement.ranks": ("placement/test_criteria", "placement/test_problem"),
-    "seqopt.placement.terms": ("placement/test_criteria", "placement/test_scales"),
-    "seqopt.placement.flow": ("placement/test_flow", "placement/test_values", *CHOSEN),
-    "formulations.beam": CHOSEN,
-    "formulations.cascade": CHOSEN,
-    "formulations.limit_analysis": STANDING,
+    "seqopt.problem.criteria": ("placement/test_criteria", "placement/test_problem"),
+    "seqopt.problem.ranks": ("placement/test_criteria", "placement/test_problem"),
+    "seqopt.problem.terms": ("placement/test_criteria", "placement/test_scales"),
+    "seqopt.plan.calling.flow": ("placement/test_flow", "placement/test_values", *CHOSEN),
+    "formulations.layers.beam": CHOSEN,
+    "formulations.layers.cascade": CHOSEN,
+    "formulations.contact.limit_analysis": STANDING,
     "formulations.cones": STANDING,
-    "formulations.minimax": CHOSEN,
-    "formulations.overlap_dp": CHOSEN,
-    "formulations.overlap_lp": CHOSEN,
-    "formulations.overlap_mip": CHOSEN,
-    "formulations.rank_search": CHOSEN,
+    "formulations.layers.minimax": CHOSEN,
+    "formulations.layers.overlap_dp": CHOSEN,
+    "formulations.layers.overlap_lp": CHOSEN,
+    "formulations.layers.overlap_mip": CHOSEN,
+    "formulations.layers.rank_search": CHOSEN,
     "formulations.whole_program": ("formulations/test_whole_program",),
     "formulations.solvers": (
         *("formulations/test_whole_program", "formulations/test_equilibrium"),
@@ -103,7 +103,7 @@ MODULES = {
     ),
 }
 LEAST = 0.95  # of the mutants that are not equivalent
-MOST, QUICK_MOST, QUICK = 60, 8, "seqopt.placement.ranks"
+MOST, QUICK_MOST, QUICK = 60, 8, "seqopt.problem.ranks"
 BROKEN = "\nraise RuntimeError\n"
 CONTROLS = {"as_it_is": "survived", "with_a_broken_line": "killed"}
 HOME = Path(__file__).resolve().parent

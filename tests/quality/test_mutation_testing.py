@@ -57,7 +57,7 @@ def test_annotations_texts_and_what_is_no_python_are_not(changes):
 def test_every_module_has_mutants_and_test_files():
     for module in MODULES:
         assert all((ROOT / name).exists() for name in files(module)), module
-    assert len(list(mutants("formulations.overlap_dp"))) > 20
+    assert len(list(mutants("formulations.layers.overlap_dp"))) > 20
 
 
 def mutant(module, before, after):
@@ -65,11 +65,11 @@ def mutant(module, before, after):
 
 
 def test_what_is_called_equivalent_is_one_change_of_one_line():
-    line, module = "for a, b in zip(x, y, strict=True):", "formulations.beam"
+    line, module = "for a, b in zip(x, y, strict=True):", "formulations.layers.beam"
     assert reason(mutant(module, line, line.replace("True", "False")))
     assert not reason(mutant(module, line, line.replace("a, b", "b, a")))
     assert not reason(mutant(module, line, line.replace("True", "False").replace("x", "z")))
-    costs = "seqopt.placement.costs"
+    costs = "seqopt.graph.layers.costs"
     assert reason(mutant(costs, "out, before = [], 0", "out, before = [], -1"))
     assert not reason(mutant(costs, "out, before = [], 0", "out, before = [], 1"))
     assert not reason(mutant(module, "out, before = [], 0", "out, before = [], -1"))
@@ -121,7 +121,7 @@ OUTCOMES = """
 from tests.quality.mutant_trials import limit, preload, trial
 from tests.quality.mutants import path_of
 preload()
-module, tests = "seqopt.placement.ranks", ["tests/placement/test_criteria.py"]
+module, tests = "seqopt.problem.ranks", ["tests/problem/test_criteria.py"]
 text = path_of(module).read_text(encoding="utf-8")
 line = "    flat = values.ravel()\\n"
 assert line in text

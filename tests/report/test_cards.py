@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 
 import seqopt
-from seqopt.placement.order_problem import OrderProblem
+from seqopt.graph.orders.orders import OrderProblem
 from seqopt.report.comparison import largest
 from seqopt.report.draw import ROBOT_COLORS
 from seqopt.report.notebook import card, facts

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from seqopt.engines.registry import make_engine
+from seqopt.graph.layers.budgets import travel
 from seqopt.network.build import build_network
-from seqopt.placement.budgets import travel
-from seqopt.placement.solving import solve
+from seqopt.plan.solving import solve
 from seqopt.report.charts import comparison_figures, trace_figure
 from seqopt.report.comparison import compare
 from seqopt.report.style import WIDTH

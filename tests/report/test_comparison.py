@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from seqopt.engines.registry import make_engine
-from seqopt.placement.formulation import formulations
+from seqopt.plan.calling.formulation import formulations
 from seqopt.report.comparison import LARGEST, compare
 from seqopt.study.presets import CRITERIA, EQUATIONS
 from tests.builders import small_arch

@@ -7,8 +7,8 @@ import pytest
 from matplotlib.colors import to_rgba
 
 from seqopt.errors import StepError
-from seqopt.placement.given_sequence import GivenSequence
-from seqopt.placement.solving import solve
+from seqopt.plan.given import GivenSequence
+from seqopt.plan.solving import solve
 from seqopt.report.gantt import gantt_picture
 from seqopt.sequence.schedule import holds
 from seqopt.sequence.two_robots import sequential

@@ -9,10 +9,10 @@ import pytest
 
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import ProblemError
+from seqopt.graph.layers.layers import pose
 from seqopt.network.build import build_network
-from seqopt.placement.criteria import RankSum
-from seqopt.placement.problem import pose
-from seqopt.placement.terms import equal
+from seqopt.problem.criteria import RankSum
+from seqopt.problem.terms import equal
 from seqopt.responses import batches
 from seqopt.responses.choices import CHOICE_RESPONSES, evaluate_choices
 from seqopt.responses.quantities import responses_of

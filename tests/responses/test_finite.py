@@ -12,8 +12,8 @@ from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import Engine, Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import SeqoptError, SolverError
+from seqopt.graph.layers.layers import pose
 from seqopt.network.build import build_network
-from seqopt.placement.problem import pose
 from seqopt.responses.table import analyze
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.sequence.two_robots import sequential

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from seqopt.files import csv_text
-from seqopt.placement.solving import solve
+from seqopt.plan.solving import solve
 from seqopt.workflow import optimize
 
 

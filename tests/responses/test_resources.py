@@ -16,9 +16,9 @@ from seqopt.engines.interface import Want
 from seqopt.engines.registry import ENGINES, make_engine
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import MemoryShortError, ProblemError, SceneError
+from seqopt.graph.layers.layers import pose
 from seqopt.network.build import build_network
-from seqopt.placement.problem import pose
-from seqopt.placement.solving import solve
+from seqopt.plan.solving import solve
 from seqopt.responses import batches, division
 from seqopt.responses.blocks import Block, answer, pack, worker_for
 from seqopt.responses.choices import CHOICE_RESPONSES, Evaluation

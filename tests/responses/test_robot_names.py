@@ -10,15 +10,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seqopt.cli.criteria import parse_criterion
 from seqopt.cli.main import main
-from seqopt.cli.values import parse_limits
+from seqopt.cli.words.criteria import parse_criterion
+from seqopt.cli.words.values import parse_limits
 from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.graph.layers.budgets import robot_use
+from seqopt.graph.layers.layers import pose
 from seqopt.network.build import build_network
-from seqopt.placement.budgets import robot_use
-from seqopt.placement.problem import pose
-from seqopt.placement.requirements import Limit, payload_limits
-from seqopt.placement.solving import solve
+from seqopt.plan.solving import solve
+from seqopt.problem.requirements import Limit, payload_limits
 from seqopt.report.comparison import compare
 from seqopt.responses.choices import CHOICE_RESPONSES
 from seqopt.responses.quantities import RESPONSES, robot_response

@@ -16,11 +16,11 @@ import pytest
 from seqopt.engines.registry import make_engine
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import FileError, SceneError
-from seqopt.placement.criteria import WeightedSum
-from seqopt.placement.problem import pose
-from seqopt.placement.robust_plan import solve_robust
-from seqopt.placement.robust_problem import robust
-from seqopt.placement.solving import solve
+from seqopt.graph.layers.layers import pose
+from seqopt.graph.scenarios.scenarios import robust
+from seqopt.plan.robust_plan import solve_robust
+from seqopt.plan.solving import solve
+from seqopt.problem.criteria import WeightedSum
 from seqopt.responses import blocks
 from seqopt.responses.blocks import Store
 from seqopt.responses.choices import Evaluation

@@ -11,10 +11,10 @@ import pytest
 from experiments.harness.scenes import running_bond
 from seqopt.engines.interface import Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.graph.layers.layers import pose
 from seqopt.network.build import build_network
-from seqopt.placement.criteria import WeightedSum
-from seqopt.placement.problem import pose
-from seqopt.placement.requirements import Limit
+from seqopt.problem.criteria import WeightedSum
+from seqopt.problem.requirements import Limit
 from seqopt.responses.quantities import (
     RESPONSES,
     responses_of,

@@ -9,9 +9,9 @@ import pytest
 import seqopt
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import StepError
+from seqopt.graph.layers.layers import pose
 from seqopt.network.build import build_network
-from seqopt.placement.problem import pose
-from seqopt.placement.solving import solve
+from seqopt.plan.solving import solve
 from seqopt.sequence.steps import StepKind, idle_robots
 from seqopt.sequence.three_robots import SCHEDULES, robot_loop, three_robot_loop, two_robot_loop
 from seqopt.sequence.two_robots import placing_node, sequential

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from experiments.stability.parts.blocks import Blocks, Contact, ring, stack
-from formulations.limit_analysis import compile_equilibrium
+from formulations.contact.limit_analysis import compile_equilibrium
 from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import DRY, Mortar
 from seqopt.network.build import build_network

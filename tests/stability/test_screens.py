@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from experiments.stability.parts.blocks import stack
-from formulations.held_equilibrium import compile_held
+from formulations.contact.held_equilibrium import compile_held
 from seqopt.contact.mortar import DRY
 from seqopt.errors import GripError, SceneError
 from seqopt.network.build import build_network

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from experiments.stability.parts.blocks import Blocks, ring, stack
-from formulations.limit_analysis import compile_equilibrium
+from formulations.contact.limit_analysis import compile_equilibrium
 from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import DRY, EPOXY
 from seqopt.network.build import build_network

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from experiments.stability.parts.blocks import stack
-from formulations.limit_analysis import compile_equilibrium
+from formulations.contact.limit_analysis import compile_equilibrium
 from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import DRY, EPOXY, Mortar
 from seqopt.network.build import build_network

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pandas as pd
 import pytest
 
-from seqopt.placement.problem import pose
-from seqopt.placement.ranking import rank_choice
+from seqopt.graph.layers.layers import pose
+from seqopt.graph.layers.ranking import rank_choice
 from seqopt.sequence.two_robots import METHODS
 from seqopt.study.presets import CLOSEST
 from seqopt.study.published import published_choice

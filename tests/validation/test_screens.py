@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from experiments.stability.parts.blocks import stack
-from formulations.held_equilibrium import compile_held
+from formulations.contact.held_equilibrium import compile_held
 from seqopt.contact.mortar import DRY, Mortar
 from seqopt.scene.parts import Robot
 from seqopt.stability.assessment import bonded

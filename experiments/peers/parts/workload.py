@@ -14,11 +14,11 @@ from scipy.optimize import linprog
 from seqopt.arrays import Floats, Ints
 from seqopt.engines.interface import Fields, Want, grip_columns
 from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.graph.layers.costs import LayeredCosts
+from seqopt.graph.layers.interface import PlacementProblem
+from seqopt.graph.layers.layers import Problem, pose
 from seqopt.network.network import Network
-from seqopt.placement.costs import LayeredCosts
-from seqopt.placement.formulation import find_formulation
-from seqopt.placement.interface import PlacementProblem
-from seqopt.placement.problem import Problem, pose
+from seqopt.plan.calling.formulation import find_formulation
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.study.presets import EQUATIONS
 

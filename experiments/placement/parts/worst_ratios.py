@@ -21,10 +21,10 @@ from functools import partial
 import numpy as np
 
 import seqopt
-from seqopt.placement.free_judge import state_columns
-from seqopt.placement.free_plan import FreePlan
-from seqopt.placement.free_problem import pose_free
-from seqopt.placement.plan import Plan
+from seqopt.graph.states.states import pose_free
+from seqopt.plan.free_plan import FreePlan
+from seqopt.plan.judge.schedules import state_columns
+from seqopt.plan.plan import Plan
 from seqopt.sequence.free_rules import with_robots
 from seqopt.sequence.steps import Step
 from seqopt.study.presets import WORST_RATIO

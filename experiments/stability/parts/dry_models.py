@@ -10,19 +10,19 @@ from math import atan
 import numpy as np
 
 from experiments.harness.scenes import longer
-from formulations.limit_analysis import compile_equilibrium
+from formulations.contact.limit_analysis import compile_equilibrium
 from seqopt.arrays import Ints, Vector
 from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import DRY, Mortar
 from seqopt.engines.registry import make_engine
 from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.graph.layers.layers import pose
+from seqopt.graph.states.states import pose_free
+from seqopt.graph.states.visits import explore
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
-from seqopt.placement.free_problem import pose_free
-from seqopt.placement.free_states import explore
-from seqopt.placement.problem import pose
-from seqopt.placement.solving import solve
-from seqopt.placement.standing import Standing
+from seqopt.plan.solving import solve
+from seqopt.problem.standing import Standing
 from seqopt.responses.table import analyze, force_column
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.parts import Robot, Spring

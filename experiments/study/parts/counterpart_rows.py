@@ -22,9 +22,9 @@ from experiments.study.parts.paper_items import CASCADE, COMPARED, MODIFIED, ROB
 from seqopt.arrays import Floats
 from seqopt.engines.interface import Engine
 from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.graph.layers.layers import Problem, pose
+from seqopt.graph.layers.ranking import rank_choice
 from seqopt.network.build import build_network
-from seqopt.placement.problem import Problem, pose
-from seqopt.placement.ranking import rank_choice
 from seqopt.report.comparison import Comparison, compare
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import load_scene

@@ -1,0 +1,77 @@
+r"""The simplified cascading scheme of Bruun et al., move by move.
+
+With ``charge="later"`` move :math:`k` knows the choice before it and takes
+
+.. math::
+
+   o_k = \arg\min_i \; c_k(i) + d_k(o_{k-1}, i)
+
+where :math:`d_k(o_{k-1}, \cdot)` is ranked among the candidates of move :math:`k` alone. With
+``charge="earlier"`` a move answers for the step it shares with the next one, at the next one's
+best:
+
+.. math::
+
+   o_k = \arg\min_i \; c_k(i) + \min_j d_{k+1}(i, j) .
+
+Bruun et al. count four steps per optimization, from the reposition to the last release; these, and
+the steps that their printed plan optimizes over, are those of ``later``, the default. Choices that
+cannot be continued to the last move are left out. It is a heuristic: what it leaves to the next
+move may cost more than it saved.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from seqopt.arrays import Floats
+from seqopt.errors import ProblemError
+from seqopt.graph.layers.interface import Aim, PlacementProblem
+from seqopt.plan.calling.first_choice import stopped
+from seqopt.plan.calling.formulation import Formulation, FormulationKind, Reads, Selection
+from seqopt.plan.calling.watch import Watch
+
+CHARGES = ("later", "earlier")
+
+
+def solve(
+    problem: PlacementProblem, *, watch: Watch | None = None, charge: str = "later"
+) -> Selection:
+    """Return the choices of the cascade.
+
+    ``problem``: its sums are used; ``watch``: says when to stop, and is told what is found;
+    ``charge``: which of two moves answers for the step that they share: ``later`` or ``earlier``.
+    Result: without a bound. Raises `InfeasibleError` if no choice is allowed; `ProblemError` if the
+    charge is neither.
+    """
+    if charge not in CHARGES:
+        raise ProblemError(f"cascade: charge is {charge!r}; give one of {', '.join(CHARGES)}")
+    watch = watch or Watch()
+    layered = problem.sums
+    good = layered.continuable()
+    choice: list[int] = []
+    for k, single in enumerate(layered.single):
+        if watch.over:
+            return stopped(problem)
+        possible = good[k] & np.isfinite(layered.shared[k][choice[-1] if choice else 0])
+        costs = single + _charged(problem, k, choice, charge)
+        choice.append(int(np.argmin(np.where(possible, costs, np.inf))))
+    return Selection(tuple(choice), layered.cost(choice))
+
+
+def _charged(problem: PlacementProblem, k: int, choice: list[int], charge: str) -> Floats:
+    """Return what move ``k`` answers for beside the steps in which it alone is open, (C_k,)."""
+    shared = problem.sums.shared
+    if charge == "later":
+        return problem.conditional(k, choice[-1]) if choice else shared[0][0]
+    return shared[k + 1].min(axis=1) if k + 1 < len(shared) else np.zeros(shared[k].shape[1])
+
+
+FORMULATION = Formulation(
+    "cascade",
+    "the cascading scheme of Bruun et al. over the whole build",
+    FormulationKind.HEURISTIC,
+    Aim.SUM,
+    solve,
+    Reads.WINDOW,
+)

@@ -1,0 +1,1 @@
+"""Programs over layers of candidates in many scenarios at once."""

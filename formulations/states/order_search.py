@@ -1,0 +1,249 @@
+r"""The order in which bricks are placed, by all sets of bricks, or where these are many by trying.
+
+The value of an order :math:`\pi` is the least worst step of any schedule of it. Orders share what
+they have in common: with the set :math:`S` of bricks standing and the newest :math:`b \in S` known,
+neither the responses nor the moves depend on how the rest was placed. The best order is therefore a
+bottleneck path
+
+.. math::
+
+   \min_{\pi} \; \min_{s_1, \dots, s_N} \; \max_i v(s_i),
+   \qquad s_i = (S_i, b_i, \text{who holds which node}),
+
+from the empty site to all bricks. A threshold rises, as for one order, until states below it
+connect both; what no order stays below is then the least. An arch of :math:`n` bricks that is built
+from its ends has some :math:`n^2` pairs :math:`(S, b)`, and any order of it is one of them.
+
+Where there are more than ``most`` pairs it goes on as a *heuristic*: from the best of a few orders
+it moves single bricks and runs of them to other places, as long as some schedule of the new order
+has a smaller worst step. The sets that were looked at leave a lower bound, and so does the whole
+structure, with which every order ends.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import closing
+from dataclasses import dataclass, replace
+from itertools import islice
+
+import numpy as np
+
+from seqopt.errors import InfeasibleError, ProblemError, TimeUpError
+from seqopt.graph.explore import Explorer
+from seqopt.graph.orders.bound import whole_bound
+from seqopt.graph.orders.orders import OrderProblem, OrderSelection
+from seqopt.graph.orders.visits import OrderStates, TooManySetsError
+from seqopt.graph.orders.work import Trial, trying, worth
+from seqopt.graph.parts import Visited
+from seqopt.graph.paths import keep_best, lexicographic, reached
+from seqopt.plan.calling.formulation import FormulationKind
+from seqopt.plan.calling.schedule_formulation import Finds, ScheduleFormulation
+from seqopt.responses.resources import HERE, Resources
+from seqopt.scene.orders import ORDERS, Order
+from seqopt.work.progress import Stage
+from seqopt.work.workers import hire, map_ordered
+
+FAR_BELOW = 4.0  # the best order known, over the first threshold
+GROWTH = 1.1  # of the threshold
+BETTER = 1e-9  # share by which an order must be better
+
+
+class _StopError(Exception):
+    """Time is used up."""
+
+
+@dataclass
+class _Search:
+    """What was found so far."""
+
+    problem: OrderProblem
+    end: float
+    resources: Resources
+    order: Order = ()
+    value: float = np.inf
+    bound: float = -np.inf
+    evaluated: int = 0
+    tried: Stage | None = None  # of orders beside the best, how many
+    each: float = 0.0  # share of one of them
+
+    def tell(self, what: object) -> None:
+        """Say how far it is; end the search in time."""
+        if self.resources.progress is not None:
+            self.resources.progress(what)
+        if time.perf_counter() > self.end:
+            raise _StopError
+
+    def tell_bricks(self, found: Explorer) -> None:
+        """Say how far all orders are looked at."""
+        self.tell(Stage("all orders", found.level / len(self.problem.scene.bricks)))
+
+    def try_order(self, order: Order) -> bool:
+        """Return whether an order is better than the best so far, and keep it if it is."""
+        if not self.problem.allows(order):
+            return False
+        return self.take(order, worth(self.problem, self.trial(order)))
+
+    def trial(self, order: Order) -> Trial:
+        """Return an order to be tried against the best so far; end the search in time."""
+        best = f", the best {self.value:.6g}" if self.order else ""
+        self.tell(self.tried or f"{self.evaluated} orders{best}")
+        return Trial(order, self.value * (1 - BETTER) if np.isfinite(self.value) else np.inf)
+
+    def take(self, order: Order, value: float) -> bool:
+        """Return whether an order that was tried is better than the best so far, and keep it."""
+        if self.tried is not None:
+            self.tried = replace(self.tried, share=min(1.0, self.tried.share + self.each))
+        self.evaluated += 1
+        better = value < self.value
+        if better:
+            self.order, self.value = order, value
+        return better
+
+
+def solve(
+    problem: OrderProblem,
+    *,
+    most: int = 5000,
+    tries: int = 200,
+    seed: int = 0,
+    seconds: float = np.inf,
+    resources: Resources = HERE,
+) -> OrderSelection:
+    """Return the best order, or a good one and a bound.
+
+    ``most``: pairs of a set of bricks and a newest one, up to which all orders are looked at;
+    ``tries``: how many orders are tried where there are more; ``seed``: in which turn; ``seconds``:
+    after which the best order found is returned; ``resources``: who is told how far it is, and who
+    tries orders where not all are looked at; what is found does not depend on it. Raises
+    `InfeasibleError`, `ProblemError`, `TimeUpError` if no order has a plan; a number is none, or no
+    plan was found by the end of the search.
+    """
+    if most < 0 or tries < 0:
+        raise ProblemError(f"options most={most}, tries={tries}: give whole numbers from 0 on")
+    search = _Search(problem, time.perf_counter() + seconds, resources)
+    try:
+        why = _run(search, most, tries, np.random.default_rng(seed))
+    except (_StopError, KeyboardInterrupt) as stop:
+        if not search.order and isinstance(stop, KeyboardInterrupt):
+            raise
+        why = "time" if isinstance(stop, _StopError) else "interrupt"
+    if not search.order and why == "time":
+        raise TimeUpError("no order with a plan was found yet; give more")
+    if not search.order:
+        raise ProblemError("options most, tries: no order was found with a plan; give more")
+    bound = min(search.bound, search.value)
+    return OrderSelection(search.order, search.value, bound, search.evaluated, why)
+
+
+def _run(search: _Search, most: int, tries: int, rng: np.random.Generator) -> str:
+    """Search all orders, or try some; return why not all were looked at."""
+    own, *named = _first_orders(search.problem)
+    search.try_order(own)
+    search.bound = whole_bound(search.problem)
+    if search.bound >= search.value * (1 - BETTER) or _all_orders(search, most):
+        return ""
+    for order in named:
+        search.try_order(order)
+    _neighbors(search, tries, rng)
+    return "size"
+
+
+def _first_orders(problem: OrderProblem) -> Iterator[Order]:
+    """Yield the scene's own order, and those that have names as far as they are allowed."""
+    own = problem.scene.build_order
+    yield own
+    for order in dict.fromkeys(make(problem.scene) for make in ORDERS.values()):
+        if order != own and problem.allows(order):
+            yield order
+
+
+def _all_orders(search: _Search, most: int) -> bool:
+    """Return whether all orders were looked at below a rising threshold; then the best is known."""
+    space = OrderStates(search.problem, most)
+    ceiling, threshold = search.value, -np.inf
+    if not space.peaks[0]:  # no state is too dear
+        ceiling = threshold = np.finfo(float).max
+    elif np.isfinite(ceiling):
+        threshold = max(ceiling / FAR_BELOW, search.bound)
+    found = Explorer(space, tell=search.tell_bricks)
+    try:
+        while not found.rise(threshold):
+            search.bound = max(search.bound, min(found.excluded, ceiling))
+            if found.excluded == np.inf or threshold >= ceiling:
+                break
+            threshold = max(found.excluded, min(ceiling, threshold * GROWTH))
+    except TooManySetsError:
+        return False
+    finally:
+        search.evaluated = max(search.evaluated, len(space.parts) - 1)
+    if found.whole:
+        _take_best(search, found)
+    elif not search.order:
+        raise InfeasibleError(
+            "no order of the bricks has a plan; extend a reach, loosen a rule or raise a limit"
+        )
+    search.bound = search.value
+    return True
+
+
+def _take_best(search: _Search, found: Explorer) -> None:
+    """Keep the best order below the threshold, if it is better than the one that is known."""
+    while True:
+        visited = found.graph()
+        best = lexicographic(visited.graph)
+        if not found.refine(best.values):
+            break
+    if best.values[0] < search.value * (1 - BETTER):
+        keys = dict.fromkeys(part for _, part, _ in visited.of(_first_ending(visited)))
+        search.value = best.values[0]
+        search.order = tuple(key[1] for key in keys)
+
+
+def _first_ending(visited: Visited) -> tuple[int, ...]:
+    """Return the best path that ends with the first brick: many orders are equally good."""
+    graph, states = visited
+    kept = keep_best(graph, 0)[0]
+    ends = graph.ends & reached(kept)
+    number = np.repeat([part[1] for _, part, _ in states], [len(rows) for _, _, rows in states])
+    return lexicographic(replace(kept, ends=ends & (number == number[ends].min()))).path
+
+
+def _neighbors(search: _Search, tries: int, rng: np.random.Generator) -> None:
+    """Try orders beside the best, until none of them is better or all tries are made."""
+    if not search.order:
+        return
+    left, better = tries, True
+    with hire(search.resources.executor, search.resources.workers) as crew:
+        work = trying(search.problem, elsewhere=crew is not None)
+        while better and left > 0:
+            before = search.evaluated
+            search.tried, search.each = Stage("orders beside the best", 1 - left / tries), 1 / tries
+            orders = [*islice(_beside(search.order, search.problem, rng), left)]
+            trials = map(search.trial, orders)
+            with closing(map_ordered(work, trials, crew)) as found:  # ends at the first better one
+                better = any(map(search.take, orders, found))
+            left -= search.evaluated - before
+
+
+def _beside(order: Order, problem: OrderProblem, rng: np.random.Generator) -> Iterator[Order]:
+    """Yield allowed orders in which one brick, or two or three in a row, stand elsewhere."""
+    count = len(order)
+    runs = [(a, size) for size in (1, 2, 3) for a in range(count - size + 1)]
+    moves = [(a, size, to) for a, size in runs for to in range(count - size + 1) if to != a]
+    for i in rng.permutation(len(moves)).tolist():
+        start, size, to = moves[i]
+        run, rest = order[start : start + size], order[:start] + order[start + size :]
+        changed = rest[:to] + run + rest[to:]
+        if problem.allows(changed):
+            yield changed
+
+
+FORMULATION = ScheduleFormulation(
+    "order_search",
+    "the order in which bricks are placed, by all sets of bricks or by trying",
+    FormulationKind.EXACT,
+    solve,
+    Finds.ORDER,
+)

@@ -1,0 +1,96 @@
+r"""All plans that no other plan beats in every response: exact, by search zones.
+
+A plan has a vector :math:`z` of numbers that are to be small, say the worst of each response. It
+is dominated by one that is nowhere larger and somewhere less. What is not dominated by any of the
+points found so far lies in one of finitely many *search zones*,
+
+.. math::
+
+   \{\, z : z < u \,\} \quad\text{for the local upper bounds } u .
+
+A zone is empty if no path of states that are all below :math:`u` leads to an end. Else the least of
+the first number in it, of the second among these, and so on, is a new point :math:`z`; every zone
+that holds it is split, once for each number, with :math:`z_k` instead of :math:`u_k`, and
+zones inside others are dropped. When no zone is left the set is complete. Source: Klamroth, Lacour
+and Vanderpooten, On the representation of the search region in multi-objective optimization (2015).
+"""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+
+from seqopt.arrays import Bools, Floats
+from seqopt.plan.calling.formulation import FormulationKind
+from seqopt.plan.calling.schedule_formulation import Finds, ScheduleFormulation
+from seqopt.plan.front import FrontProblem, FrontSelection
+from seqopt.work.progress import Tell
+
+
+def solve(
+    problem: FrontProblem,
+    *,
+    seconds: float = np.inf,
+    progress: Tell = lambda _: None,
+) -> FrontSelection:
+    """Return all vectors that no plan dominates, and a plan for each.
+
+    ``seconds``: after which the points found are returned; ``progress``: told in a few words how
+    far the search is. Result: complete unless time was up or the search was interrupted.
+    """
+    end = time.perf_counter() + seconds
+    zones = np.full((1, len(problem.names)), np.inf)
+    points: list[Floats] = []
+    plans: list[object] = []
+    stopped = ""
+    try:
+        while len(zones) and not stopped:
+            progress(f"{len(points)} plans found, {len(zones)} regions left")
+            zone, rest = zones[-1], zones[:-1]
+            found = problem.best_below(zone)
+            zones = rest
+            if found is not None:
+                point, plan = found
+                points.append(point)
+                plans.append(plan)
+                zones = split(np.vstack([rest, zone]), point)
+            stopped = "time" if time.perf_counter() > end and len(zones) else ""
+    except KeyboardInterrupt:
+        stopped = "interrupt"
+    shape = np.array(points).reshape(-1, len(problem.names))
+    return FrontSelection(shape, tuple(plans), stopped)
+
+
+def split(zones: Floats, point: Floats) -> Floats:
+    """Return the search zones that are left once a point is found.
+
+    ``zones`` (n, k): their upper bounds; ``point`` (k,). Result (m, k): None of them lies in
+    another one.
+    """
+    inside = (point < zones).all(axis=1)
+    kept = zones[~inside]
+    parts = []
+    for k in range(zones.shape[1]):
+        part = zones[inside].copy()
+        part[:, k] = point[k]
+        parts.append(part)
+    fresh = np.unique(np.concatenate(parts), axis=0)
+    fresh = fresh[~_within(fresh, kept)]
+    alone = [i for i in range(len(fresh)) if not _within(fresh[i : i + 1], np.delete(fresh, i, 0))]
+    return np.vstack([kept, fresh[alone]])
+
+
+def _within(zones: Floats, others: Floats) -> Bools:
+    """Return which zones lie in one of others, (n,) bool."""
+    inside = np.asarray((zones[:, None] <= others[None]).all(axis=2))
+    return np.asarray(inside.any(axis=1))
+
+
+FORMULATION = ScheduleFormulation(
+    "pareto_zones",
+    "all plans that none beats in every response, zone by zone",
+    FormulationKind.EXACT,
+    solve,
+    Finds.FRONT,
+)

@@ -1,0 +1,78 @@
+r"""The free schedule by a beam of given width: a heuristic that computes few responses.
+
+Brick count by brick count it keeps the ``width`` states :math:`s` of least value :math:`v` that
+those kept before lead to by placing a brick and letting go,
+
+.. math::
+
+   B_k = \text{the } w \text{ states } s \text{ next to } B_{k-1} \cup B_k
+   \text{ with the least } \; v(s),
+
+and returns the best path among them, goal by goal. Regrips are left out, but if no plan is found
+without them: then all states are looked at. The value is that of the first goal; if that is about
+moves and not about states, the states that come first are kept.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from formulations.states.on_graph import (
+    StopError,
+    after_margins,
+    best_standing,
+    narrow,
+    plan_by_then,
+    watched,
+)
+from seqopt.errors import InfeasibleError, ProblemError
+from seqopt.graph.explore import Explorer
+from seqopt.graph.states.states import FreeProblem
+from seqopt.graph.states.visits import FreeStates
+from seqopt.plan.calling.formulation import FormulationKind
+from seqopt.plan.calling.schedule_formulation import ScheduleFormulation
+from seqopt.plan.calling.schedule_selection import ScheduleSelection
+from seqopt.plan.calling.watch import Watch
+from seqopt.work.progress import Tell
+
+
+def solve(
+    problem: FreeProblem,
+    *,
+    width: int = 50,
+    seconds: float = np.inf,
+    max_memory: float = np.inf,
+    progress: Tell = lambda _: None,
+) -> ScheduleSelection:
+    """Return a plan through the states of a beam.
+
+    ``width``: how many new states of a brick count are kept, from 1; ``seconds``, ``max_memory``:
+    after which, or above how many bytes, it ends without a plan; ``progress``: told as a
+    `seqopt.work.Stage` how far it is. Result: without a bound, but of margins of stability. Raises
+    `InfeasibleError` if no plan is allowed; `ProblemError`, `TimeUpError` if the width is not
+    positive, or memory or time is up.
+    """
+    if width < 1:
+        raise ProblemError(f"option width={width}: give a whole number from 1 on")
+    tell = watched(problem, Watch(seconds), max_memory, progress)
+
+    def search(rest: FreeProblem) -> ScheduleSelection:
+        try:
+            found = narrow(rest, width, tell)
+            if found is None:
+                every = Explorer(FreeStates(rest), tell=tell)
+                if not every.rise():
+                    raise InfeasibleError("no plan of the free schedule is allowed")
+                found = best_standing(rest, every)
+        except StopError as stop:
+            return plan_by_then(None, stop)
+        return replace(found, bound=(-np.inf,) * len(found.bound))
+
+    return after_margins(problem, search, tell)
+
+
+FORMULATION = ScheduleFormulation(
+    "path_beam", "a beam over the states of every brick count", FormulationKind.HEURISTIC, solve
+)

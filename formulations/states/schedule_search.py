@@ -1,0 +1,176 @@
+r"""The free schedule by threshold and reachability, one goal after the other: exact.
+
+A state is how many bricks stand and which node each robot holds; a plan is a path from the empty
+site to an end of the build, each of its moves a step. Goals :math:`g_1, g_2, \dots` are minimized
+in their order,
+
+.. math::
+
+   \operatorname{lex\,min}_{s_1, \dots, s_N} \; \bigl( g_1(s_1, \dots, s_N), \;
+   g_2(s_1, \dots, s_N), \; \dots \bigr),
+   \qquad
+   g(s_1, \dots, s_N) = \max_i v(s_i)
+   \quad\text{or}\quad
+   g(s_1, \dots, s_N) = \sum_i c(s_{i-1}, s_i),
+
+with :math:`v` the value of a state and :math:`c` the cost of a step. A narrow search without
+regrips, which keeps the best states of every brick count, gives a first plan; where states must
+stand or be good in scenarios, which is dear to ask of them all, only if time or memory is limited;
+what the best plan of the first scenario takes in all is then where the threshold starts. It rises
+until states below it connect the empty site to an end; responses are computed only for states
+next to those that are reached below it, and with six digits until their value is close to that of
+the plan. Among these every goal is a shortest path, with the maximum instead of the sum for a peak;
+what is not on a best path of one goal is left out before the next. Whether states stand is asked
+only of those on the best path; where one falls, the next best path is sought without it (Dellin and
+Srinivasa, A unifying formalism for shortest path problems with expensive edge evaluations via lazy
+best-first search over paths with edge selectors, 2016). A margin of stability comes first: the best
+one with which states still connect both ends is found by halving an interval, and all further
+states must have it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from formulations.states.on_graph import (
+    WIDTH,
+    StopError,
+    Watching,
+    after_margins,
+    best_standing,
+    narrow,
+    plan_by_then,
+    watched,
+)
+from seqopt.errors import InfeasibleError, ProblemError
+from seqopt.graph.budgets import is_beyond
+from seqopt.graph.explore import Explorer
+from seqopt.graph.paths import distances
+from seqopt.graph.states.states import FreeProblem
+from seqopt.graph.states.visits import FreeStates
+from seqopt.plan.calling.formulation import FormulationKind
+from seqopt.plan.calling.schedule_formulation import ScheduleFormulation
+from seqopt.plan.calling.schedule_selection import ScheduleSelection
+from seqopt.plan.calling.watch import Watch
+from seqopt.problem.goals import Measure
+from seqopt.work.progress import Tell
+
+FAR_BELOW = 4.0  # what the narrow search finds, over the first threshold
+
+
+def solve(
+    problem: FreeProblem,
+    *,
+    width: int = 50,
+    growth: float = 1.1,
+    seconds: float = np.inf,
+    max_memory: float = np.inf,
+    progress: Tell = lambda _: None,
+) -> ScheduleSelection:
+    """Return the best free schedule.
+
+    ``width``: from how many new states of a brick count the narrow search goes on; ``growth``: by
+    how much the threshold rises from one search to the next, over itself; ``seconds``: after which
+    the best plan found is returned, and what is proven by then; ``max_memory``: bytes that states,
+    moves and responses may take, about; then likewise. By default as many as are free.
+    ``progress``: told as a `seqopt.work.Stage` how far each pass through the bricks is. Result: its
+    bounds are its values, unless time or memory was used up or it was interrupted. Raises
+    `InfeasibleError` if no plan is allowed; `ProblemError`, `TimeUpError` if the width is not
+    positive, or memory or time is up before any plan is found.
+    """
+    if width < 1 or not growth > 1:
+        raise ProblemError(
+            f"options width={width}, growth={growth:g}: give a whole number from 1 on, and a "
+            "number above 1"
+        )
+    tell = watched(problem, Watch(seconds), max_memory, progress)
+    if (problem.demands or problem.each) and min(seconds, max_memory) == np.inf:
+        width = 0
+    return after_margins(problem, lambda rest: _search(rest, (width, growth), tell), tell)
+
+
+def _search(problem: FreeProblem, options: tuple[int, float], tell: Watching) -> ScheduleSelection:
+    """Return the best free schedule, or the first one found where the search is stopped."""
+    found, proven = None, [-np.inf]
+    wide = Explorer(FreeStates(problem), tell=tell)
+    try:
+        found = narrow(problem, options[0], tell) if options[0] else None
+        ceiling = found.objective[0] if found else np.inf
+        if found is None and problem.budgets:
+            _require_room(problem, tell)
+        return _best(problem, wide, (ceiling, options[1]), proven)
+    except (StopError, KeyboardInterrupt) as stop:
+        return _unproven(plan_by_then(found, stop), wide, proven[-1])
+
+
+def _require_room(problem: FreeProblem, tell: Watching) -> None:
+    """Raise an `InfeasibleError` if every plan exceeds a budget, before thresholds are tried."""
+    totals = problem.goals[len(problem.aims) :]
+    every = Explorer(FreeStates(replace(problem, goals=totals, budgets=())), tell=tell)
+    if every.rise() and is_beyond(every.graph().graph, problem.budgets):
+        raise InfeasibleError("no plan of the free schedule is within all budgets")
+
+
+def _best(
+    problem: FreeProblem, wide: Explorer, options: tuple[float, float], proven: list[float]
+) -> ScheduleSelection:
+    """Return the best plan below the lowest threshold of a rising row that connects both ends.
+
+    What is proven of the first goal is added to a list on the way.
+    """
+    threshold, (ceiling, growth) = -np.inf, options
+    if np.isfinite(ceiling) or problem.goals[0].measure is not Measure.PEAK:
+        threshold = ceiling / FAR_BELOW
+    if problem.each and problem.goals[0].measure is Measure.PEAK:
+        threshold = _of_one(problem, options)
+    while True:
+        if wide.rise(threshold):
+            try:
+                return best_standing(problem, wide)
+            except InfeasibleError:  # of what stands
+                pass
+        if wide.excluded == np.inf:
+            raise InfeasibleError("no plan of the free schedule is allowed")
+        proven.append(wide.excluded)  # of a state that every plan would have to pass, or a larger
+        grown = threshold * growth if np.isfinite(threshold) else -np.inf
+        threshold = max(wide.excluded, min(ceiling, grown))
+
+
+def _of_one(problem: FreeProblem, options: tuple[float, float]) -> float:
+    """Return what the plan that is best in the first scenario takes in all; at least in that one.
+
+    What is below the former is enough to be looked at, where that plan is allowed in all.
+    """
+    first = replace(problem.each[0], goals=problem.aims, budgets=())  # budgets are of the scene
+    found = narrow(first, WIDTH, lambda _: None)
+    ceiling = np.inf if found is None else found.objective[0]
+    one = _best(first, Explorer(FreeStates(first)), (ceiling, options[1]), [])
+    worst = -np.inf
+    for level, *state in one.states:
+        values, allowed = problem.values(level, np.array([state]))
+        if not allowed[0]:
+            return one.objective[0]
+        worst = max(worst, float(values[0, 0]))
+    return worst
+
+
+def _unproven(found: ScheduleSelection, wide: Explorer, proven: float) -> ScheduleSelection:
+    """Return the first plan, and what thresholds and the levels reached prove of the first goal."""
+    bound = proven
+    if not wide.peaks[0] and wide.level:
+        graph, states = wide.graph()
+        least = distances(graph, graph.amounts[:, 0])
+        count = [len(rows) for level, _, rows in states if level <= wide.level]
+        last = [len(rows) for level, _, rows in states if level == wide.level]
+        bound = float(least[sum(count) - sum(last) : sum(count)].min(initial=np.inf))
+    return replace(found, bound=(min(bound, found.objective[0]), *found.bound[1:]))
+
+
+FORMULATION = ScheduleFormulation(
+    "schedule_search",
+    "threshold and reachability among the states of the free schedule",
+    FormulationKind.EXACT,
+    solve,
+)

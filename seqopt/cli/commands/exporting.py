@@ -1,0 +1,50 @@
+"""The command ``export``: a plan in a format of others."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from seqopt.cli.saying.answer import Answer
+from seqopt.cli.words.common_arguments import form_arguments, group
+from seqopt.cli.words.facts import scene_facts
+from seqopt.files import require_apart, write_text
+from seqopt.sequence.exports.formats import EXPORTS, export_plan, read_folder
+
+DESCRIPTION = (
+    "Write the plan of a folder, as seqopt optimize --out makes it, in a format of others: which "
+    "block is absent, placed or held in which step."
+)
+EXAMPLES = ("seqopt export best --format csv --out blocks.csv",)
+
+
+def add_arguments(command: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``export``."""
+    basic = group(command, "what is written")
+    basic.add_argument("folder", type=Path, metavar="PLAN_DIR", help="folder of a plan")
+    basic.add_argument("--format", choices=tuple(EXPORTS), required=True, help="what to write")
+    basic.add_argument("--out", type=Path, required=True, metavar="FILE", help="file to write")
+    basic.add_argument(
+        "--source",
+        type=Path,
+        metavar="FILE",
+        help="with a format of COMPAS: the file that was imported, to name its elements or to "
+        "write the plan into",
+    )
+    form_arguments(group(command, "what is printed"))
+
+
+def run(options: argparse.Namespace) -> Answer:
+    """Write the plan of a folder in a format of others.
+
+    ``options``: of the command.
+    """
+    inputs = [options.folder / name for name in ("scene.json", "plan.csv")]
+    require_apart([options.out], [*inputs, *filter(None, [options.source])])
+    scene, steps = read_folder(options.folder)
+    write_text(options.out, export_plan(scene, steps, options.format, options.source))
+    return Answer(
+        facts={"scene": scene_facts(scene), "steps": len(steps), "format": options.format},
+        text=f"{len(steps)} steps written to {options.out}",
+        written=(options.out,),
+    )

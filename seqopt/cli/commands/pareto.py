@@ -1,0 +1,231 @@
+"""The command ``pareto``: all plans that no other one beats in every aim at once."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import pandas as pd
+
+from seqopt.cli.commands.free import asked_free
+from seqopt.cli.saying.answer import Answer
+from seqopt.cli.saying.outputs import figure_notes, write_outputs, written_to
+from seqopt.cli.words.asked import level_notes, marked, scene_file
+from seqopt.cli.words.common_arguments import (
+    Takes,
+    engine_arguments,
+    form_arguments,
+    group,
+    limit_argument,
+    scene_argument,
+)
+from seqopt.cli.words.facts import scene_facts
+from seqopt.cli.words.free_arguments import add_rules, add_standing
+from seqopt.cli.words.values import parse_numbers
+from seqopt.engines.interface import Engine
+from seqopt.engines.registry import provenance
+from seqopt.errors import ProblemError, StepError, did_you_mean
+from seqopt.files import csv_text, require_folder
+from seqopt.graph.states.states import FreeProblem
+from seqopt.plan.free_front import FreeFront
+from seqopt.plan.front import Front, find_front, pick
+from seqopt.problem.goals import judged_by
+from seqopt.report.comparison import method_tables, shown_table, worst_of
+from seqopt.report.pages import PAGE, front_page
+from seqopt.responses.linear_range import LinearRange, builds_in_words
+from seqopt.responses.table import analyze
+from seqopt.sequence.free_rules import FREE
+from seqopt.sequence.steps import Step
+from seqopt.sequence.three_robots import SCHEDULES
+from seqopt.work.progress import told, within
+
+FOUR = "F_largest,M_sup,T_max,D_max"
+DESCRIPTION = (
+    "Find every plan of the free schedule, or of a sequence with open grips, that no other plan "
+    "beats in all aims at once (the Pareto set); check each, and write a table, the plans, a chart "
+    "and a page for the browser."
+)
+USAGE = ("[SCENE] --out DIR [--aim NAME,NAME] [other options]",)
+EXAMPLES = (
+    "seqopt pareto arch25 --out front",
+    "seqopt pareto arch25 --pick D_max --under F_largest=250 --out front",
+    "seqopt pareto arch25 --aim D_max,steps --seconds 60 --out front",
+)
+
+
+def add_arguments(command: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``pareto``."""
+    basic = group(command, "what is built, and what is to be small")
+    scene_argument(basic)
+    basic.add_argument(
+        "--aim",
+        default=FOUR,
+        metavar="NAME,NAME",
+        help="what is to be small: responses and, of the free schedule, steps and regrips "
+        "(default: %(default)s)",
+    )
+    basic.add_argument(
+        "--schedule",
+        default=FREE,
+        metavar="NAME|FILE",
+        help=f"{FREE} (default): any robot may place, hold or release next; or a sequence with "
+        f"open grips: {', '.join(SCHEDULES)}, or a CSV file",
+    )
+    basic.add_argument(
+        "--robots",
+        default="",
+        metavar="N|NAME,NAME",
+        help="how many robots (further ones are mobile), or which take part",
+    )
+    limit_argument(basic)
+    basic.add_argument("--out", type=Path, metavar="DIR", required=True, help="folder to write")
+    _choice(group(command, "which plan is picked, and when the search ends"))
+    form_arguments(group(command, "what is printed"))
+    free = group(command, "with --schedule free")
+    add_rules(free)
+    add_standing(free)
+    engine_arguments(group(command, "how responses are computed (advanced)"))
+    command.set_defaults(criteria=None, crown=None)
+
+
+def _choice(takes: Takes) -> None:
+    takes.add_argument(
+        "--pick",
+        metavar="NAME",
+        help="also write the plan with the least of a column of the table",
+    )
+    takes.add_argument(
+        "--round",
+        action="append",
+        default=[],
+        metavar="NAME=STEP",
+        help="round a number up to multiples of a step (SI units); may be repeated",
+    )
+    takes.add_argument(
+        "--under",
+        action="append",
+        default=[],
+        metavar="BOUND",
+        help="for --pick: only plans below it: NAME=VALUE (SI units), or a method that is to be "
+        "beaten in everything: sequential, cantilever, published; may be repeated",
+    )
+    takes.add_argument(
+        "--seconds", default="inf", type=float, metavar="S", help="end the search after so long"
+    )
+
+
+def run(options: argparse.Namespace) -> Answer:
+    """Find all plans that no other beats in every aim, and write them.
+
+    ``options``: of the command.
+    """
+    require_folder(options.out)
+    scene, free = asked_free(options)
+    rounding = parse_numbers("--round", options.round, dict.fromkeys(map(str, free.goals)))
+    problem = FreeFront(free, rounding)
+    seconds = float(options.seconds)
+    front = find_front(problem, seconds=seconds, progress=within(options.tell, seconds))
+    methods = _methods(free.engine)
+    files, left = _front_files(front, free, methods, options)
+    said = f"{len(front.steps)} points, {'complete' if front.complete else 'not complete'}"
+    picked = None
+    if options.pick:
+        chosen = pick(front.table, options.pick, _under(options.under, methods))
+        files["pick.csv"] = csv_text(analyze(free.engine, front.steps[chosen]))
+        values = shown_table(front.table).iloc[chosen]
+        picked = {"point": chosen + 1, **values}
+        row = ", ".join(f"{name} {value:.6g}" for name, value in values.items())
+        said += f"; picked row {chosen + 1}: {row}"
+    write_outputs(options, lambda: files | scene_file(scene))
+    answer = Answer(
+        facts={
+            "scene": scene_facts(scene),
+            "complete": front.complete,
+            "seconds": dict(front.seconds),
+            "points": shown_table(front.table),
+            "picked": picked,
+        },
+        text=f"{said}; {written_to(options.out)}",
+        written=(options.out,),
+        notes=(*level_notes(free.engine), *figure_notes()),
+    )
+    return marked(answer, left)
+
+
+def _methods(engine: Engine) -> dict[str, pd.DataFrame]:
+    try:
+        return method_tables(engine)[0]
+    except StepError:
+        return {}
+
+
+def _front_files(
+    front: Front,
+    free: FreeProblem,
+    methods: Mapping[str, pd.DataFrame],
+    options: argparse.Namespace,
+) -> tuple[dict[str, bytes | str], tuple[str, ...]]:
+    """Return the files of a Pareto set by name, and which points leave the linear range."""
+    engine, tell = free.engine, options.tell
+    known: dict[tuple[Step, ...], pd.DataFrame] = {}
+    plans = []
+    for number, steps in enumerate(told("analyzing plans", front.steps, tell), start=1):
+        table = known.setdefault(steps, analyze(engine, steps))
+        plans.append(table.assign(point=number))
+    tell("drawing and writing the page")
+    within = LinearRange(engine)
+    departures = [within.departures(known[steps]) for steps in front.steps]
+    said = builds_in_words({f"point {k}": each for k, each in enumerate(departures, start=1)})
+    posed = {
+        "scene": engine.network.scene.name,
+        "schedule": str(options.schedule),
+        "aims": [str(goal) for goal in free.goals],
+        **judged_by(free.goals, free.criterion),
+        "limits": {limit.response: limit.bound for limit in free.limits},
+    }
+    summary = {
+        "points": len(front.steps),
+        "complete": front.complete,
+        "seconds": dict(front.seconds),
+        "outside_linear_range": list(said),
+        **posed,
+        **provenance(engine),
+    }
+    numbered = shown_table(front.table)
+    numbered.insert(0, "point", range(1, len(numbered) + 1))
+    if said:
+        numbered["outside_linear_range"] = ["yes" if each else "" for each in departures]
+    tables = [known[steps] for steps in front.steps]
+    return {
+        PAGE: front_page(engine, shown_table(front.table), tables, departures),
+        "pareto.csv": csv_text(numbered),
+        "plans.csv": csv_text(pd.concat(plans, ignore_index=True)),
+        **_picture(front, methods),
+        "summary.json": json.dumps(summary, indent=2) + "\n",
+    }, said
+
+
+def _picture(front: Front, methods: Mapping[str, pd.DataFrame]) -> Mapping[str, bytes | str]:
+    """Return the chart of a Pareto set by file name, if it can be drawn."""
+    if figure_notes():
+        return {}
+    from seqopt.report.charts import front_figure  # noqa: PLC0415  # matplotlib is an extra
+    from seqopt.report.style import picture_files  # noqa: PLC0415
+
+    return picture_files("pareto", front_figure(front, methods))
+
+
+def _under(texts: Sequence[str], methods: Mapping[str, pd.DataFrame]) -> dict[str, float]:
+    """Return bounds from words: RESPONSE=VALUE, or the name of a method to beat."""
+    out: dict[str, float] = {}
+    for text in texts:
+        if "=" not in text and text not in methods:
+            known = ", ".join(methods)
+            why = f"no such method{did_you_mean(text, methods)}"
+            raise ProblemError(f"--under {text}: {why}; give {known}, or a bound as F_largest=250")
+        bounds = worst_of(methods[text]) if text in methods else parse_numbers("--under", [text])
+        for name, value in bounds.items():
+            out[name] = min(value, out.get(name, value))
+    return out

@@ -1,0 +1,81 @@
+"""The command ``report``: a page for the browser that shows plans step by step."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from seqopt.cli.saying.answer import Answer
+from seqopt.cli.saying.outputs import figure_notes, keep_apart
+from seqopt.cli.words.asked import asked_engine, asked_scene
+from seqopt.cli.words.common_arguments import (
+    engine_arguments,
+    form_arguments,
+    group,
+    scene_argument,
+)
+from seqopt.cli.words.facts import scene_facts
+from seqopt.files import require_folder, write_folder, write_text
+from seqopt.network.build import build_network
+from seqopt.report.pages import PAGE, folder_builds, folder_page
+
+DESCRIPTION = (
+    "Write a page with a step viewer of the plans in a folder: the structure in three dimensions, "
+    "who holds what, axial forces, displacements, and responses along the build. It is one file "
+    "and needs no network. If the folder has a scene.json, that is the scene."
+)
+EXAMPLES = (
+    "seqopt report best",
+    "seqopt report my.json plans --out plans.html",
+    "seqopt report best --figures pictures",
+)
+
+
+def add_arguments(command: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``report``."""
+    basic = group(command, "what is shown")
+    scene_argument(basic)
+    basic.add_argument("folder", type=Path, metavar="DIR", help="folder that holds plans as CSV")
+    basic.add_argument(
+        "--out", type=Path, metavar="FILE", help=f"page to write (default: {PAGE} in DIR)"
+    )
+    basic.add_argument(
+        "--figures",
+        type=Path,
+        metavar="FOLDER",
+        help="also write figures there as PNG and SVG: steps, who holds what when, and responses "
+        "along the build (needs matplotlib)",
+    )
+    engine_arguments(group(command, "how responses are computed (advanced)"))
+    form_arguments(group(command, "what is printed"))
+
+
+def run(options: argparse.Namespace) -> Answer:
+    """Write the page of the plans in a folder.
+
+    ``options``: of the command.
+    """
+    own = options.folder / "scene.json"
+    if own.is_file():  # plans go with the scene that stands beside them
+        options.scene = str(own)
+    scene = asked_scene(options)
+    path = options.folder / PAGE if options.out is None else options.out
+    keep_apart(options, path)
+    written: tuple[Path, ...] = (path,)
+    if options.figures is not None:
+        require_folder(options.figures)
+        written += () if figure_notes() else (options.figures,)
+    options.tell("analyzing plans and writing the page")
+    engine = asked_engine(options, build_network(scene))
+    write_text(path, folder_page(engine, options.folder))
+    if options.figures in written:
+        from seqopt.report.charts import plan_figures  # noqa: PLC0415  # needs an extra
+
+        options.tell("drawing figures")
+        write_folder(options.figures, plan_figures(engine, folder_builds(engine, options.folder)))
+    return Answer(
+        facts={"scene": scene_facts(scene)},
+        text=f"written to {' and '.join(map(str, written))}",
+        written=written,
+        notes=() if options.figures is None else figure_notes(),
+    )

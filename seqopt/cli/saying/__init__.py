@@ -1,0 +1,1 @@
+"""What commands answer: text, JSON, files, and how far they are."""

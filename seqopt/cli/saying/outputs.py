@@ -1,0 +1,128 @@
+"""What commands write: folders that appear whole, apart from what the command reads."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Callable, Mapping
+from importlib.util import find_spec
+from pathlib import Path
+
+import pandas as pd
+
+from seqopt.files import csv_text, require_apart, require_folder, write_folder
+from seqopt.plan.calling.watch import trace_rows
+from seqopt.plan.plan import Plan
+from seqopt.report.comparison import Comparison
+from seqopt.report.pages import PAGE
+from seqopt.scene.scene import Scene
+from seqopt.scene.scene_file import builtin_scenes, dump_scene
+
+
+def figure_notes() -> tuple[str, ...]:
+    """Return why figures are left out, if they are: what draws them is an extra."""
+    if find_spec("matplotlib") is not None:
+        return ()
+    return ("figures are left out, they need matplotlib: pip install 'seqopt[plot]'",)
+
+
+def comparison_files(result: Comparison) -> dict[str, bytes | str]:
+    """Return the tables of a comparison by file name, and its figures if they can be drawn.
+
+    Result (dict of str to (bytes or str)).
+    """
+    files: dict[str, bytes | str] = {
+        "comparison.csv": result.table.to_csv(float_format="%.6g"),
+        **{f"steps_{name}.csv": csv_text(table) for name, table in result.tables.items()},
+    }
+    if result.loop is not None and result.loop.ranks is not None:
+        files["published_ranks.csv"] = result.loop.ranks.to_csv(index=False)
+    if figure_notes() or result.loop is None:
+        return files
+    from seqopt.report.charts import comparison_figures  # noqa: PLC0415  # matplotlib is an extra
+    from seqopt.report.style import picture_files  # noqa: PLC0415
+
+    for name, figure in comparison_figures(result).items():
+        files |= picture_files(name, figure)
+    return files
+
+
+def plan_files(plan: Plan, scene: Scene, report: Mapping[str, object]) -> dict[str, bytes | str]:
+    """Return the tables of a plan, its summary and its scene, by file name.
+
+    ``scene``: that it is for; ``report``: the summary, ready for JSON. Result (dict of str to
+    (bytes or str)): with what was found at which time, unless no proof was asked for.
+    """
+    files: dict[str, bytes | str] = {
+        "plan.csv": csv_text(plan.responses()),
+        "selection.csv": csv_text(plan.table()),
+        "responses.csv": csv_text(plan.alternatives()),
+        "summary.json": json.dumps(report, indent=2) + "\n",
+        "scene.json": dump_scene(scene),
+    }
+    if rows := trace_rows(plan.selection.trace):
+        files["trace.csv"] = csv_text(pd.DataFrame(rows))
+    return files
+
+
+def worth(plan: Plan) -> str:
+    """Return what a plan is worth, in words."""
+    among = plan.summary()["candidates"]
+    if plan.certificate is None:
+        return "not compared with the optimum"
+    if among != "all":
+        return f"objective {plan.certificate.objective:.6g}, {among}"
+    return f"objective {plan.certificate.objective:.6g}, gap {100 * plan.certificate.gap:.3g} %"
+
+
+def written_to(folder: Path | None) -> str:
+    """Return where a folder with a page was written, and what shows it, or how to have one."""
+    if folder is None:
+        return "--out DIR writes the plan, its tables and a page that shows it step by step"
+    return f"written to {folder}; {folder / PAGE} shows it step by step"
+
+
+def write_outputs(
+    options: argparse.Namespace, files: Callable[[], Mapping[str, bytes | str]]
+) -> tuple[Path, ...]:
+    """Write the folder that a command was asked for, whole, if it was asked for one.
+
+    ``options``: with ``out``, the folder or None, ``tell``, and what the command reads; ``files``:
+    returns contents by file name. Result: the folder, or nothing. Raises `FileError` if one would
+    overwrite what the command reads, or the folder cannot be written.
+    """
+    if options.out is None:
+        return ()
+    options.tell("writing the plan")
+    made = files()
+    require_apart([options.out / name for name in made], inputs(options))
+    write_folder(options.out, made)
+    return (options.out,)
+
+
+def require_out(options: argparse.Namespace) -> None:
+    """Raise an error, before anything is computed, if the folder asked for cannot be written.
+
+    ``options``: with ``out``, the folder or None. Raises `FileError`, naming it.
+    """
+    if options.out is not None:
+        require_folder(options.out)
+
+
+def keep_apart(options: argparse.Namespace, *outputs: Path | None) -> None:
+    """Raise an error if outputs are one file, or one that the command reads.
+
+    ``options``: of the command; ``*outputs``: what it is to write. Raises `FileError`, naming the
+    file.
+    """
+    require_apart([path for path in outputs if path is not None], inputs(options))
+
+
+def inputs(options: argparse.Namespace) -> list[Path]:
+    """Return the files that a command reads.
+
+    ``options``: of the command.
+    """
+    scene = None if options.scene in builtin_scenes() else options.scene
+    named = (scene, getattr(options, "plan", None), getattr(options, "schedule", None))
+    return [Path(name) for name in named if name is not None]

@@ -1,0 +1,147 @@
+"""What a command says, and what it does where nobody can hear it.
+
+Results go to standard output, everything else a line each to standard error, which a terminal has
+wrapped. Names come from files of others: what steers a terminal is written as its code.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import sys
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any, TextIO
+
+from seqopt.cli.saying.layout import colored, columns, is_terminal, painted, wrapped
+from seqopt.errors import FileError, SceneWarning
+
+CLEAR = "\r\033[K"  # of a terminal: the line it is on
+LONGEST = 2000  # characters of a line on standard error
+BEGIN = re.compile(
+    r"seqopt: (error|warning|solver failed|time is over|out of memory|payload exceeded)(?=:)"
+)
+
+
+def harmless(text: str, kept: str = "") -> str:
+    r"""Return text in which what steers a terminal is replaced by its code.
+
+    ``kept``: controls that stay.
+
+    Examples
+    --------
+    >>> harmless("rob" + chr(27) + "[2J")
+    'rob\\x1b[2J'
+    """
+    if text.translate(dict.fromkeys(map(ord, kept))).isprintable():
+        return text
+    from seqopt.scene.checks import steers  # noqa: PLC0415  # names of others come with scenes
+
+    return "".join(repr(sign)[1:-1] if sign not in kept and steers(sign) else sign for sign in text)
+
+
+def show(text: str) -> None:
+    """Write a result to standard output.
+
+    ``text``: with the end of its last line. Raises `FileError` if standard output is closed.
+    """
+    if sys.stdout is None:
+        raise FileError("standard output is closed, and there is a result to write; open it")
+    sys.stdout.write(harmless(text, "\n\t"))
+
+
+def show_text(text: str, headings: Sequence[str] = ()) -> None:
+    """Write lines for people to standard output.
+
+    ``text``: a line or several, without the end of the last; a terminal has long ones wrapped;
+    ``headings``: lines of it that stand out on a terminal. Raises `FileError` if standard output is
+    closed.
+    """
+    if is_terminal(sys.stdout):
+        fits = columns()
+        lines = (wrapped(x, rest="  ") if len(x) > fits else x for x in text.split("\n"))
+        text = "\n".join(lines)
+    for line in text.split("\n"):
+        if line and line in headings and colored(sys.stdout):
+            sys.stdout.write(painted(harmless(line), "heading", sys.stdout) + "\n")
+        else:
+            show(line + "\n")
+
+
+def complain(text: str) -> None:
+    """Print what went wrong on standard error, or nothing where that is closed or full.
+
+    ``text``: one line, which stays one unless a person looks at it: a terminal has it wrapped.
+    """
+    _write_line(text, "bad")
+
+
+def note(text: str) -> None:
+    """Print what is worth knowing on standard error; else as `complain`."""
+    _write_line(text, "doubt")
+
+
+def _write_line(text: str, style: str) -> None:
+    if len(text) > LONGEST:
+        text = f"{text[: LONGEST // 2]} … {text[-LONGEST // 4 :]}"
+    text = harmless(text)
+    try:
+        if sys.stderr is not None:
+            clear = CLEAR if is_terminal(sys.stderr) else ""  # what a watcher shows there
+            print(clear + _for_people(text, style), file=sys.stderr, flush=True)
+    except OSError:
+        silence(sys.stderr)
+
+
+def _for_people(text: str, style: str) -> str:
+    """Return a line as it is, or wrapped and with its first word in color for a terminal."""
+    if is_terminal(sys.stderr):
+        text = wrapped(text, rest="  ")
+    begin = BEGIN.match(text)
+    if begin is None:
+        return text
+    return painted(begin[0], style, sys.stderr) + text[begin.end() :]
+
+
+def flush() -> None:
+    """Write what standard output still holds back.
+
+    Raises `OSError` if it cannot be written; what is left is given up.
+    """
+    try:
+        if sys.stdout is not None:
+            sys.stdout.flush()
+    except OSError:
+        silence(sys.stdout)
+        raise
+
+
+def silence(stream: TextIO) -> None:
+    """Let a stream that failed lead nowhere, so that the end of the program is quiet."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+
+
+@contextmanager
+def quiet_numbers(*, quiet: bool = False) -> Iterator[None]:
+    """Print warnings about a scene as a line each; what is not finite is an error of its own.
+
+    ``quiet``: whether to leave out warnings about a scene too.
+    """
+    import numpy as np  # noqa: PLC0415  # help needs none of it
+
+    with warnings.catch_warnings(), np.errstate(all="ignore"):
+        warnings.simplefilter("ignore", RuntimeWarning)
+        warnings.simplefilter("ignore" if quiet else "always", SceneWarning)
+        warnings.showwarning = _as_a_line(warnings.showwarning)
+        yield
+
+
+def _as_a_line(otherwise: Callable[..., None]) -> Callable[..., None]:
+    def show_warning(message: Warning | str, category: type[Warning], *rest: Any) -> None:
+        if issubclass(category, SceneWarning):
+            note(f"seqopt: warning: {message}")
+        else:
+            otherwise(message, category, *rest)
+
+    return show_warning

@@ -1,0 +1,1 @@
+"""The open grips of a schedule as layers of candidates, whose neighbors share a step."""

@@ -1,0 +1,138 @@
+"""Costs of which some pairs are known, and what these prove.
+
+A pair that was not looked at costs no less than some floor: zero for sizes, one for ranks. With
+the floor in its place every choice looks as cheap as it is, or cheaper, so the least over all
+choices is a lower bound; what known pairs alone lead to is an upper one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from seqopt.arrays import Bools, Floats, FrozenValue
+from seqopt.graph.layers.costs import LayeredCosts
+from seqopt.graph.layers.interface import Aim
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PartialCosts(FrozenValue):
+    """Costs of single choices, and of those pairs that were looked at.
+
+    ``single`` (tuple of (C_k,) float): as of `LayeredCosts`; ``rows`` (tuple of mapping of int to
+    (C_k,) float): for every move, by the candidate of the move before, what its candidates cost in
+    the steps that the two share; NaN where that was not looked at. Empty for the first move.
+    ``floor``: what any pair costs at least; ``aim``: whether costs add up or the largest counts.
+    """
+
+    single: tuple[Floats, ...]
+    rows: tuple[Mapping[int, Floats], ...]
+    floor: float
+    aim: Aim
+
+    @property
+    def join(self) -> np.ufunc:
+        """How costs go together."""
+        return np.add if self.aim is Aim.SUM else np.maximum
+
+    @cached_property
+    def to_go(self) -> tuple[Floats, ...]:
+        """What the rest of the build costs at least, from every candidate on, (C_k,) each."""
+        out = [self.single[-1]]
+        for single, rows in zip(self.single[-2::-1], self.rows[:0:-1], strict=True):
+            rest = out[0]
+            onward = np.full(len(single), self.join(self.floor, rest.min()))
+            for before, row in rows.items():
+                onward[before] = self.join(self._at_least(row), rest).min()
+            out.insert(0, self.join(single, onward))
+        return tuple(out)
+
+    @cached_property
+    def reached(self) -> tuple[Floats, ...]:
+        """What the build costs at least up to every candidate, (C_k,) each."""
+        out = [self.single[0]]
+        for single, rows in zip(self.single[1:], self.rows[1:], strict=True):
+            so_far = out[-1]
+            open_to = np.ones(len(so_far), dtype=bool)
+            open_to[list(rows)] = False
+            least = self.join(self.floor, so_far[open_to].min(initial=np.inf))
+            arrived = np.full(len(single), least)
+            for before, row in rows.items():
+                np.minimum(arrived, self.join(so_far[before], self._at_least(row)), out=arrived)
+            out.append(self.join(single, arrived))
+        return tuple(out)
+
+    @property
+    def bound(self) -> float:
+        """What any choice costs at least."""
+        return float(self.to_go[0].min())
+
+    @property
+    def best(self) -> float:
+        """The least that a choice costs of which all pairs are known; infinite if there is none."""
+        return float(self.arrived[-1].min())
+
+    @cached_property
+    def arrived(self) -> tuple[Floats, ...]:
+        """What the build costs up to every candidate by pairs that are known, (C_k,) each."""
+        out = [self.single[0]]
+        for single, rows in zip(self.single[1:], self.rows[1:], strict=True):
+            by_pairs = np.full(len(single), np.inf)
+            for before, row in rows.items():
+                np.fmin(by_pairs, self.join(out[-1][before], row), out=by_pairs)
+            out.append(self.join(single, by_pairs))
+        return tuple(out)
+
+    def promise(self, move: int) -> Floats:
+        """Return the least that a choice can cost by a candidate of the move before, from its row.
+
+        ``move``: from 1. Result (C_{k-1},): infinite where the row is known.
+        """
+        out = self.join(self.reached[move - 1], self.join(self.floor, self.to_go[move].min()))
+        out[list(self.rows[move])] = np.inf
+        return np.asarray(out)
+
+    def worth_a_look(self, move: int, before: int) -> Bools:
+        """Return which candidates of a move, after one of the move before, could still be better.
+
+        Result (C_k,).
+        """
+        least = self.join(self.reached[move - 1][before], self.join(self.floor, self.to_go[move]))
+        return np.asarray(least < self.best)
+
+    def known(self) -> tuple[LayeredCosts, tuple[tuple[int, ...], ...]]:
+        """Return the costs of choices of which all pairs are known.
+
+        Results: ``costs``: over the candidates that are left; ``candidates``: of every move, which
+        of its candidates they are.
+        """
+        last = tuple(range(len(self.single[-1])))
+        left = (*(tuple(sorted(rows)) for rows in self.rows[1:]), last)
+        single = tuple(own[list(kept)] for own, kept in zip(self.single, left, strict=True))
+        shared = [np.zeros((1, len(left[0])))]
+        for rows, before, now in zip(self.rows[1:], left[:-1], left[1:], strict=True):
+            found = np.array([rows[b][list(now)] for b in before]).reshape(len(before), len(now))
+            shared.append(np.where(np.isnan(found), np.inf, found))
+        return LayeredCosts(single, tuple(shared)), left
+
+    def _at_least(self, row: Floats) -> Floats:
+        return np.where(np.isnan(row), self.floor, row)
+
+
+def least_possible(costs: PartialCosts) -> float:
+    """Return a lower bound on the cost of any choice, over all pairs of one move at a time."""
+    so_far = costs.single[0]
+    for single, rows in zip(costs.single[1:], costs.rows[1:], strict=True):
+        pairs = np.full((len(so_far), len(single)), costs.floor)
+        for before, row in rows.items():
+            seen = ~np.isnan(row)
+            pairs[before, seen] = row[seen]
+        arrived = so_far[:, None] + pairs
+        if costs.aim is Aim.PEAK:
+            arrived = np.maximum(so_far[:, None], pairs)
+        total = arrived.min(axis=0)
+        so_far = total + single if costs.aim is Aim.SUM else np.maximum(total, single)
+    return float(so_far.min())

@@ -1,0 +1,178 @@
+"""How reliable the ranking of each move is: ties, margins, reversals."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+
+from seqopt.arrays import Floats
+from seqopt.graph.layers.costs import LayeredCosts
+from seqopt.graph.layers.layers import Problem
+from seqopt.graph.layers.possible import compared
+from seqopt.problem.criteria import RankSum, WeightedSum, WorstRatio
+from seqopt.problem.requirements import Criterion
+from seqopt.responses.choices import StepChoices
+
+TIED = 1e-9  # costs this close, relative to the largest, are equal
+
+
+def move_costs(problem: Problem, move: int, before: int, without: int | None = None) -> Floats:
+    """Return the costs of a move's candidates, the choice before it being fixed.
+
+    The search of a single move (equation 1 of Bruun et al.): each step of the window is ranked over
+    the candidates of this move alone.
+
+    ``problem``: whose responses are evaluated if they are not yet; ``move``, ``before``: a move,
+    and the candidate chosen for the move before it; ``without``: a candidate to leave out, which
+    then costs infinity. Result (C_k,).
+    """
+    total = np.zeros(len(problem.schedule.moves[move].candidates))
+    for choices in problem.window_choices(move, before):
+        faced = compared(choices, problem.schedule, problem.criterion, before)
+        total += problem.step_costs(_without(faced, without))
+    if without is not None:
+        total[without] = np.inf
+    return total
+
+
+def rank_of(costs: Floats, chosen: int) -> int:
+    """Return the rank of a candidate: 1 if none costs less.
+
+    ``costs`` (C,): equal if they differ by less than ``TIED`` of the largest; ``chosen``: index of
+    the candidate.
+    """
+    return int((costs < costs[chosen] - _tie(costs)).sum()) + 1
+
+
+def _tie(costs: Floats) -> float:
+    return TIED * float(np.abs(costs[np.isfinite(costs)]).max(initial=0.0))
+
+
+def rank_moves(problem: Problem, choice: Sequence[int]) -> pd.DataFrame:
+    """Return where the chosen candidates rank, and how reliable the first rank of each move is.
+
+    ``choice``: a candidate for every move. Result: a row per move. Columns: ``move``, ``step``,
+    ``bricks``, ``robot``, ``node`` (chosen), ``rank`` (1 if none is better), ``winner`` (the node
+    that ranks first), ``margin`` (cost from first to second), ``tied`` (candidates that share the
+    first rank), ``turned_by_candidates`` (others whose absence changes the winner) and
+    ``turned_by_criteria`` (responses whose absence does).
+    """
+    rows = []
+    for k, move in enumerate(problem.schedule.moves):
+        before = choice[k - 1] if k else 0
+        costs = move_costs(problem, k, before)
+        winner = int(np.argmin(costs))
+        others = np.delete(costs, winner)
+        turned, dropped = _turning(problem, k, before, costs)
+        rows.append(
+            {
+                "move": k + 1,
+                "step": move.step,
+                "bricks": move.bricks,
+                "robot": move.robot,
+                "node": move.candidates[choice[k]],
+                "rank": rank_of(costs, choice[k]),
+                "winner": move.candidates[winner],
+                "margin": float(others.min() - costs[winner]) if len(others) else np.inf,
+                "tied": int((costs <= costs[winner] + _tie(costs)).sum()),
+                "turned_by_candidates": " ".join(str(move.candidates[j]) for j in turned),
+                "turned_by_criteria": " ".join(dropped),
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def _turning(
+    problem: Problem, move: int, before: int, costs: Floats
+) -> tuple[list[int], list[str]]:
+    """Return the candidates and the responses without which another candidate would win."""
+    winner = int(np.argmin(costs))
+    candidates = [
+        j
+        for j in range(len(costs))
+        if j != winner
+        and np.isfinite(costs[j])
+        and int(np.argmin(move_costs(problem, move, before, without=j))) != winner
+    ]
+    bricks = problem.schedule.moves[move].bricks
+    responses = [
+        name
+        for name, criterion in _without_one(problem.criterion, bricks)
+        if int(np.argmin(move_costs(replace(problem, criterion=criterion), move, before))) != winner
+    ]
+    return candidates, responses
+
+
+def _without(choices: StepChoices, candidate: int | None) -> StepChoices:
+    """Return a step in which one candidate of its last move is impossible."""
+    if candidate is None:
+        return choices
+    responses = {}
+    for name, values in choices.responses.items():
+        responses[name] = values.copy()
+        responses[name][..., candidate] = np.nan
+    return replace(choices, responses=responses)
+
+
+def _without_one(criterion: Criterion, bricks: int) -> Iterator[tuple[str, Criterion]]:
+    """Yield every criterion with one of its responses left out, and its name."""
+    names = criterion.wanted(bricks)
+    for name in names if len(names) > 1 else ():
+        if isinstance(criterion, RankSum):
+            before, after = (
+                tuple(t for t in terms if t[0] != name) or terms
+                for terms in (criterion.before, criterion.after)
+            )
+            yield name, replace(criterion, before=before, after=after)
+        elif isinstance(criterion, WeightedSum):
+            yield name, replace(criterion, terms=tuple(t for t in criterion.terms if t[0] != name))
+        elif isinstance(criterion, WorstRatio):
+            yield (
+                name,
+                replace(criterion, limits=tuple(t for t in criterion.limits if t[0] != name)),
+            )
+
+
+def rank_choice(problem: Problem, choice: Sequence[int]) -> pd.DataFrame:
+    """Return where chosen nodes rank, move by move, the choice before each being fixed.
+
+    ``choice``: a candidate for every move. Result: a row per move. Columns: ``move``, ``step``,
+    ``bricks``, ``robot``, ``node``, ``candidates`` (how many there are), ``first_in_window`` (the
+    node that ranks first), and three ranks: ``rank_in_window`` of the move alone, ``rank_overlap``
+    with the least sum of costs to the end of the build added, ``rank_peak`` with the least worst
+    cost to the end.
+    """
+    sums = _to_go(problem.sums, np.add)
+    peaks = _to_go(problem.peaks, np.maximum)
+    rows = []
+    for k, move in enumerate(problem.schedule.moves):
+        before = choice[k - 1] if k else 0
+        window = move_costs(problem, k, before)
+        rows.append(
+            {
+                "move": k + 1,
+                "step": move.step,
+                "bricks": move.bricks,
+                "robot": move.robot,
+                "node": move.candidates[choice[k]],
+                "candidates": len(move.candidates),
+                "first_in_window": move.candidates[int(window.argmin())],
+                "rank_in_window": rank_of(window, choice[k]),
+                "rank_overlap": rank_of(problem.sums.shared[k][before] + sums[k], choice[k]),
+                "rank_peak": rank_of(
+                    np.maximum(problem.peaks.shared[k][before], peaks[k]), choice[k]
+                ),
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def _to_go(costs: LayeredCosts, join: np.ufunc) -> list[Floats]:
+    """Return the least cost from each candidate to the end, its own single cost included."""
+    out = [costs.single[-1]]
+    for single, shared in zip(costs.single[-2::-1], costs.shared[:0:-1], strict=True):
+        out.insert(0, join(single, join(shared, out[0]).min(axis=1)))
+    return out

@@ -1,0 +1,1 @@
+"""All build orders at once: states by which bricks stand."""

@@ -1,0 +1,118 @@
+"""The states of all orders of a free schedule at once: by which bricks stand, not by how many.
+
+The states with a set of bricks, the newest of them known, are those of the free schedule in any
+order that begins with the set and has this brick at its end. Sets of one size follow from those
+with a brick less. An order is a way from the empty set to all bricks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from seqopt.arrays import Bools, Floats, Ints
+from seqopt.graph.explore import Moves
+from seqopt.graph.orders.orders import OrderProblem
+from seqopt.graph.states.states import FreeProblem
+from seqopt.graph.states.visits import FreeStates, move_amounts
+from seqopt.problem.goals import Measure
+from seqopt.sequence.free_space import node_numbers, sort_entries
+
+Key = tuple[frozenset[int], int]  # bricks that stand, and the newest
+
+
+class TooManySetsError(Exception):
+    """There are more sets of bricks than may be looked at."""
+
+
+@dataclass(frozen=True)
+class OrderStates:
+    """The states of a free schedule in all orders, a part for every set of bricks and newest brick.
+
+    ``most``: how many parts there may be; ``parts``: those that were looked at, each in an order
+    that begins with its set.
+    """
+
+    problem: OrderProblem
+    most: int
+    parts: dict[Key, FreeStates] = field(default_factory=dict)
+
+    @property
+    def levels(self) -> int:
+        """How many bricks there are."""
+        return len(self.problem.scene.bricks)
+
+    @property
+    def peaks(self) -> tuple[bool, ...]:
+        """Whether the worst step counts, or what all steps take."""
+        return (self.problem.free.goals[0].measure is Measure.PEAK,)
+
+    def start(self) -> tuple[Key, Ints]:
+        """Return the empty site."""
+        empty: Key = (frozenset(), 0)
+        return empty, self._of(empty).start()[1]
+
+    def codes(self, part: Key, states: Ints) -> Ints:
+        """Return a number for every state."""
+        return self._of(part).codes(len(part[0]), states)
+
+    def within(self, part: Key, states: Ints) -> Moves:
+        """Return the moves that place no brick."""
+        return self._of(part).within(len(part[0]), states)
+
+    def onward(self, part: Key, states: Ints) -> Iterator[tuple[Key, Moves]]:
+        """Yield the moves that place one of the bricks that may come next."""
+        old = self._of(part).problem
+        for brick in self.problem.next_bricks(part[0]):
+            key = (part[0] | {brick}, brick)
+            new = self._of(key)
+            yield key, new.placed(len(part[0]), _renumbered(old, new.problem, states))
+
+    @property
+    def floors(self) -> bool:
+        """Whether there are scenarios."""
+        return bool(self.problem.free.each)
+
+    def values(self, part: Key, states: Ints, *, rough: bool, most: float) -> tuple[Floats, Bools]:
+        """Return what the first goal takes of states, and which are allowed."""
+        return self._of(part).values(len(part[0]), states, rough=rough, most=most)
+
+    def amounts(self, values: Floats, taken: Floats) -> Floats:
+        """Return what the first goal takes of moves, (m, 1)."""
+        return move_amounts(self._first, values, taken)
+
+    @cached_property
+    def _first(self) -> FreeProblem:
+        return replace(self.problem.free, goals=self.problem.free.goals[:1])
+
+    def ended(self, part: Key, states: Ints) -> Bools:
+        """Return which states end the build."""
+        return self._of(part).ended(len(part[0]), states)
+
+    def _of(self, part: Key) -> FreeStates:
+        """Return the free schedule in an order that begins with a set, its newest brick last."""
+        if part not in self.parts:
+            if len(self.parts) > self.most:
+                raise TooManySetsError
+            own = self.problem.scene.build_order
+            first = [name for name in own if name in part[0] and name != part[1]]
+            rest = [name for name in own if name not in part[0]]
+            newest = (part[1],) if part[0] else ()
+            problem = self.problem.judging((*first, *newest, *rest))
+            self.parts[part] = FreeStates(problem, standing=bool(problem.demands))
+        return self.parts[part]
+
+
+def _renumbered(old: FreeProblem, new: FreeProblem, states: Ints) -> Ints:
+    """Return states with the places that nodes have in another order."""
+    place = {node: i for i, node in enumerate(node_numbers(new.network), start=1)}
+    map_to = np.array([0, *(place[node] for node in node_numbers(old.network))])
+    out, robots = states.copy(), old.space.robots
+    nodes = states[:, :robots]  # negative where a free robot was last
+    out[:, :robots] = np.sign(nodes) * map_to[np.abs(nodes)]
+    for first, end in new.space.slots:
+        sort_entries(out, first, end)
+    return out

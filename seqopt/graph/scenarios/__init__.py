@@ -1,0 +1,1 @@
+"""Layers of candidates with a copy of their costs for every scenario."""

@@ -1,0 +1,1 @@
+"""The states of a build and the moves between them, whatever the schedule."""

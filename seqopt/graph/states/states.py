@@ -1,0 +1,479 @@
+"""The problem of the free schedule: which robot does what next, and where, over a whole build."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+
+import numpy as np
+
+from seqopt.arrays import Bools, Floats, Ints
+from seqopt.contact.mortar import Mortar, find_mortar
+from seqopt.engines.interface import Engine
+from seqopt.errors import ProblemError
+from seqopt.graph.scenarios.engines import engine_for, require_alike
+from seqopt.network.network import Network
+from seqopt.problem.criteria import RankSum
+from seqopt.problem.goals import LARGEST, STATE_RESPONSES, Goal, Measure, parse_goals
+from seqopt.problem.requirements import (
+    LIMIT_TOLERANCE,
+    Criterion,
+    Limit,
+    as_limits,
+    state_costs,
+)
+from seqopt.problem.scales import SceneFacts
+from seqopt.problem.standing import Standing, StandingSets
+from seqopt.responses.grip_sets import GripSets
+from seqopt.responses.quantities import robot_response
+from seqopt.responses.resources import HERE, Resources
+from seqopt.scene.checks import short
+from seqopt.scene.scene import Scene
+from seqopt.sequence.free_rules import FreeRules
+from seqopt.sequence.free_space import FreeSpace, free_space
+from seqopt.sequence.schedule import Schedule
+from seqopt.sequence.schedule_space import ScheduleSpace
+from seqopt.sequence.steps import Grips
+from seqopt.showing import Shown
+from seqopt.stability.assessment import Stability
+
+FREE_TITLE = "free schedule"
+BAND = 1e-5  # share of a value within which six digits do not decide
+
+
+@dataclass(frozen=True, repr=False)
+class FreeProblem(Shown):
+    """The problem of the free schedule of a scene; everything is computed when first needed.
+
+    ``engine``: what computes responses; ``rules``: which moves are possible: those that rules
+    allow, or those that choose the open grips of a schedule, however many are open in a step;
+    ``criterion``: what a step costs, for the goals that name no response; ``goals``: what to
+    minimize, the most important first; ``limits``: what no step may exceed; ``standing``: that
+    every state must stand, if it is demanded; ``settled``: margins that every state must have as
+    well; ``budgets``: caps on the sums of as many last goals, which are not to be made small but
+    kept within; ``scenarios``: of the same scene in other states of the world: what is largest in
+    any of them counts, and limits and standing hold in all. By default that of ``engine`` alone.
+    ``resources``: who solves grip sets, and where answers are kept; the proof believes none of
+    these.
+    """
+
+    engine: Engine
+    rules: FreeRules | Schedule
+    criterion: Criterion
+    goals: tuple[Goal, ...]
+    limits: tuple[Limit, ...] = ()
+    standing: Standing | None = None
+    settled: tuple[Standing, ...] = ()
+    budgets: tuple[float, ...] = ()
+    scenarios: tuple[Engine, ...] = ()
+    resources: Resources = HERE
+
+    def __repr__(self) -> str:
+        caps = zip(self.goals[len(self.aims) :], self.budgets, strict=True)
+        capped = [f"{goal} <= {cap:g}" for goal, cap in caps]
+        goals = ", ".join([*map(str, self.aims), *capped])
+        where = f"{self.network.scene.name!r}"
+        if isinstance(self.rules, Schedule):
+            where += f", {self.rules.method!r}"
+        if self.scenarios:
+            where += f", {len(self.scenarios)} scenarios"
+        return f"FreeProblem({where}, {goals}, {len(self.limits)} limits)"
+
+    @cached_property
+    def each(self) -> tuple[FreeProblem, ...]:
+        """The same problem in every scenario by itself; none where there are no scenarios."""
+        return tuple(replace(self, engine=engine, scenarios=()) for engine in self.scenarios)
+
+    @property
+    def network(self) -> Network:
+        """Of the scene that is built."""
+        return self.engine.network
+
+    @property
+    def free_rules(self) -> FreeRules:
+        """Its rules, if moves follow from any; a `ProblemError` says where they do not."""
+        if isinstance(self.rules, Schedule):
+            raise ProblemError(
+                f"schedule {self.rules.method}: its steps are given; orders, and steps or regrips "
+                "in a Pareto set, go with the free schedule"
+            )
+        return self.rules
+
+    @property
+    def among(self) -> str:
+        """Which candidates alone are looked at, in words; empty for all."""
+        rules = self.rules
+        return rules.left_out if isinstance(rules, Schedule) else rules.candidates
+
+    @property
+    def title(self) -> str:
+        """What it is about, where plans stand beside each other."""
+        return f"{self.rules.method} schedule" if isinstance(self.rules, Schedule) else FREE_TITLE
+
+    @cached_property
+    def space(self) -> FreeSpace | ScheduleSpace:
+        """Its states and moves."""
+        parks = any(goal.measure is Measure.TRAVEL for goal in self.goals)
+        if isinstance(self.rules, Schedule):
+            return ScheduleSpace(self.network, self.rules, self.caps, parks)
+        return free_space(self.network, self.rules, self.caps, parks=parks)
+
+    @cached_property
+    def caps(self) -> Mapping[str, float]:
+        """Limits on single robots, by name, N."""
+        own = {robot_response(robot.name): robot.name for robot in self.network.scene.robots}
+        out: dict[str, float] = {}
+        for limit in self.limits:
+            if limit.response in own:
+                name = own[limit.response]
+                out[name] = min(limit.bound, out.get(name, np.inf))
+        return out
+
+    @cached_property
+    def named(self) -> tuple[str, ...]:
+        """The responses that goals, criterion and limits name."""
+        names = [goal.response for goal in self.goals if goal.response]
+        if any(goal.of_states and not goal.response for goal in self.goals):
+            names += self.criterion.wanted(1)
+        names += [limit.response for limit in self.limits]
+        return tuple(name for name in STATE_RESPONSES if name in names)
+
+    @property
+    def aims(self) -> tuple[Goal, ...]:
+        """The goals that are to be made small."""
+        return self.goals[: len(self.goals) - len(self.budgets)]
+
+    @property
+    def leading(self) -> int:
+        """The first goal that is about responses, or the first of all."""
+        return next((k for k, goal in enumerate(self.goals) if goal.of_states), 0)
+
+    @cached_property
+    def sets(self) -> GripSets:
+        """Responses of grip sets, those of the engine that are named; the forces come with them."""
+        names = [name for name in self.named if name != LARGEST]
+        return GripSets(self.engine, names, self.resources)
+
+    @cached_property
+    def screened(self) -> GripSets:
+        """The same with six digits, to choose by: enough where only worst values count."""
+        if any(goal.of_states and goal.measure is not Measure.PEAK for goal in self.goals):
+            return self.sets
+        return GripSets(self.engine, self.sets.names, self.resources, screen=True)
+
+    @property
+    def models(self) -> int:
+        """How many grip sets were solved."""
+        if self.each:
+            return sum(problem.models for problem in self.each)
+        return self.sets.solved + self.screened.solved * (self.screened is not self.sets)
+
+    @property
+    def nbytes(self) -> int:
+        """How much memory the responses of grip sets take."""
+        if self.each:
+            return sum(problem.nbytes for problem in self.each)
+        return self.sets.nbytes + self.screened.nbytes
+
+    def responses(
+        self, level: int, states: Ints, *, rough: bool = False
+    ) -> tuple[Mapping[str, Floats], Bools]:
+        """Return the named responses of states, and which states are within all limits.
+
+        ``states`` (n, c): as in `seqopt.sequence.free_space`; ``rough``: whether six digits are
+        enough, except for what is close to a limit. Results: ``responses`` (dict of str to (n,)
+        float): SI units; ``within`` (n,).
+        """
+        held, bricks = self.space.held(states), self.space.bricks_at(level)
+        answers, forces = (self.screened if rough else self.sets).answers(bricks, held)
+        if rough and self.screened is not self.sets:
+            close = self._close(answers, forces, states)
+            answers[close], forces[close] = self.sets.answers(bricks, held[close])
+        found = self._by_name(answers, forces)
+        within = np.isfinite(answers).all(axis=1) & np.isfinite(forces).all(axis=1)
+        for limit in self.limits:
+            if limit.response in found:
+                within &= ~limit.exceeded(found[limit.response])
+        return found, within & self._carried(states, forces)
+
+    def _by_name(self, answers: Floats, forces: Floats) -> dict[str, Floats]:
+        found = dict(zip(self.sets.names, answers.T, strict=True))
+        found[LARGEST] = forces.max(axis=1, initial=0.0)
+        return found
+
+    def _close(self, answers: Floats, forces: Floats, states: Ints) -> Bools:
+        """Return which states are so close to a limit that more digits decide."""
+        most = self._grips(states)[1]
+        close = _near(forces, np.where(np.isfinite(most), most, np.nan)).any(axis=1)
+        found = self._by_name(answers, forces)
+        for limit in self.limits:
+            if limit.response in found:
+                close |= _near(found[limit.response], limit.bound)
+        return np.asarray(close)
+
+    def values(
+        self, level: int, states: Ints, *, rough: bool = False, most: float = np.inf
+    ) -> tuple[Floats, Bools]:
+        """Return what goals take of states, and which states are within all limits.
+
+        ``states`` (n, c); ``rough``: whether six digits are enough; ``most``: over scenarios, a
+        state of which the first goal takes more is not asked further: its values are then those of
+        some scenarios. Results: ``values`` (n, g): a column for every goal; zero for one that is
+        about moves, or about margins; ``within`` (n,).
+        """
+        if self.each:
+            asked = [partial(p.values, level, rough=rough) for p in self.each]
+            return self._worst(asked, states, most)
+        found, within = self.responses(level, states, rough=rough)
+        bricks = self.space.bricks_at(level)
+        out = np.zeros((len(states), len(self.goals)))
+        for column, goal in enumerate(self.goals):
+            if goal.of_states and not goal.of_margins:
+                if goal.response:
+                    out[:, column] = found[goal.response]
+                else:
+                    out[:, column] = state_costs(self.criterion, found, bricks, within)
+        within &= np.isfinite(out).all(axis=1)
+        out[~within] = np.inf
+        return out, within
+
+    def standing_values(
+        self, level: int, states: Ints, *, most: float = np.inf
+    ) -> tuple[Floats, Bools]:
+        """Return the same where states must also stand as is demanded, margins among the goals.
+
+        What stands, and by what margin, is asked only of states that nothing else rules out.
+
+        ``states`` (n, c); ``most``: as of `values`. Results: ``values`` (n, g); ``within`` (n,).
+        """
+        if self.each:
+            asked = [partial(p.standing_values, level) for p in self.each]
+            return self._worst(asked, states, most)
+        out, within = self.values(level, states)
+        if self.demands:
+            rows = np.flatnonzero(within)
+            within[rows] = self.stand(level, states[rows])
+        for column, goal in enumerate(self.goals):
+            if goal.of_margins:
+                rows = np.flatnonzero(within)
+                bricks, grips = self.space.bricks_at(level), self._grips(states[rows], stand=True)
+                ends = self.stability.margins(goal.response, bricks, *grips)
+                out[rows, column] = ends[:, 1]
+        within &= np.isfinite(out).all(axis=1)
+        return out, within
+
+    def stand(self, level: int, states: Ints) -> Bools:
+        """Return which states are proven to stand as is demanded.
+
+        ``states`` (n, c). Result (n,).
+        """
+        if self.each:
+            return np.asarray(np.all([p.stand(level, states) for p in self.each], axis=0))
+        bricks = self.space.bricks_at(level)
+        return np.asarray(self.stability.stand(bricks, *self._grips(states, stand=True)))
+
+    def _worst(
+        self,
+        valued: Sequence[Callable[[Ints], tuple[Floats, Bools]]],
+        states: Ints,
+        most: float,
+    ) -> tuple[Floats, Bools]:
+        """Return the largest values in all scenarios; what one rules out the next is not asked."""
+        out = np.zeros((len(states), len(self.goals)))
+        within = np.ones(len(states), dtype=bool)
+        for values in valued:
+            rows = np.flatnonzero(within & (out[:, 0] <= most))
+            found, ok = values(states[rows])
+            out[rows], within[rows] = np.maximum(out[rows], found), ok
+        out[~within] = np.inf
+        return out, within
+
+    @cached_property
+    def stability(self) -> StandingSets:
+        """What is known of how grip sets stand."""
+        mortar = self.standing or Standing()
+        return StandingSets(self.network, mortar, self._payloads, self.demands)
+
+    @property
+    def demands(self) -> tuple[Standing, ...]:
+        """All that is demanded of the stability of states."""
+        return self.settled if self.standing is None else (self.standing, *self.settled)
+
+    @cached_property
+    def certified(self) -> dict[tuple[int, Grips], Stability]:
+        """What the cone program says of states, as far as it was asked."""
+        return {}
+
+    @cached_property
+    def _caps(self) -> Floats:
+        """The largest force of the robot of every column of a state, N."""
+        kinds = self.space.kinds
+        return np.concatenate([np.full(len(kind.robots), kind.cap) for kind in kinds])
+
+    @cached_property
+    def _payloads(self) -> Floats:
+        """What the robot of every column may carry where states must stand, N."""
+        if isinstance(self.rules, FreeRules):
+            return self._caps
+        payloads = np.array([robot.payload for robot in self.network.scene.robots])
+        return np.asarray(np.minimum(payloads, self._caps))
+
+    def _grips(self, states: Ints, *, stand: bool = False) -> tuple[Ints, Floats]:
+        """Return the nodes held, ascending, and the largest force at each, (n, r)."""
+        held = states[:, : len(self._caps)].clip(min=0)
+        order = np.argsort(held, axis=1, kind="stable")
+        most: Floats = self._payloads if stand else self._caps
+        return np.take_along_axis(held, order, axis=1), np.asarray(most[order])
+
+    def _carried(self, states: Ints, forces: Floats) -> Bools:
+        """Return in which states no grip exceeds what its robot may carry."""
+        most = self._grips(states)[1]
+        return np.asarray((forces <= most + LIMIT_TOLERANCE * most).all(axis=1))
+
+
+def _near(values: Floats, bound: Floats | float) -> Bools:
+    """Return which values are so close to a bound, NaN if there is none, that digits decide."""
+    finite = np.where(np.isfinite(values), values, np.nan)
+    return np.asarray(np.abs(finite - bound) <= BAND * np.abs(bound))
+
+
+def pose_free(
+    engine: Engine,
+    rules: FreeRules | Schedule,
+    criterion: Criterion,
+    goals: Sequence[Goal] | str = "minmax",
+    limits: Sequence[Limit] = (),
+    stands: Standing | Mortar | str | None = None,
+) -> FreeProblem:
+    """Return the problem of the free schedule of an engine's scene.
+
+    Parameters
+    ----------
+    engine : Engine
+        What computes responses.
+    rules : FreeRules or Schedule
+        Which moves are possible: what rules allow, or the open grips of a schedule, however many
+        are open in a step; where its states must stand, robots keep their payloads.
+    criterion : Criterion
+        What a step costs; ranks among choices cannot be used.
+    goals : sequence of Goal or str
+        What to minimize; see `parse_goals`.
+    limits : sequence of Limit
+        What no step may exceed.
+    stands : Standing, Mortar or str, optional
+        Requires that every state stands, with this mortar: ``"dry"``, ``"bond=3e3"`` (Pa).
+
+    Returns
+    -------
+    FreeProblem
+        Nothing is computed yet, except scales that a criterion takes from the scene.
+
+    Raises
+    ------
+    ProblemError
+        If goals, criterion or limits use a response that a state does not have.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> engine = seqopt.make_engine("compliance", seqopt.load_scene("arch25"))
+    >>> pose_free(engine, FreeRules(), seqopt.CRITERIA["worst-ratio"], "minmax,steps")
+    FreeProblem('arch25', minmax, steps, 0 limits)
+    """
+    named = _goals(goals)
+    limits = _checked(limits, engine.network)
+    if any(goal.of_states and not goal.response for goal in named):
+        criterion = _of_states(engine, criterion)
+    standing = stands if isinstance(stands, Standing | None) else Standing(find_mortar(stands))
+    return _asked(FreeProblem(engine, rules, criterion, named, limits, standing))
+
+
+def within(problem: FreeProblem, caps: Mapping[str, float]) -> FreeProblem:
+    """Return a problem whose plans keep totals over the build within caps.
+
+    ``caps``: ``steps``, ``regrips``, ``travel`` (m) or ``sum(RESPONSE)``, and how much each may be.
+    Raises `ProblemError` if something is no total, or a cap is no number from 0.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> engine = seqopt.make_engine("compliance", seqopt.load_scene("arch25"))
+    >>> problem = pose_free(engine, FreeRules(), seqopt.CRITERIA["worst-ratio"])
+    >>> within(problem, {"regrips": 3})
+    FreeProblem('arch25', minmax, regrips <= 3, 0 limits)
+    """
+    goals = [_goals(name)[0] for name in caps]
+    for goal, cap in zip(goals, caps.values(), strict=True):
+        if goal.measure is Measure.PEAK or (goal.of_states and not goal.response):
+            raise ProblemError(
+                f"budget {goal}: it is no total of moves or of a response; give steps, regrips, "
+                "travel or sum(RESPONSE), or set a limit"
+            )
+        if not (isinstance(cap, int | float) and 0 <= cap < np.inf):
+            raise ProblemError(f"budget {goal}={short(cap)}: give a number from 0")
+    if problem.budgets:
+        raise ProblemError("the problem has budgets already; give all of them at once")
+    caps_of = tuple(float(cap) for cap in caps.values())
+    return replace(problem, goals=(*problem.goals, *goals), budgets=caps_of)
+
+
+def over_scenarios(problem: FreeProblem, scenes: Sequence[Scene]) -> FreeProblem:
+    """Return a problem whose worst values count in any of some scenarios.
+
+    Limits and standing hold in all of them. The criterion keeps the numbers of the scene that it
+    was posed for. A `ProblemError` names a goal that adds up responses: the worst total of any
+    scenario is no total of worst states.
+    """
+    for goal in problem.goals:
+        if goal.measure is Measure.SUM:
+            raise ProblemError(
+                f"aim {goal}: the worst total of scenarios is no total of worst states; take worst "
+                "values, or a schedule with open grips without an aim of its own"
+            )
+    for number, scene in enumerate(scenes, start=1):
+        require_alike(problem.network.scene, scene, number)
+    engines = tuple(engine_for(problem.engine, scene) for scene in scenes)
+    return replace(problem, scenarios=engines)
+
+
+def _goals(given: Sequence[Goal] | str) -> tuple[Goal, ...]:
+    """Return goals that are given as such, or by their names."""
+    goals = parse_goals(given) if isinstance(given, str) else given
+    if not isinstance(goals, Sequence) or {*map(type, goals)} != {Goal}:
+        raise ProblemError(f"aims {short(given)}: give goals, or their names, as 'minmax,steps'")
+    return tuple(goals)
+
+
+def _asked(problem: FreeProblem) -> FreeProblem:
+    """Return a problem whose stability can be asked, where it will be."""
+    if problem.standing is not None or any(goal.of_margins for goal in problem.goals):
+        _ = problem.stability  # what cannot be asked is refused now
+    return problem
+
+
+def _checked(limits: Sequence[Limit], network: Network) -> tuple[Limit, ...]:
+    """Return limits that are all on what a state has."""
+    limits = as_limits(limits)
+    robots = {robot_response(robot.name) for robot in network.scene.robots}
+    for limit in limits:
+        _require(limit.response, {*STATE_RESPONSES, *robots}, "limit")
+    return limits
+
+
+def _of_states(engine: Engine, criterion: Criterion) -> Criterion:
+    """Return a criterion posed for a scene, if it is about states alone."""
+    if isinstance(criterion, RankSum):
+        raise ProblemError(
+            f"criterion {criterion.name}: it ranks the choices of a move, and states of a "
+            "schedule are none; take worst-ratio, weighted or another one of responses"
+        )
+    for name in criterion.wanted(1):
+        _require(name, {*STATE_RESPONSES}, f"criterion {criterion.name}")
+    return criterion.for_scene(SceneFacts(engine))
+
+
+def _require(name: str, known: set[str], where: str) -> None:
+    if name not in known:
+        listed = ", ".join(sorted(known))
+        raise ProblemError(f"{where}: a state of a free schedule has no {name}; give {listed}")

@@ -1,0 +1,128 @@
+"""The states and moves of a schedule, as an `seqopt.graph.Explorer` visits them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from seqopt.arrays import Bools, Floats, Ints
+from seqopt.graph.explore import Explorer, Moves
+from seqopt.graph.states.states import FreeProblem
+from seqopt.problem.goals import Measure
+from seqopt.sequence import free_space
+
+
+@dataclass(frozen=True)
+class FreeStates:
+    """The states of a free schedule, a part for every brick count.
+
+    Moves take a column each: whether they are regrips, and how far robots go, m.
+
+    ``regrips``: whether robots may take grips on bricks that stand; ``standing``: whether it is
+    asked of every state that it stands, and by which margins.
+    """
+
+    problem: FreeProblem
+    regrips: bool = True
+    standing: bool = False
+
+    @property
+    def levels(self) -> int:
+        """How many bricks there are, or steps of a schedule."""
+        return self.problem.space.levels
+
+    @property
+    def peaks(self) -> tuple[bool, ...]:
+        """By goal, whether its worst counts."""
+        return tuple(goal.measure is Measure.PEAK for goal in self.problem.goals)
+
+    def start(self) -> tuple[int, Ints]:
+        """Return the empty site."""
+        return 0, self.problem.space.start()
+
+    def codes(self, part: int, states: Ints) -> Ints:
+        """Return a number for every state."""
+        return self.problem.space.codes(states)
+
+    def within(self, part: int, states: Ints) -> Moves:
+        """Return the moves that place no brick."""
+        return _joined(self.problem.space.within(part, states), states, regrips=self.regrips)
+
+    def onward(self, part: int, states: Ints) -> Iterator[tuple[int, Moves]]:
+        """Yield the moves that place the next brick, or take the next step of a schedule."""
+        yield part + 1, self.placed(part, states)
+
+    def placed(self, level: int, states: Ints) -> Moves:
+        """Return the moves from a level to the next."""
+        return _joined(self.problem.space.onward(level, states), states)
+
+    @property
+    def floors(self) -> bool:
+        """Whether a state that one scenario rules out is not asked of the next."""
+        return bool(self.problem.each)
+
+    def values(
+        self, part: int, states: Ints, *, rough: bool, most: float = np.inf
+    ) -> tuple[Floats, Bools]:
+        """Return what goals take of states, and which are allowed."""
+        if self.standing:
+            return self.problem.standing_values(part, states, most=most)
+        return self.problem.values(part, states, rough=rough, most=most)
+
+    def amounts(self, values: Floats, taken: Floats) -> Floats:
+        """Return what goals take of moves."""
+        return move_amounts(self.problem, values, taken)
+
+    def ended(self, part: int, states: Ints) -> Bools:
+        """Return which states end the build."""
+        return self.problem.space.ended(states)
+
+
+def move_amounts(problem: FreeProblem, values: Floats, taken: Floats) -> Floats:
+    """Return what goals take of moves, (m, g).
+
+    ``values`` (m, g): what they take of the states that the moves lead to; ``taken`` (m, 2):
+    whether the moves are regrips, and how far robots go, m. Result (m, g).
+    """
+    out = values.copy()
+    for k, goal in enumerate(problem.goals):
+        if goal.measure is Measure.STEPS:
+            out[:, k] = 1.0
+        elif goal.measure is Measure.REGRIPS:
+            out[:, k] = taken[:, 0]
+        elif goal.measure is Measure.TRAVEL:
+            out[:, k] = taken[:, 1]
+    return out
+
+
+def explore(
+    problem: FreeProblem,
+    ceiling: float = np.inf,
+    width: int | None = None,
+    tell: Callable[[Explorer], object] = lambda _: None,
+) -> Explorer:
+    """Return the states of a free schedule below a ceiling that stand as is demanded.
+
+    ``ceiling``: the first goal must not take more of a state, where it is about a peak; ``width``:
+    from how many new states of a brick count the search goes on, and without regrips; ``tell``:
+    called after every level; may raise to end the search.
+    """
+    asked = bool(problem.demands) or any(goal.of_margins for goal in problem.goals)
+    space = FreeStates(problem, regrips=width is None, standing=asked)
+    found = Explorer(space, width, tell)
+    found.rise(ceiling)
+    return found
+
+
+def _joined(
+    found: Sequence[tuple[free_space.Moves, bool]], states: Ints, *, regrips: bool = True
+) -> Moves:
+    """Return moves together, those that are regrips only if these are wanted."""
+    parts = [Moves(np.zeros(0, dtype=np.int64), states[:0], np.zeros((0, 2)))]
+    for moves, regrip in found:
+        if regrips or not regrip:
+            taken = np.column_stack([np.full(len(moves.way), float(regrip)), moves.way])
+            parts.append(Moves(moves.source, moves.states, taken))
+    return Moves(*map(np.concatenate, zip(*parts, strict=True)))

@@ -1,0 +1,1 @@
+"""How formulations are found and called, and what several of them are written with."""

@@ -1,0 +1,209 @@
+"""Formulations: ways to solve a placement problem, and what they return."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+from importlib.metadata import EntryPoint
+
+import numpy as np
+
+from seqopt.arrays import FrozenValue
+from seqopt.errors import ProblemError, did_you_mean, said
+from seqopt.graph.layers.interface import Aim
+from seqopt.plan.calling.watch import Finding
+from seqopt.plugins import plugins
+
+GROUP = "seqopt.formulations"
+EXHIBITS = "seqopt.exhibits"
+WATCH = "watch"  # the name by which a formulation takes a watch
+
+
+class FormulationKind(Enum):
+    """What a formulation promises."""
+
+    EXACT = "exact"
+    HEURISTIC = "heuristic"
+    BOUND = "bound"  # a proven bound; its choice is exact where nothing couples the moves
+
+
+class Reads(Enum):
+    """Which steps a formulation looks at."""
+
+    ALL = "all"  # every pair in every shared step
+    WINDOW = "window"  # by default, shared steps only for choices already made
+
+
+class End(Enum):
+    """How a formulation ended."""
+
+    DONE = "done"
+    STOPPED = "stopped"  # before it could keep what it promises; its choice and bound stand
+    INTERRUPTED = "interrupted"  # by whoever asked for an end; its choice and bound stand
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Selection(FrozenValue):
+    """A candidate per move, and what the formulation claims about it.
+
+    ``choice``: index of the chosen node among each move's candidates, from 0; ``objective``:
+    claimed value, in the unit of the criterion; ``bound``: claimed lower bound, budgets included;
+    minus infinity if none; ``prices``: dual value of each budget: the rate at which one more unit
+    would lower the bound; ``compile_seconds``: part of the time to solve that went into writing the
+    program down for a solver, s; ``end``: whether it ended early; ``trace``: what it knew at which
+    time: choices and bounds.
+    """
+
+    choice: tuple[int, ...]
+    objective: float
+    bound: float = -np.inf
+    prices: Mapping[str, float] = field(default_factory=dict)
+    compile_seconds: float = 0.0
+    end: End = End.DONE
+    trace: tuple[Finding, ...] = field(default=(), compare=False)
+
+
+@dataclass(frozen=True, repr=False)
+class Formulation:
+    """A way to solve the problem.
+
+    Attributes
+    ----------
+    name, summary : str
+        What it is called, and what it does in a few words.
+    kind : FormulationKind
+        What it promises.
+    aim : Aim
+        What it minimizes: the sum of the costs, or the largest cost.
+    solve : callable
+        Takes the problem and named options, returns a `Selection`.
+    reads : Reads
+        Which steps it looks at with its default options.
+    takes_budgets : bool
+        Whether it can keep totals over the build within budgets.
+    windowed : tuple of (str, int or str), optional
+        Options with which it looks at one window after the other, if it does so only with these.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> best = seqopt.formulations()["overlap_dp"]
+    >>> best.kind.value, best.aim.value
+    ('exact', 'sum')
+    """
+
+    name: str
+    summary: str
+    kind: FormulationKind
+    aim: Aim
+    solve: Callable[..., Selection]
+    reads: Reads = Reads.ALL
+    takes_budgets: bool = False
+    windowed: tuple[tuple[str, int | str], ...] | None = None
+
+    def __repr__(self) -> str:
+        least = "sum" if self.aim is Aim.SUM else "largest"
+        what = f"{self.kind.value}, least {least} of the costs"
+        return f"<Formulation {self.name}: {self.summary} ({what})>"
+
+    @property
+    def window_options(self) -> dict[str, int | str] | None:
+        """Options with which it looks at one window after the other; None if it never does."""
+        if self.windowed is None:
+            return {} if self.reads is Reads.WINDOW else None
+        return dict(self.windowed)
+
+    @property
+    def options(self) -> dict[str, int | str]:
+        """The options of ``solve``, by name, and their defaults."""
+        return {
+            name: parameter.default
+            for name, parameter in inspect.signature(self.solve).parameters.items()
+            if parameter.kind is inspect.Parameter.KEYWORD_ONLY and name != WATCH
+        }
+
+    @property
+    def watched(self) -> bool:
+        """Whether ``solve`` takes a `Watch`, and so a time limit."""
+        return WATCH in inspect.signature(self.solve).parameters
+
+
+def formulation_names() -> tuple[str, ...]:
+    """Return the names of all registered formulations, without loading any.
+
+    Result: in alphabetical order.
+    """
+    return tuple(sorted(plugins(GROUP)))
+
+
+def formulations() -> dict[str, Formulation]:
+    """Return all registered formulations: entry points of the group ``seqopt.formulations``.
+
+    Returns
+    -------
+    dict of str to Formulation
+        By name, in alphabetical order.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> [name for name, f in seqopt.formulations().items() if f.takes_budgets]
+    ['labels', 'lagrangian', 'overlap_lp', 'overlap_mip']
+    """
+    return {name: _load(entry) for name, entry in sorted(plugins(GROUP).items())}
+
+
+def exhibits() -> dict[str, Formulation]:
+    """Return the exhibits: entry points of the group ``seqopt.exhibits``.
+
+    They solve what `formulations` solve, by programs that are there to be looked at. Comparisons
+    leave them out.
+
+    Result: by name, in alphabetical order.
+    """
+    return {name: _load(entry) for name, entry in sorted(plugins(EXHIBITS).items())}
+
+
+def _load(entry: EntryPoint) -> Formulation:
+    try:
+        found = entry.load()
+    except Exception as error:  # whatever a package of others may raise
+        raise ProblemError(
+            f"formulation {entry.name!r}: {entry.value} cannot be loaded: {said(error)}; "
+            "reinstall it or remove it"
+        ) from error
+    if not isinstance(found, Formulation):
+        raise ProblemError(
+            f"formulation {entry.name!r}: {entry.value} is a {type(found).__name__}; "
+            "let the entry point name a Formulation"
+        )
+    return found
+
+
+def find_formulation(name: str) -> Formulation:
+    """Return a formulation by name.
+
+    ``name``: one of `formulation_names`, or of an exhibit. Raises `ProblemError` if there is none
+    of that name; the message lists those there are.
+    """
+    found = plugins(EXHIBITS) | plugins(GROUP)
+    if name not in found:
+        known = ", ".join(formulation_names())
+        hint = did_you_mean(name, formulation_names())
+        raise ProblemError(f"formulation {name!r} does not exist{hint}; give one of {known}")
+    return _load(found[name])
+
+
+def as_formulation(given: Formulation | str) -> Formulation:
+    """Return a formulation, by name or itself.
+
+    Raises `ProblemError` if it is neither.
+    """
+    if isinstance(given, Formulation):
+        return given
+    if isinstance(given, str):
+        return find_formulation(given)
+    known = ", ".join(formulation_names())
+    raise ProblemError(f"a {type(given).__name__} is not a formulation; give one of {known}")

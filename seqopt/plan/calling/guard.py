@@ -1,0 +1,134 @@
+"""How formulations are called: what judges them stays as it was, and nonsense is a failure.
+
+One rule for all formulations: what the judge uses has a checksum, before a formulation is called
+and after. Arrays that it unlocks and attributes that it sets are seen by it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import fields, is_dataclass
+from enum import Enum
+from functools import cached_property
+from typing import Any, TypeVar
+
+import numpy as np
+
+from seqopt.errors import SeqoptError, SolverError, said
+
+Result = TypeVar("Result")
+
+
+def called(
+    name: str, judged: Callable[[], object], kind: type[Result], solve: Callable[[], object]
+) -> Result:
+    """Return what a formulation returns, if that is what it should be.
+
+    ``name``: of the formulation; ``judged``: returns what its answer is judged by; ``kind``: what
+    it has to return; ``solve``: calls it. Result: of that kind. Raises `SolverError` if it raises
+    anything but an error of seqopt or an interrupt, returns something else, or changes what it is
+    judged by.
+    """
+    with unchanged(name, judged):
+        try:
+            found = solve()
+        except (SeqoptError, MemoryError, KeyboardInterrupt):
+            raise
+        except BaseException as error:  # whatever a formulation of others may raise, exits too
+            raise SolverError(f"formulation {name} failed: {said(error)}") from error
+    if not isinstance(found, kind):
+        raise SolverError(
+            f"formulation {name} returned a {type(found).__name__}, not a {kind.__name__}"
+        )
+    return found
+
+
+@contextmanager
+def unchanged(name: str, judged: Callable[[], object]) -> Iterator[None]:
+    """Require that values stay what they are while a formulation works.
+
+    ``name``: of the formulation; ``judged``: returns them. Raises `SolverError` if one does not,
+    also where the formulation fails.
+    """
+    before = checksum(judged())
+    try:
+        yield
+    finally:
+        if checksum(judged()) != before:
+            raise SolverError(
+                f"formulation {name} changed the problem that it is judged by; make it use copies"
+            )
+
+
+@contextmanager
+def readable(name: str) -> Iterator[None]:
+    """Say that a formulation failed where what it returned cannot be read.
+
+    ``name``: of the formulation.
+    """
+    try:
+        yield
+    except (TypeError, ValueError, AttributeError, OverflowError) as error:
+        raise SolverError(f"formulation {name} returned nonsense: {said(error)}") from error
+
+
+def text(given: object) -> str:
+    """Return a text if it is one; a `TypeError` says that it is none."""
+    if not isinstance(given, str):
+        raise TypeError(f"{type(given).__name__} where a text belongs")
+    return given
+
+
+def checksum(value: object) -> bytes:
+    """Return a checksum of a value: of its arrays, numbers, texts and fields, and of its methods.
+
+    Engines count as themselves, with the scene that they are for: what they keep may grow.
+    """
+    digest = hashlib.blake2b(digest_size=16)
+    _add(digest, value)
+    return digest.digest()
+
+
+def _add(digest: Any, value: object) -> None:
+    digest.update(type(value).__qualname__.encode())
+    if isinstance(value, np.ndarray):
+        some = value if any(value.strides) or not value.size else value.flat[:1]
+        digest.update(repr((value.dtype.str, value.shape)).encode())
+        digest.update(np.ascontiguousarray(some).view(np.uint8))
+    elif isinstance(value, str | bytes | int | float | complex | Enum | None):
+        digest.update(repr(value).encode())
+    elif isinstance(value, Mapping):
+        _add(digest, [*value.items()])
+    elif isinstance(value, tuple | list | set | frozenset):
+        for part in value if isinstance(value, tuple | list) else sorted(value, key=repr):
+            _add(digest, part)
+        digest.update(b"end")
+    elif hasattr(value, "network") and not is_dataclass(value):
+        digest.update(str(id(value)).encode())
+        _add(digest, [_shadowing(value), value.network.scene])
+    elif callable(value) and not is_dataclass(value):
+        digest.update(str(id(value)).encode())
+    else:
+        _add(digest, _parts(value))
+
+
+def _parts(value: object) -> list[object]:
+    """Return the fields of a value, and what its class and itself call under which names."""
+    methods = [(name, id(thing)) for k in type(value).__mro__ for name, thing in vars(k).items()]
+    held = getattr(value, "__dict__", {})
+    if is_dataclass(value):
+        own = {f.name for f in fields(value)}
+    else:
+        own = {n for n in held if not isinstance(getattr(type(value), n, None), cached_property)}
+    return [
+        [pair for pair in methods if not pair[0].startswith("__")],
+        [name for name in _shadowing(value) if name not in own],
+        *(getattr(value, name) for name in sorted(own)),
+    ]
+
+
+def _shadowing(value: object) -> list[str]:
+    """Return the methods of a value's class that it has under the same names itself."""
+    return [n for n in getattr(value, "__dict__", {}) if callable(getattr(type(value), n, None))]

@@ -1,0 +1,150 @@
+r"""Choices as paths whose arcs pay for what they take of budgets, as arrays for any formulation.
+
+At prices :math:`\lambda \ge 0` a choice :math:`o` costs :math:`c(o) + \lambda^T (a(o) - b)`, where
+:math:`a` is what it takes of the budgets and :math:`b` what there is. Without the budgets that is a
+shortest path, and its length is a bound on what any choice within the budgets costs. Costs and
+amounts are scaled to order one, costs by a power of two so that nothing is rounded.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from seqopt.arrays import Floats
+from seqopt.graph.layers.costs import Budget
+from seqopt.graph.layers.interface import PlacementProblem
+from seqopt.plan.calling.flow import within_each
+
+ROUNDING = 1e-9  # of a budget or a cost: within this, sums are equal; budgets have as much more
+EPS = float(np.finfo(float).eps)
+
+
+@dataclass(frozen=True, eq=False)
+class Path:
+    """A choice, what it costs and what it takes.
+
+    ``choice``: a candidate for every move; ``cost``: scaled; ``over`` (B,): what it takes of every
+    budget, less its cap; scaled.
+    """
+
+    choice: tuple[int, ...]
+    cost: float
+    over: Floats
+
+    @property
+    def within(self) -> bool:
+        """Whether it keeps all budgets."""
+        return bool((self.over <= 0).all())
+
+
+@dataclass(frozen=True, eq=False)
+class PricedPaths:
+    """The paths through the candidates of all moves.
+
+    ``arcs`` (tuple of (C_{k-1}, C_k) float): cost of every pair with its end, over ``scale``;
+    ``amounts`` (tuple of (B, C_{k-1}, C_k) float): what it takes of every budget that has a bound,
+    over the budget's unit; ``caps`` (B,): how much there is of each, in its unit, and what sums may
+    be off by; ``scale``: by which costs are divided; ``units`` (B,): by which amounts are;
+    ``names``: of the budgets.
+    """
+
+    arcs: tuple[Floats, ...]
+    amounts: tuple[Floats, ...]
+    caps: Floats
+    scale: float
+    units: Floats
+    names: tuple[str, ...]
+
+    @property
+    def loosest(self) -> float:
+        """More than any choice costs, scaled."""
+        return sum(float(arc[np.isfinite(arc)].max()) for arc in self.arcs)
+
+    def path(self, choice: Sequence[int]) -> Path:
+        """Return a choice with what it costs and takes.
+
+        ``choice``: a candidate for every move.
+        """
+        pairs = list(zip((0, *choice[:-1]), choice, strict=True))
+        cost = sum(float(arc[pair]) for arc, pair in zip(self.arcs, pairs, strict=True))
+        taken = sum(a[:, i, j] for a, (i, j) in zip(self.amounts, pairs, strict=True))
+        return Path(tuple(choice), cost, np.asarray(taken - self.caps))
+
+    def to_go(self, prices: Floats) -> tuple[list[Floats], list[Floats]]:
+        """Return the priced arcs, and the least priced cost from every candidate to the end.
+
+        ``prices`` (B,): scaled. Results: ``priced`` (list of (C_{k-1}, C_k) float): the arcs;
+        ``rest`` (list of (C_k,) float): from the source, (1,), then for every move; zero at the
+        last.
+        """
+        priced = [
+            arc + np.tensordot(prices, a, 1) for arc, a in zip(self.arcs, self.amounts, strict=True)
+        ]
+        rest = [np.zeros(priced[-1].shape[1])]
+        for arc in reversed(priced):
+            rest.insert(0, (arc + rest[0]).min(axis=1))
+        return priced, rest
+
+    def cheapest(self, prices: Floats) -> tuple[Path, float]:
+        """Return the path that is cheapest at given prices, and the bound that they prove.
+
+        ``prices`` (B,): scaled. Results: ``bound``: scaled; no choice within the budgets costs
+        less, however sums are rounded.
+        """
+        priced, rest = self.to_go(prices)
+        choice: list[int] = []
+        for arc, ahead in zip(priced, rest[1:], strict=True):
+            choice.append(int(np.argmin(arc[choice[-1] if choice else 0] + ahead)))
+        bound = float(rest[0][0] - prices @ self.caps)
+        size = 1 + float(prices @ (1 + np.abs(self.caps)))  # of what is summed, per move
+        return self.path(choice), bound - EPS * (len(priced) + 1) ** 2 * size
+
+    def named(self, prices: Floats) -> dict[str, float]:
+        """Return prices by budget, in the unit of the criterion per unit of the budget.
+
+        ``prices`` (B,): scaled.
+        """
+        worth = self.scale * prices / self.units
+        return {name: float(price) for name, price in zip(self.names, worth, strict=True)}
+
+
+def priced_paths(problem: PlacementProblem) -> PricedPaths:
+    """Return the paths of a problem.
+
+    ``problem``: its sums and budgets are used. Raises `InfeasibleError` if no choice is allowed, or
+    none is within one of the budgets; `ProblemError` if a budget is not for the moves and
+    candidates of the problem.
+    """
+    costs = problem.sums
+    costs.continuable()
+    within_each(problem)
+    budgets = [budget for budget in problem.budgets if np.isfinite(budget.bound)]
+    arcs = [shared + single for shared, single in zip(costs.shared, costs.single, strict=True)]
+    largest = max(float(np.abs(arc[np.isfinite(arc)]).max()) for arc in arcs)
+    scale = 2.0 ** math.frexp(largest)[1] if largest else 1.0
+    units = np.array([_unit(budget) for budget in budgets])
+    return PricedPaths(
+        arcs=tuple(arc / scale for arc in arcs),
+        amounts=tuple(_amounts(budgets, units, k, arc.shape) for k, arc in enumerate(arcs)),
+        caps=np.array([b.bound for b in budgets]) / units + ROUNDING,
+        scale=scale,
+        units=units,
+        names=tuple(budget.name for budget in budgets),
+    )
+
+
+def _amounts(budgets: Sequence[Budget], units: Floats, k: int, shape: tuple[int, ...]) -> Floats:
+    found = np.empty((len(budgets), *shape))
+    for row, budget, unit in zip(found, budgets, units, strict=True):
+        row[:] = (budget.shared[k] + budget.single[k]) / unit
+    return found
+
+
+def _unit(budget: Budget) -> float:
+    """Return the size of a budget: its bound, or its largest amount."""
+    largest = max(float(np.abs(a).max()) for a in (*budget.single, *budget.shared))
+    return max(abs(budget.bound), largest) or 1.0

@@ -1,0 +1,95 @@
+"""How a formulation is called: what it returns is read as a selection, or it has failed."""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
+from typing import Any
+
+import numpy as np
+
+from seqopt.errors import InfeasibleError, SolverError
+from seqopt.graph.layers.interface import PlacementProblem
+from seqopt.interrupts import answered
+from seqopt.plan.calling.formulation import WATCH, End, Formulation, Selection
+from seqopt.plan.calling.guard import called, readable
+from seqopt.plan.calling.watch import Finding, Watch
+from seqopt.plan.judge.certificate import least_sum
+from seqopt.plan.judge.conflicts import refusal
+
+
+def select(
+    formulation: Formulation, problem: PlacementProblem, watch: Watch | None = None, **options: Any
+) -> Selection:
+    """Return the selection of a formulation, with numbers where numbers belong.
+
+    ``watch``: handed to the formulation if it takes one; the trace is read from it. An interrupt is
+    then told to it, so that the formulation ends with the best choice so far. ``**options``: of the
+    formulation. Result: claimed, not proven. Raises `ProblemError`, `SolverError` as the
+    formulation does; a `SolverError` also if it raises anything else, or returns something that is
+    no selection; `KeyboardInterrupt` if it was interrupted and no choice was at hand.
+    """
+    watch = watch or Watch()
+    ends = answered(watch.interrupt) if formulation.watched else nullcontext()
+    with ends, _infeasible_confirmed(problem, formulation):
+        return _with_numbers(formulation, _called(formulation, problem, watch, options), watch)
+
+
+def _called(
+    formulation: Formulation, problem: PlacementProblem, watch: Watch, options: dict[str, Any]
+) -> Selection:
+    """Return what a formulation returns, if that is a selection."""
+    told = {WATCH: watch} if formulation.watched else {}
+    aim = formulation.aim
+    try:
+        return called(
+            formulation.name,
+            lambda: (aim.costs(problem), problem.budgets),
+            Selection,
+            lambda: formulation.solve(problem, **told, **options),
+        )
+    except SolverError as error:
+        if watch.interrupted:
+            raise KeyboardInterrupt(str(error)) from error
+        raise
+
+
+def _with_numbers(formulation: Formulation, found: Selection, watch: Watch) -> Selection:
+    """Return a selection with numbers where numbers belong, or raise a `SolverError`."""
+    with readable(formulation.name):
+        seconds = float(found.compile_seconds)
+        if not 0 <= seconds < np.inf:
+            raise ValueError(f"compile_seconds is {seconds}")
+        trace = _traced(watch, float(found.objective), float(found.bound))
+        return Selection(
+            choice=tuple(operator.index(index) for index in found.choice),
+            objective=float(found.objective),
+            bound=float(found.bound),
+            prices={str(name): float(price) for name, price in found.prices.items()},
+            compile_seconds=seconds,
+            end=End.INTERRUPTED if watch.interrupted else End(found.end),
+            trace=trace,
+        )
+
+
+def _traced(watch: Watch, objective: float, bound: float) -> tuple[Finding, ...]:
+    """Return what was told, ending with what is claimed."""
+    watch.tell(objective, bound)
+    return watch.trace
+
+
+@contextmanager
+def _infeasible_confirmed(problem: PlacementProblem, formulation: Formulation) -> Iterator[None]:
+    """Say why there is no choice where a formulation says that there is none, if that is so."""
+    try:
+        yield
+    except InfeasibleError as error:
+        costs = formulation.aim.costs(problem)
+        if not np.isfinite(least_sum(costs)):
+            costs.continuable()  # names the move
+        if problem.budgets:
+            raise refusal(problem, formulation.name) from None
+        raise SolverError(
+            f"formulation {formulation.name} says that no choice is allowed, and some are: {error}"
+        ) from None

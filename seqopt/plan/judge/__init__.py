@@ -1,0 +1,1 @@
+"""Proofs that share nothing with what they judge: values, bounds, infeasibility."""

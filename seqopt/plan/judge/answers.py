@@ -1,0 +1,74 @@
+"""What the judge of free schedules asks the engine: grip sets and what goals take of them."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from seqopt.arrays import Bools, Floats, Ints
+from seqopt.graph.states.states import FreeProblem
+from seqopt.problem.goals import LARGEST, Goal
+from seqopt.problem.requirements import state_costs
+from seqopt.responses.blocks import Block
+from seqopt.responses.grip_sets import solve_sets
+
+
+class Answers(NamedTuple):
+    """What is known of grip sets.
+
+    ``worth`` (S, g): what every goal takes of them; zero of one that is about moves or margins;
+    ``forces`` (S, r): of their grips, N; ``fit`` (S,): which hang together and are within all
+    limits.
+    """
+
+    worth: Floats
+    forces: Floats
+    fit: Bools
+
+
+def ask(problem: FreeProblem, bricks: int, grips: Ints, most: float = np.inf) -> Answers:
+    """Return what is known about grip sets, computed again by the engine.
+
+    ``grips`` (S, r): nodes held; ``most``: over scenarios, what the first goal takes more of in one
+    is not asked of the next.
+    """
+    if problem.each:
+        return _worst(problem, bricks, grips, most)
+    return _asked(problem, bricks, grips)
+
+
+def _worst(problem: FreeProblem, bricks: int, grips: Ints, most: float) -> Answers:
+    """Return the largest of all scenarios, of what is passed by those before."""
+    out = np.zeros((len(grips), len(problem.goals)))
+    forces, fit = np.zeros(grips.shape), np.ones(len(grips), dtype=bool)
+    for each in problem.each:
+        rows = np.flatnonzero(fit & (out[:, 0] <= most))
+        found = ask(each, bricks, grips[rows])
+        out[rows] = np.maximum(out[rows], found.worth)
+        forces[rows], fit[rows] = np.maximum(forces[rows], found.forces), found.fit
+    return Answers(out, forces, fit)
+
+
+def _asked(problem: FreeProblem, bricks: int, grips: Ints) -> Answers:
+    """Return the same of one scenario; nothing that is kept anywhere is believed."""
+    names = tuple(name for name in problem.named if name != LARGEST)
+    block = Block(bricks, grips, names, screen=False)
+    rows = solve_sets(problem.engine, block, problem.resources)
+    found, forces = dict(zip(names, rows.T, strict=False)), rows[:, len(names) :]
+    found[LARGEST] = forces.max(axis=1, initial=0.0)
+    fit = np.asarray(np.isfinite(rows).all(axis=1))
+    for limit in problem.limits:
+        fit &= ~limit.exceeded(found.get(limit.response, np.zeros(len(grips))))
+    worth = np.column_stack([_costs(problem, goal, found, bricks, fit) for goal in problem.goals])
+    return Answers(worth, forces, fit & np.isfinite(worth).all(axis=1))
+
+
+def _costs(
+    problem: FreeProblem, goal: Goal, found: dict[str, Floats], bricks: int, fit: Bools
+) -> Floats:
+    if goal.response and not goal.of_margins:
+        return found[goal.response]
+    if goal.of_states and not goal.of_margins:
+        return state_costs(problem.criterion, found, bricks, fit)
+    return np.zeros(len(fit))

@@ -1,0 +1,202 @@
+"""Certificates of optimality: a selection checked from the problem's data alone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from seqopt.arrays import FrozenValue
+from seqopt.errors import SolverError
+from seqopt.graph.layers.costs import TINY, LayeredCosts
+from seqopt.graph.layers.interface import Aim, PlacementProblem
+from seqopt.graph.layers.partial_costs import PartialCosts, least_possible
+from seqopt.plan.calling.formulation import (
+    End,
+    Formulation,
+    FormulationKind,
+    Selection,
+    as_formulation,
+)
+from seqopt.plan.judge.budget_proof import least_within
+
+TOLERANCE = 1e-6  # of the costs that a choice meets: how far a claim may be from what the data say
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Certificate(FrozenValue):
+    """The value of a selection and a bound on all others, from the problem's data alone.
+
+    Attributes
+    ----------
+    objective : float
+        The value of the selection, recomputed; in the unit of the criterion.
+    bound : float
+        The least value of any choice, computed again from the data; with budgets a bound on the
+        value of any choice within them, by prices and partial choices of the certificate's own.
+    gap : float
+        The objective minus the bound, relative to the magnitude of the costs of the choice: their
+        sum, or the largest for a peak. It has no unit.
+    claimed_gap : float
+        The same with the formulation's own bound if that is higher; it is not proven.
+    spent : mapping of str to float
+        The amount that the selection uses of each budget.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> proof = seqopt.optimize("arch25", criterion="worst-ratio-published").certificate
+    >>> round(proof.objective, 3), round(proof.bound, 3), proof.gap
+    (57.538, 57.538, 0.0)
+    """
+
+    objective: float
+    bound: float
+    gap: float
+    claimed_gap: float
+    spent: Mapping[str, float]
+
+    def __repr__(self) -> str:
+        values = f"objective {self.objective:.6g}, no choice below {self.bound:.6g}"
+        return f"<Certificate: {values}, gap {100 * self.gap:.3g} %>"
+
+
+def certify(problem: PlacementProblem, selection: Selection, aim: Aim) -> Certificate:
+    """Check a selection from the problem's data, without the solver.
+
+    ``problem``: what was solved; ``selection``: what a formulation claims; ``aim``: whether the sum
+    or the peak of the costs was minimized. Raises `SolverError` if the choice is not one candidate
+    per move, is not allowed, exceeds a budget, or is not worth what was claimed.
+    """
+    costs = aim.costs(problem)
+    value = _value(costs, selection.choice, aim)
+    sizes = [abs(part) for part in costs.parts(selection.choice)]
+    scale = max(sum(sizes) if aim is Aim.SUM else max(sizes), TINY)
+    if not abs(value - selection.objective) <= TOLERANCE * scale:
+        raise SolverError(f"the objective is {value:.9g}, not {selection.objective:.9g} as claimed")
+    spent = {budget.name: budget.spent(selection.choice) for budget in problem.budgets}
+    for budget in problem.budgets:
+        if budget.slack(selection.choice) < -TOLERANCE:
+            raise SolverError(
+                f"the choice takes {spent[budget.name]:.6g} of {budget.name}, more than "
+                f"{budget.bound:.6g}; use a formulation that keeps budgets exactly "
+                f"(the claimed bound is {selection.bound:.9g})"
+            )
+    bound = least(costs, aim)
+    if value < bound - TOLERANCE * scale:
+        raise SolverError(
+            f"the least value computed again, {bound:.9g}, lies above that of the choice, "
+            f"{value:.9g}: the costs changed while they were judged"
+        )
+    highest = value if problem.budgets else bound
+    if not selection.bound <= highest + TOLERANCE * scale:  # NaN is no bound
+        raise SolverError(f"the claimed bound {selection.bound:.9g} exceeds {highest:.9g}")
+    if problem.budgets and aim is Aim.SUM:
+        bound = max(bound, least_within(problem, value, selection.prices, scale))
+    gap, claimed = (max(0.0, value - b) / scale for b in (bound, max(bound, selection.bound)))
+    return Certificate(value, bound, gap, claimed, spent)
+
+
+def certify_partial(costs: PartialCosts, selection: Selection, objective: float) -> Certificate:
+    """Check a selection of which not all pairs are known, from those that are.
+
+    ``costs``: what was looked at; ``selection``: what is claimed; ``objective``: the costs of the
+    steps that the selection meets, solved again. Raises `SolverError` if the selection is not worth
+    what was claimed, or its bound is not that of the pairs.
+    """
+    scale = max(abs(objective), TINY)
+    if not abs(objective - selection.objective) <= TOLERANCE * scale:
+        raise SolverError(
+            f"the objective is {objective:.9g}, not {selection.objective:.9g} as claimed"
+        )
+    bound = least_possible(costs)
+    if not selection.bound <= bound + TOLERANCE * scale:
+        raise SolverError(f"the claimed bound {selection.bound:.9g} exceeds {bound:.9g}")
+    bound = min(bound, objective)
+    gap = (objective - bound) / scale
+    if selection.end is End.DONE and gap > TOLERANCE:
+        raise SolverError(
+            f"the value of the choice is {objective:.9g}, and no more than {bound:.9g} is proven"
+        )
+    return Certificate(objective, bound, gap, gap, {})
+
+
+def _value(costs: LayeredCosts, choice: tuple[int, ...], aim: Aim) -> float:
+    """Return the value of a choice, or raise a `SolverError` if it is not a valid choice."""
+    sizes = costs.sizes
+    if len(choice) != len(sizes):
+        raise SolverError(f"the answer names {len(choice)} candidates for {len(sizes)} moves")
+    for k, (index, size) in enumerate(zip(choice, sizes, strict=True), start=1):
+        if not 0 <= index < size:
+            raise SolverError(f"the answer names candidate {index} of {size} for move {k}")
+    value = aim.worth(costs, choice)
+    if not np.isfinite(value):
+        raise SolverError("the choice is not allowed by the problem; the solver's answer is wrong")
+    return value
+
+
+def least(costs: LayeredCosts, aim: Aim) -> float:
+    """Return the least value of any choice, ignoring budgets.
+
+    ``aim``: takes `least_sum` or `least_peak`. Result: infinite if no choice is allowed.
+    """
+    return least_sum(costs) if aim is Aim.SUM else least_peak(costs)
+
+
+def least_sum(costs: LayeredCosts) -> float:
+    """Return the least sum that any choice reaches, budgets aside: forward, move by move.
+
+    Result: infinite if no choice is allowed.
+    """
+    reached = np.zeros(1)
+    for single, shared in zip(costs.single, costs.shared, strict=True):
+        reached = (reached[:, None] + shared).min(axis=0) + single
+    return float(reached.min())
+
+
+def least_peak(costs: LayeredCosts) -> float:
+    """Return the least worst cost of any choice, by bisection over all costs that occur.
+
+    A value is reached if the choices whose costs do not exceed it connect the first move to the
+    last.
+
+    Result: infinite if no choice is allowed.
+    """
+    levels = np.unique(np.concatenate([a.ravel() for a in (*costs.single, *costs.shared)]))
+    low, high = 0, len(levels) - 1
+    while low < high:
+        middle = (low + high) // 2
+        if _connected(costs, float(levels[middle])):
+            high = middle
+        else:
+            low = middle + 1
+    return float(levels[low])
+
+
+def _connected(costs: LayeredCosts, level: float) -> bool:
+    reached = np.ones(1, dtype=bool)
+    for single, shared in zip(costs.single, costs.shared, strict=True):
+        reached = (single <= level) & ((shared <= level) & reached[:, None]).any(axis=0)
+    return bool(reached.any())
+
+
+def judge(
+    problem: PlacementProblem, selection: Selection, formulation: Formulation | str
+) -> Certificate:
+    """Certify a selection, and check what its formulation promises.
+
+    ``problem``: what was solved; ``selection``: what the formulation claims; ``formulation``: what
+    made the selection. Raises `SolverError` if the certificate fails, or without budgets a
+    formulation that is no heuristic and ran to its end misses the optimum.
+    """
+    formulation = as_formulation(formulation)
+    certificate = certify(problem, selection, formulation.aim)
+    promises = formulation.kind is not FormulationKind.HEURISTIC and selection.end is End.DONE
+    exact = promises and not problem.budgets
+    if exact and certificate.gap > TOLERANCE:
+        raise SolverError(
+            f"{formulation.name} promises the optimum {certificate.bound:.9g}, "
+            f"but the value of its choice is {certificate.objective:.9g}"
+        )
+    return certificate

@@ -1,0 +1,228 @@
+"""Certificates of free schedules: a plan recomputed, and a proof that none is better.
+
+The plan's own values come from the responses of its steps, one after the other. What no plan stays
+below is then proven goal by goal: the states that a better plan could pass and the moves between
+them are found by a second version of the rules, with responses computed again, and weak duality
+bounds every path through them (`seqopt.graph.duality`). This shares nothing with the search that is
+judged but the states that it visited, on which only the time depends.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import pandas as pd
+
+from seqopt.arrays import FrozenValue
+from seqopt.errors import SolverError
+from seqopt.graph.states.states import FreeProblem
+from seqopt.plan.calling.schedule_selection import ScheduleSelection
+from seqopt.plan.judge.proof import BELOW, Hint, Proof
+from seqopt.plan.judge.scheduled_moves import check_scheduled
+from seqopt.plan.judge.standing_proof import proven_margins, require_margin
+from seqopt.problem.goals import LARGEST, Goal, Measure
+from seqopt.problem.standing import slack
+from seqopt.responses.quantities import CHOSEN_BY
+from seqopt.responses.table import analyze, force_column
+from seqopt.sequence.free_check import check_free
+from seqopt.sequence.schedule import Schedule
+from seqopt.sequence.steps import Step, StepKind
+
+TOLERANCE = 1e-6  # over the size of a value: how far a claim may be from what the engine says
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ScheduleCertificate(FrozenValue):
+    """The values of a free schedule with bounds, checked from the problem's data alone.
+
+    ``objective``: the value of every goal, recomputed; ``bound``: what no plan stays below, goals
+    before it being at their values; minus infinity where nothing is proven; ``gap``: the largest of
+    the differences of both, over the size of the values; infinite where nothing is proven. Margins
+    of stability leave what `seqopt.problem.standing.NARROW` says. ``states``: how many states the
+    proof looked at.
+    """
+
+    objective: tuple[float, ...]
+    bound: tuple[float, ...]
+    gap: float
+    states: int
+
+
+def judge_schedule(
+    problem: FreeProblem,
+    selection: ScheduleSelection,
+    steps: Sequence[Step],
+    hint: Hint | None = None,
+    *,
+    exact: bool = True,
+) -> ScheduleCertificate:
+    """Check a free schedule from the problem's own data, without the search.
+
+    ``selection``: what a formulation claims; ``steps``: of the selection, checked in the scene;
+    ``hint`` (mapping of int to (n, c) int): states that a search visited, by brick count; only the
+    time that the proof takes depends on them; ``exact``: whether values are promised as the least;
+    else only bounds that were claimed are. Raises `SolverError` if a value is not what was claimed,
+    a limit is exceeded, or a plan is better than promised; `StepError` if a step breaks a rule.
+    """
+    if isinstance(problem.rules, Schedule):
+        check_scheduled(problem.rules, steps)
+    else:
+        check_free(problem.network, problem.rules, steps)
+    values = plan_values(problem, steps, selection.objective)
+    for goal, value, claimed in zip(problem.goals, values, selection.objective, strict=True):
+        if not abs(value - claimed) <= TOLERANCE * max(abs(value), abs(claimed)):
+            raise SolverError(f"{goal} is {value:.9g}, not {claimed:.9g} as claimed")
+    if selection.stopped:
+        return _stopped(values)
+    proof = Proof(problem, hint)
+    if problem.budgets:
+        return _within_budgets(problem, selection, values, proof)
+    bounds = _bounds(problem, proof, values)
+    promised = values if exact else selection.bound
+    for goal, value, bound in zip(problem.goals, promised, bounds, strict=True):
+        if not goal.of_margins and not bound >= value - BELOW * abs(value):
+            raise SolverError(f"{goal}: {value:.9g} is promised as the least; a plan has less")
+    gaps = [(v - b) / (abs(v) or 1.0) for v, b in zip(values, bounds, strict=True)]
+    return ScheduleCertificate(values, bounds, max(gaps), proof.states)
+
+
+def _bounds(problem: FreeProblem, proof: Proof, values: tuple[float, ...]) -> tuple[float, ...]:
+    """Return what no plan stays below, goal by goal; margins come first and have their width."""
+    out: list[float] = []
+    for goal, value in zip(problem.goals, values, strict=True):
+        if goal.of_margins:
+            bound = max(0.0, value - slack(goal.response, value))
+            if value > 0 and not proof.is_impossible((*values[: len(out)], bound)):
+                raise SolverError(f"{goal}: {value:.9g} is promised as the least; a plan has less")
+            out.append(bound)
+    if len(out) < len(values):
+        pairs = zip(proof.bounds(values), values, strict=True)
+        out += [v if b >= v - BELOW * abs(v) else b for b, v in pairs][len(out) :]
+    return tuple(out)
+
+
+def _within_budgets(
+    problem: FreeProblem,
+    selection: ScheduleSelection,
+    values: tuple[float, ...],
+    proof: Proof,
+) -> ScheduleCertificate:
+    """Return the certificate of a plan within budgets: what prices leave open is its gap."""
+    aims = len(problem.aims)
+    pairs = zip(problem.goals[aims:], values[aims:], problem.budgets, strict=True)
+    for goal, spent, cap in pairs:
+        if not spent <= cap + TOLERANCE * cap:
+            raise SolverError(f"{goal} is {spent:.9g}, more than the {cap:g} that are allowed")
+    claimed, prices = selection.bound, selection.prices
+    fits = [aims <= len(prices), *(len(each) >= len(problem.budgets) for each in prices)]
+    if not all(fits):
+        raise SolverError("there is no price for every budget and goal")
+    bounds = proof.budget_bounds(values, claimed, prices)
+    for goal, bound, said in zip(problem.aims, bounds, claimed, strict=False):
+        if not bound >= said - TOLERANCE * abs(said):
+            raise SolverError(f"{goal}: no plan within budgets is promised below {said:.9g}")
+    bounds = tuple(min(b, v) for b, v in zip(bounds, values, strict=False))
+    gaps = [(v - b) / (abs(v) or 1.0) for v, b in zip(values, bounds, strict=False)]
+    return ScheduleCertificate(values, (*bounds, *values[aims:]), max(gaps), proof.states)
+
+
+def _stopped(values: tuple[float, ...]) -> ScheduleCertificate:
+    """Return the certificate of a search that ended early: its bounds are claimed, not proven."""
+    none = (-np.inf,) * len(values)
+    return ScheduleCertificate(values, none, np.inf, 0)
+
+
+def plan_values(
+    problem: FreeProblem, steps: Sequence[Step], claimed: Sequence[float] = ()
+) -> tuple[float, ...]:
+    """Return what goals take of a sequence, from the responses of its steps.
+
+    ``claimed``: the value of every goal; margins of stability are compared with these, and taken
+    from them. Result: SI units. Over scenarios the largest, but ways, which are those of the scene
+    itself. Raises `SolverError` if a step exceeds a limit, does not stand as is demanded, or has
+    less of a margin.
+    """
+    if problem.each:
+        worth = [plan_values(each, steps, claimed) for each in problem.each]
+        worst = np.max(worth, axis=0).tolist()
+        if any(goal.measure is Measure.TRAVEL for goal in problem.goals):  # as it is planned
+            worst = [
+                travel_of(problem, steps) if goal.measure is Measure.TRAVEL else value
+                for goal, value in zip(problem.goals, worst, strict=True)
+            ]
+        return tuple(worst)
+    table = analyze(problem.engine, steps)
+    columns = state_columns(problem, table)
+    _require_limits(problem, columns)
+    margins = _margins(problem, steps)
+    out = []
+    for k, goal in enumerate(problem.goals):
+        if goal.of_margins:
+            require_margin(goal.response, claimed[k], margins[goal.response])
+            out.append(claimed[k])
+        elif goal.measure is Measure.STEPS:
+            out.append(float(len(steps)))
+        elif goal.measure is Measure.REGRIPS:
+            out.append(float(sum(step.kind is StepKind.REPOSITION for step in steps)))
+        elif goal.measure is Measure.TRAVEL:
+            out.append(travel_of(problem, steps))
+        else:
+            costs = _costs(problem, goal, columns, len(steps))
+            out.append(float(costs.max() if goal.measure is Measure.PEAK else costs.sum()))
+    return tuple(out)
+
+
+def _require_limits(problem: FreeProblem, columns: Mapping[str, np.ndarray]) -> None:
+    """Raise a `SolverError` if a step exceeds a limit."""
+    for limit in problem.limits:
+        if limit.response in columns and limit.exceeded(columns[limit.response]).any():
+            at = int(np.argmax(columns[limit.response])) + 1
+            raise SolverError(f"step {at} exceeds the limit on {limit.response}")
+
+
+def _margins(problem: FreeProblem, steps: Sequence[Step]) -> Mapping[str, float]:
+    """Return the margins of a plan where they count, and require that it stands where it must."""
+    if problem.standing is None and not any(goal.of_margins for goal in problem.goals):
+        return {}
+    return proven_margins(problem, steps)
+
+
+def state_columns(problem: FreeProblem, table: pd.DataFrame) -> Mapping[str, np.ndarray]:
+    """Return the named responses of a table of steps, SI units.
+
+    ``table``: from `seqopt.analyze`. Result (dict of str to (n,) float).
+    """
+    forces = table[[force_column(robot) for robot in problem.network.scene.robots]].abs()
+    out = {LARGEST: forces.max(axis=1).fillna(0.0).to_numpy(float)}
+    for name in problem.named:
+        if name == "C_max":
+            out[name] = np.maximum(0.0, -table["F_min_N"].to_numpy(float))
+        elif name != LARGEST:
+            out[name] = table[CHOSEN_BY[name].column].to_numpy(float) / CHOSEN_BY[name].scale
+    return out
+
+
+def travel_of(problem: FreeProblem, steps: Sequence[Step]) -> float:
+    """Return how far robots go from one grip to the next.
+
+    Result: m; straight lines.
+    """
+    scene, total = problem.network.scene, 0.0
+    for robot in range(len(scene.robots)):
+        nodes = [step.grips[robot] for step in steps]
+        held = [node for node in nodes if node is not None]
+        for first, second in pairwise(held):
+            ends = [scene.node_position(node) for node in (first, second)]
+            total += float(np.linalg.norm(np.array(ends[0]) - np.array(ends[1])))
+    return total
+
+
+def _costs(
+    problem: FreeProblem, goal: Goal, columns: Mapping[str, np.ndarray], count: int
+) -> np.ndarray:
+    if goal.response:
+        return columns[goal.response]
+    return np.asarray(problem.criterion.costs(columns, 1, count))

@@ -1,0 +1,1 @@
+"""Searches that compute only what they need, and questions beyond one optimum."""

@@ -1,0 +1,135 @@
+"""The last gap between bound and choice: all beginnings of choices that may still be better.
+
+Weights prove a bound for every beginning of a choice: what it costs so far, weighed, and the least
+from there on. Beginnings whose bound is not below the best choice are left out; where too many
+remain, those with the highest bounds are, and the least of these bounds stays a bound on what was
+not looked at.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from seqopt.arrays import Floats, Ints
+from seqopt.graph.scenarios.arcs import Choice, ScenarioArcs
+from seqopt.plan.calling.watch import Watch
+from seqopt.plan.search.scenario_weights import Weighed
+
+WIDTH = 20_000  # beginnings that are kept after every move
+CLOSE = 1e-9  # differences that are none, over the size of the values
+NUMBERS = 2e7  # that beginnings with all candidates of the next move may be
+IMPROVED = 50  # choices met that are improved move by move first
+
+
+@dataclass(frozen=True)
+class Searched:
+    """The best choice, and a bound on all.
+
+    ``value``: what the aim makes of its totals; ``bound``: on the value of any choice.
+    """
+
+    choice: Choice
+    value: float
+    bound: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Layer:
+    """Beginnings of choices: totals so far (n, S), last candidates (n,), whose follower each is."""
+
+    totals: Floats
+    node: Ints
+    parent: Ints
+
+
+def close_gap(arcs: ScenarioArcs, weighed: Weighed, watch: Watch, width: int = WIDTH) -> Searched:
+    """Return the best choice as far as it can be found, with a bound.
+
+    ``weighed``: of `best_weights`; ``watch``: says when to stop, and is told what is found;
+    ``width``: how many beginnings are kept after every move.
+    """
+    choice, value = weighed.choice, weighed.value
+    for start in sorted(weighed.met, key=lambda c: arcs.aim.value(arcs.totals(c)))[:IMPROVED]:
+        if watch.over:
+            break
+        choice, value = min((choice, value), arcs.improved(start), key=lambda pair: pair[1])
+    watch.tell(value, weighed.bound)
+    level = value - CLOSE * max(abs(value), abs(weighed.bound))
+    if weighed.bound >= level or watch.over:
+        return Searched(choice, value, min(weighed.bound, value))
+    layers, bound = _grown(arcs, _provers(arcs, weighed), level, (watch, width))
+    bound = max(bound, weighed.bound)
+    last = layers[-1]
+    if len(layers) == len(arcs.arcs) + 1 and len(last.node):
+        values = arcs.aim.each(last.totals)
+        best = int(np.argmin(values))
+        if values[best] < value:
+            choice = _traced(layers, best)
+            value = arcs.aim.value(arcs.totals(choice))
+        bound = max(min(bound, value), weighed.bound)
+    watch.tell(value, min(bound, value))
+    return Searched(choice, value, min(bound, value))
+
+
+def _provers(arcs: ScenarioArcs, weighed: Weighed) -> Floats:
+    """Return weights that prove bounds of beginnings, (J, S): the best, and single scenarios."""
+    if arcs.aim.most(arcs.scenarios) < 1:
+        return weighed.weights[None]
+    return np.vstack([weighed.weights, np.eye(arcs.scenarios)])
+
+
+def _grown(
+    arcs: ScenarioArcs, provers: Floats, level: float, effort: tuple[Watch, int]
+) -> tuple[list[_Layer], float]:
+    """Return the beginnings after every move, and a bound on all that were left out.
+
+    Fewer layers than moves come back where time was over.
+    """
+    watch, width = effort
+    to_go = [arcs.to_go(weights)[1] for weights in provers]
+    layers = [_Layer(np.zeros((1, arcs.scenarios)), np.zeros(1, int), np.zeros(1, int))]
+    bound = level
+    for k in range(len(arcs.arcs)):
+        if watch.over:
+            return layers, -np.inf
+        grown, lowest = _followed(arcs, k, layers[-1], (provers, [rest[k + 1] for rest in to_go]))
+        kept = np.flatnonzero(lowest < level)
+        most = _fitting(arcs, k + 1, width)
+        if len(kept) > most:
+            order = kept[np.argsort(lowest[kept], kind="stable")]
+            kept, bound = order[:most], min(bound, float(lowest[order[most]]))
+        layers.append(_Layer(grown.totals[kept], grown.node[kept], grown.parent[kept]))
+    return layers, bound
+
+
+def _fitting(arcs: ScenarioArcs, k: int, width: int) -> int:
+    """Return how many beginnings are kept before a move, so that what follows fits the memory."""
+    if k == len(arcs.arcs):
+        return width
+    return max(1, min(width, int(NUMBERS / (arcs.scenarios * arcs.arcs[k].shape[2]))))
+
+
+def _followed(
+    arcs: ScenarioArcs, k: int, layer: _Layer, proofs: tuple[Floats, Sequence[Floats]]
+) -> tuple[_Layer, Floats]:
+    """Return every beginning with every candidate of the next move, and bounds of them."""
+    provers, to_go = proofs
+    parent, node = np.nonzero(~arcs.shut[k][layer.node])
+    totals = layer.totals[parent] + arcs.arcs[k][:, layer.node[parent], node].T
+    lowest = np.full(len(node), -np.inf)
+    for weights, rest in zip(provers, to_go, strict=True):
+        lowest = np.maximum(lowest, totals @ weights + rest[node])
+    return _Layer(totals, node, parent), lowest
+
+
+def _traced(layers: Sequence[_Layer], last: int) -> Choice:
+    """Return the choice that ends with one of the last beginnings."""
+    choice: list[int] = []
+    at = last
+    for layer in reversed(layers[1:]):
+        choice.append(int(layer.node[at]))
+        at = int(layer.parent[at])
+    return tuple(reversed(choice))

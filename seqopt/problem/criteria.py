@@ -1,0 +1,212 @@
+"""Criteria: what a step costs, from the responses of all choices that compete in it.
+
+Every criterion turns responses over choices, ``(C,)`` for one open move or ``(C, D)`` for two, into
+costs of the same shape. A name stands for a response: ``T_max``, ``M_sup``, ``D_max``, ``C_max``
+(the largest compression), ``F_move`` (the robot that takes its grip), ``F_largest`` (the largest
+grip force), ``F_`` and a robot's name (its force; in brackets where that means something else, as
+``F_[sup]``), ``F_each`` (the forces of all robots, a term each).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from seqopt.arrays import Floats, Terse
+from seqopt.problem.ranks import Among, Ranked, ranks_of
+from seqopt.problem.requirements import ChoiceResponses
+from seqopt.problem.scales import NEVER, ROUNDED, SceneFacts
+from seqopt.problem.terms import known, named, present, scale_of, spell_out
+
+
+@dataclass(frozen=True, repr=False)
+class RankSum(Terse):
+    """The criteria of Bruun et al.: ranks of responses, averaged, least is best (a Borda count).
+
+    Ranks start at 1; ties share the mean of their ranks. Responses are rounded to a resolution
+    before they are ranked, so that differences without meaning decide nothing. A robot that does
+    not grip ranks all choices equal. Source: equations (1) to (3) of Bruun et al.
+
+    ``name``: what the criterion is called; ``before``, ``after`` (tuple of (str, float)): weight of
+    every response in moves before the crown and from it on; ``crown``: brick count of a move from
+    which ``after`` holds, `NEVER` if it does not; by default that at which the scene's build
+    reaches its crown; ``delay``: how many bricks after the scene's crown ``after`` begins to hold;
+    ``resolution`` (tuple of (str, float)): what a response is rounded to, by its first letter: N, N
+    m, m. By default `ROUNDED` in the scene's own units, so that density, length, stiffness and
+    units of force change no choice. ``ranked``: in a step with two open moves ranks run over all
+    pairs, scaled down to as many as the later move has candidates, or over its candidates given the
+    choice before; ``among``: whether a node that the choice before makes impossible is ranked in
+    later steps.
+    """
+
+    name: str
+    before: tuple[tuple[str, float], ...]
+    after: tuple[tuple[str, float], ...]
+    crown: float | None = None
+    delay: int = 0
+    resolution: tuple[tuple[str, float], ...] | None = None
+    ranked: Ranked = Ranked.PAIRS
+    among: Among = Among.ALL
+
+    @property
+    def settings(self) -> Mapping[str, object]:
+        """Its weights and crown, None if it has none, what it rounds to and what it ranks among."""
+        crown = None if self.crown == NEVER else self.crown
+        weights = {"before_crown": dict(self.before), "from_crown_on": dict(self.after)}
+        ranks = {"ranked": self.ranked.value, "among": self.among.value}
+        rounding = {"resolution": dict(self.resolution or ())}
+        return {"weights": weights, "crown": crown, **rounding, **ranks}
+
+    def wanted(self, bricks: int) -> tuple[str, ...]:
+        """Return the responses that it needs of a move.
+
+        ``bricks``: bricks placed when the move is made; decides between ``before`` and ``after``.
+        Result: names of responses.
+        """
+        return tuple(name for name, _ in self._terms(bricks))
+
+    def for_scene(self, facts: SceneFacts) -> RankSum:
+        """Return the criterion with everything that it takes from a scene filled in.
+
+        ``facts``: of the scene.
+        """
+        crown = self.crown
+        if self.before == self.after:
+            crown = NEVER
+        elif crown is None:
+            crown = facts.crown + self.delay
+        resolution = self.resolution
+        if resolution is None:
+            resolution = tuple((name, share * facts.units.of(name)) for name, share in ROUNDED)
+        return replace(
+            self,
+            before=spell_out(self.before, facts.robots),
+            after=spell_out(self.after, facts.robots),
+            crown=crown,
+            delay=0,
+            resolution=spell_out(resolution, ()),
+        )
+
+    def costs(self, responses: ChoiceResponses, bricks: int, choices: int) -> Floats:
+        """Return the weighted mean of the ranks.
+
+        ``responses`` (mapping of str to (C,) or (C, D) float): as in `Criterion.costs`; ``bricks``:
+        bricks placed at the move that decides the step; ``choices``: how many candidates that move
+        has; ranks run from 1 to it. Result ((C,) or (C, D) float): NaN where a choice is
+        impossible.
+        """
+        terms = self._terms(bricks)
+        total: Floats = np.zeros_like(responses[terms[0][0]])
+        rounding = dict(known(self.resolution, self.name))
+        for name, weight in terms:
+            units = responses[name] / rounding[name[0]]
+            total = total + weight * ranks_of(units, choices, self.ranked)
+        return total / sum(weight for _, weight in terms)
+
+    def _terms(self, bricks: int) -> tuple[tuple[str, float], ...]:
+        return self.before if bricks < known(self.crown, self.name) else self.after
+
+
+@dataclass(frozen=True, repr=False)
+class WeightedSum(Terse):
+    """A weighted sum of responses, each divided by a scale of its own.
+
+    ``name``: what the criterion is called; ``terms`` (tuple of (str, float, float or None)):
+    response, weight, scale (N, N m or m). By default (None) the scale is the least that any fixed
+    method of the scene reaches of the response's largest value.
+    """
+
+    name: str
+    terms: tuple[tuple[str, float, float | None], ...]
+
+    @property
+    def settings(self) -> Mapping[str, object]:
+        """What responses are divided by, SI units, and their weights."""
+        weights = {name: weight for name, weight, _ in self.terms}
+        return {"scales": {name: scale for name, _, scale in self.terms}, "weights": weights}
+
+    def wanted(self, bricks: int) -> tuple[str, ...]:
+        """Return the responses that it needs.
+
+        ``bricks``: without effect: it needs the same for every move. Result: names of responses.
+        """
+        return tuple(name for name, _, _ in self.terms)
+
+    def for_scene(self, facts: SceneFacts) -> WeightedSum:
+        """Return the criterion with everything that it takes from a scene filled in.
+
+        ``facts``: of the scene.
+        """
+        terms = spell_out(self.terms, facts.robots)
+        scaled = tuple(
+            (name, weight, scale_of(facts, name, scale)) for name, weight, scale in terms
+        )
+        name = named(self.name, facts, [scale for _, _, scale in terms])
+        return replace(self, name=name, terms=scaled)
+
+    def costs(self, responses: ChoiceResponses, bricks: int, choices: int) -> Floats:
+        """Return the weighted sums.
+
+        ``responses`` (mapping of str to (C,) or (C, D) float): as in `Criterion.costs`; ``bricks``,
+        ``choices``: without effect. Result ((C,) or (C, D) float): NaN where a choice is
+        impossible.
+        """
+        parts = [
+            weight / known(scale, self.name) * present(responses[name])
+            for name, weight, scale in self.terms
+        ]
+        return np.asarray(sum(parts))
+
+
+@dataclass(frozen=True, repr=False)
+class WorstRatio(Terse):
+    """The largest ratio of a response to its limit: a step is as bad as its worst response.
+
+    ``name``: what the criterion is called; ``limits`` (tuple of (str, float or None)): response and
+    limit (N, N m or m). By default (None) the limit is the least that any fixed method of the scene
+    reaches of the response's largest value.
+    """
+
+    name: str
+    limits: tuple[tuple[str, float | None], ...]
+
+    @property
+    def settings(self) -> Mapping[str, object]:
+        """What responses are divided by, SI units."""
+        return {"scales": dict(self.limits)}
+
+    def wanted(self, bricks: int) -> tuple[str, ...]:
+        """Return the responses that it needs.
+
+        ``bricks``: without effect: it needs the same for every move. Result: names of responses.
+        """
+        return tuple(name for name, _ in self.limits)
+
+    def for_scene(self, facts: SceneFacts) -> WorstRatio:
+        """Return the criterion with everything that it takes from a scene filled in.
+
+        ``facts``: of the scene.
+        """
+        limits = spell_out(self.limits, facts.robots)
+        name = named(self.name, facts, [scale for _, scale in limits])
+        scaled = tuple((response, scale_of(facts, response, s)) for response, s in limits)
+        return replace(self, name=name, limits=scaled)
+
+    def costs(self, responses: ChoiceResponses, bricks: int, choices: int) -> Floats:
+        """Return the largest ratios.
+
+        ``responses`` (mapping of str to (C,) or (C, D) float): as in `Criterion.costs`; ``bricks``,
+        ``choices``: without effect. Result ((C,) or (C, D) float): 1 where a response is at its
+        limit; NaN where a choice is impossible.
+        """
+        parts = [present(responses[name]) / known(limit, self.name) for name, limit in self.limits]
+        return np.asarray(np.max(np.stack(parts), axis=0))
+
+
+SCALED = ("F_largest", "M_sup", "T_max", "D_max")
+OVER_METHODS = WeightedSum("weighted", tuple((name, 1.0, None) for name in SCALED))
+"""The sum of responses over what the scene's fixed methods reach."""
+WORST_OVER_METHODS = WorstRatio("worst-ratio", tuple((name, None) for name in SCALED))
+"""The largest of these ratios."""

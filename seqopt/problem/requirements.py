@@ -1,0 +1,185 @@
+"""The requirements on a plan: a criterion, limits, and the responses that these need."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from numbers import Real
+from typing import Protocol
+
+import numpy as np
+
+from seqopt.arrays import Bools, Floats, Terse
+from seqopt.errors import ProblemError
+from seqopt.problem.scales import SceneFacts
+from seqopt.responses.quantities import robot_response
+from seqopt.scene.checks import short
+from seqopt.scene.scene import Scene
+
+ChoiceResponses = Mapping[str, Floats]
+
+
+class Criterion(Protocol):
+    """What a step costs."""
+
+    @property
+    def name(self) -> str:
+        """What the criterion is called."""
+
+    def wanted(self, bricks: int) -> tuple[str, ...]:
+        """Return the responses that it needs of a move.
+
+        Parameters
+        ----------
+        bricks : int
+            Bricks placed when the move is made.
+
+        Returns
+        -------
+        tuple of str
+            Names of responses.
+        """
+
+    @property
+    def settings(self) -> Mapping[str, object]:
+        """The numbers that the criterion uses, for the summary, ready for JSON."""
+
+    def for_scene(self, facts: SceneFacts) -> Criterion:
+        """Return the criterion with everything that it takes from a scene filled in.
+
+        Parameters
+        ----------
+        facts : SceneFacts
+            Robots, crown, units and scales of the scene.
+
+        Returns
+        -------
+        Criterion
+            With ``F_each`` spelled out for the robots, and no number left open.
+        """
+
+    def costs(self, responses: ChoiceResponses, bricks: int, choices: int) -> Floats:
+        """Return the costs of all choices in one step.
+
+        Parameters
+        ----------
+        responses : mapping of str to (C,) or (C, D) float
+            SI units; NaN where a choice is impossible, all NaN where a robot does not grip.
+        bricks : int
+            Bricks placed at the move that decides the step: the later one of two.
+        choices : int
+            How many candidates that move has.
+
+        Returns
+        -------
+        (C,) or (C, D) float
+            NaN where a choice is impossible.
+        """
+
+
+LIMIT_TOLERANCE = 1e-9  # by which a response may exceed a limit, over the limit's size
+
+
+@dataclass(frozen=True)
+class Limit:
+    """A bound on a response that no step may exceed by more than `LIMIT_TOLERANCE` of it.
+
+    Parameters
+    ----------
+    response : str
+        A name as in `seqopt.problem.criteria`.
+    bound : float
+        SI units.
+
+    Raises
+    ------
+    ProblemError
+        If the arguments are not a name and a number.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> seqopt.Limit("F_largest", 300.0)
+    Limit(response='F_largest', bound=300.0)
+    """
+
+    response: str
+    bound: float
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.response, str) or not isinstance(self.bound, Real):
+            raise ProblemError(
+                f"limit {short(self.response)} of {short(self.bound)}: give the name of a response "
+                "and a number"
+            )
+        if math.isnan(self.bound):
+            raise ProblemError(f"limit {self.response}: its bound is NaN; give a number")
+
+    def exceeded(self, values: Floats) -> Bools:
+        """Return where values of the response exceed the limit.
+
+        ``values`` (...): NaN, as of a robot that does not grip, exceeds nothing. Result (...).
+        """
+        return np.asarray(values > self.bound + LIMIT_TOLERANCE * abs(self.bound))
+
+
+def as_limits(given: Sequence[Limit] | Limit) -> tuple[Limit, ...]:
+    """Return limits, one or several.
+
+    Raises `ProblemError` if it is something else.
+    """
+    limits = (given,) if isinstance(given, Limit) else given
+    if not isinstance(limits, Sequence) or not all(isinstance(each, Limit) for each in limits):
+        raise ProblemError(
+            f"limits {short(given)}: give values, as [seqopt.Limit('F_largest', 300.0)]; "
+            "seqopt.problem.requirements.payload_limits(scene) has those of all payloads"
+        )
+    return tuple(limits)
+
+
+def payload_limits(scene: Scene) -> tuple[Limit, ...]:
+    """Return limits that keep every robot of a scene within its payload.
+
+    Result: one for every robot, N.
+    """
+    return tuple(Limit(robot_response(robot.name), robot.payload) for robot in scene.robots)
+
+
+@dataclass(frozen=True, repr=False)
+class ResponsesAsked(Terse):
+    """The responses that criterion, limits and further wishes ask for.
+
+    ``criterion``: what a step costs; ``limits``: what no open step may exceed; ``also``: responses
+    that are asked for beside these.
+    """
+
+    criterion: Criterion
+    limits: tuple[Limit, ...]
+    also: tuple[str, ...]
+
+    def __call__(self, bricks: int) -> frozenset[str]:
+        """Return their names for a move.
+
+        ``bricks``: bricks placed when the move is made.
+        """
+        named = {*self.criterion.wanted(bricks), *(limit.response for limit in self.limits)}
+        return frozenset(named | {*self.also})
+
+
+def state_costs(
+    criterion: Criterion, found: Mapping[str, Floats], bricks: int, possible: Bools
+) -> Floats:
+    """Return what states cost; steps can be added to a plan, so none may cost less than nothing.
+
+    ``found`` (mapping of str to (n,) float): responses of the states, SI units; ``possible`` (n,):
+    which states count. Result (n,): infinite where a state does not count. Raises `ProblemError` if
+    a state that counts costs less than zero.
+    """
+    costs = np.where(possible, criterion.costs(found, bricks, len(possible)), np.inf)
+    if (costs < 0).any():
+        raise ProblemError(
+            f"criterion {criterion.name}: a step costs {costs.min():.6g} at {bricks} bricks; in a "
+            "free schedule none may cost less than zero: add a constant"
+        )
+    return costs

@@ -1,0 +1,198 @@
+"""Costs and budgets as arrays: sums, peaks, what can be continued, and what is refused."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+import pytest
+from hypothesis import given
+
+from seqopt.errors import InfeasibleError, ProblemError
+from seqopt.graph.layers.costs import Budget, LayeredCosts
+from tests.strategies import problems
+
+INF = np.inf
+
+
+def three_moves():
+    """Costs of which every sum of three single and three shared ones is another number."""
+    single = (np.array([1.0, 2.0]), np.array([10.0, 20.0, 40.0]), np.array([100.0, 200.0]))
+    shared = (
+        np.array([[1e3, 2e3]]),
+        np.array([[1e4, 2e4, 3e4], [4e4, 5e4, 6e4]]),
+        np.array([[1e5, 2e5], [3e5, 4e5], [5e5, 6e5]]),
+    )
+    return LayeredCosts(single, shared)
+
+
+def changed(part, move, value):
+    """The costs of three moves with those of a move replaced."""
+    costs = three_moves()
+    arrays = list(getattr(costs, part))
+    arrays[move] = value
+    return replace(costs, **{part: tuple(arrays)})
+
+
+def test_a_choice_meets_its_own_costs_and_those_it_shares_with_the_one_before():
+    costs = three_moves()
+    assert costs.sizes == (2, 3, 2)
+    assert costs.parts((1, 2, 0)) == [2.0, 2e3, 40.0, 6e4, 100.0, 5e5]
+    assert costs.cost((1, 2, 0)) == 562142.0
+    assert costs.worst((1, 2, 0)) == 5e5
+    assert costs.worst((0, 0, 1)) == 2e5
+    with pytest.raises(ValueError, match="zip"):
+        costs.parts((1, 2))
+
+
+def test_costs_are_copies_that_cannot_be_written_to():
+    given_array = np.array([1.0, 2.0])
+    costs = LayeredCosts((given_array,), (np.zeros((1, 2)),))
+    given_array[0] = 9.0
+    assert costs.single[0][0] == 1
+    for array in (*costs.single, *costs.shared):
+        with pytest.raises(ValueError, match="read-only"):
+            array[...] = 1
+
+
+def completions(costs, move, candidate):
+    """All ways from a candidate to the last move, and what they cost from it on."""
+    later = product(*(range(size) for size in costs.sizes[move + 1 :]))
+    for rest in later:
+        path = (candidate, *rest)
+        own = sum(costs.single[move + i][c] for i, c in enumerate(path))
+        pairs = zip(path[:-1], path[1:], costs.shared[move + 1 :], strict=True)
+        yield own + sum(shared[a, b] for a, b, shared in pairs)
+
+
+@given(problem=problems())
+def test_what_can_be_continued_is_what_enumeration_continues(problem):
+    costs = problem.sums
+    choices = [*product(*(range(size) for size in costs.sizes))]
+    if not np.isfinite([costs.cost(c) for c in choices]).any():
+        with pytest.raises(InfeasibleError):
+            costs.continuable()
+        return
+    for move, good in enumerate(costs.continuable()):
+        ways = [any(map(np.isfinite, completions(costs, move, c))) for c in range(len(good))]
+        assert good.tolist() == ways
+
+
+@pytest.mark.parametrize(
+    ("part", "move", "value", "named"),
+    [
+        ("single", 0, [INF, INF], "move 1: none of its 2 candidates"),
+        ("shared", 0, [[INF, INF]], "move 1: none of its 2 candidates"),
+        ("single", 1, [INF, INF, INF], "move 2: none of its 3 candidates"),
+        ("shared", 1, np.full((2, 3), INF), "move 2: none of its 3 candidates"),
+        ("single", 2, [INF, INF], "move 3: none of its 2 candidates"),
+    ],
+)
+def test_the_move_that_ends_every_choice_is_named(part, move, value, named):
+    with pytest.raises(InfeasibleError, match=named):
+        changed(part, move, np.array(value)).continuable()
+
+
+def test_a_dead_end_is_told_from_where_it_is_reached():
+    """The first of move 1 leads to the first of move 2 alone, which leads nowhere."""
+    single = (np.zeros(2), np.zeros(2), np.zeros(2))
+    shared = (
+        np.zeros((1, 2)),
+        np.array([[0.0, INF], [0.0, 0.0]]),
+        np.array([[INF, INF], [INF, 0.0]]),
+    )
+    good = LayeredCosts(single, shared).continuable()
+    assert [g.tolist() for g in good] == [[False, True], [False, True], [True, True]]
+
+
+@pytest.mark.parametrize(
+    ("part", "move", "value", "named"),
+    [
+        ("single", 0, [], "move 1 has no candidates"),
+        ("single", 1, [], "move 2 has no candidates"),
+        ("shared", 0, np.zeros((2, 2)), r"move 1: shared costs \(2, 2\); give them for \(1, 2\)"),
+        ("shared", 1, np.zeros((3, 2)), r"move 2: shared costs \(3, 2\); give them for \(2, 3\)"),
+        ("shared", 1, np.zeros((2, 2)), r"move 2: shared costs \(2, 2\); give them for \(2, 3\)"),
+        ("shared", 2, np.zeros((3, 3)), r"move 3: shared costs \(3, 3\); give them for \(3, 2\)"),
+        ("single", 2, [np.nan, 0.0], "move 3: a single cost is NaN"),
+        ("single", 0, [0.0, -INF], "move 1: a single cost is NaN or -inf"),
+        ("shared", 1, [[0, 0, 0], [0, 0, np.nan]], "move 2: a shared cost is NaN"),
+        ("shared", 1, [[0, 0, 0], [0, 0, -INF]], "move 2: a shared cost is NaN or -inf"),
+    ],
+)
+def test_what_is_wrong_with_costs_is_named_with_its_move(part, move, value, named):
+    with pytest.raises(ProblemError, match=named):
+        changed(part, move, np.array(value, dtype=float))
+
+
+def test_as_many_shared_as_single_costs():
+    costs = three_moves()
+    with pytest.raises(ProblemError, match="the problem has no moves"):
+        LayeredCosts((), ())
+    with pytest.raises(ProblemError, match="3 single and 2 shared costs"):
+        LayeredCosts(costs.single, costs.shared[:2])
+    with pytest.raises(ProblemError, match="2 single and 3 shared costs"):
+        LayeredCosts(costs.single[:2], costs.shared)
+
+
+def test_what_is_not_allowed_may_be_marked_everywhere_and_large_costs_stay():
+    """Infinite costs do not count as large; the rest may be so as long as it has a sum."""
+    costs = changed("single", 1, np.full(3, INF))
+    assert costs.worst((0, 0, 0)) == INF
+    large = changed("single", 0, np.array([-1e308, INF]))
+    assert large.cost((0, 0, 0)) == -1e308
+    with pytest.raises(ProblemError, match="so large that their sum overflows"):
+        changed("shared", 2, np.full((3, 2), -1e308)).__class__(
+            large.single, (*large.shared[:2], np.full((3, 2), 1e308))
+        )
+
+
+def use(bound):
+    """A budget of which the candidates of two moves take 3 and -5, 0 and 4."""
+    return Budget(
+        "use",
+        (np.array([3.0, -5.0]), np.array([0.0, 4.0])),
+        (np.zeros((1, 2)), np.array([[0.0, 1.0], [0.0, 1.0]])),
+        bound,
+    )
+
+
+@pytest.mark.parametrize(
+    ("choice", "bound", "slack"),
+    [
+        ((0, 0), 12.0, 9 / 12),  # 3 taken of 12
+        ((0, 0), 2.0, -1 / 3),  # over what is taken, where that is more than the bound
+        ((0, 0), 3.0, 0.0),
+        ((1, 1), 2.0, 2 / 10),  # 5 less 5: amounts that cancel count in full
+        ((1, 0), -5.0, 0.0),
+        ((1, 0), -20.0, -15 / 20),
+        ((1, 0), 0.0, 5 / 5),
+        ((0, 1), 7.0, -1 / 8),  # with what the pair takes
+        ((0, 1), INF, 1.0),  # no cap leaves all
+    ],
+)
+def test_what_a_choice_takes_and_leaves_of_a_budget(choice, bound, slack):
+    budget = use(bound)
+    assert budget.spent(choice) == LayeredCosts(budget.single, budget.shared).cost(choice)
+    assert budget.slack(choice) == slack
+
+
+def test_nothing_taken_of_nothing_leaves_nothing():
+    none = replace(use(0.0), single=(np.zeros(2), np.zeros(2)))
+    assert none.slack((0, 0)) == 0
+
+
+@pytest.mark.parametrize(
+    ("change", "named"),
+    [
+        ({"bound": np.nan}, "budget 'use': the bound is nan"),
+        ({"bound": -INF}, "budget 'use': the bound is -inf"),
+        ({"single": (np.zeros(2), np.array([0.0, INF]))}, "budget 'use': an amount is infinite"),
+        ({"shared": (np.array([[INF, 0.0]]), np.zeros((2, 2)))}, "use': an amount is infinite"),
+        ({"single": (np.zeros(2),)}, "budget 'use': 1 single and 2 shared costs"),
+    ],
+)
+def test_a_budget_that_is_no_budget_is_named(change, named):
+    with pytest.raises(ProblemError, match=named):
+        replace(use(1.0), **change)

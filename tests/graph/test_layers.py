@@ -1,0 +1,112 @@
+"""The problem that a schedule poses, its criteria and rankings."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.stats import rankdata
+
+from seqopt.graph.layers.layers import pose
+from seqopt.graph.layers.ranking import move_costs, rank_moves
+from seqopt.plan.solving import solve
+from seqopt.plan.tables import choice_table
+from seqopt.problem.ranks import mean_ranks, scaled_ranks
+from seqopt.problem.requirements import payload_limits
+from seqopt.problem.scales import SceneFacts
+from seqopt.sequence.three_robots import modified_sequential
+from seqopt.study.presets import CRITERIA, EQUATIONS, WEIGHTED, WORST_RATIO
+from seqopt.study.published import paper_models, published_choice
+
+
+def test_a_third_support_ends_twisting(engine25):
+    schedule = modified_sequential(engine25.network)
+    problem = pose(engine25, schedule, EQUATIONS)
+    table = solve(problem, "cascade").responses()
+    worst = 1e-6 * table["D_max_1e-3mm"].max()
+    assert worst < 20e-6  # the sequential method reaches 306e-6 m
+
+
+def test_models(problem25):
+    """The paper counts 2,576 and 22,724; reach, occupancy and equal models leave fewer."""
+    assert paper_models(problem25.schedule) == (2576, 22724)
+    choices = sum(next(iter(s.responses.values())).size for s in problem25.evaluation.steps)
+    assert problem25.evaluation.models < choices < 22724
+
+
+def test_payloads_can_be_kept(engine25, loop25):
+    """The printed equations overload no robot once its payload is a limit."""
+    problem = pose(engine25, loop25, EQUATIONS, payload_limits(loop25.scene))
+    plan = solve(problem, "overlap_dp").responses()
+    forces = plan[["F_rob1_N", "F_rob2_N", "F_rob3_N"]].to_numpy(float)
+    assert np.nanmax(np.abs(forces)) <= 392.4
+
+
+def test_ranks():
+    values = np.array([3.0, 1.0, 1.0, np.nan, 2.0])
+    assert scaled_ranks(values, 5) == pytest.approx([4, 1.5, 1.5, np.nan, 3], nan_ok=True)
+    assert scaled_ranks(np.array([1.2, 0.9, 1.4]), 3) == pytest.approx([2, 2, 2])  # all round to 1
+    assert scaled_ranks(np.full(3, np.nan), 3) == pytest.approx([2, 2, 2])
+
+
+@given(values=st.lists(st.integers(-5, 5), min_size=1, max_size=30))
+def test_ranks_are_those_of_scipy(values):
+    found = mean_ranks(np.array(values, dtype=float))
+    assert found.tolist() == rankdata(values, method="average").tolist()
+    assert found.sum() == pytest.approx(len(values) * (len(values) + 1) / 2)
+
+
+@given(st.lists(st.integers(0, 9), min_size=12, max_size=12))
+def test_shared_ranks_weigh_as_much_as_single_ones(values):
+    """Ranks over pairs have the mean of ranks over single candidates."""
+    pairs = scaled_ranks(np.array(values, float).reshape(3, 4), 4)
+    assert pairs.mean() == pytest.approx(scaled_ranks(np.arange(4.0), 4).mean())
+    assert 0.5 < pairs.min() <= pairs.max() < 4.5
+
+
+@pytest.mark.parametrize("criterion", CRITERIA.values(), ids=CRITERIA)
+def test_better_responses_never_cost_more(engine25, criterion):
+    criterion = criterion.for_scene(SceneFacts(engine25))
+    rng = np.random.default_rng(0)
+    names = criterion.wanted(20)
+    scale = {"F": 400.0, "T": 100.0, "M": 40.0, "D": 3e-5}
+    values = {name: scale[name[0]] * rng.random(12) for name in names}
+    before = criterion.costs(values, 20, 12)
+    better = {name: v.copy() for name, v in values.items()}
+    for name in names:
+        better[name][5] *= 0.5
+    assert criterion.costs(better, 20, 12)[5] <= before[5]
+
+
+def test_ranking_diagnostics(problem25):
+    choice = published_choice(problem25)
+    table = rank_moves(problem25, choice)
+    assert table["node"].tolist() == list(problem25.nodes(choice))
+    assert (table["rank"] == 1).sum() == (table["node"] == table["winner"]).sum()
+    assert (table["tied"] >= 1).all()
+    assert (table["margin"] >= 0).all()
+    unstable = table[table["turned_by_candidates"] != ""]
+    assert len(unstable) > 0  # a Borda count reverses when candidates drop out
+    row = unstable.iloc[0]
+    k, node = int(row["move"]) - 1, int(row["turned_by_candidates"].split()[0])
+    gone = problem25.schedule.moves[k].candidates.index(node)
+    before = choice[k - 1] if k else 0
+    without = move_costs(problem25, k, before, without=gone)
+    assert problem25.schedule.moves[k].candidates[int(without.argmin())] != row["winner"]
+
+
+def test_raw_values_do_not_reverse(engine25, loop25):
+    """A cost that does not depend on the other candidates keeps its winner when one drops out."""
+    for criterion in (WEIGHTED, WORST_RATIO):
+        table = rank_moves(pose(engine25, loop25, criterion), (0,) * 2 + (1,) * 20)
+        assert (table["turned_by_candidates"] == "").all()
+
+
+def test_tables_are_labeled(problem25):
+    for state in (problem25.evaluation.steps[0], problem25.evaluation.steps[-4]):
+        table = choice_table(problem25, state)
+        moves = [problem25.schedule.moves[m] for m in state.moves]
+        assert list(table.index.names) == [f"{m.robot}_node" for m in moves]
+        assert "cost" in table
+        assert len(table) == np.prod([len(m.candidates) for m in moves])

@@ -1,0 +1,225 @@
+"""What is proven of budgets: bounds, conflicts, what they cost."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from fractions import Fraction
+from itertools import combinations, product
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from seqopt.errors import InfeasibleError, SolverError
+from seqopt.graph.layers.budgets import steps_over, travel
+from seqopt.graph.layers.costs import Budget, LayeredCosts
+from seqopt.graph.layers.interface import CostProblem
+from seqopt.plan.calling.formulation import End, FormulationKind, formulations
+from seqopt.plan.judge import budget_proof
+from seqopt.plan.judge.budget_proof import least_within
+from seqopt.plan.judge.conflicts import smallest_conflict
+from seqopt.plan.price_curve import price_curve
+from seqopt.plan.solving import solve
+from tests.strategies import budgeted
+
+TAKERS = {name: found for name, found in formulations().items() if found.takes_budgets}
+
+
+def within(problem, budgets=None):
+    """The allowed choices within budgets and what they cost."""
+    budgets = problem.budgets if budgets is None else budgets
+    return {
+        choice: problem.sums.cost(choice)
+        for choice in product(*map(range, problem.sums.sizes))
+        if np.isfinite(problem.sums.cost(choice))
+        and all(b.spent(choice) <= b.bound for b in budgets)
+    }
+
+
+@pytest.mark.parametrize("most", [1, 5_000])
+@given(problem=budgeted(), price=st.floats(0, 5))
+@settings(max_examples=60)
+def test_no_choice_costs_less_than_is_proven(problem, price, most):
+    found = within(problem)
+    claimed = {budget.name: price for budget in problem.budgets}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(budget_proof, "MOST", most)
+        for value in {*found.values()}:
+            bound = least_within(problem, value, claimed, max(value, 1.0))
+            assert bound <= min(found.values()) + 1e-6
+            if most > 1:
+                assert bound == pytest.approx(min(found.values()), abs=1e-6)
+
+
+@given(problem=budgeted())
+@settings(max_examples=60)
+def test_the_smallest_conflict(problem):
+    if not within(problem, ()):
+        return
+    found = smallest_conflict(problem)
+    sizes = [
+        count
+        for count in range(1, len(problem.budgets) + 1)
+        if any(not within(problem, some) for some in combinations(problem.budgets, count))
+    ]
+    assert len(found) == (sizes[0] if sizes else 0)
+    assert not found or not within(problem, found)
+
+
+def tied(rng):
+    """A problem of one to three moves with equal costs; a choice is exactly at its budgets.
+
+    Or just above them, so that none may be within.
+    """
+    sizes = rng.integers(1, 4, rng.integers(1, 4))
+
+    def parts(values):
+        pairs = zip((1, *sizes[:-1]), sizes, strict=True)
+        shared = tuple(rng.choice([0.0, *values], pair) for pair in pairs)
+        return tuple(rng.choice(values, size) for size in sizes), shared
+
+    chosen = tuple(int(rng.integers(size)) for size in sizes)
+    budgets = []
+    for name in ("one", "two")[: rng.integers(1, 3)]:
+        budget = Budget(name, *parts([0.1, 0.2, 0.3, 1.0, 2.0]), 0.0)
+        bound = budget.spent(chosen) - rng.choice([0.0, 0.0, 0.0, 0.05])
+        budgets.append(replace(budget, bound=bound))
+    return CostProblem(LayeredCosts(*parts([1.85, 3.7, 3.7, 1e-3])), tuple(budgets))
+
+
+def exactly_within(problem):
+    """The choices within all budgets, without rounding, and what they cost."""
+
+    def spent(budget, choice):
+        return sum(map(Fraction, LayeredCosts(budget.single, budget.shared).parts(choice)))
+
+    return {
+        choice: problem.sums.cost(choice)
+        for choice in product(*map(range, problem.sums.sizes))
+        if all(spent(budget, choice) <= Fraction(budget.bound) for budget in problem.budgets)
+    }
+
+
+@pytest.mark.parametrize("draws", [60, pytest.param(200, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("name", TAKERS)
+def test_none_is_within_only_where_enumeration_finds_none(name, draws):
+    """Prices may rise without end where costs tie; rounding must not decide what is possible."""
+    rng = np.random.default_rng(1)
+    refused = 0
+    for _ in range(draws):
+        problem = tied(rng)
+        found = exactly_within(problem)
+        try:
+            proof = solve(problem, name).certificate
+        except InfeasibleError:
+            assert not found, problem
+            refused += 1
+        except SolverError:
+            assert TAKERS[name].kind is FormulationKind.BOUND, problem
+        else:
+            best = min(found.values(), default=np.inf)
+            assert proof.bound <= best + 1e-6
+            if TAKERS[name].kind is FormulationKind.EXACT:
+                assert proof.objective <= best + 1e-6
+    assert refused
+
+
+def test_a_choice_exactly_at_its_budget_is_within():
+    none = (np.zeros((1, 2)),)
+    costs = LayeredCosts((np.array([3.7, 1.85]),), none)
+    problem = CostProblem(costs, (Budget("use", (np.array([1.0, 2.0]),), none, 1.0),))
+    for name in TAKERS:
+        assert solve(problem, name).selection.choice == (0,)
+
+
+def test_what_rounding_puts_above_a_bound_is_not_proven_to_exceed_it():
+    """0.1 + 1.1 is more than 1.2 in binary fractions; a choice that takes it counts as within."""
+    pairs = (np.zeros((1, 2)), np.zeros((2, 1)))
+    use = (np.array([0.1, 0.0]), np.array([1.1]))
+    costs = LayeredCosts((np.array([1.0, 2.0]), np.zeros(1)), pairs)
+    problem = CostProblem(costs, (Budget("use", use, pairs, 1.2),))
+    assert problem.budgets[0].spent((0, 0)) > 1.2
+    assert least_within(problem, 2.0, {}, 2.0) == pytest.approx(1.0)
+    assert least_within(problem, 2.0, {"use": 1e17}, 2.0) <= 1.0 + 1e-6
+    only = replace(problem.budgets[0], single=(np.array([0.1, 0.1]), np.array([1.1])))
+    assert smallest_conflict(replace(problem, budgets=(only,))) == ()
+    for name in ("labels", "overlap_mip"):
+        assert solve(problem, name).selection.choice == (0, 0)
+
+
+def test_budgets_that_conflict_are_named(problem25):
+    way, force = travel(problem25, 11.5), steps_over(problem25, "F_largest", 238.7, 8.0)
+    for budget in (way, force):
+        assert solve(replace(problem25, budgets=(budget,)), "labels").certificate.gap <= 1e-6
+    idle = travel(problem25, 1e3)
+    capped = replace(problem25, budgets=(idle, way, force))
+    for name in ("labels", "overlap_mip", "lagrangian"):
+        with pytest.raises(InfeasibleError) as caught:
+            solve(capped, name)
+        said = (
+            "11.5 of 'robot travel [m]' and 8 of 'steps with F_largest over 238.7' cannot be kept"
+        )
+        assert said in str(caught.value)
+        assert "1000" not in str(caught.value)
+
+
+def test_few_labels_stop_with_a_bound(problem25):
+    capped = replace(
+        problem25,
+        budgets=(travel(problem25, 18.0), steps_over(problem25, "F_largest", 250.0, 18.0)),
+    )
+    best = solve(capped, "labels")
+    assert best.selection.end is End.DONE
+    assert best.certificate.claimed_gap <= 1e-6
+    few = solve(capped, "labels", most=8)
+    assert few.selection.bound <= best.certificate.objective <= few.certificate.objective
+    assert few.selection.end is End.STOPPED or few.selection.bound == few.selection.objective
+    assert few.certificate.claimed_gap < 0.02
+    tight = replace(capped, budgets=(*capped.budgets, travel(problem25, 10.9)))
+    with pytest.raises(SolverError, match="before any choice within all budgets was found"):
+        solve(tight, "labels", most=1, time_limit=0)
+
+
+def test_what_a_budget_costs(problem25):
+    budget = travel(problem25, np.inf)
+    table = price_curve(problem25, budget, [10.0, 12.0, 16.0, 20.0, 30.0])
+    assert np.isnan(table["objective"].iloc[0])
+    rest = table.iloc[1:]
+    assert rest["objective"].is_monotonic_decreasing
+    assert (rest["spent"] <= rest["bound"]).all()
+    assert (rest["gap"] <= 1e-6).all()
+    assert rest["price"].iloc[-1] == 0
+    assert rest["price"].is_monotonic_decreasing
+    relaxed = price_curve(problem25, budget, [12.0, 16.0], "lagrangian")
+    np.testing.assert_allclose(relaxed["price"], rest["price"].iloc[:2])
+
+
+def test_a_budget_without_a_bound_is_none(problem25):
+    free = replace(problem25, budgets=(travel(problem25, np.inf),))
+    best = solve(problem25, "overlap_dp").certificate.objective
+    for name in ("labels", "lagrangian"):
+        assert solve(free, name).certificate.objective == pytest.approx(best)
+
+
+def test_the_bound_holds_where_costs_have_both_signs():
+    rng = np.random.default_rng(3)
+    costs = CostProblem(_random(rng, 4, 6).sums)
+    assert costs.sums.sizes == (6,) * 4
+    capped = _random(rng, 4, 6)
+    found = within(capped)
+    plan = solve(capped, "labels")
+    assert plan.certificate.objective == pytest.approx(min(found.values()))
+    assert plan.certificate.gap <= 1e-6
+
+
+def _random(rng, moves, size):
+    def parts():
+        single = tuple(rng.normal(size=size) for _ in range(moves))
+        shared = (
+            rng.normal(size=(1, size)),
+            *(rng.normal(size=(size, size)) for _ in range(1, moves)),
+        )
+        return single, shared
+
+    return CostProblem(LayeredCosts(*parts()), (Budget("use", *parts(), -2.0),))

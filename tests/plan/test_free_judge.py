@@ -1,0 +1,204 @@
+"""What judges free schedules and Pareto sets sees what is wrong with them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import seqopt
+from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.errors import ProblemError, SeqoptError, SolverError, StepError
+from seqopt.graph.states.states import pose_free
+from seqopt.network.build import build_network
+from seqopt.plan.calling.formulation import FormulationKind
+from seqopt.plan.calling.schedule_formulation import (
+    Finds,
+    ScheduleFormulation,
+    find_schedule_formulation,
+)
+from seqopt.plan.free_front import FreeFront
+from seqopt.plan.front import FrontSelection, find_front
+from seqopt.plan.judge.schedules import judge_schedule
+from seqopt.plan.solving import solve
+from seqopt.problem.criteria import WorstRatio
+from seqopt.problem.requirements import Limit
+from seqopt.sequence.free_rules import FreeRules
+from tests.builders import small_arch
+
+ONES = WorstRatio("ones", (("F_largest", 100.0), ("M_sup", 10.0)))
+
+
+def posed(aim="minmax,steps", rules=None, limits=()):
+    engine = ComplianceEngine(build_network(small_arch(5)))
+    return pose_free(engine, rules or FreeRules(), ONES, aim, limits)
+
+
+@pytest.fixture(scope="module")
+def plan():
+    return solve(posed(), "schedule_search")
+
+
+def test_a_plan_is_not_accepted_at_another_value(plan):
+    better = replace(plan.selection, objective=(0.9 * plan.selection.objective[0], 1.0))
+    with pytest.raises(SolverError, match=r"minmax is .* as claimed"):
+        judge_schedule(plan.problem, better, plan.steps)
+
+
+@pytest.mark.parametrize("aim", ["minmax", "steps", "regrips", "travel", "sum"])
+def test_a_plan_that_is_not_the_best_is_seen(aim):
+    """One that is best for the opposite order, judged by a goal at which it loses."""
+    rules = FreeRules(regrips=1)
+    other = solve(posed("M_sup" if aim != "minmax" else "steps,T_max", rules), "schedule_search")
+    problem = posed(aim, rules)
+    best = solve(problem, "schedule_search").certificate.objective[0]
+    from seqopt.plan.judge.schedules import plan_values  # noqa: PLC0415
+
+    value = plan_values(problem, other.steps)[0]
+    claimed = replace(other.selection, objective=(value,), bound=(value,))
+    if value > best * (1 + 1e-9):
+        with pytest.raises(SolverError, match="is promised as the least; a plan has less"):
+            judge_schedule(problem, claimed, other.steps)
+    else:
+        assert judge_schedule(problem, claimed, other.steps).gap == 0
+        assert aim in ("steps", "regrips")  # others do tell the two apart
+
+
+def test_a_step_against_the_rules_is_seen(plan):
+    strict = replace(plan.problem, rules=FreeRules(least_grips=3))
+    with pytest.raises(StepError, match="fewer than least_grips=3"):
+        judge_schedule(strict, plan.selection, plan.steps)
+
+
+def test_a_limit_that_is_exceeded_is_seen(plan):
+    worst = plan.responses()["M_sup_Nm"].max()
+    capped = replace(plan.problem, limits=(Limit("M_sup", 0.99 * worst),))
+    with pytest.raises(SolverError, match="exceeds the limit on M_sup"):
+        judge_schedule(capped, plan.selection, plan.steps)
+
+
+def test_states_of_no_free_schedule_are_refused(plan):
+    def nonsense(problem):
+        return replace(plan.selection, states=((1, 99, 0, 0),))
+
+    liar = ScheduleFormulation("liar", "lies", FormulationKind.EXACT, nonsense)
+    with pytest.raises(SolverError, match="none of this free schedule"):
+        solve(plan.problem, liar)
+
+    def jump(problem):
+        return replace(plan.selection, states=plan.selection.states[::2])
+
+    with pytest.raises(SeqoptError):
+        solve(plan.problem, replace(liar, solve=jump))
+
+
+def test_problems_go_to_their_own_formulations(plan):
+    with pytest.raises(ProblemError, match="not a formulation of the free schedule"):
+        solve(plan.problem, "minimax")
+    with pytest.raises(ProblemError, match="a free schedule has no moves to choose"):
+        solve(plan.problem, seqopt.formulations()["minimax"])
+    with pytest.raises(
+        ProblemError, match=r"a Pareto set, and one plan is asked for; use .*schedule_"
+    ):
+        solve(plan.problem, "pareto_zones")
+    with pytest.raises(ProblemError, match="one plan, and a Pareto set is asked for; use pareto_"):
+        find_front(FreeFront(posed("F_largest")), "schedule_search")
+    with pytest.raises(ProblemError, match="is for free schedules"):
+        solve(object(), find_schedule_formulation("schedule_search"))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ({"goals": "fast"}, "aim 'fast' does not exist"),
+        ({"goals": "steps,steps"}, "aim steps: it is listed twice"),
+        ({"goals": ()}, "give goals, or their names"),
+        ({"limits": [Limit("F_move", 3.0)]}, "a state of a free schedule has no F_move"),
+        ({"criterion": seqopt.CRITERIA["equations-2-3"]}, "it ranks the choices of a move"),
+    ],
+)
+def test_what_cannot_be_posed_gets_one_line(arguments, said):
+    engine = ComplianceEngine(build_network(small_arch(4)))
+    given = {"criterion": ONES} | arguments
+    with pytest.raises(ProblemError, match=said) as caught:
+        pose_free(engine, FreeRules(), **given)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_limit_on_one_robot_binds_it_alone():
+    forces = "F_rob2_N"
+    free = solve(posed("minmax"), "schedule_search")
+    largest = free.responses()[forces].abs().max()
+    capped = solve(posed("minmax", limits=[Limit("F_rob2", 0.9 * largest)]), "schedule_search")
+    assert capped.responses()[forces].abs().max() <= 0.9 * largest * (1 + 1e-9)
+
+
+class Changed:
+    """A formulation of Pareto sets whose answer is changed."""
+
+    def __init__(self, change):
+        self.change = change
+
+    def __call__(self, problem, **options):
+        found = find_schedule_formulation("pareto_zones", Finds.FRONT).solve(problem, **options)
+        return self.change(found)
+
+
+@pytest.fixture(scope="module")
+def front_of(engine25):
+    """Return the checked front of a changed answer."""
+    problem = pose_free(engine25, FreeRules(), ONES, "F_largest,M_sup")
+    front = FreeFront(problem, {"F_largest": 20.0, "M_sup": 2.0})
+
+    def judged(change):
+        formulation = ScheduleFormulation(
+            "changed", "", FormulationKind.EXACT, Changed(change), Finds.FRONT
+        )
+        return find_front(front, formulation)
+
+    return judged
+
+
+@pytest.mark.slow
+def test_a_set_that_lacks_a_point_is_seen(front_of):
+    whole = front_of(lambda found: found)
+    assert whole.complete
+    assert len(whole.table) > 2
+    for lost in range(len(whole.table)):
+        keep = [i for i in range(len(whole.table)) if i != lost]
+        with pytest.raises(SolverError, match="the set lacks a point below"):
+            front_of(
+                lambda f, keep=keep: FrontSelection(f.points[keep], tuple(f.plans[i] for i in keep))
+            )
+
+
+def test_a_point_that_its_plan_does_not_reach_is_seen(front_of):
+    with pytest.raises(SolverError, match="as claimed"):
+        front_of(lambda f: FrontSelection(0.9 * f.points, f.plans))
+
+
+def test_a_point_that_another_one_dominates_is_seen(front_of):
+    twice = np.array([0, *range(100)])
+    with pytest.raises(SolverError, match="is dominated by another one"):
+        front_of(
+            lambda f: FrontSelection(
+                f.points[twice[: len(f.points) + 1]],
+                tuple(f.plans[i] for i in twice[: len(f.points) + 1]),
+            )
+        )
+
+
+def test_a_set_that_was_not_finished_says_so(front_of):
+    found = front_of(lambda f: FrontSelection(f.points[:1], f.plans[:1], "time"))
+    assert not found.complete
+    assert len(found.table) == 1
+
+
+def test_what_differs_by_rounding_alone_is_no_other_point():
+    front = find_front(FreeFront(posed("F_largest,M_sup,T_max,D_max")))
+    points = front.table[["F_largest", "M_sup", "T_max", "D_max"]].to_numpy()
+    assert len(points) == len(
+        np.unique(np.array([[f"{x:.8e}" for x in p] for p in points]), axis=0)
+    )
+    assert len(points) == 1  # a second one was less by the last digits of T_max alone

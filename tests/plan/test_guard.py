@@ -1,0 +1,288 @@
+"""Formulations of schedules, orders and fronts: what they change, return, raise and deny."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import seqopt
+from formulations.states.order_search import FORMULATION as ORDER
+from formulations.states.pareto_zones import FORMULATION as FRONT
+from formulations.states.schedule_search import FORMULATION as PLAN
+from seqopt.errors import InfeasibleError, SolverError
+from seqopt.graph.orders.orders import OrderProblem, OrderSelection
+from seqopt.graph.states.states import pose_free
+from seqopt.plan import robust_plan
+from seqopt.plan.calling.schedule_selection import ScheduleSelection
+from seqopt.plan.free_front import FreeFront
+from seqopt.plan.front import FrontSelection, find_front
+from seqopt.plan.order_plan import solve_order
+from seqopt.plan.solving import solve
+from seqopt.problem.criteria import WorstRatio
+from seqopt.problem.goals import parse_goals
+from seqopt.problem.requirements import Limit
+from seqopt.sequence.free_rules import FreeRules
+from tests.builders import small_arch
+
+ONES = WorstRatio("ones", (("F_largest", 100.0), ("M_sup", 10.0)))
+CHANGED = "changed the problem that it is judged by"
+RULES = FreeRules(least_grips=1)
+
+
+def free(limits=(), rules=RULES, aim="F_largest,M_sup"):
+    engine = seqopt.make_engine("compliance", small_arch(4))
+    return pose_free(engine, rules, ONES, aim, limits)
+
+
+def order(**words):
+    return OrderProblem(free(**words))
+
+
+def front(**words):
+    return FreeFront(free(**words))
+
+
+def loop(limits=()):
+    engine = free().engine
+    schedule = seqopt.three_robot_loop(engine.network)
+    return FreeFront(pose_free(engine, schedule, ONES, "F_largest,M_sup", limits))
+
+
+KINDS = {
+    "plan": (free, solve, PLAN),
+    "order": (order, solve_order, ORDER),
+    "front": (front, find_front, FRONT),
+    "loop's front": (loop, find_front, FRONT),
+}
+kinds = pytest.mark.parametrize("kind", KINDS)
+
+
+def asked(kind, fake, **words):
+    """Solve a problem of a kind by its formulation with another function."""
+    pose, solver, real = KINDS[kind]
+    return solver(pose(**words), replace(real, name="fake", solve=fake))
+
+
+def first_free(problem):
+    """The free problem within one, or itself."""
+    return getattr(problem, "free", getattr(problem, "_problem", problem))
+
+
+def goals(problem):
+    object.__setattr__(first_free(problem), "goals", parse_goals("D_max,T_max"))
+
+
+def rules(problem):
+    object.__setattr__(first_free(problem).rules, "least_grips", 0)
+
+
+def limits(problem):
+    object.__setattr__(first_free(problem), "limits", (Limit("M_sup", 1e9),))
+
+
+def engine(problem):
+    first_free(problem).engine.solve = None
+
+
+def says_empty(problem):
+    problem.is_empty_below = lambda _: True
+
+
+def infinite(problem):
+    amounts = problem._visited.graph.amounts
+    amounts.flags.writeable = True
+    amounts[:] = np.inf
+
+
+CHANGES = [
+    *((kind, change) for kind in ("plan", "order", "front") for change in (goals, rules, limits)),
+    *((kind, engine) for kind in ("plan", "order", "front")),
+    ("front", says_empty), ("loop's front", says_empty),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("kind", "change"), CHANGES)
+@pytest.mark.parametrize("denies", [False, True])
+def test_a_changed_problem_is_refused(kind, change, denies):
+    def fake(problem, **options):
+        found = KINDS[kind][2].solve(problem, **options)
+        change(problem)
+        if denies:
+            raise InfeasibleError("none")
+        return found
+
+    rules_before = replace(RULES)
+    with pytest.raises(SolverError, match=CHANGED):
+        asked(kind, fake, **({} if kind.startswith("loop") else {"rules": rules_before}))
+
+
+@pytest.mark.parametrize(("kind", "change"), [("front", infinite), ("loop's front", infinite)])
+def test_what_was_computed_for_a_formulation_is_not_judged_by(kind, change):
+    def fake(problem, **options):
+        found = KINDS[kind][2].solve(problem, **options)
+        change(problem)
+        return found
+
+    pose, solver, real = KINDS[kind]
+    assert repr(asked(kind, fake)) == repr(solver(pose(), real))
+
+
+@kinds
+def test_what_a_formulation_only_computes_is_no_change(kind):
+    pose, solver, real = KINDS[kind]
+    problem = pose()
+    first, again = solver(problem, real), solver(problem, real)
+    assert repr(first) == repr(again)
+
+
+@pytest.mark.parametrize("name", ["space", "caps", "named", "certified"])
+def test_what_a_formulation_leaves_behind_is_forgotten(name):
+    def fake(problem, **options):
+        found = PLAN.solve(problem, **options)
+        vars(problem)[name] = "forged"
+        return found
+
+    problem = free()
+    plan = solve(problem, replace(PLAN, solve=fake))
+    assert plan.certificate == solve(free(), PLAN).certificate
+    assert vars(problem).get(name) != "forged"
+
+
+PLANS = {
+    "states None": {"states": None},
+    "no states": {"states": ()},
+    "states text": {"states": "abc"},
+    "states nested": {"states": (((1,),),)},
+    "states of floats": {"states": ((1.5, 1, 0, 0),)},
+    "states too short": {"states": ((1,),)},
+    "states beyond": {"states": ((1, 10**30, 0, 0),)},
+    "values None": {"objective": None},
+    "too few values": {"objective": (1.0,)},
+    "values text": {"objective": ("a", "b")},
+    "values NaN": {"objective": (np.nan, 1.0)},
+    "too few bounds": {"bound": (1.0,)},
+    "bounds None": {"bound": None},
+    "bounds NaN where it was stopped": {"bound": (np.nan, np.nan), "stopped": "time"},
+    "bounds above the values": {"bound": (np.inf, 1e9), "stopped": "time"},
+    "stopped None": {"stopped": None},
+}
+ORDERS = {
+    "order None": {"order": None},
+    "order text": {"order": "abcd"},
+    "order of floats": {"order": (1.5, 2, 3, 4)},
+    "value None": {"objective": None},
+    "value NaN": {"objective": np.nan},
+    "bound None": {"bound": None},
+    "bound NaN where it was stopped": {"bound": np.nan, "stopped": "time"},
+    "evaluated None": {"evaluated": None},
+    "stopped a number": {"stopped": 3},
+}
+FRONTS = {
+    "points None": {"points": None},
+    "points text": {"points": "abc"},
+    "points NaN": {"points": np.full((1, 2), np.nan), "plans": (((1, 1, 0, 0),),)},
+    "too few numbers": {"points": np.zeros((1, 1)), "plans": (((1, 1, 0, 0),),)},
+    "too few plans": {"plans": ()},
+    "plans None": {"plans": None},
+    "plans of text": {"points": np.ones((1, 2)), "plans": ("abc",)},
+    "plans of nothing": {"points": np.ones((1, 2)), "plans": (None,)},
+    "stopped None": {"stopped": None},
+}
+CLASSES = {"plan": ScheduleSelection, "order": OrderSelection, "front": FrontSelection}
+NONSENSE = [
+    *(("plan", what, change) for what, change in PLANS.items()),
+    *(("order", what, change) for what, change in ORDERS.items()),
+    *(("front", what, change) for what, change in FRONTS.items()),
+    *(("loop's front", what, change) for what, change in FRONTS.items()),
+]
+
+
+@pytest.mark.parametrize(
+    ("kind", "change"), [(k, c) for k, _, c in NONSENSE], ids=[f"{k}: {w}" for k, w, _ in NONSENSE]
+)
+@pytest.mark.parametrize("proof", [True, False])
+def test_nonsense_has_failed(kind, change, proof):
+    def fake(problem, **options):
+        return replace(KINDS[kind][2].solve(problem, **options), **change)
+
+    if "front" in kind and not proof:
+        return  # there is no such choice
+    pose, solver, real = KINDS[kind]
+    words = {} if "front" in kind else {"proof": proof}
+    with pytest.raises(SolverError) as caught:
+        solver(pose(), replace(real, name="fake", solve=fake), **words)
+    assert "\n" not in str(caught.value)
+
+
+@kinds
+@pytest.mark.parametrize("reply", [None, "best", 3.0, (), np.zeros(3), ScheduleSelection])
+def test_what_is_no_selection_has_failed(kind, reply):
+    with pytest.raises(SolverError, match=r"formulation fake returned a .*, not a .*Selection"):
+        asked(kind, lambda *_, **__: reply)
+
+
+@kinds
+@pytest.mark.parametrize("error", [ZeroDivisionError("by\nzero"), KeyError("x"), SystemExit(3)])
+def test_what_raises_has_failed(kind, error):
+    def fake(*_, **__):
+        raise error
+
+    with pytest.raises(SolverError, match=f"formulation fake failed: {type(error).__name__}"):
+        asked(kind, fake)
+
+
+def denies(*_, **__):
+    raise InfeasibleError("none")
+
+
+def empty(problem, **_):
+    return FrontSelection(np.zeros((0, len(problem.names))), ())
+
+
+@pytest.mark.parametrize(
+    ("kind", "fake", "said"),
+    [
+        ("plan", denies, "fake says that no plan is allowed, and some are"),
+        ("order", denies, "fake says that no order has a plan, and some have"),
+        ("front", denies, "fake found no plan, and some are allowed"),
+        ("front", empty, "fake found no plan, and some are allowed"),
+        ("loop's front", denies, "fake found no plan, and some are allowed"),
+        ("loop's front", empty, "fake found no plan, and some are allowed"),
+    ],
+)
+def test_that_there_is_no_plan_is_not_believed(kind, fake, said):
+    with pytest.raises(SolverError, match=said):
+        asked(kind, fake)
+
+
+@kinds
+def test_where_there_is_no_plan_it_is_proven(kind):
+    """Nothing that a formulation says counts; of time and size the judge may have too little."""
+    words = {"limits": [Limit("F_largest", 1.0)]}
+    with pytest.raises(InfeasibleError) as caught:
+        asked(kind, denies, **words)
+    assert "claimed" not in str(caught.value)
+
+
+def test_scenarios_have_the_same_guard(monkeypatch):
+    scene = small_arch(5)
+    loop = seqopt.three_robot_loop(seqopt.build_network(scene))
+    problem = seqopt.pose(seqopt.make_engine("compliance", scene), loop, ONES)
+    robust = seqopt.robust(problem, seqopt.scenarios(scene, count=2, seed=1), "worst-peak")
+    real = seqopt.formulations()["minimax"]
+
+    def changes(problem):
+        object.__setattr__(problem, "budgets", None)
+        return real.solve(problem)
+
+    for fake, said in (
+        (changes, CHANGED),
+        (denies, "says that no choice is allowed, and some are"),
+        (lambda _: None, "returned a NoneType, not a Selection"),
+    ):
+        cheat = replace(real, solve=fake)
+        monkeypatch.setattr(robust_plan, "find_formulation", lambda _, cheat=cheat: cheat)
+        with pytest.raises(SolverError, match=said):
+            seqopt.solve_robust(robust)

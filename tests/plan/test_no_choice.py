@@ -1,0 +1,179 @@
+"""Problems without a choice, and formulations that return nonsense or raise."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from seqopt.cli.main import main
+from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.errors import InfeasibleError, MemoryShortError, ProblemError, SolverError
+from seqopt.graph.layers.costs import Budget, LayeredCosts
+from seqopt.graph.layers.interface import CostProblem
+from seqopt.graph.layers.layers import pose
+from seqopt.network.build import build_network
+from seqopt.plan.calling import formulation as registry
+from seqopt.plan.calling.formulation import Selection, find_formulation
+from seqopt.plan.solving import solve
+from seqopt.responses import batches
+from seqopt.scene.arch import ArchShape, arch_scene
+from seqopt.scene.scene_file import save_scene
+from seqopt.sequence.three_robots import modified_sequential, three_robot_loop
+from seqopt.study.presets import EQUATIONS
+from tests.builders import six_bricks
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_a_schedule_without_an_open_move_is_no_problem(capsys, tmp_path, count):
+    scene = arch_scene(ArchShape(pitch=[1.2, 0.7][:count]))
+    network = build_network(scene)
+    with pytest.raises(ProblemError, match=f"with {count} bricks it leaves no grip open"):
+        pose(ComplianceEngine(network), modified_sequential(network), EQUATIONS)
+    path = tmp_path / "scene.json"
+    save_scene(scene, path)
+    words = ("--schedule", "modified-sequential", "--out", str(tmp_path / "out"))
+    for more in ((), ("--no-proof",)):
+        formulation = ("--formulation", "cascade")
+        assert main(["optimize", str(path), *formulation, *words, *more]) == 2
+        assert "leaves no grip open" in capsys.readouterr().err
+    assert main(["compare", str(path)]) == 0
+    assert "needs three robots and four bricks" in capsys.readouterr().out
+
+
+@pytest.fixture(scope="module")
+def problem():
+    network = build_network(six_bricks())
+    return pose(ComplianceEngine(network), three_robot_loop(network), EQUATIONS)
+
+
+TRUE = (0, 0, 0)
+NONSENSE = {
+    "None": None,
+    "text": "overlap_dp",
+    "a number": 3.0,
+    "a tuple": (TRUE, 1.0),
+    "an array": np.zeros(3),
+    "a class": Selection,
+    "choice None": Selection(None, 1.0),
+    "choice a number": Selection(3, 1.0),
+    "choice text": Selection("abc", 1.0),
+    "choice of floats": Selection((0.0, 1.0, 0.5), 1.0),
+    "choice of None": Selection((None, None, None), 1.0),
+    "choice of NaN": Selection((np.nan,) * 3, 1.0),
+    "choice nested": Selection(((0,), (0,), (0,)), 1.0),
+    "choice a table": Selection(np.zeros((3, 2)), 1.0),
+    "choice too short": Selection((0,), 1.0),
+    "choice too long": Selection((0,) * 9, 1.0),
+    "choice beyond": Selection((99, 0, 0), 1.0),
+    "choice below": Selection((-1, 0, 0), 1.0),
+    "choice beyond all bounds": Selection((10**30, 0, 0), 1.0),
+    "objective None": Selection(TRUE, None),
+    "objective text": Selection(TRUE, "least"),
+    "objective NaN": Selection(TRUE, np.nan),
+    "objective complex": Selection(TRUE, 1j),
+    "objective an array": Selection(TRUE, np.zeros(2)),
+    "objective beyond all bounds": Selection(TRUE, 10**400),
+    "bound None": Selection(TRUE, 1.0, bound=None),
+    "bound text": Selection(TRUE, 1.0, bound="low"),
+    "bound NaN": Selection(TRUE, 1.0, bound=np.nan),
+    "prices None": Selection(TRUE, 1.0, prices=None),
+    "prices text": Selection(TRUE, 1.0, prices={"a": "dear"}),
+    "seconds None": Selection(TRUE, 1.0, compile_seconds=None),
+    "seconds NaN": Selection(TRUE, 1.0, compile_seconds=np.nan),
+    "seconds below zero": Selection(TRUE, 1.0, compile_seconds=-1.0),
+}
+
+
+@pytest.mark.parametrize("what", NONSENSE)
+def test_a_formulation_that_returns_nonsense_has_failed(problem, what):
+    made = replace(find_formulation("overlap_dp"), name="odd", solve=lambda _: NONSENSE[what])
+    with pytest.raises(SolverError) as caught:
+        solve(problem, made)
+    assert "\n" not in str(caught.value)
+
+
+def test_whole_numbers_of_any_kind_are_a_choice(problem):
+    true = find_formulation("overlap_dp").solve(problem)
+    odd = replace(true, choice=np.array(true.choice), objective=np.float64(true.objective))
+    made = replace(find_formulation("overlap_dp"), solve=lambda _: odd)
+    assert solve(problem, made).selection == true
+
+
+@pytest.mark.parametrize("error", [ZeroDivisionError("by\nzero"), KeyError("x"), OSError("gone")])
+def test_a_formulation_that_raises_has_failed(problem, error):
+    def fails(_):
+        raise error
+
+    made = replace(find_formulation("overlap_dp"), name="odd", solve=fails)
+    with pytest.raises(SolverError, match=f"formulation odd failed: {type(error).__name__}"):
+        solve(problem, made)
+
+
+def says_so(_):
+    raise InfeasibleError("no choice is within all budgets")
+
+
+def test_that_there_is_no_choice_is_not_believed(problem):
+    with pytest.raises(SolverError, match="no choice is allowed, and some are: no choice is with"):
+        solve(problem, replace(find_formulation("overlap_dp"), solve=says_so))
+
+
+def test_that_budgets_conflict_is_proven_or_claimed():
+    """Two moves of two candidates; a budget that one choice keeps, and one that none does."""
+    costs = LayeredCosts((np.ones(2),) * 2, (np.zeros((1, 2)), np.zeros((2, 2))))
+    formulation = replace(find_formulation("labels"), solve=says_so)
+    for bound, said in (
+        (0.5, "every choice uses at least 1 of 'b'"),
+        (1.5, "claimed by labels, an"),
+    ):
+        budget = Budget("b", (np.array([0.5, 2.0]),) * 2, costs.shared, bound)
+        with pytest.raises(InfeasibleError, match=said):
+            solve(CostProblem(costs, (budget,)), formulation)
+
+
+def test_an_exit_does_not_leave_through_solve(problem):
+    with pytest.raises(SolverError, match="overlap_dp failed: SystemExit: 3"):
+        solve(problem, replace(find_formulation("overlap_dp"), solve=lambda _: sys.exit(3)))
+
+
+class Entry:
+    name, value = "odd", "package:THING"
+
+    def __init__(self, thing):
+        self.thing = thing
+
+    def load(self):
+        if isinstance(self.thing, Exception):
+            raise self.thing
+        return self.thing
+
+
+@pytest.mark.parametrize(
+    ("thing", "said"),
+    [(ImportError("no package"), "cannot be loaded: ImportError: no package"), (3, "is a int")],
+)
+def test_a_registered_formulation_that_is_none_is_named(monkeypatch, thing, said):
+    monkeypatch.setattr(registry, "plugins", lambda _: {"odd": Entry(thing)})
+    with pytest.raises(ProblemError, match=f"'odd': package:THING {said}"):
+        find_formulation("odd")
+
+
+def test_what_does_not_fit_into_memory_is_refused_before(problem, monkeypatch):
+    needed = batches.bytes_of_costs(problem.schedule) / batches._SHARE
+    whole = batches.bytes_of_choices(problem.schedule, problem.evaluation.wanted) / batches._SHARE
+    monkeypatch.setattr(batches, "free_memory", lambda: 0.99 * min(needed, whole))
+    fresh = replace(problem, evaluation=replace(problem.evaluation))
+    with pytest.raises(MemoryShortError, match=r"take about .* GB, .*up to 7 candidates"):
+        _ = fresh.sums
+    monkeypatch.setattr(batches, "free_memory", lambda: 1.01 * needed)
+    fresh = replace(problem, evaluation=replace(problem.evaluation))
+    assert fresh.sums == problem.sums
+
+
+def test_the_estimate_of_memory_is_about_right(problem):
+    kept = sum(a.nbytes for s in problem.evaluation.steps for a in s.responses.values())
+    assert 1 < batches.bytes_of_choices(problem.schedule, problem.evaluation.wanted) / kept < 5
+    assert batches.free_memory() > 1e6

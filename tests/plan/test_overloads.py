@@ -1,0 +1,118 @@
+"""What is promised of every step: payloads, limits, and judges that keep their own data."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import seqopt
+from seqopt.errors import InfeasibleError, SolverError
+from seqopt.graph.layers.budgets import travel
+from seqopt.graph.layers.costs import LayeredCosts
+from seqopt.graph.layers.interface import Aim, CostProblem
+from seqopt.plan.judge.certificate import certify
+from seqopt.problem.overloads import Excess, overloads
+from seqopt.problem.requirements import Limit, payload_limits
+
+
+def weak(scene, payload):
+    return replace(scene, robots=tuple(replace(r, payload=payload) for r in scene.robots))
+
+
+def test_a_limit_that_a_fixed_step_exceeds_is_infeasible(arch25):
+    """The first two steps of the loop have no open grip: nothing can be chosen there."""
+    with pytest.raises(InfeasibleError, match=r"F_largest is up to .* of 20 \(steps? 1"):
+        seqopt.optimize(arch25, limits=[seqopt.Limit("F_largest", 20.0)])
+    with pytest.raises(InfeasibleError, match="no grip is left to choose"):
+        seqopt.optimize(
+            arch25, "modified-sequential", formulation="cascade", proof=False,
+            limits=payload_limits(weak(arch25, 150.0)),
+        )  # fmt: skip
+
+
+def test_payloads_hold_on_every_step_or_are_named(arch25):
+    kept = seqopt.optimize(arch25, limits=payload_limits(arch25))
+    assert kept.overloads == ()
+    assert kept.summary()["payload_exceeded"] == []
+    over = seqopt.optimize(weak(arch25, 350.0))
+    assert [excess.limit.response for excess in over.overloads] == ["F_rob1"]
+    table = over.responses()
+    assert over.overloads[0].largest == table["F_rob1_N"].abs().max()
+    assert over.summary()["payload_exceeded"] == [str(over.overloads[0])]
+    assert "rob1 holds up to 375.4 N, more than its payload of 350 N (step" in str(
+        over.overloads[0]
+    )
+
+
+def test_methods_without_a_choice_are_looked_at_too(engine25):
+    table = seqopt.analyze(engine25, seqopt.sequential(engine25.network))
+    (excess,) = overloads(engine25.network.scene, table)
+    assert (excess.limit.response, excess.steps) == ("F_rob2", (47,))
+
+
+@pytest.mark.parametrize(("share", "exceeds"), [(1.0, False), (1 - 1e-12, False), (1 - 1e-6, True)])
+def test_the_last_bit_decides_nothing(share, exceeds):
+    limit = seqopt.Limit("T_max", share * 0.3)
+    assert limit.exceeded(np.array([0.1 + 0.2, np.nan])).tolist() == [exceeds, False]
+
+
+def small():
+    costs = LayeredCosts(
+        (np.array([2.0, 1.0]), np.array([1.0, 4.0])), (np.zeros((1, 2)), np.ones((2, 2)))
+    )
+    return CostProblem(costs)
+
+
+def unlocking(problem, **_):
+    """Make the data say what the answer claims."""
+    for costs in (*problem.sums.single, *problem.sums.shared):
+        costs.flags.writeable = True
+        costs[:] = 0.0
+    return seqopt.formulations()["overlap_dp"].solve(problem)
+
+
+def replacing(problem, **_):
+    object.__setattr__(problem, "sums", LayeredCosts((np.zeros(2),) * 2, (np.zeros((1, 2)), np.zeros((2, 2)))))  # fmt: skip  # noqa: E501
+    return seqopt.formulations()["overlap_dp"].solve(problem)
+
+
+@pytest.mark.parametrize("cheat", [unlocking, replacing])
+def test_a_formulation_that_changes_what_it_is_judged_by_is_refused(cheat):
+    cheater = replace(seqopt.formulations()["overlap_dp"], solve=cheat)
+    with pytest.raises(SolverError, match="changed the problem that it is judged by"):
+        seqopt.solve(small(), cheater)
+    assert seqopt.solve(small(), "overlap_dp").certificate.objective == 3.0
+
+
+def test_costs_that_change_while_they_are_judged_are_seen(monkeypatch):
+    problem = small()
+    selection = seqopt.formulations()["overlap_dp"].solve(problem)
+    monkeypatch.setattr("seqopt.plan.judge.certificate.least", lambda *_: 99.0)
+    with pytest.raises(SolverError, match="lies above that of the choice"):
+        certify(problem, selection, Aim.SUM)
+
+
+def test_an_optimum_within_budgets_is_proven_or_claimed(engine25, monkeypatch):
+    criterion = seqopt.CRITERIA["worst-ratio-published"]
+    problem = seqopt.pose(engine25, seqopt.three_robot_loop(engine25.network), criterion)
+    free = seqopt.solve(problem, "overlap_dp")
+    assert free.summary()["status"] == "optimal"
+    tight = replace(
+        problem, budgets=(travel(problem, 0.8 * travel(problem, 1.0).spent(free.selection.choice)),)
+    )
+    plan = seqopt.solve(tight, "overlap_mip")
+    assert plan.certificate.gap <= 1e-6
+    assert plan.summary()["status"] == "optimal"
+    monkeypatch.setattr("seqopt.plan.judge.budget_proof.MOST", 1)
+    monkeypatch.setattr("seqopt.plan.judge.budget_proof.CLIMBS", 2)
+    plan = seqopt.solve(tight, "overlap_mip")
+    assert plan.certificate.gap > 1e-6 >= plan.certificate.claimed_gap
+    assert plan.summary()["status"] == "claimed optimal"
+
+
+def test_a_long_list_of_steps_is_cut():
+    excess = Excess(Limit("D_max", 1e-5), tuple(range(1, 31)), 2e-5)
+    assert str(excess).endswith("(steps 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12 and 18 more)")
+    assert str(Excess(Limit("D_max", 1e-5), (7,), 2e-5)).endswith("(step 7)")

@@ -1,0 +1,178 @@
+"""One way to solve: what is computed when, and what a plan says of itself."""
+
+from __future__ import annotations
+
+import pickle
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import seqopt
+from seqopt.engines.interface import Want
+from seqopt.errors import ProblemError, StepError
+from seqopt.graph.layers.budgets import travel
+from seqopt.graph.layers.costs import LayeredCosts
+from seqopt.graph.layers.interface import CostProblem
+from seqopt.graph.layers.layers import Problem
+from seqopt.plan.calling.formulation import FormulationKind
+from seqopt.study.presets import find_criterion
+
+WORST = seqopt.CRITERIA["worst-ratio-published"]
+
+
+class Counting:
+    """An engine that counts the grip sets it is asked for."""
+
+    def __init__(self, engine):
+        self.engine, self.asked = engine, 0
+
+    @property
+    def network(self):
+        return self.engine.network
+
+    def solve(self, bricks, grips, want=Want.RESPONSES):
+        self.asked += len(grips)
+        return self.engine.solve(bricks, grips, want)
+
+
+@pytest.fixture
+def counted(engine25):
+    engine = Counting(engine25)
+    return engine, seqopt.pose(engine, seqopt.three_robot_loop(engine.network), WORST)
+
+
+def test_posing_computes_nothing(counted):
+    engine, problem = counted
+    assert engine.asked == 0
+    assert problem.evaluation.models == engine.asked > 0
+
+
+def test_a_search_without_proof_computes_only_what_it_meets(counted):
+    engine, problem = counted
+    plan = seqopt.solve(problem, "cascade", proof=False)
+    assert 0.98 * engine.asked < plan.models < engine.asked  # a few in both kinds of step
+    assert plan.certificate is None
+    assert np.isnan(plan.selection.objective)
+    proven = seqopt.solve(problem, "cascade")
+    assert plan.nodes == proven.nodes
+    assert plan.steps == proven.steps
+    assert engine.asked > problem.evaluation.models
+    assert plan.models < 0.3 * problem.evaluation.models
+    assert plan.summary()["status"] == "unproven"
+    assert plan.summary()["gap"] is None
+    assert "without proof" in repr(plan)
+
+
+def test_a_changed_problem_keeps_its_responses(counted):
+    engine, problem = counted
+    before = problem.evaluation.models
+    other = replace(problem, criterion=problem.criterion, limits=())
+    assert other.sums == problem.sums
+    assert other == problem
+    assert engine.asked == before
+
+
+def test_only_the_costs_of_the_aim_are_computed(counted):
+    _, problem = counted
+    seqopt.solve(problem, "minimax")
+    assert "_peaks" in vars(problem)
+    assert "_sums" not in vars(problem)
+
+
+def test_a_plan_is_a_value(engine25):
+    problem = seqopt.pose(engine25, seqopt.three_robot_loop(engine25.network), WORST)
+    plan, again = (seqopt.solve(problem, "overlap_dp") for _ in range(2))
+    assert plan == again
+    assert hash(plan) == hash(again)
+    assert plan != seqopt.solve(problem, "minimax")
+    assert len(repr(plan)) < 120
+    assert len(repr(problem)) < 120
+    assert [*plan.seconds] == ["respond", "rank", "compile", "solve", "verify"]
+
+
+def test_a_plan_shows_its_steps_and_choices(engine25):
+    plan = seqopt.optimize(engine25.network.scene, engine="compliance")
+    assert next(iter(plan.seconds)) == "assemble"
+    assert plan.table()["node"].tolist() == [*plan.nodes]
+    table = plan.responses()
+    assert len(table) == len(plan.steps) == 90
+    assert (table["optimized_robot"] != "").sum() > 22
+    looked = plan.alternatives()
+    assert looked["step"].is_monotonic_increasing
+    assert (len(looked), np.isfinite(looked["cost"]).sum()) == (14320, 13929)
+
+
+def test_a_plan_of_costs_alone_has_a_choice_and_no_steps():
+    costs = LayeredCosts((np.array([2.0, 1.0]),), (np.zeros((1, 2)),))
+    plan = seqopt.solve(CostProblem(costs), "overlap_dp")
+    assert plan.nodes == plan.selection.choice == (1,)
+    assert plan.steps == ()
+    assert plan.certificate.gap == 0.0
+    for ask in (plan.table, plan.responses, plan.alternatives, plan.summary):
+        with pytest.raises(ProblemError, match="given by its costs alone"):
+            ask()
+    with pytest.raises(ProblemError, match="ask for the proof"):
+        seqopt.solve(CostProblem(costs), "cascade", proof=False)
+
+
+@pytest.mark.parametrize("name", seqopt.formulations())
+def test_budgets_are_refused_by_those_that_do_not_take_them(engine25, name):
+    problem = seqopt.pose(engine25, seqopt.three_robot_loop(engine25.network), WORST)
+    problem = replace(problem, budgets=(travel(problem, 1e3),))
+    formulation = seqopt.formulations()[name]
+    if formulation.takes_budgets:
+        assert seqopt.solve(problem, name).certificate.spent
+        return
+    with pytest.raises(ProblemError, match="couples all moves; use labels or lagrangian"):
+        seqopt.solve(problem, name)
+
+
+@pytest.mark.parametrize("name", seqopt.formulations())
+def test_without_proof_only_windows_are_searched(counted, name):
+    engine, problem = counted
+    formulation = seqopt.formulations()[name]
+    if formulation.window_options is not None:
+        assert formulation.kind is FormulationKind.HEURISTIC
+        assert seqopt.solve(problem, formulation, proof=False).steps
+        return
+    with pytest.raises(ProblemError, match="needs all models: use cascade or rank_search"):
+        seqopt.solve(problem, formulation, proof=False)
+    assert engine.asked == 0
+
+
+def test_the_short_cut_does_what_the_long_way_does(arch25, engine25):
+    problem = seqopt.pose(
+        engine25, seqopt.three_robot_loop(engine25.network), find_criterion("equations-2-3")
+    )
+    plan = seqopt.solve(problem, "overlap_dp")
+    for scene in (arch25, "arch25"):
+        short = seqopt.optimize(scene)
+        assert short.nodes == plan.nodes
+        assert short.certificate.objective == plan.certificate.objective
+
+
+@pytest.mark.parametrize(
+    ("wrong", "error", "message"),
+    [
+        ({"scene": "arch26"}, seqopt.SeqoptError, "no such built-in scene or file"),
+        ({"schedule": "ring"}, StepError, "give one of three-robot, modified-sequential"),
+        ({"criterion": "ranks"}, ProblemError, "give one of equations-2-3"),
+        ({"formulation": "dp"}, ProblemError, "give one of beam, cascade"),
+        ({"width": 3}, ProblemError, "option width: overlap_dp has no options"),
+        ({"formulation": "beam", "horizon": 3}, ProblemError, "option horizon: beam has width"),
+        ({"engine": "x"}, seqopt.SeqoptError, "known are auto"),
+    ],
+)
+def test_a_wrong_word_gets_the_words_there_are(arch25, wrong, error, message):
+    with pytest.raises(error, match=message):
+        seqopt.optimize(**({"scene": arch25} | wrong))
+
+
+def test_a_problem_is_the_same_after_pickling(engine25):
+    problem = seqopt.pose(engine25, seqopt.three_robot_loop(engine25.network), WORST)
+    costs = pickle.loads(pickle.dumps(problem.sums))
+    assert costs == problem.sums
+    assert hash(costs) == hash(problem.sums)
+    assert not costs.single[0].flags.writeable
+    assert isinstance(problem, Problem)

@@ -1,0 +1,165 @@
+"""Proofs are as strong as they promise: one that looks at less, or allows more, is noticed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from heapq import heappop, heappush
+from itertools import product
+
+import numpy as np
+import pytest
+
+import seqopt
+from seqopt.engines.interface import Want
+from seqopt.errors import SolverError
+from seqopt.graph import Explorer
+from seqopt.graph.layers.costs import Budget, LayeredCosts
+from seqopt.graph.layers.interface import Aim, CostProblem
+from seqopt.graph.layers.partial_costs import PartialCosts
+from seqopt.graph.orders.orders import OrderProblem
+from seqopt.graph.orders.visits import OrderStates
+from seqopt.graph.states.states import pose_free
+from seqopt.plan.calling.formulation import Selection
+from seqopt.plan.judge import budget_proof
+from seqopt.plan.judge.budget_proof import least_within
+from seqopt.plan.judge.certificate import TOLERANCE, certify_partial
+from seqopt.plan.judge.orders import finds_better_order
+from seqopt.plan.judge.proof import Proof
+from seqopt.plan.order_plan import solve_order
+from seqopt.plan.solving import solve
+from seqopt.problem.criteria import WorstRatio
+from seqopt.problem.requirements import Limit
+from seqopt.responses.quantities import CHOSEN_BY
+from seqopt.sequence.free_check import RuleBook
+from seqopt.sequence.free_rules import FreeRules
+from tests.builders import small_arch
+
+ONES = WorstRatio("ones", (("F_largest", 100.0), ("M_sup", 10.0)))
+
+
+def posed(aim, scene=None, limits=(), count=5):
+    engine = seqopt.make_engine("compliance", scene or small_arch(count))
+    return pose_free(engine, FreeRules(), ONES, aim, limits)
+
+
+def states_below(problem, bound, join):
+    """How many states plans may pass whose values, joined, are within a bound: in plain words."""
+    book, engine = RuleBook(problem.network, problem.rules), problem.engine
+    work = [(0.0, 0, 0, (None,) * len(problem.network.scene.robots))]
+    done, values, pushed = set(), {}, 0
+    while work:
+        taken, _, bricks, grips = heappop(work)
+        if (bricks, grips) in done:
+            continue
+        done.add((bricks, grips))
+        for _, after, held, _ in book.follow(bricks, grips, 0):
+            nodes = tuple(sorted(node for node in held if node is not None))
+            if (after, nodes) not in values:
+                asked = np.array([nodes], dtype=int).reshape(1, -1)
+                fields = engine.solve(after, asked, Want.ALL)
+                values[after, nodes] = float(CHOSEN_BY["M_sup"].of(engine.network, fields)[0])
+            total = join(taken, values[after, nodes])
+            if total <= bound:
+                pushed += 1
+                heappush(work, (total, pushed, after, held))
+    return len(done)
+
+
+@pytest.mark.parametrize(("aim", "join"), [("M_sup", max), ("sum(M_sup)", lambda a, b: a + b)])
+def test_the_proof_looks_at_every_state_that_a_better_plan_could_pass(aim, join):
+    problem = posed(aim, count=6)
+    best = solve(problem, "schedule_search", proof=False).selection.objective
+    proof = Proof(problem)
+    assert proof.bounds(best) == pytest.approx(best, rel=1e-12)
+    most = best[0] * (1 + 1e-9) if join is max else np.inf  # any state may be on a way to less
+    assert proof.states == states_below(problem, most, join)
+    assert proof.states > 200  # enough for one that stops early to look at less
+
+
+@pytest.mark.parametrize("aim", ["F_largest", "sum(M_sup)"])
+@pytest.mark.parametrize("by", ["payloads", "limits"])
+def test_the_proof_lets_robots_carry_all_they_may(aim, by):
+    """They may just carry what any plan needs: plans above the best one are found."""
+    scene = small_arch(5)
+    (least,) = solve(posed("F_largest"), "schedule_search", proof=False).selection.objective
+    limits = [Limit(f"F_{robot.name}", least) for robot in scene.robots] if by == "limits" else ()
+    if by == "payloads":
+        robots = tuple(replace(robot, payload=least) for robot in scene.robots)
+        scene = replace(scene, robots=robots)
+    problem = posed(aim, scene, limits)
+    (best,) = solve(problem, "schedule_search").selection.objective
+    assert Proof(problem).bounds((best * (1 + 1e-6),)) == pytest.approx((best,), rel=1e-9)
+
+
+def signed_problem(rng, moves=3, size=5):
+    """A problem with two budgets, amounts and costs of both signs, and what choices cost."""
+
+    def parts():
+        pairs = [(1, size), *[(size, size)] * (moves - 1)]
+        return tuple(rng.normal(size=size) for _ in pairs), tuple(rng.normal(size=p) for p in pairs)
+
+    budgets = tuple(Budget(name, *parts(), float(rng.uniform(-4, 2))) for name in ("one", "two"))
+    problem = CostProblem(LayeredCosts(*parts()), budgets)
+    found = [
+        problem.sums.cost(choice)
+        for choice in product(range(size), repeat=moves)
+        if all(budget.spent(choice) <= budget.bound for budget in budgets)
+    ]
+    return problem, sorted(found)
+
+
+@pytest.mark.parametrize("most", [1, 3])
+@pytest.mark.parametrize("climbs", [1, 80])
+def test_what_is_set_aside_counts_and_prices_are_not_negative(monkeypatch, most, climbs):
+    """Few partial choices are kept, prices of any sign are claimed: no choice is below a bound."""
+    monkeypatch.setattr(budget_proof, "MOST", most)
+    monkeypatch.setattr(budget_proof, "CLIMBS", climbs)
+    rng = np.random.default_rng(4)
+    proven = 0
+    for _ in range(10):
+        problem, found = signed_problem(rng)
+        for price, value in product((-3.0, 0.0, 5.0), found[:3]):
+            claimed = {"one": price, "two": -price}
+            bound = least_within(problem, value, claimed, max(abs(value), 1.0))
+            assert bound <= found[0] + 1e-6
+            proven += bound > found[0] - 0.5
+    assert proven
+
+
+ROW = np.array([3.0, np.nan])
+
+
+@pytest.mark.parametrize(("aim", "best", "bound"), [(Aim.SUM, 6.0, 4.0), (Aim.PEAK, 3.0, 2.0)])
+def test_what_some_pairs_prove_is_all_that_may_be_claimed(aim, best, bound):
+    """The first move costs 2, the second 1 or 1.5, a pair that is known 3, others at least 1."""
+    part = PartialCosts((np.full(2, 2.0), np.array([1.0, 1.5])), ({}, {0: ROW, 1: ROW}), 1.0, aim)
+    part = part if aim is Aim.PEAK else replace(part, rows=({}, {0: ROW}))
+    assert (part.best, part.bound) == (best, bound)
+    claimed = Selection((0, 0), best, bound=bound, end="stopped")
+    proof = certify_partial(part, claimed, best)
+    assert (proof.bound, proof.gap) == (bound, (best - bound) / best)
+    certify_partial(part, replace(claimed, bound=bound + 0.9 * TOLERANCE * best), best)
+    for more in (1.1 * TOLERANCE * best, 0.1 * bound, bound, np.inf):
+        with pytest.raises(SolverError, match="claimed bound"):
+            certify_partial(part, replace(claimed, bound=bound + more), best)
+
+
+def test_what_was_left_out_for_a_threshold_bounds_all_orders():
+    """Whatever the threshold; and with few sets looked at nothing is proven."""
+    problem = OrderProblem(posed("F_largest", count=4))
+    best = solve_order(problem).selection.objective
+    for share in (0.0, 1e-3, 0.5, 0.99):
+        found = Explorer(OrderStates(problem, 5000))
+        assert not found.rise(share * best)
+        assert share * best < found.excluded <= best * (1 + 1e-6)
+    assert finds_better_order(problem, best) is False
+    assert finds_better_order(problem, best * 1.01)
+    assert finds_better_order(problem, best, most=3) is None
+
+
+def test_a_plan_with_more_regrips_is_found_within_the_same_peak():
+    """A peak is the largest of all steps, however many there are of them."""
+    problem = posed("minmax,regrips")
+    peak, regrips = solve(problem, "schedule_search", proof=False).selection.objective
+    assert Proof(problem).bounds((peak, regrips)) == pytest.approx((peak, regrips))
+    assert Proof(problem).bounds((peak, regrips + 1)) == pytest.approx((peak, regrips))

@@ -1,0 +1,351 @@
+"""Plans for many scenarios: right against brute force and programs, and refused where they lie."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from itertools import pairwise, product
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import seqopt
+from formulations.scenarios.scenario_program import solve_program
+from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.errors import InfeasibleError, ProblemError, SolverError
+from seqopt.graph.layers.budgets import travel
+from seqopt.graph.layers.costs import LayeredCosts
+from seqopt.graph.layers.interface import Aim
+from seqopt.graph.scenarios.aims import (
+    WORST_PEAK,
+    WORST_TOTAL,
+    RobustAim,
+    cvar,
+    parse_robust,
+)
+from seqopt.graph.scenarios.arcs import scenario_arcs
+from seqopt.graph.scenarios.costs import ScenarioCosts
+from seqopt.graph.scenarios.scenarios import RobustProblem, largest_of, robust
+from seqopt.plan import robust_plan
+from seqopt.plan.calling.watch import Watch
+from seqopt.plan.out_of_sample import judge_unseen
+from seqopt.plan.robust_plan import solve_robust
+from seqopt.plan.search.scenario_search import Searched, close_gap
+from seqopt.plan.search.scenario_weights import best_weights
+from seqopt.responses.resources import Resources
+from seqopt.scene.scenarios import scenarios
+from tests.builders import six_bricks, small_arch
+
+AIMS = (WORST_PEAK, WORST_TOTAL, cvar(0.0), cvar(0.5), cvar(0.7), cvar(0.99))
+every = pytest.mark.parametrize("aim", AIMS, ids=str)
+
+
+@st.composite
+def many(draw, most_moves=4, most_candidates=4):
+    """Costs of the same few moves in several scenarios, with ties and what is not allowed."""
+    sizes = draw(st.lists(st.integers(1, most_candidates), min_size=1, max_size=most_moves))
+    rng = np.random.default_rng(draw(st.integers(0, 2**32)))
+    whole = draw(st.booleans())
+
+    def array(*shape):
+        costs = rng.integers(-2, 6, shape).astype(float) if whole else rng.normal(3.0, 2.0, shape)
+        return np.where(rng.uniform(size=shape) < 0.04, np.inf, costs)
+
+    def layers():
+        single = tuple(array(size) for size in sizes)
+        return LayeredCosts(
+            single, tuple(array(a, b) for a, b in zip([1, *sizes[:-1]], sizes, strict=True))
+        )
+
+    return tuple(layers() for _ in range(draw(st.integers(1, 6))))
+
+
+class Posed:
+    """A problem over scenarios that is given by its costs alone."""
+
+    def __init__(self, layers, aim):
+        self.layers, self.aim, self.seconds, self.costs = layers, aim, {}, layers
+        self.from_cache = ()  # nothing that a cache said
+
+    def layered(self, aim):
+        return self.layers
+
+    def steps(self, choice):
+        return ()
+
+
+def values(layers, aim):
+    """What every choice that is allowed in all scenarios is worth."""
+    found = {}
+    for choice in product(*(range(size) for size in layers[0].sizes)):
+        each = [aim.aim.worth(costs, choice) for costs in layers]
+        if np.isfinite(each).all():
+            found[choice] = tail(each, aim)
+    return found
+
+
+def tail(each, aim):
+    """The mean of the worst, written down anew: by the least over thresholds."""
+    if str(aim).startswith("worst"):
+        return max(each)
+    rest = (1 - aim.level) * len(each)
+    return min(t + sum(max(x - t, 0.0) for x in each) / rest for t in each)
+
+
+@every
+@given(layers=many())
+@settings(max_examples=30)
+def test_plans_agree_with_brute_force(aim, layers):
+    found = values(layers, aim)
+    if not found:
+        with pytest.raises(InfeasibleError, match=f"over all {len(layers)} scenarios, move"):
+            solve_robust(Posed(layers, aim))
+        return
+    plan = solve_robust(Posed(layers, aim))
+    best = min(found.values())
+    assert plan.objective == pytest.approx(best, abs=1e-6)
+    assert found[plan.choice] == pytest.approx(plan.objective, abs=1e-9)
+    assert plan.proven <= plan.bound + 1e-9 <= best + 2e-9
+    assert plan.status == "optimal"
+
+
+@pytest.mark.parametrize("aim", AIMS[1:], ids=str)
+@given(layers=many())
+@settings(max_examples=10)
+def test_plans_agree_with_the_program(aim, layers):
+    if not values(layers, aim):
+        return
+    plan = solve_robust(Posed(layers, aim))
+    most = aim.most(len(layers))
+    assert solve_program(layers, most, whole=True).value == pytest.approx(plan.objective, abs=1e-5)
+    relaxed = solve_program(layers, most, whole=False).value
+    assert relaxed == pytest.approx(plan.proven, abs=1e-4 * max(1.0, abs(relaxed)))
+
+
+@pytest.mark.parametrize("aim", AIMS[1:], ids=str)
+@given(layers=many(), width=st.integers(1, 3))
+@settings(max_examples=25)
+def test_a_narrow_search_still_has_a_valid_bound(aim, layers, width):
+    found = values(layers, aim)
+    if found:
+        plan = solve_robust(Posed(layers, aim), width=width)
+        assert plan.bound <= min(found.values()) + 1e-9
+        assert plan.objective >= min(found.values()) - 1e-9
+
+
+@every
+@given(layers=many())
+@settings(max_examples=15)
+def test_a_plan_that_has_no_time_is_feasible_and_its_bound_valid(aim, layers):
+    found = values(layers, aim)
+    if found:
+        plan = solve_robust(Posed(layers, aim), time_limit=0.0)
+        assert plan.choice in found
+        assert plan.bound <= min(found.values()) + 1e-9
+
+
+@given(layers=many())
+@settings(max_examples=15)
+def test_aims_are_ordered(layers):
+    """The mean is at most any mean of the worst, and these at most the worst."""
+    if values(layers, WORST_TOTAL):
+        worth = [solve_robust(Posed(layers, aim)).objective for aim in (*AIMS[2:], WORST_TOTAL)]
+        assert all(a <= b + 1e-7 for a, b in pairwise(worth))
+
+
+@given(
+    each=st.lists(st.floats(-100, 100), min_size=1, max_size=8),
+    level=st.floats(0, 0.99),
+)
+def test_a_tail_is_the_least_over_thresholds(each, level):
+    aim = cvar(level)
+    assert aim.value(np.array(each)) == pytest.approx(tail(each, aim), abs=1e-9)
+    assert aim.ordered_weights(len(each)).sum() == pytest.approx(1.0)
+
+
+def test_one_scenario_is_the_nominal_problem():
+    problem = posed()
+    alone = solve_robust(robust(problem, [problem.schedule.scene], WORST_TOTAL))
+    known = seqopt.solve(problem, "overlap_dp").certificate
+    assert alone.objective == pytest.approx(known.objective)
+    peak = solve_robust(robust(problem, [problem.schedule.scene], WORST_PEAK))
+    assert peak.objective == seqopt.solve(problem, "minimax").certificate.objective
+
+
+# negative controls: a wrong claim is seen
+
+
+def claimed(monkeypatch, found):
+    monkeypatch.setattr(robust_plan, "close_gap", lambda *_: found)
+
+
+LAYERS = tuple(
+    LayeredCosts((np.array(single),), (np.zeros((1, 2)),)) for single in ([3.0, 1.0], [0.0, 4.0])
+)
+
+
+@pytest.mark.parametrize(
+    ("found", "match"),
+    [
+        (Searched((0,), 2.5, 2.0), "objective is 3, not 2.5 as claimed"),
+        (Searched((1,), 4.0, 4.5), "bound is 4.5, above the objective 4"),
+    ],
+)
+def test_a_false_claim_is_refused(monkeypatch, found, match):
+    assert solve_robust(Posed(LAYERS, WORST_TOTAL)).objective == 3.0
+    claimed(monkeypatch, found)
+    with pytest.raises(SolverError, match=match):
+        solve_robust(Posed(LAYERS, WORST_TOTAL))
+
+
+def test_weights_that_do_not_fit_the_aim_prove_nothing(monkeypatch):
+    aim = cvar(0.0)
+    found = best_weights(scenario_arcs(LAYERS, aim), Watch())
+    unfit = replace(found, weights=np.array([1.0, 0.0]))
+    monkeypatch.setattr(robust_plan, "best_weights", lambda *_: unfit)
+    with pytest.raises(SolverError, match="do not fit the aim"):
+        solve_robust(Posed(LAYERS, aim))
+
+
+def test_the_gap_that_weights_leave_is_real_here():
+    """Half of either scenario proves 2; no choice is better than 3."""
+    arcs = scenario_arcs(LAYERS, WORST_TOTAL)
+    weighed = best_weights(arcs, Watch())
+    assert weighed.bound == pytest.approx(2.0)
+    searched = close_gap(arcs, weighed, Watch())
+    assert searched.bound == pytest.approx(3.0)
+
+
+# scenes
+
+
+def posed(limits=(), workers=1):
+    network = seqopt.build_network(six_bricks())
+    engine = seqopt.make_engine("compliance", network)
+    return seqopt.pose(
+        engine,
+        seqopt.three_robot_loop(network),
+        seqopt.CRITERIA["weighted-published"],
+        limits,
+        resources=Resources(workers),
+    )
+
+
+@every
+def test_a_plan_of_a_scene_is_judged_on_unseen_scenarios(aim):
+    problem = posed()
+    scene = problem.schedule.scene
+    plan = solve_robust(robust(problem, scenarios(scene, count=6, seed=1), aim))
+    trial = judge_unseen(plan, scenarios(scene, count=4, seed=2))
+    table = trial.table
+    assert table["set"].value_counts().to_dict() == {"nominal": 1, "optimized": 6, "unseen": 4}
+    column = "peak" if aim.aim is Aim.PEAK else "total"
+    for other in ("robust", "nominal"):  # nobody beats the plan that knows the scenario
+        assert (table[f"{other}_{column}"] >= table[f"knows_it_{column}"] - 1e-9).all()
+    summary = trial.summary()
+    assert summary["optimized"]["robust"] == pytest.approx(plan.objective)
+    assert summary["optimized"]["robust"] <= summary["optimized"]["nominal"] + 1e-9
+    assert summary["nominal"]["nominal"] == summary["nominal"]["knows_it"]
+    assert len(plan.table()) == len(plan.choice) == len(plan.nodes)
+    assert f"RobustPlan({aim}, 6 scenarios" in repr(plan)
+
+
+def test_costs_of_a_scenario_are_those_of_its_own_problem():
+    problem = posed()
+    found = robust(problem, scenarios(problem.schedule.scene, count=2, seed=3), WORST_PEAK)
+    for scene, costs in zip(found.scenes, found.costs, strict=True):
+        engine = ComplianceEngine(seqopt.build_network(scene))
+        own = seqopt.pose(engine, problem.schedule, problem.criterion)
+        assert own.sums == costs.sums
+        assert own.peaks == costs.peaks
+    assert found.costs[0] != found.costs[1]
+
+
+@pytest.mark.slow
+def test_workers_change_nothing():
+    scene = six_bricks()
+    drawn = scenarios(scene, count=3, seed=1)
+    one, two = (solve_robust(robust(posed(workers=n), drawn, WORST_TOTAL)) for n in (1, 2))
+    assert one.choice == two.choice
+    assert one.problem.costs[0].sums == two.problem.costs[0].sums
+
+
+def test_limits_hold_in_every_scenario():
+    problem = posed()
+    drawn = scenarios(problem.schedule.scene, count=5, seed=1)
+    free = solve_robust(robust(problem, drawn, WORST_TOTAL))
+    largest = max(largest_force(scene, free) for scene in drawn.scenes)
+    limited = posed([seqopt.Limit("F_largest", 0.9 * largest)])
+    kept = solve_robust(robust(limited, drawn, WORST_TOTAL))
+    assert kept.objective >= free.objective
+    assert all(largest_force(scene, kept) <= 0.9 * largest + 1e-6 for scene in drawn.scenes)
+    nothing = posed([seqopt.Limit("F_largest", 1.0)])
+    with pytest.raises(InfeasibleError):
+        solve_robust(robust(nothing, drawn, WORST_TOTAL))
+    trial = judge_unseen(kept, scenarios(problem.schedule.scene, count=8, seed=9, density=0.5))
+    assert not np.isnan(trial.table.drop(columns="set").to_numpy(float)).any()
+
+
+def largest_force(scene, plan):
+    """The largest force of a grip in the steps whose grips were chosen."""
+    table = seqopt.analyze(ComplianceEngine(seqopt.build_network(scene)), plan.steps)
+    chosen = {step.number for step in plan.problem.nominal.schedule.steps if step.moves}
+    rows = table[table["step"].isin(chosen)]
+    return rows[["F_rob1_N", "F_rob2_N", "F_rob3_N"]].abs().max().max()
+
+
+def test_peaks_of_scenarios_join_into_one():
+    problem = posed()
+    found = robust(problem, scenarios(problem.schedule.scene, count=3), WORST_PEAK)
+    layers = found.layered(Aim.PEAK)
+    joined = largest_of(layers)
+    choice = seqopt.solve(problem, "overlap_dp").selection.choice
+    assert joined.worst(choice) == max(costs.worst(choice) for costs in layers)
+    assert isinstance(found, RobustProblem)
+    assert isinstance(found.costs[0], ScenarioCosts)
+
+
+# bad input
+
+
+@pytest.mark.parametrize(
+    ("text", "aim"),
+    [("worst-peak", WORST_PEAK), ("worst-total", WORST_TOTAL), ("cvar=0.9", cvar(0.9))],
+)
+def test_aims_in_words(text, aim):
+    assert parse_robust(text) == aim
+    assert str(aim) == text
+
+
+@pytest.mark.parametrize("text", ["", "worst", "cvar", "cvar=", "cvar=x", "cvar=1", "cvar=-0.1"])
+def test_words_that_are_no_aim(text):
+    with pytest.raises(ProblemError, match="give"):
+        parse_robust(text)
+
+
+def test_what_is_no_problem_is_refused():
+    problem = posed()
+    scene = problem.schedule.scene
+    drawn = scenarios(scene, count=1)
+    with pytest.raises(ProblemError, match="no scenario"):
+        robust(problem, [], WORST_PEAK)
+    with pytest.raises(ProblemError, match="give a problem of"):
+        robust(problem, drawn, None)
+    assert robust(problem, drawn, "worst-peak") == robust(problem, drawn, WORST_PEAK)
+    with pytest.raises(ProblemError, match="robust aim worst does not exist"):
+        robust(problem, drawn, "worst")
+    with pytest.raises(ProblemError, match="is not a scene"):
+        robust(problem, [scene, None], WORST_PEAK)
+    with pytest.raises(ProblemError, match="scenario 1: it has other bricks"):
+        robust(problem, [small_arch(4)], WORST_PEAK)
+    engine = ComplianceEngine(problem.engine.network)
+    own = seqopt.pose(engine, problem.schedule, problem.criterion)
+    with pytest.raises(ProblemError, match="scenarios need engines of their own"):
+        robust(own, drawn, WORST_PEAK)
+    capped = replace(problem, budgets=(travel(problem, math.inf),))
+    with pytest.raises(ProblemError, match="take no budgets"):
+        robust(capped, drawn, WORST_PEAK)
+    with pytest.raises(ProblemError, match="is not a kind"):
+        RobustAim("worst-peak")

@@ -1,0 +1,229 @@
+"""Criteria people bring: functions of responses, aims in their order, quantiles over steps."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import seqopt
+from seqopt.errors import InfeasibleError, ProblemError
+from seqopt.graph.layers.budgets import travel
+from seqopt.graph.layers.interface import Aim, CostProblem
+from seqopt.graph.layers.layers import pose
+from seqopt.graph.states.states import pose_free
+from seqopt.plan.judge.proof import Proof
+from seqopt.plan.search.in_order import solve_in_order
+from seqopt.plan.search.step_quantile import least_quantile
+from seqopt.problem.criteria import WeightedSum
+from seqopt.problem.own_criterion import StepCost
+from seqopt.sequence.free_rules import FreeRules
+from tests.builders import six_bricks, small_arch
+from tests.strategies import problems
+
+NAMES = ("F_largest", "M_sup")
+
+
+def weighed(responses, bricks):
+    return responses["F_largest"] / 100.0 + 2.0 * responses["M_sup"] / 10.0
+
+
+def posed(criterion, scene=None):
+    network = seqopt.build_network(six_bricks() if scene is None else scene)
+    engine = seqopt.make_engine("compliance", network)
+    return pose(engine, seqopt.three_robot_loop(network), criterion)
+
+
+def test_a_function_costs_what_the_same_ready_made_criterion_does():
+    same = WeightedSum("same", (("F_largest", 1.0, 100.0), ("M_sup", 2.0, 10.0)))
+    ours, theirs = posed(StepCost("own", NAMES, weighed)), posed(same)
+    for a, b in zip(
+        (*ours.sums.single, *ours.sums.shared),
+        (*theirs.sums.single, *theirs.sums.shared),
+        strict=True,
+    ):
+        assert a == pytest.approx(b)
+    assert seqopt.solve(ours, "overlap_dp").certificate.objective == pytest.approx(
+        seqopt.solve(theirs, "overlap_mip").certificate.objective
+    )
+
+
+def test_forces_of_all_robots_are_spelled_out_and_zero_without_a_grip():
+    seen = {}
+
+    def spread(responses, bricks):
+        forces = np.stack([responses[name] for name in sorted(responses)])
+        seen.setdefault(tuple(sorted(responses)), []).append(forces)
+        return forces.max(axis=0) - forces.min(axis=0)
+
+    problem = posed(StepCost("spread", ("F_each",), spread))
+    plan = seqopt.solve(problem, "overlap_dp")
+    assert [*seen] == [("F_rob1", "F_rob2", "F_rob3")]
+    assert any(
+        (forces == 0).all(axis=tuple(range(1, forces.ndim))).any() for forces in seen.popitem()[1]
+    )
+    assert plan.summary()["responses"] == ["F_rob1", "F_rob2", "F_rob3"]
+    assert plan.summary()["function"].endswith("spread")
+
+
+def test_what_it_does_not_allow_is_not_chosen():
+    def strict(responses, bricks):
+        return np.where(responses["F_largest"] > 150.0, np.inf, responses["M_sup"])
+
+    with pytest.raises(InfeasibleError):
+        seqopt.solve(
+            posed(StepCost("none", ("F_largest",), lambda r, b: np.inf * r["F_largest"])),
+            "overlap_dp",
+        )
+    free = seqopt.solve(posed(StepCost("free", NAMES, lambda r, b: r["M_sup"])), "overlap_dp")
+    bound = seqopt.solve(posed(StepCost("strict", NAMES, strict)), "overlap_dp")
+    assert bound.certificate.objective >= free.certificate.objective
+
+
+@pytest.mark.parametrize(
+    ("function", "said"),
+    [
+        (lambda r, b: r["T_max"], "its function failed: KeyError"),
+        (lambda r, b: 1.0, r"returned shape \(\)"),
+        (lambda r, b: r["M_sup"].ravel()[:1], "returned shape"),
+        (lambda r, b: np.full_like(r["M_sup"], np.nan), "returned nan for a possible choice"),
+        (lambda r, b: np.full_like(r["M_sup"], -np.inf), "returned -inf for a possible choice"),
+        (lambda r, b: "much", "its function failed: ValueError"),
+    ],
+)
+def test_a_function_that_is_wrong_gets_one_line(function, said):
+    with pytest.raises(ProblemError, match=said) as caught:
+        seqopt.solve(posed(StepCost("wrong", NAMES, function)), "overlap_dp")
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("aim", ["minmax", "sum", "minmax,steps"])
+def test_a_cost_below_zero_is_refused_where_steps_can_be_added(aim):
+    """A sum would fall without end; where moves are given any sign is allowed."""
+    criterion = StepCost("gain", ("F_largest",), lambda r, bricks: r["F_largest"] - 60.0)
+    engine = seqopt.make_engine("compliance", small_arch(4))
+    free = pose_free(engine, FreeRules(), criterion, aim)
+    with pytest.raises(ProblemError, match=r"gain: a step costs -\d.* at \d bricks; .* constant"):
+        seqopt.solve(free, "schedule_search")
+    with pytest.raises(ProblemError, match="gain: a step costs -"):
+        Proof(free).bounds((0.0,) * len(free.goals))
+    assert seqopt.solve(posed(criterion), "overlap_dp").certificate.gap == 0
+
+
+def test_what_is_no_function_is_refused():
+    with pytest.raises(ProblemError, match="give names of responses"):
+        StepCost("wrong", NAMES, 3.0)
+    with pytest.raises(ProblemError, match="give names of responses"):
+        StepCost("wrong", "T_max", weighed)
+    with pytest.raises(ProblemError, match="response X_max does not exist"):
+        posed(StepCost("wrong", ("X_max",), weighed))
+
+
+# aims in their order
+
+
+def values(goals):
+    """What every allowed choice is worth, in the order of the aims."""
+    found = {}
+    for choice in product(*(range(size) for size in goals[0][0].sums.sizes)):
+        worth = tuple(aim.worth(problem.sums, choice) for problem, aim in goals)
+        if np.isfinite(worth).all():
+            found[choice] = worth
+    return found
+
+
+@given(problem=problems(), data=st.data())
+@settings(max_examples=60)
+def test_aims_in_their_order_agree_with_brute_force(problem, data):
+    goals = [(problem, data.draw(st.sampled_from(Aim)))]
+    rng = np.random.default_rng(data.draw(st.integers(0, 2**32)))
+    for _ in range(data.draw(st.integers(0, 2))):
+        costs = replace(
+            problem.sums,
+            single=tuple(rng.integers(0, 3, s.shape) + 0.0 for s in problem.sums.single),
+            shared=tuple(rng.integers(0, 3, s.shape) + 0.0 for s in problem.sums.shared),
+        )
+        goals.append((CostProblem(costs), data.draw(st.sampled_from(Aim))))
+    found = values(goals)
+    if not found:
+        with pytest.raises(InfeasibleError, match="move"):
+            solve_in_order(goals)
+        return
+    best = solve_in_order(goals)
+    assert best.values == min(found.values())
+    assert found[best.choice] == best.values
+
+
+def test_the_order_matters():
+    one = posed(seqopt.CRITERIA["worst-ratio-published"])
+    two = posed(seqopt.CRITERIA["weighted-published"])
+    first = solve_in_order([(one, Aim.PEAK), (two, Aim.SUM)])
+    second = solve_in_order([(two, Aim.SUM), (one, Aim.PEAK)])
+    assert first.values[0] == seqopt.solve(one, "minimax").certificate.objective
+    assert second.values[0] == pytest.approx(seqopt.solve(two, "overlap_dp").certificate.objective)
+    assert first.values[1] >= second.values[0] - 1e-9
+    assert second.values[1] >= first.values[0]
+
+
+def test_what_does_not_go_together_is_refused():
+    one, other = (
+        posed(seqopt.CRITERIA["weighted"]),
+        posed(seqopt.CRITERIA["weighted"], small_arch(4)),
+    )
+    with pytest.raises(ProblemError, match="there is no aim"):
+        solve_in_order([])
+    with pytest.raises(ProblemError, match="pose them with one schedule"):
+        solve_in_order([(one, Aim.SUM), (other, Aim.SUM)])
+    capped = replace(one, budgets=(travel(one, 1.0),))
+    with pytest.raises(ProblemError, match="take no budgets"):
+        solve_in_order([(capped, Aim.SUM)])
+    with pytest.raises(ProblemError, match="take no budgets"):
+        least_quantile(capped)
+
+
+# quantiles over steps
+
+
+def step_costs(problem, choice):
+    """The costs of the open steps of a choice, one by one."""
+    out = []
+    for choices in problem.evaluation.steps:
+        costs = problem.step_costs(choices)
+        out.append(float(costs[tuple(choice[m] for m in choices.moves)]))
+    return np.sort(out)[::-1]
+
+
+@pytest.mark.parametrize("share", [0.0, 0.1, 0.3, 0.6])
+def test_quantiles_agree_with_brute_force(share):
+    problem = posed(seqopt.CRITERIA["worst-ratio-published"], small_arch(6))
+    found = least_quantile(problem, share)
+    most = int(share * found.steps + 1e-9)
+    every = (
+        step_costs(problem, choice)
+        for choice in product(*(range(size) for size in problem.sums.sizes))
+        if np.isfinite(problem.sums.cost(choice))
+    )
+    assert found.level == min(costs[most] for costs in every)
+    own = step_costs(problem, found.choice)
+    assert (own > found.level).sum() == found.above <= most
+    assert len(own) == found.steps
+
+
+def test_no_step_above_is_the_least_peak():
+    problem = posed(seqopt.CRITERIA["worst-ratio-published"])
+    assert (
+        least_quantile(problem, 0.0).level == seqopt.solve(problem, "minimax").certificate.objective
+    )
+    levels = [least_quantile(problem, share).level for share in (0.0, 0.1, 0.2, 0.5)]
+    assert levels == sorted(levels, reverse=True)
+    assert levels[-1] < levels[0]
+
+
+@pytest.mark.parametrize("share", [-0.1, 1.0, "half", True])
+def test_shares_that_are_none(share):
+    with pytest.raises(ProblemError, match="share is"):
+        least_quantile(posed(seqopt.CRITERIA["weighted"]), share)

@@ -1,0 +1,203 @@
+"""What criteria take from a scene: crown, units, scales; and that none of it is one arch's."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import seqopt
+from experiments.harness.scenes import running_bond
+from seqopt.cli.main import main
+from seqopt.contact.mortar import bond_mortar
+from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.errors import MechanismError, ProblemError, StepError
+from seqopt.network.build import build_network
+from seqopt.problem.criteria import OVER_METHODS, RankSum, WeightedSum
+from seqopt.problem.scales import NEVER, ROUNDED, SceneFacts, crown, own_scales
+from seqopt.problem.terms import equal
+from seqopt.scene.arch import ArchShape, arch_scene
+from seqopt.scene.parts import Sphere
+from seqopt.sequence.free_rules import FreeRules
+from seqopt.sequence.two_robots import METHODS
+from seqopt.study.presets import CLOSEST, EQUATIONS, RESOLUTION
+from tests.builders import anywhere, far_reaching, rescaled, small_arch
+from tests.strategies import arches
+
+
+def facts_of(scene):
+    return SceneFacts(ComplianceEngine(build_network(scene)))
+
+
+def test_the_crown_of_the_reference_arch_and_of_others(arch25):
+    assert crown(arch25) == 13
+    assert crown(small_arch(15)) == 8
+    assert crown(small_arch(50)) == 26  # of two that are nearly as high
+    line = ArchShape(pitch=np.linspace(1.3, -1.3, 50).tolist(), pattern="V")
+    assert crown(arch_scene(line)) == 25  # two bricks are equally high: the first
+    assert crown(running_bond(6, 4)) == NEVER
+    upward = replace(small_arch(15), build_order=tuple(range(1, 9)) + tuple(range(15, 8, -1)))
+    assert crown(upward) == 8
+
+
+def test_a_build_from_both_ends_has_no_crown():
+    order = [b for pair in zip(range(1, 8), range(15, 8, -1), strict=True) for b in pair] + [8]
+    assert crown(replace(small_arch(15), build_order=tuple(order))) == NEVER
+
+
+def test_gravity_says_what_is_high(arch25):
+    assert crown(replace(arch25, gravity=(0.0, 0.0, 9.81))) == NEVER
+
+
+def test_rounding_is_the_papers_on_its_arch(arch25):
+    criterion = EQUATIONS.for_scene(facts_of(arch25))
+    assert criterion.crown == 13
+    assert [name for name, _ in criterion.resolution] == [name for name, _ in RESOLUTION]
+    for (_, own), (_, paper) in zip(criterion.resolution, RESOLUTION, strict=True):
+        assert own == pytest.approx(paper, rel=1e-12)
+    assert CLOSEST.for_scene(facts_of(arch25)).crown == 14
+
+
+def test_the_user_sets_the_crown_and_the_rounding(arch25):
+    own = replace(EQUATIONS, crown=5, resolution=RESOLUTION)
+    assert own.for_scene(facts_of(arch25)) == replace(
+        own, before=equal("T_max", "M_sup", "F_rob1", "F_rob2", "F_rob3")
+    )
+    plan = seqopt.optimize(arch25, criterion=own)
+    assert plan.summary()["crown"] == 5
+    assert plan.nodes != seqopt.optimize(arch25).nodes
+
+
+def test_the_summary_says_which_crown_was_used(arch25):
+    assert seqopt.optimize(arch25).summary()["crown"] == 13
+    wall = running_bond(4, 3)
+    assert seqopt.optimize(wall, engine="compliance").summary()["crown"] is None
+
+
+def test_scales_are_those_of_the_scenes_own_methods(arch25):
+    facts = facts_of(arch25)
+    tables = [seqopt.analyze(facts.engine, m(facts.engine.network)) for m in (
+        seqopt.sequential, seqopt.cantilever)]  # fmt: skip
+    for name, column, size in (("M_sup", "M_sup_Nm", 1.0), ("D_max", "D_max_1e-3mm", 1e6)):
+        assert facts.reference[name] == min(t[column].max() for t in tables) / size
+    heavy = facts_of(
+        replace(arch25, bricks=tuple(replace(b, density=4840.0) for b in arch25.bricks))
+    )
+    for name, value in facts.reference.items():
+        assert heavy.reference[name] == pytest.approx(2 * value)
+
+
+@pytest.mark.slow
+def test_a_method_that_falls_on_its_way_gives_no_scales():
+    network = build_network(small_arch(9))
+    for strength, falls in ((1.5e5, {"cantilever"}), (3e4, {*METHODS})):
+        engine = seqopt.make_engine("auto", network, bond_mortar(strength))
+        stand = {}
+        for name, method in METHODS.items():
+            with suppress(MechanismError):
+                stand[name] = seqopt.analyze(engine, method(network))
+        assert METHODS.keys() - stand.keys() == falls
+        facts = SceneFacts(engine)
+        if stand:
+            (table,) = stand.values()
+            assert facts.reference["M_sup"] == table["M_sup_Nm"].max()
+        else:
+            assert facts.reference == own_scales(network)
+            assert facts.basis == " over payload, weight and size"
+
+
+def one_places(count):
+    """An arch that no fixed method builds: only one robot reaches its other end."""
+    scene = small_arch(count)
+    near = Sphere(center=scene.placed[0].position, radius=0.15)
+    first, second = anywhere(2)
+    return replace(scene, robots=(first, replace(second, reach=near)))
+
+
+ALONE = FreeRules(newest="free", least_grips=1)
+
+
+@pytest.mark.parametrize("criterion", ["worst-ratio", "weighted"])
+def test_a_scene_that_no_fixed_method_builds_has_scales_of_its_own(criterion):
+    scene = one_places(6)
+    for method in METHODS.values():
+        with pytest.raises(StepError):
+            method(build_network(scene))
+    plan = seqopt.optimize(scene, "free", criterion, rules=ALONE)
+    assert plan.status == "optimal"
+    summary = plan.summary()
+    assert summary["criterion"] == f"{criterion} over payload, weight and size"
+    weight = float(np.linalg.norm(build_network(scene).weight.sum(axis=0)))
+    assert summary["scales"]["F_largest"] == min(robot.payload for robot in scene.robots)
+    assert summary["scales"]["T_max"] == pytest.approx(weight)
+    given = seqopt.optimize(scene, "free", "worst-ratio-published", rules=ALONE)
+    assert given.summary()["criterion"] == "worst-ratio-published"
+
+
+def test_the_command_line_says_so(capsys, tmp_path):
+    seqopt.save_scene(one_places(5), tmp_path / "s.json")
+    words = ["--schedule", "free", "--rule", "newest=free", "--rule", "least_grips=1"]
+    assert main(["optimize", str(tmp_path / "s.json"), *words]) == 0
+    said = capsys.readouterr().err
+    assert "criterion: worst-ratio over payload, weight and size: no fixed method builds" in said
+
+
+def test_scales_of_a_scene_go_with_its_units():
+    """Powers of two: the same digits in other units of length, force and stiffness."""
+    scene = one_places(5)
+    length, force, softness = 2.0, 8.0, 4.0
+    own, other = (
+        own_scales(build_network(s)) for s in (scene, rescaled(scene, length, force, softness))
+    )
+    ratio = {name: other[name] / own[name] for name in ("F_largest", "T_max", "M_sup")}
+    assert ratio == {"F_largest": force, "T_max": force, "M_sup": force * length}
+    assert all(value > 0 for value in own.values())
+
+
+def test_a_response_without_a_scale_is_named(arch25):
+    lacking = WeightedSum("own", (("F_move", 1.0, None),))
+    with pytest.raises(ProblemError, match="F_move has no scale of its own; give one"):
+        lacking.for_scene(facts_of(arch25))
+
+
+def test_a_criterion_that_is_not_posed_says_so():
+    for criterion in (EQUATIONS, OVER_METHODS, RankSum("own", equal("T_max"), equal("M_sup"))):
+        with pytest.raises(ProblemError, match=r"not posed for a scene; use seqopt\.pose"):
+            criterion.costs({name: np.ones(3) for name in ("T_max", "F_largest")}, 3, 3)
+
+
+@pytest.mark.parametrize("name", ["equations-2-3", "closest-to-plan", "weighted", "worst-ratio"])
+@given(
+    scene=arches(min_bricks=4, max_bricks=7).map(far_reaching),
+    power=st.tuples(*[st.integers(-8, 8)] * 3),
+)
+@settings(max_examples=6)
+def test_units_change_no_choice(name, scene, power):
+    """Powers of two: the same digits in other units of length, force and stiffness."""
+    other = rescaled(scene, *(2.0**p for p in power))
+    a, b = (seqopt.optimize(s, criterion=name, engine="compliance") for s in (scene, other))
+    assert a.nodes == b.nodes
+    assert b.certificate.objective == pytest.approx(a.certificate.objective, rel=1e-9)
+
+
+@pytest.mark.parametrize("density", [0.1, 10.0])
+@pytest.mark.parametrize("scene", ["arch25", "wall"])
+def test_the_density_of_all_bricks_changes_no_choice(arch25, scene, density):
+    scene = arch25 if scene == "arch25" else running_bond(5, 4)
+    bricks = tuple(replace(b, density=density * b.density) for b in scene.bricks)
+    other = replace(scene, bricks=bricks)
+    plans = [seqopt.optimize(s, engine="compliance") for s in (scene, other)]
+    assert plans[0].nodes == plans[1].nodes
+
+
+def test_a_rounding_in_newtons_knows_the_density(arch25):
+    """The control: what was wrong before."""
+    absolute = replace(EQUATIONS, resolution=RESOLUTION)
+    light = replace(arch25, bricks=tuple(replace(b, density=242.0) for b in arch25.bricks))
+    plans = [seqopt.optimize(s, criterion=absolute).nodes for s in (arch25, light)]
+    assert plans[0] != plans[1]
+    assert len(ROUNDED) == len(RESOLUTION)
