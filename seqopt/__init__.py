@@ -28,15 +28,15 @@ if TYPE_CHECKING:
     from seqopt.engines.interface import Engine
     from seqopt.engines.registry import make_engine
     from seqopt.errors import SeqoptError
-    from seqopt.graph.layers.layers import pose
     from seqopt.graph.scenarios.scenarios import robust
-    from seqopt.graph.states.states import pose_free
+    from seqopt.graph.states.states import build_states
     from seqopt.network.build import build_network
     from seqopt.network.network import Network
     from seqopt.plan.calling.formulation import Formulation, formulations
     from seqopt.plan.given import GivenSequence
     from seqopt.plan.judge.certificate import Certificate
     from seqopt.plan.plan import Plan
+    from seqopt.plan.posing import pose
     from seqopt.plan.robust_plan import solve_robust
     from seqopt.plan.solving import solve
     from seqopt.problem.own_criterion import StepCost
@@ -65,7 +65,7 @@ _HOMES = {
     "errors": ("SeqoptError",),
     "graph.layers.layers": ("pose",),
     "graph.scenarios.scenarios": ("robust",),
-    "graph.states.states": ("pose_free",),
+    "graph.states.states": ("build_states",),
     "network.build": ("build_network",),
     "network.network": ("Network",),
     "plan.calling.formulation": ("Formulation", "formulations"),
@@ -123,7 +123,7 @@ __all__ = [  # noqa: RUF022  # in the order in which they are met
     "Formulation",
     "formulations",
     "FreeRules",
-    "pose_free",
+    "build_states",
     "solve",
     "optimize",
     "scenarios",

@@ -12,8 +12,8 @@ from seqopt.contact.mortar import Mortar
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import USUAL, make_engine
 from seqopt.errors import ProblemError
-from seqopt.graph.layers.layers import Problem, pose
-from seqopt.graph.states.states import FreeProblem, pose_free, within
+from seqopt.graph.layers.layers import Layers, candidate_layers
+from seqopt.graph.states.states import States, build_states, within
 from seqopt.network.build import build_network
 from seqopt.plan.free_plan import FreePlan
 from seqopt.plan.plan import Plan
@@ -123,7 +123,7 @@ def optimize(
         Bounds that no step may exceed, whether or not a grip is open in it.
     **options
         Of `seqopt.solve`, the formulation, `seqopt.responses.Resources`, if free of `FreeRules`;
-        ``aim`` and ``stands`` of `pose_free` with every schedule; ``order``, ``mortar``,
+        ``aim`` and ``stands`` of `build_states` with every schedule; ``order``, ``mortar``,
         ``robots``; ``budgets``, ``candidates`` in words.
 
     Returns
@@ -158,7 +158,7 @@ def _pose(
     asked: tuple[Criterion | str | None, str],
     limits: Sequence[Limit],
     options: dict[str, Any],
-) -> tuple[Problem | FreeProblem, float]:
+) -> tuple[Layers | States, float]:
     """Return the problem, and the seconds to it; what options say of it is taken out of them."""
     start = time.perf_counter()
     found = load_scene(scene) if isinstance(scene, str | Path) else scene
@@ -169,7 +169,7 @@ def _pose(
     if not free:
         _refuse(options, FREE_WORDS, f"only the free schedule has it; give schedule={FREE!r}")
     engine = make_engine(asked[1], build_network(made), options.pop("mortar", None))
-    problem: Problem | FreeProblem
+    problem: Layers | States
     if states:
         rules = _free_rules(options) if free else _open(engine, schedule, options)
         words = {name: options.pop(name, None) for name in STATE_WORDS}
@@ -190,7 +190,7 @@ def posed(
     limits: Sequence[Limit] = (),
     budgets: Sequence[str] = (),
     resources: Resources = HERE,
-) -> Problem:
+) -> Layers:
     """Return the problem of a schedule with open grips, by what people say of it.
 
     ``engine``: what computes responses; it has the scene. ``schedule``: with the grips that are
@@ -201,7 +201,9 @@ def posed(
     asked = parse_budgets(budgets)
     chosen = find_criterion(criterion or DEFAULTS["any other"].criterion)
     counted = [budget.response for budget in asked if budget.response]
-    return with_budgets(pose(engine, schedule, chosen, limits, counted, resources), asked)
+    return with_budgets(
+        candidate_layers(engine, schedule, chosen, limits, counted, resources), asked
+    )
 
 
 def posed_free(
@@ -212,7 +214,7 @@ def posed_free(
     rules: FreeRules | Schedule | None = None,
     limits: Sequence[Limit] = (),
     stands: Standing | Mortar | str | None = None,
-) -> FreeProblem:
+) -> States:
     """Return the problem of a free schedule, or of states of another, by what people say of it.
 
     ``engine``: what computes responses; it has the scene. ``criterion``: as of `optimize`. ``aim``:
@@ -220,7 +222,7 @@ def posed_free(
     """
     usual = DEFAULTS[FREE]
     chosen = find_criterion(criterion or usual.criterion)
-    return pose_free(engine, rules or FreeRules(), chosen, aim or usual.aim, limits, stands)
+    return build_states(engine, rules or FreeRules(), chosen, aim or usual.aim, limits, stands)
 
 
 def _open(

@@ -12,7 +12,7 @@ from seqopt.arrays import _LONGEST, Terse
 from seqopt.engines.registry import ENGINES
 from seqopt.errors import SceneError
 from seqopt.graph.layers.budgets import travel
-from seqopt.graph.orders.orders import OrderProblem
+from seqopt.graph.orders.orders import AllOrders
 from seqopt.plan.free_front import FreeFront
 from seqopt.plan.front import find_front
 from seqopt.plan.order_plan import solve_order
@@ -50,7 +50,7 @@ def met(problem25):
     values = [plan, lean, free, robust, free.report()]
     values += [judge_unseen(robust, drawn), drawn, loop, find_front(loop), FreeFront(aims)]
     values += [
-        solve_order(OrderProblem(free.problem)),
+        solve_order(AllOrders(free.problem)),
         *engines(network),
         *engines(posed.engine.network),
     ]

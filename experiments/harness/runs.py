@@ -30,7 +30,7 @@ from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import Engine
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.graph.layers.interface import Aim
-from seqopt.graph.layers.layers import Problem, pose
+from seqopt.graph.layers.layers import Layers, candidate_layers
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.plan.calling.formulation import Formulation, formulations
@@ -100,15 +100,15 @@ def contenders() -> dict[str, Aim]:
     return {f.name: f.aim for f in formulations().values()} | {NO_PROOF: Aim.SUM}
 
 
-def _pose(scene: Scene, engine: str, criterion: str) -> tuple[Problem, dict[str, float]]:
+def _pose(scene: Scene, engine: str, criterion: str) -> tuple[Layers, dict[str, float]]:
     """Return the loop's problem, nothing of it computed, and the time that took."""
     start = time.perf_counter()
     net = build_network(scene)
-    problem = pose(ENGINES[engine](net), three_robot_loop(net), CRITERIA[criterion])
+    problem = candidate_layers(ENGINES[engine](net), three_robot_loop(net), CRITERIA[criterion])
     return problem, {"assemble": time.perf_counter() - start}
 
 
-def _responded(problem: Problem, seconds: dict[str, float]) -> tuple[Problem, dict[str, float]]:
+def _responded(problem: Layers, seconds: dict[str, float]) -> tuple[Layers, dict[str, float]]:
     """Compute the costs of both aims; add the time that took."""
     stages = [problem.seconds(aim) for aim in Aim]
     ranked = sum(stage["rank"] for stage in stages)
@@ -116,9 +116,9 @@ def _responded(problem: Problem, seconds: dict[str, float]) -> tuple[Problem, di
 
 
 def _row(
-    problem: Problem,
+    problem: Layers,
     formulation: Formulation,
-    reference: Problem,
+    reference: Layers,
     shared: dict[str, float],
     repeats: int,
 ) -> Row:
@@ -128,7 +128,7 @@ def _row(
     return {"formulation": formulation.name, **judged, "models": plans[-1].models_needed}
 
 
-def _search_row(scene: Scene, engine: str, criterion: str, reference: Problem, repeats: int) -> Row:
+def _search_row(scene: Scene, engine: str, criterion: str, reference: Layers, repeats: int) -> Row:
     found = _repeated(repeats, lambda: _search(scene, engine, criterion))
     stages = {"assemble": statistics.median(seconds["assemble"] for _, seconds in found)}
     stages |= {"compile": 0.0, "solve": 0.0}  # choosing is part of the search
@@ -147,9 +147,7 @@ def _medians(plans: Sequence[Plan], stages: Sequence[str]) -> dict[str, float]:
     return {stage: statistics.median(plan.seconds[stage] for plan in plans) for stage in stages}
 
 
-def _judged(
-    reference: Problem, aim: Aim, choice: tuple[int, ...], seconds: dict[str, float]
-) -> Row:
+def _judged(reference: Layers, aim: Aim, choice: tuple[int, ...], seconds: dict[str, float]) -> Row:
     objective, gap = worth(reference, aim, choice)
     return {
         "aim": aim.value,
@@ -162,14 +160,14 @@ def _judged(
     }
 
 
-def worth(reference: Problem, aim: Aim, choice: tuple[int, ...]) -> tuple[float, float]:
+def worth(reference: Layers, aim: Aim, choice: tuple[int, ...]) -> tuple[float, float]:
     """Return the value of a choice by the reference's data, and its gap to the optimum there."""
     costs = aim.costs(reference)
     value, bound = float(aim.worth(costs, choice)), least(costs, aim)
     return value, max(0.0, value - bound) / max(abs(bound), np.finfo(float).tiny)
 
 
-def error(problem: Problem, reference: Problem) -> float:
+def error(problem: Layers, reference: Layers) -> float:
     """Return the largest difference of responses over the largest of each kind in its step."""
     worst = 0.0
     for own, exact in zip(problem.evaluation.steps, reference.evaluation.steps, strict=True):

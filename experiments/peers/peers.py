@@ -38,7 +38,7 @@ from experiments.peers.parts.workload import PATHS, SETTINGS, SLOW, Case, produc
 from seqopt.arrays import Floats
 from seqopt.engines.interface import Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.graph.layers.layers import Problem
+from seqopt.graph.layers.layers import Layers
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.report.style import BLUE, GRAY, SMALL, VERMILION, name_panels, new_figure, plain, styled
@@ -219,7 +219,7 @@ def summarize(rounds: pd.DataFrame, models: int) -> pd.DataFrame:
     return grouped[times].median().assign(**worst).reset_index()
 
 
-def paths(problem: Problem, names: list[str], rounds: int) -> pd.DataFrame:
+def paths(problem: Layers, names: list[str], rounds: int) -> pd.DataFrame:
     """Return time and least cost of every tool on one placement problem; costs are ready."""
     rows = []
     for name in names:

@@ -38,7 +38,7 @@ from matplotlib.figure import Figure
 from experiments.harness.claim import Claim, Finding, Options
 from experiments.harness.results import drawn
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.graph.layers.layers import Problem, pose
+from seqopt.graph.layers.layers import Layers, candidate_layers
 from seqopt.graph.layers.ranking import move_costs, rank_of
 from seqopt.network.build import build_network
 from seqopt.plan.calling.formulation import find_formulation
@@ -179,14 +179,14 @@ class Decision:
     searched: tuple[int, ...]
 
 
-def problems(scene: Scene, schedule: Schedule) -> dict[str, Problem]:
+def problems(scene: Scene, schedule: Schedule) -> dict[str, Layers]:
     """Return the problem under every criterion of the nominal scene, all models solved once."""
-    posed = pose(ComplianceEngine(build_network(scene)), schedule, EQUATIONS, also=ALSO)
+    posed = candidate_layers(ComplianceEngine(build_network(scene)), schedule, EQUATIONS, also=ALSO)
     nominal = SceneFacts(ComplianceEngine(build_network(schedule.scene)))
     return {c.name: replace(posed, criterion=c.for_scene(nominal)) for c in TESTED}
 
 
-def judge(problem: Problem, nominal: Decision) -> dict[str, float]:
+def judge(problem: Layers, nominal: Decision) -> dict[str, float]:
     """Return how far a scenario's decisions are from the nominal ones."""
     plan = solve(problem, "overlap_dp")
     best = plan.certificate.objective

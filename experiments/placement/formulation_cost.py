@@ -64,7 +64,7 @@ from experiments.placement.parts.formulation_charts import contest_chart, cost_c
 from formulations.solvers import anatomy, minimize_whole
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.graph.layers.interface import Aim
-from seqopt.graph.layers.layers import Problem, pose
+from seqopt.graph.layers.layers import Layers, candidate_layers
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.plan.calling.formulation import find_formulation, formulations
@@ -80,16 +80,16 @@ GENERAL = ("overlap_lp", "overlap_mip")
 ANYWHERE, ON_THE_ARCH = 20.0, 100.0  # ratios that are claimed
 
 
-def problem_of(net: Network, criterion: Criterion) -> Problem:
+def problem_of(net: Network, criterion: Criterion) -> Layers:
     """Return the problem with its costs computed, its operators built anew."""
-    problem = pose(ComplianceEngine(net), three_robot_loop(net), criterion)
+    problem = candidate_layers(ComplianceEngine(net), three_robot_loop(net), criterion)
     for aim in Aim:
         aim.costs(problem)
     return problem
 
 
 def compared(net: Network, criterion: Criterion, rounds: int) -> dict[str, float]:
-    """Return seconds to pose the problem and to solve it by every formulation of the sum."""
+    """Return seconds to candidate_layers the problem and to solve it by every formulation of the sum."""
     row = {
         "bricks": float(len(net.scene.bricks)),
         "pose": best(partial(problem_of, net, criterion), rounds),
@@ -241,7 +241,7 @@ LIMIT = 60.0  # s
 CLOSE, FAR, THIRD, FEW_NODES = 1e-3, 0.05, 1 / 3, 10
 
 
-def written(problem: Problem, name: str, limit: float) -> tuple[dict[str, object], pd.DataFrame]:
+def written(problem: Layers, name: str, limit: float) -> tuple[dict[str, object], pd.DataFrame]:
     """Return size, bound, nodes and time of a program, and what was found at which time."""
     formulation = find_formulation(name)
     costs = formulation.aim.costs(problem)
@@ -270,7 +270,7 @@ def programs(network: Network, limit: float) -> Iterator[tuple[dict[str, object]
     """Yield what is measured of every program."""
     engine, schedule = ComplianceEngine(network), three_robot_loop(network)
     for aim, criterion in ((Aim.SUM, EQUATIONS), (Aim.PEAK, WORST_RATIO)):
-        problem = pose(engine, schedule, criterion)
+        problem = candidate_layers(engine, schedule, criterion)
         for name in SHAPES[aim]:
             yield written(problem, name, limit)
 

@@ -25,7 +25,7 @@ from experiments.harness.claim import Claim, Finding, Options, Times, on_this_ru
 from experiments.harness.results import RESULTS
 from experiments.harness.runs import scene_named
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.graph.states.states import pose_free
+from seqopt.graph.states.states import build_states
 from seqopt.network.build import build_network
 from seqopt.plan.calling.formulation import FormulationKind
 from seqopt.plan.calling.schedule_formulation import (
@@ -49,7 +49,7 @@ CLOSE = 1e-6
 def run(scene: str, aim: str, name: str) -> tuple[FreePlan, float]:
     """Return the plan of a formulation for a problem of which nothing is computed, and its time."""
     engine = ComplianceEngine(build_network(scene_named(scene)))
-    problem = pose_free(engine, FreeRules(), CRITERIA["worst-ratio-published"], aim)
+    problem = build_states(engine, FreeRules(), CRITERIA["worst-ratio-published"], aim)
     formulation = find_schedule_formulation(name)
     start = time.process_time()
     found = formulation.solve(problem, seconds=PATIENCE)

@@ -24,7 +24,7 @@ from experiments.harness.claim import Claim, Finding, Options
 from experiments.harness.results import stored
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import StepError
-from seqopt.graph.layers.layers import pose
+from seqopt.graph.layers.layers import candidate_layers
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.plan.calling.formulation import FormulationKind, formulations
@@ -62,7 +62,7 @@ def gaps(draws: int) -> Iterator[dict[str, object]]:
             continue
         engine = ComplianceEngine(network)
         for criterion in COMPARED:
-            problem = pose(engine, loop, CRITERIA[criterion])
+            problem = candidate_layers(engine, loop, CRITERIA[criterion])
             for name in heuristics:
                 proof = solve(problem, name).certificate
                 assert proof is not None

@@ -40,10 +40,10 @@ from experiments.harness.scenes import half_circle
 from formulations.scenarios.scenario_program import solve_program
 from seqopt.engines.registry import make_engine
 from seqopt.graph.layers.interface import Aim
-from seqopt.graph.layers.layers import Problem, pose
+from seqopt.graph.layers.layers import Layers, candidate_layers
 from seqopt.graph.scenarios.aims import WORST_PEAK, WORST_TOTAL, RobustAim, cvar
 from seqopt.graph.scenarios.arcs import Choice
-from seqopt.graph.scenarios.scenarios import RobustProblem, robust
+from seqopt.graph.scenarios.scenarios import ScenarioLayers, robust
 from seqopt.network.build import build_network
 from seqopt.plan.calling.watch import Watch
 from seqopt.plan.out_of_sample import judge_unseen
@@ -79,12 +79,14 @@ class Effort:
     limit: float
 
 
-def posed(scene: Scene, criterion: Criterion) -> Problem:
+def posed(scene: Scene, criterion: Criterion) -> Layers:
     network = build_network(scene)
-    return pose(make_engine("compliance", network), three_robot_loop(network), criterion)
+    return candidate_layers(
+        make_engine("compliance", network), three_robot_loop(network), criterion
+    )
 
 
-def over_draws(problem: Problem, count: int, seed: int) -> RobustProblem:
+def over_draws(problem: Layers, count: int, seed: int) -> ScenarioLayers:
     """Return the problem over so many scenarios, costs computed."""
     scene = problem.schedule.scene
     found = robust(problem, scenarios(scene, count=count, seed=seed), WORST_PEAK)
@@ -106,7 +108,7 @@ def made(scene: Scene, effort: Effort) -> Iterator[dict[str, object]]:
                     yield row | {"scenarios": count} | measured(plan, unseen)
 
 
-def measured(plan: RobustPlan, unseen: RobustProblem) -> dict[str, object]:
+def measured(plan: RobustPlan, unseen: ScenarioLayers) -> dict[str, object]:
     """Return what a plan is worth where it was made and elsewhere."""
     trial = judge_unseen(plan, unseen).summary()
     return {

@@ -32,7 +32,7 @@ from experiments.harness.claim import Claim, Finding, Options
 from experiments.harness.results import drawn
 from seqopt.arrays import Floats
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.graph.layers.layers import Problem, pose
+from seqopt.graph.layers.layers import Layers, candidate_layers
 from seqopt.graph.layers.ranking import TIED, rank_choice, rank_of
 from seqopt.network.build import build_network
 from seqopt.problem.criteria import RankSum
@@ -84,7 +84,7 @@ def rules() -> list[Rule]:
     return [Rule(*parts) for parts in product(FOURTH, WINDOWS, JOINS, ROUNDED)]
 
 
-def order(problem: Problem, choice: tuple[int, ...], move: int, rule: Rule) -> Floats:
+def order(problem: Layers, choice: tuple[int, ...], move: int, rule: Rule) -> Floats:
     """Return what the candidates of a move cost (C,), infinite where two robots meet."""
     shared = [s for s in problem.evaluation.steps if s.moves == (move - 1, move)]
     own = [s for s in problem.evaluation.steps if s.moves == (move,)][-WINDOWS["own steps"] :]
@@ -121,7 +121,7 @@ def _ranks(values: list[Floats], name: str, rule: Rule) -> Floats:
     return joined[rule.join]()
 
 
-def placed(problem: Problem, rule: Rule) -> pd.DataFrame:
+def placed(problem: Layers, rule: Rule) -> pd.DataFrame:
     """Return where the published nodes rank: a row per optimization, with ``alone`` if first."""
     choice, rows = published_choice(problem), []
     for move, node in enumerate(choice):
@@ -133,7 +133,7 @@ def placed(problem: Problem, rule: Rule) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def compression(problem: Problem, tried: list[Rule]) -> pd.DataFrame:
+def compression(problem: Layers, tried: list[Rule]) -> pd.DataFrame:
     """Return how often each rule names the published node alone, first, and among three."""
     rows = []
     for rule in tried:
@@ -182,7 +182,7 @@ def variants() -> list[RankSum]:
     return out
 
 
-def scores(problem: Problem, criteria: list[RankSum]) -> pd.DataFrame:
+def scores(problem: Layers, criteria: list[RankSum]) -> pd.DataFrame:
     """Return how often each criterion names the published node first, and among three."""
     choice = published_choice(problem)
     rows = []
@@ -244,7 +244,7 @@ def experiment(options: Options) -> Finding:
     engine = ComplianceEngine(build_network(load_scene("arch25")))
     robots = ("F_rob1", "F_rob2", "F_rob3")
     also = ("T_max", "M_sup", "D_max", "C_max", "F_move", "F_largest", *robots)
-    problem = pose(engine, three_robot_loop(engine.network), EQUATIONS, also=also)
+    problem = candidate_layers(engine, three_robot_loop(engine.network), EQUATIONS, also=also)
     tried = variants()
     wanted = {CLOSEST.before, CLOSEST.after}
     chosen = [

@@ -23,12 +23,12 @@ from seqopt.graph.explore import Explorer
 from seqopt.graph.graph import Graph
 from seqopt.graph.parts import Key, Visited
 from seqopt.graph.paths import Best, distances, lexicographic, reached, tied
-from seqopt.graph.states.states import FreeProblem
+from seqopt.graph.states.states import States
 from seqopt.graph.states.visits import FreeStates, explore
 from seqopt.interrupts import answered
 from seqopt.plan.calling.formulation import FormulationKind
 from seqopt.plan.calling.schedule_formulation import ScheduleFormulation
-from seqopt.plan.calling.schedule_selection import ScheduleSelection
+from seqopt.plan.calling.schedule_selection import StatePath
 from seqopt.plan.calling.watch import Watch
 from seqopt.plan.search.sturdiest import best_margin
 from seqopt.work.memory import free_memory
@@ -39,7 +39,7 @@ COPIES = 2.0  # of what is kept, that are needed at once while it grows
 
 _Values = tuple[float, ...]
 Watching = Callable[[Explorer], None]
-Search = Callable[[FreeProblem], ScheduleSelection]
+Search = Callable[[States], StatePath]
 
 
 class Choice(NamedTuple):
@@ -71,17 +71,17 @@ def on_graph(
     `Choice` of a graph whose moves are all on paths from the start to an end; stops when a
     `seqopt.plan.calling.watch.Watch` says so; ``kind``: what it promises. Result: it takes no
     budgets; its options are ``seconds`` and ``max_memory``. If its first goal is a peak, the graph
-    has the states below that of a first plan, by a narrow search. Where time or memory ends early, that
-    plan is returned.
+    has the states below that of a first plan, by a narrow search. Where time or memory ends early,
+    that plan is returned.
     """
 
     def solve(
-        problem: FreeProblem,
+        problem: States,
         *,
         seconds: float = np.inf,
         max_memory: float = np.inf,
         progress: Tell = lambda _: None,
-    ) -> ScheduleSelection:
+    ) -> StatePath:
         if problem.budgets:
             raise ProblemError(
                 f"formulation {name}: it takes no budgets; take schedule_search or path_beam"
@@ -94,11 +94,11 @@ def on_graph(
 
 
 def _chosen(
-    problem: FreeProblem,
+    problem: States,
     choose: Callable[[Graph, Watch], Choice],
     watch: Watch,
     tell: Watching,
-) -> ScheduleSelection:
+) -> StatePath:
     """Return the plan of a choice; where time was over, the better one of it and a first plan."""
     first = None
     try:
@@ -217,7 +217,7 @@ def _back(popped: list[tuple[int, int]], last: int) -> tuple[int, ...]:
     return tuple(reversed(path))
 
 
-def watched(problem: FreeProblem, watch: Watch, most: float, progress: Tell) -> Watching:
+def watched(problem: States, watch: Watch, most: float, progress: Tell) -> Watching:
     """Return what is told every level: it says how far it is, and ends the search in time."""
 
     def tell(found: Explorer) -> None:
@@ -232,14 +232,12 @@ def watched(problem: FreeProblem, watch: Watch, most: float, progress: Tell) -> 
     return tell
 
 
-def plan_by_then(
-    found: ScheduleSelection | None, stop: StopError | KeyboardInterrupt
-) -> ScheduleSelection:
+def plan_by_then(found: StatePath | None, stop: StopError | KeyboardInterrupt) -> StatePath:
     """Return a first plan, of which nothing is proven; raise an error if there is none yet."""
     if found is None:
         raise _too_little(stop) from None
     none = (-np.inf,) * len(found.objective)
-    return ScheduleSelection(found.states, found.objective, none, stopped=str(stop) or "interrupt")
+    return StatePath(found.states, found.objective, none, stopped=str(stop) or "interrupt")
 
 
 def _too_little(stop: StopError | KeyboardInterrupt) -> SeqoptError | KeyboardInterrupt:
@@ -251,7 +249,7 @@ def _too_little(stop: StopError | KeyboardInterrupt) -> SeqoptError | KeyboardIn
     return TimeUpError("no plan was found yet; give more")
 
 
-def after_margins(problem: FreeProblem, search: Search, tell: Watching) -> ScheduleSelection:
+def after_margins(problem: States, search: Search, tell: Watching) -> StatePath:
     """Return what is found once margins of stability, which come first, are at their best."""
     margins = [goal.of_margins for goal in problem.goals]
     if sorted(margins, reverse=True) != margins:
@@ -269,7 +267,7 @@ def after_margins(problem: FreeProblem, search: Search, tell: Watching) -> Sched
     return replace(after, objective=(value, *after.objective), bound=(bound, *after.bound))
 
 
-def narrow(problem: FreeProblem, width: int, tell: Watching) -> ScheduleSelection | None:
+def narrow(problem: States, width: int, tell: Watching) -> StatePath | None:
     """Return the best plan through a few states of every brick count, if there is one.
 
     Where states must stand it is asked of all of them only if the best paths fall.
@@ -284,7 +282,7 @@ def narrow(problem: FreeProblem, width: int, tell: Watching) -> ScheduleSelectio
     return None
 
 
-def best_standing(problem: FreeProblem, found: Explorer) -> ScheduleSelection:
+def best_standing(problem: States, found: Explorer) -> StatePath:
     """Return the best path through visited states that stand as is demanded."""
     known: set[tuple[int, ...]] = set()
     while True:
@@ -294,7 +292,7 @@ def best_standing(problem: FreeProblem, found: Explorer) -> ScheduleSelection:
             return selection(visited, best)
 
 
-def _exact(problem: FreeProblem, found: Explorer) -> tuple[Visited, Best | Within]:
+def _exact(problem: States, found: Explorer) -> tuple[Visited, Best | Within]:
     """Return the best path through visited states, values close to its own being exact."""
     while True:
         visited = found.graph()
@@ -306,13 +304,13 @@ def _exact(problem: FreeProblem, found: Explorer) -> tuple[Visited, Best | Withi
             return visited, best
 
 
-def selection(visited: Visited, best: Best | Within) -> ScheduleSelection:
+def selection(visited: Visited, best: Best | Within) -> StatePath:
     """Return a path as a plan, and with it the states that a better one could pass."""
     rows = tuple((level, *state.tolist()) for level, _, state in visited.of(best.path))
     hint = _passable(visited, best.values[0])
     if isinstance(best, Within):
-        return ScheduleSelection(rows, best.values, best.bounds, hint, best.prices)
-    return ScheduleSelection(rows, best.values, best.values, hint)
+        return StatePath(rows, best.values, best.bounds, hint, best.prices)
+    return StatePath(rows, best.values, best.values, hint)
 
 
 def _passable(visited: Visited, value: float) -> tuple[Ints, ...]:
@@ -327,7 +325,7 @@ def _passable(visited: Visited, value: float) -> tuple[Ints, ...]:
 
 
 def _leave_out(
-    problem: FreeProblem,
+    problem: States,
     found: Explorer,
     states: list[tuple[int, Key, Ints]],
     known: set[tuple[int, ...]],

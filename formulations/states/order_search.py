@@ -33,7 +33,7 @@ import numpy as np
 from seqopt.errors import InfeasibleError, ProblemError, TimeUpError
 from seqopt.graph.explore import Explorer
 from seqopt.graph.orders.bound import whole_bound
-from seqopt.graph.orders.orders import OrderProblem, OrderSelection
+from seqopt.graph.orders.orders import AllOrders, OrderSelection
 from seqopt.graph.orders.visits import OrderStates, TooManySetsError
 from seqopt.graph.orders.work import Trial, trying, worth
 from seqopt.graph.parts import Visited
@@ -58,7 +58,7 @@ class _StopError(Exception):
 class _Search:
     """What was found so far."""
 
-    problem: OrderProblem
+    problem: AllOrders
     end: float
     resources: Resources
     order: Order = ()
@@ -103,7 +103,7 @@ class _Search:
 
 
 def solve(
-    problem: OrderProblem,
+    problem: AllOrders,
     *,
     most: int = 5000,
     tries: int = 200,
@@ -150,7 +150,7 @@ def _run(search: _Search, most: int, tries: int, rng: np.random.Generator) -> st
     return "size"
 
 
-def _first_orders(problem: OrderProblem) -> Iterator[Order]:
+def _first_orders(problem: AllOrders) -> Iterator[Order]:
     """Yield the scene's own order, and those that have names as far as they are allowed."""
     own = problem.scene.build_order
     yield own
@@ -227,7 +227,7 @@ def _neighbors(search: _Search, tries: int, rng: np.random.Generator) -> None:
             left -= search.evaluated - before
 
 
-def _beside(order: Order, problem: OrderProblem, rng: np.random.Generator) -> Iterator[Order]:
+def _beside(order: Order, problem: AllOrders, rng: np.random.Generator) -> Iterator[Order]:
     """Yield allowed orders in which one brick, or two or three in a row, stand elsewhere."""
     count = len(order)
     runs = [(a, size) for size in (1, 2, 3) for a in range(count - size + 1)]

@@ -29,23 +29,23 @@ from formulations.states.on_graph import (
 )
 from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.graph.explore import Explorer
-from seqopt.graph.states.states import FreeProblem
+from seqopt.graph.states.states import States
 from seqopt.graph.states.visits import FreeStates
 from seqopt.plan.calling.formulation import FormulationKind
 from seqopt.plan.calling.schedule_formulation import ScheduleFormulation
-from seqopt.plan.calling.schedule_selection import ScheduleSelection
+from seqopt.plan.calling.schedule_selection import StatePath
 from seqopt.plan.calling.watch import Watch
 from seqopt.work.progress import Tell
 
 
 def solve(
-    problem: FreeProblem,
+    problem: States,
     *,
     width: int = 50,
     seconds: float = np.inf,
     max_memory: float = np.inf,
     progress: Tell = lambda _: None,
-) -> ScheduleSelection:
+) -> StatePath:
     """Return a plan through the states of a beam.
 
     ``width``: how many new states of a brick count are kept, from 1; ``seconds``, ``max_memory``:
@@ -58,7 +58,7 @@ def solve(
         raise ProblemError(f"option width={width}: give a whole number from 1 on")
     tell = watched(problem, Watch(seconds), max_memory, progress)
 
-    def search(rest: FreeProblem) -> ScheduleSelection:
+    def search(rest: States) -> StatePath:
         try:
             found = narrow(rest, width, tell)
             if found is None:

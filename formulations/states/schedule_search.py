@@ -48,11 +48,11 @@ from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.graph.budgets import is_beyond
 from seqopt.graph.explore import Explorer
 from seqopt.graph.paths import distances
-from seqopt.graph.states.states import FreeProblem
+from seqopt.graph.states.states import States
 from seqopt.graph.states.visits import FreeStates
 from seqopt.plan.calling.formulation import FormulationKind
 from seqopt.plan.calling.schedule_formulation import ScheduleFormulation
-from seqopt.plan.calling.schedule_selection import ScheduleSelection
+from seqopt.plan.calling.schedule_selection import StatePath
 from seqopt.plan.calling.watch import Watch
 from seqopt.problem.goals import Measure
 from seqopt.work.progress import Tell
@@ -61,14 +61,14 @@ FAR_BELOW = 4.0  # what the narrow search finds, over the first threshold
 
 
 def solve(
-    problem: FreeProblem,
+    problem: States,
     *,
     width: int = 50,
     growth: float = 1.1,
     seconds: float = np.inf,
     max_memory: float = np.inf,
     progress: Tell = lambda _: None,
-) -> ScheduleSelection:
+) -> StatePath:
     """Return the best free schedule.
 
     ``width``: from how many new states of a brick count the narrow search goes on; ``growth``: by
@@ -91,7 +91,7 @@ def solve(
     return after_margins(problem, lambda rest: _search(rest, (width, growth), tell), tell)
 
 
-def _search(problem: FreeProblem, options: tuple[int, float], tell: Watching) -> ScheduleSelection:
+def _search(problem: States, options: tuple[int, float], tell: Watching) -> StatePath:
     """Return the best free schedule, or the first one found where the search is stopped."""
     found, proven = None, [-np.inf]
     wide = Explorer(FreeStates(problem), tell=tell)
@@ -105,7 +105,7 @@ def _search(problem: FreeProblem, options: tuple[int, float], tell: Watching) ->
         return _unproven(plan_by_then(found, stop), wide, proven[-1])
 
 
-def _require_room(problem: FreeProblem, tell: Watching) -> None:
+def _require_room(problem: States, tell: Watching) -> None:
     """Raise an `InfeasibleError` if every plan exceeds a budget, before thresholds are tried."""
     totals = problem.goals[len(problem.aims) :]
     every = Explorer(FreeStates(replace(problem, goals=totals, budgets=())), tell=tell)
@@ -114,8 +114,8 @@ def _require_room(problem: FreeProblem, tell: Watching) -> None:
 
 
 def _best(
-    problem: FreeProblem, wide: Explorer, options: tuple[float, float], proven: list[float]
-) -> ScheduleSelection:
+    problem: States, wide: Explorer, options: tuple[float, float], proven: list[float]
+) -> StatePath:
     """Return the best plan below the lowest threshold of a rising row that connects both ends.
 
     What is proven of the first goal is added to a list on the way.
@@ -138,7 +138,7 @@ def _best(
         threshold = max(wide.excluded, min(ceiling, grown))
 
 
-def _of_one(problem: FreeProblem, options: tuple[float, float]) -> float:
+def _of_one(problem: States, options: tuple[float, float]) -> float:
     """Return what the plan that is best in the first scenario takes in all; at least in that one.
 
     What is below the former is enough to be looked at, where that plan is allowed in all.
@@ -156,7 +156,7 @@ def _of_one(problem: FreeProblem, options: tuple[float, float]) -> float:
     return worst
 
 
-def _unproven(found: ScheduleSelection, wide: Explorer, proven: float) -> ScheduleSelection:
+def _unproven(found: StatePath, wide: Explorer, proven: float) -> StatePath:
     """Return the first plan, and what thresholds and the levels reached prove of the first goal."""
     bound = proven
     if not wide.peaks[0] and wide.level:

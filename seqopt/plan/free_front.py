@@ -14,7 +14,7 @@ from seqopt.graph.graph import Graph
 from seqopt.graph.parts import Visited
 from seqopt.graph.paths import distances, fewest_moves, keep_best, reached
 from seqopt.graph.states.counts import steps_with, with_held
-from seqopt.graph.states.states import FreeProblem
+from seqopt.graph.states.states import States
 from seqopt.graph.states.steps import steps_of
 from seqopt.graph.states.visits import explore
 from seqopt.plan.judge.infeasible import confirmed
@@ -35,7 +35,7 @@ class FreeFront:
     default. Raises `ProblemError` if the goals are others, or a rounding is no positive number.
     """
 
-    def __init__(self, problem: FreeProblem, rounding: Mapping[str, float] | None = None) -> None:
+    def __init__(self, problem: States, rounding: Mapping[str, float] | None = None) -> None:
         self._problem = problem
         for goal in problem.goals:
             if goal.measure not in (Measure.PEAK, Measure.STEPS, Measure.REGRIPS):

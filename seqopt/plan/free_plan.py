@@ -15,13 +15,13 @@ from seqopt.contact.mortar import Mortar
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import provenance
 from seqopt.errors import InfeasibleError
-from seqopt.graph.states.states import FreeProblem
+from seqopt.graph.states.states import States
 from seqopt.graph.states.steps import steps_of
 from seqopt.plan.build import ShownBuild
 from seqopt.plan.calling.formulation import Formulation, FormulationKind
 from seqopt.plan.calling.guard import called
 from seqopt.plan.calling.schedule_formulation import ScheduleFormulation, find_schedule_formulation
-from seqopt.plan.calling.schedule_selection import ScheduleSelection, with_numbers
+from seqopt.plan.calling.schedule_selection import StatePath, with_numbers
 from seqopt.plan.judge.infeasible import confirmed
 from seqopt.plan.judge.schedules import TOLERANCE, ScheduleCertificate, judge_schedule
 from seqopt.plan.judge.standing_proof import certified
@@ -47,9 +47,9 @@ class FreePlan(ShownBuild):
     proof; ``steps``: checked; ``seconds``: by stage, s: solve (responses among it), verify.
     """
 
-    problem: FreeProblem
+    problem: States
     formulation: ScheduleFormulation
-    selection: ScheduleSelection
+    selection: StatePath
     certificate: ScheduleCertificate | None
     steps: tuple[Step, ...]
     seconds: Mapping[str, float] = field(compare=False, hash=False)
@@ -207,17 +207,17 @@ class FreePlan(ShownBuild):
         return count
 
 
-def _named(problem: FreeProblem) -> str:
+def _named(problem: States) -> str:
     return problem.rules.method if isinstance(problem.rules, Schedule) else FREE
 
 
-def _rules(problem: FreeProblem) -> dict[str, object]:
+def _rules(problem: States) -> dict[str, object]:
     rules = problem.rules
     return {} if isinstance(rules, Schedule) else rules.described(problem.network.scene)
 
 
 def solve_free(
-    problem: FreeProblem,
+    problem: States,
     formulation: ScheduleFormulation | Formulation | str = "schedule_search",
     *,
     proof: bool = True,
@@ -238,7 +238,7 @@ def solve_free(
 
 
 def _solved(
-    problem: FreeProblem,
+    problem: States,
     formulation: ScheduleFormulation,
     options: Mapping[str, Any],
     *,
@@ -259,22 +259,22 @@ def _solved(
     return FreePlan(problem, formulation, selection, certificate, steps, seconds)
 
 
-def _judged(problem: FreeProblem) -> FreeProblem:
+def _judged(problem: States) -> States:
     """Return what a formulation must not change; who works for it may."""
     return replace(problem, resources=HERE)
 
 
 def _selected(
     formulation: ScheduleFormulation,
-    problem: FreeProblem,
-    twin: FreeProblem,
+    problem: States,
+    twin: States,
     options: Mapping[str, Any],
-) -> ScheduleSelection:
+) -> StatePath:
     """Return what a formulation says, with numbers where numbers belong; or why there is none."""
     start, name = time.perf_counter(), formulation.name
     solve = partial(formulation.solve, problem, **options)
     try:
-        selection = called(name, partial(_judged, problem), ScheduleSelection, solve)
+        selection = called(name, partial(_judged, problem), StatePath, solve)
     except InfeasibleError:
         left = float(options.get("seconds", math.inf)) - (time.perf_counter() - start)
         raise confirmed(twin, name, left) from None

@@ -15,7 +15,7 @@ import pandas as pd
 
 from seqopt.engines.interface import Engine
 from seqopt.errors import InfeasibleError, SolverError
-from seqopt.graph.orders.orders import OrderProblem, OrderSelection
+from seqopt.graph.orders.orders import AllOrders, OrderSelection
 from seqopt.plan.build import ShownBuild
 from seqopt.plan.calling.guard import called, readable, text
 from seqopt.plan.calling.schedule_formulation import (
@@ -44,7 +44,7 @@ class OrderPlan(ShownBuild):
     is claimed.
     """
 
-    problem: OrderProblem
+    problem: AllOrders
     selection: OrderSelection
     plan: FreePlan
     seconds: Mapping[str, float]
@@ -137,7 +137,7 @@ class OrderPlan(ShownBuild):
 
 
 def solve_order(
-    problem: OrderProblem,
+    problem: AllOrders,
     formulation: ScheduleFormulation | str = "order_search",
     *,
     proof: bool = True,
@@ -170,9 +170,7 @@ def solve_order(
     return OrderPlan(twin, selection, plan, seconds, proven)
 
 
-def _planned(
-    name: str, problem: OrderProblem, selection: OrderSelection, *, proof: bool
-) -> FreePlan:
+def _planned(name: str, problem: AllOrders, selection: OrderSelection, *, proof: bool) -> FreePlan:
     """Return the best plan of an order, which must be worth what is claimed."""
     _require_allowed(name, problem, selection.order)
     plan = solve_free(problem.at(selection.order), "schedule_search", proof=proof)
@@ -182,7 +180,7 @@ def _planned(
 
 def _selected(
     found: ScheduleFormulation,
-    problems: tuple[OrderProblem, OrderProblem],
+    problems: tuple[AllOrders, AllOrders],
     end: float,
     solve: Callable[[], object],
 ) -> OrderSelection:
@@ -202,7 +200,7 @@ def _selected(
     return _with_numbers(found.name, said)
 
 
-def _proven(name: str, problem: OrderProblem, selection: OrderSelection, end: float) -> bool:
+def _proven(name: str, problem: AllOrders, selection: OrderSelection, end: float) -> bool:
     """Return whether a bound on all orders is proven; raise an error if one is below it."""
     if selection.stopped in ENDED or not isfinite(selection.bound):
         return False
@@ -225,7 +223,7 @@ def _with_numbers(name: str, found: OrderSelection) -> OrderSelection:
         return OrderSelection(order, objective, bound, evaluated, text(found.stopped))
 
 
-def _require_allowed(name: str, problem: OrderProblem, order: Order) -> None:
+def _require_allowed(name: str, problem: AllOrders, order: Order) -> None:
     """Raise an error if an order does not name every brick once, or is none of those asked for."""
     in_order(problem.scene, order)
     if not problem.allows(order):

@@ -18,7 +18,7 @@ from seqopt.errors import InfeasibleError
 from seqopt.graph.layers.interface import Aim
 from seqopt.graph.scenarios.arcs import Choice
 from seqopt.graph.scenarios.costs import ScenarioCosts
-from seqopt.graph.scenarios.scenarios import RobustProblem, robust
+from seqopt.graph.scenarios.scenarios import ScenarioLayers, robust
 from seqopt.plan.robust_plan import RobustPlan, best_choice
 from seqopt.scene.scenarios import Scenarios
 from seqopt.scene.scene import Scene
@@ -59,7 +59,7 @@ class Trial(Terse):
         }
 
 
-def judge_unseen(plan: RobustPlan, scenes: RobustProblem | Scenarios | Sequence[Scene]) -> Trial:
+def judge_unseen(plan: RobustPlan, scenes: ScenarioLayers | Scenarios | Sequence[Scene]) -> Trial:
     """Return the value of a plan in other scenarios, beside two plans for comparison.
 
     ``scenes``: not those it was made for: drawn with another seed. Or the problem over them, whose
@@ -72,7 +72,7 @@ def judge_unseen(plan: RobustPlan, scenes: RobustProblem | Scenarios | Sequence[
     aim = problem.aim.aim
     chosen = best_choice(aim.costs(nominal), aim).choice
     unseen = scenes
-    if not isinstance(unseen, RobustProblem):
+    if not isinstance(unseen, ScenarioLayers):
         unseen = robust(nominal, unseen, problem.aim)
     sets = {"nominal": (known,), "optimized": problem.costs, "unseen": unseen.costs}
     rows: list[dict[str, object]] = [
@@ -84,7 +84,7 @@ def judge_unseen(plan: RobustPlan, scenes: RobustProblem | Scenarios | Sequence[
 
 
 def _row(
-    costs: ScenarioCosts, problem: RobustProblem, choices: tuple[Choice, Choice]
+    costs: ScenarioCosts, problem: ScenarioLayers, choices: tuple[Choice, Choice]
 ) -> dict[str, float]:
     """Return what three plans cost in a scenario."""
     aim = problem.aim.aim

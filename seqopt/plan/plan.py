@@ -14,7 +14,7 @@ from seqopt.engines.interface import Engine
 from seqopt.engines.registry import provenance
 from seqopt.errors import ProblemError
 from seqopt.graph.layers.interface import PlacementProblem
-from seqopt.graph.layers.layers import Problem
+from seqopt.graph.layers.layers import Layers
 from seqopt.graph.layers.objectives import split_gap, under_both
 from seqopt.graph.layers.ranking import move_costs, rank_of
 from seqopt.plan.build import ShownBuild
@@ -82,7 +82,7 @@ class Plan(ShownBuild):
             gap = 100 * self.certificate.gap
             proof = f"objective {self.certificate.objective:.6g}, gap {gap:.3g} %"
         what = ""
-        if isinstance(self.problem, Problem):
+        if isinstance(self.problem, Layers):
             schedule = self.problem.schedule
             what = f"{schedule.scene.name!r}, {schedule.method!r}, "
         return f"Plan({what}by {self.formulation.name}: {counts}, {proof})"
@@ -112,7 +112,7 @@ class Plan(ShownBuild):
         return self.problem.nodes(self.selection.choice)
 
     @property
-    def explored(self) -> tuple[Problem, ...]:
+    def explored(self) -> tuple[Layers, ...]:
         """The problems whose responses were computed: the whole, or what a search needed."""
         return (self._posed,) if self.search is None else self.search.explored
 
@@ -133,8 +133,8 @@ class Plan(ShownBuild):
         return window_models(self._posed.schedule, self.selection.choice)
 
     @property
-    def _posed(self) -> Problem:
-        if not isinstance(self.problem, Problem):
+    def _posed(self) -> Layers:
+        if not isinstance(self.problem, Layers):
             raise ProblemError(
                 "the problem is given by its costs alone and has no steps; pose it with a schedule"
             )

@@ -17,7 +17,7 @@ from seqopt.graph.layers.costs import TINY, LayeredCosts
 from seqopt.graph.layers.interface import Aim, CostProblem
 from seqopt.graph.scenarios.aims import RobustAim
 from seqopt.graph.scenarios.arcs import Choice, scenario_arcs
-from seqopt.graph.scenarios.scenarios import RobustProblem, largest_of
+from seqopt.graph.scenarios.scenarios import ScenarioLayers, largest_of
 from seqopt.plan.build import ShownBuild
 from seqopt.plan.calling.formulation import Formulation, Selection, find_formulation
 from seqopt.plan.calling.selecting import select
@@ -46,7 +46,7 @@ class RobustPlan(ShownBuild):
     by stage, s: respond, solve, verify.
     """
 
-    problem: RobustProblem
+    problem: ScenarioLayers
     choice: Choice
     steps: tuple[Step, ...]
     objective: float
@@ -106,7 +106,7 @@ class RobustPlan(ShownBuild):
 
 
 def solve_robust(
-    problem: RobustProblem,
+    problem: ScenarioLayers,
     *,
     time_limit: float = math.inf,
     progress: Callable[[Finding], object] | None = None,
@@ -119,7 +119,7 @@ def solve_robust(
 
     Parameters
     ----------
-    problem : RobustProblem
+    problem : ScenarioLayers
         Of `seqopt.graph.scenarios.scenarios.robust`.
     time_limit : float, optional
         After which it stops choosing, with the best choice so far and a bound, s.
@@ -157,7 +157,7 @@ def solve_robust(
     return _judged(problem, found, weights, watch.seconds)
 
 
-def _judged(problem: RobustProblem, found: Searched, weights: Floats, taken: float) -> RobustPlan:
+def _judged(problem: ScenarioLayers, found: Searched, weights: Floats, taken: float) -> RobustPlan:
     """Return the plan of a choice, checked; the time it took to find is given, s."""
     start, layers = time.perf_counter(), problem.layered(problem.aim.aim)
     proven = _proven(largest_of(layers), layers, problem.aim, weights)
@@ -227,7 +227,7 @@ def _proven(
 
 
 def _checked(
-    problem: RobustProblem, layers: tuple[LayeredCosts, ...], found: Searched, proven: float
+    problem: ScenarioLayers, layers: tuple[LayeredCosts, ...], found: Searched, proven: float
 ) -> float:
     """Return the value of a choice from the scenarios' costs, if it is as claimed."""
     worth = problem.aim.aim.worth

@@ -9,14 +9,14 @@ import numpy as np
 
 from seqopt.graph.layers.budgets import steps_over, travel
 from seqopt.graph.layers.costs import Budget
-from seqopt.graph.layers.layers import Problem
+from seqopt.graph.layers.layers import Layers
 from seqopt.plan.solving import on_the_way, solve
 from seqopt.problem.budgets import AskedBudget
 
 UNBOUND = "overlap_dp"  # finds the optimum without budgets, of which a share may be asked
 
 
-def with_budgets(problem: Problem, asked: Sequence[AskedBudget]) -> Problem:
+def with_budgets(problem: Layers, asked: Sequence[AskedBudget]) -> Layers:
     """Return a problem with budgets; shares are those of its optimum without any.
 
     ``problem``: posed with the responses that the budgets name.
@@ -31,7 +31,7 @@ def with_budgets(problem: Problem, asked: Sequence[AskedBudget]) -> Problem:
     return replace(problem, budgets=tuple(budgets))
 
 
-def _budget(problem: Problem, asked: AskedBudget, bound: float) -> Budget:
+def _budget(problem: Layers, asked: AskedBudget, bound: float) -> Budget:
     """Return the budget of how much there is, in its unit."""
     if not asked.response:
         return travel(problem, bound)

@@ -13,8 +13,8 @@ import numpy as np
 
 from seqopt.errors import ProblemError
 from seqopt.graph.layers.interface import PlacementProblem
-from seqopt.graph.layers.layers import Problem
-from seqopt.graph.states.states import FreeProblem
+from seqopt.graph.layers.layers import Layers
+from seqopt.graph.states.states import States
 from seqopt.plan.calling.fitting import require_fit, require_proof, require_time
 from seqopt.plan.calling.formulation import (
     End,
@@ -60,7 +60,7 @@ def solve(
 
 @overload
 def solve(
-    problem: FreeProblem,
+    problem: States,
     formulation: ScheduleFormulation | str,
     *,
     proof: bool = True,
@@ -71,7 +71,7 @@ def solve(
 
 
 def solve(
-    problem: PlacementProblem | FreeProblem,
+    problem: PlacementProblem | States,
     formulation: Formulation | ScheduleFormulation | str,
     *,
     proof: bool = True,
@@ -84,7 +84,7 @@ def solve(
 
     Parameters
     ----------
-    problem : PlacementProblem or FreeProblem
+    problem : PlacementProblem or States
         From `seqopt.pose` or `seqopt.pose_free`, or a `seqopt.graph.layers.interface.CostProblem`.
     formulation : Formulation, ScheduleFormulation or str
         Or a name in `seqopt.formulations`; ``schedule_search`` for the free schedule.
@@ -116,7 +116,7 @@ def solve(
     0.0
     """
     run = _Run(time_limit, progress, proof, lazy)
-    if isinstance(problem, FreeProblem):
+    if isinstance(problem, States):
         return _solve_free(problem, formulation, run, options)
     found = _fitting(problem, formulation, time_limit, options)
     return _solve_loop(problem, found, run, options)
@@ -135,7 +135,7 @@ def _solve_loop(
 
 
 def _solve_free(
-    problem: FreeProblem,
+    problem: States,
     formulation: Formulation | ScheduleFormulation | str,
     run: _Run,
     options: dict[str, Any],
@@ -166,7 +166,7 @@ def _fitting(
 ) -> Formulation:
     """Return the formulation if it, the problem and the options go together."""
     if isinstance(formulation, ScheduleFormulation):
-        raise ProblemError(f"{formulation.name} is for free schedules; pose one with pose_free")
+        raise ProblemError(f"{formulation.name} is for free schedules; pose one with build_states")
     found = as_formulation(formulation)
     if not isinstance(getattr(problem, "budgets", None), tuple):
         raise ProblemError(
@@ -174,7 +174,7 @@ def _fitting(
         )
     require_fit(problem, found, options)
     require_time(found, time_limit)
-    if isinstance(problem, Problem):
+    if isinstance(problem, Layers):
         problem.require_possible()
     return found
 
@@ -195,7 +195,7 @@ def _solve_all(
     with _timed(seconds, "verify"):
         certificate = judge(problem, selection, formulation)
         steps = problem.steps(selection.choice)
-        if isinstance(problem, Problem):
+        if isinstance(problem, Layers):
             require_anew(problem, selection.choice)
     order = {stage: seconds[stage] for stage in ("compile", "solve", "verify")}
     return Plan(problem, formulation, selection, certificate, steps, {**stages, **order})
@@ -215,7 +215,7 @@ def _solve_windows(
             f"{asked} looks beyond the window of a move and needs all models: "
             f"use {' or '.join(able)} without options, or ask for the proof"
         )
-    if not isinstance(problem, Problem):
+    if not isinstance(problem, Layers):
         raise ProblemError("the costs of all choices are given; ask for the proof, it is free")
     if getattr(problem.criterion, "among", Among.ALL) is not Among.ALL:
         raise ProblemError(
@@ -236,7 +236,7 @@ def _solve_lazily(
     problem: PlacementProblem, formulation: Formulation, run: _Run, options: Mapping[str, Any]
 ) -> Plan:
     """Return the certified plan of a search that solves only the models that the proof needs."""
-    if not isinstance(problem, Problem):
+    if not isinstance(problem, Layers):
         raise ProblemError("the costs of all choices are given; nothing is saved by a lazy search")
     if options:
         raise ProblemError(f"option {min(options)}: a lazy search has no options; leave it out")

@@ -7,12 +7,12 @@ from collections.abc import Iterator, Mapping, Sequence
 import pandas as pd
 
 from seqopt.arrays import Floats
-from seqopt.graph.layers.layers import Problem
+from seqopt.graph.layers.layers import Layers
 from seqopt.plan.search.window_search import WindowSearch
 from seqopt.responses.choices import StepChoices
 
 
-def moves_table(problem: Problem, choice: Sequence[int], grips: pd.DataFrame) -> pd.DataFrame:
+def moves_table(problem: Layers, choice: Sequence[int], grips: pd.DataFrame) -> pd.DataFrame:
     """Return what was chosen for every move, for how long, and with which force.
 
     ``choice``: the candidate that is taken for every move; ``grips``: of the plan, as of
@@ -41,7 +41,7 @@ def moves_table(problem: Problem, choice: Sequence[int], grips: pd.DataFrame) ->
     return pd.DataFrame(rows)
 
 
-def choice_table(problem: Problem, choices: StepChoices) -> pd.DataFrame:
+def choice_table(problem: Layers, choices: StepChoices) -> pd.DataFrame:
     """Return raw responses and cost of every choice in a step.
 
     ``choices``: one of ``problem.evaluation.steps``. Result: a row per choice, labeled by its
@@ -56,7 +56,7 @@ def choice_table(problem: Problem, choices: StepChoices) -> pd.DataFrame:
 
 
 def alternatives(
-    problem: Problem, choice: tuple[int, ...], search: WindowSearch | None
+    problem: Layers, choice: tuple[int, ...], search: WindowSearch | None
 ) -> pd.DataFrame:
     """Return raw responses and cost of every choice that was looked at.
 
@@ -78,8 +78,8 @@ def alternatives(
 
 
 def _looked_at(
-    problem: Problem, choice: tuple[int, ...], search: WindowSearch | None
-) -> Iterator[tuple[Problem, StepChoices, int | None]]:
+    problem: Layers, choice: tuple[int, ...], search: WindowSearch | None
+) -> Iterator[tuple[Layers, StepChoices, int | None]]:
     """Yield steps and, where only one choice before is kept, the node of that choice."""
     if search is not None or not problem.evaluation.streams:
         for posed in (problem,) if search is None else search.explored:

@@ -13,10 +13,10 @@ from seqopt.engines.interface import Engine
 from seqopt.errors import ProblemError, SeqoptError, StepError
 from seqopt.graph.layers.costs import TINY
 from seqopt.graph.layers.interface import Aim
-from seqopt.graph.layers.layers import Problem, pose
+from seqopt.graph.layers.layers import Layers, candidate_layers
 from seqopt.graph.layers.objectives import under_both
 from seqopt.graph.layers.ranking import rank_choice
-from seqopt.graph.states.states import pose_free
+from seqopt.graph.states.states import build_states
 from seqopt.plan.calling.formulation import formulations
 from seqopt.plan.free_plan import FreePlan
 from seqopt.plan.judge.certificate import least_sum
@@ -198,7 +198,7 @@ def _add_largest(
     return notes
 
 
-def _criteria(problem: Problem | None, free: FreePlan | None) -> dict[str, Criterion]:
+def _criteria(problem: Layers | None, free: FreePlan | None) -> dict[str, Criterion]:
     """Return the criteria as they were posed, by problem."""
     found = {} if problem is None else {problem.schedule.method: problem.criterion}
     return found if free is None else found | {FREE: free.problem.criterion}
@@ -206,7 +206,7 @@ def _criteria(problem: Problem | None, free: FreePlan | None) -> dict[str, Crite
 
 def _plans(
     engine: Engine, criterion: Criterion, progress: Tell, robots: Sequence[str]
-) -> tuple[dict[str, Plan], Problem | None, str]:
+) -> tuple[dict[str, Plan], Layers | None, str]:
     """Return the plan of the modified sequential method and of every formulation on the loop.
 
     And the problem of the loop; none, and the reason, where the robots cannot build by it.
@@ -217,10 +217,10 @@ def _plans(
         loop = find_schedule(network, robots=robots)  # whose refusal says most
         if count >= MOST:
             progress(Stage("comparing", 0.0))
-            modified = pose(engine, modified_sequential(network, robots[:3]), criterion)
+            modified = candidate_layers(engine, modified_sequential(network, robots[:3]), criterion)
             plans["modified-sequential"] = on_the_way(solve(modified, "cascade"))
         known = formulations()
-        problem = pose(engine, loop, criterion, resources=Resources(progress=progress))
+        problem = candidate_layers(engine, loop, criterion, resources=Resources(progress=progress))
         for done, (name, formulation) in enumerate(known.items()):
             progress(Stage("comparing", (done + 1) / (len(known) + 1)))
             plans[name] = on_the_way(solve(problem, formulation))
@@ -281,7 +281,7 @@ def _row(plan: Plan) -> dict[str, object]:
 
 
 def _facts(
-    problem: Problem, rows: Mapping[str, dict[str, object]], robots: Sequence[str]
+    problem: Layers, rows: Mapping[str, dict[str, object]], robots: Sequence[str]
 ) -> LoopFacts:
     method = problem.schedule.method
     counted = paper_models(problem.schedule) if method == "three-robot" else None
@@ -289,9 +289,7 @@ def _facts(
     return LoopFacts(method, problem.seconds(Aim.SUM), counted, ranks)
 
 
-def _published_ranks(
-    problem: Problem, rows: Mapping[str, dict[str, object]]
-) -> pd.DataFrame | None:
+def _published_ranks(problem: Layers, rows: Mapping[str, dict[str, object]]) -> pd.DataFrame | None:
     """Return where the published plan's nodes rank, and add to its row what it is worth."""
     if PUBLISHED not in rows:
         return None
@@ -379,7 +377,7 @@ def _free_plan(
     """Return the shortest free schedule with the smallest worst step, or why there is none."""
     try:
         rules = FreeRules(robots=tuple(robots))
-        problem = pose_free(engine, rules, criterion, "minmax,steps")
+        problem = build_states(engine, rules, criterion, "minmax,steps")
         return solve(problem, "schedule_search", time_limit=PATIENCE, progress=progress), ""
     except SeqoptError as error:
         return None, f"{FREE}: {error}"

@@ -16,10 +16,10 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from seqopt.errors import ExtraError, ProblemError
-from seqopt.graph.layers.layers import Problem
-from seqopt.graph.orders.orders import OrderProblem
-from seqopt.graph.scenarios.scenarios import RobustProblem
-from seqopt.graph.states.states import FreeProblem
+from seqopt.graph.layers.layers import Layers
+from seqopt.graph.orders.orders import AllOrders
+from seqopt.graph.scenarios.scenarios import ScenarioLayers
+from seqopt.graph.states.states import States
 from seqopt.network.network import Network
 from seqopt.plan.build import ShownBuild
 from seqopt.problem.requirements import Limit
@@ -158,7 +158,7 @@ def _schedule(value: Schedule) -> Card:
 
 
 @facts.register
-def _problem(value: Problem) -> Card:
+def _problem(value: Layers) -> Card:
     title, rows, draw = _schedule(value.schedule)
     more = {
         "criterion": value.criterion.name,
@@ -171,14 +171,14 @@ def _problem(value: Problem) -> Card:
 
 
 @facts.register
-def _robust_problem(value: RobustProblem) -> Card:
+def _robust_problem(value: ScenarioLayers) -> Card:
     _, rows, draw = _problem(value.nominal)
     more = {"scenarios": len(value.scenes), "aim over them": str(value.aim)}
     return Card("Problem over scenarios: which nodes to hold", {**rows, **more}, draw)
 
 
 @facts.register
-def _free_problem(value: FreeProblem) -> Card:
+def _free_problem(value: States) -> Card:
     scene, columns = value.network.scene, value.space.kinds
     team = sorted(robot for kind in columns for robot in kind.robots)
     rows = {
@@ -196,7 +196,7 @@ def _free_problem(value: FreeProblem) -> Card:
 
 
 @facts.register
-def _order_problem(value: OrderProblem) -> Card:
+def _order_problem(value: AllOrders) -> Card:
     _, rows, draw = _free_problem(value.free)
     name = "Problem of the order: which brick next, by whom, and where"
     return Card(name, {**rows, "orders": value.among.value}, draw)

@@ -6,7 +6,7 @@ from importlib import resources
 
 import pandas as pd
 
-from seqopt.graph.layers.layers import Problem
+from seqopt.graph.layers.layers import Layers
 from seqopt.responses.quantities import RESPONSES
 from seqopt.responses.table import support_columns
 from seqopt.scene.scene import Scene
@@ -77,7 +77,7 @@ def published_plan(scene: Scene) -> tuple[Step, ...]:
     return parse_plan(scene, source.read_text(encoding="utf-8"), "published three-robot plan")
 
 
-def published_choice(problem: Problem) -> tuple[int, ...]:
+def published_choice(problem: Layers) -> tuple[int, ...]:
     """Return what the published plan chooses for the moves of the three-robot loop.
 
     ``problem``: the loop on the arch of Bruun et al. Result: index of the published node among the

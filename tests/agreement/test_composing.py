@@ -18,7 +18,7 @@ from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import find_mortar
 from seqopt.errors import InfeasibleError, StepError
 from seqopt.graph.scenarios.scenarios import robust
-from seqopt.graph.states.states import pose_free, within
+from seqopt.graph.states.states import build_states, within
 from seqopt.plan.calling.formulation import FormulationKind
 from seqopt.plan.calling.schedule_formulation import (
     Finds,
@@ -209,7 +209,7 @@ def test_everything_goes_with_everything(name, data):
     spent = [each[-1] for each in plans]
     caps = [float(np.quantile(spent, pick(0.0, 0.5)))] if capped and plans else []
     best = best_of(plans, len(words), caps)
-    problem = pose_free(
+    problem = build_states(
         *(engines_of(name, 0)[0], rules, ONES, aim),
         limits=[Limit(response, bound)],
         stands=mortar or None,
@@ -246,7 +246,7 @@ def test_a_plan_that_is_not_the_best_is_seen():
     """The control: another best than that of every path is refused."""
     plans = every_path("own", "", lambda *each: state("own", 0, "", each), ("minmax", "steps"))
     best = best_of(list(plans), 2, [])
-    problem = pose_free(engines_of("own", 0)[0], rules_of("own", ""), ONES, "minmax,steps")
+    problem = build_states(engines_of("own", 0)[0], rules_of("own", ""), ONES, "minmax,steps")
     agree(problem, PLANS[0], best, 2)
     for wrong in ([0.9 * best[0], best[1]], [1.1 * best[0], best[1]], [best[0], best[1] - 1]):
         with pytest.raises(AssertionError):

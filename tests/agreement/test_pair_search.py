@@ -16,7 +16,7 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.graph.layers.costs import LayeredCosts
 from seqopt.graph.layers.interface import Aim, CostProblem
-from seqopt.graph.layers.layers import pose
+from seqopt.graph.layers.layers import candidate_layers
 from seqopt.graph.layers.partial_costs import PartialCosts, least_possible
 from seqopt.network.build import build_network
 from seqopt.plan.calling.formulation import End, Selection
@@ -42,7 +42,7 @@ OWN = StepCost("squares", ("F_largest", "T_max"), squares, least=0.5)
 
 
 def posed(engine, criterion, limits=()):
-    return pose(engine, three_robot_loop(engine.network), criterion, limits)
+    return candidate_layers(engine, three_robot_loop(engine.network), criterion, limits)
 
 
 QUICK = {("overlap_dp", CONDITIONAL), ("minimax", WORST_RATIO), ("overlap_dp", OWN)}

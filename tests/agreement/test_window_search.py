@@ -8,7 +8,7 @@ from hypothesis import given
 from seqopt.engines.interface import Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import SolverError, TimeUpError
-from seqopt.graph.layers.layers import pose
+from seqopt.graph.layers.layers import candidate_layers
 from seqopt.network.build import build_network
 from seqopt.plan.calling.watch import Watch
 from seqopt.plan.search.window_search import search_windows
@@ -55,10 +55,10 @@ class Counting:
 def test_it_chooses_as_the_cascade_does(engine25, method, criterion):
     schedule = SCHEDULES[method](engine25.network)
     counting = Counting(engine25)
-    asked = pose(counting, schedule, CRITERIA[criterion])
+    asked = candidate_layers(counting, schedule, CRITERIA[criterion])
     counting.sets = 0  # some criteria ask for the scene's methods when they are posed
     found = solve(asked, "cascade", proof=False)
-    problem = pose(engine25, schedule, CRITERIA[criterion])
+    problem = candidate_layers(engine25, schedule, CRITERIA[criterion])
     for name, options in (("rank_search", {"horizon": 1}), ("cascade", {})):
         plan = solve(problem, name, **options)
         assert found.nodes == plan.nodes
@@ -74,24 +74,24 @@ def test_it_chooses_as_the_cascade_does(engine25, method, criterion):
 @pytest.mark.parametrize(("response", "bound"), [("F_largest", 300), ("M_sup", 12), ("T_max", 80)])
 def test_under_a_limit_that_binds_it_chooses_as_the_cascade_does(engine25, response, bound):
     schedule, limits = three_robot_loop(engine25.network), [Limit(response, bound)]
-    problem = pose(engine25, schedule, EQUATIONS, limits)
+    problem = candidate_layers(engine25, schedule, EQUATIONS, limits)
     found = search_windows(problem)
     assert found.choice == solve(problem, "cascade").selection.choice
-    assert found.choice != search_windows(pose(engine25, schedule, EQUATIONS)).choice
+    assert found.choice != search_windows(candidate_layers(engine25, schedule, EQUATIONS)).choice
 
 
 @given(scene=arches(min_bricks=4, max_bricks=7).map(far_reaching))
 def test_on_any_chain_it_chooses_as_the_cascade_does(scene):
     engine = ComplianceEngine(build_network(scene))
     schedule = three_robot_loop(engine.network)
-    problem = pose(engine, schedule, WEIGHTED)
+    problem = candidate_layers(engine, schedule, WEIGHTED)
     found = search_windows(problem)
     assert found.choice == solve(problem, "cascade").selection.choice
 
 
 def test_a_time_limit_ends_it_and_says_what_was_chosen(engine25):
     """An hour is enough; of no time every moment is the last."""
-    problem = pose(engine25, three_robot_loop(engine25.network), EQUATIONS)
+    problem = candidate_layers(engine25, three_robot_loop(engine25.network), EQUATIONS)
     plan = solve(problem, "cascade", proof=False, time_limit=3600.0)
     assert plan.nodes == solve(problem, "cascade", proof=False).nodes
     with pytest.raises(TimeUpError, match=r"^.* s: no move was chosen yet; give more"):

@@ -24,7 +24,7 @@ from seqopt.engines.rigid.refinement import Corrector, Refinement, held_operator
 from seqopt.engines.rigid.trial import solve_batch
 from seqopt.engines.rigid.ungripped import ungripped_system
 from seqopt.errors import MechanismError, SolverError
-from seqopt.graph.layers.layers import pose
+from seqopt.graph.layers.layers import candidate_layers
 from seqopt.network.build import build_network
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.sequence.three_robots import three_robot_loop
@@ -75,7 +75,7 @@ def test_a_torsion_free_joint_matters_only_where_it_acts(arch25, engine25, monke
 def test_an_arch_with_a_torsion_free_joint_is_posed_together(arch25, together):
     """It took 49 s, set by set, and now solves none on its own."""
     net = build_network(torsion_free(arch25, TWISTED))
-    problem = pose(ComplianceEngine(net), three_robot_loop(net), EQUATIONS)
+    problem = candidate_layers(ComplianceEngine(net), three_robot_loop(net), EQUATIONS)
     assert all(np.isfinite(cost).any() for cost in problem.sums.single)
 
 

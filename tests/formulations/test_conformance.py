@@ -16,7 +16,7 @@ from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.graph.layers.budgets import robot_use, steps_over, travel
 from seqopt.graph.layers.costs import Budget, LayeredCosts
 from seqopt.graph.layers.interface import Aim, CostProblem
-from seqopt.graph.layers.layers import pose
+from seqopt.graph.layers.layers import candidate_layers
 from seqopt.network.build import build_network
 from seqopt.plan.calling.formulation import (
     End,
@@ -299,7 +299,7 @@ def test_prices_are_slopes_of_the_bound(name, problem):
 @pytest.mark.parametrize("criterion", CRITERIA.values(), ids=CRITERIA)
 @pytest.mark.parametrize("method", SCHEDULES)
 def test_exact_ones_agree_on_the_reference_arch(engine25, criterion, method):
-    problem = pose(engine25, SCHEDULES[method](engine25.network), criterion)
+    problem = candidate_layers(engine25, SCHEDULES[method](engine25.network), criterion)
     values = [solve(problem, ALL[name]).certificate.objective for name in EXACT_SUMS]
     assert len(values) == 5
     assert np.ptp(values) <= 1e-6 * max(values)
@@ -312,7 +312,7 @@ def test_exact_ones_agree_on_the_reference_arch(engine25, criterion, method):
 @pytest.mark.parametrize("criterion", CRITERIA.values(), ids=CRITERIA)
 def test_all_exact_ones_equal_brute_force_on_small_arches(count, criterion):
     engine = ComplianceEngine(build_network(small_arch(count)))
-    problem = pose(engine, three_robot_loop(engine.network), criterion)
+    problem = candidate_layers(engine, three_robot_loop(engine.network), criterion)
     best = solve(problem, ALL["rank_search"], horizon=count).certificate.objective
     assert best == pytest.approx(brute_force(problem, Aim.SUM))
     for name in EXACT_SUMS:
@@ -350,10 +350,12 @@ def test_a_longer_horizon_and_a_wider_beam_serve(problem25):
 
 def test_limits_hold_or_are_infeasible(engine25):
     schedule = three_robot_loop(engine25.network)
-    best = solve(pose(engine25, schedule, WORST_RATIO), ALL["minimax"]).certificate.objective
+    best = solve(
+        candidate_layers(engine25, schedule, WORST_RATIO), ALL["minimax"]
+    ).certificate.objective
     for factor in (1.001, 0.999):
         limits = [Limit(name, factor * best * bound) for name, bound in WORST_RATIO.limits]
-        problem = pose(engine25, schedule, EQUATIONS, limits)
+        problem = candidate_layers(engine25, schedule, EQUATIONS, limits)
         if factor > 1:
             choice = solve(problem, ALL["overlap_dp"]).selection.choice
             for choices in problem.evaluation.steps:

@@ -14,7 +14,7 @@ from formulations.states.on_graph import Choice, on_graph, on_paths, worth
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError, TimeUpError
 from seqopt.graph.paths import fewest_moves, lexicographic
-from seqopt.graph.states.states import pose_free
+from seqopt.graph.states.states import build_states
 from seqopt.graph.states.visits import explore
 from seqopt.network.build import build_network
 from seqopt.plan.calling.formulation import FormulationKind
@@ -53,7 +53,7 @@ def known(size, aim):
 
 
 def posed(aim, size=(4, 2), **words):
-    return pose_free(*small(*size), ONES, aim, **words)
+    return build_states(*small(*size), ONES, aim, **words)
 
 
 def check(name, problem, best):
@@ -95,7 +95,7 @@ def test_all_agree_with_brute_force_under_any_rules(build):
     for aim in ("minmax,steps", "regrips,sum"):
         best = best_values(engine, rules, aim)
         for name in ALL:
-            check(name, pose_free(engine, rules, ONES, aim), best)
+            check(name, build_states(engine, rules, ONES, aim), best)
 
 
 @pytest.mark.parametrize("module", ["path_dp", "path_labels", "best_first", "flow_lp", "flow_mip"])

@@ -15,10 +15,10 @@ from formulations.states.order_search import FORMULATION
 from seqopt.contact.mortar import find_mortar
 from seqopt.errors import InfeasibleError, ProblemError, SolverError, TimeUpError
 from seqopt.graph.orders.bound import whole_bound
-from seqopt.graph.orders.orders import OrderProblem, OrderSelection
+from seqopt.graph.orders.orders import AllOrders, OrderSelection
 from seqopt.graph.orders.work import trying
 from seqopt.graph.scenarios.scenarios import robust
-from seqopt.graph.states.states import pose_free, within
+from seqopt.graph.states.states import build_states, within
 from seqopt.plan.calling.schedule_formulation import find_schedule_formulation
 from seqopt.plan.judge.orders import finds_better_order
 from seqopt.plan.order_plan import solve_order
@@ -38,7 +38,7 @@ ONES = WorstRatio("ones", (("F_largest", 100.0), ("M_sup", 10.0), ("T_max", 30.0
 
 def posed(scene, rules=None, aim="minmax", among="tied", limits=()):
     engine = seqopt.make_engine("compliance", scene)
-    return OrderProblem(pose_free(engine, rules or FreeRules(), ONES, aim, limits), among)
+    return AllOrders(build_states(engine, rules or FreeRules(), ONES, aim, limits), among)
 
 
 def brute_force(problem):
@@ -130,7 +130,7 @@ def test_the_proof_knows_the_best_of_all_orders(build):
 def test_the_proof_of_orders_knows_what_must_stand():
     """What is demanded of stability holds in every order, where bricks have other places."""
     problem = posed(small_arch(4))
-    standing = OrderProblem(replace(problem.free, standing=Standing(find_mortar("dry"))))
+    standing = AllOrders(replace(problem.free, standing=Standing(find_mortar("dry"))))
     worths = brute_force(standing)
     least = min(worths.values())
     assert finds_better_order(standing, least * (1 - 1e-9)) is False
@@ -189,8 +189,8 @@ def test_a_criterion_that_cannot_be_sent_is_named():
         free, criterion=StepCost("mine", ("F_largest",), lambda found, _: found["F_largest"])
     )
     with pytest.raises(ProblemError, match="criterion mine: it cannot be sent"):
-        trying(OrderProblem(own), elsewhere=True)
-    assert callable(trying(OrderProblem(own), elsewhere=False))
+        trying(AllOrders(own), elsewhere=True)
+    assert callable(trying(AllOrders(own), elsewhere=False))
 
 
 def test_the_aims_after_the_first_are_those_of_the_plan():
@@ -314,7 +314,7 @@ def test_the_arch_of_the_paper_in_its_best_order(arch25):
     """Two bricks from one end, the rest from the other: 0.7693 instead of 0.8401."""
     criterion = seqopt.CRITERIA["worst-ratio-published"]
     engine = seqopt.make_engine("compliance", arch25)
-    found = solve_order(OrderProblem(pose_free(engine, FreeRules(), criterion)), FORMULATION)
+    found = solve_order(AllOrders(build_states(engine, FreeRules(), criterion)), FORMULATION)
     assert found.status == "optimal"
     assert found.selection.objective == pytest.approx(0.76929, abs=1e-5)
     assert found.order == (1, 2, *range(25, 2, -1))

@@ -21,7 +21,7 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError, StepError, TimeUpError
 from seqopt.graph.paths import fewest_moves, keep_best, reached
 from seqopt.graph.states.counts import steps_with, with_held
-from seqopt.graph.states.states import pose_free
+from seqopt.graph.states.states import build_states
 from seqopt.graph.states.visits import explore
 from seqopt.network.build import build_network
 from seqopt.plan.calling.schedule_formulation import Finds, find_schedule_formulation
@@ -62,7 +62,7 @@ def check_against_brute_force(scene, rules):
     engine = ComplianceEngine(build_network(scene))
     best = brute_force(engine, rules)
     first, second, third = (
-        pose_free(engine, rules, ONES, aim)
+        build_states(engine, rules, ONES, aim)
         for aim in ("minmax,steps", "steps,minmax", "minmax,regrips")
     )
     if best is None:
@@ -97,7 +97,7 @@ def test_over_scenarios_it_equals_brute_force(build):
     costs = {n: max(peaks(g)[n] for g, _ in graphs) for n in common if n != "end"}
     best = least_peak(common, graphs[0][1], costs) if "end" in common else None
     engine = seqopt.make_engine("compliance", build_network(scene))
-    problem = seqopt.robust(pose_free(engine, rules, ONES, "minmax,steps"), scenes, "worst-peak")
+    problem = seqopt.robust(build_states(engine, rules, ONES, "minmax,steps"), scenes, "worst-peak")
     if best is None:
         with pytest.raises(InfeasibleError, match="free schedule: "):
             seqopt.solve(problem, "schedule_search")
@@ -151,7 +151,7 @@ def test_pareto_sets_equal_brute_force(build):
     scene, rules = build
     engine = ComplianceEngine(build_network(scene))
     step = np.array([5.0, 2.0])
-    problem = pose_free(engine, rules, ONES, "F_largest,M_sup")
+    problem = build_states(engine, rules, ONES, "F_largest,M_sup")
     expected = brute_front(engine, rules, step)
     front = FreeFront(problem, {"F_largest": 5.0, "M_sup": 2.0})
     if not expected:
@@ -195,7 +195,7 @@ def test_steps_and_regrips_in_one_set_equal_brute_force(build):
     }
     expected = counted_front(graph, start, worst)
     for aim in ("F_largest,steps,regrips", "regrips,F_largest,steps"):
-        front = FreeFront(pose_free(engine, rules, ONES, aim), {"F_largest": 10.0})
+        front = FreeFront(build_states(engine, rules, ONES, aim), {"F_largest": 10.0})
         if not expected:
             with pytest.raises(InfeasibleError):
                 find_front(front)
@@ -209,7 +209,7 @@ def test_steps_and_regrips_in_one_set_equal_brute_force(build):
 def test_who_holds_more_at_the_end_has_fewer_steps():
     """Of every number of grips held at the end the plan with the fewest moves, step by step."""
     for rules in (FreeRules(least_grips=1), FreeRules(least_grips=1, ending="held")):
-        problem = pose_free(
+        problem = build_states(
             ComplianceEngine(build_network(with_robots(small_arch(4), 4))), rules, ONES, "regrips"
         )
         found = []
@@ -237,7 +237,7 @@ def test_corners_hold_what_no_point_dominates(points, z):
 
 @pytest.fixture(scope="module")
 def arch(engine25):
-    return pose_free(engine25, FreeRules(), seqopt.CRITERIA["worst-ratio-published"], "minmax")
+    return build_states(engine25, FreeRules(), seqopt.CRITERIA["worst-ratio-published"], "minmax")
 
 
 def test_the_arch_of_the_paper(arch):
@@ -251,7 +251,7 @@ def test_the_arch_of_the_paper(arch):
 
 def test_fewest_steps_that_beat_every_published_maximum(arch, engine25):
     limits = [Limit(name, bound) for name, bound in arch.criterion.limits]
-    problem = pose_free(engine25, FreeRules(), arch.criterion, "steps,regrips,minmax", limits)
+    problem = build_states(engine25, FreeRules(), arch.criterion, "steps,regrips,minmax", limits)
     plan = seqopt.solve(problem, "schedule_search")
     assert plan.certificate.objective == pytest.approx((48, 0, 0.88289), abs=1e-5)
     assert plan.summary()["steps_before_release"] == 47
@@ -259,7 +259,7 @@ def test_fewest_steps_that_beat_every_published_maximum(arch, engine25):
 
 def pose_goals(text):
     engine = ComplianceEngine(build_network(small_arch(4)))
-    return pose_free(engine, FreeRules(), ONES, text).goals
+    return build_states(engine, FreeRules(), ONES, text).goals
 
 
 def test_all_states_of_the_arch_are_counted(arch):
@@ -303,7 +303,7 @@ def test_where_memory_ends_there_is_a_bound(arch):
 
 def test_travel_is_that_of_the_steps():
     network = build_network(with_robots(small_arch(5), 4))
-    problem = pose_free(ComplianceEngine(network), FreeRules(), ONES, "minmax,travel")
+    problem = build_states(ComplianceEngine(network), FreeRules(), ONES, "minmax,travel")
     plan = seqopt.solve(problem, "schedule_search")  # its certificate recomputes both
     scene = network.scene
     ways = 0.0
@@ -321,7 +321,7 @@ def test_what_opens_a_way_is_asked_of_rigid_bricks(arch25):
     engine = AutoEngine(arch25)
     two = FreeRules(robots=("rob1", "rob2"), least_grips=1)
     with pytest.raises(InfeasibleError, match=r"brick 25 .* with payload=ignored"):
-        seqopt.solve(pose_free(engine, two, ONES, "steps"), "schedule_search")
+        seqopt.solve(build_states(engine, two, ONES, "steps"), "schedule_search")
     assert {choice.level for choice in engine.tally} == {Level.RIGID}
     far = engine.rigid.solve(24, [[1]], Want.JOINTS).joint_wrench  # a state on the way
     assert find_elastic_limits(engine.network, EPOXY).exceeded(far).all()
@@ -348,7 +348,7 @@ class Clock:
 def test_a_time_limit_holds_while_it_is_asked_what_helps(monkeypatch, limit, said):
     """What is known by then is said."""
     engine = ComplianceEngine(build_network(small_arch(5)))
-    problem = pose_free(engine, FreeRules(), ONES, "steps", [Limit("F_largest", 1.0)])
+    problem = build_states(engine, FreeRules(), ONES, "steps", [Limit("F_largest", 1.0)])
     monkeypatch.setattr("seqopt.plan.judge.infeasible.time", Clock())
     with pytest.raises(InfeasibleError, match=said):
         seqopt.solve(problem, "schedule_search", time_limit=limit)
@@ -362,7 +362,7 @@ def test_refusals_name_the_brick_and_what_opens_a_way(arch, engine25):
     )
     with pytest.raises(InfeasibleError, match=said):
         seqopt.solve(replace(arch, rules=two), "schedule_search")
-    tight = pose_free(engine25, FreeRules(), ONES, "steps", [Limit("F_largest", 200.0)])
+    tight = build_states(engine25, FreeRules(), ONES, "steps", [Limit("F_largest", 200.0)])
     with pytest.raises(InfeasibleError, match=r"F_largest=216\.005 instead of 200"):
         seqopt.solve(tight, "schedule_search")
     enough = [Limit("F_largest", 216.006)]
@@ -385,18 +385,18 @@ def test_the_front_of_the_arch_rounded(arch):
 
 
 def test_steps_can_be_among_what_is_to_be_small(arch, engine25):
-    problem = pose_free(engine25, FreeRules(), arch.criterion, "F_largest,M_sup,steps")
+    problem = build_states(engine25, FreeRules(), arch.criterion, "F_largest,M_sup,steps")
     front = find_front(FreeFront(problem, {"F_largest": 10.0, "M_sup": 2.0}))
     steps = front.table["steps"].to_numpy()
     assert steps.min() == 48
     assert len({*steps}) > 1
     with pytest.raises(ProblemError, match="pareto: travel adds up along a plan"):
-        FreeFront(pose_free(engine25, FreeRules(), arch.criterion, "steps,travel"))
+        FreeFront(build_states(engine25, FreeRules(), arch.criterion, "steps,travel"))
 
 
 def test_the_front_of_the_loop_holds_its_best_peak(engine25):
     loop = three_robot_loop(engine25.network)
-    posed = pose_free(engine25, loop, ONES, "F_largest,M_sup")
+    posed = build_states(engine25, loop, ONES, "F_largest,M_sup")
     front = find_front(FreeFront(posed, rounding={"F_largest": 5.0}))
     assert front.complete
     alone = seqopt.solve(
@@ -411,7 +411,7 @@ def test_the_pareto_set_of_a_schedule_with_closed_steps_equals_brute_force(count
     """Where a step without an open grip decides, less in the open ones is worth nothing."""
     engine = ComplianceEngine(build_network(small_arch(count)))
     loop = modified_sequential(engine.network)
-    problem = pose_free(engine, loop, ONES, "T_max,F_largest")
+    problem = build_states(engine, loop, ONES, "T_max,F_largest")
     front, values = find_front(FreeFront(problem)), set()
     for nodes in product(*(move.candidates for move in loop.moves)):
         with contextlib.suppress(StepError):
@@ -426,7 +426,7 @@ def test_the_short_cut_does_what_the_long_way_does():
     scene, limits = small_arch(5), [Limit("F_largest", 250.0)]
     rules = FreeRules(ending="held")
     engine = ComplianceEngine(build_network(with_robots(scene, 4)))
-    problem = pose_free(engine, rules, ONES, "minmax,steps", limits, "bond=1e5")
+    problem = build_states(engine, rules, ONES, "minmax,steps", limits, "bond=1e5")
     plan = seqopt.solve(problem, "schedule_search")
     words = {"aim": "minmax,steps", "rules": rules, "robots": 4, "stands": "bond=1e5"}
     short = seqopt.optimize(scene, "free", ONES, engine="compliance", limits=limits, **words)

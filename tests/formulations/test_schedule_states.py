@@ -14,7 +14,7 @@ from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import DRY, find_mortar
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError, StepError
-from seqopt.graph.states.states import pose_free, within
+from seqopt.graph.states.states import build_states, within
 from seqopt.network.build import build_network
 from seqopt.plan.judge.schedules import judge_schedule
 from seqopt.problem.criteria import WorstRatio
@@ -97,7 +97,7 @@ def test_every_aim_equals_brute_force(name):
     scene = engine.network.scene
     assert len(plans) > 10
     for aim in ("minmax", "sum", "minmax,travel", "travel,sum(M_sup)", "T_max,steps", "steps,sum"):
-        plan = seqopt.solve(pose_free(engine, schedule, ONES, aim), "schedule_search")
+        plan = seqopt.solve(build_states(engine, schedule, ONES, aim), "schedule_search")
         best = list(plan.selection.objective)
         left = [goals(aim, scene, *each) for each in plans]
         for k, value in enumerate(best):
@@ -117,10 +117,10 @@ def test_limits_equal_brute_force(name):
     worst = sorted({goals("T_max,sum", scene, *each) for each in plans})
     bound = worst[len(worst) // 3][0]
     least = min(total for tension, total in worst if tension <= bound)
-    limited = pose_free(engine, schedule, ONES, "sum", [Limit("T_max", bound)])
+    limited = build_states(engine, schedule, ONES, "sum", [Limit("T_max", bound)])
     found = seqopt.solve(limited, "schedule_search")
     assert found.selection.objective[0] == pytest.approx(least, rel=1e-7)
-    none = pose_free(engine, schedule, ONES, "sum", [Limit("T_max", 0.999 * worst[0][0])])
+    none = build_states(engine, schedule, ONES, "sum", [Limit("T_max", 0.999 * worst[0][0])])
     with pytest.raises(InfeasibleError, match=r"it becomes possible with T_max="):
         seqopt.solve(none, "schedule_search")
 
@@ -134,7 +134,7 @@ def test_budgets_equal_brute_force(name):
     known = np.array([goals("minmax,sum,travel,sum(M_sup)", scene, *each) for each in plans])
     for cap in np.quantile(known[:, 2], [0.05, 0.4]):
         able = known[known[:, 2] <= cap]
-        problem = within(pose_free(engine, schedule, ONES, "minmax,sum"), {"travel": cap})
+        problem = within(build_states(engine, schedule, ONES, "minmax,sum"), {"travel": cap})
         plan = seqopt.solve(problem, "schedule_search")
         value, total, travelled = plan.selection.objective
         assert value == pytest.approx(able[:, 0].min(), rel=1e-7)
@@ -147,14 +147,14 @@ def test_budgets_equal_brute_force(name):
         assert gap == pytest.approx(1 - bound / total, abs=1e-9)
         assert plan.status == ("optimal" if gap <= 1e-6 else "feasible")
         both = {"travel": cap, "sum(M_sup)": np.median(able[:, 3])}
-        plan = seqopt.solve(within(pose_free(engine, schedule, ONES, "minmax"), both), SEARCH)
+        plan = seqopt.solve(within(build_states(engine, schedule, ONES, "minmax"), both), SEARCH)
         within_both = able[able[:, 3] <= both["sum(M_sup)"]]
         assert plan.certificate.bound[0] <= within_both[:, 0].min() * (1 + 1e-9)
         assert plan.selection.objective[0] >= within_both[:, 0].min() * (1 - 1e-9)
         spent = dict(zip(map(str, plan.problem.goals), plan.selection.objective, strict=True))
         assert all(spent[word] <= cap * (1 + 1e-9) for word, cap in both.items())
     fewest = known[:, 3].min()
-    few = within(pose_free(engine, schedule, ONES, "minmax"), {"sum(M_sup)": 0.9 * fewest})
+    few = within(build_states(engine, schedule, ONES, "minmax"), {"sum(M_sup)": 0.9 * fewest})
     least = re.escape(f"sum(M_sup) is at least {fewest:.6g}, and")
     with pytest.raises(InfeasibleError, match=least):
         seqopt.solve(few, SEARCH)
@@ -163,7 +163,7 @@ def test_budgets_equal_brute_force(name):
 def test_the_judge_of_budgets_has_prices_of_its_own_to_check():
     """The control: no prices, wrong prices and a bound that is too high are seen."""
     engine, schedule = built("four")
-    problem = within(pose_free(engine, schedule, ONES, "sum"), {"travel": 3.0})
+    problem = within(build_states(engine, schedule, ONES, "sum"), {"travel": 3.0})
     plan = seqopt.solve(problem, SEARCH)
     judge_schedule(problem, plan.selection, plan.steps)
     for wrong, said in (
@@ -197,7 +197,7 @@ def test_what_stands_equals_brute_force(name, mortar):
         for steps, table in every_plan(engine, schedule)
         if all(map(stands, steps))
     ]
-    problem = pose_free(engine, schedule, ONES, "minmax,sum", stands=mortar)
+    problem = build_states(engine, schedule, ONES, "minmax,sum", stands=mortar)
     assert bool(able) == (mortar == "bond=2e4" or name == "four")
     if able:
         found = seqopt.solve(problem, "schedule_search")
@@ -222,7 +222,7 @@ def test_one_call_and_loops_of_costs_agree_where_both_are_asked():
 def test_the_judge_sees_a_worse_plan_and_one_of_another_schedule():
     """The control: the second best is refused, and so are steps that the schedule has not."""
     engine, schedule = built("three-robot")
-    problem = pose_free(engine, schedule, ONES, "sum")
+    problem = build_states(engine, schedule, ONES, "sum")
     found = seqopt.solve(problem, "schedule_search")
     scene = engine.network.scene
     plans = [(goals("sum", scene, *each)[0], each[0]) for each in every_plan(engine, schedule)]
@@ -241,4 +241,4 @@ def test_what_does_not_go_together_is_said_in_a_line():
     with pytest.raises(StepError, match=r"open at once; .* give an aim"):
         seqopt.pose(engine, schedule, ONES)
     with pytest.raises(ProblemError, match="ranks the choices of a move"):
-        pose_free(engine, schedule, seqopt.CRITERIA["equations-2-3"], "sum")
+        build_states(engine, schedule, seqopt.CRITERIA["equations-2-3"], "sum")

@@ -18,7 +18,7 @@ from seqopt.contact.mortar import DRY, find_mortar
 from seqopt.engines.interface import Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, MechanismError, ProblemError, SceneError, SolverError
-from seqopt.graph.states.states import pose_free
+from seqopt.graph.states.states import build_states
 from seqopt.network.build import build_network
 from seqopt.plan.free_front import FreeFront
 from seqopt.plan.front import find_front
@@ -91,7 +91,7 @@ def brute_force(engine, rules, mortar):
 def check(scene, rules, mortar="dry"):
     engine = ComplianceEngine(build_network(scene))
     best = brute_force(engine, rules, find_mortar(mortar))
-    problem = pose_free(engine, rules, ONES, "minmax", stands=mortar)
+    problem = build_states(engine, rules, ONES, "minmax", stands=mortar)
     if best is None:
         with pytest.raises(InfeasibleError, match="free schedule: "):
             seqopt.solve(problem, "schedule_search")
@@ -123,7 +123,7 @@ def test_it_equals_brute_force(build):
 @pytest.fixture(scope="module")
 def dry():
     engine = ComplianceEngine(build_network(small_arch(5)))
-    return pose_free(engine, FreeRules(), ONES, "minmax", stands="dry")
+    return build_states(engine, FreeRules(), ONES, "minmax", stands="dry")
 
 
 def test_a_plan_that_does_not_stand_is_seen(dry):
@@ -156,14 +156,14 @@ def test_a_better_plan_that_stands_is_seen(dry):
 )
 def test_a_margin_is_the_best_to_its_width(dry, aim):
     """With the value that was found a plan exists; past the bound none does."""
-    problem = pose_free(dry.engine, dry.rules, ONES, aim)
+    problem = build_states(dry.engine, dry.rules, ONES, aim)
     plan = seqopt.solve(problem, "schedule_search")
     name, (value, *_), (bound, *_) = (
         aim.split(",")[0],
         *((plan.certificate.objective, plan.certificate.bound)),
     )
     assert bound <= value
-    rest = pose_free(dry.engine, dry.rules, ONES, "steps")
+    rest = build_states(dry.engine, dry.rules, ONES, "steps")
     asked = Standing().demanding(name, value)
     assert seqopt.solve(replace(rest, standing=asked), "schedule_search").steps
     if bound < value:
@@ -178,7 +178,7 @@ def leaning(scale=1.0, stands=None, aim="bond"):
         seqopt.ArchShape(pitch=(1.2, 0.0, -1.2), pattern="VLR", density=2000.0 * scale)
     )
     engine = ComplianceEngine(build_network(scene))
-    return pose_free(engine, FreeRules(), ONES, aim, stands=stands)
+    return build_states(engine, FreeRules(), ONES, aim, stands=stands)
 
 
 @pytest.mark.parametrize(
@@ -218,20 +218,20 @@ def test_demands_that_others_imply_are_not_asked():
 
 
 def test_margins_come_before_other_aims(dry):
-    problem = pose_free(dry.engine, dry.rules, ONES, "minmax,tilt")
+    problem = build_states(dry.engine, dry.rules, ONES, "minmax,tilt")
     with pytest.raises(ProblemError, match="name bond, friction and tilt before all others"):
         seqopt.solve(problem, "schedule_search")
 
 
 def test_a_robot_that_holds_anything_says_nothing_of_what_stands(dry):
     with pytest.raises(ProblemError, match="without a largest force holds up anything"):
-        pose_free(dry.engine, FreeRules(payload="ignored"), ONES, "minmax", stands="dry")
+        build_states(dry.engine, FreeRules(payload="ignored"), ONES, "minmax", stands="dry")
 
 
 def test_a_bond_that_opens_a_way_is_named():
     engine = ComplianceEngine(build_network(small_arch(6)))
     rules = FreeRules(robots=("rob1", "rob2"), least_grips=0)
-    problem = pose_free(engine, rules, ONES, "minmax", stands=Standing("dry", 0.0))
+    problem = build_states(engine, rules, ONES, "minmax", stands=Standing("dry", 0.0))
     problem = replace(problem, standing=Standing(replace(DRY, friction=0.05)))
     with pytest.raises(InfeasibleError, match=r"it becomes possible with .*a bond of [\d.e+]+ Pa"):
         seqopt.solve(problem, "schedule_search")
@@ -241,10 +241,10 @@ def test_the_bond_that_is_named_is_enough():
     engine = ComplianceEngine(build_network(small_arch(6)))
     loop = three_robot_loop(engine.network)
     with pytest.raises(InfeasibleError, match="a bond of") as caught:
-        seqopt.solve(pose_free(engine, loop, ONES, "minmax", stands="dry"), "schedule_search")
+        seqopt.solve(build_states(engine, loop, ONES, "minmax", stands="dry"), "schedule_search")
     said = float(re.search(r"a bond of ([\d.e+]+) Pa", str(caught.value))[1])
     strong, weak = (
-        pose_free(engine, loop, ONES, "minmax", stands=f"bond={bond}")
+        build_states(engine, loop, ONES, "minmax", stands=f"bond={bond}")
         for bond in (said, 0.9 * said)
     )
     assert seqopt.solve(strong, "schedule_search").status == "optimal"
@@ -272,7 +272,7 @@ def test_tilts_by_steps_are_those_of_the_program(dry):
 
 @pytest.mark.slow
 def test_pareto_sets_with_a_margin(dry):
-    problem = pose_free(dry.engine, dry.rules, ONES, "F_largest,bond")
+    problem = build_states(dry.engine, dry.rules, ONES, "F_largest,bond")
     front = find_front(FreeFront(problem, {"F_largest": 10.0, "bond": 500.0}))
     assert front.complete
     assert (front.table["bond"] % 500 == 0).all()
@@ -282,7 +282,7 @@ def test_pareto_sets_with_a_margin(dry):
 @pytest.mark.slow
 def test_the_arch_is_built_dry(engine25):
     criterion = seqopt.CRITERIA["worst-ratio-published"]
-    problem = pose_free(engine25, FreeRules(), criterion, "steps,minmax", stands="dry")
+    problem = build_states(engine25, FreeRules(), criterion, "steps,minmax", stands="dry")
     plan = seqopt.solve(problem, "schedule_search")
     assert plan.certificate.objective == pytest.approx((48, 0.919157), abs=1e-5)
     assert set(plan.stability()["verdict"]) == {"stands"}

@@ -8,7 +8,7 @@ from itertools import pairwise, product
 import numpy as np
 import pytest
 
-from formulations import (
+from formulations.layers import (
     assignment_loose,
     assignment_tight,
     minimax_arc,

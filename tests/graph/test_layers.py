@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import rankdata
 
-from seqopt.graph.layers.layers import pose
+from seqopt.graph.layers.layers import candidate_layers
 from seqopt.graph.layers.ranking import move_costs, rank_moves
 from seqopt.plan.solving import solve
 from seqopt.plan.tables import choice_table
@@ -22,7 +22,7 @@ from seqopt.study.published import paper_models, published_choice
 
 def test_a_third_support_ends_twisting(engine25):
     schedule = modified_sequential(engine25.network)
-    problem = pose(engine25, schedule, EQUATIONS)
+    problem = candidate_layers(engine25, schedule, EQUATIONS)
     table = solve(problem, "cascade").responses()
     worst = 1e-6 * table["D_max_1e-3mm"].max()
     assert worst < 20e-6  # the sequential method reaches 306e-6 m
@@ -37,7 +37,7 @@ def test_models(problem25):
 
 def test_payloads_can_be_kept(engine25, loop25):
     """The printed equations overload no robot once its payload is a limit."""
-    problem = pose(engine25, loop25, EQUATIONS, payload_limits(loop25.scene))
+    problem = candidate_layers(engine25, loop25, EQUATIONS, payload_limits(loop25.scene))
     plan = solve(problem, "overlap_dp").responses()
     forces = plan[["F_rob1_N", "F_rob2_N", "F_rob3_N"]].to_numpy(float)
     assert np.nanmax(np.abs(forces)) <= 392.4
@@ -99,7 +99,7 @@ def test_ranking_diagnostics(problem25):
 def test_raw_values_do_not_reverse(engine25, loop25):
     """A cost that does not depend on the other candidates keeps its winner when one drops out."""
     for criterion in (WEIGHTED, WORST_RATIO):
-        table = rank_moves(pose(engine25, loop25, criterion), (0,) * 2 + (1,) * 20)
+        table = rank_moves(candidate_layers(engine25, loop25, criterion), (0,) * 2 + (1,) * 20)
         assert (table["turned_by_candidates"] == "").all()
 
 

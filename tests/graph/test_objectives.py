@@ -14,7 +14,7 @@ from scipy.stats import rankdata
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import ProblemError
 from seqopt.graph.layers.costs import LayeredCosts
-from seqopt.graph.layers.layers import pose
+from seqopt.graph.layers.layers import candidate_layers
 from seqopt.graph.layers.objectives import least_among_least, split_gap, under, under_both
 from seqopt.graph.layers.ranking import move_costs, rank_choice
 from seqopt.network.build import build_network
@@ -33,7 +33,7 @@ values = st.one_of(st.integers(0, 4).map(float), st.just(np.nan))
 
 def posed(count, criterion, limits=()):
     engine = ComplianceEngine(build_network(small_arch(count)))
-    return pose(engine, three_robot_loop(engine.network), criterion, limits)
+    return candidate_layers(engine, three_robot_loop(engine.network), criterion, limits)
 
 
 def rank_again(problem, choice):
@@ -92,7 +92,7 @@ def test_exact_ones_equal_brute_force_under_every_objective(count, ranked, among
 
 @pytest.mark.parametrize("among", Among)
 def test_the_conditional_objective_is_what_a_search_of_one_move_goes_by(engine25, loop25, among):
-    problem = pose(engine25, loop25, replace(CONDITIONAL, among=among))
+    problem = candidate_layers(engine25, loop25, replace(CONDITIONAL, among=among))
     choice = solve(problem, "cascade").selection.choice
     for k in range(len(choice)):
         before = choice[k - 1] if k else 0
@@ -125,7 +125,7 @@ def test_the_reference_arch_under_both(problem25):
 
 
 def test_under_the_conditional_objective_sight_is_all_that_is_lost(engine25, loop25):
-    problem = pose(engine25, loop25, CONDITIONAL)
+    problem = candidate_layers(engine25, loop25, CONDITIONAL)
     plan = solve(problem, "cascade")
     parts = split_gap(problem, plan.selection.choice)
     assert parts.objective == 0
@@ -137,14 +137,14 @@ def test_under_the_conditional_objective_sight_is_all_that_is_lost(engine25, loo
 def test_nodes_that_cannot_be_taken_change_ranks(engine25, loop25):
     first = {}
     for among in Among:
-        problem = pose(engine25, loop25, replace(EQUATIONS, among=among))
+        problem = candidate_layers(engine25, loop25, replace(EQUATIONS, among=among))
         ranks = rank_choice(problem, published_choice(problem))["rank_in_window"]
         first[among] = int((ranks == 1).sum())
     assert first == {Among.ALL: 10, Among.POSSIBLE: 11}
 
 
 def test_without_ranks_there_is_one_objective(engine25, loop25):
-    problem = pose(engine25, loop25, WEIGHTED)
+    problem = candidate_layers(engine25, loop25, WEIGHTED)
     choice = solve(problem, "cascade").selection.choice
     assert under_both(problem, choice) == {"pairs": None, "conditional": None}
     assert split_gap(problem, choice) is None
@@ -153,7 +153,7 @@ def test_without_ranks_there_is_one_objective(engine25, loop25):
 def test_limits_hold_under_both(engine25, loop25):
     limit = Limit("F_largest", 300.0)
     for ranked in Ranked:
-        problem = pose(engine25, loop25, replace(EQUATIONS, ranked=ranked), [limit])
+        problem = candidate_layers(engine25, loop25, replace(EQUATIONS, ranked=ranked), [limit])
         choice = solve(problem, "overlap_dp").selection.choice
         for step in problem.evaluation.steps:
             assert step.responses["F_largest"][tuple(choice[m] for m in step.moves)] <= 300.0
@@ -162,7 +162,7 @@ def test_limits_hold_under_both(engine25, loop25):
 
 
 def test_ranks_among_possible_candidates_need_all_models(engine25, loop25):
-    problem = pose(engine25, loop25, replace(EQUATIONS, among=Among.POSSIBLE))
+    problem = candidate_layers(engine25, loop25, replace(EQUATIONS, among=Among.POSSIBLE))
     with pytest.raises(ProblemError, match="rank among all, or ask for the proof"):
         solve(problem, "cascade", proof=False)
 

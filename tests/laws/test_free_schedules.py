@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError
-from seqopt.graph.states.states import pose_free
+from seqopt.graph.states.states import build_states
 from seqopt.network.build import build_network
 from seqopt.plan.solving import solve
 from seqopt.problem.criteria import WorstRatio
@@ -26,7 +26,7 @@ SCALES = (("F_largest", 100.0), ("M_sup", 10.0), ("T_max", 30.0), ("D_max", 1e-5
 def best(scene, rules, aim="minmax", scales=SCALES):
     """The optimum, infinite where there is none."""
     engine = ComplianceEngine(build_network(scene))
-    problem = pose_free(engine, rules, WorstRatio("ones", scales), aim)
+    problem = build_states(engine, rules, WorstRatio("ones", scales), aim)
     try:
         return np.array(solve(problem, "schedule_search").certificate.objective)
     except InfeasibleError:

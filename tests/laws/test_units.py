@@ -10,7 +10,7 @@ import pytest
 from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import DRY
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.graph.layers.layers import pose
+from seqopt.graph.layers.layers import candidate_layers
 from seqopt.network.build import build_network
 from seqopt.plan.calling.formulation import find_formulation
 from seqopt.plan.solving import solve
@@ -26,7 +26,7 @@ SCALES += [pytest.param(scales, marks=pytest.mark.slow) for scales in INVERSE]
 
 
 def solved(scene, criterion):
-    problem = pose(
+    problem = candidate_layers(
         ComplianceEngine(build_network(scene)), three_robot_loop(build_network(scene)), criterion
     )
     plan = solve(problem, find_formulation("overlap_dp"))

@@ -10,7 +10,7 @@ import pytest
 import seqopt
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import ProblemError, SeqoptError, SolverError, StepError
-from seqopt.graph.states.states import pose_free
+from seqopt.graph.states.states import build_states
 from seqopt.network.build import build_network
 from seqopt.plan.calling.formulation import FormulationKind
 from seqopt.plan.calling.schedule_formulation import (
@@ -32,7 +32,7 @@ ONES = WorstRatio("ones", (("F_largest", 100.0), ("M_sup", 10.0)))
 
 def posed(aim="minmax,steps", rules=None, limits=()):
     engine = ComplianceEngine(build_network(small_arch(5)))
-    return pose_free(engine, rules or FreeRules(), ONES, aim, limits)
+    return build_states(engine, rules or FreeRules(), ONES, aim, limits)
 
 
 @pytest.fixture(scope="module")
@@ -122,7 +122,7 @@ def test_what_cannot_be_posed_gets_one_line(arguments, said):
     engine = ComplianceEngine(build_network(small_arch(4)))
     given = {"criterion": ONES} | arguments
     with pytest.raises(ProblemError, match=said) as caught:
-        pose_free(engine, FreeRules(), **given)
+        build_states(engine, FreeRules(), **given)
     assert "\n" not in str(caught.value)
 
 
@@ -148,7 +148,7 @@ class Changed:
 @pytest.fixture(scope="module")
 def front_of(engine25):
     """Return the checked front of a changed answer."""
-    problem = pose_free(engine25, FreeRules(), ONES, "F_largest,M_sup")
+    problem = build_states(engine25, FreeRules(), ONES, "F_largest,M_sup")
     front = FreeFront(problem, {"F_largest": 20.0, "M_sup": 2.0})
 
     def judged(change):

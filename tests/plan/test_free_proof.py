@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError
-from seqopt.graph.states.states import pose_free
+from seqopt.graph.states.states import build_states
 from seqopt.network.build import build_network
 from seqopt.plan.judge.free_moves import RuleTables
 from seqopt.plan.judge.proof import Proof
@@ -73,7 +73,7 @@ def test_tables_say_what_the_book_says(build, data):
 def test_bounds_are_the_values_of_the_best_plan(aim, build, told):
     """Whatever states it is told of; and of a worse plan they are less than its values."""
     scene, rules = build
-    problem = pose_free(ComplianceEngine(build_network(scene)), rules, ONES, aim)
+    problem = build_states(ComplianceEngine(build_network(scene)), rules, ONES, aim)
     try:
         best = solve(problem, "schedule_search").selection
     except InfeasibleError:

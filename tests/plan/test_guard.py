@@ -12,10 +12,10 @@ from formulations.states.order_search import FORMULATION as ORDER
 from formulations.states.pareto_zones import FORMULATION as FRONT
 from formulations.states.schedule_search import FORMULATION as PLAN
 from seqopt.errors import InfeasibleError, SolverError
-from seqopt.graph.orders.orders import OrderProblem, OrderSelection
-from seqopt.graph.states.states import pose_free
+from seqopt.graph.orders.orders import AllOrders, OrderSelection
+from seqopt.graph.states.states import build_states
 from seqopt.plan import robust_plan
-from seqopt.plan.calling.schedule_selection import ScheduleSelection
+from seqopt.plan.calling.schedule_selection import StatePath
 from seqopt.plan.free_front import FreeFront
 from seqopt.plan.front import FrontSelection, find_front
 from seqopt.plan.order_plan import solve_order
@@ -33,11 +33,11 @@ RULES = FreeRules(least_grips=1)
 
 def free(limits=(), rules=RULES, aim="F_largest,M_sup"):
     engine = seqopt.make_engine("compliance", small_arch(4))
-    return pose_free(engine, rules, ONES, aim, limits)
+    return build_states(engine, rules, ONES, aim, limits)
 
 
 def order(**words):
-    return OrderProblem(free(**words))
+    return AllOrders(free(**words))
 
 
 def front(**words):
@@ -47,7 +47,7 @@ def front(**words):
 def loop(limits=()):
     engine = free().engine
     schedule = seqopt.three_robot_loop(engine.network)
-    return FreeFront(pose_free(engine, schedule, ONES, "F_largest,M_sup", limits))
+    return FreeFront(build_states(engine, schedule, ONES, "F_largest,M_sup", limits))
 
 
 KINDS = {
@@ -190,7 +190,7 @@ FRONTS = {
     "plans of nothing": {"points": np.ones((1, 2)), "plans": (None,)},
     "stopped None": {"stopped": None},
 }
-CLASSES = {"plan": ScheduleSelection, "order": OrderSelection, "front": FrontSelection}
+CLASSES = {"plan": StatePath, "order": OrderSelection, "front": FrontSelection}
 NONSENSE = [
     *(("plan", what, change) for what, change in PLANS.items()),
     *(("order", what, change) for what, change in ORDERS.items()),
@@ -217,7 +217,7 @@ def test_nonsense_has_failed(kind, change, proof):
 
 
 @kinds
-@pytest.mark.parametrize("reply", [None, "best", 3.0, (), np.zeros(3), ScheduleSelection])
+@pytest.mark.parametrize("reply", [None, "best", 3.0, (), np.zeros(3), StatePath])
 def test_what_is_no_selection_has_failed(kind, reply):
     with pytest.raises(SolverError, match=r"formulation fake returned a .*, not a .*Selection"):
         asked(kind, lambda *_, **__: reply)

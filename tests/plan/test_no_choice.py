@@ -13,7 +13,7 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, MemoryShortError, ProblemError, SolverError
 from seqopt.graph.layers.costs import Budget, LayeredCosts
 from seqopt.graph.layers.interface import CostProblem
-from seqopt.graph.layers.layers import pose
+from seqopt.graph.layers.layers import candidate_layers
 from seqopt.network.build import build_network
 from seqopt.plan.calling import formulation as registry
 from seqopt.plan.calling.formulation import Selection, find_formulation
@@ -31,7 +31,7 @@ def test_a_schedule_without_an_open_move_is_no_problem(capsys, tmp_path, count):
     scene = arch_scene(ArchShape(pitch=[1.2, 0.7][:count]))
     network = build_network(scene)
     with pytest.raises(ProblemError, match=f"with {count} bricks it leaves no grip open"):
-        pose(ComplianceEngine(network), modified_sequential(network), EQUATIONS)
+        candidate_layers(ComplianceEngine(network), modified_sequential(network), EQUATIONS)
     path = tmp_path / "scene.json"
     save_scene(scene, path)
     words = ("--schedule", "modified-sequential", "--out", str(tmp_path / "out"))
@@ -46,7 +46,7 @@ def test_a_schedule_without_an_open_move_is_no_problem(capsys, tmp_path, count):
 @pytest.fixture(scope="module")
 def problem():
     network = build_network(six_bricks())
-    return pose(ComplianceEngine(network), three_robot_loop(network), EQUATIONS)
+    return candidate_layers(ComplianceEngine(network), three_robot_loop(network), EQUATIONS)
 
 
 TRUE = (0, 0, 0)

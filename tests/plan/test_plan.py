@@ -14,7 +14,7 @@ from seqopt.errors import ProblemError, StepError
 from seqopt.graph.layers.budgets import travel
 from seqopt.graph.layers.costs import LayeredCosts
 from seqopt.graph.layers.interface import CostProblem
-from seqopt.graph.layers.layers import Problem
+from seqopt.graph.layers.layers import Layers
 from seqopt.plan.calling.formulation import FormulationKind
 from seqopt.study.presets import find_criterion
 
@@ -175,4 +175,4 @@ def test_a_problem_is_the_same_after_pickling(engine25):
     assert costs == problem.sums
     assert hash(costs) == hash(problem.sums)
     assert not costs.single[0].flags.writeable
-    assert isinstance(problem, Problem)
+    assert isinstance(problem, Layers)

@@ -16,9 +16,9 @@ from seqopt.graph import Explorer
 from seqopt.graph.layers.costs import Budget, LayeredCosts
 from seqopt.graph.layers.interface import Aim, CostProblem
 from seqopt.graph.layers.partial_costs import PartialCosts
-from seqopt.graph.orders.orders import OrderProblem
+from seqopt.graph.orders.orders import AllOrders
 from seqopt.graph.orders.visits import OrderStates
-from seqopt.graph.states.states import pose_free
+from seqopt.graph.states.states import build_states
 from seqopt.plan.calling.formulation import Selection
 from seqopt.plan.judge import budget_proof
 from seqopt.plan.judge.budget_proof import least_within
@@ -39,7 +39,7 @@ ONES = WorstRatio("ones", (("F_largest", 100.0), ("M_sup", 10.0)))
 
 def posed(aim, scene=None, limits=(), count=5):
     engine = seqopt.make_engine("compliance", scene or small_arch(count))
-    return pose_free(engine, FreeRules(), ONES, aim, limits)
+    return build_states(engine, FreeRules(), ONES, aim, limits)
 
 
 def states_below(problem, bound, join):
@@ -146,7 +146,7 @@ def test_what_some_pairs_prove_is_all_that_may_be_claimed(aim, best, bound):
 
 def test_what_was_left_out_for_a_threshold_bounds_all_orders():
     """Whatever the threshold; and with few sets looked at nothing is proven."""
-    problem = OrderProblem(posed("F_largest", count=4))
+    problem = AllOrders(posed("F_largest", count=4))
     best = solve_order(problem).selection.objective
     for share in (0.0, 1e-3, 0.5, 0.99):
         found = Explorer(OrderStates(problem, 5000))

@@ -27,7 +27,7 @@ from seqopt.graph.scenarios.aims import (
 )
 from seqopt.graph.scenarios.arcs import scenario_arcs
 from seqopt.graph.scenarios.costs import ScenarioCosts
-from seqopt.graph.scenarios.scenarios import RobustProblem, largest_of, robust
+from seqopt.graph.scenarios.scenarios import ScenarioLayers, largest_of, robust
 from seqopt.plan import robust_plan
 from seqopt.plan.calling.watch import Watch
 from seqopt.plan.out_of_sample import judge_unseen
@@ -303,7 +303,7 @@ def test_peaks_of_scenarios_join_into_one():
     joined = largest_of(layers)
     choice = seqopt.solve(problem, "overlap_dp").selection.choice
     assert joined.worst(choice) == max(costs.worst(choice) for costs in layers)
-    assert isinstance(found, RobustProblem)
+    assert isinstance(found, ScenarioLayers)
     assert isinstance(found.costs[0], ScenarioCosts)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from seqopt.errors import ProblemError, SolverError
-from seqopt.graph.layers.layers import pose
+from seqopt.graph.layers.layers import candidate_layers
 from seqopt.plan.search.window_search import search_windows, window
 from seqopt.plan.solving import solve
 from seqopt.problem.requirements import Limit
@@ -17,24 +17,24 @@ from seqopt.study.presets import EQUATIONS, WEIGHTED
 def test_a_dead_end_that_the_cascade_foresees(engine25):
     schedule, limits = three_robot_loop(engine25.network), [Limit("T_max", 64.0)]
     with pytest.raises(SolverError, match="move 8, step 31: rob2 has no allowed grip after"):
-        search_windows(pose(engine25, schedule, EQUATIONS, limits))
-    plan = solve(pose(engine25, schedule, EQUATIONS, limits), "cascade")
+        search_windows(candidate_layers(engine25, schedule, EQUATIONS, limits))
+    plan = solve(candidate_layers(engine25, schedule, EQUATIONS, limits), "cascade")
     assert len(plan.nodes) == len(schedule.moves)
 
 
 def test_a_window_depends_on_the_choices_before_it(engine25):
     schedule = three_robot_loop(engine25.network)
-    found = search_windows(pose(engine25, schedule, EQUATIONS))
+    found = search_windows(candidate_layers(engine25, schedule, EQUATIONS))
     nodes = [m.candidates[c] for m, c in zip(schedule.moves, found.choice, strict=True)]
-    own = pose(engine25, window(schedule, 9, nodes), EQUATIONS).sums.single[0]
+    own = candidate_layers(engine25, window(schedule, 9, nodes), EQUATIONS).sums.single[0]
     assert own.tolist() == found.shared[9].sums.single[0].tolist()
     nodes[8] = next(n for n in schedule.moves[8].candidates if n != nodes[8])
-    other = pose(engine25, window(schedule, 9, nodes), EQUATIONS).sums.single[0]
+    other = candidate_layers(engine25, window(schedule, 9, nodes), EQUATIONS).sums.single[0]
     assert other.tolist() != own.tolist()
 
 
 def test_the_table_says_what_the_next_one_costs(engine25):
-    problem = pose(engine25, three_robot_loop(engine25.network), WEIGHTED)
+    problem = candidate_layers(engine25, three_robot_loop(engine25.network), WEIGHTED)
     plan = solve(problem, "rank_search", proof=False)
     found, table = plan.search, plan.table()
     assert len(table) == 22
@@ -47,7 +47,7 @@ def test_the_table_says_what_the_next_one_costs(engine25):
 def test_a_dead_end_is_named(engine25):
     schedule = three_robot_loop(engine25.network)
     with pytest.raises(SolverError, match="move 1, step 3: rob3 has no allowed grip"):
-        search_windows(pose(engine25, schedule, EQUATIONS, [Limit("F_largest", 9.0)]))
+        search_windows(candidate_layers(engine25, schedule, EQUATIONS, [Limit("F_largest", 9.0)]))
 
 
 @pytest.mark.parametrize(

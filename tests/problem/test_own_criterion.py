@@ -14,8 +14,8 @@ import seqopt
 from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.graph.layers.budgets import travel
 from seqopt.graph.layers.interface import Aim, CostProblem
-from seqopt.graph.layers.layers import pose
-from seqopt.graph.states.states import pose_free
+from seqopt.graph.layers.layers import candidate_layers
+from seqopt.graph.states.states import build_states
 from seqopt.plan.judge.proof import Proof
 from seqopt.plan.search.in_order import solve_in_order
 from seqopt.plan.search.step_quantile import least_quantile
@@ -35,7 +35,7 @@ def weighed(responses, bricks):
 def posed(criterion, scene=None):
     network = seqopt.build_network(six_bricks() if scene is None else scene)
     engine = seqopt.make_engine("compliance", network)
-    return pose(engine, seqopt.three_robot_loop(network), criterion)
+    return candidate_layers(engine, seqopt.three_robot_loop(network), criterion)
 
 
 def test_a_function_costs_what_the_same_ready_made_criterion_does():
@@ -106,7 +106,7 @@ def test_a_cost_below_zero_is_refused_where_steps_can_be_added(aim):
     """A sum would fall without end; where moves are given any sign is allowed."""
     criterion = StepCost("gain", ("F_largest",), lambda r, bricks: r["F_largest"] - 60.0)
     engine = seqopt.make_engine("compliance", small_arch(4))
-    free = pose_free(engine, FreeRules(), criterion, aim)
+    free = build_states(engine, FreeRules(), criterion, aim)
     with pytest.raises(ProblemError, match=r"gain: a step costs -\d.* at \d bricks; .* constant"):
         seqopt.solve(free, "schedule_search")
     with pytest.raises(ProblemError, match="gain: a step costs -"):
@@ -176,7 +176,7 @@ def test_what_does_not_go_together_is_refused():
     )
     with pytest.raises(ProblemError, match="there is no aim"):
         solve_in_order([])
-    with pytest.raises(ProblemError, match="pose them with one schedule"):
+    with pytest.raises(ProblemError, match="candidate_layers them with one schedule"):
         solve_in_order([(one, Aim.SUM), (other, Aim.SUM)])
     capped = replace(one, budgets=(travel(one, 1.0),))
     with pytest.raises(ProblemError, match="take no budgets"):

@@ -16,7 +16,7 @@ from seqopt.engines.interface import Engine, Fields, Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.graph.layers.costs import Budget, LayeredCosts
 from seqopt.graph.layers.interface import Aim, CostProblem, PlacementProblem
-from seqopt.graph.layers.layers import Problem, pose
+from seqopt.graph.layers.layers import candidate_layers
 from seqopt.network.network import Network
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.requirements import Criterion, Limit
@@ -145,16 +145,16 @@ def opposed(size: Size, rng: Rng, total: float) -> CostProblem:
     return replace(problem, budgets=budgets)
 
 
-def arch(size: Size, criterion: Criterion, limits: tuple[Limit, ...] = ()) -> Problem:
+def arch(size: Size, criterion: Criterion, limits: tuple[Limit, ...] = ()) -> Layers:
     """Return the problem of the three-robot loop on a small arch."""
     engine = ComplianceEngine(half_circle(size.bricks))
-    return pose(engine, three_robot_loop(engine.network), criterion, limits)
+    return candidate_layers(engine, three_robot_loop(engine.network), criterion, limits)
 
 
-def flat(size: Size, _: Rng) -> Problem:
+def flat(size: Size, _: Rng) -> Layers:
     """Return a problem in which all possible choices respond equally."""
     engine = Even(ComplianceEngine(half_circle(size.bricks)))
-    return pose(engine, three_robot_loop(engine.network), EQUATIONS)
+    return candidate_layers(engine, three_robot_loop(engine.network), EQUATIONS)
 
 
 class Even:
@@ -177,7 +177,7 @@ class Even:
         return Fields(**sevens)
 
 
-def tight(size: Size, _: Rng) -> Problem:
+def tight(size: Size, _: Rng) -> Layers:
     """Return a problem whose limit is the least force with which it can be built."""
     least, __ = enumerated(arch(size, FORCE), Aim.PEAK)
     return arch(size, FORCE, (Limit("F_largest", least),))

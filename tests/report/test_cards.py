@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 
 import seqopt
-from seqopt.graph.orders.orders import OrderProblem
+from seqopt.graph.orders.orders import AllOrders
 from seqopt.report.comparison import largest
 from seqopt.report.draw import ROBOT_COLORS
 from seqopt.report.notebook import card, facts
@@ -27,7 +27,7 @@ def values():
     posed = plan.problem
     robust = seqopt.robust(posed, seqopt.scenarios(scene, count=2, seed=1), "worst-peak")
     network = posed.engine.network
-    found = [plan, free, posed, free.problem, OrderProblem(free.problem), robust]
+    found = [plan, free, posed, free.problem, AllOrders(free.problem), robust]
     found += [posed.schedule, network, scene, *assess_steps(network, plan.steps[:1], "epoxy")]
     return {type(value).__name__: value for value in found}
 

@@ -15,7 +15,7 @@ from seqopt.cli.words.criteria import parse_criterion
 from seqopt.cli.words.values import parse_limits
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.graph.layers.budgets import robot_use
-from seqopt.graph.layers.layers import pose
+from seqopt.graph.layers.layers import candidate_layers
 from seqopt.network.build import build_network
 from seqopt.plan.solving import solve
 from seqopt.problem.requirements import Limit, payload_limits
@@ -56,7 +56,7 @@ def called(*names):
 
 def posed(scene, criterion, **more):
     network = build_network(scene)
-    return pose(ComplianceEngine(network), three_robot_loop(network), criterion, **more)
+    return candidate_layers(ComplianceEngine(network), three_robot_loop(network), criterion, **more)
 
 
 @pytest.mark.parametrize("name", NAMES)

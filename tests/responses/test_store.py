@@ -16,7 +16,7 @@ import pytest
 from seqopt.engines.registry import make_engine
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import FileError, SceneError
-from seqopt.graph.layers.layers import pose
+from seqopt.graph.layers.layers import candidate_layers
 from seqopt.graph.scenarios.scenarios import robust
 from seqopt.plan.robust_plan import solve_robust
 from seqopt.plan.solving import solve
@@ -163,7 +163,7 @@ SEARCHES = {
 def posed(cache):
     engine, schedule = make_engine("compliance", SCENE), three_robot_loop(SCENE)
     criterion = WeightedSum("all", tuple((name, 1.0, 1.0) for name in ("T_max", "M_sup", "F_move")))
-    return pose(engine, schedule, criterion, resources=Resources(cache=cache))
+    return candidate_layers(engine, schedule, criterion, resources=Resources(cache=cache))
 
 
 @pytest.mark.parametrize("how", SEARCHES)
@@ -228,7 +228,7 @@ def test_a_search_without_proof_uses_it_too(tmp_path, asked):
     def plan():
         engine = make_engine("compliance", SCENE)
         resources = Resources(cache=tmp_path)
-        problem = pose(engine, three_robot_loop(SCENE), EQUATIONS, resources=resources)
+        problem = candidate_layers(engine, three_robot_loop(SCENE), EQUATIONS, resources=resources)
         return solve(problem, "cascade", proof=False)
 
     first = plan()

@@ -16,7 +16,7 @@ from seqopt.engines.interface import Fields, Want, grip_columns
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.graph.layers.costs import LayeredCosts
 from seqopt.graph.layers.interface import PlacementProblem
-from seqopt.graph.layers.layers import Problem, pose
+from seqopt.graph.layers.layers import Layers, candidate_layers
 from seqopt.network.network import Network
 from seqopt.plan.calling.formulation import find_formulation
 from seqopt.sequence.three_robots import three_robot_loop
@@ -59,10 +59,10 @@ class Recorder:
         return self.engine.solve(bricks, grips, want)
 
 
-def workload(net: Network) -> tuple[Problem, list[Case]]:
+def workload(net: Network) -> tuple[Layers, list[Case]]:
     """Return the posed problem and all models it takes."""
     recorder = Recorder(net)
-    problem = pose(recorder, three_robot_loop(net), EQUATIONS)
+    problem = candidate_layers(recorder, three_robot_loop(net), EQUATIONS)
     assert problem.evaluation.models  # evaluated here, and so recorded
     return problem, recorder.cases
 

@@ -23,7 +23,7 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, SeqoptError
 from seqopt.graph.layers.budgets import steps_over, travel
 from seqopt.graph.layers.costs import Budget
-from seqopt.graph.layers.layers import Problem, pose
+from seqopt.graph.layers.layers import Layers, candidate_layers
 from seqopt.network.build import build_network
 from seqopt.plan.calling.formulation import Formulation, Selection, find_formulation
 from seqopt.plan.calling.watch import Watch
@@ -48,12 +48,12 @@ MOST_MEMORY = 6 * 2**30  # bytes of addresses, several times what answers take
 SHORT, ROUNDS = 0.2, 5  # s; what takes less is repeated, and the median counts
 
 
-def posed(bricks: int, criterion: str, case: str) -> Problem:
+def posed(bricks: int, criterion: str, case: str) -> Layers:
     """Return a problem with its costs computed, its budgets shares of what the optimum takes."""
     network = build_network(scene_named("arch25" if bricks == 25 else f"chain{bricks}"))
     also = () if case == NO_BUDGET else COUNTED
     loop = three_robot_loop(network)
-    problem = pose(ComplianceEngine(network), loop, CRITERIA[criterion], also=also)
+    problem = candidate_layers(ComplianceEngine(network), loop, CRITERIA[criterion], also=also)
     choice = solve(problem, "overlap_dp").selection.choice
     if case == NO_BUDGET:
         return problem
@@ -67,7 +67,7 @@ def posed(bricks: int, criterion: str, case: str) -> Problem:
     return replace(problem, budgets=tuple(kept))
 
 
-def _whole(problem: Problem, choice: tuple[int, ...]) -> list[Budget]:
+def _whole(problem: Layers, choice: tuple[int, ...]) -> list[Budget]:
     """Return a budget of each kind without a bound; levels are those that the choice meets."""
     budgets = [travel(problem, np.inf)]
     for name in COUNTED:
@@ -80,7 +80,7 @@ def _whole(problem: Problem, choice: tuple[int, ...]) -> list[Budget]:
 
 
 def timed(
-    problem: Problem, formulation: Formulation, limit: float
+    problem: Layers, formulation: Formulation, limit: float
 ) -> tuple[Selection | SeqoptError, float]:
     """Return what a formulation chooses, or how it fails, and the seconds of the processor."""
     formulation.aim.costs(problem)
@@ -95,7 +95,7 @@ def timed(
     return found, statistics.median(took)
 
 
-def row(problem: Problem, name: str, limit: float) -> dict[str, object]:
+def row(problem: Layers, name: str, limit: float) -> dict[str, object]:
     """Return what a formulation finds and proves of a problem, and what that takes."""
     formulation = find_formulation(name)
     found, seconds = timed(problem, formulation, limit)

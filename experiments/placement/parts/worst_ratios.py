@@ -21,7 +21,7 @@ from functools import partial
 import numpy as np
 
 import seqopt
-from seqopt.graph.states.states import pose_free
+from seqopt.graph.states.states import build_states
 from seqopt.plan.free_plan import FreePlan
 from seqopt.plan.judge.schedules import state_columns
 from seqopt.plan.plan import Plan
@@ -105,7 +105,7 @@ def worst_ratio(steps: Steps, robots: int) -> float:
     if robots != len(scene.robots):
         scene = with_robots(scene, robots)
     engine = seqopt.make_engine(ENGINE, seqopt.build_network(scene))
-    problem = pose_free(engine, seqopt.FreeRules(), WORST_RATIO)
+    problem = build_states(engine, seqopt.FreeRules(), WORST_RATIO)
     columns = state_columns(problem, seqopt.analyze(engine, steps))
     return float(np.max(WORST_RATIO.costs(columns, 1, len(steps))))
 

@@ -16,8 +16,8 @@ from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import DRY, Mortar
 from seqopt.engines.registry import make_engine
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.graph.layers.layers import pose
-from seqopt.graph.states.states import pose_free
+from seqopt.graph.layers.layers import candidate_layers
+from seqopt.graph.states.states import build_states
 from seqopt.graph.states.visits import explore
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
@@ -62,7 +62,7 @@ def can_build(cell: Cell, payload: float) -> bool:
     bricks, thickness, friction, robots = cell
     engine = make_engine("compliance", catenary(bricks, thickness, robots, payload))
     standing = Standing(Mortar(friction=friction))
-    problem = pose_free(engine, RULES, CRITERIA["weighted"], "steps", stands=standing)
+    problem = build_states(engine, RULES, CRITERIA["weighted"], "steps", stands=standing)
     return explore(problem, width=50).whole or explore(problem).whole
 
 
@@ -225,6 +225,6 @@ def growth(scene: Scene, methods: Plans, sizes: tuple[int, ...]) -> Rows:
         net = build_network(line)
         made = {name: method(net) for name, method in METHODS.items()}
         if times <= 2:  # the choice for longer arches is a study of its own
-            loop = pose(ComplianceEngine(net), three_robot_loop(net), EQUATIONS)
+            loop = candidate_layers(ComplianceEngine(net), three_robot_loop(net), EQUATIONS)
             made["three-robot, optimized"] = solve(loop, "overlap_dp").steps
         yield from extremes("longer", times, line, made)

@@ -22,7 +22,7 @@ from experiments.study.parts.paper_items import CASCADE, COMPARED, MODIFIED, ROB
 from seqopt.arrays import Floats
 from seqopt.engines.interface import Engine
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.graph.layers.layers import Problem, pose
+from seqopt.graph.layers.layers import Layers, candidate_layers
 from seqopt.graph.layers.ranking import rank_choice
 from seqopt.network.build import build_network
 from seqopt.report.comparison import Comparison, compare
@@ -56,7 +56,7 @@ class Ours:
 
     engine: ComplianceEngine
     methods: Comparison
-    problem: Problem
+    problem: Layers
 
     @property
     def scene(self) -> Scene:
@@ -70,7 +70,7 @@ class Ours:
 
 def ours() -> Ours:
     engine = ComplianceEngine(build_network(load_scene("arch25")))
-    problem = pose(engine, three_robot_loop(engine.network), EQUATIONS)
+    problem = candidate_layers(engine, three_robot_loop(engine.network), EQUATIONS)
     return Ours(engine, compare(engine, EQUATIONS), problem)
 
 

@@ -30,7 +30,7 @@ from seqopt.cli.words.values import parse_limits, parse_numbers, parse_robots, p
 from seqopt.errors import ProblemError, StepError
 from seqopt.graph.scenarios.aims import RobustAim
 from seqopt.graph.scenarios.scenarios import robust
-from seqopt.graph.states.states import FreeProblem, within
+from seqopt.graph.states.states import States, within
 from seqopt.network.build import build_network
 from seqopt.plan.calling.schedule_formulation import find_schedule_formulation
 from seqopt.plan.free_plan import FreePlan
@@ -135,7 +135,7 @@ def _require_free(options: argparse.Namespace) -> None:
         )
 
 
-def asked_free(options: argparse.Namespace) -> tuple[Scene, FreeProblem]:
+def asked_free(options: argparse.Namespace) -> tuple[Scene, States]:
     """Return the scene with its robots, and the problem of its free schedule.
 
     ``options``: of the command ``optimize`` or ``pareto``.

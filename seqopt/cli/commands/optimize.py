@@ -17,7 +17,7 @@ from seqopt.cli.words.asked import exceeded, idle_notes, posed_notes, strictly
 from seqopt.cli.words.facts import scene_facts
 from seqopt.cli.words.posing import asked_problem
 from seqopt.cli.words.values import parse_options, parse_time_limit
-from seqopt.graph.layers.layers import Problem
+from seqopt.graph.layers.layers import Layers
 from seqopt.plan.calling.formulation import End, find_formulation
 from seqopt.plan.plan import Plan
 from seqopt.plan.solving import solve
@@ -87,7 +87,7 @@ def _files(plan: Plan, report: Mapping[str, object]) -> dict[str, bytes | str]:
 
 
 def _answer(
-    options: argparse.Namespace, problem: Problem, plan: Plan, report: Mapping[str, object]
+    options: argparse.Namespace, problem: Layers, plan: Plan, report: Mapping[str, object]
 ) -> Answer:
     """Return what a plan is worth, once it is written."""
     table, scene = plan.responses(), problem.schedule.scene

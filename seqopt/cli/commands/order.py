@@ -15,8 +15,8 @@ from seqopt.cli.words.asked import exceeded, level_notes, strictly
 from seqopt.cli.words.facts import scene_facts
 from seqopt.cli.words.values import parse_numbers, parse_time_limit
 from seqopt.errors import ProblemError
-from seqopt.graph.orders.orders import OrderProblem
-from seqopt.graph.states.states import FreeProblem
+from seqopt.graph.orders.orders import AllOrders
+from seqopt.graph.states.states import States
 from seqopt.plan.calling.schedule_formulation import Finds, find_schedule_formulation
 from seqopt.plan.free_plan import FreePlan
 from seqopt.plan.order_plan import OrderPlan, solve_order
@@ -27,7 +27,7 @@ SEARCH = "search"  # the order that is sought
 
 def optimize_order(
     options: argparse.Namespace,
-    free: FreeProblem,
+    free: States,
     judged: Callable[[FreePlan], dict[str, object]] | None = None,
 ) -> Answer:
     """Find the order whose best free schedule is best, and write its plan.
@@ -43,7 +43,7 @@ def optimize_order(
     formulation = find_schedule_formulation(options.formulation or "order_search", Finds.ORDER)
     numbers = parse_numbers("--option", options.option, formulation.options)
     whole = {name: type(formulation.options[name])(value) for name, value in numbers.items()}
-    problem = OrderProblem(free)
+    problem = AllOrders(free)
     require_out(options)
     limit = parse_time_limit(options.time_limit)
     found = solve_order(

@@ -28,7 +28,7 @@ from seqopt.engines.interface import Engine
 from seqopt.engines.registry import provenance
 from seqopt.errors import ProblemError, StepError, did_you_mean
 from seqopt.files import csv_text, require_folder
-from seqopt.graph.states.states import FreeProblem
+from seqopt.graph.states.states import States
 from seqopt.plan.free_front import FreeFront
 from seqopt.plan.front import Front, find_front, pick
 from seqopt.problem.goals import judged_by
@@ -163,7 +163,7 @@ def _methods(engine: Engine) -> dict[str, pd.DataFrame]:
 
 def _front_files(
     front: Front,
-    free: FreeProblem,
+    free: States,
     methods: Mapping[str, pd.DataFrame],
     options: argparse.Namespace,
 ) -> tuple[dict[str, bytes | str], tuple[str, ...]]:

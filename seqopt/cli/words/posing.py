@@ -9,7 +9,6 @@ from seqopt.cli.words.asked import asked_engine, asked_scene
 from seqopt.cli.words.criteria import asked_criterion
 from seqopt.cli.words.means import parse_resources
 from seqopt.cli.words.values import parse_limits, parse_robots
-from seqopt.graph.layers.layers import Problem
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.problem.budgets import parse_budgets
@@ -18,7 +17,7 @@ from seqopt.sequence.schedule_file import find_schedule
 from seqopt.workflow import posed
 
 
-def asked_problem(options: argparse.Namespace) -> Problem:
+def asked_problem(options: argparse.Namespace) -> Layers:
     """Return the problem that the command ``optimize`` is asked for.
 
     ``options``: of the command.

@@ -10,12 +10,12 @@ import numpy as np
 from seqopt.arrays import Floats
 from seqopt.errors import ProblemError
 from seqopt.graph.layers.costs import Budget
-from seqopt.graph.layers.layers import Problem
+from seqopt.graph.layers.layers import Layers
 from seqopt.responses.quantities import robot_response
 from seqopt.sequence.schedule import OpenGrip
 
 
-def steps_over(problem: Problem, response: str, level: float, bound: float) -> Budget:
+def steps_over(problem: Layers, response: str, level: float, bound: float) -> Budget:
     """Return a bound on the number of open steps in which a response exceeds a level.
 
     ``problem``: whose choices the budget is for; ``response``: among those that the problem
@@ -35,7 +35,7 @@ def steps_over(problem: Problem, response: str, level: float, bound: float) -> B
     return Budget(f"steps with {response} over {level:g}", tuple(single), tuple(shared), bound)
 
 
-def robot_use(problem: Problem, robot: str, force: float, bound: float) -> Budget:
+def robot_use(problem: Layers, robot: str, force: float, bound: float) -> Budget:
     """Return a bound on the number of open steps in which a robot carries more than a force.
 
     ``problem``: whose choices the budget is for; it evaluates the robot's force; ``robot``: name of
@@ -45,7 +45,7 @@ def robot_use(problem: Problem, robot: str, force: float, bound: float) -> Budge
     return steps_over(problem, robot_response(robot), force, bound)
 
 
-def travel(problem: Problem, bound: float) -> Budget:
+def travel(problem: Layers, bound: float) -> Budget:
     """Return a bound on the distance that robots travel to chosen grips and on to their next ones.
 
     ``problem``: whose choices the budget is for; ``bound``: m. Result: each choice takes straight
@@ -69,12 +69,12 @@ def travel(problem: Problem, bound: float) -> Budget:
     return Budget("robot travel [m]", tuple(single), tuple(shared), bound)
 
 
-def _empty(problem: Problem) -> tuple[list[Floats], list[Floats]]:
+def _empty(problem: Layers) -> tuple[list[Floats], list[Floats]]:
     sizes = problem.sums.sizes
     pairs = zip((1, *sizes[:-1]), sizes, strict=True)
     return [np.zeros(size) for size in sizes], [np.zeros(pair) for pair in pairs]
 
 
-def _distances(problem: Problem, first: tuple[int, ...], second: tuple[int, ...]) -> Floats:
+def _distances(problem: Layers, first: tuple[int, ...], second: tuple[int, ...]) -> Floats:
     at = problem.schedule.scene.node_position
     return np.array([[math.dist(at(a), at(b)) for b in second] for a in first])

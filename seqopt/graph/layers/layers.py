@@ -32,7 +32,7 @@ from seqopt.showing import Shown
 
 
 @dataclass(frozen=True, repr=False)
-class Problem(Shown):
+class Layers(Shown):
     """Support placement over a whole build.
 
     Nothing is computed before it is asked for: responses, sums and peaks each on first use.
@@ -59,7 +59,7 @@ class Problem(Shown):
         counts = f"{len(schedule.steps)} steps, {len(schedule.moves)} moves"
         extras = f"{len(self.limits)} limits, {len(self.budgets)} budgets"
         what = f"{schedule.scene.name!r}, {schedule.method!r}: {counts}"
-        return f"Problem({what}, criterion {self.criterion.name!r}, {extras})"
+        return f"Layers({what}, criterion {self.criterion.name!r}, {extras})"
 
     @property
     def engine(self) -> Engine:
@@ -147,7 +147,7 @@ class Problem(Shown):
         return by_move(self.evaluation.steps)
 
     @cached_property
-    def others(self) -> dict[Criterion, Problem]:
+    def others(self) -> dict[Criterion, Layers]:
         """The same problem under other criteria that need the same responses, as they are met."""
         return {}
 
@@ -208,14 +208,14 @@ def _closed(step: OpenStep) -> Step:
     return Step(step.number, step.kind, step.bricks, grips)
 
 
-def pose(
+def candidate_layers(
     engine: Engine,
     schedule: Schedule,
     criterion: Criterion,
     limits: Sequence[Limit] = (),
     also: Sequence[str] = (),
     resources: Resources = HERE,
-) -> Problem:
+) -> Layers:
     """Return the problem of choosing the open grips of a schedule.
 
     Parameters
@@ -235,7 +235,7 @@ def pose(
 
     Returns
     -------
-    Problem
+    Layers
         The problem; nothing is computed yet.
 
     Raises
@@ -249,7 +249,7 @@ def pose(
     >>> network = seqopt.build_network(seqopt.load_scene("arch25"))
     >>> engine, schedule = seqopt.make_engine("auto", network), seqopt.three_robot_loop(network)
     >>> seqopt.pose(engine, schedule, seqopt.CRITERIA["equations-2-3"])  # doctest: +ELLIPSIS
-    Problem('arch25', 'three-robot': 90 steps, 22 moves, criterion 'equations-2-3', ...
+    Layers('arch25', 'three-robot': 90 steps, 22 moves, criterion 'equations-2-3', ...
     """
     known = {*CHOICE_RESPONSES, *map(robot_response, robots_of(engine, schedule, criterion))}
     asked = ResponsesAsked(criterion.for_scene(SceneFacts(engine)), as_limits(limits), tuple(also))
@@ -257,4 +257,4 @@ def pose(
         why = f"does not exist{did_you_mean(min(unknown), known)}"
         raise ProblemError(f"response {min(unknown)} {why}; give {', '.join(sorted(known))}")
     schedule.require_pairs()
-    return Problem(asked.criterion, asked.limits, Evaluation(engine, schedule, asked, resources))
+    return Layers(asked.criterion, asked.limits, Evaluation(engine, schedule, asked, resources))

@@ -16,7 +16,7 @@ import numpy as np
 
 from seqopt.arrays import Bools, Floats
 from seqopt.graph.layers.costs import TINY, LayeredCosts
-from seqopt.graph.layers.layers import Problem
+from seqopt.graph.layers.layers import Layers
 from seqopt.problem.criteria import RankSum
 from seqopt.problem.ranks import Ranked
 
@@ -41,7 +41,7 @@ class GapParts:
         return self.short_sight + self.objective
 
 
-def under(problem: Problem, ranked: Ranked) -> Problem | None:
+def under(problem: Layers, ranked: Ranked) -> Layers | None:
     """Return a problem with its ranks taken another way.
 
     ``problem``: whose responses are shared. Result: None if the criterion has no ranks, or
@@ -57,7 +57,7 @@ def under(problem: Problem, ranked: Ranked) -> Problem | None:
     return problem.others.setdefault(criterion, replace(problem, criterion=criterion))
 
 
-def under_both(problem: Problem, choice: Sequence[int]) -> dict[str, float | None]:
+def under_both(problem: Layers, choice: Sequence[int]) -> dict[str, float | None]:
     """Return the value of a choice under both objectives.
 
     ``choice``: a candidate for every move. Result (dict of str to (float or None)): ``pairs`` and
@@ -67,7 +67,7 @@ def under_both(problem: Problem, choice: Sequence[int]) -> dict[str, float | Non
     return {name: None if p is None else p.sums.cost(choice) for name, p in found.items()}
 
 
-def split_gap(problem: Problem, choice: Sequence[int]) -> GapParts | None:
+def split_gap(problem: Layers, choice: Sequence[int]) -> GapParts | None:
     """Return the gap of a choice, in two parts.
 
     ``problem``: its sums are what choices are charged; ``choice``: a candidate for every move.

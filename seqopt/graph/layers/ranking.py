@@ -10,7 +10,7 @@ import pandas as pd
 
 from seqopt.arrays import Floats
 from seqopt.graph.layers.costs import LayeredCosts
-from seqopt.graph.layers.layers import Problem
+from seqopt.graph.layers.layers import Layers
 from seqopt.graph.layers.possible import compared
 from seqopt.problem.criteria import RankSum, WeightedSum, WorstRatio
 from seqopt.problem.requirements import Criterion
@@ -19,7 +19,7 @@ from seqopt.responses.choices import StepChoices
 TIED = 1e-9  # costs this close, relative to the largest, are equal
 
 
-def move_costs(problem: Problem, move: int, before: int, without: int | None = None) -> Floats:
+def move_costs(problem: Layers, move: int, before: int, without: int | None = None) -> Floats:
     """Return the costs of a move's candidates, the choice before it being fixed.
 
     The search of a single move (equation 1 of Bruun et al.): each step of the window is ranked over
@@ -51,7 +51,7 @@ def _tie(costs: Floats) -> float:
     return TIED * float(np.abs(costs[np.isfinite(costs)]).max(initial=0.0))
 
 
-def rank_moves(problem: Problem, choice: Sequence[int]) -> pd.DataFrame:
+def rank_moves(problem: Layers, choice: Sequence[int]) -> pd.DataFrame:
     """Return where the chosen candidates rank, and how reliable the first rank of each move is.
 
     ``choice``: a candidate for every move. Result: a row per move. Columns: ``move``, ``step``,
@@ -85,9 +85,7 @@ def rank_moves(problem: Problem, choice: Sequence[int]) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def _turning(
-    problem: Problem, move: int, before: int, costs: Floats
-) -> tuple[list[int], list[str]]:
+def _turning(problem: Layers, move: int, before: int, costs: Floats) -> tuple[list[int], list[str]]:
     """Return the candidates and the responses without which another candidate would win."""
     winner = int(np.argmin(costs))
     candidates = [
@@ -136,7 +134,7 @@ def _without_one(criterion: Criterion, bricks: int) -> Iterator[tuple[str, Crite
             )
 
 
-def rank_choice(problem: Problem, choice: Sequence[int]) -> pd.DataFrame:
+def rank_choice(problem: Layers, choice: Sequence[int]) -> pd.DataFrame:
     """Return where chosen nodes rank, move by move, the choice before each being fixed.
 
     ``choice``: a candidate for every move. Result: a row per move. Columns: ``move``, ``step``,

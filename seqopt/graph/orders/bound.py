@@ -7,8 +7,8 @@ from itertools import combinations
 import numpy as np
 
 from seqopt.arrays import Floats, Ints
-from seqopt.graph.orders.orders import OrderProblem
-from seqopt.graph.states.states import FreeProblem
+from seqopt.graph.orders.orders import AllOrders
+from seqopt.graph.states.states import States
 from seqopt.problem.goals import LARGEST, Measure
 from seqopt.sequence.free_rules import Ending
 from seqopt.sequence.free_space import node_numbers
@@ -16,7 +16,7 @@ from seqopt.sequence.free_space import node_numbers
 MOST_SETS = 200_000  # grip sets of the whole structure that are looked at
 
 
-def whole_bound(problem: OrderProblem) -> float:
+def whole_bound(problem: AllOrders) -> float:
     """Return the least value with which all bricks stand, whoever holds them.
 
     Every plan of every order passes such a state, and the one in which nobody holds if it ends so.
@@ -48,7 +48,7 @@ def _sets(places: list[int], fewest: int, robots: int) -> Ints:
     return np.array(rows, dtype=np.int64).reshape(-1, robots)
 
 
-def _values(free: FreeProblem, held: Ints) -> Floats:
+def _values(free: States, held: Ints) -> Floats:
     """Return what the goal takes of grip sets of the whole; infinite where something is loose."""
     bricks, goal = len(free.network.inner), free.goals[0]
     answers, forces = free.sets.answers(bricks, held)

@@ -11,7 +11,7 @@ from seqopt.arrays import FrozenValue
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import make_engine, recipe_of
 from seqopt.errors import ProblemError
-from seqopt.graph.states.states import FreeProblem
+from seqopt.graph.states.states import States
 from seqopt.network.build import build_network
 from seqopt.scene.orders import Order
 from seqopt.scene.scene import Scene
@@ -26,7 +26,7 @@ class Orders(Enum):
 
 
 @dataclass(frozen=True, repr=False)
-class OrderProblem(Shown):
+class AllOrders(Shown):
     """The free schedule of a scene whose build order is free too.
 
     The value of an order is the first goal of its best plan; the criterion keeps the numbers that
@@ -36,7 +36,7 @@ class OrderProblem(Shown):
     `ProblemError` if it is one, the engine was not made by name, or there are no such orders.
     """
 
-    free: FreeProblem
+    free: States
     among: Orders = Orders.TIED
 
     def __post_init__(self) -> None:
@@ -63,7 +63,7 @@ class OrderProblem(Shown):
             )
 
     def __repr__(self) -> str:
-        return f"OrderProblem({self.scene.name!r}, {self.free.goals[0]}, {self.among.value} orders)"
+        return f"AllOrders({self.scene.name!r}, {self.free.goals[0]}, {self.among.value} orders)"
 
     @property
     def scene(self) -> Scene:
@@ -102,12 +102,12 @@ class OrderProblem(Shown):
         """
         return all(b in self.next_bricks(frozenset(order[:k])) for k, b in enumerate(order))
 
-    def judging(self, order: Order) -> FreeProblem:
+    def judging(self, order: Order) -> States:
         """Return the free schedule of one order with the goal that orders are judged by alone."""
         alone = self.free.resources.alone()  # orders are shared out, not their grip sets
         return replace(self.at(order), goals=self.free.goals[:1], resources=alone)
 
-    def at(self, order: Order) -> FreeProblem:
+    def at(self, order: Order) -> States:
         """Return the free schedule of one order."""
         engine, *others = (_anew(e, order) for e in (self.free.engine, *self.free.scenarios))
         return replace(self.free, engine=engine, scenarios=tuple(others))

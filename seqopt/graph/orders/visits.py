@@ -15,8 +15,8 @@ import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.graph.explore import Moves
-from seqopt.graph.orders.orders import OrderProblem
-from seqopt.graph.states.states import FreeProblem
+from seqopt.graph.orders.orders import AllOrders
+from seqopt.graph.states.states import States
 from seqopt.graph.states.visits import FreeStates, move_amounts
 from seqopt.problem.goals import Measure
 from seqopt.sequence.free_space import node_numbers, sort_entries
@@ -36,7 +36,7 @@ class OrderStates:
     that begins with its set.
     """
 
-    problem: OrderProblem
+    problem: AllOrders
     most: int
     parts: dict[Key, FreeStates] = field(default_factory=dict)
 
@@ -85,7 +85,7 @@ class OrderStates:
         return move_amounts(self._first, values, taken)
 
     @cached_property
-    def _first(self) -> FreeProblem:
+    def _first(self) -> States:
         return replace(self.problem.free, goals=self.problem.free.goals[:1])
 
     def ended(self, part: Key, states: Ints) -> Bools:
@@ -106,7 +106,7 @@ class OrderStates:
         return self.parts[part]
 
 
-def _renumbered(old: FreeProblem, new: FreeProblem, states: Ints) -> Ints:
+def _renumbered(old: States, new: States, states: Ints) -> Ints:
     """Return states with the places that nodes have in another order."""
     place = {node: i for i, node in enumerate(node_numbers(new.network), start=1)}
     map_to = np.array([0, *(place[node] for node in node_numbers(old.network))])

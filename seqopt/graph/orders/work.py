@@ -10,9 +10,9 @@ from functools import partial
 import numpy as np
 
 from seqopt.errors import ProblemError
-from seqopt.graph.orders.orders import OrderProblem
+from seqopt.graph.orders.orders import AllOrders
 from seqopt.graph.paths import keep_best
-from seqopt.graph.states.states import FreeProblem
+from seqopt.graph.states.states import States
 from seqopt.graph.states.visits import explore
 from seqopt.responses.blocks import Shipment, engine_of, pack
 from seqopt.scene.orders import Order
@@ -31,7 +31,7 @@ class Trial:
     ceiling: float
 
 
-def worth(problem: OrderProblem, trial: Trial) -> float:
+def worth(problem: AllOrders, trial: Trial) -> float:
     """Return the first goal of the best plan of an order.
 
     Result: infinite where no plan of it stays below the ceiling.
@@ -45,7 +45,7 @@ def worth(problem: OrderProblem, trial: Trial) -> float:
     return found
 
 
-def trying(problem: OrderProblem, *, elsewhere: bool) -> Callable[[Trial], float]:
+def trying(problem: AllOrders, *, elsewhere: bool) -> Callable[[Trial], float]:
     """Return the function that tries orders.
 
     ``elsewhere``: whether it is to be sent to other processes: then with the scene, not with an
@@ -71,4 +71,4 @@ def trying(problem: OrderProblem, *, elsewhere: bool) -> Callable[[Trial], float
 def _sent(shipment: Shipment, content: bytes, trial: Trial) -> float:
     rest, others, among = pickle.loads(content)  # our own, from `trying`
     rest["scenarios"] = tuple(map(engine_of, others))
-    return worth(OrderProblem(FreeProblem(engine=engine_of(shipment), **rest), among), trial)
+    return worth(AllOrders(States(engine=engine_of(shipment), **rest), among), trial)

@@ -12,7 +12,7 @@ from seqopt.arrays import FrozenValue
 from seqopt.engines.registry import Recipe, make_engine
 from seqopt.errors import MechanismError, ProblemError, SolverError
 from seqopt.graph.layers.costs import LayeredCosts
-from seqopt.graph.layers.layers import Problem
+from seqopt.graph.layers.layers import Layers
 from seqopt.graph.scenarios.engines import recipe_for
 from seqopt.problem.requirements import Criterion, Limit, ResponsesAsked
 from seqopt.responses.choices import Evaluation
@@ -27,7 +27,7 @@ from seqopt.work.workers import Crew, hire, map_ordered
 class ScenarioCosts(FrozenValue):
     """What the choices of a schedule cost in one scenario.
 
-    ``sums``, ``peaks``: as of `seqopt.graph.layers.layers.Problem`; infinite where a limit is
+    ``sums``, ``peaks``: as of `seqopt.graph.layers.layers.Layers`; infinite where a limit is
     exceeded; ``models``: how many different models were solved; ``seconds``: that solving them
     took, s.
     """
@@ -55,16 +55,16 @@ class ScenarioTask:
     also: tuple[str, ...]
     resources: Resources
 
-    def problem(self) -> Problem:
+    def problem(self) -> Layers:
         """Return the placement problem of this scenario."""
         recipe = self.recipe
         engine = make_engine(recipe.engine, recipe.scene, **recipe.options)  # type: ignore[arg-type]
         asked = ResponsesAsked(self.criterion, self.limits, self.also)
         evaluation = Evaluation(engine, self.schedule, asked, self.resources)
-        return Problem(self.criterion, self.limits, evaluation)
+        return Layers(self.criterion, self.limits, evaluation)
 
 
-def tasks_of(problem: Problem, scenes: Sequence[Scene]) -> tuple[ScenarioTask, ...]:
+def tasks_of(problem: Layers, scenes: Sequence[Scene]) -> tuple[ScenarioTask, ...]:
     """Return the tasks of scenarios.
 
     ``problem``: the nominal one. Raises `ProblemError` if the engine was not made by name, so that

@@ -13,11 +13,11 @@ from seqopt.arrays import Floats
 from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.graph.layers.costs import LayeredCosts
 from seqopt.graph.layers.interface import Aim
-from seqopt.graph.layers.layers import Problem
+from seqopt.graph.layers.layers import Layers
 from seqopt.graph.scenarios.aims import WORST_PEAK, RobustAim, parse_robust
 from seqopt.graph.scenarios.costs import ScenarioCosts, scenario_costs, tasks_of
 from seqopt.graph.scenarios.engines import require_alike
-from seqopt.graph.states.states import FreeProblem, over_scenarios
+from seqopt.graph.states.states import States, over_scenarios
 from seqopt.scene.checks import short
 from seqopt.scene.scenarios import Scenarios
 from seqopt.scene.scene import Scene
@@ -26,7 +26,7 @@ from seqopt.showing import Shown
 
 
 @dataclass(frozen=True, repr=False)
-class RobustProblem(Shown):
+class ScenarioLayers(Shown):
     """Support placement over a whole build, in many scenarios at once.
 
     Nothing is computed before it is asked for. Limits hold in every scenario.
@@ -35,14 +35,14 @@ class RobustProblem(Shown):
     scenario; ``scenes``: the scenarios; ``aim``: what to minimize over them.
     """
 
-    nominal: Problem
+    nominal: Layers
     scenes: tuple[Scene, ...]
     aim: RobustAim
 
     def __repr__(self) -> str:
         schedule = self.nominal.schedule
         what = f"{schedule.scene.name!r}, {schedule.method!r}, {len(self.scenes)} scenarios"
-        return f"RobustProblem({what}, criterion {self.nominal.criterion.name!r}, {self.aim})"
+        return f"ScenarioLayers({what}, criterion {self.nominal.criterion.name!r}, {self.aim})"
 
     @property
     def costs(self) -> tuple[ScenarioCosts, ...]:
@@ -55,7 +55,7 @@ class RobustProblem(Shown):
         return scenario_costs(tasks_of(self.nominal, self.scenes), resources)
 
     @property
-    def from_cache(self) -> Iterator[Problem]:
+    def from_cache(self) -> Iterator[Layers]:
         """The problems of the scenarios, if their responses may come from files."""
         if self.nominal.evaluation.resources.cache is None:
             return iter(())
@@ -66,18 +66,18 @@ class RobustProblem(Shown):
         """What the costs of all scenarios took: ``respond``, s."""
         return {"respond": self._found[1]}
 
-    def under(self, aim: RobustAim) -> RobustProblem:
+    def under(self, aim: RobustAim) -> ScenarioLayers:
         """Return the same problem with another aim; costs that are known stay known."""
         return self._kept(replace(self, aim=aim))
 
-    def first(self, count: int) -> RobustProblem:
+    def first(self, count: int) -> ScenarioLayers:
         """Return the problem of the first scenarios alone; costs that are known stay known.
 
         ``count``: how many, from 1.
         """
         return self._kept(replace(self, scenes=self.scenes[: max(count, 1)]))
 
-    def _kept(self, other: RobustProblem) -> RobustProblem:
+    def _kept(self, other: ScenarioLayers) -> ScenarioLayers:
         known: tuple[tuple[ScenarioCosts, ...], float] | None = vars(self).get("_found")
         if known is not None:
             vars(other)["_found"] = known[0][: len(other.scenes)], known[1]
@@ -99,7 +99,7 @@ class RobustProblem(Shown):
         return tuple(c.sums if aim is Aim.SUM else c.peaks for c in self.costs)
 
     def steps(self, choice: Sequence[int]) -> tuple[Step, ...]:
-        """Return the checked steps of the build; see `Problem.steps`.
+        """Return the checked steps of the build; see `Layers.steps`.
 
         ``choice``: a candidate for every move.
         """
@@ -108,24 +108,24 @@ class RobustProblem(Shown):
 
 @overload
 def robust(
-    problem: Problem, scenes: Scenarios | Sequence[Scene], aim: RobustAim | str
-) -> RobustProblem: ...
+    problem: Layers, scenes: Scenarios | Sequence[Scene], aim: RobustAim | str
+) -> ScenarioLayers: ...
 
 
 @overload
 def robust(
-    problem: FreeProblem, scenes: Scenarios | Sequence[Scene], aim: RobustAim | str
-) -> FreeProblem: ...
+    problem: States, scenes: Scenarios | Sequence[Scene], aim: RobustAim | str
+) -> States: ...
 
 
 def robust(
-    problem: Problem | FreeProblem, scenes: Scenarios | Sequence[Scene], aim: RobustAim | str
-) -> RobustProblem | FreeProblem:
+    problem: Layers | States, scenes: Scenarios | Sequence[Scene], aim: RobustAim | str
+) -> ScenarioLayers | States:
     """Return the problem of a plan that is good in many scenarios at once.
 
     Parameters
     ----------
-    problem : Problem or FreeProblem
+    problem : Layers or States
         The nominal one, of `seqopt.pose` or `seqopt.pose_free`; with an engine of
         `seqopt.make_engine`.
     scenes : Scenarios or sequence of Scene
@@ -135,7 +135,7 @@ def robust(
 
     Returns
     -------
-    RobustProblem or FreeProblem
+    ScenarioLayers or States
         As the nominal one, for `solve_robust` and `seqopt.solve`; nothing is computed yet.
 
     Raises
@@ -149,14 +149,14 @@ def robust(
     >>> scene = seqopt.load_scene("arch25")
     >>> problem = seqopt.optimize(scene, criterion="worst-ratio-published").problem
     >>> robust(problem, seqopt.scenarios(scene, count=5), "worst-peak")  # doctest: +ELLIPSIS
-    RobustProblem('arch25', 'three-robot', 5 scenarios, ... worst-peak)
+    ScenarioLayers('arch25', 'three-robot', 5 scenarios, ... worst-peak)
     """
     aim = parse_robust(aim) if isinstance(aim, str) else aim
-    if isinstance(problem, FreeProblem):
+    if isinstance(problem, States):
         return over_scenarios(problem, _worst_of(scenes, aim))
-    if not isinstance(problem, Problem) or not isinstance(aim, RobustAim):
+    if not isinstance(problem, Layers) or not isinstance(aim, RobustAim):
         raise ProblemError(
-            f"{short(aim if isinstance(problem, Problem) else problem)}: give a problem of "
+            f"{short(aim if isinstance(problem, Layers) else problem)}: give a problem of "
             "seqopt.pose, scenarios, and an aim as WORST_PEAK, WORST_TOTAL or cvar(0.9)"
         )
     found = _scenes(scenes)
@@ -167,7 +167,7 @@ def robust(
     for i, scene in enumerate(found, start=1):
         require_alike(problem.schedule.scene, scene, i)
     tasks_of(problem, found[:1])  # says if engines for other scenes cannot be made
-    return RobustProblem(problem, found, aim)
+    return ScenarioLayers(problem, found, aim)
 
 
 def _scenes(scenes: Scenarios | Sequence[Scene]) -> tuple[Scene, ...]:

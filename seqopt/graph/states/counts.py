@@ -14,11 +14,11 @@ import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.graph.graph import Graph
-from seqopt.graph.states.states import FreeProblem
+from seqopt.graph.states.states import States
 from seqopt.sequence.free_rules import Ending
 
 
-def steps_with(problem: FreeProblem, regrips: Floats, held: Ints) -> Floats:
+def steps_with(problem: States, regrips: Floats, held: Ints) -> Floats:
     """Return how many steps plans have.
 
     ``regrips`` (n,): infinite where there is no plan; ``held`` (n,): how many grips are held at the
@@ -28,7 +28,7 @@ def steps_with(problem: FreeProblem, regrips: Floats, held: Ints) -> Floats:
     return np.asarray(2 * problem.space.levels + 2 * regrips - held + released)
 
 
-def with_held(problem: FreeProblem, graph: Graph, held: Bools) -> Graph:
+def with_held(problem: States, graph: Graph, held: Bools) -> Graph:
     """Return a graph whose paths end in some states, or let all go in them last.
 
     ``held`` (n,): which states hold as many grips as wanted.

@@ -43,7 +43,7 @@ BAND = 1e-5  # share of a value within which six digits do not decide
 
 
 @dataclass(frozen=True, repr=False)
-class FreeProblem(Shown):
+class States(Shown):
     """The problem of the free schedule of a scene; everything is computed when first needed.
 
     ``engine``: what computes responses; ``rules``: which moves are possible: those that rules
@@ -78,10 +78,10 @@ class FreeProblem(Shown):
             where += f", {self.rules.method!r}"
         if self.scenarios:
             where += f", {len(self.scenarios)} scenarios"
-        return f"FreeProblem({where}, {goals}, {len(self.limits)} limits)"
+        return f"States({where}, {goals}, {len(self.limits)} limits)"
 
     @cached_property
-    def each(self) -> tuple[FreeProblem, ...]:
+    def each(self) -> tuple[States, ...]:
         """The same problem in every scenario by itself; none where there are no scenarios."""
         return tuple(replace(self, engine=engine, scenarios=()) for engine in self.scenarios)
 
@@ -338,14 +338,14 @@ def _near(values: Floats, bound: Floats | float) -> Bools:
     return np.asarray(np.abs(finite - bound) <= BAND * np.abs(bound))
 
 
-def pose_free(
+def build_states(
     engine: Engine,
     rules: FreeRules | Schedule,
     criterion: Criterion,
     goals: Sequence[Goal] | str = "minmax",
     limits: Sequence[Limit] = (),
     stands: Standing | Mortar | str | None = None,
-) -> FreeProblem:
+) -> States:
     """Return the problem of the free schedule of an engine's scene.
 
     Parameters
@@ -366,7 +366,7 @@ def pose_free(
 
     Returns
     -------
-    FreeProblem
+    States
         Nothing is computed yet, except scales that a criterion takes from the scene.
 
     Raises
@@ -378,18 +378,18 @@ def pose_free(
     --------
     >>> import seqopt
     >>> engine = seqopt.make_engine("compliance", seqopt.load_scene("arch25"))
-    >>> pose_free(engine, FreeRules(), seqopt.CRITERIA["worst-ratio"], "minmax,steps")
-    FreeProblem('arch25', minmax, steps, 0 limits)
+    >>> build_states(engine, FreeRules(), seqopt.CRITERIA["worst-ratio"], "minmax,steps")
+    States('arch25', minmax, steps, 0 limits)
     """
     named = _goals(goals)
     limits = _checked(limits, engine.network)
     if any(goal.of_states and not goal.response for goal in named):
         criterion = _of_states(engine, criterion)
     standing = stands if isinstance(stands, Standing | None) else Standing(find_mortar(stands))
-    return _asked(FreeProblem(engine, rules, criterion, named, limits, standing))
+    return _asked(States(engine, rules, criterion, named, limits, standing))
 
 
-def within(problem: FreeProblem, caps: Mapping[str, float]) -> FreeProblem:
+def within(problem: States, caps: Mapping[str, float]) -> States:
     """Return a problem whose plans keep totals over the build within caps.
 
     ``caps``: ``steps``, ``regrips``, ``travel`` (m) or ``sum(RESPONSE)``, and how much each may be.
@@ -399,9 +399,9 @@ def within(problem: FreeProblem, caps: Mapping[str, float]) -> FreeProblem:
     --------
     >>> import seqopt
     >>> engine = seqopt.make_engine("compliance", seqopt.load_scene("arch25"))
-    >>> problem = pose_free(engine, FreeRules(), seqopt.CRITERIA["worst-ratio"])
+    >>> problem = build_states(engine, FreeRules(), seqopt.CRITERIA["worst-ratio"])
     >>> within(problem, {"regrips": 3})
-    FreeProblem('arch25', minmax, regrips <= 3, 0 limits)
+    States('arch25', minmax, regrips <= 3, 0 limits)
     """
     goals = [_goals(name)[0] for name in caps]
     for goal, cap in zip(goals, caps.values(), strict=True):
@@ -418,7 +418,7 @@ def within(problem: FreeProblem, caps: Mapping[str, float]) -> FreeProblem:
     return replace(problem, goals=(*problem.goals, *goals), budgets=caps_of)
 
 
-def over_scenarios(problem: FreeProblem, scenes: Sequence[Scene]) -> FreeProblem:
+def over_scenarios(problem: States, scenes: Sequence[Scene]) -> States:
     """Return a problem whose worst values count in any of some scenarios.
 
     Limits and standing hold in all of them. The criterion keeps the numbers of the scene that it
@@ -445,7 +445,7 @@ def _goals(given: Sequence[Goal] | str) -> tuple[Goal, ...]:
     return tuple(goals)
 
 
-def _asked(problem: FreeProblem) -> FreeProblem:
+def _asked(problem: States) -> States:
     """Return a problem whose stability can be asked, where it will be."""
     if problem.standing is not None or any(goal.of_margins for goal in problem.goals):
         _ = problem.stability  # what cannot be asked is refused now

@@ -9,7 +9,7 @@ import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.graph.explore import Explorer, Moves
-from seqopt.graph.states.states import FreeProblem
+from seqopt.graph.states.states import States
 from seqopt.problem.goals import Measure
 from seqopt.sequence import free_space
 
@@ -24,7 +24,7 @@ class FreeStates:
     asked of every state that it stands, and by which margins.
     """
 
-    problem: FreeProblem
+    problem: States
     regrips: bool = True
     standing: bool = False
 
@@ -80,7 +80,7 @@ class FreeStates:
         return self.problem.space.ended(states)
 
 
-def move_amounts(problem: FreeProblem, values: Floats, taken: Floats) -> Floats:
+def move_amounts(problem: States, values: Floats, taken: Floats) -> Floats:
     """Return what goals take of moves, (m, g).
 
     ``values`` (m, g): what they take of the states that the moves lead to; ``taken`` (m, 2):
@@ -98,7 +98,7 @@ def move_amounts(problem: FreeProblem, values: Floats, taken: Floats) -> Floats:
 
 
 def explore(
-    problem: FreeProblem,
+    problem: States,
     ceiling: float = np.inf,
     width: int | None = None,
     tell: Callable[[Explorer], object] = lambda _: None,

@@ -28,7 +28,7 @@ class ScheduleFormulation:
     """A way to solve the free schedule.
 
     ``name``, ``summary``: what it is called, and what it does in a few words; ``kind``: what it
-    promises; ``solve``: takes the problem and named options, returns a `ScheduleSelection`, or of a
+    promises; ``solve``: takes the problem and named options, returns a `StatePath`, or of a
     Pareto set a `seqopt.plan.front.FrontSelection`; ``finds``: which of the two.
     """
 

@@ -14,7 +14,7 @@ CLOSE = 1e-6  # over a value: how far a bound may be above it by rounding
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ScheduleSelection(FrozenValue):
+class StatePath(FrozenValue):
     """A free schedule, and what its formulation claims of it.
 
     ``states``: after every step: how many bricks stand, then the node that each robot holds, as a
@@ -36,7 +36,7 @@ class ScheduleSelection(FrozenValue):
     stopped: str = ""
 
 
-def with_numbers(name: str, found: ScheduleSelection, goals: int) -> ScheduleSelection:
+def with_numbers(name: str, found: StatePath, goals: int) -> StatePath:
     """Return a selection with numbers where numbers belong.
 
     ``name``: of the formulation that made it; ``goals``: how many goals there are. Raises
@@ -54,4 +54,4 @@ def with_numbers(name: str, found: ScheduleSelection, goals: int) -> ScheduleSel
             raise ValueError("a value or bound is NaN, or a bound is above its value")
         visited = tuple(np.asarray(rows) for rows in found.visited)
         prices = tuple(tuple(map(float, each)) for each in found.prices)
-        return ScheduleSelection(states, objective, bound, visited, prices, text(found.stopped))
+        return StatePath(states, objective, bound, visited, prices, text(found.stopped))

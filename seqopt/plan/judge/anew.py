@@ -13,7 +13,7 @@ from itertools import chain
 import numpy as np
 
 from seqopt.errors import FileError
-from seqopt.graph.layers.layers import Problem
+from seqopt.graph.layers.layers import Layers
 from seqopt.network.network import Network
 from seqopt.responses.blocks import pack
 from seqopt.responses.choices import Evaluation
@@ -23,11 +23,11 @@ SAME = 1e-5  # over its largest, that a response may differ: ten times what a sc
 
 
 def require_anew(
-    problem: Problem, choice: Sequence[int], met: Sequence[tuple[Problem, Sequence[int]]] = ()
+    problem: Layers, choice: Sequence[int], met: Sequence[tuple[Layers, Sequence[int]]] = ()
 ) -> None:
     """Raise an error if a choice leads to other responses than its problem has from a cache.
 
-    ``choice``: a candidate for every move; ``met`` (sequence of (Problem, sequence of int)): where
+    ``choice``: a candidate for every move; ``met`` (sequence of (Layers, sequence of int)): where
     its own responses are not computed: problems with all of its steps, and the choices in these.
     Raises `FileError` if a response of a step is another one when it is computed anew.
     """

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
-from seqopt.graph.states.states import FreeProblem
+from seqopt.graph.states.states import States
 from seqopt.problem.goals import LARGEST, Goal
 from seqopt.problem.requirements import state_costs
 from seqopt.responses.blocks import Block
@@ -27,7 +27,7 @@ class Answers(NamedTuple):
     fit: Bools
 
 
-def ask(problem: FreeProblem, bricks: int, grips: Ints, most: float = np.inf) -> Answers:
+def ask(problem: States, bricks: int, grips: Ints, most: float = np.inf) -> Answers:
     """Return what is known about grip sets, computed again by the engine.
 
     ``grips`` (S, r): nodes held; ``most``: over scenarios, what the first goal takes more of in one
@@ -38,7 +38,7 @@ def ask(problem: FreeProblem, bricks: int, grips: Ints, most: float = np.inf) ->
     return _asked(problem, bricks, grips)
 
 
-def _worst(problem: FreeProblem, bricks: int, grips: Ints, most: float) -> Answers:
+def _worst(problem: States, bricks: int, grips: Ints, most: float) -> Answers:
     """Return the largest of all scenarios, of what is passed by those before."""
     out = np.zeros((len(grips), len(problem.goals)))
     forces, fit = np.zeros(grips.shape), np.ones(len(grips), dtype=bool)
@@ -50,7 +50,7 @@ def _worst(problem: FreeProblem, bricks: int, grips: Ints, most: float) -> Answe
     return Answers(out, forces, fit)
 
 
-def _asked(problem: FreeProblem, bricks: int, grips: Ints) -> Answers:
+def _asked(problem: States, bricks: int, grips: Ints) -> Answers:
     """Return the same of one scenario; nothing that is kept anywhere is believed."""
     names = tuple(name for name in problem.named if name != LARGEST)
     block = Block(bricks, grips, names, screen=False)
@@ -65,7 +65,7 @@ def _asked(problem: FreeProblem, bricks: int, grips: Ints) -> Answers:
 
 
 def _costs(
-    problem: FreeProblem, goal: Goal, found: dict[str, Floats], bricks: int, fit: Bools
+    problem: States, goal: Goal, found: dict[str, Floats], bricks: int, fit: Bools
 ) -> Floats:
     if goal.response and not goal.of_margins:
         return found[goal.response]

@@ -13,7 +13,7 @@ import numpy as np
 from seqopt.errors import InfeasibleError, SeqoptError, SolverError
 from seqopt.graph.explore import Explorer
 from seqopt.graph.paths import distances, least_peak
-from seqopt.graph.states.states import FreeProblem
+from seqopt.graph.states.states import States
 from seqopt.graph.states.visits import explore
 from seqopt.plan.judge.proof import Proof
 from seqopt.plan.search.sturdiest import WORST, bisected, with_margin
@@ -24,14 +24,14 @@ from seqopt.sequence.schedule import Schedule
 
 STEPS = (Goal(Measure.STEPS),)
 STANDING = "no requirement to stand"
-Look = Callable[[FreeProblem], Explorer]
+Look = Callable[[States], Explorer]
 
 
 class _LateError(Exception):
     """Time is over."""
 
 
-def confirmed(problem: FreeProblem, name: str, seconds: float = np.inf) -> SeqoptError:
+def confirmed(problem: States, name: str, seconds: float = np.inf) -> SeqoptError:
     """Return the error that says why no plan is allowed, once it is proven that none is.
 
     ``name``: of the formulation that says so; ``seconds``: after which what is not proven is called
@@ -54,7 +54,7 @@ def confirmed(problem: FreeProblem, name: str, seconds: float = np.inf) -> Seqop
     return InfeasibleError(why if proven else f"claimed by {name}, and not proven: {why}")
 
 
-def _over_budget(problem: FreeProblem, found: Explorer, name: str) -> SeqoptError:
+def _over_budget(problem: States, found: Explorer, name: str) -> SeqoptError:
     """Return the error that names what each budget needs at least, where plans exist without."""
     graph, states = found.graph()
     first = len(problem.goals) - len(problem.budgets)
@@ -69,7 +69,7 @@ def _over_budget(problem: FreeProblem, found: Explorer, name: str) -> SeqoptErro
     )
 
 
-def _with_any_margin(problem: FreeProblem) -> FreeProblem:
+def _with_any_margin(problem: States) -> States:
     """Return a problem in which states must have the margins that are asked for, however little."""
     for goal in problem.goals:
         if goal.of_margins:
@@ -82,7 +82,7 @@ def _in_time(end: float, _: Explorer) -> None:
         raise _LateError
 
 
-def why_impossible(problem: FreeProblem, seconds: float = np.inf) -> str:
+def why_impossible(problem: States, seconds: float = np.inf) -> str:
     """Return why no plan is allowed, in a line.
 
     ``problem``: which has no plan; ``seconds``: after which it says what it found by then. Result:
@@ -101,7 +101,7 @@ def why_impossible(problem: FreeProblem, seconds: float = np.inf) -> str:
         return f"{problem.title}: {where}; time was over before it was known what helps, give more"
 
 
-def _where(problem: FreeProblem, look: Look) -> str:
+def _where(problem: States, look: Look) -> str:
     """Return where it stops."""
     placed = problem.network.scene.placed
     stops = look(replace(problem, goals=STEPS)).reached
@@ -112,7 +112,7 @@ def _where(problem: FreeProblem, look: Look) -> str:
     return f"after brick {placed[-1].name} the build cannot end"
 
 
-def _what_helps(problem: FreeProblem, look: Look) -> str:
+def _what_helps(problem: States, look: Look) -> str:
     """Return what opens a way, as the end of a line."""
     ways = list(_opening(problem, look))
     if not ways:
@@ -123,7 +123,7 @@ def _what_helps(problem: FreeProblem, look: Look) -> str:
     return f"; it becomes possible with {' or '.join(ways)}"
 
 
-def _opening(problem: FreeProblem, look: Look) -> Iterator[str]:
+def _opening(problem: States, look: Look) -> Iterator[str]:
     """Yield rules, each loosened as little as is enough alone, and limits that alone are enough."""
     problem = replace(problem, goals=STEPS)
     done: set[str] = set()
@@ -140,14 +140,14 @@ def _opening(problem: FreeProblem, look: Look) -> Iterator[str]:
             yield limit.response
 
 
-def _loosened(problem: FreeProblem) -> Iterator[tuple[str, FreeRules]]:
+def _loosened(problem: States) -> Iterator[tuple[str, FreeRules]]:
     """Yield the rules that can be loosened: what stands is asked of robots with payloads."""
     for text, rules in problem.rules.loosened() if isinstance(problem.rules, FreeRules) else ():
         if not problem.demands or rules.payload is Payload.KEPT:
             yield text, rules
 
 
-def _pair(problem: FreeProblem, look: Look) -> str:
+def _pair(problem: States, look: Look) -> str:
     """Return the first two that open a way together: rules, or a rule and a limit; or nothing."""
     for text, rules in _loosened(problem):
         other = next(_opening(replace(problem, rules=rules), look), "")
@@ -156,7 +156,7 @@ def _pair(problem: FreeProblem, look: Look) -> str:
     return ""
 
 
-def _enough(problem: FreeProblem, way: str, look: Look) -> str:
+def _enough(problem: States, way: str, look: Look) -> str:
     """Return how far a limit has to be raised, where it is a limit that is loosened."""
     if way == STANDING and not any(demand.tilt for demand in problem.demands):
         own, bare = problem.standing or Standing(), replace(problem, settled=(), goals=STEPS)
@@ -178,7 +178,7 @@ def _enough(problem: FreeProblem, way: str, look: Look) -> str:
     return f"{way}={least:.6g} instead of {found[0].bound:g}"
 
 
-def worst_least(problem: FreeProblem, response: str, look: Look = explore) -> float:
+def worst_least(problem: States, response: str, look: Look = explore) -> float:
     """Return the least worst value of a response that a plan within the other limits reaches.
 
     ``response``: one of `seqopt.problem.goals.STATE_RESPONSES`, or ``bond``; ``look``:

@@ -18,9 +18,9 @@ import numpy as np
 
 from seqopt.arrays import Floats, Ints
 from seqopt.graph.graph import Graph
-from seqopt.graph.orders.orders import OrderProblem
+from seqopt.graph.orders.orders import AllOrders
 from seqopt.graph.paths import distances
-from seqopt.graph.states.states import FreeProblem
+from seqopt.graph.states.states import States
 from seqopt.network.build import build_network
 from seqopt.plan.judge.answers import ask
 from seqopt.plan.judge.free_moves import Follows, RuleTables
@@ -38,7 +38,7 @@ MOST_SETS = 200_000  # grip sets of the whole structure that are looked at
 
 
 def finds_better_order(
-    problem: OrderProblem, value: float, *, most: int = MOST, end: float = np.inf
+    problem: AllOrders, value: float, *, most: int = MOST, end: float = np.inf
 ) -> bool | None:
     """Return whether some order has a plan whose first goal is below a value.
 
@@ -55,7 +55,7 @@ def finds_better_order(
     return None if least is None else least < value
 
 
-def _least_of_all(problem: OrderProblem, below: float, most: int, end: float) -> float | None:
+def _least_of_all(problem: AllOrders, below: float, most: int, end: float) -> float | None:
     """Return what the first goal takes at least in any order; None where not all are looked at.
 
     Of a worst step it is said whether some order stays below a value: zero, or infinity.
@@ -100,7 +100,7 @@ class _Reached(NamedTuple):
     tables: Tables
 
 
-def _of_the_whole(problem: OrderProblem) -> float:
+def _of_the_whole(problem: AllOrders) -> float:
     """Return the least value with which all bricks stand, whoever holds them: every order ends so.
 
     Minus infinity where there are too many grip sets to look at.
@@ -114,14 +114,14 @@ def _of_the_whole(problem: OrderProblem) -> float:
     return least if free.free_rules.ending is Ending.HELD else max(least, _least(free, nodes, 0))
 
 
-def _least(free: FreeProblem, nodes: list[int], count: int) -> float:
+def _least(free: States, nodes: list[int], count: int) -> float:
     """Return the least that the goal takes of the whole with so many grips; infinite of none."""
     grips = np.array([*combinations(nodes, count)], dtype=np.int64)
     found = ask(free, len(free.network.inner), grips.reshape(comb(len(nodes), count), count))
     return float(found.worth[found.fit, 0].min(initial=np.inf))
 
 
-def _closed(problem: OrderProblem, key: Key, parts: list[_Entries], below: float) -> _Reached:
+def _closed(problem: AllOrders, key: Key, parts: list[_Entries], below: float) -> _Reached:
     """Return the states with a set of bricks that are reached, below a value of a worst step."""
     passable = Passable(problem.judging(_order(problem, key)))
     tables, asked = passable.tables, Asked((below,), () if problem.free.demands else None)
@@ -162,7 +162,7 @@ def _closed(problem: OrderProblem, key: Key, parts: list[_Entries], below: float
     return _Reached(part.states, distances(graph, graph.amounts[:, 0])[1:], tables)
 
 
-def _placed(problem: OrderProblem, key: Key, found: _Reached) -> Iterator[tuple[Key, _Entries]]:
+def _placed(problem: AllOrders, key: Key, found: _Reached) -> Iterator[tuple[Key, _Entries]]:
     """Yield what follows by placing a brick: some states more than once."""
     parks = problem.free.goals[0].measure is Measure.TRAVEL
     own = _renumbered(problem, key, found.states)
@@ -178,11 +178,11 @@ def _placed(problem: OrderProblem, key: Key, found: _Reached) -> Iterator[tuple[
                 yield after, _Entries(states, found.least[move.source], move.way)
 
 
-def _renumbered(problem: OrderProblem, key: Key, states: Ints, *, back: bool = False) -> Ints:
+def _renumbered(problem: AllOrders, key: Key, states: Ints, *, back: bool = False) -> Ints:
     return _places(problem, _order(problem, key), states, back=back)
 
 
-def _places(problem: OrderProblem, order: Order, states: Ints, *, back: bool = False) -> Ints:
+def _places(problem: AllOrders, order: Order, states: Ints, *, back: bool = False) -> Ints:
     """Return states with places in the scene's own order for those in another one, or back."""
     nodes = {brick.name: brick.nodes for brick in problem.scene.bricks}
     own = {n: i for i, n in enumerate((n for b in problem.scene.build_order for n in nodes[b]), 1)}
@@ -194,7 +194,7 @@ def _places(problem: OrderProblem, order: Order, states: Ints, *, back: bool = F
     return out
 
 
-def _order(problem: OrderProblem, key: Key, following: int | None = None) -> Order:
+def _order(problem: AllOrders, key: Key, following: int | None = None) -> Order:
     """Return an order that begins with a set, its newest brick last, and maybe another one."""
     own, (stand, newest) = problem.scene.build_order, key
     first = [name for name in own if name in stand and name != newest]

@@ -9,7 +9,7 @@ import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.graph.paths import tied
-from seqopt.graph.states.states import FreeProblem
+from seqopt.graph.states.states import States
 from seqopt.graph.states.visits import move_amounts
 from seqopt.plan.judge.answers import ask
 from seqopt.plan.judge.free_moves import Follows, RuleTables
@@ -58,7 +58,7 @@ class Passable:
     ``margins``: how many goals are about margins; they come first.
     """
 
-    def __init__(self, problem: FreeProblem) -> None:
+    def __init__(self, problem: States) -> None:
         self.problem = problem
         most, own = _loads(problem, stand=False), _loads(problem, stand=True)
         self.tables = _tables(problem, most)
@@ -171,7 +171,7 @@ def _alike(book: RuleBook, most: Mapping[int, float]) -> list[tuple[int, ...]]:
     return [tuple(group) for group in groups.values() if len(group) > 1]
 
 
-def _tables(problem: FreeProblem, most: Mapping[int, float]) -> Tables:
+def _tables(problem: States, most: Mapping[int, float]) -> Tables:
     """Return what rules or a schedule allow."""
     parks = any(goal.measure is Measure.TRAVEL for goal in problem.goals)
     if isinstance(problem.rules, Schedule):
@@ -180,7 +180,7 @@ def _tables(problem: FreeProblem, most: Mapping[int, float]) -> Tables:
     return RuleTables(book, _alike(book, most), parks=parks)
 
 
-def _loads(problem: FreeProblem, *, stand: bool) -> dict[int, float]:
+def _loads(problem: States, *, stand: bool) -> dict[int, float]:
     """Return the most that every robot of the scene may carry, or has to hold with, N."""
     out, rules = {}, problem.rules
     kept = stand if isinstance(rules, Schedule) else rules.payload is Payload.KEPT

@@ -17,7 +17,7 @@ from seqopt.graph.budgets import budget_bounds, is_beyond
 from seqopt.graph.duality import lexicographic_bounds
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import lexicographic, reached
-from seqopt.graph.states.states import FreeProblem
+from seqopt.graph.states.states import States
 from seqopt.plan.judge.free_moves import Follows
 from seqopt.plan.judge.passable import Asked, Passable
 from seqopt.problem.goals import Measure
@@ -34,7 +34,7 @@ class Proof:
     states a better plan could pass.
     """
 
-    def __init__(self, problem: FreeProblem, hint: Hint | None = None) -> None:
+    def __init__(self, problem: States, hint: Hint | None = None) -> None:
         self._passable = Passable(problem)
         self._told = {} if hint is None else _rows(problem, self._passable, hint)
         self.states = 0
@@ -150,7 +150,7 @@ class _Levels:
         return Graph(*rows, amounts, peaks, np.concatenate(self._ends))
 
 
-def _rows(problem: FreeProblem, passable: Passable, hint: Hint) -> dict[int, Ints]:
+def _rows(problem: States, passable: Passable, hint: Hint) -> dict[int, Ints]:
     """Return states of a search as rows of the tables, by brick count."""
     tables, columns = passable.tables, [r for kind in problem.space.kinds for r in kind.robots]
     order = [columns.index(r) for r in tables.team]

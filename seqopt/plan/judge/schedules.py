@@ -18,8 +18,8 @@ import pandas as pd
 
 from seqopt.arrays import FrozenValue
 from seqopt.errors import SolverError
-from seqopt.graph.states.states import FreeProblem
-from seqopt.plan.calling.schedule_selection import ScheduleSelection
+from seqopt.graph.states.states import States
+from seqopt.plan.calling.schedule_selection import StatePath
 from seqopt.plan.judge.proof import BELOW, Hint, Proof
 from seqopt.plan.judge.scheduled_moves import check_scheduled
 from seqopt.plan.judge.standing_proof import proven_margins, require_margin
@@ -52,8 +52,8 @@ class ScheduleCertificate(FrozenValue):
 
 
 def judge_schedule(
-    problem: FreeProblem,
-    selection: ScheduleSelection,
+    problem: States,
+    selection: StatePath,
     steps: Sequence[Step],
     hint: Hint | None = None,
     *,
@@ -89,7 +89,7 @@ def judge_schedule(
     return ScheduleCertificate(values, bounds, max(gaps), proof.states)
 
 
-def _bounds(problem: FreeProblem, proof: Proof, values: tuple[float, ...]) -> tuple[float, ...]:
+def _bounds(problem: States, proof: Proof, values: tuple[float, ...]) -> tuple[float, ...]:
     """Return what no plan stays below, goal by goal; margins come first and have their width."""
     out: list[float] = []
     for goal, value in zip(problem.goals, values, strict=True):
@@ -105,8 +105,8 @@ def _bounds(problem: FreeProblem, proof: Proof, values: tuple[float, ...]) -> tu
 
 
 def _within_budgets(
-    problem: FreeProblem,
-    selection: ScheduleSelection,
+    problem: States,
+    selection: StatePath,
     values: tuple[float, ...],
     proof: Proof,
 ) -> ScheduleCertificate:
@@ -136,7 +136,7 @@ def _stopped(values: tuple[float, ...]) -> ScheduleCertificate:
 
 
 def plan_values(
-    problem: FreeProblem, steps: Sequence[Step], claimed: Sequence[float] = ()
+    problem: States, steps: Sequence[Step], claimed: Sequence[float] = ()
 ) -> tuple[float, ...]:
     """Return what goals take of a sequence, from the responses of its steps.
 
@@ -175,7 +175,7 @@ def plan_values(
     return tuple(out)
 
 
-def _require_limits(problem: FreeProblem, columns: Mapping[str, np.ndarray]) -> None:
+def _require_limits(problem: States, columns: Mapping[str, np.ndarray]) -> None:
     """Raise a `SolverError` if a step exceeds a limit."""
     for limit in problem.limits:
         if limit.response in columns and limit.exceeded(columns[limit.response]).any():
@@ -183,14 +183,14 @@ def _require_limits(problem: FreeProblem, columns: Mapping[str, np.ndarray]) -> 
             raise SolverError(f"step {at} exceeds the limit on {limit.response}")
 
 
-def _margins(problem: FreeProblem, steps: Sequence[Step]) -> Mapping[str, float]:
+def _margins(problem: States, steps: Sequence[Step]) -> Mapping[str, float]:
     """Return the margins of a plan where they count, and require that it stands where it must."""
     if problem.standing is None and not any(goal.of_margins for goal in problem.goals):
         return {}
     return proven_margins(problem, steps)
 
 
-def state_columns(problem: FreeProblem, table: pd.DataFrame) -> Mapping[str, np.ndarray]:
+def state_columns(problem: States, table: pd.DataFrame) -> Mapping[str, np.ndarray]:
     """Return the named responses of a table of steps, SI units.
 
     ``table``: from `seqopt.analyze`. Result (dict of str to (n,) float).
@@ -205,7 +205,7 @@ def state_columns(problem: FreeProblem, table: pd.DataFrame) -> Mapping[str, np.
     return out
 
 
-def travel_of(problem: FreeProblem, steps: Sequence[Step]) -> float:
+def travel_of(problem: States, steps: Sequence[Step]) -> float:
     """Return how far robots go from one grip to the next.
 
     Result: m; straight lines.
@@ -221,7 +221,7 @@ def travel_of(problem: FreeProblem, steps: Sequence[Step]) -> float:
 
 
 def _costs(
-    problem: FreeProblem, goal: Goal, columns: Mapping[str, np.ndarray], count: int
+    problem: States, goal: Goal, columns: Mapping[str, np.ndarray], count: int
 ) -> np.ndarray:
     if goal.response:
         return columns[goal.response]

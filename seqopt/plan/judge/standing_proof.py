@@ -9,7 +9,7 @@ import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.errors import SolverError
-from seqopt.graph.states.states import FreeProblem
+from seqopt.graph.states.states import States
 from seqopt.problem.standing import Standing, StandingSets, slack
 from seqopt.sequence.steps import Step
 from seqopt.stability.assessment import Stability, Verdict, assess_steps, step_verdicts
@@ -23,7 +23,7 @@ class StandingProof:
     ``payload``: the most that every robot may carry, N.
     """
 
-    def __init__(self, problem: FreeProblem, payload: dict[int, float]) -> None:
+    def __init__(self, problem: States, payload: dict[int, float]) -> None:
         self._problem, self._payload = problem, payload
         self._sets: dict[Standing, tuple[StandingSets, ...]] = {}
 
@@ -58,7 +58,7 @@ class StandingProof:
         return self._sets[asked]
 
 
-def proven_margins(problem: FreeProblem, steps: Sequence[Step]) -> dict[str, float]:
+def proven_margins(problem: States, steps: Sequence[Step]) -> dict[str, float]:
     """Return the margins of a plan by the cone program, and require that every step stands.
 
     Margins are found only where they are asked for: the worst ``bond``, ``friction`` and ``tilt``
@@ -85,7 +85,7 @@ def _falls(step: Step, what: str) -> SolverError:
     return SolverError(f"step {step.number} is not proven to stand as demanded: {what}")
 
 
-def certified(problem: FreeProblem, steps: Sequence[Step]) -> tuple[Stability, ...]:
+def certified(problem: States, steps: Sequence[Step]) -> tuple[Stability, ...]:
     """Return verdict and margins of every step by the cone program; of equal ones once."""
     mortar = (problem.standing or Standing()).mortar
     for step in steps:

@@ -23,7 +23,7 @@ from seqopt.errors import InfeasibleError, ProblemError, SolverError, TimeUpErro
 from seqopt.graph.layers.floors import floor_of
 from seqopt.graph.layers.interface import Aim, CostProblem
 from seqopt.graph.layers.joining import Joined
-from seqopt.graph.layers.layers import Problem
+from seqopt.graph.layers.layers import Layers
 from seqopt.graph.layers.partial_costs import PartialCosts
 from seqopt.graph.layers.windows import pairs_as_moves, possible_after, window
 from seqopt.interrupts import answered
@@ -68,7 +68,7 @@ class PairSearch:
         return float(sum(met) if aim is Aim.SUM else max(met))
 
 
-def search_pairs(problem: Problem, formulation: Formulation, watch: Watch) -> PairSearch:
+def search_pairs(problem: Layers, formulation: Formulation, watch: Watch) -> PairSearch:
     """Solve a problem exactly, looking only at pairs that could be better than what is known.
 
     ``problem``: its own responses are not computed; ``formulation``: exact; it is given what is
@@ -113,7 +113,7 @@ def _proven(costs: PartialCosts) -> bool:
     return math.isfinite(costs.best) and costs.best - costs.bound <= EQUAL * size
 
 
-def _floor(problem: Problem, formulation: Formulation) -> float:
+def _floor(problem: Layers, formulation: Formulation) -> float:
     """Return what any pair costs at least; raise an error where that is not known."""
     if formulation.kind is not FormulationKind.EXACT:
         raise ProblemError(f"{formulation.name}: the lazy search proves; give an exact formulation")
@@ -132,7 +132,7 @@ def _floor(problem: Problem, formulation: Formulation) -> float:
 class _Pairs:
     """A search on its way: the costs that are known."""
 
-    def __init__(self, problem: Problem, aim: Aim, floor: float) -> None:
+    def __init__(self, problem: Layers, aim: Aim, floor: float) -> None:
         self._problem, self._schedule, self._aim = problem, problem.schedule, aim
         self._each = isinstance(problem.criterion, WeightedSum | WorstRatio)  # pair by pair
         sizes = [len(move.candidates) for move in self._schedule.moves]
@@ -239,12 +239,12 @@ class _Pairs:
         return WindowSearch(self._alone, tuple(shared), choice)
 
 
-def _own(problem: Problem, aim: Aim) -> tuple[Floats, ...]:
+def _own(problem: Layers, aim: Aim) -> tuple[Floats, ...]:
     """Return the costs of each move's candidates where it alone is open."""
     return aim.costs(problem).single
 
 
-def _of(problem: Problem, schedule: Schedule, resources: Resources | None = None) -> Problem:
+def _of(problem: Layers, schedule: Schedule, resources: Resources | None = None) -> Layers:
     """Return the problem of another schedule, everything else being the same."""
     evaluation = replace(problem.evaluation, schedule=schedule)
     if resources is not None:

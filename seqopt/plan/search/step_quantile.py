@@ -20,7 +20,7 @@ from seqopt.errors import ProblemError
 from seqopt.graph.layers.costs import LayeredCosts
 from seqopt.graph.layers.interface import Aim, CostProblem
 from seqopt.graph.layers.joining import Joined
-from seqopt.graph.layers.layers import Problem
+from seqopt.graph.layers.layers import Layers
 from seqopt.graph.layers.possible import compared
 from seqopt.plan.judge.certificate import least_sum
 from seqopt.plan.search.in_order import solve_in_order
@@ -44,7 +44,7 @@ class StepQuantile:
     steps: int
 
 
-def least_quantile(problem: Problem, share: float = 0.1) -> StepQuantile:
+def least_quantile(problem: Layers, share: float = 0.1) -> StepQuantile:
     """Return the choice with the least level that no more than a share of open steps exceed.
 
     ``problem``: without budgets; ``share``: of the open steps, from 0 (the least peak) to below 1.
@@ -74,7 +74,7 @@ def least_quantile(problem: Problem, share: float = 0.1) -> StepQuantile:
     return StepQuantile(found.choice, float(levels[low]), round(found.values[0]), len(steps))
 
 
-def _step_costs(problem: Problem) -> list[tuple[tuple[int, ...], Floats]]:
+def _step_costs(problem: Layers) -> list[tuple[tuple[int, ...], Floats]]:
     """Return the costs of every open step's choices, with the moves that are open in it."""
     out = []
     for steps in problem.evaluation.levels():

@@ -8,7 +8,7 @@ from math import pi
 
 from seqopt.errors import InfeasibleError
 from seqopt.graph.explore import Explorer
-from seqopt.graph.states.states import FreeProblem
+from seqopt.graph.states.states import States
 from seqopt.graph.states.visits import explore
 from seqopt.problem.goals import Goal, Measure
 from seqopt.problem.standing import Standing, slack
@@ -20,8 +20,8 @@ WIDTH = 50  # states of a brick count from which a quick look for a plan goes on
 
 
 def best_margin(
-    problem: FreeProblem, tell: Callable[[Explorer], object] = lambda _: None
-) -> tuple[float, float, FreeProblem]:
+    problem: States, tell: Callable[[Explorer], object] = lambda _: None
+) -> tuple[float, float, States]:
     """Return the best value of the first goal, a margin, and what is left to choose at it.
 
     ``problem``: whose first goal is about a margin; ``tell``: called with the states that are
@@ -32,7 +32,7 @@ def best_margin(
     """
     name = problem.goals[0].response
 
-    def demanding(value: float) -> FreeProblem:
+    def demanding(value: float) -> States:
         goals = problem.goals[1:] or (Goal(Measure.STEPS),)
         return replace(with_margin(problem, name, value), goals=goals)
 
@@ -62,7 +62,7 @@ def bisected(name: str, exists: Callable[[float], bool]) -> tuple[float, float]:
     return low, high
 
 
-def with_margin(problem: FreeProblem, name: str, value: float) -> FreeProblem:
+def with_margin(problem: States, name: str, value: float) -> States:
     """Return a problem in which every state must have a margin as well.
 
     ``name``: one of `seqopt.problem.standing.MARGINS`; ``value``: as goals count it.

@@ -19,7 +19,7 @@ import numpy as np
 from seqopt.arrays import Floats, Terse
 from seqopt.errors import MemoryShortError, SolverError, TimeUpError
 from seqopt.graph.layers.joining import Joined
-from seqopt.graph.layers.layers import Problem
+from seqopt.graph.layers.layers import Layers
 from seqopt.graph.layers.windows import possible_after, window
 from seqopt.plan.calling.watch import Watch
 from seqopt.responses.choices import StepChoices
@@ -36,17 +36,17 @@ class WindowSearch(Terse):
     every move.
     """
 
-    alone: Problem
-    shared: tuple[Problem, ...]
+    alone: Layers
+    shared: tuple[Layers, ...]
     choice: tuple[int, ...]
 
     @property
-    def explored(self) -> tuple[Problem, ...]:
+    def explored(self) -> tuple[Layers, ...]:
         """The problems of which responses were computed."""
         return (self.alone, *(problem for problem in self.shared if problem.evaluation.steps))
 
     @property
-    def met(self) -> list[tuple[Problem, tuple[int, ...]]]:
+    def met(self) -> list[tuple[Layers, tuple[int, ...]]]:
         """The problems with all steps of the build, and what is chosen in each."""
         each = zip(self.shared, self.choice, strict=True)
         return [(self.alone, self.choice), *((problem, (now,)) for problem, now in each)]
@@ -59,7 +59,7 @@ class WindowSearch(Terse):
         return np.asarray(self.alone.singles[move] + self.shared[move].singles[0])
 
 
-def search_windows(problem: Problem, watch: Watch | None = None) -> WindowSearch:
+def search_windows(problem: Layers, watch: Watch | None = None) -> WindowSearch:
     """Choose every open grip of a build, one move after the other.
 
     Brick counts come in ascending order, each move being chosen as soon as its own steps are known.
@@ -87,7 +87,7 @@ def search_windows(problem: Problem, watch: Watch | None = None) -> WindowSearch
 class _Walk:
     """A search on its way: what was looked at, and what is chosen."""
 
-    def __init__(self, problem: Problem) -> None:
+    def __init__(self, problem: Layers) -> None:
         self._problem, self._schedule = problem, problem.schedule
         single = tuple(step for step in self._schedule.steps if len(step.moves) == 1)
         self.alone = _of(
@@ -99,7 +99,7 @@ class _Walk:
                 "used; take near candidates only, or raise max_memory"
             )
         self._own = Joined([len(move.candidates) for move in self._schedule.moves], np.add)
-        self.shared: list[Problem] = []
+        self.shared: list[Layers] = []
         self.choice: list[int] = []
 
     def look(self, steps: Sequence[StepChoices]) -> None:
@@ -150,7 +150,7 @@ class _Walk:
         return f"{moves} were chosen, at nodes {chosen}" if chosen else "no move was chosen yet"
 
 
-def _of(problem: Problem, schedule: Schedule, resources: Resources) -> Problem:
+def _of(problem: Layers, schedule: Schedule, resources: Resources) -> Layers:
     """Return the problem of another schedule, everything else being the same."""
     evaluation = replace(problem.evaluation, schedule=schedule, resources=resources)
     return replace(problem, evaluation=evaluation)
