@@ -28,8 +28,6 @@ if TYPE_CHECKING:
     from seqopt.engines.interface import Engine
     from seqopt.engines.registry import make_engine
     from seqopt.errors import SeqoptError
-    from seqopt.graph.scenarios.scenarios import robust
-    from seqopt.graph.states.states import build_states
     from seqopt.network.build import build_network
     from seqopt.network.network import Network
     from seqopt.plan.calling.formulation import Formulation, formulations
@@ -37,9 +35,9 @@ if TYPE_CHECKING:
     from seqopt.plan.judge.certificate import Certificate
     from seqopt.plan.plan import Plan
     from seqopt.plan.posing import pose
-    from seqopt.plan.robust_plan import solve_robust
     from seqopt.plan.solving import solve
     from seqopt.problem.own_criterion import StepCost
+    from seqopt.problem.problem import Problem
     from seqopt.problem.requirements import Limit
     from seqopt.responses.table import analyze
     from seqopt.scene.arch import ArchShape, arch_scene
@@ -63,18 +61,16 @@ _HOMES = {
     "engines.interface": ("Engine",),
     "engines.registry": ("make_engine",),
     "errors": ("SeqoptError",),
-    "graph.layers.layers": ("pose",),
-    "graph.scenarios.scenarios": ("robust",),
-    "graph.states.states": ("build_states",),
     "network.build": ("build_network",),
     "network.network": ("Network",),
     "plan.calling.formulation": ("Formulation", "formulations"),
     "plan.given": ("GivenSequence",),
     "plan.judge.certificate": ("Certificate",),
     "plan.plan": ("Plan",),
-    "plan.robust_plan": ("solve_robust",),
+    "plan.posing": ("pose",),
     "plan.solving": ("solve",),
     "problem.own_criterion": ("StepCost",),
+    "problem.problem": ("Problem",),
     "problem.requirements": ("Limit",),
     "responses.table": ("analyze",),
     "scene.arch": ("ArchShape", "arch_scene"),
@@ -119,16 +115,14 @@ __all__ = [  # noqa: RUF022  # in the order in which they are met
     "CRITERIA",
     "StepCost",
     "Limit",
+    "Problem",
     "pose",
     "Formulation",
     "formulations",
     "FreeRules",
-    "build_states",
     "solve",
     "optimize",
     "scenarios",
-    "robust",
-    "solve_robust",
     "Plan",
     "GivenSequence",
     "Certificate",

@@ -29,7 +29,6 @@ from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import Engine
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.graph.layers.interface import Aim
 from seqopt.graph.layers.layers import Layers, candidate_layers
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
@@ -37,6 +36,7 @@ from seqopt.plan.calling.formulation import Formulation, formulations
 from seqopt.plan.judge.certificate import least
 from seqopt.plan.plan import Plan
 from seqopt.plan.solving import solve
+from seqopt.problem.aims import Aim
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.three_robots import three_robot_loop

@@ -63,7 +63,6 @@ from experiments.placement.parts.budget_cases import CASES, COMPARED, NO_BUDGET
 from experiments.placement.parts.formulation_charts import contest_chart, cost_chart, shape_chart
 from formulations.solvers import anatomy, minimize_whole
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.graph.layers.interface import Aim
 from seqopt.graph.layers.layers import Layers, candidate_layers
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
@@ -71,6 +70,7 @@ from seqopt.plan.calling.formulation import find_formulation, formulations
 from seqopt.plan.calling.watch import Watch, trace_rows
 from seqopt.plan.judge.certificate import least
 from seqopt.plan.solving import solve
+from seqopt.problem.aims import Aim
 from seqopt.problem.requirements import Criterion
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.three_robots import three_robot_loop

@@ -33,24 +33,23 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from seqopt.plan.robust_plan import RobustPlan, solve_robust
 
 from experiments.harness.claim import Claim, Finding, Options, Times, on_this_run
 from experiments.harness.results import drawn, stored
 from experiments.harness.scenes import half_circle
 from formulations.scenarios.scenario_program import solve_program
 from seqopt.engines.registry import make_engine
-from seqopt.graph.layers.interface import Aim
 from seqopt.graph.layers.layers import Layers, candidate_layers
-from seqopt.graph.scenarios.aims import WORST_PEAK, WORST_TOTAL, RobustAim, cvar
 from seqopt.graph.scenarios.arcs import Choice
 from seqopt.graph.scenarios.scenarios import ScenarioLayers, robust
 from seqopt.network.build import build_network
 from seqopt.plan.calling.watch import Watch
 from seqopt.plan.out_of_sample import judge_unseen
-from seqopt.plan.robust_plan import RobustPlan, solve_robust
 from seqopt.plan.search.in_order import solve_in_order
 from seqopt.plan.search.step_quantile import least_quantile
 from seqopt.plan.solving import solve
+from seqopt.problem.aims import WORST_PEAK, WORST_TOTAL, Aim, RobustAim, cvar
 from seqopt.problem.requirements import Criterion
 from seqopt.report.style import BLUE, GRAY, VERMILION, dress, new_figure, styled
 from seqopt.scene.scenarios import scenarios

@@ -22,9 +22,10 @@ from scipy import sparse
 from formulations.whole_program import WholeProgram, below, largest_of_each, solve_whole
 from seqopt.arrays import Floats
 from seqopt.graph.layers.costs import LayeredCosts
-from seqopt.graph.layers.interface import Aim, PlacementProblem
+from seqopt.graph.layers.interface import PlacementProblem
 from seqopt.plan.calling.formulation import Formulation, FormulationKind, Selection
 from seqopt.plan.calling.watch import Watch
+from seqopt.problem.aims import Aim
 
 
 def write(problem: PlacementProblem) -> WholeProgram:

@@ -33,12 +33,13 @@ import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.errors import InfeasibleError, ProblemError
-from seqopt.graph.layers.interface import Aim, PlacementProblem
+from seqopt.graph.layers.interface import PlacementProblem
 from seqopt.plan.calling.first_choice import stopped
 from seqopt.plan.calling.formulation import End, Formulation, FormulationKind, Selection
 from seqopt.plan.calling.priced_paths import ROUNDING, Path, PricedPaths, priced_paths
 from seqopt.plan.calling.prices import Priced, best_prices
 from seqopt.plan.calling.watch import Watch
+from seqopt.problem.aims import Aim
 
 NARROW, WIDER = 256, 16  # labels kept at first, and how many times as many then
 AT_ONCE = 2_000_000  # pairs of a label and a candidate that are looked at together

@@ -28,9 +28,10 @@ from formulations.whole_program import (
     worst_pairs,
 )
 from seqopt.arrays import Floats
-from seqopt.graph.layers.interface import Aim, PlacementProblem
+from seqopt.graph.layers.interface import PlacementProblem
 from seqopt.plan.calling.formulation import Formulation, FormulationKind, Selection
 from seqopt.plan.calling.watch import Watch
+from seqopt.problem.aims import Aim
 
 
 def write(problem: PlacementProblem) -> WholeProgram:

@@ -26,8 +26,7 @@ from seqopt.graph.paths import Best, distances, lexicographic, reached, tied
 from seqopt.graph.states.states import States
 from seqopt.graph.states.visits import FreeStates, explore
 from seqopt.interrupts import answered
-from seqopt.plan.calling.formulation import FormulationKind
-from seqopt.plan.calling.schedule_formulation import ScheduleFormulation
+from seqopt.plan.calling.formulation import Formulation, FormulationKind, On
 from seqopt.plan.calling.schedule_selection import StatePath
 from seqopt.plan.calling.watch import Watch
 from seqopt.plan.search.sturdiest import best_margin
@@ -64,7 +63,7 @@ def on_graph(
     summary: str,
     choose: Callable[[Graph, Watch], Choice],
     kind: FormulationKind = FormulationKind.EXACT,
-) -> ScheduleFormulation:
+) -> Formulation:
     """Return the formulation of the free schedule that chooses a path through the graph of states.
 
     ``name``, ``summary``: what it is called, and what it does in a few words; ``choose``: returns a
@@ -90,7 +89,7 @@ def on_graph(
         tell = watched(problem, watch, max_memory, progress)
         return after_margins(problem, lambda rest: _chosen(rest, choose, watch, tell), tell)
 
-    return ScheduleFormulation(name, summary, kind, solve)
+    return Formulation(name, summary, kind, None, solve, on=On.STATES)
 
 
 def _chosen(

@@ -38,8 +38,7 @@ from seqopt.graph.orders.visits import OrderStates, TooManySetsError
 from seqopt.graph.orders.work import Trial, trying, worth
 from seqopt.graph.parts import Visited
 from seqopt.graph.paths import keep_best, lexicographic, reached
-from seqopt.plan.calling.formulation import FormulationKind
-from seqopt.plan.calling.schedule_formulation import Finds, ScheduleFormulation
+from seqopt.plan.calling.formulation import Formulation, FormulationKind, On
 from seqopt.responses.resources import HERE, Resources
 from seqopt.scene.orders import ORDERS, Order
 from seqopt.work.progress import Stage
@@ -240,10 +239,11 @@ def _beside(order: Order, problem: AllOrders, rng: np.random.Generator) -> Itera
             yield changed
 
 
-FORMULATION = ScheduleFormulation(
+FORMULATION = Formulation(
     "order_search",
     "the order in which bricks are placed, by all sets of bricks or by trying",
     FormulationKind.EXACT,
+    None,
     solve,
-    Finds.ORDER,
+    on=On.ORDERS,
 )

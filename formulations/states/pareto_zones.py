@@ -22,8 +22,7 @@ import time
 import numpy as np
 
 from seqopt.arrays import Bools, Floats
-from seqopt.plan.calling.formulation import FormulationKind
-from seqopt.plan.calling.schedule_formulation import Finds, ScheduleFormulation
+from seqopt.plan.calling.formulation import Formulation, FormulationKind, On
 from seqopt.plan.front import FrontProblem, FrontSelection
 from seqopt.work.progress import Tell
 
@@ -87,10 +86,11 @@ def _within(zones: Floats, others: Floats) -> Bools:
     return np.asarray(inside.any(axis=1))
 
 
-FORMULATION = ScheduleFormulation(
+FORMULATION = Formulation(
     "pareto_zones",
     "all plans that none beats in every response, zone by zone",
     FormulationKind.EXACT,
+    None,
     solve,
-    Finds.FRONT,
+    on=On.FRONTS,
 )

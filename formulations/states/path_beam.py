@@ -31,8 +31,7 @@ from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.graph.explore import Explorer
 from seqopt.graph.states.states import States
 from seqopt.graph.states.visits import FreeStates
-from seqopt.plan.calling.formulation import FormulationKind
-from seqopt.plan.calling.schedule_formulation import ScheduleFormulation
+from seqopt.plan.calling.formulation import Formulation, FormulationKind, On
 from seqopt.plan.calling.schedule_selection import StatePath
 from seqopt.plan.calling.watch import Watch
 from seqopt.work.progress import Tell
@@ -73,6 +72,11 @@ def solve(
     return after_margins(problem, search, tell)
 
 
-FORMULATION = ScheduleFormulation(
-    "path_beam", "a beam over the states of every brick count", FormulationKind.HEURISTIC, solve
+FORMULATION = Formulation(
+    "path_beam",
+    "a beam over the states of every brick count",
+    FormulationKind.HEURISTIC,
+    None,
+    solve,
+    on=On.STATES,
 )

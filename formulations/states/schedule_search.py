@@ -50,8 +50,7 @@ from seqopt.graph.explore import Explorer
 from seqopt.graph.paths import distances
 from seqopt.graph.states.states import States
 from seqopt.graph.states.visits import FreeStates
-from seqopt.plan.calling.formulation import FormulationKind
-from seqopt.plan.calling.schedule_formulation import ScheduleFormulation
+from seqopt.plan.calling.formulation import Formulation, FormulationKind, On
 from seqopt.plan.calling.schedule_selection import StatePath
 from seqopt.plan.calling.watch import Watch
 from seqopt.problem.goals import Measure
@@ -168,9 +167,12 @@ def _unproven(found: StatePath, wide: Explorer, proven: float) -> StatePath:
     return replace(found, bound=(min(bound, found.objective[0]), *found.bound[1:]))
 
 
-FORMULATION = ScheduleFormulation(
+FORMULATION = Formulation(
     "schedule_search",
     "threshold and reachability among the states of the free schedule",
     FormulationKind.EXACT,
+    None,
     solve,
+    on=On.STATES,
+    takes_budgets=True,
 )

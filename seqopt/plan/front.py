@@ -13,12 +13,8 @@ import pandas as pd
 
 from seqopt.arrays import Floats, FrozenValue, Terse
 from seqopt.errors import InfeasibleError, ProblemError, SolverError, did_you_mean
+from seqopt.plan.calling.formulation import Formulation, On, as_formulation
 from seqopt.plan.calling.guard import called, readable, text
-from seqopt.plan.calling.schedule_formulation import (
-    Finds,
-    ScheduleFormulation,
-    find_schedule_formulation,
-)
 from seqopt.sequence.steps import Step, StepKind
 from seqopt.work.progress import Tell, told
 
@@ -132,7 +128,7 @@ class Front(Terse):
 
 def find_front(
     problem: FrontProblem,
-    formulation: ScheduleFormulation | str = "pareto_zones",
+    formulation: Formulation | str = "pareto_zones",
     *,
     seconds: float = np.inf,
     progress: Tell = lambda _: None,
@@ -144,7 +140,7 @@ def find_front(
     `SolverError` if a plan is not worth what is claimed, or the set lacks a point.
     """
     start = time.perf_counter()
-    formulation = find_schedule_formulation(formulation, Finds.FRONT)
+    formulation = as_formulation(formulation, On.FRONTS)
     twin, name = problem.anew(), formulation.name  # which no formulation can reach
     solve = partial(formulation.solve, problem, seconds=seconds, progress=progress)
     found = _found(name, (problem, twin), solve)

@@ -8,18 +8,23 @@ each single scenario (wait and see), which no plan can beat.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
 
 from seqopt.arrays import Terse
-from seqopt.errors import InfeasibleError
-from seqopt.graph.layers.interface import Aim
+from seqopt.errors import InfeasibleError, ProblemError
+from seqopt.graph.layers.interface import CostProblem
 from seqopt.graph.scenarios.arcs import Choice
 from seqopt.graph.scenarios.costs import ScenarioCosts
-from seqopt.graph.scenarios.scenarios import ScenarioLayers, robust
-from seqopt.plan.robust_plan import RobustPlan, best_choice
+from seqopt.graph.scenarios.scenarios import ScenarioLayers, in_scenarios
+from seqopt.graph.states.states import over_scenarios
+from seqopt.plan.judge.schedules import plan_values
+from seqopt.plan.plan import Plan
+from seqopt.plan.shares import best_choice
+from seqopt.problem.aims import Aim
+from seqopt.scene.orders import in_order
 from seqopt.scene.scenarios import Scenarios
 from seqopt.scene.scene import Scene
 
@@ -30,14 +35,16 @@ PLANS = ("robust", "nominal", "knows_it")
 class Trial(Terse):
     """Plans, scenario by scenario.
 
-    ``plan``: what was judged; ``nominal``: the exact optimum of the nominal scene, of the same aim
-    in one scenario; ``table``: a row per scenario. Columns: ``set`` (``nominal``, ``optimized`` or
-    ``unseen``), ``scenario`` (from 1), then for each of the plans ``robust``, ``nominal`` and
-    ``knows_it`` its ``_total`` and ``_peak`` there: infinite where it exceeds a limit, or nothing
-    keeps it. The last is the best of the aim in that scenario.
+    ``plan``: what was judged; ``known``: the layers over scenarios that it was chosen from;
+    ``nominal``: the exact optimum of the nominal scene, of the same aim in one scenario; ``table``:
+    a row per scenario. Columns: ``set`` (``nominal``, ``optimized`` or ``unseen``), ``scenario``
+    (from 1), then for each of the plans ``robust``, ``nominal`` and ``knows_it`` its ``_total`` and
+    ``_peak`` there: infinite where it exceeds a limit, or nothing keeps it. The last is the best of
+    the aim in that scenario.
     """
 
-    plan: RobustPlan
+    plan: Plan
+    layers: ScenarioLayers
     nominal: Choice
     table: pd.DataFrame
 
@@ -46,12 +53,17 @@ class Trial(Terse):
         sets = ", ".join(f"{count} {name}" for name, count in counts.items())
         return f"<Trial of {self.plan} in scenarios: {sets}>"
 
+    @property
+    def known(self) -> tuple[Scene, ...]:
+        """The scenarios that the plan was chosen by."""
+        return self.layers.scenes
+
     def summary(self) -> dict[str, dict[str, float]]:
         """Return what the aim makes of every set of scenarios, ready for JSON.
 
         Result: by set and plan; infinite numbers are left to the caller.
         """
-        aim = self.plan.problem.aim
+        aim = self.layers.aim
         column = "peak" if aim.aim is Aim.PEAK else "total"
         return {
             str(name): {plan: aim.value(rows[f"{plan}_{column}"].to_numpy()) for plan in PLANS}
@@ -59,28 +71,47 @@ class Trial(Terse):
         }
 
 
-def judge_unseen(plan: RobustPlan, scenes: ScenarioLayers | Scenarios | Sequence[Scene]) -> Trial:
+def judge_unseen(plan: Plan, scenes: ScenarioLayers | Scenarios | Sequence[Scene]) -> Trial:
     """Return the value of a plan in other scenarios, beside two plans for comparison.
 
-    ``scenes``: not those it was made for: drawn with another seed. Or the problem over them, whose
-    costs may be known. Result: also of the nominal scene and of the scenarios that it was made for.
-    Raises `ProblemError` as `seqopt.graph.scenarios.scenarios.robust`.
+    ``plan``: of candidates over scenarios; ``scenes``: not those it was made for: drawn with
+    another seed. Or the layers over them, whose costs may be known. Result: also of the nominal
+    scene and of the scenarios that it was made for. Raises `ProblemError` if a scenario has other
+    bricks or nodes.
     """
-    problem = plan.problem
-    nominal = problem.nominal
+    problem = plan.graph
+    if not isinstance(problem, ScenarioLayers):
+        raise ProblemError("the plan was not chosen over scenarios; pose with scenarios")
+    nominal, aim = problem.nominal, problem.aim.aim
     known = ScenarioCosts(nominal.sums, nominal.peaks, 0, 0.0)
-    aim = problem.aim.aim
-    chosen = best_choice(aim.costs(nominal), aim).choice
-    unseen = scenes
-    if not isinstance(unseen, ScenarioLayers):
-        unseen = robust(nominal, unseen, problem.aim)
-    sets = {"nominal": (known,), "optimized": problem.costs, "unseen": unseen.costs}
+    chosen = best_choice(nominal, aim).choice
+    if not isinstance(scenes, ScenarioLayers):
+        some = scenes.scenes if isinstance(scenes, Scenarios) else scenes
+        scenes = in_scenarios(nominal, some, problem.aim)
+    sets = {"nominal": (known,), "optimized": problem.costs, "unseen": scenes.costs}
     rows: list[dict[str, object]] = [
         {"set": name, "scenario": i, **_row(costs, problem, (plan.choice, chosen))}
         for name, found in sets.items()
         for i, costs in enumerate(found, start=1)
     ]
-    return Trial(plan, chosen, pd.DataFrame(rows))
+    return Trial(plan, problem, chosen, pd.DataFrame(rows))
+
+
+def worst_values(plan: Plan, unseen: Scenarios) -> dict[str, float]:
+    """Return the worst values of a plan of states in scenarios that it was not chosen by.
+
+    Result: by goal; margins are left out.
+    """
+    graph = plan.states
+    order = graph.network.scene.build_order
+    scenes = [in_order(scene, order) for scene in unseen.scenes]
+    judged = replace(graph, scenarios=(), limits=(), standing=None, settled=(), budgets=())
+    goals = tuple(goal for goal in graph.goals if not goal.of_margins)
+    if not goals:
+        return {}
+    judged = over_scenarios(replace(judged, goals=goals), scenes)
+    values = plan_values(judged, plan.steps)
+    return {str(goal): value for goal, value in zip(goals, values, strict=True)}
 
 
 def _row(
@@ -89,7 +120,7 @@ def _row(
     """Return what three plans cost in a scenario."""
     aim = problem.aim.aim
     try:
-        best = best_choice(costs.sums if aim is Aim.SUM else costs.peaks, aim).choice
+        best = best_choice(CostProblem(costs.sums if aim is Aim.SUM else costs.peaks), aim).choice
     except InfeasibleError:
         best = None
     out: dict[str, float] = {}

@@ -12,8 +12,10 @@ import pandas as pd
 from seqopt.errors import InfeasibleError
 from seqopt.graph.layers.costs import Budget
 from seqopt.graph.layers.interface import PlacementProblem
-from seqopt.plan.calling.formulation import Formulation
-from seqopt.plan.solving import on_the_way, solve
+from seqopt.plan.calling.formulation import Formulation, Selection
+from seqopt.plan.layers import on_the_way
+from seqopt.plan.plan import Plan
+from seqopt.plan.solving import solve
 
 
 def price_curve(
@@ -56,7 +58,7 @@ def _row(
         "proven": proof.bound,
         "gap": proof.gap,
         "spent": proof.spent[budget.name],
-        "price": plan.selection.prices.get(budget.name, np.nan),
+        "price": _price(plan, budget.name),
     }
 
 
@@ -64,3 +66,9 @@ def _with(problem: PlacementProblem, budget: Budget) -> PlacementProblem:
     """Return a problem with one more budget."""
     changed: PlacementProblem = replace(problem, budgets=(*problem.budgets, budget))  # type: ignore[type-var]
     return changed
+
+
+def _price(plan: Plan, budget: str) -> float:
+    """Return what one more unit of a budget would save; NaN if its formulation says nothing."""
+    assert isinstance(plan.selection, Selection)  # budgets of candidates
+    return plan.selection.prices.get(budget, np.nan)

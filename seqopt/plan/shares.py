@@ -9,11 +9,15 @@ import numpy as np
 
 from seqopt.graph.layers.budgets import steps_over, travel
 from seqopt.graph.layers.costs import Budget
+from seqopt.graph.layers.interface import PlacementProblem
 from seqopt.graph.layers.layers import Layers
-from seqopt.plan.solving import on_the_way, solve
+from seqopt.plan.calling.formulation import End, Selection, find_formulation
+from seqopt.plan.calling.selecting import select
+from seqopt.plan.judge.certificate import judge
+from seqopt.problem.aims import Aim
 from seqopt.problem.budgets import AskedBudget
 
-UNBOUND = "overlap_dp"  # finds the optimum without budgets, of which a share may be asked
+CHOOSES = {Aim.PEAK: "minimax", Aim.SUM: "overlap_dp"}  # of one scenario, without budgets
 
 
 def with_budgets(problem: Layers, asked: Sequence[AskedBudget]) -> Layers:
@@ -25,7 +29,7 @@ def with_budgets(problem: Layers, asked: Sequence[AskedBudget]) -> Layers:
     for each in asked:
         bound = each.bound
         if each.share:
-            free = on_the_way(solve(problem, UNBOUND)).selection.choice
+            free = best_choice(problem, Aim.SUM).choice
             bound *= _budget(problem, each, np.inf).spent(free)
         budgets.append(_budget(problem, each, bound))
     return replace(problem, budgets=tuple(budgets))
@@ -36,3 +40,16 @@ def _budget(problem: Layers, asked: AskedBudget, bound: float) -> Budget:
     if not asked.response:
         return travel(problem, bound)
     return steps_over(problem, asked.response, asked.level, bound)
+
+
+def best_choice(problem: PlacementProblem, aim: Aim) -> Selection:
+    """Return the best choice without budgets, judged; an interrupt ends more than this.
+
+    Raises `InfeasibleError` if no choice is allowed; `KeyboardInterrupt` if it was interrupted.
+    """
+    formulation = find_formulation(CHOOSES[aim])
+    found = select(formulation, problem)
+    if found.end is End.INTERRUPTED:
+        raise KeyboardInterrupt
+    judge(problem, found, formulation)
+    return found

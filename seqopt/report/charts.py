@@ -166,7 +166,7 @@ def trace_figure(plans: Sequence[Plan]) -> Figure:
     known_by = looks(plan.formulation.name for plan in plans)
     for plan in plans:
         name = plan.formulation.name
-        trace = plan.selection.trace
+        trace = plan.trace
         seconds = np.array([found.seconds for found in trace])
         for values, more in (
             ([found.objective for found in trace], {"label": typed(name)}),

@@ -12,16 +12,17 @@ from seqopt.arrays import Terse
 from seqopt.engines.interface import Engine
 from seqopt.errors import ProblemError, SeqoptError, StepError
 from seqopt.graph.layers.costs import TINY
-from seqopt.graph.layers.interface import Aim
 from seqopt.graph.layers.layers import Layers, candidate_layers
 from seqopt.graph.layers.objectives import under_both
 from seqopt.graph.layers.ranking import rank_choice
 from seqopt.graph.states.states import build_states
-from seqopt.plan.calling.formulation import formulations
-from seqopt.plan.free_plan import FreePlan
+from seqopt.plan.calling.formulation import On, formulations
+from seqopt.plan.calling.schedule_selection import StatePath
 from seqopt.plan.judge.certificate import least_sum
+from seqopt.plan.layers import on_the_way
 from seqopt.plan.plan import Plan
-from seqopt.plan.solving import on_the_way, solve
+from seqopt.plan.solving import solve
+from seqopt.problem.aims import Aim
 from seqopt.problem.criteria import RankSum, WorstRatio
 from seqopt.problem.overloads import overloads
 from seqopt.problem.requirements import Criterion
@@ -198,10 +199,10 @@ def _add_largest(
     return notes
 
 
-def _criteria(problem: Layers | None, free: FreePlan | None) -> dict[str, Criterion]:
+def _criteria(problem: Layers | None, free: Plan | None) -> dict[str, Criterion]:
     """Return the criteria as they were posed, by problem."""
     found = {} if problem is None else {problem.schedule.method: problem.criterion}
-    return found if free is None else found | {FREE: free.problem.criterion}
+    return found if free is None else found | {FREE: free.states.criterion}
 
 
 def _plans(
@@ -219,7 +220,7 @@ def _plans(
             progress(Stage("comparing", 0.0))
             modified = candidate_layers(engine, modified_sequential(network, robots[:3]), criterion)
             plans["modified-sequential"] = on_the_way(solve(modified, "cascade"))
-        known = formulations()
+        known = formulations(On.LAYERS)
         problem = candidate_layers(engine, loop, criterion, resources=Resources(progress=progress))
         for done, (name, formulation) in enumerate(known.items()):
             progress(Stage("comparing", (done + 1) / (len(known) + 1)))
@@ -268,7 +269,7 @@ def _row(plan: Plan) -> dict[str, object]:
     found = plan.objectives()
     parts = found["gap_parts"] or {}
     return {
-        "problem": plan.summary()["schedule"],
+        "problem": plan.method,
         "objective": plan.certificate.objective,
         "gap": plan.certificate.gap,
         **(found["objectives"] or {}),
@@ -373,7 +374,7 @@ def _free_criterion(criterion: Criterion, rows: Sequence[Mapping[str, float]]) -
 
 def _free_plan(
     engine: Engine, criterion: Criterion, robots: Sequence[str], progress: Tell
-) -> tuple[FreePlan | None, str]:
+) -> tuple[Plan | None, str]:
     """Return the shortest free schedule with the smallest worst step, or why there is none."""
     try:
         rules = FreeRules(robots=tuple(robots))
@@ -383,14 +384,15 @@ def _free_plan(
         return None, f"{FREE}: {error}"
 
 
-def _free_row(plan: FreePlan) -> dict[str, object]:
+def _free_row(plan: Plan) -> dict[str, object]:
     """Return what a free schedule is worth, for a row: its objective is its worst step."""
+    assert isinstance(plan.selection, StatePath)  # of states
     bound, value = plan.selection.bound[0], plan.selection.objective[0]
     return {
         "problem": FREE,
         "objective": value,
         "gap": (value - bound) / (abs(value) or 1.0),  # without weight all responses are zero
-        "models": plan.problem.models,
+        "models": plan.models,
         "seconds": sum(plan.seconds.values()),
         "solve_seconds": plan.seconds["solve"],
     }

@@ -16,12 +16,11 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from seqopt.errors import ExtraError, ProblemError
-from seqopt.graph.layers.layers import Layers
-from seqopt.graph.orders.orders import AllOrders
-from seqopt.graph.scenarios.scenarios import ScenarioLayers
 from seqopt.graph.states.states import States
 from seqopt.network.network import Network
 from seqopt.plan.build import ShownBuild
+from seqopt.plan.plan import Plan
+from seqopt.problem.problem import Problem
 from seqopt.problem.requirements import Limit
 from seqopt.report.comparison import largest
 from seqopt.report.pages import WORDS
@@ -158,48 +157,26 @@ def _schedule(value: Schedule) -> Card:
 
 
 @facts.register
-def _problem(value: Layers) -> Card:
-    title, rows, draw = _schedule(value.schedule)
+def _problem(value: Problem) -> Card:
+    scene = value.scene
+    if isinstance(value.moves, Schedule):
+        title, rows, draw = _schedule(value.moves)
+        name = f"Problem: which nodes to hold ({title[0].lower()}{title[1:]})"
+    else:
+        team = value.moves.robots or tuple(robot.name for robot in scene.robots)
+        rows = {"scene": scene.name, "bricks": len(scene.bricks), "robots": ", ".join(team)}
+        name, draw = "Problem: who does what next, and where", lambda: _of_scene(scene)
     more = {
-        "criterion": value.criterion.name,
-        "limits": _limits(value.limits),
-        "budgets": ", ".join(budget.name for budget in value.budgets) or "none",
-        "engine": repr(value.engine),
-    }
-    name = f"Problem: which nodes to hold ({title[0].lower()}{title[1:]})"
-    return Card(name, {**rows, **more}, draw)
-
-
-@facts.register
-def _robust_problem(value: ScenarioLayers) -> Card:
-    _, rows, draw = _problem(value.nominal)
-    more = {"scenarios": len(value.scenes), "aim over them": str(value.aim)}
-    return Card("Problem over scenarios: which nodes to hold", {**rows, **more}, draw)
-
-
-@facts.register
-def _free_problem(value: States) -> Card:
-    scene, columns = value.network.scene, value.space.kinds
-    team = sorted(robot for kind in columns for robot in kind.robots)
-    rows = {
-        "scene": scene.name,
-        "bricks": len(scene.bricks),
-        "robots": ", ".join(scene.robots[robot].name for robot in team),
         "to be least, in this order": ", ".join(map(str, value.goals)),
         "criterion": value.criterion.name,
         "limits": _limits(value.limits),
-        "every step must stand": "yes" if value.standing is not None else "not asked",
+        "budgets": ", ".join(value.budgets),
+        "every step must stand": "yes" if value.stands is not None else "",
+        "scenarios": f"{len(value.scenarios)}, {value.over}" if value.scenarios else "",
+        "orders": "" if value.orders is None else value.orders.value,
         "engine": repr(value.engine),
     }
-    name = f"Problem of the {value.title}: who does what next, and where"
-    return Card(name, rows, lambda: _of_scene(scene))
-
-
-@facts.register
-def _order_problem(value: AllOrders) -> Card:
-    _, rows, draw = _free_problem(value.free)
-    name = "Problem of the order: which brick next, by whom, and where"
-    return Card(name, {**rows, "orders": value.among.value}, draw)
+    return Card(name, {**rows, **{name: said for name, said in more.items() if said}}, draw)
 
 
 def _limits(limits: tuple[Limit, ...]) -> str:
@@ -231,10 +208,10 @@ def _build(value: ShownBuild) -> Card:
 
 def _criterion(value: ShownBuild) -> str:
     """Return the name of the criterion that a plan was chosen by; empty where none was."""
-    problem = getattr(value, "problem", None)
-    for inner in ("nominal", "free"):  # of problems over scenarios and orders
-        problem = getattr(problem, inner, problem)
-    return "" if problem is None else str(problem.criterion.name)
+    if not isinstance(value, Plan):
+        return ""
+    posed = value.states if isinstance(value.graph, States) else value.layers
+    return posed.criterion.name
 
 
 def _worst(value: ShownBuild) -> Rows:

@@ -15,7 +15,7 @@ from seqopt.cli.main import main
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.graph.layers.costs import LayeredCosts
-from seqopt.graph.layers.interface import Aim, CostProblem
+from seqopt.graph.layers.interface import CostProblem
 from seqopt.graph.layers.layers import candidate_layers
 from seqopt.graph.layers.partial_costs import PartialCosts, least_possible
 from seqopt.network.build import build_network
@@ -23,6 +23,7 @@ from seqopt.plan.calling.formulation import End, Selection
 from seqopt.plan.judge.certificate import certify_partial
 from seqopt.plan.search.window_search import search_windows
 from seqopt.plan.solving import solve
+from seqopt.problem.aims import Aim
 from seqopt.problem.own_criterion import StepCost
 from seqopt.problem.ranks import Among, Ranked
 from seqopt.problem.requirements import Limit

@@ -15,7 +15,7 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.graph.layers.budgets import robot_use, steps_over, travel
 from seqopt.graph.layers.costs import Budget, LayeredCosts
-from seqopt.graph.layers.interface import Aim, CostProblem
+from seqopt.graph.layers.interface import CostProblem
 from seqopt.graph.layers.layers import candidate_layers
 from seqopt.network.build import build_network
 from seqopt.plan.calling.formulation import (
@@ -26,6 +26,7 @@ from seqopt.plan.calling.formulation import (
     formulations,
 )
 from seqopt.plan.solving import solve
+from seqopt.problem.aims import Aim
 from seqopt.problem.requirements import Limit
 from seqopt.sequence.three_robots import SCHEDULES, three_robot_loop
 from seqopt.study.presets import CRITERIA, EQUATIONS, WORST_RATIO

@@ -11,11 +11,12 @@ import pytest
 from formulations import solvers
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.graph.layers.costs import Budget, LayeredCosts
-from seqopt.graph.layers.interface import Aim, CostProblem
+from seqopt.graph.layers.interface import CostProblem
 from seqopt.plan.calling.flow import LayeredFlow
 from seqopt.plan.calling.formulation import Formulation, FormulationKind, Selection, formulations
 from seqopt.plan.judge.certificate import certify
 from seqopt.plan.solving import solve
+from seqopt.problem.aims import Aim
 from tests.quality.degenerate import MALFORMED, judge, outcomes
 from tests.quality.degenerate_cases import CASES, Size, capped, costs, opposed, whole
 

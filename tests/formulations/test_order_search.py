@@ -9,6 +9,8 @@ from itertools import permutations
 import numpy as np
 import pytest
 from hypothesis import given, settings
+from seqopt.plan.calling.schedule_formulation import find_schedule_formulation
+from seqopt.plan.order_plan import solve_order
 
 import seqopt
 from formulations.states.order_search import FORMULATION
@@ -19,9 +21,7 @@ from seqopt.graph.orders.orders import AllOrders, OrderSelection
 from seqopt.graph.orders.work import trying
 from seqopt.graph.scenarios.scenarios import robust
 from seqopt.graph.states.states import build_states, within
-from seqopt.plan.calling.schedule_formulation import find_schedule_formulation
 from seqopt.plan.judge.orders import finds_better_order
-from seqopt.plan.order_plan import solve_order
 from seqopt.plan.solving import solve
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.own_criterion import StepCost
@@ -104,14 +104,14 @@ def test_the_worst_of_scenarios_equals_brute_force(workers):
     scene = small_arch(4)
     some = seqopt.scenarios(scene, count=3, density=0.9, seed=5)
     nominal = posed(scene)
-    problem = replace(nominal, free=robust(nominal.free, some, "worst-peak"))
+    problem = replace(nominal, states=robust(nominal.states, some, "worst-peak"))
     worths = brute_force(problem)
     found = solve_order(problem, FORMULATION, resources=Resources(workers=workers))
     assert found.status == "optimal"
     assert found.selection.objective == pytest.approx(min(worths.values()), rel=1e-8)
     assert found.selection.objective > 1.01 * min(brute_force(nominal).values())
     with pytest.raises(ProblemError, match="an order is chosen by its first aim alone"):
-        replace(nominal, free=within(nominal.free, {"regrips": 1}))
+        replace(nominal, states=within(nominal.states, {"regrips": 1}))
 
 
 @given(build=free_builds(most_bricks=4, most_robots=3))
@@ -130,7 +130,7 @@ def test_the_proof_knows_the_best_of_all_orders(build):
 def test_the_proof_of_orders_knows_what_must_stand():
     """What is demanded of stability holds in every order, where bricks have other places."""
     problem = posed(small_arch(4))
-    standing = AllOrders(replace(problem.free, standing=Standing(find_mortar("dry"))))
+    standing = AllOrders(replace(problem.states, standing=Standing(find_mortar("dry"))))
     worths = brute_force(standing)
     least = min(worths.values())
     assert finds_better_order(standing, least * (1 - 1e-9)) is False
@@ -166,7 +166,7 @@ def test_a_heuristic_order_is_on_the_right_side(seed):
     assert tried.selection.bound <= best * (1 + 1e-9)
     assert best <= tried.selection.objective * (1 + 1e-9)
     assert tried.status == ("heuristic" if tried.gap > 1e-6 else "optimal")
-    own = solve(problem.free, "schedule_search").selection.objective[0]
+    own = solve(problem.states, "schedule_search").selection.objective[0]
     assert tried.selection.objective <= own * (1 + 1e-9)
     assert tried.summary()["order_status"] == tried.status
 
@@ -184,7 +184,7 @@ def test_who_tries_orders_changes_nothing(hired):
 
 
 def test_a_criterion_that_cannot_be_sent_is_named():
-    free = posed(small_arch(5)).free
+    free = posed(small_arch(5)).states
     own = replace(
         free, criterion=StepCost("mine", ("F_largest",), lambda found, _: found["F_largest"])
     )
@@ -282,7 +282,7 @@ def test_a_wall_is_as_bad_as_it_is_whole_in_any_order():
 def test_no_plan_stays_below_the_whole_structure(build):
     problem = posed(*build)
     try:
-        best = solve(problem.free, "schedule_search").selection.objective[0]
+        best = solve(problem.states, "schedule_search").selection.objective[0]
     except InfeasibleError:
         return
     assert whole_bound(problem) <= best * (1 + 1e-9)

@@ -15,10 +15,11 @@ import formulations.layers.rank_search
 from formulations.solvers import anatomy, minimize, minimize_whole
 from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.graph.layers.costs import LayeredCosts
-from seqopt.graph.layers.interface import Aim, CostProblem
+from seqopt.graph.layers.interface import CostProblem
 from seqopt.plan.calling.formulation import End, FormulationKind, Reads
 from seqopt.plan.calling.formulation import formulations as registered
 from seqopt.plan.calling.watch import Watch
+from seqopt.problem.aims import Aim
 from tests.strategies import problems
 
 ALL = registered()

@@ -11,8 +11,9 @@ import seqopt
 from seqopt.errors import InfeasibleError, SolverError
 from seqopt.graph.layers.budgets import travel
 from seqopt.graph.layers.costs import LayeredCosts
-from seqopt.graph.layers.interface import Aim, CostProblem
+from seqopt.graph.layers.interface import CostProblem
 from seqopt.plan.judge.certificate import certify
+from seqopt.problem.aims import Aim
 from seqopt.problem.overloads import Excess, overloads
 from seqopt.problem.requirements import Limit, payload_limits
 

@@ -8,13 +8,14 @@ from itertools import product
 
 import numpy as np
 import pytest
+from seqopt.plan.order_plan import solve_order
 
 import seqopt
 from seqopt.engines.interface import Want
 from seqopt.errors import SolverError
 from seqopt.graph import Explorer
 from seqopt.graph.layers.costs import Budget, LayeredCosts
-from seqopt.graph.layers.interface import Aim, CostProblem
+from seqopt.graph.layers.interface import CostProblem
 from seqopt.graph.layers.partial_costs import PartialCosts
 from seqopt.graph.orders.orders import AllOrders
 from seqopt.graph.orders.visits import OrderStates
@@ -25,8 +26,8 @@ from seqopt.plan.judge.budget_proof import least_within
 from seqopt.plan.judge.certificate import TOLERANCE, certify_partial
 from seqopt.plan.judge.orders import finds_better_order
 from seqopt.plan.judge.proof import Proof
-from seqopt.plan.order_plan import solve_order
 from seqopt.plan.solving import solve
+from seqopt.problem.aims import Aim
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.requirements import Limit
 from seqopt.responses.quantities import CHOSEN_BY

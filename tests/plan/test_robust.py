@@ -10,30 +10,30 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from seqopt.plan.robust_plan import solve_robust
 
 import seqopt
 from formulations.scenarios.scenario_program import solve_program
+from formulations.scenarios.scenario_search import Searched, close_gap
+from formulations.scenarios.scenario_weights import best_weights
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.graph.layers.budgets import travel
 from seqopt.graph.layers.costs import LayeredCosts
-from seqopt.graph.layers.interface import Aim
-from seqopt.graph.scenarios.aims import (
-    WORST_PEAK,
-    WORST_TOTAL,
-    RobustAim,
-    cvar,
-    parse_robust,
-)
 from seqopt.graph.scenarios.arcs import scenario_arcs
 from seqopt.graph.scenarios.costs import ScenarioCosts
 from seqopt.graph.scenarios.scenarios import ScenarioLayers, largest_of, robust
 from seqopt.plan import robust_plan
 from seqopt.plan.calling.watch import Watch
 from seqopt.plan.out_of_sample import judge_unseen
-from seqopt.plan.robust_plan import solve_robust
-from seqopt.plan.search.scenario_search import Searched, close_gap
-from seqopt.plan.search.scenario_weights import best_weights
+from seqopt.problem.aims import (
+    WORST_PEAK,
+    WORST_TOTAL,
+    Aim,
+    RobustAim,
+    cvar,
+    parse_robust,
+)
 from seqopt.responses.resources import Resources
 from seqopt.scene.scenarios import scenarios
 from tests.builders import six_bricks, small_arch

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from seqopt.graph.layers.costs import Budget, LayeredCosts
-from seqopt.graph.layers.interface import Aim, CostProblem
+from seqopt.graph.layers.interface import CostProblem
 from seqopt.plan.calling.flow import layered_flow
 from seqopt.plan.calling.formulation import Selection
 from seqopt.plan.judge.certificate import certify
+from seqopt.problem.aims import Aim
 
 
 def made(cost=1.0):

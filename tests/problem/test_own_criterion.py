@@ -13,12 +13,13 @@ from hypothesis import strategies as st
 import seqopt
 from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.graph.layers.budgets import travel
-from seqopt.graph.layers.interface import Aim, CostProblem
+from seqopt.graph.layers.interface import CostProblem
 from seqopt.graph.layers.layers import candidate_layers
 from seqopt.graph.states.states import build_states
 from seqopt.plan.judge.proof import Proof
 from seqopt.plan.search.in_order import solve_in_order
 from seqopt.plan.search.step_quantile import least_quantile
+from seqopt.problem.aims import Aim
 from seqopt.problem.criteria import WeightedSum
 from seqopt.problem.own_criterion import StepCost
 from seqopt.sequence.free_rules import FreeRules

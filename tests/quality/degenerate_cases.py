@@ -15,9 +15,10 @@ from seqopt.arrays import Floats
 from seqopt.engines.interface import Engine, Fields, Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.graph.layers.costs import Budget, LayeredCosts
-from seqopt.graph.layers.interface import Aim, CostProblem, PlacementProblem
+from seqopt.graph.layers.interface import CostProblem, PlacementProblem
 from seqopt.graph.layers.layers import candidate_layers
 from seqopt.network.network import Network
+from seqopt.problem.aims import Aim
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.requirements import Criterion, Limit
 from seqopt.sequence.three_robots import three_robot_loop

@@ -17,7 +17,6 @@ from seqopt.cli.arguments import COMMANDS, parser
 from seqopt.cli.saying.answer import Answer
 from seqopt.cli.words.rules import RULES
 from seqopt.plan.calling.formulation import formulation_names
-from seqopt.plan.calling.schedule_formulation import Finds, schedule_formulation_names
 from seqopt.responses.choices import CHOICE_RESPONSES
 from seqopt.scene.library.by_words import KINDS
 from seqopt.scene.orders import ORDERS
@@ -98,7 +97,7 @@ def _names() -> dict[str, list[str]]:
     """Return the names that an argument takes, by its place among the options."""
     responses = [*CHOICE_RESPONSES]
     return {
-        "formulation": [*formulation_names(), *schedule_formulation_names(Finds.PLAN, Finds.ORDER)],
+        "formulation": [*formulation_names()],
         "criteria": [*CRITERIA, *responses],
         "aim": [*AIMS, *responses],
         "pick": [*responses, "steps", "regrips"],

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import pandas as pd
 
-from seqopt.cli.commands.free import asked_free
 from seqopt.cli.saying.answer import Answer
 from seqopt.cli.saying.outputs import figure_notes, write_outputs, written_to
 from seqopt.cli.words.asked import level_notes, marked, scene_file
@@ -23,6 +22,7 @@ from seqopt.cli.words.common_arguments import (
 )
 from seqopt.cli.words.facts import scene_facts
 from seqopt.cli.words.free_arguments import add_rules, add_standing
+from seqopt.cli.words.posing import asked_problem
 from seqopt.cli.words.values import parse_numbers
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import provenance
@@ -31,6 +31,7 @@ from seqopt.files import csv_text, require_folder
 from seqopt.graph.states.states import States
 from seqopt.plan.free_front import FreeFront
 from seqopt.plan.front import Front, find_front, pick
+from seqopt.plan.posing import states_of
 from seqopt.problem.goals import judged_by
 from seqopt.report.comparison import method_tables, shown_table, worst_of
 from seqopt.report.pages import PAGE, front_page
@@ -122,7 +123,8 @@ def run(options: argparse.Namespace) -> Answer:
     ``options``: of the command.
     """
     require_folder(options.out)
-    scene, free = asked_free(options)
+    asked = asked_problem(options)
+    scene, free = asked.scene, states_of(asked.problem)
     rounding = parse_numbers("--round", options.round, dict.fromkeys(map(str, free.goals)))
     problem = FreeFront(free, rounding)
     seconds = float(options.seconds)

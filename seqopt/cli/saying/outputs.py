@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 from collections.abc import Callable, Mapping
 from importlib.util import find_spec
 from pathlib import Path
@@ -11,11 +12,13 @@ from pathlib import Path
 import pandas as pd
 
 from seqopt.files import csv_text, require_apart, require_folder, write_folder
+from seqopt.graph.layers.layers import Layers
+from seqopt.graph.states.states import States
 from seqopt.plan.calling.watch import trace_rows
+from seqopt.plan.out_of_sample import Trial
 from seqopt.plan.plan import Plan
 from seqopt.report.comparison import Comparison
-from seqopt.report.pages import PAGE
-from seqopt.scene.scene import Scene
+from seqopt.report.pages import PAGE, plan_page
 from seqopt.scene.scene_file import builtin_scenes, dump_scene
 
 
@@ -47,32 +50,44 @@ def comparison_files(result: Comparison) -> dict[str, bytes | str]:
     return files
 
 
-def plan_files(plan: Plan, scene: Scene, report: Mapping[str, object]) -> dict[str, bytes | str]:
-    """Return the tables of a plan, its summary and its scene, by file name.
+def plan_files(
+    plan: Plan, report: Mapping[str, object], trial: Trial | None = None
+) -> dict[str, bytes | str]:
+    """Return the tables of a plan, its summary, its scene and its page, by file name.
 
-    ``scene``: that it is for; ``report``: the summary, ready for JSON. Result (dict of str to
-    (bytes or str)): with what was found at which time, unless no proof was asked for.
+    ``report``: the summary; numbers that are not finite are written as null; ``trial``: the plan in
+    other scenarios. Result (dict of str to (bytes or str)).
     """
+    table = plan.responses()
     files: dict[str, bytes | str] = {
-        "plan.csv": csv_text(plan.responses()),
-        "selection.csv": csv_text(plan.table()),
-        "responses.csv": csv_text(plan.alternatives()),
-        "summary.json": json.dumps(report, indent=2) + "\n",
-        "scene.json": dump_scene(scene),
+        "plan.csv": csv_text(table),
+        "summary.json": json.dumps(_plain(report), indent=2) + "\n",
+        "scene.json": dump_scene(plan.engine.network.scene),
     }
-    if rows := trace_rows(plan.selection.trace):
+    stands: list[str] = []
+    if not isinstance(plan.graph, States):
+        files["selection.csv"] = csv_text(plan.table())
+    elif plan.graph.standing is not None:
+        verdicts = plan.stability()
+        files["stability.csv"] = csv_text(verdicts)
+        stands = [str(verdict) for verdict in verdicts["verdict"]]
+    if isinstance(plan.graph, Layers):
+        files["responses.csv"] = csv_text(plan.alternatives())
+    if rows := trace_rows(plan.trace):
         files["trace.csv"] = csv_text(pd.DataFrame(rows))
+    if trial is not None:
+        files["scenarios.csv"] = csv_text(trial.table)
+    files[PAGE] = plan_page(plan.engine, plan.title, table, plan.worth, stands)
     return files
 
 
-def worth(plan: Plan) -> str:
-    """Return what a plan is worth, in words."""
-    among = plan.summary()["candidates"]
-    if plan.certificate is None:
-        return "not compared with the optimum"
-    if among != "all":
-        return f"objective {plan.certificate.objective:.6g}, {among}"
-    return f"objective {plan.certificate.objective:.6g}, gap {100 * plan.certificate.gap:.3g} %"
+def _plain(value: object) -> object:
+    """Return what JSON can hold: null in the place of numbers that are not finite."""
+    if isinstance(value, Mapping):
+        return {str(name): _plain(part) for name, part in value.items()}
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
 
 
 def written_to(folder: Path | None) -> str:

@@ -17,11 +17,10 @@ from seqopt.engines.auto import AutoEngine
 from seqopt.engines.interface import Engine, Fields
 from seqopt.engines.registry import make_engine
 from seqopt.errors import ProblemError, SceneError
-from seqopt.graph.layers.layers import Layers
-from seqopt.graph.states.states import States
 from seqopt.interrupts import ending
 from seqopt.network.network import Network
 from seqopt.problem.overloads import overloads
+from seqopt.problem.problem import Problem
 from seqopt.problem.scales import OWN
 from seqopt.responses.linear_range import OUTSIDE, REMEDY
 from seqopt.responses.staged import staged_fields
@@ -79,7 +78,7 @@ def level_notes(engine: Engine) -> tuple[str, ...]:
     return (*said, *([f"engine: {engine.unchecked}"] if engine.unchecked else []))
 
 
-def posed_notes(problem: Layers | States) -> tuple[str, ...]:
+def posed_notes(problem: Problem) -> tuple[str, ...]:
     """Return which levels the engine took, and whether scales are not those of fixed methods."""
     said, name = level_notes(problem.engine), problem.criterion.name
     if not name.endswith(OWN):

@@ -21,9 +21,6 @@ from seqopt.cli.words.free_arguments import add_rules, add_standing
 from seqopt.plan.calling.formulation import formulation_names
 from seqopt.sequence.free_rules import FREE
 from seqopt.sequence.three_robots import SCHEDULES
-from seqopt.workflow import DEFAULTS
-
-_USUAL = DEFAULTS["any other"]
 
 
 def add_arguments(command: argparse.ArgumentParser) -> None:
@@ -50,9 +47,9 @@ def _basic(takes: Takes) -> None:
         "--formulation",
         metavar="NAME",
         help=f"which mathematical program chooses: {', '.join(formulation_names())} (default: "
-        f"{_USUAL.formulation}, which is exact and the fastest, or {_USUAL.with_budgets} with "
-        f"--budget); with --aim or --schedule free: {DEFAULTS[FREE].formulation} (default) or "
-        "another over states, as path_dp, path_beam or flow_lp; --robust without these has its own",
+        "overlap_dp, which is exact and the fastest, labels with --budget, minimax with --robust "
+        "worst-peak, scenario_search with other aims over scenarios; schedule_search with --aim, "
+        "--stands or --schedule free, order_search with --order search)",
     )
     takes.add_argument(
         "--schedule",

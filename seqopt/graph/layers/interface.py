@@ -2,35 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from enum import Enum
 from typing import Protocol
 
 import numpy as np
 
 from seqopt.arrays import Floats, FrozenValue
 from seqopt.graph.layers.costs import Budget, LayeredCosts
+from seqopt.problem.aims import Aim
 from seqopt.sequence.steps import Step
-
-
-class Aim(Enum):
-    """What to minimize over the build: the sum of costs or the largest cost."""
-
-    SUM = "sum"
-    PEAK = "peak"
-
-    @property
-    def worth(self) -> Callable[[LayeredCosts, Sequence[int]], float]:
-        """The value of a choice: its total, or its largest cost."""
-        return LayeredCosts.cost if self is Aim.SUM else LayeredCosts.worst
-
-    def costs(self, problem: PlacementProblem) -> LayeredCosts:
-        """Return the costs of a problem that this aim is about.
-
-        Result: its sums or its peaks.
-        """
-        return problem.sums if self is Aim.SUM else problem.peaks
 
 
 class PlacementProblem(Protocol):

@@ -14,10 +14,10 @@ from seqopt.arrays import Floats
 from seqopt.engines.interface import Engine
 from seqopt.errors import InfeasibleError, ProblemError, did_you_mean
 from seqopt.graph.layers.costs import Budget, LayeredCosts
-from seqopt.graph.layers.interface import Aim
 from seqopt.graph.layers.joining import Joined
 from seqopt.graph.layers.possible import compared, spread_over_pairs
 from seqopt.graph.layers.windows import by_move, possible_after, window_anew, window_kept
+from seqopt.problem.aims import Aim
 from seqopt.problem.checks import robots_of
 from seqopt.problem.overloads import excesses
 from seqopt.problem.requirements import Criterion, Limit, ResponsesAsked, as_limits

@@ -15,7 +15,7 @@ import numpy as np
 
 from seqopt.arrays import Bools, Floats, FrozenValue
 from seqopt.graph.layers.costs import LayeredCosts
-from seqopt.graph.layers.interface import Aim
+from seqopt.problem.aims import Aim
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from enum import Enum
 from functools import cached_property
 
 from seqopt.arrays import FrozenValue
@@ -13,16 +12,10 @@ from seqopt.engines.registry import make_engine, recipe_of
 from seqopt.errors import ProblemError
 from seqopt.graph.states.states import States
 from seqopt.network.build import build_network
+from seqopt.problem.problem import Orders
 from seqopt.scene.orders import Order
 from seqopt.scene.scene import Scene
 from seqopt.showing import Shown
-
-
-class Orders(Enum):
-    """Among which orders the best is sought."""
-
-    TIED = "tied"  # a joint or ground end ties every brick to what stands when it is placed
-    ANY = "any"
 
 
 @dataclass(frozen=True, repr=False)
@@ -32,43 +25,38 @@ class AllOrders(Shown):
     The value of an order is the first goal of its best plan; the criterion keeps the numbers that
     it has in the scene's own order.
 
-    ``free``: in the scene's own order, of `seqopt.pose_free`; its first goal is no margin. Raises
+    ``states``: in the scene's own order, of `seqopt.graph.states.states.build_states`; its first goal is no margin. Raises
     `ProblemError` if it is one, the engine was not made by name, or there are no such orders.
     """
 
-    free: States
+    states: States
     among: Orders = Orders.TIED
 
     def __post_init__(self) -> None:
-        try:
-            object.__setattr__(self, "among", Orders(self.among))
-        except ValueError:
-            known = ", ".join(each.value for each in Orders)
-            raise ProblemError(f"orders {self.among!r}: give one of {known}") from None
-        goal = self.free.goals[0]
+        goal = self.states.goals[0]
         if goal.of_margins:
             raise ProblemError(
                 f"aim {goal}: an order is not chosen by a margin; name minmax, a response, sum, "
                 "steps, regrips or travel first"
             )
-        if self.free.budgets:
+        if self.states.budgets:
             raise ProblemError(
-                f"budget {self.free.goals[-1]}: an order is chosen by its first aim alone; leave "
+                f"budget {self.states.goals[-1]}: an order is chosen by its first aim alone; leave "
                 "it out, or give an order"
             )
-        if recipe_of(self.free.engine) is None:
+        if recipe_of(self.states.engine) is None:
             raise ProblemError(
-                f"engine {type(self.free.engine).__name__}: orders need engines of their own; take "
+                f"engine {type(self.states.engine).__name__}: orders need engines of their own; take "
                 "one of seqopt.make_engine"
             )
 
     def __repr__(self) -> str:
-        return f"AllOrders({self.scene.name!r}, {self.free.goals[0]}, {self.among.value} orders)"
+        return f"AllOrders({self.scene.name!r}, {self.states.goals[0]}, {self.among.value} orders)"
 
     @property
     def scene(self) -> Scene:
         """What is built."""
-        return self.free.network.scene
+        return self.states.network.scene
 
     @cached_property
     def ties(self) -> dict[int, frozenset[int]]:
@@ -104,13 +92,13 @@ class AllOrders(Shown):
 
     def judging(self, order: Order) -> States:
         """Return the free schedule of one order with the goal that orders are judged by alone."""
-        alone = self.free.resources.alone()  # orders are shared out, not their grip sets
-        return replace(self.at(order), goals=self.free.goals[:1], resources=alone)
+        alone = self.states.resources.alone()  # orders are shared out, not their grip sets
+        return replace(self.at(order), goals=self.states.goals[:1], resources=alone)
 
     def at(self, order: Order) -> States:
         """Return the free schedule of one order."""
-        engine, *others = (_anew(e, order) for e in (self.free.engine, *self.free.scenarios))
-        return replace(self.free, engine=engine, scenarios=tuple(others))
+        engine, *others = (_anew(e, order) for e in (self.states.engine, *self.states.scenarios))
+        return replace(self.states, engine=engine, scenarios=tuple(others))
 
 
 def _anew(engine: Engine, order: Order) -> Engine:

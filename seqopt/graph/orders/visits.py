@@ -48,7 +48,7 @@ class OrderStates:
     @property
     def peaks(self) -> tuple[bool, ...]:
         """Whether the worst step counts, or what all steps take."""
-        return (self.problem.free.goals[0].measure is Measure.PEAK,)
+        return (self.problem.states.goals[0].measure is Measure.PEAK,)
 
     def start(self) -> tuple[Key, Ints]:
         """Return the empty site."""
@@ -74,7 +74,7 @@ class OrderStates:
     @property
     def floors(self) -> bool:
         """Whether there are scenarios."""
-        return bool(self.problem.free.each)
+        return bool(self.problem.states.each)
 
     def values(self, part: Key, states: Ints, *, rough: bool, most: float) -> tuple[Floats, Bools]:
         """Return what the first goal takes of states, and which are allowed."""
@@ -86,7 +86,7 @@ class OrderStates:
 
     @cached_property
     def _first(self) -> States:
-        return replace(self.problem.free, goals=self.problem.free.goals[:1])
+        return replace(self.problem.states, goals=self.problem.states.goals[:1])
 
     def ended(self, part: Key, states: Ints) -> Bools:
         """Return which states end the build."""

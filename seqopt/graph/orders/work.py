@@ -54,7 +54,7 @@ def trying(problem: AllOrders, *, elsewhere: bool) -> Callable[[Trial], float]:
     """
     if not elsewhere:
         return partial(worth, problem)
-    free = replace(problem.free, resources=problem.free.resources.alone())
+    free = replace(problem.states, resources=problem.states.resources.alone())
     sent = ("engine", "scenarios")
     rest = {f.name: getattr(free, f.name) for f in fields(free) if f.name not in sent}
     others = tuple(map(pack, free.scenarios))

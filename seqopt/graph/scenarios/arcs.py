@@ -13,7 +13,7 @@ import numpy as np
 
 from seqopt.arrays import Bools, Floats, FrozenValue
 from seqopt.graph.layers.costs import LayeredCosts
-from seqopt.graph.scenarios.aims import RobustAim
+from seqopt.problem.aims import RobustAim
 
 Choice = tuple[int, ...]
 BETTER = 1e-12  # by which a value is better than another, over the size of both

@@ -5,22 +5,19 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import overload
 
 import numpy as np
 
 from seqopt.arrays import Floats
+from seqopt.engines.interface import Engine
 from seqopt.errors import InfeasibleError, ProblemError
-from seqopt.graph.layers.costs import LayeredCosts
-from seqopt.graph.layers.interface import Aim
+from seqopt.graph.layers.costs import Budget, LayeredCosts
 from seqopt.graph.layers.layers import Layers
-from seqopt.graph.scenarios.aims import WORST_PEAK, RobustAim, parse_robust
 from seqopt.graph.scenarios.costs import ScenarioCosts, scenario_costs, tasks_of
 from seqopt.graph.scenarios.engines import require_alike
-from seqopt.graph.states.states import States, over_scenarios
-from seqopt.scene.checks import short
-from seqopt.scene.scenarios import Scenarios
+from seqopt.problem.aims import Aim, RobustAim
 from seqopt.scene.scene import Scene
+from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import Step
 from seqopt.showing import Shown
 
@@ -61,10 +58,45 @@ class ScenarioLayers(Shown):
             return iter(())
         return (task.problem() for task in tasks_of(self.nominal, self.scenes))
 
-    @property
-    def seconds(self) -> Mapping[str, float]:
-        """What the costs of all scenarios took: ``respond``, s."""
+    def seconds(self, aim: Aim) -> Mapping[str, float]:
+        """Return what the costs of all scenarios took, of whatever aim: ``respond``, s."""
         return {"respond": self._found[1]}
+
+    @property
+    def engine(self) -> Engine:
+        """What computes the responses of the nominal scene."""
+        return self.nominal.engine
+
+    @property
+    def schedule(self) -> Schedule:
+        """The steps and moves."""
+        return self.nominal.schedule
+
+    @property
+    def budgets(self) -> tuple[Budget, ...]:
+        """None: they would be other ones in every scenario."""
+        return ()
+
+    @property
+    def sums(self) -> LayeredCosts:
+        """None: the worst total of scenarios is no total of costs; a `ProblemError` says so."""
+        raise ProblemError(
+            f"{self.aim}: totals over scenarios are no sum of one cost; take scenario_search, or "
+            "minimax with worst-peak"
+        )
+
+    @cached_property
+    def peaks(self) -> LayeredCosts:
+        """The largest costs in any scenario: their largest over a build is that over scenarios."""
+        return largest_of(self.layered(Aim.PEAK))
+
+    def conditional(self, move: int, before: int) -> Floats:
+        """Return the shared costs of a move's candidates, the choice before being made, (C_k,)."""
+        return np.asarray(self.peaks.shared[move][before])
+
+    def nodes(self, choice: Sequence[int]) -> tuple[int, ...]:
+        """Return the nodes that a choice stands for; see `Layers.nodes`."""
+        return self.nominal.nodes(choice)
 
     def under(self, aim: RobustAim) -> ScenarioLayers:
         """Return the same problem with another aim; costs that are known stay known."""
@@ -106,85 +138,18 @@ class ScenarioLayers(Shown):
         return self.nominal.steps(choice)
 
 
-@overload
-def robust(
-    problem: Layers, scenes: Scenarios | Sequence[Scene], aim: RobustAim | str
-) -> ScenarioLayers: ...
+def in_scenarios(nominal: Layers, scenes: Sequence[Scene], aim: RobustAim) -> ScenarioLayers:
+    """Return the layers of a problem in many scenarios; nothing is computed yet.
 
-
-@overload
-def robust(
-    problem: States, scenes: Scenarios | Sequence[Scene], aim: RobustAim | str
-) -> States: ...
-
-
-def robust(
-    problem: Layers | States, scenes: Scenarios | Sequence[Scene], aim: RobustAim | str
-) -> ScenarioLayers | States:
-    """Return the problem of a plan that is good in many scenarios at once.
-
-    Parameters
-    ----------
-    problem : Layers or States
-        The nominal one, of `seqopt.pose` or `seqopt.pose_free`; with an engine of
-        `seqopt.make_engine`.
-    scenes : Scenarios or sequence of Scene
-        Of `seqopt.scenarios`, or scenes of one's own with the same bricks and nodes.
-    aim : RobustAim or str
-        Or in words: ``worst-peak``, ``worst-total`` or ``cvar=0.9``; of states the first alone.
-
-    Returns
-    -------
-    ScenarioLayers or States
-        As the nominal one, for `solve_robust` and `seqopt.solve`; nothing is computed yet.
-
-    Raises
-    ------
-    ProblemError
-        If there is no scenario, one has other bricks or nodes, or the problem has budgets.
-
-    Examples
-    --------
-    >>> import seqopt
-    >>> scene = seqopt.load_scene("arch25")
-    >>> problem = seqopt.optimize(scene, criterion="worst-ratio-published").problem
-    >>> robust(problem, seqopt.scenarios(scene, count=5), "worst-peak")  # doctest: +ELLIPSIS
-    ScenarioLayers('arch25', 'three-robot', 5 scenarios, ... worst-peak)
+    ``nominal``: with an engine of `seqopt.make_engine`; ``scenes``: with the same bricks and nodes.
+    Raises `ProblemError` if there is no scenario, or one has other bricks or nodes.
     """
-    aim = parse_robust(aim) if isinstance(aim, str) else aim
-    if isinstance(problem, States):
-        return over_scenarios(problem, _worst_of(scenes, aim))
-    if not isinstance(problem, Layers) or not isinstance(aim, RobustAim):
-        raise ProblemError(
-            f"{short(aim if isinstance(problem, Layers) else problem)}: give a problem of "
-            "seqopt.pose, scenarios, and an aim as WORST_PEAK, WORST_TOTAL or cvar(0.9)"
-        )
-    found = _scenes(scenes)
-    if problem.budgets:
-        raise ProblemError(
-            f"budget {problem.budgets[0].name!r}: aims over scenarios take no budgets; leave it out"
-        )
-    for i, scene in enumerate(found, start=1):
-        require_alike(problem.schedule.scene, scene, i)
-    tasks_of(problem, found[:1])  # says if engines for other scenes cannot be made
-    return ScenarioLayers(problem, found, aim)
-
-
-def _scenes(scenes: Scenarios | Sequence[Scene]) -> tuple[Scene, ...]:
-    found = scenes.scenes if isinstance(scenes, Scenarios) else tuple(scenes)
-    if not found:
+    if not scenes:
         raise ProblemError("there is no scenario; give at least one")
-    return found
-
-
-def _worst_of(scenes: Scenarios | Sequence[Scene], aim: object) -> tuple[Scene, ...]:
-    """Return scenarios whose worst states count, as they do where states are chosen."""
-    if aim != WORST_PEAK:
-        said = aim if isinstance(aim, RobustAim) else short(aim)
-        raise ProblemError(
-            f"robust aim {said}: where states are chosen, worst steps count; give worst-peak"
-        )
-    return _scenes(scenes)
+    for i, scene in enumerate(scenes, start=1):
+        require_alike(nominal.schedule.scene, scene, i)
+    tasks_of(nominal, scenes[:1])  # says if engines for other scenes cannot be made
+    return ScenarioLayers(nominal, tuple(scenes), aim)
 
 
 def largest_of(layers: Sequence[LayeredCosts]) -> LayeredCosts:
@@ -194,6 +159,8 @@ def largest_of(layers: Sequence[LayeredCosts]) -> LayeredCosts:
 
     ``layers``: of the same moves. Raises `InfeasibleError` if no choice is allowed in all of them.
     """
+    if len(layers) == 1:
+        return layers[0]
     single = tuple(map(_largest, zip(*(each.single for each in layers), strict=True)))
     shared = tuple(map(_largest, zip(*(each.shared for each in layers), strict=True)))
     out = LayeredCosts(single, shared)

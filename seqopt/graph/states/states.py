@@ -30,7 +30,7 @@ from seqopt.responses.quantities import robot_response
 from seqopt.responses.resources import HERE, Resources
 from seqopt.scene.checks import short
 from seqopt.scene.scene import Scene
-from seqopt.sequence.free_rules import FreeRules
+from seqopt.sequence.free_rules import FREE, FreeRules
 from seqopt.sequence.free_space import FreeSpace, free_space
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.schedule_space import ScheduleSpace
@@ -105,6 +105,11 @@ class States(Shown):
         """Which candidates alone are looked at, in words; empty for all."""
         rules = self.rules
         return rules.left_out if isinstance(rules, Schedule) else rules.candidates
+
+    @property
+    def method(self) -> str:
+        """The name of the schedule, or ``free``."""
+        return self.rules.method if isinstance(self.rules, Schedule) else FREE
 
     @property
     def title(self) -> str:

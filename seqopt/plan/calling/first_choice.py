@@ -9,8 +9,9 @@ import numpy as np
 from seqopt.arrays import Floats
 from seqopt.errors import SolverError, TimeUpError
 from seqopt.graph.layers.costs import LayeredCosts
-from seqopt.graph.layers.interface import Aim, PlacementProblem
+from seqopt.graph.layers.interface import PlacementProblem
 from seqopt.plan.calling.formulation import End, Selection
+from seqopt.problem.aims import Aim
 
 
 def stopped(

@@ -3,22 +3,34 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from importlib.metadata import EntryPoint
+from typing import Any
 
 import numpy as np
 
 from seqopt.arrays import FrozenValue
 from seqopt.errors import ProblemError, did_you_mean, said
-from seqopt.graph.layers.interface import Aim
 from seqopt.plan.calling.watch import Finding
 from seqopt.plugins import plugins
+from seqopt.problem.aims import Aim
 
 GROUP = "seqopt.formulations"
 EXHIBITS = "seqopt.exhibits"
 WATCH = "watch"  # the name by which a formulation takes a watch
+LEAST = {Aim.SUM: "sum", Aim.PEAK: "largest"}
+
+
+class On(Enum):
+    """What a formulation is given, and so what it finds."""
+
+    LAYERS = "open grips in layers of candidates"
+    SCENARIOS = "layers of candidates in many scenarios"
+    STATES = "the states of a build"
+    ORDERS = "the states of all orders"
+    FRONTS = "Pareto sets"
 
 
 class FormulationKind(Enum):
@@ -75,16 +87,20 @@ class Formulation:
         What it is called, and what it does in a few words.
     kind : FormulationKind
         What it promises.
-    aim : Aim
-        What it minimizes: the sum of the costs, or the largest cost.
+    aim : Aim or None
+        Over layers, what it minimizes: the sum of the costs, or the largest cost; None elsewhere,
+        where a problem has its goals.
     solve : callable
-        Takes the problem and named options, returns a `Selection`.
+        Takes the graph and named options, returns what is chosen: of layers a `Selection`, of
+        states a `seqopt.plan.calling.schedule_selection.StatePath`.
     reads : Reads
         Which steps it looks at with its default options.
     takes_budgets : bool
         Whether it can keep totals over the build within budgets.
     windowed : tuple of (str, int or str), optional
         Options with which it looks at one window after the other, if it does so only with these.
+    on : On, optional
+        What it is given: layers, states, orders, scenarios.
 
     Examples
     --------
@@ -97,15 +113,17 @@ class Formulation:
     name: str
     summary: str
     kind: FormulationKind
-    aim: Aim
-    solve: Callable[..., Selection]
+    aim: Aim | None
+    solve: Callable[..., Any]
     reads: Reads = Reads.ALL
     takes_budgets: bool = False
     windowed: tuple[tuple[str, int | str], ...] | None = None
+    on: On = On.LAYERS
 
     def __repr__(self) -> str:
-        least = "sum" if self.aim is Aim.SUM else "largest"
-        what = f"{self.kind.value}, least {least} of the costs"
+        what = f"{self.kind.value}, on {self.on.value}"
+        if self.aim is not None:
+            what = f"{self.kind.value}, least {LEAST[self.aim]} of the costs"
         return f"<Formulation {self.name}: {self.summary} ({what})>"
 
     @property
@@ -116,13 +134,21 @@ class Formulation:
         return dict(self.windowed)
 
     @property
-    def options(self) -> dict[str, int | str]:
-        """The options of ``solve``, by name, and their defaults."""
+    def options(self) -> dict[str, Any]:
+        """The options of ``solve`` that are numbers or words, by name, and their defaults."""
         return {
             name: parameter.default
             for name, parameter in inspect.signature(self.solve).parameters.items()
-            if parameter.kind is inspect.Parameter.KEYWORD_ONLY and name != WATCH
+            if parameter.kind is inspect.Parameter.KEYWORD_ONLY
+            and isinstance(parameter.default, int | float | str)
         }
+
+    def require_options(self, given: Iterable[str]) -> None:
+        """Raise a `ProblemError` that names the first option which is not of this formulation."""
+        for name in given:
+            if name not in self.options:
+                known = ", ".join(self.options) or "no options"
+                raise ProblemError(f"option {name}: {self.name} has {known}")
 
     @property
     def watched(self) -> bool:
@@ -130,16 +156,22 @@ class Formulation:
         return WATCH in inspect.signature(self.solve).parameters
 
 
-def formulation_names() -> tuple[str, ...]:
-    """Return the names of all registered formulations, without loading any.
+def formulation_names(*on: On) -> tuple[str, ...]:
+    """Return the names of registered formulations; none is loaded if all are asked for.
 
-    Result: in alphabetical order.
+    ``*on``: what they are given; by default anything. Result: in alphabetical order.
     """
-    return tuple(sorted(plugins(GROUP)))
+    names = tuple(sorted(plugins(GROUP)))
+    return tuple(name for name in names if find_formulation(name).on in on) if on else names
 
 
-def formulations() -> dict[str, Formulation]:
-    """Return all registered formulations: entry points of the group ``seqopt.formulations``.
+def formulations(*on: On) -> dict[str, Formulation]:
+    """Return registered formulations: entry points of the group ``seqopt.formulations``.
+
+    Parameters
+    ----------
+    *on : On
+        What they are given; by default anything.
 
     Returns
     -------
@@ -150,9 +182,9 @@ def formulations() -> dict[str, Formulation]:
     --------
     >>> import seqopt
     >>> [name for name, f in seqopt.formulations().items() if f.takes_budgets]
-    ['labels', 'lagrangian', 'overlap_lp', 'overlap_mip']
+    ['labels', 'lagrangian', 'overlap_lp', 'overlap_mip', 'schedule_search']
     """
-    return {name: _load(entry) for name, entry in sorted(plugins(GROUP).items())}
+    return {name: find_formulation(name) for name in formulation_names(*on)}
 
 
 def exhibits() -> dict[str, Formulation]:
@@ -196,14 +228,20 @@ def find_formulation(name: str) -> Formulation:
     return _load(found[name])
 
 
-def as_formulation(given: Formulation | str) -> Formulation:
+def as_formulation(given: object, *on: On) -> Formulation:
     """Return a formulation, by name or itself.
 
-    Raises `ProblemError` if it is neither.
+    ``*on``: what it has to be for; by default anything. Raises `ProblemError` if it is none, or is
+    for something else.
     """
-    if isinstance(given, Formulation):
-        return given
     if isinstance(given, str):
-        return find_formulation(given)
-    known = ", ".join(formulation_names())
-    raise ProblemError(f"a {type(given).__name__} is not a formulation; give one of {known}")
+        given = find_formulation(given)
+    if not isinstance(given, Formulation):
+        known = ", ".join(formulation_names(*on))
+        raise ProblemError(f"a {type(given).__name__} is not a formulation; give one of {known}")
+    if on and given.on not in on:
+        raise ProblemError(
+            f"{given.name} is for {given.on.value}, and {on[0].value} are asked for; "
+            f"use {' or '.join(formulation_names(*on))}"
+        )
+    return given

@@ -10,13 +10,16 @@ from typing import Any
 import numpy as np
 
 from seqopt.errors import InfeasibleError, SolverError
+from seqopt.graph.layers.costs import LayeredCosts
 from seqopt.graph.layers.interface import PlacementProblem
+from seqopt.graph.scenarios.scenarios import ScenarioLayers, largest_of
 from seqopt.interrupts import answered
 from seqopt.plan.calling.formulation import WATCH, End, Formulation, Selection
 from seqopt.plan.calling.guard import called, readable
 from seqopt.plan.calling.watch import Finding, Watch
 from seqopt.plan.judge.certificate import least_sum
 from seqopt.plan.judge.conflicts import refusal
+from seqopt.problem.aims import Aim
 
 
 def select(
@@ -41,11 +44,10 @@ def _called(
 ) -> Selection:
     """Return what a formulation returns, if that is a selection."""
     told = {WATCH: watch} if formulation.watched else {}
-    aim = formulation.aim
     try:
         return called(
             formulation.name,
-            lambda: (aim.costs(problem), problem.budgets),
+            lambda: (_costs(formulation, problem), problem.budgets),
             Selection,
             lambda: formulation.solve(problem, **told, **options),
         )
@@ -53,6 +55,14 @@ def _called(
         if watch.interrupted:
             raise KeyboardInterrupt(str(error)) from error
         raise
+
+
+def _costs(formulation: Formulation, problem: PlacementProblem) -> tuple[LayeredCosts, ...]:
+    """Return the costs that a formulation is given, of every scenario if totals over them count."""
+    if formulation.aim is not None:
+        return (formulation.aim.costs(problem),)
+    assert isinstance(problem, ScenarioLayers)  # what is for states has no such costs
+    return problem.layered(Aim.SUM)
 
 
 def _with_numbers(formulation: Formulation, found: Selection, watch: Watch) -> Selection:
@@ -85,7 +95,7 @@ def _infeasible_confirmed(problem: PlacementProblem, formulation: Formulation) -
     try:
         yield
     except InfeasibleError as error:
-        costs = formulation.aim.costs(problem)
+        costs = largest_of(_costs(formulation, problem))
         if not np.isfinite(least_sum(costs)):
             costs.continuable()  # names the move
         if problem.budgets:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from seqopt.arrays import FrozenValue
 from seqopt.errors import SolverError
 from seqopt.graph.layers.costs import TINY, LayeredCosts
-from seqopt.graph.layers.interface import Aim, PlacementProblem
+from seqopt.graph.layers.interface import PlacementProblem
 from seqopt.graph.layers.partial_costs import PartialCosts, least_possible
 from seqopt.plan.calling.formulation import (
     End,
@@ -20,28 +20,32 @@ from seqopt.plan.calling.formulation import (
     as_formulation,
 )
 from seqopt.plan.judge.budget_proof import least_within
+from seqopt.problem.aims import Aim
 
 TOLERANCE = 1e-6  # of the costs that a choice meets: how far a claim may be from what the data say
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Certificate(FrozenValue):
-    """The value of a selection and a bound on all others, from the problem's data alone.
+    """The values of a plan and bounds on all others, from the problem's data alone.
 
     Attributes
     ----------
-    objective : float
-        The value of the selection, recomputed; in the unit of the criterion.
-    bound : float
-        The least value of any choice, computed again from the data; with budgets a bound on the
-        value of any choice within them, by prices and partial choices of the certificate's own.
+    values : tuple of float
+        The value of every goal, recomputed; of candidates one, in the unit of the criterion.
+    bounds : tuple of float
+        What no plan stays below, goals before it being at their values, computed again from the
+        data; minus infinity where nothing is proven.
     gap : float
-        The objective minus the bound, relative to the magnitude of the costs of the choice: their
-        sum, or the largest for a peak. It has no unit.
+        What is left between them, over the size of the values: of the costs that a choice of
+        candidates meets, their sum or the largest. It has no unit; infinite where nothing is
+        proven. Margins of stability leave what `seqopt.problem.standing.NARROW` says.
     claimed_gap : float
         The same with the formulation's own bound if that is higher; it is not proven.
     spent : mapping of str to float
-        The amount that the selection uses of each budget.
+        The amount that the plan uses of each budget.
+    states : int
+        How many states the proof looked at, where it is about states.
 
     Examples
     --------
@@ -51,15 +55,26 @@ class Certificate(FrozenValue):
     (57.538, 57.538, 0.0)
     """
 
-    objective: float
-    bound: float
+    values: tuple[float, ...]
+    bounds: tuple[float, ...]
     gap: float
     claimed_gap: float
-    spent: Mapping[str, float]
+    spent: Mapping[str, float] = field(default_factory=dict)
+    states: int = 0
 
     def __repr__(self) -> str:
         values = f"objective {self.objective:.6g}, no choice below {self.bound:.6g}"
         return f"<Certificate: {values}, gap {100 * self.gap:.3g} %>"
+
+    @property
+    def objective(self) -> float:
+        """The value of the first goal."""
+        return self.values[0]
+
+    @property
+    def bound(self) -> float:
+        """What no plan stays below in the first goal."""
+        return self.bounds[0]
 
 
 def certify(problem: PlacementProblem, selection: Selection, aim: Aim) -> Certificate:
@@ -95,7 +110,7 @@ def certify(problem: PlacementProblem, selection: Selection, aim: Aim) -> Certif
     if problem.budgets and aim is Aim.SUM:
         bound = max(bound, least_within(problem, value, selection.prices, scale))
     gap, claimed = (max(0.0, value - b) / scale for b in (bound, max(bound, selection.bound)))
-    return Certificate(value, bound, gap, claimed, spent)
+    return Certificate((value,), (bound,), gap, claimed, spent)
 
 
 def certify_partial(costs: PartialCosts, selection: Selection, objective: float) -> Certificate:
@@ -119,7 +134,7 @@ def certify_partial(costs: PartialCosts, selection: Selection, objective: float)
         raise SolverError(
             f"the value of the choice is {objective:.9g}, and no more than {bound:.9g} is proven"
         )
-    return Certificate(objective, bound, gap, gap, {})
+    return Certificate((objective,), (bound,), gap, gap)
 
 
 def _value(costs: LayeredCosts, choice: tuple[int, ...], aim: Aim) -> float:
@@ -191,6 +206,7 @@ def judge(
     formulation that is no heuristic and ran to its end misses the optimum.
     """
     formulation = as_formulation(formulation)
+    assert formulation.aim is not None  # it is for layers of candidates
     certificate = certify(problem, selection, formulation.aim)
     promises = formulation.kind is not FormulationKind.HEURISTIC and selection.end is End.DONE
     exact = promises and not problem.budgets

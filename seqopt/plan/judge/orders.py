@@ -46,7 +46,7 @@ def finds_better_order(
     looked at; ``end``: until when, as of `time.perf_counter`. Result: None where it is not known,
     because there are more sets or time is over.
     """
-    peak = problem.free.goals[0].measure is Measure.PEAK
+    peak = problem.states.goals[0].measure is Measure.PEAK
     if peak and _of_the_whole(problem) >= value:
         return False
     if np.isfinite(value):
@@ -124,14 +124,14 @@ def _least(free: States, nodes: list[int], count: int) -> float:
 def _closed(problem: AllOrders, key: Key, parts: list[_Entries], below: float) -> _Reached:
     """Return the states with a set of bricks that are reached, below a value of a worst step."""
     passable = Passable(problem.judging(_order(problem, key)))
-    tables, asked = passable.tables, Asked((below,), () if problem.free.demands else None)
+    tables, asked = passable.tables, Asked((below,), () if problem.states.demands else None)
     start = tables.start()
     if not key[0]:
         parts = [_Entries(start, np.zeros(1), np.zeros(1))]
     states, before, way = map(np.concatenate, zip(*parts, strict=True))
     rows = tables.in_order(_renumbered(problem, key, states, back=True).astype(start.dtype))
     part = passable.closed(len(key[0]), rows, asked)
-    peak = problem.free.goals[0].measure is Measure.PEAK
+    peak = problem.states.goals[0].measure is Measure.PEAK
     if peak or not len(part.states):
         return _Reached(part.states, np.zeros(len(part.states)), tables)
     order = np.argsort(part.codes, kind="stable")
@@ -164,12 +164,12 @@ def _closed(problem: AllOrders, key: Key, parts: list[_Entries], below: float) -
 
 def _placed(problem: AllOrders, key: Key, found: _Reached) -> Iterator[tuple[Key, _Entries]]:
     """Yield what follows by placing a brick: some states more than once."""
-    parks = problem.free.goals[0].measure is Measure.TRAVEL
+    parks = problem.states.goals[0].measure is Measure.TRAVEL
     own = _renumbered(problem, key, found.states)
     for brick in problem.next_bricks(key[0]) if len(found.states) else ():
         order = _order(problem, key, brick)
         network = build_network(problem.scene, order)
-        tables = RuleTables(RuleBook(network, problem.free.free_rules), [], parks=parks)
+        tables = RuleTables(RuleBook(network, problem.states.free_rules), [], parks=parks)
         rows = _places(problem, order, own, back=True).astype(tables.start().dtype)
         for move in tables.follow(len(key[0]), rows):
             if move.level > len(key[0]) and len(move.states):
@@ -188,7 +188,7 @@ def _places(problem: AllOrders, order: Order, states: Ints, *, back: bool = Fals
     own = {n: i for i, n in enumerate((n for b in problem.scene.build_order for n in nodes[b]), 1)}
     place = np.array([0, *(own[n] for b in order for n in nodes[b])])
     place = np.argsort(place) if back else place
-    out, robots = states.astype(np.int64), len(problem.free.free_rules.team(problem.scene))
+    out, robots = states.astype(np.int64), len(problem.states.free_rules.team(problem.scene))
     held = states[:, :robots].astype(np.int64)  # negative where a free robot was last
     out[:, :robots] = np.sign(held) * place[np.abs(held)]
     return out

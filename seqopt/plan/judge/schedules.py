@@ -10,16 +10,15 @@ judged but the states that it visited, on which only the time depends.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 import pandas as pd
 
-from seqopt.arrays import FrozenValue
 from seqopt.errors import SolverError
 from seqopt.graph.states.states import States
 from seqopt.plan.calling.schedule_selection import StatePath
+from seqopt.plan.judge.certificate import Certificate
 from seqopt.plan.judge.proof import BELOW, Hint, Proof
 from seqopt.plan.judge.scheduled_moves import check_scheduled
 from seqopt.plan.judge.standing_proof import proven_margins, require_margin
@@ -34,23 +33,6 @@ from seqopt.sequence.steps import Step, StepKind
 TOLERANCE = 1e-6  # over the size of a value: how far a claim may be from what the engine says
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class ScheduleCertificate(FrozenValue):
-    """The values of a free schedule with bounds, checked from the problem's data alone.
-
-    ``objective``: the value of every goal, recomputed; ``bound``: what no plan stays below, goals
-    before it being at their values; minus infinity where nothing is proven; ``gap``: the largest of
-    the differences of both, over the size of the values; infinite where nothing is proven. Margins
-    of stability leave what `seqopt.problem.standing.NARROW` says. ``states``: how many states the
-    proof looked at.
-    """
-
-    objective: tuple[float, ...]
-    bound: tuple[float, ...]
-    gap: float
-    states: int
-
-
 def judge_schedule(
     problem: States,
     selection: StatePath,
@@ -58,7 +40,7 @@ def judge_schedule(
     hint: Hint | None = None,
     *,
     exact: bool = True,
-) -> ScheduleCertificate:
+) -> Certificate:
     """Check a free schedule from the problem's own data, without the search.
 
     ``selection``: what a formulation claims; ``steps``: of the selection, checked in the scene;
@@ -86,7 +68,7 @@ def judge_schedule(
         if not goal.of_margins and not bound >= value - BELOW * abs(value):
             raise SolverError(f"{goal}: {value:.9g} is promised as the least; a plan has less")
     gaps = [(v - b) / (abs(v) or 1.0) for v, b in zip(values, bounds, strict=True)]
-    return ScheduleCertificate(values, bounds, max(gaps), proof.states)
+    return Certificate(values, bounds, max(gaps), max(gaps), {}, proof.states)
 
 
 def _bounds(problem: States, proof: Proof, values: tuple[float, ...]) -> tuple[float, ...]:
@@ -109,7 +91,7 @@ def _within_budgets(
     selection: StatePath,
     values: tuple[float, ...],
     proof: Proof,
-) -> ScheduleCertificate:
+) -> Certificate:
     """Return the certificate of a plan within budgets: what prices leave open is its gap."""
     aims = len(problem.aims)
     pairs = zip(problem.goals[aims:], values[aims:], problem.budgets, strict=True)
@@ -126,13 +108,14 @@ def _within_budgets(
             raise SolverError(f"{goal}: no plan within budgets is promised below {said:.9g}")
     bounds = tuple(min(b, v) for b, v in zip(bounds, values, strict=False))
     gaps = [(v - b) / (abs(v) or 1.0) for v, b in zip(values, bounds, strict=False)]
-    return ScheduleCertificate(values, (*bounds, *values[aims:]), max(gaps), proof.states)
+    left = max(gaps)
+    return Certificate(values, (*bounds, *values[aims:]), left, left, {}, proof.states)
 
 
-def _stopped(values: tuple[float, ...]) -> ScheduleCertificate:
+def _stopped(values: tuple[float, ...]) -> Certificate:
     """Return the certificate of a search that ended early: its bounds are claimed, not proven."""
     none = (-np.inf,) * len(values)
-    return ScheduleCertificate(values, none, np.inf, 0)
+    return Certificate(values, none, np.inf, np.inf)
 
 
 def plan_values(

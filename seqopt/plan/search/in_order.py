@@ -14,8 +14,9 @@ import numpy as np
 from seqopt.arrays import Bools, Floats
 from seqopt.errors import ProblemError
 from seqopt.graph.layers.costs import TINY, LayeredCosts
-from seqopt.graph.layers.interface import Aim, PlacementProblem
+from seqopt.graph.layers.interface import PlacementProblem
 from seqopt.graph.layers.objectives import TIED, on_a_least_path
+from seqopt.problem.aims import Aim
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ import numpy as np
 from seqopt.arrays import Floats, Ints
 from seqopt.errors import InfeasibleError, ProblemError, SolverError, TimeUpError
 from seqopt.graph.layers.floors import floor_of
-from seqopt.graph.layers.interface import Aim, CostProblem
+from seqopt.graph.layers.interface import CostProblem
 from seqopt.graph.layers.joining import Joined
 from seqopt.graph.layers.layers import Layers
 from seqopt.graph.layers.partial_costs import PartialCosts
@@ -31,6 +31,7 @@ from seqopt.plan.calling.formulation import End, Formulation, FormulationKind, S
 from seqopt.plan.calling.selecting import select
 from seqopt.plan.calling.watch import Watch
 from seqopt.plan.search.window_search import WindowSearch, search_windows
+from seqopt.problem.aims import Aim
 from seqopt.problem.criteria import WeightedSum, WorstRatio
 from seqopt.responses.resources import Resources
 from seqopt.sequence.schedule import Schedule
@@ -77,6 +78,7 @@ def search_pairs(problem: Layers, formulation: Formulation, watch: Watch) -> Pai
     are budgets, or costs have no floor; `TimeUpError` if it is stopped before a choice is known.
     """
     floor = _floor(problem, formulation)
+    assert formulation.aim is not None  # it is of candidates
     walk = _Pairs(problem, formulation.aim, floor)
     with answered(watch.interrupt):
         walk.look_until_proven(watch)

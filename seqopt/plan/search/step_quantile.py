@@ -18,12 +18,13 @@ import numpy as np
 from seqopt.arrays import Floats
 from seqopt.errors import ProblemError
 from seqopt.graph.layers.costs import LayeredCosts
-from seqopt.graph.layers.interface import Aim, CostProblem
+from seqopt.graph.layers.interface import CostProblem
 from seqopt.graph.layers.joining import Joined
 from seqopt.graph.layers.layers import Layers
 from seqopt.graph.layers.possible import compared
 from seqopt.plan.judge.certificate import least_sum
 from seqopt.plan.search.in_order import solve_in_order
+from seqopt.problem.aims import Aim
 from seqopt.scene.checks import short
 
 StepCosts = Sequence[tuple[tuple[int, ...], Floats]]

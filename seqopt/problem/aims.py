@@ -1,18 +1,62 @@
-"""Aims over scenarios: worst peak, worst total, or the mean of a tail."""
+"""Aims: the sum of costs or the largest, and what becomes of them over scenarios."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from numbers import Real
+from typing import Protocol, TypeVar
 
 import numpy as np
 
 from seqopt.arrays import Floats
 from seqopt.errors import ProblemError, did_you_mean
-from seqopt.graph.layers.interface import Aim
 from seqopt.scene.checks import short
+
+
+class Costs(Protocol):
+    """Costs of choices, of which an aim takes the sum or the largest."""
+
+    def cost(self, choice: Sequence[int]) -> float:
+        """Return the sum of the costs that a choice meets."""
+
+    def worst(self, choice: Sequence[int]) -> float:
+        """Return the largest cost that a choice meets."""
+
+
+Found_co = TypeVar("Found_co", bound=Costs, covariant=True)
+
+
+class Costed(Protocol[Found_co]):
+    """What has costs to be summed up, and costs whose largest counts."""
+
+    @property
+    def sums(self) -> Found_co:
+        """The costs whose sum over the build is minimized."""
+
+    @property
+    def peaks(self) -> Found_co:
+        """The costs whose largest over the build is minimized."""
+
+
+class Aim(Enum):
+    """What to minimize over the build: the sum of costs or the largest cost."""
+
+    SUM = "sum"
+    PEAK = "peak"
+
+    @property
+    def worth(self) -> Callable[[Costs, Sequence[int]], float]:
+        """The value of a choice: its total, or its largest cost."""
+        if self is Aim.SUM:
+            return lambda costs, choice: costs.cost(choice)
+        return lambda costs, choice: costs.worst(choice)
+
+    def costs(self, problem: Costed[Found_co]) -> Found_co:
+        """Return the costs of a problem that this aim is about: its sums or its peaks."""
+        return problem.sums if self is Aim.SUM else problem.peaks
 
 
 class RobustKind(Enum):

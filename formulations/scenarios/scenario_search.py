@@ -1,6 +1,12 @@
-"""The last gap between bound and choice: all beginnings of choices that may still be better.
+r"""The least worst or tail total over scenarios: weights of scenarios, then all that may be better.
 
-Weights prove a bound for every beginning of a choice: what it costs so far, weighed, and the least
+.. math::
+
+   \min_{o_1, \dots, o_K} \; \max_{w \in W} \sum_s w_s \, c_s(o), \qquad
+   W = \Bigl\{ w \ge 0 : \sum_s w_s = 1, \; w_s \le \bar w \Bigr\}
+
+with the totals :math:`c_s` of a choice in every scenario. The best weights
+(`formulations.scenarios.scenario_weights`) leave a gap, which is closed here. They prove a bound for every beginning of a choice: what it costs so far, weighed, and the least
 from there on. Beginnings whose bound is not below the best choice are left out; where too many
 remain, those with the highest bounds are, and the least of these bounds stays a bound on what was
 not looked at.
@@ -13,10 +19,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from formulations.scenarios.scenario_weights import Weighed, best_weights
 from seqopt.arrays import Floats, Ints
-from seqopt.graph.scenarios.arcs import Choice, ScenarioArcs
+from seqopt.errors import ProblemError
+from seqopt.graph.scenarios.arcs import Choice, ScenarioArcs, scenario_arcs
+from seqopt.graph.scenarios.scenarios import ScenarioLayers
+from seqopt.plan.calling.formulation import End, Formulation, FormulationKind, On, Selection
 from seqopt.plan.calling.watch import Watch
-from seqopt.plan.search.scenario_weights import Weighed
+from seqopt.problem.aims import Aim
 
 WIDTH = 20_000  # beginnings that are kept after every move
 CLOSE = 1e-9  # differences that are none, over the size of the values
@@ -43,6 +53,22 @@ class _Layer:
     totals: Floats
     node: Ints
     parent: Ints
+
+
+def solve(problem: ScenarioLayers, *, watch: Watch, width: int = WIDTH) -> Selection:
+    """Return the choice whose worst or tail total is least, and the weights that bound it.
+
+    ``width``: how many beginnings of choices are kept after every move. Result: its ``prices`` are
+    the weights of the scenarios by number, from 1.
+    """
+    if problem.aim.aim is Aim.PEAK:
+        raise ProblemError("worst peaks are those of one set of layers; take minimax")
+    arcs = scenario_arcs(problem.layered(Aim.SUM), problem.aim)
+    weighed = best_weights(arcs, watch)
+    found = close_gap(arcs, weighed, watch, width)
+    weights = {str(i): float(w) for i, w in enumerate(weighed.weights, start=1)}
+    end = End.STOPPED if watch.over else End.DONE
+    return Selection(found.choice, found.value, found.bound, weights, end=end)
 
 
 def close_gap(arcs: ScenarioArcs, weighed: Weighed, watch: Watch, width: int = WIDTH) -> Searched:
@@ -133,3 +159,13 @@ def _traced(layers: Sequence[_Layer], last: int) -> Choice:
         choice.append(int(layer.node[at]))
         at = int(layer.parent[at])
     return tuple(reversed(choice))
+
+
+FORMULATION = Formulation(
+    "scenario_search",
+    "totals over scenarios, by weights and beginnings of choices",
+    FormulationKind.EXACT,
+    None,
+    solve,
+    on=On.SCENARIOS,
+)

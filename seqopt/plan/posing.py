@@ -1,0 +1,288 @@
+"""Problems posed, and the graphs of choices that answer them.
+
+What is asked is one value; what can be done is a graph of it: layers of candidates where the open
+grips of a schedule are chosen and neighbors alone share a step, a copy of these for every scenario,
+states and moves of any schedule, or the states of all orders. Which of these a formulation is given
+is its own matter (`seqopt.plan.calling.formulation.On`); a problem that has no such graph says why
+in one line.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+from seqopt.contact.mortar import Mortar, find_mortar
+from seqopt.engines.interface import Engine
+from seqopt.errors import ProblemError
+from seqopt.graph.layers.layers import Layers, candidate_layers
+from seqopt.graph.orders.orders import AllOrders
+from seqopt.graph.scenarios.scenarios import ScenarioLayers, in_scenarios
+from seqopt.graph.states.states import States, build_states, over_scenarios, within
+from seqopt.plan.calling.formulation import On
+from seqopt.plan.shares import with_budgets
+from seqopt.problem.aims import WORST_PEAK, Aim, RobustAim, parse_robust
+from seqopt.problem.budgets import parse_budgets, parse_caps
+from seqopt.problem.goals import Goal, Measure, parse_goals
+from seqopt.problem.problem import Orders, Problem
+from seqopt.problem.requirements import Criterion, Limit, as_limits
+from seqopt.problem.standing import Standing
+from seqopt.responses.resources import HERE, Resources
+from seqopt.scene.checks import short
+from seqopt.scene.scenarios import Scenarios
+from seqopt.scene.scene import Scene
+from seqopt.sequence.free_rules import FreeRules
+from seqopt.sequence.schedule import Schedule
+
+Graph = Layers | ScenarioLayers | States | AllOrders
+AIMS = {Aim.SUM: Goal(Measure.SUM), Aim.PEAK: Goal(Measure.PEAK)}
+USUAL = {On.LAYERS: "overlap_dp", On.STATES: "schedule_search", On.ORDERS: "order_search"}
+
+
+def pose(
+    engine: Engine,
+    moves: Schedule | FreeRules,
+    criterion: Criterion,
+    goals: Sequence[Goal] | str = (),
+    limits: Sequence[Limit] = (),
+    *,
+    budgets: Sequence[str] | str = (),
+    stands: Standing | Mortar | str | None = None,
+    scenarios: Scenarios | Sequence[Scene] = (),
+    over: RobustAim | str = WORST_PEAK,
+    orders: Orders | str | None = None,
+    also: Sequence[str] = (),
+    resources: Resources = HERE,
+) -> Problem:
+    """Return the problem of a build, of whatever schedule.
+
+    Parameters
+    ----------
+    engine : Engine
+        The engine that computes responses; it has the scene.
+    moves : Schedule or FreeRules
+        What can be chosen: the open grips of a schedule, or every move that rules allow.
+    criterion : Criterion
+        What a step costs.
+    goals : sequence of Goal or str, optional
+        What is to be small, the most important first, as ``"minmax,steps"``; over states of the
+        build. By default the sum of the costs of open grips or the largest, as the formulation
+        minimizes; of rules the worst step.
+    limits : sequence of Limit, optional
+        Bounds that no step may exceed.
+    budgets : sequence of str, optional
+        Caps on totals: of candidates as `seqopt.problem.budgets.parse_budgets`, of states as
+        `seqopt.problem.budgets.parse_caps` reads them.
+    stands : Standing, Mortar or str, optional
+        Requires that every state stands, with this mortar: ``"dry"``, ``"bond=3e3"`` (Pa).
+    scenarios : Scenarios or sequence of Scene, optional
+        Other states of the world, of `seqopt.scenarios`, or scenes with the same bricks and nodes.
+    over : RobustAim or str, optional
+        What counts over scenarios: ``worst-peak``, ``worst-total`` or ``cvar=0.9``.
+    orders : Orders or str, optional
+        Among which build orders the best is sought, ``tied`` or ``any``; by default the scene's.
+    also : sequence of str, optional
+        Further responses to compute.
+    resources : Resources, optional
+        Processes, memory and a folder for results; by default only this process.
+
+    Returns
+    -------
+    Problem
+        Nothing is computed yet, except scales that a criterion takes from the scene.
+
+    Raises
+    ------
+    ProblemError
+        If there is no such response, no grip is open, or questions do not go together.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> network = seqopt.build_network(seqopt.load_scene("arch25"))
+    >>> engine, schedule = seqopt.make_engine("auto", network), seqopt.three_robot_loop(network)
+    >>> seqopt.pose(engine, schedule, seqopt.CRITERIA["equations-2-3"])
+    Problem('arch25', 'three-robot', criterion 'equations-2-3')
+    >>> worst = seqopt.CRITERIA["worst-ratio"]
+    >>> seqopt.pose(engine, seqopt.FreeRules(), worst, "minmax,steps", budgets="regrips=3")
+    Problem('arch25', 'free', criterion 'worst-ratio', minmax, steps, 1 budgets)
+    """
+    problem = Problem(
+        engine,
+        moves,
+        criterion,
+        _goals(goals),
+        as_limits(limits),
+        (budgets,) if isinstance(budgets, str) else tuple(budgets),
+        stands if isinstance(stands, Standing | None) else Standing(find_mortar(stands)),
+        scenarios.scenes if isinstance(scenarios, Scenarios) else tuple(scenarios),
+        parse_robust(over) if isinstance(over, str) else over,
+        None if orders is None else _orders(orders),
+        tuple(also),
+        resources,
+    )
+    posed = replace(problem, criterion=_usual_criterion(problem))
+    posed.graphs.update(problem.graphs)
+    return posed
+
+
+def natural(problem: Problem) -> On:
+    """Return which graph answers a problem if no formulation says."""
+    if problem.orders is not None:
+        return On.ORDERS
+    if isinstance(problem.moves, FreeRules) or problem.goals or problem.stands is not None:
+        return On.STATES
+    if problem.scenarios and problem.over.aim is Aim.SUM:
+        return On.SCENARIOS
+    return On.LAYERS
+
+
+def usual(problem: Problem) -> str:
+    """Return the name of the formulation that solves a problem if none is named."""
+    on = natural(problem)
+    if on is On.SCENARIOS:
+        return "scenario_search"
+    if on is On.LAYERS and problem.scenarios:
+        return "minimax"
+    return "labels" if on is On.LAYERS and problem.budgets else USUAL[on]
+
+
+def graph_of(problem: Problem, on: On | None = None) -> Graph:
+    """Return the graph of choices of a problem; what was computed for it before is kept.
+
+    ``on``: what a formulation is given; by default as `natural`. Raises `ProblemError` if the
+    problem has no such graph.
+    """
+    on = natural(problem) if on is None else on
+    if on.name not in problem.graphs:
+        problem.graphs[on.name] = MADE[on](problem)
+    found: Graph = problem.graphs[on.name]
+    return found
+
+
+def layers_of(problem: Problem) -> Layers:
+    """Return the open grips of a problem in layers of candidates, budgets included."""
+    found = graph_of(problem, On.LAYERS)
+    assert isinstance(found, Layers)
+    return found
+
+
+def states_of(problem: Problem) -> States:
+    """Return the states and moves of a problem."""
+    found = graph_of(problem, On.STATES)
+    assert isinstance(found, States)
+    return found
+
+
+def _usual_criterion(problem: Problem) -> Criterion:
+    """Return the criterion with the numbers of the scene; raise what the usual graph says."""
+    on = natural(problem)
+    if on in (On.STATES, On.ORDERS):
+        graph = graph_of(problem, on)
+        states = graph.states if isinstance(graph, AllOrders) else graph
+        assert isinstance(states, States)  # it was made of rules or goals
+        return states.criterion
+    parse_budgets(problem.budgets)
+    if problem.scenarios:
+        return _scenarios(problem).nominal.criterion
+    return _plain_layers(problem).criterion
+
+
+def _plain_layers(problem: Problem) -> Layers:
+    """Return layers of candidates without budgets."""
+    if "plain" not in problem.graphs:
+        counted = [b.response for b in parse_budgets(problem.budgets) if b.response]
+        problem.graphs["plain"] = candidate_layers(
+            problem.engine,
+            problem.schedule,
+            problem.criterion,
+            problem.limits,
+            (*problem.also, *counted),
+            problem.resources,
+        )
+    found: Layers = problem.graphs["plain"]
+    return found
+
+
+def _layers(problem: Problem) -> Layers | ScenarioLayers:
+    """Return the layers of a problem; with scenarios the largest costs in any."""
+    _require_candidates(problem)
+    if problem.scenarios:
+        return _scenarios(problem)
+    asked = parse_budgets(problem.budgets)
+    layers = _plain_layers(problem)
+    return with_budgets(layers, asked) if asked else layers
+
+
+def _scenarios(problem: Problem) -> ScenarioLayers:
+    _require_candidates(problem)
+    if problem.budgets:
+        raise ProblemError(
+            f"budget {problem.budgets[0]}: aims over scenarios take none where candidates are "
+            "chosen; leave it out, or name aims"
+        )
+    return in_scenarios(_plain_layers(problem), problem.scenarios, problem.over)
+
+
+def _require_candidates(problem: Problem) -> None:
+    """Raise an error if something is asked that layers of candidates do not know."""
+    why = {
+        "orders": problem.orders is not None,
+        f"aim {', '.join(map(str, problem.goals))}": len(problem.goals) > 1
+        or any(goal not in AIMS.values() for goal in problem.goals),
+        "stands": problem.stands is not None,
+    }
+    for name, asked in why.items():
+        if asked:
+            raise ProblemError(
+                f"{name}: it is about states of the build, not about candidates alone; take "
+                "schedule_search or another formulation of states"
+            )
+
+
+def _states(problem: Problem) -> States:
+    """Return the states of a problem, with all that is asked of them."""
+    if problem.scenarios and problem.over != WORST_PEAK:
+        raise ProblemError(
+            f"robust aim {problem.over}: where states are chosen, worst steps count; "
+            "give worst-peak"
+        )
+    goals = problem.goals or (AIMS[Aim.PEAK],)
+    found = build_states(
+        problem.engine, problem.moves, problem.criterion, goals, problem.limits, problem.stands
+    )
+    found = replace(found, resources=problem.resources)
+    if caps := parse_caps(problem.budgets):
+        found = within(found, caps)
+    return over_scenarios(found, problem.scenarios) if problem.scenarios else found
+
+
+def _all_orders(problem: Problem) -> AllOrders:
+    if problem.orders is None:
+        raise ProblemError("an order is given; pose with orders='tied' to seek one")
+    return AllOrders(_states(problem), problem.orders)
+
+
+MADE: dict[On, Callable[[Problem], Graph]] = {
+    On.LAYERS: _layers,
+    On.SCENARIOS: _scenarios,
+    On.STATES: _states,
+    On.ORDERS: _all_orders,
+    On.FRONTS: _states,
+}
+
+
+def _goals(given: Sequence[Goal] | str) -> tuple[Goal, ...]:
+    """Return goals that are given as such, or by their names."""
+    goals = parse_goals(given) if isinstance(given, str) else given
+    if not isinstance(goals, Sequence) or {*map(type, goals)} - {Goal}:
+        raise ProblemError(f"aims {short(given)}: give goals, or their names, as 'minmax,steps'")
+    return tuple(goals)
+
+
+def _orders(given: Orders | str) -> Orders:
+    try:
+        return Orders(given)
+    except ValueError:
+        known = ", ".join(each.value for each in Orders)
+        raise ProblemError(f"orders {given!r}: give one of {known}") from None

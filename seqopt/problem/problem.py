@@ -1,0 +1,114 @@
+"""The problem: what is asked of a build, whatever graph of choices answers it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from enum import Enum
+from functools import cached_property
+from typing import Any
+
+from seqopt.engines.interface import Engine
+from seqopt.errors import ProblemError
+from seqopt.problem.aims import WORST_PEAK, RobustAim
+from seqopt.problem.goals import Goal
+from seqopt.problem.requirements import Criterion, Limit
+from seqopt.problem.standing import Standing
+from seqopt.responses.resources import HERE, Resources
+from seqopt.scene.scene import Scene
+from seqopt.sequence.free_rules import FREE, FreeRules
+from seqopt.sequence.schedule import Schedule
+from seqopt.showing import Shown
+
+
+class Orders(Enum):
+    """Among which orders the best is sought."""
+
+    TIED = "tied"  # a joint or ground end ties every brick to what stands when it is placed
+    ANY = "any"
+
+
+@dataclass(frozen=True, repr=False)
+class Problem(Shown):
+    """What is asked of a build. Nothing is computed before a formulation needs it.
+
+    Attributes
+    ----------
+    engine : Engine
+        What computes responses; it has the scene.
+    moves : Schedule or FreeRules
+        What can be chosen: the open grips of a schedule, or every move that rules allow.
+    criterion : Criterion
+        What a step costs.
+    goals : tuple of Goal
+        What is to be small, the most important first; empty where the formulation says whether
+        the sum of the costs of open grips or the largest counts.
+    limits : tuple of Limit
+        Bounds that no step may exceed, whether or not a grip is open in it.
+    budgets : tuple of str
+        Caps on totals over the build, in words.
+    stands : Standing or None
+        The demand that every state stands.
+    scenarios : tuple of Scene
+        The same scene in other states of the world; limits and standing hold in all of them.
+    over : RobustAim
+        What counts of the values in all scenarios.
+    orders : Orders or None
+        Among which build orders the best is sought; None for the scene's own.
+    also : tuple of str
+        Further responses to compute, besides those that are needed.
+    resources : Resources
+        Processes, memory and a folder for results.
+    """
+
+    engine: Engine
+    moves: Schedule | FreeRules
+    criterion: Criterion
+    goals: tuple[Goal, ...] = ()
+    limits: tuple[Limit, ...] = ()
+    budgets: tuple[str, ...] = ()
+    stands: Standing | None = None
+    scenarios: tuple[Scene, ...] = ()
+    over: RobustAim = WORST_PEAK
+    orders: Orders | None = None
+    also: tuple[str, ...] = ()
+    resources: Resources = HERE
+
+    def __repr__(self) -> str:
+        what = f"{self.scene.name!r}, {self.method!r}, criterion {self.criterion.name!r}"
+        counts = {
+            "limits": len(self.limits),
+            "budgets": len(self.budgets),
+            "scenarios": len(self.scenarios),
+        }
+        parts = [what, *map(str, self.goals), *(f"{n} {name}" for name, n in counts.items() if n)]
+        if self.stands is not None:
+            parts.append("every state stands")
+        if self.orders is not None:
+            parts.append(f"{self.orders.value} orders")
+        return f"Problem({', '.join(parts)})"
+
+    @property
+    def scene(self) -> Scene:
+        """What is built."""
+        return self.engine.network.scene
+
+    @property
+    def method(self) -> str:
+        """The name of the schedule, or ``free``."""
+        return FREE if isinstance(self.moves, FreeRules) else self.moves.method
+
+    @property
+    def schedule(self) -> Schedule:
+        """The schedule whose grips are open; a `ProblemError` where rules say what can be done."""
+        if isinstance(self.moves, FreeRules):
+            raise ProblemError("the free schedule has no open grips; it has states")
+        return self.moves
+
+    def but(self, **changes: Any) -> Problem:
+        """Return the same problem with something else asked; nothing that is known is kept."""
+        return replace(self, **changes)
+
+    @cached_property
+    def graphs(self) -> dict[str, Any]:
+        """The graphs of choices that were made for it, which keep what was computed."""
+        return {}
