@@ -13,9 +13,9 @@ from seqopt.engines.registry import ENGINES
 from seqopt.errors import SceneError
 from seqopt.graph.layers.budgets import travel
 from seqopt.graph.orders.orders import AllOrders
+from seqopt.graph.states.states import build_states
 from seqopt.plan.free_front import FreeFront
 from seqopt.plan.front import find_front
-from seqopt.plan.order_plan import solve_order
 from seqopt.plan.out_of_sample import judge_unseen
 from seqopt.report.comparison import compare
 from seqopt.scene.library import ArchForm, DomeShape, VaultShape
@@ -43,14 +43,16 @@ def met(problem25):
     free = seqopt.optimize(small, "free")
     drawn = seqopt.scenarios(small, count=2, seed=1)
     posed = seqopt.optimize(small, criterion="worst-ratio").problem
-    robust = seqopt.solve_robust(seqopt.robust(posed, drawn, "worst-peak"))
+    asked = (posed.engine, posed.moves, posed.criterion)
+    robust = seqopt.solve(seqopt.pose(*asked, scenarios=drawn))
     words = posed.criterion, "F_largest,M_sup"
-    loop = FreeFront(seqopt.pose_free(posed.engine, posed.schedule, *words))
-    aims = seqopt.pose_free(posed.engine, seqopt.FreeRules(), posed.criterion, "F_largest,steps")
+    loop = FreeFront(build_states(posed.engine, posed.schedule, *words))
+    rules, aim = seqopt.FreeRules(), "F_largest,steps"
+    aims = build_states(posed.engine, rules, posed.criterion, aim)
     values = [plan, lean, free, robust, free.report()]
     values += [judge_unseen(robust, drawn), drawn, loop, find_front(loop), FreeFront(aims)]
     values += [
-        solve_order(AllOrders(free.problem)),
+        seqopt.solve(AllOrders(free.states)),
         *engines(network),
         *engines(posed.engine.network),
     ]

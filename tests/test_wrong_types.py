@@ -54,7 +54,7 @@ def test_what_is_meant_is_taken(tmp_path):
     dry = seqopt.assess_steps(SCENE, steps, "dry")
     assert dry == seqopt.assess_steps(NETWORK, steps, seqopt.DRY)
     limit = seqopt.Limit("T_max", 1e6)
-    assert seqopt.pose(ENGINE, LOOP, EQUATIONS, limit).limits == (limit,)
+    assert seqopt.pose(ENGINE, LOOP, EQUATIONS, limits=limit).limits == (limit,)
     selection = seqopt.formulations()["overlap_dp"].solve(PROBLEM)
     assert judge(PROBLEM, selection, "overlap_dp").gap == 0.0
     require_fit(PROBLEM, "beam", {"width": 3})
@@ -75,7 +75,7 @@ COARSE = RankSum("own", (("T_max", 1.0),), (("T_max", 1.0),), resolution=(("T", 
 WRONG = {
     "limits 'payload': give values": lambda: seqopt.optimize(SCENE, limits="payload"),
     "limits 'payload': give": lambda: seqopt.optimize(SCENE, "free", limits="payload"),
-    "limits [5]: give values": lambda: seqopt.pose(ENGINE, LOOP, EQUATIONS, [5]),
+    "limits [5]: give values": lambda: seqopt.pose(ENGINE, LOOP, EQUATIONS, limits=[5]),
     "schedule 5: give a Schedule": lambda: seqopt.optimize(SCENE, 5),
     "cache is 5; give the path of a folder": lambda: seqopt.optimize(SCENE, cache=5),
     "cache is ''; give the path": lambda: seqopt.optimize(SCENE, cache=""),

@@ -32,7 +32,7 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.graph.layers.layers import Layers, candidate_layers
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
-from seqopt.plan.calling.formulation import Formulation, formulations
+from seqopt.plan.calling.formulation import Formulation, On, formulations
 from seqopt.plan.judge.certificate import least
 from seqopt.plan.plan import Plan
 from seqopt.plan.solving import solve
@@ -83,7 +83,7 @@ def rows(scene: str, engine: str, criterion: str, repeats: int) -> list[Row]:
     return [
         *(
             base | _row(problem, formulation, reference, shared, repeats)
-            for formulation in formulations().values()
+            for formulation in formulations(On.LAYERS).values()
         ),
         base | _search_row(built, engine, criterion, reference, repeats),
     ]
@@ -97,7 +97,7 @@ def _repeated(repeats: int, call: Callable[[], Result]) -> list[Result]:
 
 def contenders() -> dict[str, Aim]:
     """Return the names of what chooses, and what each makes least, in the order of the rows."""
-    return {f.name: f.aim for f in formulations().values()} | {NO_PROOF: Aim.SUM}
+    return {f.name: f.aim for f in formulations(On.LAYERS).values()} | {NO_PROOF: Aim.SUM}
 
 
 def _pose(scene: Scene, engine: str, criterion: str) -> tuple[Layers, dict[str, float]]:

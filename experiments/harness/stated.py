@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 
 from experiments.harness.results import RESULTS, markdown, two
-from seqopt.plan.calling.formulation import formulations
+from seqopt.plan.calling.formulation import On, formulations
 
 FREE = {
     "overlap_dp": "the least sum (the default)",
@@ -60,7 +60,7 @@ def shapes_table(table: pd.DataFrame) -> str:
 
 
 def _contest(table: pd.DataFrame, when: dict[str, str]) -> str:
-    kinds = {name: formulation.kind.value for name, formulation in formulations().items()}
+    kinds = {name: each.kind.value for name, each in formulations(On.LAYERS).items()}
     counts = sorted(table["bricks"].unique())
     head = ["formulation", "use it for", "kind", "largest gap"]
     head += [*(f"{n} bricks" for n in counts), "memory"]

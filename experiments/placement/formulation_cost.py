@@ -66,7 +66,7 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.graph.layers.layers import Layers, candidate_layers
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
-from seqopt.plan.calling.formulation import find_formulation, formulations
+from seqopt.plan.calling.formulation import On, find_formulation, formulations
 from seqopt.plan.calling.watch import Watch, trace_rows
 from seqopt.plan.judge.certificate import least
 from seqopt.plan.solving import solve
@@ -89,14 +89,14 @@ def problem_of(net: Network, criterion: Criterion) -> Layers:
 
 
 def compared(net: Network, criterion: Criterion, rounds: int) -> dict[str, float]:
-    """Return seconds to candidate_layers the problem and to solve it by every formulation of the sum."""
+    """Return seconds to pose the problem and to solve it by every formulation of the sum."""
     row = {
         "bricks": float(len(net.scene.bricks)),
         "pose": best(partial(problem_of, net, criterion), rounds),
     }
     problem = problem_of(net, criterion)
     row["models"] = float(problem.evaluation.models)
-    for name, formulation in formulations().items():
+    for name, formulation in formulations(On.LAYERS).items():
         if formulation.aim is not Aim.SUM:
             continue
         row[name] = best(partial(formulation.solve, problem), rounds)
@@ -156,7 +156,7 @@ def specs() -> Iterator[Spec]:
         for criterion in COMPARED:
             for case in CASES:
                 rare = bricks >= RARE and (criterion != COMPARED[0] or case not in FEW)
-                for name, formulation in formulations().items():
+                for name, formulation in formulations(On.LAYERS).items():
                     able = formulation.takes_budgets or case == NO_BUDGET
                     if able and not (rare and name in SOLVERS):
                         yield bricks, criterion, case, name
@@ -245,7 +245,7 @@ def written(problem: Layers, name: str, limit: float) -> tuple[dict[str, object]
     """Return size, bound, nodes and time of a program, and what was found at which time."""
     formulation = find_formulation(name)
     costs = formulation.aim.costs(problem)
-    written = import_module(f"formulations.{name}").write(problem)
+    written = import_module(f"formulations.layers.{name}").write(problem)
     size, relaxed = anatomy(written.program)
     watch, start = Watch(limit), time.perf_counter()
     found = minimize_whole(written.program, feasible=True, watch=watch, told=written.bound)

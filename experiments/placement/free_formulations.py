@@ -27,13 +27,13 @@ from experiments.harness.runs import scene_named
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.graph.states.states import build_states
 from seqopt.network.build import build_network
-from seqopt.plan.calling.formulation import FormulationKind
-from seqopt.plan.calling.schedule_formulation import (
-    Finds,
-    find_schedule_formulation,
-    schedule_formulation_names,
+from seqopt.plan.calling.formulation import (
+    FormulationKind,
+    On,
+    find_formulation,
+    formulation_names,
 )
-from seqopt.plan.free_plan import FreePlan
+from seqopt.plan.plan import Plan
 from seqopt.plan.solving import solve
 from seqopt.sequence.free_rules import FreeRules
 from seqopt.study.presets import CRITERIA
@@ -46,11 +46,11 @@ ON = 25
 CLOSE = 1e-6
 
 
-def run(scene: str, aim: str, name: str) -> tuple[FreePlan, float]:
+def run(scene: str, aim: str, name: str) -> tuple[Plan, float]:
     """Return the plan of a formulation for a problem of which nothing is computed, and its time."""
     engine = ComplianceEngine(build_network(scene_named(scene)))
     problem = build_states(engine, FreeRules(), CRITERIA["worst-ratio-published"], aim)
-    formulation = find_schedule_formulation(name)
+    formulation = find_formulation(name)
     start = time.process_time()
     found = formulation.solve(problem, seconds=PATIENCE)
     seconds = time.process_time() - start
@@ -64,9 +64,9 @@ def row(scene: str, aim: str, name: str, rounds: int) -> dict[str, object]:
     chosen, proof = plan.selection, plan.certificate
     value, bound = chosen.objective[0], chosen.bound[0]
     if proof is not None and not chosen.stopped:
-        bound = proof.bound[0]
+        bound = proof.bound
     return {
-        "bricks": len(plan.problem.network.scene.bricks),
+        "bricks": len(plan.engine.network.scene.bricks),
         "aim": aim,
         "formulation": name,
         "kind": plan.formulation.kind.value,
@@ -76,7 +76,7 @@ def row(scene: str, aim: str, name: str, rounds: int) -> dict[str, object]:
         "steps": len(plan.steps),
         "bound": bound,
         "gap": (value - bound) / value,
-        "models": plan.problem.models,
+        "models": plan.models,
         "states": sum(map(len, chosen.visited)),
     }
 
@@ -117,7 +117,7 @@ def holds(table: pd.DataFrame) -> bool:
 
 
 def experiment(options: Options) -> Finding:
-    names = schedule_formulation_names(Finds.PLAN)
+    names = formulation_names(On.STATES)
     sizes, rounds = (SIZES[:1], 1) if options.quick else (SIZES, 3)
     rows: list[dict[str, object]] = []
     late = set[tuple[str, str]]()

@@ -24,10 +24,10 @@ from experiments.harness.claim import Claim, Finding, Options
 from experiments.harness.results import stored
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import StepError
-from seqopt.graph.layers.layers import candidate_layers
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
-from seqopt.plan.calling.formulation import FormulationKind, formulations
+from seqopt.plan.calling.formulation import FormulationKind, On, formulations
+from seqopt.plan.posing import pose
 from seqopt.plan.solving import solve
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.sequence.three_robots import three_robot_loop
@@ -53,7 +53,8 @@ def arch(rng: np.random.Generator) -> Network:
 def gaps(draws: int) -> Iterator[dict[str, object]]:
     """Yield a row for every arch, criterion and heuristic; arches out of reach are left out."""
     rng = np.random.default_rng(0)
-    heuristics = [n for n, f in formulations().items() if f.kind is FormulationKind.HEURISTIC]
+    known = formulations(On.LAYERS)
+    heuristics = [n for n, f in known.items() if f.kind is FormulationKind.HEURISTIC]
     for draw in range(draws):
         network = arch(rng)
         try:
@@ -62,7 +63,7 @@ def gaps(draws: int) -> Iterator[dict[str, object]]:
             continue
         engine = ComplianceEngine(network)
         for criterion in COMPARED:
-            problem = candidate_layers(engine, loop, CRITERIA[criterion])
+            problem = pose(engine, loop, CRITERIA[criterion])
             for name in heuristics:
                 proof = solve(problem, name).certificate
                 assert proof is not None

@@ -33,7 +33,6 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from seqopt.plan.robust_plan import RobustPlan, solve_robust
 
 from experiments.harness.claim import Claim, Finding, Options, Times, on_this_run
 from experiments.harness.results import drawn, stored
@@ -42,10 +41,11 @@ from formulations.scenarios.scenario_program import solve_program
 from seqopt.engines.registry import make_engine
 from seqopt.graph.layers.layers import Layers, candidate_layers
 from seqopt.graph.scenarios.arcs import Choice
-from seqopt.graph.scenarios.scenarios import ScenarioLayers, robust
+from seqopt.graph.scenarios.scenarios import ScenarioLayers, in_scenarios
 from seqopt.network.build import build_network
 from seqopt.plan.calling.watch import Watch
 from seqopt.plan.out_of_sample import judge_unseen
+from seqopt.plan.plan import Plan
 from seqopt.plan.search.in_order import solve_in_order
 from seqopt.plan.search.step_quantile import least_quantile
 from seqopt.plan.solving import solve
@@ -88,7 +88,7 @@ def posed(scene: Scene, criterion: Criterion) -> Layers:
 def over_draws(problem: Layers, count: int, seed: int) -> ScenarioLayers:
     """Return the problem over so many scenarios, costs computed."""
     scene = problem.schedule.scene
-    found = robust(problem, scenarios(scene, count=count, seed=seed), WORST_PEAK)
+    found = in_scenarios(problem, scenarios(scene, count=count, seed=seed).scenes, WORST_PEAK)
     assert found.costs
     return found
 
@@ -102,18 +102,19 @@ def made(scene: Scene, effort: Effort) -> Iterator[dict[str, object]]:
             most = over_draws(problem, max(effort.counts), seed)
             for aim in (aim for aim, own in AIMS.items() if own is criterion):
                 for count in effort.counts:
-                    plan = solve_robust(most.under(aim).first(count))
+                    plan = solve(most.under(aim).first(count))
                     row = {"aim": str(aim), "criterion": criterion.name, "seed": seed}
                     yield row | {"scenarios": count} | measured(plan, unseen)
 
 
-def measured(plan: RobustPlan, unseen: ScenarioLayers) -> dict[str, object]:
+def measured(plan: Plan, unseen: ScenarioLayers) -> dict[str, object]:
     """Return what a plan is worth where it was made and elsewhere."""
-    trial = judge_unseen(plan, unseen).summary()
+    trial, proof = judge_unseen(plan, unseen).summary(), plan.certificate
+    assert proof is not None
     return {
-        "objective": plan.objective,
-        "gap": plan.gap,
-        "gap_by_weights": (plan.objective - plan.proven) / plan.objective,
+        "objective": proof.objective,
+        "gap": proof.claimed_gap,
+        "gap_by_weights": proof.gap,
         "solve_s": plan.seconds["solve"],
         **{f"{name}_{who}": trial[name][who] for name in trial for who in trial[name]},
     }
@@ -124,11 +125,11 @@ def references(scene: Scene, count: int, limit: float) -> pd.DataFrame:
     found = []
     most = over_draws(posed(scene, WEIGHTED), count, 0)
     for aim in (WORST_TOTAL, TAIL):
-        plan = solve_robust(most.under(aim))
+        plan = solve(most.under(aim))
         start = time.perf_counter()
         told = solve_program(most.layered(Aim.SUM), aim.most(count), whole=True, watch=Watch(limit))
-        row = {"aim": str(aim), "scenarios": count, "objective": plan.objective}
-        row |= {"bound": plan.bound, "solve_s": plan.seconds["solve"]}
+        row = {"aim": str(aim), "scenarios": count, "objective": plan.objective[str(aim)]}
+        row |= {"bound": plan.selection.bound, "solve_s": plan.seconds["solve"]}
         row |= {"program": told.value, "program_bound": told.bound}
         found.append(row | {"program_s": time.perf_counter() - start, "limit_s": limit})
     return pd.DataFrame(found)
@@ -144,9 +145,9 @@ def plans(scene: Scene, count: int) -> dict[str, Choice]:
         "worst": solve(worst, "minimax").selection.choice,
         "worst, then sum": solve_in_order([(worst, Aim.PEAK), (total, Aim.SUM)]).choice,
         "all but a tenth of the steps": least_quantile(worst, 0.1).choice,
-        "robust, worst peak": solve_robust(peaks).choice,
-        "robust, worst total": solve_robust(totals.under(WORST_TOTAL)).choice,
-        "robust, cvar=0.9": solve_robust(totals.under(TAIL)).choice,
+        "robust, worst peak": solve(peaks).choice,
+        "robust, worst total": solve(totals.under(WORST_TOTAL)).choice,
+        "robust, cvar=0.9": solve(totals.under(TAIL)).choice,
     }
 
 

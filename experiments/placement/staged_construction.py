@@ -37,9 +37,9 @@ from experiments.harness.results import drawn
 from seqopt.engines.interface import Engine, Fields
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.engines.rigid.ungripped import Ungripped, ungripped_system
-from seqopt.graph.layers.layers import candidate_layers
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
+from seqopt.plan.posing import pose
 from seqopt.plan.solving import solve
 from seqopt.report.style import BLUE, INK, VERMILION, dress, new_figure, styled
 from seqopt.responses.quantities import CHOSEN_BY, RESPONSES, TO_1E_3MM, lengths
@@ -194,7 +194,7 @@ def builds(engine: ComplianceEngine) -> dict[str, tuple[Step, ...]]:
     network = engine.network
     out = {name: tuple(method(network)) for name, method in METHODS.items()}
     out[PUBLISHED] = published_plan(network.scene)
-    loop = candidate_layers(engine, three_robot_loop(network), EQUATIONS)
+    loop = pose(engine, three_robot_loop(network), EQUATIONS)
     out["three-robot, optimized"] = solve(loop, "overlap_dp").steps
     out["three-robot, minimax"] = solve(loop, "minimax").steps
     return out

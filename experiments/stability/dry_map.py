@@ -75,9 +75,9 @@ from seqopt.arrays import Ints
 from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import DRY, EPOXY, Mortar, bond_mortar
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.graph.layers.layers import candidate_layers
 from seqopt.network.build import build_network
 from seqopt.network.network import GROUND, Network
+from seqopt.plan.posing import pose
 from seqopt.plan.solving import solve
 from seqopt.responses.table import analyze, force_column
 from seqopt.scene.scene_file import load_scene
@@ -229,10 +229,10 @@ def plans(engine: ComplianceEngine) -> Plans:
     """Return the steps of every method of the reference arch."""
     net = engine.network
     out = {name: method(net) for name, method in METHODS.items()}
-    modified = candidate_layers(engine, modified_sequential(net), EQUATIONS)
+    modified = pose(engine, modified_sequential(net), EQUATIONS)
     out["modified sequential"] = solve(modified, "cascade").steps
     out["three-robot, published"] = published_plan(net.scene)
-    loop = candidate_layers(engine, three_robot_loop(net), EQUATIONS)
+    loop = pose(engine, three_robot_loop(net), EQUATIONS)
     out["three-robot, optimized"] = solve(loop, "overlap_dp").steps
     out["three-robot, minimax"] = solve(loop, "minimax").steps
     return out

@@ -9,8 +9,8 @@ r"""Totals over scenarios as one mixed-integer program (cvxpy, HiGHS): a referen
 with the costs :math:`c_s` of pairs in every scenario and the largest weight :math:`\bar w` of one:
 1 for the worst total, :math:`1 / ((1 - \alpha) S)` for the mean total of the worst
 :math:`1 - \alpha` of :math:`S` scenarios (Rockafellar and Uryasev). Without the integers its value
-is that which weights of scenarios prove (`formulations.scenarios.scenario_weights`), tens to hundreds
-of times faster by dynamic programs.
+is that which weights of scenarios prove (`formulations.scenarios.scenario_weights`), tens to
+hundreds of times faster by dynamic programs.
 """
 
 from __future__ import annotations

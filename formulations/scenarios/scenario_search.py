@@ -6,10 +6,10 @@ r"""The least worst or tail total over scenarios: weights of scenarios, then all
    W = \Bigl\{ w \ge 0 : \sum_s w_s = 1, \; w_s \le \bar w \Bigr\}
 
 with the totals :math:`c_s` of a choice in every scenario. The best weights
-(`formulations.scenarios.scenario_weights`) leave a gap, which is closed here. They prove a bound for every beginning of a choice: what it costs so far, weighed, and the least
-from there on. Beginnings whose bound is not below the best choice are left out; where too many
-remain, those with the highest bounds are, and the least of these bounds stays a bound on what was
-not looked at.
+(`formulations.scenarios.scenario_weights`) leave a gap, which is closed here. They prove a bound
+for every beginning of a choice: what it costs so far, weighed, and the least from there on.
+Beginnings whose bound is not below the best choice are left out; where too many remain, those with
+the highest bounds are, and the least of these bounds stays a bound on what was not looked at.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from formulations.scenarios.scenario_weights import Weighed, best_weights
 from seqopt.arrays import Floats, Ints
 from seqopt.errors import ProblemError
 from seqopt.graph.scenarios.arcs import Choice, ScenarioArcs, scenario_arcs
-from seqopt.graph.scenarios.scenarios import ScenarioLayers
+from seqopt.graph.scenarios.scenarios import ScenarioLayers, largest_of
 from seqopt.plan.calling.formulation import End, Formulation, FormulationKind, On, Selection
 from seqopt.plan.calling.watch import Watch
 from seqopt.problem.aims import Aim
@@ -63,7 +63,9 @@ def solve(problem: ScenarioLayers, *, watch: Watch, width: int = WIDTH) -> Selec
     """
     if problem.aim.aim is Aim.PEAK:
         raise ProblemError("worst peaks are those of one set of layers; take minimax")
-    arcs = scenario_arcs(problem.layered(Aim.SUM), problem.aim)
+    layers = problem.layered(Aim.SUM)
+    largest_of(layers)  # says if no choice is allowed in all scenarios
+    arcs = scenario_arcs(layers, problem.aim)
     weighed = best_weights(arcs, watch)
     found = close_gap(arcs, weighed, watch, width)
     weights = {str(i): float(w) for i, w in enumerate(weighed.weights, start=1)}

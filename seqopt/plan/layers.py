@@ -84,7 +84,9 @@ def _solve_windows(graph: PlacementProblem, formulation: Formulation, run: Run) 
     """Return the plan of a search that solves only the models it meets."""
     alone = formulation.window_options
     if alone is None or run.options not in ({}, alone):
-        able = [n for n, other in formulations().items() if other.window_options is not None]
+        able = [
+            n for n, other in formulations(On.LAYERS).items() if other.window_options is not None
+        ]
         asked = " ".join(
             [formulation.name, *(f"{name}={value}" for name, value in run.options.items())]
         )
@@ -93,7 +95,7 @@ def _solve_windows(graph: PlacementProblem, formulation: Formulation, run: Run) 
             f"use {' or '.join(able)} without options, or ask for the proof"
         )
     if not isinstance(graph, Layers):
-        raise ProblemError("the costs of all choices are given; ask for the proof, it is free")
+        raise ProblemError("the costs of all choices are needed or given; ask for the proof")
     if getattr(graph.criterion, "among", Among.ALL) is not Among.ALL:
         raise ProblemError(
             "ranks among possible candidates need all models: rank among all, or ask for the proof"
@@ -114,7 +116,7 @@ def _solve_windows(graph: PlacementProblem, formulation: Formulation, run: Run) 
 def _solve_lazily(graph: PlacementProblem, formulation: Formulation, run: Run) -> Plan:
     """Return the certified plan of a search that solves only the models that the proof needs."""
     if not isinstance(graph, Layers):
-        raise ProblemError("the costs of all choices are given; nothing is saved by a lazy search")
+        raise ProblemError("the costs of all choices are needed or given; leave out lazy")
     if run.options:
         raise ProblemError(f"option {min(run.options)}: a lazy search has no options; leave it out")
     seconds: dict[str, float] = {}

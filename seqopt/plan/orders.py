@@ -21,6 +21,7 @@ from seqopt.plan.judge.orders import finds_better_order
 from seqopt.plan.plan import FoundOrder, Plan
 from seqopt.plan.run import Run
 from seqopt.plan.states import solve_states
+from seqopt.responses.resources import HERE
 from seqopt.scene.orders import Order, in_order
 
 ENDED = ("time", "interrupt")  # searches that were told to end: nothing more is computed
@@ -40,7 +41,7 @@ def solve_orders(problem: AllOrders, formulation: Formulation, run: Run) -> Plan
         options["seconds"] = run.time_limit
     means = problem.states.resources
     means = replace(means, progress=run.progress or means.progress)
-    twin = replace(problem, states=replace(problem.states))  # which no formulation can reach
+    twin = _judged(problem)  # which no formulation can reach
     ends = start + float(options.get("seconds", inf))
     solve = partial(formulation.solve, problem, resources=means, **options)
     selection = _selected(formulation, (problem, twin), ends, solve)
@@ -73,7 +74,7 @@ def _selected(
     """Return what a formulation says, with numbers where numbers belong; or why there is none."""
     asked, problem = problems
     try:
-        said = called(found.name, lambda: (asked, problem), OrderSelection, solve)
+        said = called(found.name, lambda: (_judged(asked), problem), OrderSelection, solve)
     except InfeasibleError as error:
         some = finds_better_order(problem, np.inf, end=end)
         if some:
@@ -84,6 +85,11 @@ def _selected(
             raise
         raise InfeasibleError(f"claimed by {found.name}, and not proven: {error}") from None
     return _with_numbers(found.name, said)
+
+
+def _judged(problem: AllOrders) -> AllOrders:
+    """Return what a formulation must not change; who works for it may."""
+    return replace(problem, states=replace(problem.states, resources=HERE))
 
 
 def _proven(name: str, problem: AllOrders, selection: OrderSelection, end: float) -> bool:

@@ -59,6 +59,9 @@ class FoundOrder:
     selection: OrderSelection
     proven: bool
 
+    def __repr__(self) -> str:
+        return f"<FoundOrder of {len(self.selection.order)} bricks: {self.bound_said}>"
+
     @property
     def gap(self) -> float:
         """What the bound leaves open, over the value."""
@@ -115,7 +118,7 @@ class Plan(ShownBuild):
     Plan('arch25', 'three-robot', by overlap_dp: 90 steps, objective 657.465, gap 0 %)
     >>> plan = seqopt.optimize("arch25", "free", aim="minmax,steps")
     >>> plan.status, plan.regrips
-    (<Status.OPTIMAL: 'optimal'>, 1)
+    (<Status.OPTIMAL: 'optimal'>, 0)
     """
 
     problem: Problem | PlacementProblem | States | AllOrders
@@ -208,8 +211,15 @@ class Plan(ShownBuild):
     def ended(self) -> End:
         """How the formulation ended."""
         if isinstance(self.selection, StatePath):
-            return ENDS.get(self.selection.stopped, End.STOPPED)
+            return ENDS.get(self.stopped, End.STOPPED)
         return self.selection.end
+
+    @property
+    def stopped(self) -> str:
+        """Why a search of states or orders ended early: ``time``, ``memory``, ``size``, say."""
+        if self.order is not None and self.order.selection.stopped:
+            return self.order.selection.stopped
+        return self.selection.stopped if isinstance(self.selection, StatePath) else ""
 
     @property
     def trace(self) -> tuple[Finding, ...]:

@@ -39,7 +39,7 @@ AIMS = {Aim.SUM: Goal(Measure.SUM), Aim.PEAK: Goal(Measure.PEAK)}
 USUAL = {On.LAYERS: "overlap_dp", On.STATES: "schedule_search", On.ORDERS: "order_search"}
 
 
-def pose(
+def pose(  # noqa: PLR0913  # every question is a word of its own
     engine: Engine,
     moves: Schedule | FreeRules,
     criterion: Criterion,
@@ -116,8 +116,8 @@ def pose(
         (budgets,) if isinstance(budgets, str) else tuple(budgets),
         stands if isinstance(stands, Standing | None) else Standing(find_mortar(stands)),
         scenarios.scenes if isinstance(scenarios, Scenarios) else tuple(scenarios),
-        parse_robust(over) if isinstance(over, str) else over,
-        None if orders is None else _orders(orders),
+        _over(over),
+        None if orders is None else Orders.of(orders),
         tuple(also),
         resources,
     )
@@ -280,9 +280,9 @@ def _goals(given: Sequence[Goal] | str) -> tuple[Goal, ...]:
     return tuple(goals)
 
 
-def _orders(given: Orders | str) -> Orders:
-    try:
-        return Orders(given)
-    except ValueError:
-        known = ", ".join(each.value for each in Orders)
-        raise ProblemError(f"orders {given!r}: give one of {known}") from None
+def _over(given: RobustAim | str) -> RobustAim:
+    """Return an aim over scenarios that is given as such, or in words."""
+    aim = parse_robust(given) if isinstance(given, str) else given
+    if not isinstance(aim, RobustAim):
+        raise ProblemError(f"robust aim {short(aim)}: give worst-peak, worst-total or cvar=0.9")
+    return aim

@@ -114,7 +114,9 @@ def _of_graph(problem: object, formulation: Formulation | str | None) -> Formula
         return as_formulation(formulation or "schedule_search", On.STATES)
     if isinstance(problem, AllOrders):
         return as_formulation(formulation or "order_search", On.ORDERS)
-    if isinstance(problem, ScenarioLayers) and problem.aim.aim is Aim.SUM:
-        return as_formulation(formulation or "scenario_search", On.SCENARIOS)
+    if isinstance(problem, ScenarioLayers):
+        peak = problem.aim.aim is Aim.PEAK
+        usual_one, on = ("minimax", On.LAYERS) if peak else ("scenario_search", On.SCENARIOS)
+        return as_formulation(formulation or usual_one, on)
     known = getattr(problem, "budgets", None)
     return as_formulation(formulation or ("labels" if known else "overlap_dp"), On.LAYERS)

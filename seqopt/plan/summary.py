@@ -34,7 +34,7 @@ def summarized(plan: Plan) -> dict[str, object]:
         "candidates": f"heuristic: {plan.among}" if plan.among else "all",
         "status": f"{plan.status} among these" if _narrowed(plan) else str(plan.status),
         "ended": plan.ended.value,
-        "stopped": plan.selection.stopped if isinstance(plan.selection, StatePath) else "",
+        "stopped": plan.stopped,
         "objective": plan.objective,
         "bound": _bounds(plan),
         "gap": plan.gap,

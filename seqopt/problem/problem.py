@@ -26,6 +26,15 @@ class Orders(Enum):
     TIED = "tied"  # a joint or ground end ties every brick to what stands when it is placed
     ANY = "any"
 
+    @classmethod
+    def of(cls, given: Orders | str) -> Orders:
+        """Return orders that are given as such, or by name; a `ProblemError` names those known."""
+        try:
+            return cls(given)
+        except ValueError:
+            known = ", ".join(each.value for each in cls)
+            raise ProblemError(f"orders {given!r}: give one of {known}") from None
+
 
 @dataclass(frozen=True, repr=False)
 class Problem(Shown):
@@ -58,6 +67,15 @@ class Problem(Shown):
         Further responses to compute, besides those that are needed.
     resources : Resources
         Processes, memory and a folder for results.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> problem = seqopt.optimize("arch25", "free", aim="minmax,steps").problem
+    >>> problem
+    Problem('arch25', 'free', criterion 'worst-ratio', minmax, steps)
+    >>> seqopt.solve(problem.but(budgets=("regrips=3",))).status
+    <Status.OPTIMAL: 'optimal'>
     """
 
     engine: Engine

@@ -17,13 +17,12 @@ import seqopt
 from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import find_mortar
 from seqopt.errors import InfeasibleError, StepError
-from seqopt.graph.scenarios.scenarios import robust
-from seqopt.graph.states.states import build_states, within
-from seqopt.plan.calling.formulation import FormulationKind
-from seqopt.plan.calling.schedule_formulation import (
-    Finds,
-    find_schedule_formulation,
-    schedule_formulation_names,
+from seqopt.graph.states.states import build_states
+from seqopt.plan.calling.formulation import (
+    FormulationKind,
+    On,
+    find_formulation,
+    formulation_names,
 )
 from seqopt.problem.requirements import LIMIT_TOLERANCE, Limit
 from seqopt.sequence.free_rules import FreeRules, with_robots
@@ -45,7 +44,7 @@ FOUR_OPEN = """step,type,bricks,rob1_node,rob2_node,rob3_node,rob4_node
 SCALES = np.array([scale for _, scale in ONES.limits])
 IGNORED = FreeRules(payload="ignored")
 AIMS = ("minmax", "minmax,steps", "sum", "steps,minmax", "regrips,T_max", "travel", "T_max,sum")
-PLANS = [find_schedule_formulation(n) for n in schedule_formulation_names(Finds.PLAN)]
+PLANS = [find_formulation(n) for n in formulation_names(On.STATES)]
 
 
 @cache
@@ -209,16 +208,15 @@ def test_everything_goes_with_everything(name, data):
     spent = [each[-1] for each in plans]
     caps = [float(np.quantile(spent, pick(0.0, 0.5)))] if capped and plans else []
     best = best_of(plans, len(words), caps)
-    problem = build_states(
+    unit = "m" if capped == "travel" else ""
+    problem = seqopt.pose(
         *(engines_of(name, 0)[0], rules, ONES, aim),
         limits=[Limit(response, bound)],
+        budgets=[f"{capped}={cap!r}{unit}" for cap in caps],
         stands=mortar or None,
+        scenarios=seqopt.scenarios(scene_of(name), count=scenarios, seed=3) if scenarios else (),
     )
-    problem = within(problem, {capped: caps[0]}) if caps else problem
-    if scenarios:
-        some = seqopt.scenarios(scene_of(name), count=scenarios, seed=3)
-        problem = robust(problem, some, "worst-peak")
-    formulation = find_schedule_formulation("schedule_search") if caps else pick(*PLANS)
+    formulation = find_formulation("schedule_search") if caps else pick(*PLANS)
     agree(problem, formulation, best, len(words))
 
 
@@ -234,7 +232,7 @@ def agree(problem, formulation, best, aims):
         assert "\n" not in str(caught.value)
         return
     plan = seqopt.solve(problem, formulation)
-    found, bound = plan.selection.objective[:aims], plan.certificate.bound[:aims]
+    found, bound = plan.selection.objective[:aims], plan.certificate.bounds[:aims]
     if formulation.kind is FormulationKind.EXACT and not problem.budgets:
         assert found == pytest.approx(best, rel=1e-7)
         assert bound == pytest.approx(best, rel=1e-6)

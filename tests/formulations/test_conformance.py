@@ -21,6 +21,7 @@ from seqopt.network.build import build_network
 from seqopt.plan.calling.formulation import (
     End,
     FormulationKind,
+    On,
     exhibits,
     find_formulation,
     formulations,
@@ -33,7 +34,7 @@ from seqopt.study.presets import CRITERIA, EQUATIONS, WORST_RATIO
 from tests.builders import small_arch
 from tests.strategies import budgeted, problems
 
-SHOWN = formulations()  # what comparisons have
+SHOWN = formulations(On.LAYERS)  # what comparisons have
 ALL = SHOWN | exhibits()
 EXACT_SUMS = [
     n for n, f in SHOWN.items() if f.aim is Aim.SUM and f.kind is not FormulationKind.HEURISTIC
@@ -332,7 +333,7 @@ def test_options_are_checked(problem25):
     ):
         with pytest.raises(ProblemError, match=named):
             ALL[name].solve(problem25, **options)
-    with pytest.raises(ProblemError, match="does not exist; give one of beam, cascade"):
+    with pytest.raises(ProblemError, match="does not exist; give one of beam, best_first"):
         find_formulation("simplex")
 
 

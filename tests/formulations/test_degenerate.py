@@ -13,16 +13,24 @@ from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.graph.layers.costs import Budget, LayeredCosts
 from seqopt.graph.layers.interface import CostProblem
 from seqopt.plan.calling.flow import LayeredFlow
-from seqopt.plan.calling.formulation import Formulation, FormulationKind, Selection, formulations
+from seqopt.plan.calling.formulation import (
+    Formulation,
+    FormulationKind,
+    On,
+    Selection,
+    formulations,
+)
 from seqopt.plan.judge.certificate import certify
 from seqopt.plan.solving import solve
 from seqopt.problem.aims import Aim
 from tests.quality.degenerate import MALFORMED, judge, outcomes
 from tests.quality.degenerate_cases import CASES, Size, capped, costs, opposed, whole
 
-ALL = formulations()
+ALL = formulations(On.LAYERS)
 SMALL = Size(3, 3, 6)
-TAKERS = [name for name, formulation in formulations().items() if formulation.takes_budgets]
+TAKERS = [
+    name for name, formulation in formulations(On.LAYERS).items() if formulation.takes_budgets
+]
 FLOWS = ("overlap_lp", "overlap_mip")
 EXACT = ("labels", "lagrangian", "minimax", "overlap_dp", *FLOWS)
 BOUNDS = ("lagrangian", "overlap_lp")  # where a budget binds

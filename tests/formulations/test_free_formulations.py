@@ -17,11 +17,11 @@ from seqopt.graph.paths import fewest_moves, lexicographic
 from seqopt.graph.states.states import build_states
 from seqopt.graph.states.visits import explore
 from seqopt.network.build import build_network
-from seqopt.plan.calling.formulation import FormulationKind
-from seqopt.plan.calling.schedule_formulation import (
-    Finds,
-    find_schedule_formulation,
-    schedule_formulation_names,
+from seqopt.plan.calling.formulation import (
+    FormulationKind,
+    On,
+    find_formulation,
+    formulation_names,
 )
 from seqopt.plan.calling.watch import Watch
 from seqopt.plan.solving import solve
@@ -32,7 +32,7 @@ from tests.builders import from_both_sides, small_arch
 from tests.random_graphs import graphs, simple_paths, values_of
 from tests.strategies import free_builds
 
-ALL = {name: find_schedule_formulation(name) for name in schedule_formulation_names(Finds.PLAN)}
+ALL = {name: find_formulation(name) for name in formulation_names(On.STATES)}
 EXACT = [name for name, found in ALL.items() if found.kind is FormulationKind.EXACT]
 AIMS = ("minmax", "minmax,steps", "sum", "steps,minmax", "regrips,sum(T_max)", "travel")
 slow = pytest.mark.slow
@@ -64,8 +64,8 @@ def check(name, problem, best):
         return
     plan = solve(problem, ALL[name])
     found, proof = plan.selection, plan.certificate
-    assert proof.objective == pytest.approx(found.objective)
-    assert proof.bound[0] == pytest.approx(best[0])
+    assert proof.values == pytest.approx(found.objective)
+    assert proof.bounds[0] == pytest.approx(best[0])
     if name in EXACT:
         assert found.objective == pytest.approx(best, rel=1e-7)
         assert found.bound == pytest.approx(best, rel=1e-7)
@@ -105,7 +105,7 @@ def test_it_finds_the_best_path_of_any_graph(module, graph):
     graph = on_paths(graph)
     found = sorted(values_of(graph, moves) for moves in simple_paths(graph))
     if found:
-        choice = import_module(f"formulations.{module}").choose(graph, Watch(np.inf))
+        choice = import_module(f"formulations.states.{module}").choose(graph, Watch(np.inf))
         assert worth(graph, choice.path) == pytest.approx(found[0])
         assert choice.bounds == pytest.approx(found[0])
 
@@ -203,9 +203,9 @@ def test_a_heuristic_that_promises_nothing_is_shown_with_its_gap():
     )
     problem, best = posed("sum", (4, 3)), known((4, 3), "sum")[0]
     plan = solve(problem, modest)
-    value = plan.certificate.objective[0]
+    value = plan.certificate.values[0]
     assert value > best * (1 + 1e-6)
-    assert plan.certificate.bound[0] == pytest.approx(best)
+    assert plan.certificate.bounds[0] == pytest.approx(best)
     assert plan.certificate.gap == pytest.approx((value - best) / value)
     assert plan.status == "feasible"
     assert f"feasible within {plan.certificate.gap:.2g}" in plan.worth

@@ -28,7 +28,7 @@ def test_a_plan_does_not_depend_on_who_solves_it(schedule, tmp_path):
         for means in ways:
             again = solved(schedule, **means)
             assert (again.steps, again.objective) == (first.steps, first.objective)
-            assert again.certificate.bound == first.certificate.bound
+            assert again.certificate.bounds == first.certificate.bounds
 
 
 def test_processes_of_our_own_give_the_same_and_end():

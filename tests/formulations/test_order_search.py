@@ -9,8 +9,6 @@ from itertools import permutations
 import numpy as np
 import pytest
 from hypothesis import given, settings
-from seqopt.plan.calling.schedule_formulation import find_schedule_formulation
-from seqopt.plan.order_plan import solve_order
 
 import seqopt
 from formulations.states.order_search import FORMULATION
@@ -19,8 +17,10 @@ from seqopt.errors import InfeasibleError, ProblemError, SolverError, TimeUpErro
 from seqopt.graph.orders.bound import whole_bound
 from seqopt.graph.orders.orders import AllOrders, OrderSelection
 from seqopt.graph.orders.work import trying
-from seqopt.graph.scenarios.scenarios import robust
-from seqopt.graph.states.states import build_states, within
+from seqopt.graph.states.states import build_states, over_scenarios, within
+from seqopt.plan.calling.formulation import (
+    find_formulation,
+)
 from seqopt.plan.judge.orders import finds_better_order
 from seqopt.plan.solving import solve
 from seqopt.problem.criteria import WorstRatio
@@ -41,10 +41,15 @@ def posed(scene, rules=None, aim="minmax", among="tied", limits=()):
     return AllOrders(build_states(engine, rules or FreeRules(), ONES, aim, limits), among)
 
 
+def sharing(problem, means):
+    """The same problem, for which others work."""
+    return replace(problem, states=replace(problem.states, resources=means))
+
+
 def brute_force(problem):
     """What the best plan of every order is worth, one order after the other."""
     worths = {}
-    search = find_schedule_formulation("schedule_search")
+    search = find_formulation("schedule_search")
     for order in permutations(problem.scene.build_order):
         try:
             worths[order] = search.solve(problem.judging(order)).objective[0]
@@ -59,12 +64,14 @@ def check_against_brute_force(scene, rules, aim="minmax"):
     for among in ("tied", "any"):  # what nothing ties cannot be held
         if not worths:
             with pytest.raises(InfeasibleError, match="no order of the bricks has a plan"):
-                solve_order(replace(problem, among=among), FORMULATION)
+                seqopt.solve(replace(problem, among=among), FORMULATION)
             continue
-        found = solve_order(replace(problem, among=among), FORMULATION)
+        found = seqopt.solve(replace(problem, among=among), FORMULATION)
         assert found.status == "optimal"
-        assert found.selection.objective == pytest.approx(min(worths.values()), rel=1e-8)
-        assert worths[found.order] == pytest.approx(found.selection.objective, rel=1e-8)
+        assert found.order.selection.objective == pytest.approx(min(worths.values()), rel=1e-8)
+        assert worths[found.order.selection.order] == pytest.approx(
+            found.order.selection.objective, rel=1e-8
+        )
 
 
 @given(build=free_builds(most_bricks=3, most_robots=3))
@@ -79,10 +86,10 @@ def test_what_adds_up_equals_brute_force(aim, bricks, robots):
     """It is found over all orders at once; the proof knows the least of all, and no less."""
     scene = small_arch(bricks)
     problem = posed(replace(scene, robots=scene.robots[:robots]), FreeRules(least_grips=1), aim)
-    worths, found = brute_force(problem), solve_order(problem, FORMULATION)
-    assert found.selection.objective == pytest.approx(min(worths.values()), rel=1e-9)
-    assert worths[found.order] == pytest.approx(min(worths.values()), rel=1e-9)
-    assert (found.status, found.gap) == ("optimal", 0.0)
+    worths, found = brute_force(problem), seqopt.solve(problem, FORMULATION)
+    assert found.order.selection.objective == pytest.approx(min(worths.values()), rel=1e-9)
+    assert worths[found.order.selection.order] == pytest.approx(min(worths.values()), rel=1e-9)
+    assert (found.status, found.order.gap) == ("optimal", 0.0)
     least = min(worths.values())
     assert finds_better_order(problem, least + 1e-6 * max(1.0, least)) is True
     assert finds_better_order(problem, least) is False
@@ -95,7 +102,7 @@ def test_another_order_is_found_where_the_own_one_has_no_plan():
     )
     problem = posed(scene, placed_by_one)
     assert [*brute_force(problem)] == [(2, 1)]
-    assert solve_order(problem, FORMULATION).order == (2, 1)
+    assert seqopt.solve(problem, FORMULATION).order.selection.order == (2, 1)
 
 
 @pytest.mark.parametrize("workers", [1, 2])
@@ -104,12 +111,12 @@ def test_the_worst_of_scenarios_equals_brute_force(workers):
     scene = small_arch(4)
     some = seqopt.scenarios(scene, count=3, density=0.9, seed=5)
     nominal = posed(scene)
-    problem = replace(nominal, states=robust(nominal.states, some, "worst-peak"))
+    problem = replace(nominal, states=over_scenarios(nominal.states, some.scenes))
     worths = brute_force(problem)
-    found = solve_order(problem, FORMULATION, resources=Resources(workers=workers))
+    found = seqopt.solve(sharing(problem, Resources(workers=workers)), FORMULATION)
     assert found.status == "optimal"
-    assert found.selection.objective == pytest.approx(min(worths.values()), rel=1e-8)
-    assert found.selection.objective > 1.01 * min(brute_force(nominal).values())
+    assert found.order.selection.objective == pytest.approx(min(worths.values()), rel=1e-8)
+    assert found.order.selection.objective > 1.01 * min(brute_force(nominal).values())
     with pytest.raises(ProblemError, match="an order is chosen by its first aim alone"):
         replace(nominal, states=within(nominal.states, {"regrips": 1}))
 
@@ -160,14 +167,14 @@ def test_it_equals_brute_force_on_arches(count):
 @pytest.mark.parametrize("seed", [0, 1])
 def test_a_heuristic_order_is_on_the_right_side(seed):
     problem = posed(small_arch(5), aim="F_largest")
-    best = solve_order(problem, FORMULATION).selection.objective
-    tried = solve_order(problem, FORMULATION, most=6, tries=20, seed=seed)
-    assert tried.selection.stopped == "size"
-    assert tried.selection.bound <= best * (1 + 1e-9)
-    assert best <= tried.selection.objective * (1 + 1e-9)
-    assert tried.status == ("heuristic" if tried.gap > 1e-6 else "optimal")
+    best = seqopt.solve(problem, FORMULATION).order.selection.objective
+    tried = seqopt.solve(problem, FORMULATION, most=6, tries=20, seed=seed)
+    assert tried.order.selection.stopped == "size"
+    assert tried.order.selection.bound <= best * (1 + 1e-9)
+    assert best <= tried.order.selection.objective * (1 + 1e-9)
+    assert tried.status == ("feasible" if tried.order.gap > 1e-6 else "optimal")
     own = solve(problem.states, "schedule_search").selection.objective[0]
-    assert tried.selection.objective <= own * (1 + 1e-9)
+    assert tried.order.selection.objective <= own * (1 + 1e-9)
     assert tried.summary()["order_status"] == tried.status
 
 
@@ -175,10 +182,10 @@ def test_a_heuristic_order_is_on_the_right_side(seed):
 def test_who_tries_orders_changes_nothing(hired):
     """Two processes of our own, or two threads of an executor."""
     problem = posed(small_arch(6), aim="F_largest")
-    alone = solve_order(problem, FORMULATION, most=6, tries=25)
+    alone = seqopt.solve(problem, FORMULATION, most=6, tries=25)
     with ThreadPoolExecutor(2) as executor:
         means = Resources(workers=2, executor=executor if hired else None)
-        shared = solve_order(problem, FORMULATION, most=6, tries=25, resources=means)
+        shared = seqopt.solve(sharing(problem, means), FORMULATION, most=6, tries=25)
     assert alone.order != problem.scene.build_order  # something was found
     assert shared.selection == alone.selection
 
@@ -194,10 +201,10 @@ def test_a_criterion_that_cannot_be_sent_is_named():
 
 
 def test_the_aims_after_the_first_are_those_of_the_plan():
-    found = solve_order(posed(small_arch(5), aim="T_max,steps"), FORMULATION)
-    assert found.plan.certificate.gap == 0
-    assert [*found.plan.objective] == ["T_max", "steps"]
-    assert found.plan.problem.network.scene.build_order == found.order
+    found = seqopt.solve(posed(small_arch(5), aim="T_max,steps"), FORMULATION)
+    assert found.certificate.gap == 0
+    assert [*found.objective] == ["T_max", "steps"]
+    assert found.engine.network.scene.build_order == found.order.selection.order
 
 
 def test_time_leaves_an_order_and_a_bound():
@@ -207,27 +214,27 @@ def test_time_leaves_an_order_and_a_bound():
         if isinstance(told, Stage) and told.share >= 3 / 8:
             raise KeyboardInterrupt
 
-    found = solve_order(problem, FORMULATION, progress=interrupt)
-    assert found.selection.stopped == "interrupt"
-    assert found.status == "heuristic"
-    assert found.selection.bound <= found.selection.objective
+    found = seqopt.solve(problem, FORMULATION, progress=interrupt)
+    assert found.order.selection.stopped == "interrupt"
+    assert found.status == "feasible"
+    assert found.order.selection.bound <= found.order.selection.objective
     with pytest.raises(TimeUpError, match="no order with a plan was found yet; give more"):
-        solve_order(problem, FORMULATION, seconds=0.0)
+        seqopt.solve(problem, FORMULATION, seconds=0.0)
 
 
 def test_an_order_that_the_check_refuses_is_seen():
     problem = posed(small_arch(4))
-    found = solve_order(problem, FORMULATION)
+    found = seqopt.solve(problem, FORMULATION)
     for change, said in (
-        ({"objective": 0.9 * found.selection.objective}, "the value of the order is"),
-        ({"bound": 1.1 * found.selection.objective}, "and a bound of"),
+        ({"objective": 0.9 * found.order.selection.objective}, "the value of the order is"),
+        ({"bound": 1.1 * found.order.selection.objective}, "and a bound of"),
         ({"order": (2, 1, 3, 4)}, "places a brick that nothing ties"),
         ({"order": (1, 2, 3)}, "1 bricks are missing"),
     ):
-        claimed = replace(found.selection, **change)
+        claimed = replace(found.order.selection, **change)
         liar = replace(FORMULATION, solve=lambda *_, claimed=claimed, **more: claimed)
         with pytest.raises((SolverError, seqopt.SeqoptError), match=said):
-            solve_order(problem, liar)
+            seqopt.solve(problem, liar)
 
 
 @pytest.mark.parametrize(("least", "order", "said"), [
@@ -248,33 +255,33 @@ def test_a_formulation_that_names_a_bad_order_is_not_believed(least, order, said
     fake = replace(FORMULATION, solve=lambda *_, **more: claimed)
     if said:
         with pytest.raises(SolverError, match=said):
-            solve_order(problem, fake)
+            seqopt.solve(problem, fake)
         return
-    found = solve_order(problem, fake)
-    assert found.status == ("optimal" if order == "best" else "heuristic")
+    found = seqopt.solve(problem, fake)
+    assert found.status == ("optimal" if order == "best" else "feasible")
 
 
 def test_a_bound_that_is_not_proven_is_claimed():
     problem = posed(small_arch(5), aim="F_largest")
-    found = solve_order(problem, FORMULATION, proof=False)
+    found = seqopt.solve(problem, FORMULATION, proof=False)
     assert (found.status, found.summary()["order_bound_proven"]) == ("claimed optimal", False)
-    assert "claimed, not proven" in found.bound_said
+    assert "claimed, not proven" in found.order.bound_said
     assert "claimed optimal" in repr(found)
-    value = found.selection.objective
+    value = found.order.selection.objective
     assert finds_better_order(problem, value, most=3) is None
     assert finds_better_order(problem, value, end=0.0) is None
-    proven = solve_order(problem, FORMULATION)
+    proven = seqopt.solve(problem, FORMULATION)
     assert (proven.status, proven.summary()["order_bound_proven"]) == ("optimal", True)
-    assert "claimed" not in proven.bound_said
+    assert "claimed" not in proven.order.bound_said
 
 
 def test_a_wall_is_as_bad_as_it_is_whole_in_any_order():
     """The released wall is the worst step of every order; nothing else has to be looked at."""
     problem = posed(wall(WallShape(columns=4, courses=3)))
-    found = solve_order(problem, FORMULATION)
+    found = seqopt.solve(problem, FORMULATION)
     assert found.status == "optimal"
-    assert found.selection.evaluated == 1
-    assert found.selection.bound == pytest.approx(whole_bound(problem))
+    assert found.order.selection.evaluated == 1
+    assert found.order.selection.bound == pytest.approx(whole_bound(problem))
 
 
 @given(build=free_builds(most_bricks=4, most_robots=3))
@@ -299,13 +306,13 @@ def test_what_is_no_problem_gets_one_line(words, said):
     with pytest.raises(ProblemError, match=said):
         posed(small_arch(4), **words)
     with pytest.raises(ProblemError, match="option depth: order_search has most"):
-        solve_order(posed(small_arch(4)), FORMULATION, depth=1)
+        seqopt.solve(posed(small_arch(4)), FORMULATION, depth=1)
 
 
 def test_limits_hold_in_the_best_order():
     limits = [seqopt.Limit("F_largest", 150.0)]
-    found = solve_order(posed(small_arch(5), limits=limits), FORMULATION)
-    forces = found.plan.responses().filter(regex="^F_rob").abs().to_numpy()
+    found = seqopt.solve(posed(small_arch(5), limits=limits), FORMULATION)
+    forces = found.responses().filter(regex="^F_rob").abs().to_numpy()
     assert np.nanmax(forces) <= 150.0 * (1 + 1e-9)
 
 
@@ -314,7 +321,7 @@ def test_the_arch_of_the_paper_in_its_best_order(arch25):
     """Two bricks from one end, the rest from the other: 0.7693 instead of 0.8401."""
     criterion = seqopt.CRITERIA["worst-ratio-published"]
     engine = seqopt.make_engine("compliance", arch25)
-    found = solve_order(AllOrders(build_states(engine, FreeRules(), criterion)), FORMULATION)
+    found = seqopt.solve(AllOrders(build_states(engine, FreeRules(), criterion)), FORMULATION)
     assert found.status == "optimal"
-    assert found.selection.objective == pytest.approx(0.76929, abs=1e-5)
-    assert found.order == (1, 2, *range(25, 2, -1))
+    assert found.order.selection.objective == pytest.approx(0.76929, abs=1e-5)
+    assert found.order.selection.order == (1, 2, *range(25, 2, -1))

@@ -104,7 +104,7 @@ def test_every_aim_equals_brute_force(name):
             least = min(each[k] for each in left)
             assert value == pytest.approx(least, rel=1e-7)
             left = [each for each in left if each[k] <= least * (1 + 1e-9)]
-        assert plan.certificate.bound == pytest.approx(best, rel=1e-6)
+        assert plan.certificate.bounds == pytest.approx(best, rel=1e-6)
         assert plan.status == "optimal"
         assert plan.summary()["schedule"] == schedule.method
 
@@ -140,7 +140,7 @@ def test_budgets_equal_brute_force(name):
         assert value == pytest.approx(able[:, 0].min(), rel=1e-7)
         assert travelled <= cap * (1 + 1e-9)
         least = able[able[:, 0] <= value * (1 + 1e-9), 1].min()
-        bound = plan.certificate.bound[1]
+        bound = plan.certificate.bounds[1]
         assert bound <= least * (1 + 1e-9)
         assert total >= least * (1 - 1e-9)
         gap = plan.certificate.gap
@@ -149,7 +149,7 @@ def test_budgets_equal_brute_force(name):
         both = {"travel": cap, "sum(M_sup)": np.median(able[:, 3])}
         plan = seqopt.solve(within(build_states(engine, schedule, ONES, "minmax"), both), SEARCH)
         within_both = able[able[:, 3] <= both["sum(M_sup)"]]
-        assert plan.certificate.bound[0] <= within_both[:, 0].min() * (1 + 1e-9)
+        assert plan.certificate.bounds[0] <= within_both[:, 0].min() * (1 + 1e-9)
         assert plan.selection.objective[0] >= within_both[:, 0].min() * (1 - 1e-9)
         spent = dict(zip(map(str, plan.problem.goals), plan.selection.objective, strict=True))
         assert all(spent[word] <= cap * (1 + 1e-9) for word, cap in both.items())

@@ -97,7 +97,7 @@ def check(scene, rules, mortar="dry"):
             seqopt.solve(problem, "schedule_search")
         return
     plan = seqopt.solve(problem, "schedule_search")
-    assert plan.certificate.objective == pytest.approx((best,))
+    assert plan.certificate.values == pytest.approx((best,))
     assert set(plan.stability()["verdict"]) == {"stands"}
     assert problem.stability.undecided == 0
 
@@ -160,7 +160,7 @@ def test_a_margin_is_the_best_to_its_width(dry, aim):
     plan = seqopt.solve(problem, "schedule_search")
     name, (value, *_), (bound, *_) = (
         aim.split(",")[0],
-        *((plan.certificate.objective, plan.certificate.bound)),
+        *((plan.certificate.values, plan.certificate.bounds)),
     )
     assert bound <= value
     rest = build_states(dry.engine, dry.rules, ONES, "steps")
@@ -203,7 +203,7 @@ def test_a_bond_is_found_to_its_share_at_every_size(scale):
     """Fifty pascals were left open, whatever the size; the gap says what is."""
     problem = leaning(scale)
     plan = seqopt.solve(problem, "schedule_search")
-    (value,), (bound,) = plan.certificate.objective, plan.certificate.bound
+    (value,), (bound,) = plan.certificate.values, plan.certificate.bounds
     true = worst_least(problem, "bond")
     assert 0.98 * value <= bound <= true <= value * (1 + 2 * GAP)
     assert plan.certificate.gap == pytest.approx((value - bound) / value)
@@ -284,7 +284,7 @@ def test_the_arch_is_built_dry(engine25):
     criterion = seqopt.CRITERIA["worst-ratio-published"]
     problem = build_states(engine25, FreeRules(), criterion, "steps,minmax", stands="dry")
     plan = seqopt.solve(problem, "schedule_search")
-    assert plan.certificate.objective == pytest.approx((48, 0.919157), abs=1e-5)
+    assert plan.certificate.values == pytest.approx((48, 0.919157), abs=1e-5)
     assert set(plan.stability()["verdict"]) == {"stands"}
     assert plan.regrips == 0
     two = replace(problem, rules=FreeRules(robots=("rob1", "rob2"), least_grips=0))

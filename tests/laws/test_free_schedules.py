@@ -28,7 +28,7 @@ def best(scene, rules, aim="minmax", scales=SCALES):
     engine = ComplianceEngine(build_network(scene))
     problem = build_states(engine, rules, WorstRatio("ones", scales), aim)
     try:
-        return np.array(solve(problem, "schedule_search").certificate.objective)
+        return np.array(solve(problem, "schedule_search").certificate.values)
     except InfeasibleError:
         return np.full(aim.count(",") + 1, np.inf)
 

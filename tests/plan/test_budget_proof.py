@@ -15,7 +15,7 @@ from seqopt.errors import InfeasibleError, SolverError
 from seqopt.graph.layers.budgets import steps_over, travel
 from seqopt.graph.layers.costs import Budget, LayeredCosts
 from seqopt.graph.layers.interface import CostProblem
-from seqopt.plan.calling.formulation import End, FormulationKind, formulations
+from seqopt.plan.calling.formulation import End, FormulationKind, On, formulations
 from seqopt.plan.judge import budget_proof
 from seqopt.plan.judge.budget_proof import least_within
 from seqopt.plan.judge.conflicts import smallest_conflict
@@ -23,7 +23,7 @@ from seqopt.plan.price_curve import price_curve
 from seqopt.plan.solving import solve
 from tests.strategies import budgeted
 
-TAKERS = {name: found for name, found in formulations().items() if found.takes_budgets}
+TAKERS = {name: found for name, found in formulations(On.LAYERS).items() if found.takes_budgets}
 
 
 def within(problem, budgets=None):

@@ -13,13 +13,19 @@ from seqopt.errors import SolverError
 from seqopt.graph.layers.budgets import travel
 from seqopt.graph.layers.costs import Budget, LayeredCosts
 from seqopt.graph.layers.interface import CostProblem
-from seqopt.plan.calling.formulation import Formulation, FormulationKind, Selection, formulations
+from seqopt.plan.calling.formulation import (
+    Formulation,
+    FormulationKind,
+    On,
+    Selection,
+    formulations,
+)
 from seqopt.plan.judge.certificate import TOLERANCE, certify, judge, least_peak, least_sum
 from seqopt.plan.solving import solve
 from seqopt.problem.aims import Aim
 from tests.strategies import problems
 
-ALL = formulations()
+ALL = formulations(On.LAYERS)
 
 
 FAULTS = {

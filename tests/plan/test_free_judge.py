@@ -12,12 +12,7 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import ProblemError, SeqoptError, SolverError, StepError
 from seqopt.graph.states.states import build_states
 from seqopt.network.build import build_network
-from seqopt.plan.calling.formulation import FormulationKind
-from seqopt.plan.calling.schedule_formulation import (
-    Finds,
-    ScheduleFormulation,
-    find_schedule_formulation,
-)
+from seqopt.plan.calling.formulation import Formulation, FormulationKind, On, find_formulation
 from seqopt.plan.free_front import FreeFront
 from seqopt.plan.front import FrontSelection, find_front
 from seqopt.plan.judge.schedules import judge_schedule
@@ -52,7 +47,7 @@ def test_a_plan_that_is_not_the_best_is_seen(aim):
     rules = FreeRules(regrips=1)
     other = solve(posed("M_sup" if aim != "minmax" else "steps,T_max", rules), "schedule_search")
     problem = posed(aim, rules)
-    best = solve(problem, "schedule_search").certificate.objective[0]
+    best = solve(problem, "schedule_search").certificate.values[0]
     from seqopt.plan.judge.schedules import plan_values  # noqa: PLC0415
 
     value = plan_values(problem, other.steps)[0]
@@ -82,7 +77,7 @@ def test_states_of_no_free_schedule_are_refused(plan):
     def nonsense(problem):
         return replace(plan.selection, states=((1, 99, 0, 0),))
 
-    liar = ScheduleFormulation("liar", "lies", FormulationKind.EXACT, nonsense)
+    liar = Formulation("liar", "lies", FormulationKind.EXACT, None, nonsense, on=On.STATES)
     with pytest.raises(SolverError, match="none of this free schedule"):
         solve(plan.problem, liar)
 
@@ -94,18 +89,15 @@ def test_states_of_no_free_schedule_are_refused(plan):
 
 
 def test_problems_go_to_their_own_formulations(plan):
-    with pytest.raises(ProblemError, match="not a formulation of the free schedule"):
-        solve(plan.problem, "minimax")
-    with pytest.raises(ProblemError, match="a free schedule has no moves to choose"):
-        solve(plan.problem, seqopt.formulations()["minimax"])
-    with pytest.raises(
-        ProblemError, match=r"a Pareto set, and one plan is asked for; use .*schedule_"
-    ):
-        solve(plan.problem, "pareto_zones")
-    with pytest.raises(ProblemError, match="one plan, and a Pareto set is asked for; use pareto_"):
+    for own in ("minmax", seqopt.formulations()["minimax"], "pareto_zones", "order_search"):
+        with pytest.raises(ProblemError):
+            solve(plan.graph, own)
+    with pytest.raises(ProblemError, match=r"are asked for; use .*schedule_search"):
+        solve(plan.graph, "minimax")
+    with pytest.raises(ProblemError, match="and Pareto sets are asked for; use pareto_zones"):
         find_front(FreeFront(posed("F_largest")), "schedule_search")
-    with pytest.raises(ProblemError, match="is for free schedules"):
-        solve(object(), find_schedule_formulation("schedule_search"))
+    with pytest.raises(ProblemError, match="layers of candidates are asked for"):
+        solve(object(), find_formulation("schedule_search"))
 
 
 @pytest.mark.parametrize(
@@ -141,7 +133,7 @@ class Changed:
         self.change = change
 
     def __call__(self, problem, **options):
-        found = find_schedule_formulation("pareto_zones", Finds.FRONT).solve(problem, **options)
+        found = find_formulation("pareto_zones").solve(problem, **options)
         return self.change(found)
 
 
@@ -152,8 +144,8 @@ def front_of(engine25):
     front = FreeFront(problem, {"F_largest": 20.0, "M_sup": 2.0})
 
     def judged(change):
-        formulation = ScheduleFormulation(
-            "changed", "", FormulationKind.EXACT, Changed(change), Finds.FRONT
+        formulation = Formulation(
+            "changed", "", FormulationKind.EXACT, None, Changed(change), on=On.FRONTS
         )
         return find_front(front, formulation)
 

@@ -12,6 +12,7 @@ from seqopt.errors import InfeasibleError, SolverError
 from seqopt.graph.layers.budgets import travel
 from seqopt.graph.layers.costs import LayeredCosts
 from seqopt.graph.layers.interface import CostProblem
+from seqopt.graph.layers.layers import candidate_layers
 from seqopt.plan.judge.certificate import certify
 from seqopt.problem.aims import Aim
 from seqopt.problem.overloads import Excess, overloads
@@ -97,7 +98,7 @@ def test_costs_that_change_while_they_are_judged_are_seen(monkeypatch):
 
 def test_an_optimum_within_budgets_is_proven_or_claimed(engine25, monkeypatch):
     criterion = seqopt.CRITERIA["worst-ratio-published"]
-    problem = seqopt.pose(engine25, seqopt.three_robot_loop(engine25.network), criterion)
+    problem = candidate_layers(engine25, seqopt.three_robot_loop(engine25.network), criterion)
     free = seqopt.solve(problem, "overlap_dp")
     assert free.summary()["status"] == "optimal"
     tight = replace(

@@ -8,7 +8,6 @@ from itertools import product
 
 import numpy as np
 import pytest
-from seqopt.plan.order_plan import solve_order
 
 import seqopt
 from seqopt.engines.interface import Want
@@ -148,7 +147,7 @@ def test_what_some_pairs_prove_is_all_that_may_be_claimed(aim, best, bound):
 def test_what_was_left_out_for_a_threshold_bounds_all_orders():
     """Whatever the threshold; and with few sets looked at nothing is proven."""
     problem = AllOrders(posed("F_largest", count=4))
-    best = solve_order(problem).selection.objective
+    best = seqopt.solve(problem).order.selection.objective
     for share in (0.0, 1e-3, 0.5, 0.99):
         found = Explorer(OrderStates(problem, 5000))
         assert not found.rise(share * best)

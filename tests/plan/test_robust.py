@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from itertools import pairwise, product
 
@@ -10,22 +9,22 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from seqopt.plan.robust_plan import solve_robust
 
 import seqopt
+from formulations.scenarios import scenario_search
 from formulations.scenarios.scenario_program import solve_program
 from formulations.scenarios.scenario_search import Searched, close_gap
 from formulations.scenarios.scenario_weights import best_weights
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
-from seqopt.graph.layers.budgets import travel
 from seqopt.graph.layers.costs import LayeredCosts
+from seqopt.graph.layers.layers import candidate_layers
 from seqopt.graph.scenarios.arcs import scenario_arcs
 from seqopt.graph.scenarios.costs import ScenarioCosts
-from seqopt.graph.scenarios.scenarios import ScenarioLayers, largest_of, robust
-from seqopt.plan import robust_plan
+from seqopt.graph.scenarios.scenarios import ScenarioLayers, in_scenarios, largest_of
 from seqopt.plan.calling.watch import Watch
 from seqopt.plan.out_of_sample import judge_unseen
+from seqopt.plan.posing import graph_of, layers_of
 from seqopt.problem.aims import (
     WORST_PEAK,
     WORST_TOTAL,
@@ -62,18 +61,32 @@ def many(draw, most_moves=4, most_candidates=4):
     return tuple(layers() for _ in range(draw(st.integers(1, 6))))
 
 
-class Posed:
-    """A problem over scenarios that is given by its costs alone."""
+class Posed(ScenarioLayers):
+    """Layers over scenarios that are given by their costs alone."""
 
     def __init__(self, layers, aim):
-        self.layers, self.aim, self.seconds, self.costs = layers, aim, {}, layers
-        self.from_cache = ()  # nothing that a cache said
+        super().__init__(None, (), aim)
+        vars(self)["given"] = layers
 
     def layered(self, aim):
-        return self.layers
+        return self.given
+
+    def seconds(self, aim):
+        return {}
+
+    @property
+    def from_cache(self):
+        return ()  # nothing that a cache said
 
     def steps(self, choice):
         return ()
+
+
+def robust(problem, scenes, aim):
+    """A problem over scenarios."""
+    some = {"limits": problem.limits, "resources": problem.resources}
+    asked = (problem.engine, problem.moves, problem.criterion)
+    return seqopt.pose(*asked, scenarios=scenes, over=aim, **some)
 
 
 def values(layers, aim):
@@ -101,14 +114,16 @@ def test_plans_agree_with_brute_force(aim, layers):
     found = values(layers, aim)
     if not found:
         with pytest.raises(InfeasibleError, match=f"over all {len(layers)} scenarios, move"):
-            solve_robust(Posed(layers, aim))
+            seqopt.solve(Posed(layers, aim))
         return
-    plan = solve_robust(Posed(layers, aim))
+    plan = seqopt.solve(Posed(layers, aim))
     best = min(found.values())
-    assert plan.objective == pytest.approx(best, abs=1e-6)
-    assert found[plan.choice] == pytest.approx(plan.objective, abs=1e-9)
-    assert plan.proven <= plan.bound + 1e-9 <= best + 2e-9
-    assert plan.status == "optimal"
+    proof = plan.certificate
+    assert proof.objective == pytest.approx(best, abs=1e-6)
+    assert found[plan.choice] == pytest.approx(proof.objective, abs=1e-9)
+    assert proof.bound <= plan.selection.bound + 1e-9 <= best + 2e-9
+    assert plan.status.endswith("optimal")
+    assert plan.status == "claimed optimal" or proof.gap <= 1e-6
 
 
 @pytest.mark.parametrize("aim", AIMS[1:], ids=str)
@@ -117,11 +132,13 @@ def test_plans_agree_with_brute_force(aim, layers):
 def test_plans_agree_with_the_program(aim, layers):
     if not values(layers, aim):
         return
-    plan = solve_robust(Posed(layers, aim))
+    plan = seqopt.solve(Posed(layers, aim))
     most = aim.most(len(layers))
-    assert solve_program(layers, most, whole=True).value == pytest.approx(plan.objective, abs=1e-5)
+    assert solve_program(layers, most, whole=True).value == pytest.approx(
+        plan.certificate.objective, abs=1e-5
+    )
     relaxed = solve_program(layers, most, whole=False).value
-    assert relaxed == pytest.approx(plan.proven, abs=1e-4 * max(1.0, abs(relaxed)))
+    assert relaxed == pytest.approx(plan.certificate.bound, abs=1e-4 * max(1.0, abs(relaxed)))
 
 
 @pytest.mark.parametrize("aim", AIMS[1:], ids=str)
@@ -130,9 +147,9 @@ def test_plans_agree_with_the_program(aim, layers):
 def test_a_narrow_search_still_has_a_valid_bound(aim, layers, width):
     found = values(layers, aim)
     if found:
-        plan = solve_robust(Posed(layers, aim), width=width)
-        assert plan.bound <= min(found.values()) + 1e-9
-        assert plan.objective >= min(found.values()) - 1e-9
+        plan = seqopt.solve(Posed(layers, aim), "scenario_search", width=width)
+        assert plan.selection.bound <= min(found.values()) + 1e-9
+        assert plan.certificate.objective >= min(found.values()) - 1e-9
 
 
 @every
@@ -141,9 +158,11 @@ def test_a_narrow_search_still_has_a_valid_bound(aim, layers, width):
 def test_a_plan_that_has_no_time_is_feasible_and_its_bound_valid(aim, layers):
     found = values(layers, aim)
     if found:
-        plan = solve_robust(Posed(layers, aim), time_limit=0.0)
+        name = "minimax" if aim == WORST_PEAK else "scenario_search"
+        limit = {} if aim == WORST_PEAK else {"time_limit": 0.0}
+        plan = seqopt.solve(Posed(layers, aim), name, **limit)
         assert plan.choice in found
-        assert plan.bound <= min(found.values()) + 1e-9
+        assert plan.selection.bound <= min(found.values()) + 1e-9
 
 
 @given(layers=many())
@@ -151,7 +170,10 @@ def test_a_plan_that_has_no_time_is_feasible_and_its_bound_valid(aim, layers):
 def test_aims_are_ordered(layers):
     """The mean is at most any mean of the worst, and these at most the worst."""
     if values(layers, WORST_TOTAL):
-        worth = [solve_robust(Posed(layers, aim)).objective for aim in (*AIMS[2:], WORST_TOTAL)]
+        worth = [
+            seqopt.solve(Posed(layers, aim)).certificate.objective
+            for aim in (*AIMS[2:], WORST_TOTAL)
+        ]
         assert all(a <= b + 1e-7 for a, b in pairwise(worth))
 
 
@@ -167,18 +189,18 @@ def test_a_tail_is_the_least_over_thresholds(each, level):
 
 def test_one_scenario_is_the_nominal_problem():
     problem = posed()
-    alone = solve_robust(robust(problem, [problem.schedule.scene], WORST_TOTAL))
+    alone = seqopt.solve(robust(problem, [problem.schedule.scene], WORST_TOTAL))
     known = seqopt.solve(problem, "overlap_dp").certificate
-    assert alone.objective == pytest.approx(known.objective)
-    peak = solve_robust(robust(problem, [problem.schedule.scene], WORST_PEAK))
-    assert peak.objective == seqopt.solve(problem, "minimax").certificate.objective
+    assert alone.certificate.objective == pytest.approx(known.objective)
+    peak = seqopt.solve(robust(problem, [problem.schedule.scene], WORST_PEAK))
+    assert peak.certificate.objective == seqopt.solve(problem, "minimax").certificate.objective
 
 
 # negative controls: a wrong claim is seen
 
 
 def claimed(monkeypatch, found):
-    monkeypatch.setattr(robust_plan, "close_gap", lambda *_: found)
+    monkeypatch.setattr(scenario_search, "close_gap", lambda *_: found)
 
 
 LAYERS = tuple(
@@ -194,19 +216,19 @@ LAYERS = tuple(
     ],
 )
 def test_a_false_claim_is_refused(monkeypatch, found, match):
-    assert solve_robust(Posed(LAYERS, WORST_TOTAL)).objective == 3.0
+    assert seqopt.solve(Posed(LAYERS, WORST_TOTAL)).certificate.objective == 3.0
     claimed(monkeypatch, found)
     with pytest.raises(SolverError, match=match):
-        solve_robust(Posed(LAYERS, WORST_TOTAL))
+        seqopt.solve(Posed(LAYERS, WORST_TOTAL))
 
 
 def test_weights_that_do_not_fit_the_aim_prove_nothing(monkeypatch):
     aim = cvar(0.0)
     found = best_weights(scenario_arcs(LAYERS, aim), Watch())
     unfit = replace(found, weights=np.array([1.0, 0.0]))
-    monkeypatch.setattr(robust_plan, "best_weights", lambda *_: unfit)
+    monkeypatch.setattr(scenario_search, "best_weights", lambda *_: unfit)
     with pytest.raises(SolverError, match="do not fit the aim"):
-        solve_robust(Posed(LAYERS, aim))
+        seqopt.solve(Posed(LAYERS, aim))
 
 
 def test_the_gap_that_weights_leave_is_real_here():
@@ -228,7 +250,7 @@ def posed(limits=(), workers=1):
         engine,
         seqopt.three_robot_loop(network),
         seqopt.CRITERIA["weighted-published"],
-        limits,
+        limits=limits,
         resources=Resources(workers),
     )
 
@@ -237,7 +259,7 @@ def posed(limits=(), workers=1):
 def test_a_plan_of_a_scene_is_judged_on_unseen_scenarios(aim):
     problem = posed()
     scene = problem.schedule.scene
-    plan = solve_robust(robust(problem, scenarios(scene, count=6, seed=1), aim))
+    plan = seqopt.solve(robust(problem, scenarios(scene, count=6, seed=1), aim))
     trial = judge_unseen(plan, scenarios(scene, count=4, seed=2))
     table = trial.table
     assert table["set"].value_counts().to_dict() == {"nominal": 1, "optimized": 6, "unseen": 4}
@@ -245,19 +267,20 @@ def test_a_plan_of_a_scene_is_judged_on_unseen_scenarios(aim):
     for other in ("robust", "nominal"):  # nobody beats the plan that knows the scenario
         assert (table[f"{other}_{column}"] >= table[f"knows_it_{column}"] - 1e-9).all()
     summary = trial.summary()
-    assert summary["optimized"]["robust"] == pytest.approx(plan.objective)
+    assert summary["optimized"]["robust"] == pytest.approx(plan.certificate.objective)
     assert summary["optimized"]["robust"] <= summary["optimized"]["nominal"] + 1e-9
     assert summary["nominal"]["nominal"] == summary["nominal"]["knows_it"]
     assert len(plan.table()) == len(plan.choice) == len(plan.nodes)
-    assert f"RobustPlan({aim}, 6 scenarios" in repr(plan)
+    assert plan.title == str(aim)
 
 
 def test_costs_of_a_scenario_are_those_of_its_own_problem():
     problem = posed()
-    found = robust(problem, scenarios(problem.schedule.scene, count=2, seed=3), WORST_PEAK)
+    some = scenarios(problem.schedule.scene, count=2, seed=3)
+    found = graph_of(robust(problem, some, WORST_PEAK))
     for scene, costs in zip(found.scenes, found.costs, strict=True):
         engine = ComplianceEngine(seqopt.build_network(scene))
-        own = seqopt.pose(engine, problem.schedule, problem.criterion)
+        own = candidate_layers(engine, problem.schedule, problem.criterion)
         assert own.sums == costs.sums
         assert own.peaks == costs.peaks
     assert found.costs[0] != found.costs[1]
@@ -267,23 +290,23 @@ def test_costs_of_a_scenario_are_those_of_its_own_problem():
 def test_workers_change_nothing():
     scene = six_bricks()
     drawn = scenarios(scene, count=3, seed=1)
-    one, two = (solve_robust(robust(posed(workers=n), drawn, WORST_TOTAL)) for n in (1, 2))
+    one, two = (seqopt.solve(robust(posed(workers=n), drawn, WORST_TOTAL)) for n in (1, 2))
     assert one.choice == two.choice
-    assert one.problem.costs[0].sums == two.problem.costs[0].sums
+    assert one.graph.costs[0].sums == two.graph.costs[0].sums
 
 
 def test_limits_hold_in_every_scenario():
     problem = posed()
     drawn = scenarios(problem.schedule.scene, count=5, seed=1)
-    free = solve_robust(robust(problem, drawn, WORST_TOTAL))
+    free = seqopt.solve(robust(problem, drawn, WORST_TOTAL))
     largest = max(largest_force(scene, free) for scene in drawn.scenes)
     limited = posed([seqopt.Limit("F_largest", 0.9 * largest)])
-    kept = solve_robust(robust(limited, drawn, WORST_TOTAL))
-    assert kept.objective >= free.objective
+    kept = seqopt.solve(robust(limited, drawn, WORST_TOTAL))
+    assert kept.certificate.objective >= free.certificate.objective
     assert all(largest_force(scene, kept) <= 0.9 * largest + 1e-6 for scene in drawn.scenes)
     nothing = posed([seqopt.Limit("F_largest", 1.0)])
     with pytest.raises(InfeasibleError):
-        solve_robust(robust(nothing, drawn, WORST_TOTAL))
+        seqopt.solve(robust(nothing, drawn, WORST_TOTAL))
     trial = judge_unseen(kept, scenarios(problem.schedule.scene, count=8, seed=9, density=0.5))
     assert not np.isnan(trial.table.drop(columns="set").to_numpy(float)).any()
 
@@ -291,14 +314,15 @@ def test_limits_hold_in_every_scenario():
 def largest_force(scene, plan):
     """The largest force of a grip in the steps whose grips were chosen."""
     table = seqopt.analyze(ComplianceEngine(seqopt.build_network(scene)), plan.steps)
-    chosen = {step.number for step in plan.problem.nominal.schedule.steps if step.moves}
+    chosen = {step.number for step in plan.layers.schedule.steps if step.moves}
     rows = table[table["step"].isin(chosen)]
     return rows[["F_rob1_N", "F_rob2_N", "F_rob3_N"]].abs().max().max()
 
 
 def test_peaks_of_scenarios_join_into_one():
     problem = posed()
-    found = robust(problem, scenarios(problem.schedule.scene, count=3), WORST_PEAK)
+    some = scenarios(problem.schedule.scene, count=3)
+    found = graph_of(robust(problem, some, WORST_PEAK))
     layers = found.layered(Aim.PEAK)
     joined = largest_of(layers)
     choice = seqopt.solve(problem, "overlap_dp").selection.choice
@@ -330,8 +354,8 @@ def test_what_is_no_problem_is_refused():
     scene = problem.schedule.scene
     drawn = scenarios(scene, count=1)
     with pytest.raises(ProblemError, match="no scenario"):
-        robust(problem, [], WORST_PEAK)
-    with pytest.raises(ProblemError, match="give a problem of"):
+        in_scenarios(layers_of(problem), [], WORST_PEAK)
+    with pytest.raises(ProblemError, match="give worst-peak"):
         robust(problem, drawn, None)
     assert robust(problem, drawn, "worst-peak") == robust(problem, drawn, WORST_PEAK)
     with pytest.raises(ProblemError, match="robust aim worst does not exist"):
@@ -344,8 +368,8 @@ def test_what_is_no_problem_is_refused():
     own = seqopt.pose(engine, problem.schedule, problem.criterion)
     with pytest.raises(ProblemError, match="scenarios need engines of their own"):
         robust(own, drawn, WORST_PEAK)
-    capped = replace(problem, budgets=(travel(problem, math.inf),))
-    with pytest.raises(ProblemError, match="take no budgets"):
-        robust(capped, drawn, WORST_PEAK)
+    capped = robust(problem, drawn, WORST_PEAK).but(budgets=("travel=3m",))
+    with pytest.raises(ProblemError, match="where candidates are chosen"):
+        seqopt.solve(capped)
     with pytest.raises(ProblemError, match="is not a kind"):
         RobustAim("worst-peak")

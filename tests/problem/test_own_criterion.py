@@ -177,7 +177,7 @@ def test_what_does_not_go_together_is_refused():
     )
     with pytest.raises(ProblemError, match="there is no aim"):
         solve_in_order([])
-    with pytest.raises(ProblemError, match="candidate_layers them with one schedule"):
+    with pytest.raises(ProblemError, match="pose them with one schedule"):
         solve_in_order([(one, Aim.SUM), (other, Aim.SUM)])
     capped = replace(one, budgets=(travel(one, 1.0),))
     with pytest.raises(ProblemError, match="take no budgets"):

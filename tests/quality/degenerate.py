@@ -35,7 +35,7 @@ import pandas as pd
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.graph.layers.interface import PlacementProblem
 from seqopt.plan.calling.fitting import require_fit
-from seqopt.plan.calling.formulation import Formulation, FormulationKind, formulations
+from seqopt.plan.calling.formulation import Formulation, FormulationKind, On, formulations
 from seqopt.plan.judge.certificate import judge as certified
 from tests.quality.degenerate_cases import CASES, Case, Size, enumerated
 
@@ -99,10 +99,10 @@ def outcomes(name: str, case: Case, size: Size, draws: int) -> list[dict[str, ob
         found: dict[str, dict[str, object]]
         try:
             problem = case(size, np.random.default_rng(seed))
-            found = {n: judge(problem, f) for n, f in formulations().items()}
+            found = {n: judge(problem, f) for n, f in formulations(On.LAYERS).items()}
         except ProblemError as error:  # before any formulation
             status = "refused" if name in MALFORMED else "wrong"
-            found = {n: {"status": status, "message": str(error)} for n in formulations()}
+            found = {n: {"status": status, "message": str(error)} for n in formulations(On.LAYERS)}
         for formulation, row in found.items():
             rows.append({"case": name, "seed": seed, "formulation": formulation} | row)
     return rows
@@ -121,7 +121,7 @@ def pivot(table: pd.DataFrame, column: str) -> str:
     wide = table.pivot_table(
         values=column, index="case", columns="formulation", aggfunc=summary, sort=False
     )
-    return wide.reindex(columns=list(formulations())).to_string(na_rep="-")
+    return wide.reindex(columns=list(formulations(On.LAYERS))).to_string(na_rep="-")
 
 
 def faults(table: pd.DataFrame) -> list[str]:

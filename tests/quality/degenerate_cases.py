@@ -16,7 +16,7 @@ from seqopt.engines.interface import Engine, Fields, Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.graph.layers.costs import Budget, LayeredCosts
 from seqopt.graph.layers.interface import CostProblem, PlacementProblem
-from seqopt.graph.layers.layers import candidate_layers
+from seqopt.graph.layers.layers import Layers, candidate_layers
 from seqopt.network.network import Network
 from seqopt.problem.aims import Aim
 from seqopt.problem.criteria import WorstRatio

@@ -17,9 +17,9 @@ from seqopt.engines.registry import make_engine
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import FileError, SceneError
 from seqopt.graph.layers.layers import candidate_layers
-from seqopt.graph.scenarios.scenarios import robust
-from seqopt.plan.robust_plan import solve_robust
+from seqopt.graph.scenarios.scenarios import in_scenarios
 from seqopt.plan.solving import solve
+from seqopt.problem.aims import WORST_TOTAL
 from seqopt.problem.criteria import WeightedSum
 from seqopt.responses import blocks
 from seqopt.responses.blocks import Store
@@ -156,7 +156,7 @@ SEARCHES = {
     "all": lambda problem: solve(problem, "overlap_dp"),
     "lazy": lambda problem: solve(problem, "overlap_dp", lazy=True),
     "without proof": lambda problem: solve(problem, "cascade", proof=False),
-    "over scenarios": lambda problem: solve_robust(robust(problem, [SCENE], "worst-total")),
+    "over scenarios": lambda problem: solve(in_scenarios(problem, [SCENE], WORST_TOTAL)),
 }
 
 

@@ -31,7 +31,7 @@ def run(bricks: int, robots: int) -> dict[str, object]:
         "worst": plan.selection.objective[0],
         "bound": plan.selection.bound[0],
         "steps": len(plan.steps),
-        "models": plan.problem.models,
+        "models": plan.models,
         "states": 0 if certificate is None else certificate.states,
         "seconds": time.process_time() - start,
         "memory_MB": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,

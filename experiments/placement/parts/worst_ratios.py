@@ -22,7 +22,6 @@ import numpy as np
 
 import seqopt
 from seqopt.graph.states.states import build_states
-from seqopt.plan.free_plan import FreePlan
 from seqopt.plan.judge.schedules import state_columns
 from seqopt.plan.plan import Plan
 from seqopt.sequence.free_rules import with_robots
@@ -55,7 +54,7 @@ def chosen(criterion: str, formulation: str) -> tuple[Steps, str]:
 def free(aim: str, robots: int = 3, **words: object) -> tuple[Steps, str]:
     """Return the steps of the free schedule, and what is proven least."""
     own = {"aim": aim, "robots": robots, **words}
-    plan: FreePlan = seqopt.optimize(SCENE, "free", WORST_RATIO, engine=ENGINE, **own)
+    plan: Plan = seqopt.optimize(SCENE, "free", WORST_RATIO, engine=ENGINE, **own)
     assert plan.status == "optimal"
     return plan.steps, aim
 

@@ -16,11 +16,11 @@ from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import DRY, Mortar
 from seqopt.engines.registry import make_engine
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.graph.layers.layers import candidate_layers
 from seqopt.graph.states.states import build_states
 from seqopt.graph.states.visits import explore
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
+from seqopt.plan.posing import pose
 from seqopt.plan.solving import solve
 from seqopt.problem.standing import Standing
 from seqopt.responses.table import analyze, force_column
@@ -225,6 +225,6 @@ def growth(scene: Scene, methods: Plans, sizes: tuple[int, ...]) -> Rows:
         net = build_network(line)
         made = {name: method(net) for name, method in METHODS.items()}
         if times <= 2:  # the choice for longer arches is a study of its own
-            loop = candidate_layers(ComplianceEngine(net), three_robot_loop(net), EQUATIONS)
+            loop = pose(ComplianceEngine(net), three_robot_loop(net), EQUATIONS)
             made["three-robot, optimized"] = solve(loop, "overlap_dp").steps
         yield from extremes("longer", times, line, made)

@@ -242,14 +242,6 @@ def candidate_layers(
     ------
     ProblemError
         If there is no such response, or no grip is open.
-
-    Examples
-    --------
-    >>> import seqopt
-    >>> network = seqopt.build_network(seqopt.load_scene("arch25"))
-    >>> engine, schedule = seqopt.make_engine("auto", network), seqopt.three_robot_loop(network)
-    >>> seqopt.pose(engine, schedule, seqopt.CRITERIA["equations-2-3"])  # doctest: +ELLIPSIS
-    Layers('arch25', 'three-robot': 90 steps, 22 moves, criterion 'equations-2-3', ...
     """
     known = {*CHOICE_RESPONSES, *map(robot_response, robots_of(engine, schedule, criterion))}
     asked = ResponsesAsked(criterion.for_scene(SceneFacts(engine)), as_limits(limits), tuple(also))

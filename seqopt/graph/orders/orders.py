@@ -25,14 +25,15 @@ class AllOrders(Shown):
     The value of an order is the first goal of its best plan; the criterion keeps the numbers that
     it has in the scene's own order.
 
-    ``states``: in the scene's own order, of `seqopt.graph.states.states.build_states`; its first goal is no margin. Raises
-    `ProblemError` if it is one, the engine was not made by name, or there are no such orders.
+    ``states``: in the scene's own order; their first goal is no margin. Raises `ProblemError` if it
+    is one, the engine was not made by name, or there are no such orders.
     """
 
     states: States
     among: Orders = Orders.TIED
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "among", Orders.of(self.among))
         goal = self.states.goals[0]
         if goal.of_margins:
             raise ProblemError(
@@ -46,8 +47,8 @@ class AllOrders(Shown):
             )
         if recipe_of(self.states.engine) is None:
             raise ProblemError(
-                f"engine {type(self.states.engine).__name__}: orders need engines of their own; take "
-                "one of seqopt.make_engine"
+                f"engine {type(self.states.engine).__name__}: orders need engines of their own; "
+                "take one of seqopt.make_engine"
             )
 
     def __repr__(self) -> str:

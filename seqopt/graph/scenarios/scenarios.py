@@ -159,8 +159,6 @@ def largest_of(layers: Sequence[LayeredCosts]) -> LayeredCosts:
 
     ``layers``: of the same moves. Raises `InfeasibleError` if no choice is allowed in all of them.
     """
-    if len(layers) == 1:
-        return layers[0]
     single = tuple(map(_largest, zip(*(each.single for each in layers), strict=True)))
     shared = tuple(map(_largest, zip(*(each.shared for each in layers), strict=True)))
     out = LayeredCosts(single, shared)

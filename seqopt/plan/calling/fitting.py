@@ -23,7 +23,7 @@ def require_fit(
     """
     formulation = as_formulation(formulation)
     if problem.budgets and not formulation.takes_budgets:
-        able = [name for name, other in formulations().items() if other.takes_budgets]
+        able = [name for name, other in formulations(formulation.on).items() if other.takes_budgets]
         raise ProblemError(
             f"{formulation.name}: the budget {problem.budgets[0].name!r} couples all moves; "
             f"use {' or '.join(able)}"

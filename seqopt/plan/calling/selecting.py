@@ -95,7 +95,8 @@ def _infeasible_confirmed(problem: PlacementProblem, formulation: Formulation) -
     try:
         yield
     except InfeasibleError as error:
-        costs = largest_of(_costs(formulation, problem))
+        every = _costs(formulation, problem)
+        costs = every[0] if formulation.aim is not None else largest_of(every)
         if not np.isfinite(least_sum(costs)):
             costs.continuable()  # names the move
         if problem.budgets:
