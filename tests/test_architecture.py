@@ -37,7 +37,11 @@ ROOMS = (
 SOLVERS = {"cvxpy", "clarabel", "highspy"}
 SOLVER_HOME = "formulations"
 SHARED = {  # what formulations may import
-    *("formulations.cones", "formulations.states.on_graph"),
+    *(
+        "formulations.cones",
+        "formulations.states.on_graph",
+        "formulations.scenarios.scenario_weights",
+    ),
     *("formulations.solvers", "formulations.whole_program"),
 }
 MECHANICS = {"network.mechanics", "engines.rigid"}  # not for the frame

@@ -14,6 +14,7 @@ from seqopt.engines.frame import FrameEngine
 from seqopt.engines.planar import PlanarEngine
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import SeqoptError
+from seqopt.graph.layers.layers import candidate_layers
 from seqopt.plan.calling.fitting import require_fit
 from seqopt.plan.judge.certificate import judge
 from seqopt.problem.criteria import RankSum, WeightedSum, WorstRatio
@@ -26,7 +27,7 @@ NETWORK = seqopt.build_network(SCENE)
 ENGINE = ComplianceEngine(NETWORK)
 LOOP = seqopt.three_robot_loop(NETWORK)
 EQUATIONS = seqopt.CRITERIA["equations-2-3"]
-PROBLEM = seqopt.pose(ENGINE, LOOP, EQUATIONS)
+PROBLEM = candidate_layers(ENGINE, LOOP, EQUATIONS)
 
 
 @pytest.mark.parametrize(

@@ -18,9 +18,10 @@ from seqopt.plan.calling.guard import called, readable, text
 from seqopt.plan.calling.schedule_selection import StatePath
 from seqopt.plan.judge.certificate import TOLERANCE
 from seqopt.plan.judge.orders import finds_better_order
-from seqopt.plan.plan import FoundOrder, Plan
+from seqopt.plan.plan import Plan
 from seqopt.plan.run import Run
 from seqopt.plan.states import solve_states
+from seqopt.plan.status import FoundOrder
 from seqopt.responses.resources import HERE
 from seqopt.scene.orders import Order, in_order
 

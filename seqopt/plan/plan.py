@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from enum import StrEnum
 from functools import cached_property
 from math import isfinite, isinf
 
@@ -12,10 +11,11 @@ import pandas as pd
 
 from seqopt.contact.mortar import Mortar
 from seqopt.engines.interface import Engine
+from seqopt.engines.registry import provenance
 from seqopt.errors import ProblemError
 from seqopt.graph.layers.interface import PlacementProblem
 from seqopt.graph.layers.layers import Layers
-from seqopt.graph.orders.orders import AllOrders, OrderSelection
+from seqopt.graph.orders.orders import AllOrders
 from seqopt.graph.scenarios.scenarios import ScenarioLayers
 from seqopt.graph.states.states import States
 from seqopt.plan.build import ShownBuild
@@ -25,63 +25,18 @@ from seqopt.plan.calling.watch import Finding
 from seqopt.plan.judge.certificate import TOLERANCE, Certificate
 from seqopt.plan.judge.standing_proof import certified
 from seqopt.plan.search.window_search import WindowSearch
-from seqopt.plan.summary import summarized
-from seqopt.plan.tables import alternatives, chosen_table, split_objectives
+from seqopt.plan.status import ENDS, FoundOrder, Status
+from seqopt.plan.tables import Objectives, alternatives, chosen_table, moves_table, split_objectives
 from seqopt.problem.aims import Aim
+from seqopt.problem.goals import judged_by
 from seqopt.problem.overloads import Excess, overloads
 from seqopt.problem.problem import Problem
 from seqopt.responses.choices import window_models
 from seqopt.responses.table import analyze
-from seqopt.sequence.steps import Step, StepKind
+from seqopt.sequence.free_rules import Ending
+from seqopt.sequence.schedule import Schedule
+from seqopt.sequence.steps import Step, StepKind, idle_robots
 from seqopt.stability.assessment import stability_table
-
-ENDS = {"": End.DONE, "interrupt": End.INTERRUPTED}  # of searches over states
-
-
-class Status(StrEnum):
-    """What is known of a plan."""
-
-    OPTIMAL = "optimal"  # proven
-    CLAIMED = "claimed optimal"  # the formulation says so; less is proven
-    FEASIBLE = "feasible"  # it ended early, is a heuristic, or its bound leaves something open
-    UNPROVEN = "unproven"  # no proof was asked for
-
-
-@dataclass(frozen=True, repr=False)
-class FoundOrder:
-    """The build order of a plan, and what is known of all others.
-
-    ``problem``: among which orders it was sought; ``selection``: what the formulation claims;
-    ``proven``: whether it is proven that no order stays below the bound; else it is claimed.
-    """
-
-    problem: AllOrders
-    selection: OrderSelection
-    proven: bool
-
-    def __repr__(self) -> str:
-        return f"<FoundOrder of {len(self.selection.order)} bricks: {self.bound_said}>"
-
-    @property
-    def gap(self) -> float:
-        """What the bound leaves open, over the value."""
-        value = self.selection.objective
-        return max(0.0, value - self.selection.bound) / max(abs(value), TOLERANCE)
-
-    @property
-    def status(self) -> Status:
-        """What is known of the order: whether none is better."""
-        if self.gap > TOLERANCE:
-            return Status.FEASIBLE
-        return Status.OPTIMAL if self.proven else Status.CLAIMED
-
-    @property
-    def bound_said(self) -> str:
-        """What no order stays below, and whether that is proven, in words."""
-        if not isfinite(self.selection.bound):
-            return "others are not looked at yet"
-        claimed = "" if self.proven else " (claimed, not proven)"
-        return f"no order below {self.selection.bound:.6g}{claimed}"
 
 
 @dataclass(frozen=True, repr=False)
@@ -142,12 +97,10 @@ class Plan(ShownBuild):
         graph = self.graph
         if isinstance(graph, ScenarioLayers):
             return graph.nominal
-        if not isinstance(graph, Layers):
-            why = "it was chosen from states of the build, which have no candidates"
-            if not isinstance(graph, States):
-                why = "the problem is given by its costs alone; pose it with a schedule"
-            raise ProblemError(f"the plan has no moves to show: {why}")
-        return graph
+        if isinstance(graph, Layers):
+            return graph
+        chosen = "states, which have no candidates" if isinstance(graph, States) else "costs alone"
+        raise ProblemError(f"the plan has no moves to show: it was chosen from {chosen}")
 
     @property
     def states(self) -> States:
@@ -229,9 +182,7 @@ class Plan(ShownBuild):
     @property
     def among(self) -> str:
         """Which candidates alone were looked at, in words; empty for all."""
-        if isinstance(self.graph, States):
-            return self.graph.among
-        return self.layers.schedule.left_out
+        return self.graph.among if isinstance(self.graph, States) else self.layers.schedule.left_out
 
     @property
     def status(self) -> Status:
@@ -347,7 +298,12 @@ class Plan(ShownBuild):
         many there were); then ``single_cost``, ``shared_cost`` and ``rank_in_window``, or without
         proof ``cost`` and the ``margin`` to the next candidate. Of states as of `grips`.
         """
-        return self.grips() if isinstance(self.graph, States) else chosen_table(self)
+        if isinstance(self.selection, StatePath):
+            return self.grips()
+        aim = self.formulation.aim
+        if aim is None or isinstance(self.graph, ScenarioLayers):
+            return moves_table(self.layers, self.choice, self.grips())
+        return chosen_table(self.layers, self.selection, aim, self.search, self.grips())
 
     def alternatives(self) -> pd.DataFrame:
         """Return the responses and the cost of every choice that was evaluated.
@@ -357,14 +313,21 @@ class Plan(ShownBuild):
         """
         return alternatives(self.layers, self.choice, self.search)
 
-    def objectives(self) -> dict[str, dict[str, float | None] | None]:
+    def objectives(self) -> Objectives:
         """Return the sum of ranks under both objectives, and the two parts of a heuristic's gap.
 
         Result: ``objectives`` as of `seqopt.graph.layers.objectives.under_both`; ``gap_parts`` with
         ``short_sight`` and ``objective``, as of `split_gap`, for heuristics. None where there is no
         proof, or no ranks.
         """
-        return split_objectives(self)
+        if (
+            self.certificate is None
+            or self.search is not None
+            or not isinstance(self.graph, Layers)
+        ):
+            return {"objectives": None, "gap_parts": None}
+        heuristic = self.formulation.kind is FormulationKind.HEURISTIC
+        return split_objectives(self.graph, self.choice, heuristic=heuristic)
 
     def stability(self, mortar: Mortar | str | None = None) -> pd.DataFrame:
         """Return whether every step stands and by which margins, by the cone program.
@@ -391,4 +354,147 @@ class Plan(ShownBuild):
         ``order_bound`` (on the first aim, of any order), ``order_bound_proven``,
         ``order_evaluated`` and ``order_stopped``; the ``engine`` and ``versions``.
         """
-        return summarized(self)
+        return _summarized(self)
+
+
+def _summarized(plan: Plan) -> dict[str, object]:
+    """Return the summary of a plan, with the same keys whatever it was chosen from."""
+    graph, proof, scene = plan.graph, plan.certificate, plan.engine.network.scene
+    of_states = isinstance(graph, States)
+    asked = _states_asked(graph) if isinstance(graph, States) else _layers_asked(plan)
+    return {
+        "scene": scene.name,
+        "schedule": plan.method,
+        "formulation": plan.formulation.name,
+        "kind": plan.formulation.kind.value,
+        **asked,
+        "candidates": f"heuristic: {plan.among}" if plan.among else "all",
+        "status": f"{plan.status} among these" if _narrowed(plan) else str(plan.status),
+        "ended": plan.ended.value,
+        "stopped": plan.stopped,
+        "objective": plan.objective,
+        "bound": _bounds(plan),
+        "gap": plan.gap,
+        "claimed_gap": None if proof is None or plan.gap is None else proof.claimed_gap,
+        **plan.objectives(),
+        "budgets": _spent_states(plan) if of_states else _spent(plan),
+        "steps": len(plan.steps),
+        "steps_before_release": len(plan.steps) - _letting_go(plan),
+        "regrips": plan.regrips,
+        "idle_robots": list(idle_robots(scene, plan.steps)),
+        "outside_linear_range": [str(departure) for departure in plan.departures],
+        "payload_exceeded": [str(excess) for excess in plan.overloads],
+        "models_evaluated": plan.models,
+        "states_in_proof": 0 if proof is None else proof.states,
+        **_order(plan),
+        "seconds": dict(plan.seconds),
+        **provenance(plan.engine),
+    }
+
+
+def _narrowed(plan: Plan) -> bool:
+    return bool(plan.among) and plan.status.endswith("optimal")
+
+
+def _layers_asked(plan: Plan) -> dict[str, object]:
+    """Return what was asked of candidates."""
+    layers, graph = plan.layers, plan.graph
+    scenarios = len(graph.scenes) if isinstance(graph, ScenarioLayers) else 0
+    return {
+        "aims": list(plan.goals),
+        "criterion": layers.criterion.name,
+        **layers.criterion.settings,
+        "scenarios": scenarios,
+        "limits": {limit.response: limit.bound for limit in layers.limits},
+        "rules": {},
+        "stands": None,
+    }
+
+
+def _states_asked(graph: States) -> dict[str, object]:
+    """Return what was asked of states."""
+    rules = graph.rules
+    stands = None
+    if graph.standing is not None:
+        sets = graph.stability
+        counts = {"looked_at": sets.looked_at, "programs": sets.programs}
+        stands = {**graph.standing.described(), **counts, "undecided": sets.undecided}
+    return {
+        "aims": [str(goal) for goal in graph.aims],
+        **judged_by(graph.goals, graph.criterion),
+        "scenarios": len(graph.scenarios),
+        "limits": {limit.response: limit.bound for limit in graph.limits},
+        "rules": {} if isinstance(rules, Schedule) else rules.described(graph.network.scene),
+        "stands": stands,
+    }
+
+
+def _bounds(plan: Plan) -> dict[str, float | None]:
+    """Return what no plan stays below, by aim; claimed of a search that ended early."""
+    proof, graph = plan.certificate, plan.graph
+    if isinstance(graph, States) and isinstance(plan.selection, StatePath):
+        early = proof is None or plan.selection.stopped
+        bounds = plan.selection.bound if early or proof is None else proof.bounds
+        pairs = zip(graph.aims, bounds, strict=False)
+        return {str(g): g.shown(b) if isfinite(b) else None for g, b in pairs}
+    if proof is None:
+        return {}
+    return {
+        name: b if isfinite(b) else None for name, b in zip(plan.goals, proof.bounds, strict=True)
+    }
+
+
+def _spent_states(plan: Plan) -> dict[str, dict[str, float | None]]:
+    """Return what there is of every budget of states, and what is spent."""
+    graph = plan.states
+    names = plan.goals[len(graph.aims) :]
+    return {
+        name: {"bound": cap, "spent": plan.objective[name], "price": None}
+        for name, cap in zip(names, graph.budgets, strict=True)
+    }
+
+
+def _spent(plan: Plan) -> dict[str, dict[str, float | None]]:
+    """Return what there is of every budget of candidates, what is spent, and its price."""
+    graph, chosen = plan.graph, plan.selection
+    assert isinstance(chosen, Selection)
+    assert not isinstance(graph, States)
+    problem: PlacementProblem = graph
+    return {
+        budget.name: {
+            "bound": budget.bound if isfinite(budget.bound) else None,
+            "spent": budget.spent(chosen.choice),
+            "price": chosen.prices.get(budget.name),
+        }
+        for budget in problem.budgets
+    }
+
+
+def _letting_go(plan: Plan) -> int:
+    """Return how many steps at the end only let go."""
+    if not isinstance(plan.graph, States) or isinstance(plan.graph.rules, Schedule):
+        return 0
+    rules, steps = plan.graph.rules, plan.steps
+    if rules.ending is Ending.HELD:
+        return 0
+    kinds = [step.kind is StepKind.RELEASE for step in reversed(steps)]
+    count = 0
+    while kinds[count] and len(steps[-1 - count].held) < rules.least_grips:
+        count += 1
+    return count
+
+
+def _order(plan: Plan) -> dict[str, object]:
+    """Return what there is to say of an order that was sought; nothing of one that was given."""
+    if plan.order is None:
+        return {}
+    found = plan.order.selection
+    return {
+        "order": [*found.order],
+        "orders": plan.order.problem.among.value,
+        "order_status": str(plan.order.status),
+        "order_bound": found.bound if isfinite(found.bound) else None,
+        "order_bound_proven": plan.order.proven,
+        "order_evaluated": found.evaluated,
+        "order_stopped": found.stopped,
+    }

@@ -54,37 +54,18 @@ def pose(  # noqa: PLR0913  # every question is a word of its own
     also: Sequence[str] = (),
     resources: Resources = HERE,
 ) -> Problem:
-    """Return the problem of a build, of whatever schedule.
+    """Return the problem of a build, of whatever schedule; words stand for values everywhere.
 
     Parameters
     ----------
-    engine : Engine
-        The engine that computes responses; it has the scene.
-    moves : Schedule or FreeRules
-        What can be chosen: the open grips of a schedule, or every move that rules allow.
-    criterion : Criterion
-        What a step costs.
+    engine, moves, criterion : Engine, Schedule or FreeRules, Criterion
+        What has the scene, what can be chosen, and what a step costs.
     goals : sequence of Goal or str, optional
-        What is to be small, the most important first, as ``"minmax,steps"``; over states of the
-        build. By default the sum of the costs of open grips or the largest, as the formulation
-        minimizes; of rules the worst step.
-    limits : sequence of Limit, optional
-        Bounds that no step may exceed.
-    budgets : sequence of str, optional
-        Caps on totals: of candidates as `seqopt.problem.budgets.parse_budgets`, of states as
-        `seqopt.problem.budgets.parse_caps` reads them.
-    stands : Standing, Mortar or str, optional
-        Requires that every state stands, with this mortar: ``"dry"``, ``"bond=3e3"`` (Pa).
-    scenarios : Scenarios or sequence of Scene, optional
-        Other states of the world, of `seqopt.scenarios`, or scenes with the same bricks and nodes.
-    over : RobustAim or str, optional
-        What counts over scenarios: ``worst-peak``, ``worst-total`` or ``cvar=0.9``.
-    orders : Orders or str, optional
-        Among which build orders the best is sought, ``tied`` or ``any``; by default the scene's.
-    also : sequence of str, optional
-        Further responses to compute.
-    resources : Resources, optional
-        Processes, memory and a folder for results; by default only this process.
+        As ``"minmax,steps"``, over states of the build. By default the sum of the costs of open
+        grips or the largest, as the formulation minimizes; of rules the worst step.
+    limits, budgets, stands, scenarios, over, orders, also, resources : optional
+        As of `Problem`: ``"travel=3.5m"``, ``"dry"``, `seqopt.scenarios`, ``"cvar=0.9"`` (or
+        ``worst-peak``, ``worst-total``), ``"tied"`` or ``"any"``.
 
     Returns
     -------
@@ -99,28 +80,14 @@ def pose(  # noqa: PLR0913  # every question is a word of its own
     Examples
     --------
     >>> import seqopt
-    >>> network = seqopt.build_network(seqopt.load_scene("arch25"))
-    >>> engine, schedule = seqopt.make_engine("auto", network), seqopt.three_robot_loop(network)
-    >>> seqopt.pose(engine, schedule, seqopt.CRITERIA["equations-2-3"])
-    Problem('arch25', 'three-robot', criterion 'equations-2-3')
+    >>> engine = seqopt.make_engine("auto", seqopt.load_scene("arch25"))
     >>> worst = seqopt.CRITERIA["worst-ratio"]
     >>> seqopt.pose(engine, seqopt.FreeRules(), worst, "minmax,steps", budgets="regrips=3")
     Problem('arch25', 'free', criterion 'worst-ratio', minmax, steps, 1 budgets)
     """
-    problem = Problem(
-        engine,
-        moves,
-        criterion,
-        _goals(goals),
-        as_limits(limits),
-        (budgets,) if isinstance(budgets, str) else tuple(budgets),
-        stands if isinstance(stands, Standing | None) else Standing(find_mortar(stands)),
-        scenarios.scenes if isinstance(scenarios, Scenarios) else tuple(scenarios),
-        _over(over),
-        None if orders is None else Orders.of(orders),
-        tuple(also),
-        resources,
-    )
+    asked = (_goals(goals), as_limits(limits), _words(budgets), _standing(stands))
+    worlds = (_scenes(scenarios), _over(over), None if orders is None else Orders.of(orders))
+    problem = Problem(engine, moves, criterion, *asked, *worlds, tuple(also), resources)
     posed = replace(problem, criterion=_usual_criterion(problem))
     posed.graphs.update(problem.graphs)
     return posed
@@ -278,6 +245,21 @@ def _goals(given: Sequence[Goal] | str) -> tuple[Goal, ...]:
     if not isinstance(goals, Sequence) or {*map(type, goals)} - {Goal}:
         raise ProblemError(f"aims {short(given)}: give goals, or their names, as 'minmax,steps'")
     return tuple(goals)
+
+
+def _words(given: Sequence[str] | str) -> tuple[str, ...]:
+    """Return budgets in words; what is none is refused with the others."""
+    if isinstance(given, str) or not isinstance(given, Sequence):
+        return (given,)
+    return tuple(given)
+
+
+def _standing(given: Standing | Mortar | str | None) -> Standing | None:
+    return given if isinstance(given, Standing | None) else Standing(find_mortar(given))
+
+
+def _scenes(given: Scenarios | Sequence[Scene]) -> tuple[Scene, ...]:
+    return given.scenes if isinstance(given, Scenarios) else tuple(given)
 
 
 def _over(given: RobustAim | str) -> RobustAim:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -13,48 +12,58 @@ from seqopt.arrays import Floats
 from seqopt.graph.layers.layers import Layers
 from seqopt.graph.layers.objectives import split_gap, under_both
 from seqopt.graph.layers.ranking import move_costs, rank_of
-from seqopt.plan.calling.formulation import FormulationKind
+from seqopt.plan.calling.formulation import Selection
 from seqopt.plan.search.window_search import WindowSearch
+from seqopt.problem.aims import Aim
 from seqopt.responses.choices import StepChoices
 
-if TYPE_CHECKING:
-    from seqopt.plan.plan import Plan
+Objectives = dict[str, dict[str, float | None] | None]
 
 
-def chosen_table(plan: Plan) -> pd.DataFrame:
-    """Return what was chosen for every move and what it is worth; see `Plan.table`."""
-    chosen = moves_table(plan.layers, plan.choice, plan.grips())
-    return chosen if plan.layers is not plan.graph else chosen.join(pd.DataFrame([*_worths(plan)]))
+def chosen_table(
+    problem: Layers,
+    selection: Selection,
+    aim: Aim,
+    search: WindowSearch | None,
+    grips: pd.DataFrame,
+) -> pd.DataFrame:
+    """Return what was chosen for every move and what it is worth.
+
+    ``search``: what was looked at, where not all models were solved; ``grips``: of the plan.
+    Result: as of `seqopt.plan.plan.Plan.table`.
+    """
+    worths = pd.DataFrame([*_worths(problem, selection.choice, aim, search)])
+    return moves_table(problem, selection.choice, grips).join(worths)
 
 
-def _worths(plan: Plan) -> Iterator[dict[str, float]]:
+def _worths(
+    problem: Layers, choice: tuple[int, ...], aim: Aim, search: WindowSearch | None
+) -> Iterator[dict[str, float]]:
     """Yield the cells of the table that say what the choice of every move is worth."""
-    layers, aim = plan.layers, plan.formulation.aim
-    assert aim is not None  # candidates of one scene were chosen
-    for k, (before, now) in enumerate(pairwise((0, *plan.choice))):
-        if plan.search is not None:
-            costs = plan.search.costs(k)
+    for k, (before, now) in enumerate(pairwise((0, *choice))):
+        if search is not None:
+            costs = search.costs(k)
             margin = np.delete(costs, now).min(initial=np.inf) - costs[now]
             yield {"cost": costs[now], "margin": margin}
             continue
-        layered = aim.costs(layers)
+        layered = aim.costs(problem)
         yield {
             "single_cost": layered.single[k][now],
             "shared_cost": layered.shared[k][before, now],
-            "rank_in_window": rank_of(move_costs(layers, k, before), now),
+            "rank_in_window": rank_of(move_costs(problem, k, before), now),
         }
 
 
-def split_objectives(plan: Plan) -> dict[str, dict[str, float | None] | None]:
-    """Return the sum of ranks under both objectives; see `Plan.objectives`."""
-    none: dict[str, dict[str, float | None] | None] = {"objectives": None, "gap_parts": None}
-    if plan.certificate is None or plan.search is not None or not isinstance(plan.graph, Layers):
-        return none
-    values = under_both(plan.graph, plan.choice)
+def split_objectives(problem: Layers, choice: tuple[int, ...], *, heuristic: bool) -> Objectives:
+    """Return the sum of ranks under both objectives, and the two parts of a heuristic's gap.
+
+    Result: ``objectives`` as of `seqopt.graph.layers.objectives.under_both`; ``gap_parts`` as of
+    `split_gap`; None where there are no ranks.
+    """
+    values = under_both(problem, choice)
     if None in values.values():
-        return none
-    heuristic = plan.formulation.kind is FormulationKind.HEURISTIC
-    parts = split_gap(plan.graph, plan.choice) if heuristic else None
+        return {"objectives": None, "gap_parts": None}
+    parts = split_gap(problem, choice) if heuristic else None
     if parts is None:
         return {"objectives": values, "gap_parts": None}
     split: dict[str, float | None] = {"short_sight": parts.short_sight}

@@ -20,10 +20,30 @@ class Costs(Protocol):
     """Costs of choices, of which an aim takes the sum or the largest."""
 
     def cost(self, choice: Sequence[int]) -> float:
-        """Return the sum of the costs that a choice meets."""
+        """Return the sum of the costs that a choice meets.
+
+        Parameters
+        ----------
+        choice : sequence of int
+            A candidate for every move.
+
+        Returns
+        -------
+        float
+        """
 
     def worst(self, choice: Sequence[int]) -> float:
-        """Return the largest cost that a choice meets."""
+        """Return the largest cost that a choice meets.
+
+        Parameters
+        ----------
+        choice : sequence of int
+            A candidate for every move.
+
+        Returns
+        -------
+        float
+        """
 
 
 Found_co = TypeVar("Found_co", bound=Costs, covariant=True)

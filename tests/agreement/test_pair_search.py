@@ -214,7 +214,7 @@ def test_what_cannot_be_searched_lazily_is_refused(engine25, criterion, name, op
 
 def test_costs_that_are_given_and_free_schedules_have_nothing_to_save():
     costs = CostProblem(LayeredCosts((np.ones(2),), (np.zeros((1, 2)),)))
-    with pytest.raises(ProblemError, match="nothing is saved"):
+    with pytest.raises(ProblemError, match="leave out lazy"):
         solve(costs, "overlap_dp", lazy=True)
 
 

@@ -16,7 +16,7 @@ import pytest
 from seqopt.cli.main import main
 from seqopt.cli.words.means import parse_size
 from seqopt.errors import ProblemError
-from seqopt.plan import solving
+from seqopt.plan import layers
 from seqopt.scene.scene_file import save_scene
 from tests.builders import ROOT, small_arch
 
@@ -205,7 +205,7 @@ def test_fewer_candidates_are_a_heuristic_that_says_so(capsys, tmp_path):
     assert second["status"] == "optimal among these"
     assert second["candidates"].startswith("heuristic: near:6 keeps")
     assert second["models_evaluated"] < 0.8 * first["models_evaluated"]
-    assert second["objective"] >= first["objective"]
+    assert second["objective"]["sum"] >= first["objective"]["sum"]
     assert main([*words, "--out", str(near), "--candidates", "far:6"]) == 2
     assert "give near:JOINTS or within:METERS" in capsys.readouterr().err
 
@@ -238,17 +238,17 @@ def test_an_interrupted_choice_is_written_with_its_bound(capsys, monkeypatch, tm
     assert (tmp_path / "out" / "trace.csv").exists()
     summary = written["summary.json"]
     assert summary["ended"] == "interrupted"
-    assert summary["bound"] <= summary["objective"]
+    assert summary["bound"]["sum"] <= summary["objective"]["sum"]
 
 
 def test_an_interrupt_ends_all_that_is_compared(capsys, monkeypatch):
     """One plan that was interrupted does not let the next begin."""
-    select = solving.select
+    select = layers.select
 
     def interrupted(formulation, problem, watch, **options):
         watch.interrupt()
         return select(formulation, problem, watch, **options)
 
-    monkeypatch.setattr(solving, "select", interrupted)
+    monkeypatch.setattr(layers, "select", interrupted)
     assert main(["compare"]) == 130
     assert capsys.readouterr().err == "seqopt: interrupted\n"

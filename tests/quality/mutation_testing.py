@@ -53,21 +53,21 @@ RIGID = (
 CHOSEN = ("formulations/test_programs", "formulations/test_degenerate")
 STANDING = ("formulations/test_equilibrium", "validation/test_limit_analysis")
 PROOFS = {
-    "seqopt.plan.judge.budget_proof": ("placement/test_proofs", "placement/test_budget_proof"),
+    "seqopt.plan.judge.budget_proof": ("plan/test_proofs", "plan/test_budget_proof"),
     "seqopt.plan.judge.certificate": (
-        *("placement/test_certificate", "placement/test_values", "placement/test_proofs"),
+        *("plan/test_certificate", "plan/test_values", "plan/test_proofs"),
         "agreement/test_pair_search",
     ),
-    "seqopt.plan.judge.conflicts": ("placement/test_budget_proof", "placement/test_no_choice"),
-    "seqopt.graph.duality": ("graph/test_graph", "placement/test_free_proof"),
+    "seqopt.plan.judge.conflicts": ("plan/test_budget_proof", "plan/test_no_choice"),
+    "seqopt.graph.duality": ("graph/test_graph", "plan/test_free_proof"),
     "seqopt.plan.judge.proof": (
-        *("placement/test_proofs", "placement/test_free_proof", "placement/test_free_judge"),
+        *("plan/test_proofs", "plan/test_free_proof", "plan/test_free_judge"),
     ),
-    "seqopt.plan.judge.passable": ("placement/test_proofs", "placement/test_free_proof"),
-    "seqopt.plan.judge.free_moves": ("placement/test_free_proof", "placement/test_proofs"),
+    "seqopt.plan.judge.passable": ("plan/test_proofs", "plan/test_free_proof"),
+    "seqopt.plan.judge.free_moves": ("plan/test_free_proof", "plan/test_proofs"),
     "seqopt.graph.orders.bound": ("formulations/test_order_search",),
-    "seqopt.plan.judge.orders": ("placement/test_proofs", "formulations/test_order_search"),
-    "seqopt.graph.layers.partial_costs": ("placement/test_proofs", "agreement/test_pair_search"),
+    "seqopt.plan.judge.orders": ("plan/test_proofs", "formulations/test_order_search"),
+    "seqopt.graph.layers.partial_costs": ("plan/test_proofs", "agreement/test_pair_search"),
 }  # what says that nothing is better, or that there is nothing
 MODULES = {
     "seqopt.engines.rigid.compliance": (
@@ -81,12 +81,12 @@ MODULES = {
     "seqopt.engines.rigid.operator": RIGID,
     "seqopt.engines.rigid.grip_equations": RIGID,
     "seqopt.engines.rigid.growth": ("engines/test_operator", "engines/test_growth"),
-    "seqopt.graph.layers.costs": ("placement/test_costs", "placement/test_values"),
+    "seqopt.graph.layers.costs": ("graph/test_costs", "plan/test_values"),
     **PROOFS,
-    "seqopt.problem.criteria": ("placement/test_criteria", "placement/test_problem"),
-    "seqopt.problem.ranks": ("placement/test_criteria", "placement/test_problem"),
-    "seqopt.problem.terms": ("placement/test_criteria", "placement/test_scales"),
-    "seqopt.plan.calling.flow": ("placement/test_flow", "placement/test_values", *CHOSEN),
+    "seqopt.problem.criteria": ("problem/test_criteria", "graph/test_layers"),
+    "seqopt.problem.ranks": ("problem/test_criteria", "graph/test_layers"),
+    "seqopt.problem.terms": ("problem/test_criteria", "problem/test_scales"),
+    "seqopt.plan.calling.flow": ("plan/test_flow", "plan/test_values", *CHOSEN),
     "formulations.layers.beam": CHOSEN,
     "formulations.layers.cascade": CHOSEN,
     "formulations.contact.limit_analysis": STANDING,

@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 
 import seqopt
-from seqopt.graph.orders.orders import AllOrders
+from seqopt.problem.problem import Orders
 from seqopt.report.comparison import largest
 from seqopt.report.draw import ROBOT_COLORS
 from seqopt.report.notebook import card, facts
@@ -25,9 +25,9 @@ def values():
     scene = seqopt.load_scene("wall:columns=2,courses=3")
     plan, free = seqopt.optimize(scene, criterion="worst-ratio"), seqopt.optimize(scene, "free")
     posed = plan.problem
-    robust = seqopt.robust(posed, seqopt.scenarios(scene, count=2, seed=1), "worst-peak")
+    robust = posed.but(scenarios=seqopt.scenarios(scene, count=2, seed=1).scenes)
     network = posed.engine.network
-    found = [plan, free, posed, free.problem, AllOrders(free.problem), robust]
+    found = [plan, free, posed, free.problem, free.problem.but(orders=Orders.TIED), robust]
     found += [posed.schedule, network, scene, *assess_steps(network, plan.steps[:1], "epoxy")]
     return {type(value).__name__: value for value in found}
 

@@ -54,7 +54,7 @@ def test_what_is_no_order_gets_one_line(order, said):
 def test_the_order_is_an_argument_of_the_short_cut_and_of_commands(tmp_path, capsys):
     scene, order = small_arch(5), (1, 5, 2, 4, 3)
     plan = seqopt.optimize(scene, "free", order="ends")
-    assert plan.problem.network.scene.build_order == order
+    assert plan.problem.scene.build_order == order
     path, out = tmp_path / "arch.json", tmp_path / "out"
     seqopt.save_scene(scene, path)
     words = ["--schedule", "free", "--order", "1,5,2,4..3", "--out", str(out)]

@@ -63,7 +63,7 @@ def test_rules_can_be_given_one_by_one_or_as_a_value():
     one = seqopt.optimize("wall:columns=2,courses=2", "free", newest="placing")
     rules = seqopt.FreeRules(newest="placing")
     assert one.steps == seqopt.optimize("wall:columns=2,courses=2", "free", rules=rules).steps
-    assert one.problem.rules == rules
+    assert one.problem.moves == rules
     with pytest.raises(seqopt.SeqoptError, match="option newest: only the free schedule has it"):
         seqopt.optimize("wall:columns=2,courses=2", newest="placing")
 
