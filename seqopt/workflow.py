@@ -104,8 +104,7 @@ def optimize(
     Plan('arch25', 'free', by schedule_search: 50 steps, minmax 0.840088, steps 50, optimal)
     """
     start = time.perf_counter()
-    given = (criterion, engine, formulation)
-    problem = _asked(scene, schedule, given, limits, options)
+    problem = _asked(scene, schedule, (criterion, engine, formulation), limits, options)
     assemble = time.perf_counter() - start
     plan = solve(problem, formulation, **options)
     return replace(plan, seconds={"assemble": assemble, **plan.seconds})

@@ -42,7 +42,7 @@ class FreeFront:
                 raise ProblemError(
                     f"pareto: {goal} adds up along a plan; give responses, steps and regrips"
                 )
-        self._round, self._rounding = rounding_steps(self.names, rounding), rounding
+        self._round, self._rounding = _rounding_steps(self.names, rounding), rounding
 
     def __repr__(self) -> str:
         return f"<FreeFront of {self._problem}>"
@@ -65,7 +65,7 @@ class FreeFront:
         graph, states = found.graph()
         amounts = graph.amounts.copy()
         peaks = [k for k, peak in enumerate(graph.peaks) if peak]
-        amounts[:, peaks] = rounded_up(amounts[:, peaks], self._round[peaks])
+        amounts[:, peaks] = _rounded_up(amounts[:, peaks], self._round[peaks])
         return Visited(replace(graph, amounts=amounts), states)
 
     @cached_property
@@ -160,12 +160,12 @@ class FreeFront:
 
         ``claimed`` (k,): the values with which margins of stability are compared. Result (k,).
         """
-        return rounded_up(
+        return _rounded_up(
             np.array(plan_values(self._problem, steps, claimed.tolist())), self._round
         )
 
 
-def rounding_steps(names: Sequence[str], rounding: Mapping[str, float] | None) -> Floats:
+def _rounding_steps(names: Sequence[str], rounding: Mapping[str, float] | None) -> Floats:
     """Return what every number is rounded up to multiples of; zero where it is not.
 
     Result (k,). Raises `ProblemError` if a name is none of these, or a step is no positive number.
@@ -177,7 +177,7 @@ def rounding_steps(names: Sequence[str], rounding: Mapping[str, float] | None) -
     return np.array([(rounding or {}).get(name, 0.0) for name in names])
 
 
-def rounded_up(values: Floats, steps: Floats) -> Floats:
+def _rounded_up(values: Floats, steps: Floats) -> Floats:
     """Return values rounded up to multiples of steps, others rounded to ten digits.
 
     What differs by less than ten digits is the same: no plan is better by an error of rounding.

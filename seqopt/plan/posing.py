@@ -61,8 +61,8 @@ def pose(  # noqa: PLR0913  # every question is a word of its own
     engine, moves, criterion : Engine, Schedule or FreeRules, Criterion
         What has the scene, what can be chosen, and what a step costs.
     goals : sequence of Goal or str, optional
-        As ``"minmax,steps"``, over states of the build. By default the sum of the costs of open
-        grips or the largest, as the formulation minimizes; of rules the worst step.
+        As ``"minmax,steps"``, over states; by default the sum of the costs of open grips or the
+        largest, as the formulation minimizes, and of rules the worst step.
     limits, budgets, stands, scenarios, over, orders, also, resources : optional
         As of `Problem`: ``"travel=3.5m"``, ``"dry"``, `seqopt.scenarios`, ``"cvar=0.9"`` (or
         ``worst-peak``, ``worst-total``), ``"tied"`` or ``"any"``.
@@ -87,7 +87,11 @@ def pose(  # noqa: PLR0913  # every question is a word of its own
     """
     asked = (_goals(goals), as_limits(limits), _words(budgets), _standing(stands))
     worlds = (_scenes(scenarios), _over(over), None if orders is None else Orders.of(orders))
-    problem = Problem(engine, moves, criterion, *asked, *worlds, tuple(also), resources)
+    return _scaled(Problem(engine, moves, criterion, *asked, *worlds, tuple(also), resources))
+
+
+def _scaled(problem: Problem) -> Problem:
+    """Return a problem whose criterion has the numbers of the scene; raise what does not fit."""
     posed = replace(problem, criterion=_usual_criterion(problem))
     posed.graphs.update(problem.graphs)
     return posed

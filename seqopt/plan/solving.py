@@ -55,7 +55,7 @@ def solve(
         Solve only the models that the proof needs, as is always done where states are chosen.
     time_limit : float, optional
         Seconds of choosing after which it returns its best choice and a bound, as at an interrupt;
-        without proof, of all it does, and an error names the moves that were chosen by then.
+        without proof of all it does: an error names the moves that were chosen by then.
     progress : callable, optional
         Called with every better choice and bound as it is found, or with a few words.
     **options
@@ -74,19 +74,20 @@ def solve(
     --------
     >>> import seqopt
     >>> problem = seqopt.optimize("arch25").problem
-    >>> seqopt.solve(problem, "overlap_dp").certificate.gap
-    0.0
     >>> seqopt.solve(problem, "overlap_lp").status
     <Status.OPTIMAL: 'optimal'>
     """
-    run = Run(time_limit, progress, proof, lazy, options)
-    if isinstance(problem, Problem):
-        found = as_formulation(formulation or usual(problem), *_able(problem))
-        graph: Any = graph_of(problem, found.on)
-        _require_goal(problem, found)
-        return replace(SOLVE[found.on](graph, found, run), problem=problem)
-    found = _of_graph(problem, formulation)
-    return SOLVE[found.on](problem, found, run)
+    return _solved(problem, formulation, Run(time_limit, progress, proof, lazy, options))
+
+
+def _solved(problem: Any, formulation: Formulation | str | None, run: Run) -> Plan:
+    """Return the plan of a problem, or of a graph of choices that is given."""
+    if not isinstance(problem, Problem):
+        found = _of_graph(problem, formulation)
+        return SOLVE[found.on](problem, found, run)
+    found = as_formulation(formulation or usual(problem), *_able(problem))
+    _require_goal(problem, found)
+    return replace(SOLVE[found.on](graph_of(problem, found.on), found, run), problem=problem)
 
 
 def _able(problem: Problem) -> tuple[On, ...]:

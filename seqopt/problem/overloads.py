@@ -49,7 +49,7 @@ def excesses(scene: Scene, table: pd.DataFrame, limits: Sequence[Limit]) -> tupl
     for limit in limits:
         if limit.response == "F_move":
             continue
-        values = response_along(scene, table, limit.response)
+        values = _response_along(scene, table, limit.response)
         over = limit.exceeded(values)
         if over.any():
             steps = tuple(int(number) for number in table["step"][over])
@@ -67,7 +67,7 @@ def overloads(scene: Scene, table: pd.DataFrame) -> tuple[Excess, ...]:
     return tuple(replace(excess, robot=names[excess.limit.response]) for excess in found)
 
 
-def response_along(scene: Scene, table: pd.DataFrame, name: str) -> np.ndarray:
+def _response_along(scene: Scene, table: pd.DataFrame, name: str) -> np.ndarray:
     """Return a response of every step as limits name it.
 
     ``table``: from `seqopt.analyze`; ``name``: ``T_max``, ``C_max``, ``M_sup``, ``D_max``,

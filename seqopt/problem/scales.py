@@ -64,7 +64,7 @@ class Units:
         return units[response[0]]
 
 
-def scene_units(network: Network) -> Units:
+def _scene_units(network: Network) -> Units:
     """Return the units of a scene.
 
     Result: each 1 where the scene has no weight or no stiffness.
@@ -82,7 +82,7 @@ def own_scales(network: Network) -> Mapping[str, float]:
     Result: SI units: of grip forces the smallest payload; of ``T_max`` the weight of the structure,
     of ``M_sup`` this at its size, of ``D_max`` what it moves a chain of a joint for every brick.
     """
-    scene, units = network.scene, scene_units(network)
+    scene, units = network.scene, _scene_units(network)
     count = len(scene.bricks)
     size = np.ptp([brick.position for brick in scene.bricks], axis=0).max()
     size += max(max(brick.dimensions) for brick in scene.bricks)
@@ -133,8 +133,8 @@ class SceneFacts:
 
     @cached_property
     def units(self) -> Units:
-        """See `scene_units`."""
-        return scene_units(self.engine.network)
+        """See `_scene_units`."""
+        return _scene_units(self.engine.network)
 
     @property
     def reference(self) -> Mapping[str, float]:

@@ -76,7 +76,7 @@ def comparison_figures(result: Comparison) -> dict[str, Figure]:
     """Return the figures of a comparison of a scene that has a loop of its robots."""
     return {
         "maxima": _maxima(result),
-        "responses": responses_figure(result.tables),
+        "responses": _responses_figure(result.tables),
         "gap_against_cost": _gaps(result),
     }
 
@@ -104,7 +104,7 @@ def _maxima(result: Comparison) -> Figure:
 
 
 @styled
-def responses_figure(builds: Mapping[str, pd.DataFrame]) -> Figure:
+def _responses_figure(builds: Mapping[str, pd.DataFrame]) -> Figure:
     """Return the largest responses at every number of bricks; equal builds share a line."""
     plans = merged(builds)
     tables = {_together(names): worst_steps(builds[one]) for one, names in plans.items()}
@@ -314,4 +314,4 @@ def plan_figures(engine: Engine, builds: Sequence[Build]) -> dict[str, bytes]:
         grips = gantt_picture(scene, build.steps, build.table)
         files |= picture_files(f"{build.name}_grips", grips)
     tables = {build.name: build.table for build in builds}
-    return files | picture_files("responses", responses_figure(tables))
+    return files | picture_files("responses", _responses_figure(tables))

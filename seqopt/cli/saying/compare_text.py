@@ -68,7 +68,7 @@ def _responses(comparison: Comparison) -> Iterator[str]:
         cells = (f"{names[line]:>{names[2]}}" for names in RESPONSES.values())
         yield f"{'':{NAME}}{''.join(cells)}".rstrip()
     for problem, rows in comparison.table.groupby("problem", sort=False):
-        yield title_of(str(problem))
+        yield _title_of(str(problem))
         figures = rows[[*RESPONSES]].round(3).apply(tuple, axis=1)
         ranked = figures[sorted(figures.index, key=_plainness)]
         shown = {*ranked.index[~ranked.duplicated()]}
@@ -138,7 +138,7 @@ def _choices(comparison: Comparison) -> Iterator[str]:
     yield f"{'':{NAME}}{'objective':>10}{'gap':>9}{'steps':>7}{'models':>9}{'seconds':>9}  kind"
     chosen = comparison.table[comparison.table["objective"].notna()]
     for problem, rows in chosen.groupby("problem", sort=False):
-        yield title_of(str(problem))
+        yield _title_of(str(problem))
         for name, row in rows.iterrows():
             steps = len(comparison.tables[str(name)])
             yield (
@@ -198,14 +198,14 @@ def _notes(comparison: Comparison) -> Iterator[list[str]]:
             yield [heading, *lines]
 
 
-def title_of(problem: str) -> str:
+def _title_of(problem: str) -> str:
     """Return what a problem is called above its rows.
 
     ``problem``: of a comparison's table.
 
     Examples
     --------
-    >>> title_of("three-robot")
+    >>> _title_of("three-robot")
     'three-robot loop, grips chosen by a formulation'
     """
     titles = {

@@ -25,7 +25,7 @@ def asked_criterion(options: argparse.Namespace) -> Criterion:
     """
     usual = DEFAULTS["any other"].criterion.name
     criterion = parse_criterion(options.criteria or usual, options.crown)
-    return rank_otherwise(criterion, options.ranked, options.among)
+    return _rank_otherwise(criterion, options.ranked, options.among)
 
 
 def parse_criterion(text: str, crown: str | None = None) -> Criterion:
@@ -51,7 +51,7 @@ def parse_criterion(text: str, crown: str | None = None) -> Criterion:
     return RankSum(text, tuple(terms), tuple(terms))
 
 
-def rank_otherwise(criterion: Criterion, ranked: str | None, among: str | None) -> Criterion:
+def _rank_otherwise(criterion: Criterion, ranked: str | None, among: str | None) -> Criterion:
     """Return a criterion of ranks with what it ranks among.
 
     ``ranked``, ``among``: values of `seqopt.problem.ranks.Ranked` and

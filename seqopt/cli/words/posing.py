@@ -17,7 +17,6 @@ from seqopt.errors import ProblemError, StepError
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.plan.calling.formulation import On, find_formulation
-from seqopt.plan.posing import natural
 from seqopt.problem.aims import RobustAim
 from seqopt.problem.budgets import parse_budgets, parse_caps
 from seqopt.problem.problem import Orders, Problem
@@ -46,7 +45,7 @@ def asked_problem(options: argparse.Namespace) -> Asked:
 
     Raises `ProblemError` or `StepError` if words do not go together, naming one.
     """
-    of_states = wants_states(options)
+    of_states = _wants_states(options)
     (_require_states if of_states else _require_candidates)(options)
     sought = options.order == SEARCH
     options.order = None if sought else options.order
@@ -74,7 +73,7 @@ def asked_problem(options: argparse.Namespace) -> Asked:
     return Asked(scene, problem, aim, known, unseen)
 
 
-def wants_states(options: argparse.Namespace) -> bool:
+def _wants_states(options: argparse.Namespace) -> bool:
     """Return whether states of the build are to be chosen, and not candidates of moves."""
     if options.schedule == FREE or options.aim or options.stands or options.order == SEARCH:
         return True
@@ -91,7 +90,7 @@ def _criterion(options: argparse.Namespace, *, of_states: bool) -> Criterion | N
 def _asked_moves(options: argparse.Namespace, network: Network) -> Schedule | FreeRules:
     """Return the open grips or the rules that a command is asked for."""
     if options.schedule != FREE:
-        return asked_schedule(options, network)
+        return _asked_schedule(options, network)
     names = () if options.robots.isdecimal() else parse_robots(options.robots)
     rules = parse_rules(options.rule, names)
     candidates = getattr(options, "candidates", None)
@@ -124,13 +123,8 @@ def _require_states(options: argparse.Namespace) -> None:
         raise StepError(f"--schedule {options.schedule}: a count of robots goes with free")
 
 
-def asked_schedule(options: argparse.Namespace, network: Network) -> Schedule:
+def _asked_schedule(options: argparse.Namespace, network: Network) -> Schedule:
     """Return the schedule with open grips that a command is asked for."""
     schedule = find_schedule(network, options.schedule, parse_robots(options.robots))
     rule = getattr(options, "candidates", None)
     return schedule if rule is None else thin(schedule, rule)
-
-
-def is_on_states(problem: Problem) -> bool:
-    """Return whether a problem is about states of the build if no formulation says otherwise."""
-    return natural(problem) in (On.STATES, On.ORDERS)

@@ -149,11 +149,6 @@ class States(Shown):
         """The goals that are to be made small."""
         return self.goals[: len(self.goals) - len(self.budgets)]
 
-    @property
-    def leading(self) -> int:
-        """The first goal that is about responses, or the first of all."""
-        return next((k for k, goal in enumerate(self.goals) if goal.of_states), 0)
-
     @cached_property
     def sets(self) -> GripSets:
         """Responses of grip sets, those of the engine that are named; the forces come with them."""

@@ -20,7 +20,7 @@ def steps_of(space: FreeSpace | ScheduleSpace, states: Sequence[Sequence[int]]) 
     state to the next.
     """
     if isinstance(space, ScheduleSpace):
-        return scheduled_steps(space, states)
+        return _scheduled_steps(space, states)
     numbers = [None, *node_numbers(space.network)]
     grips: list[int | None] = [None] * len(space.network.scene.robots)
     stays: dict[int, int] = {}  # where a robot was last, as a place from 1
@@ -38,7 +38,7 @@ def steps_of(space: FreeSpace | ScheduleSpace, states: Sequence[Sequence[int]]) 
     return check_sequence(space.network.scene, out)
 
 
-def scheduled_steps(space: ScheduleSpace, states: Sequence[Sequence[int]]) -> tuple[Step, ...]:
+def _scheduled_steps(space: ScheduleSpace, states: Sequence[Sequence[int]]) -> tuple[Step, ...]:
     """Return the checked steps of states of a schedule, one for each of its steps."""
     rows = np.array([row[1:] for row in states if len(row) == space.robots + 1], dtype=np.int64)
     if len(rows) != space.levels or [row[0] for row in states] != [*range(1, space.levels + 1)]:

@@ -40,7 +40,7 @@ def _conflict(costs: LayeredCosts, budgets: tuple[Budget, ...]) -> bool:
     return least_within(CostProblem(allowed, budgets), 1.0, {}, 1.0) >= PROVEN
 
 
-def least_spent(costs: LayeredCosts, budget: Budget) -> float:
+def _least_spent(costs: LayeredCosts, budget: Budget) -> float:
     """Return the least that an allowed choice takes of a budget.
 
     ``costs``: say which choices are allowed. Result: in its unit.
@@ -65,7 +65,7 @@ def refusal(problem: PlacementProblem, name: str) -> InfeasibleError:
             f"claimed by {name}, and not proven: no choice is within all budgets; raise a bound"
         )
     if len(found) == 1:
-        least = least_spent(problem.sums, found[0])
+        least = _least_spent(problem.sums, found[0])
         return InfeasibleError(
             f"no choice is within all budgets: every choice uses at least {least:.6g} of "
             f"{found[0].name!r}, more than {found[0].bound:.6g}; raise that bound"

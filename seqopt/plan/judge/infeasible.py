@@ -50,7 +50,7 @@ def confirmed(problem: States, name: str, seconds: float = np.inf) -> SeqoptErro
     except _LateError:
         proven = False
     bare = replace(problem, goals=problem.aims, budgets=())
-    why = why_impossible(bare, end - time.perf_counter())
+    why = _why_impossible(bare, end - time.perf_counter())
     return InfeasibleError(why if proven else f"claimed by {name}, and not proven: {why}")
 
 
@@ -82,7 +82,7 @@ def _in_time(end: float, _: Explorer) -> None:
         raise _LateError
 
 
-def why_impossible(problem: States, seconds: float = np.inf) -> str:
+def _why_impossible(problem: States, seconds: float = np.inf) -> str:
     """Return why no plan is allowed, in a line.
 
     ``problem``: which has no plan; ``seconds``: after which it says what it found by then. Result:

@@ -133,7 +133,7 @@ def plan_values(
         worst = np.max(worth, axis=0).tolist()
         if any(goal.measure is Measure.TRAVEL for goal in problem.goals):  # as it is planned
             worst = [
-                travel_of(problem, steps) if goal.measure is Measure.TRAVEL else value
+                _travel_of(problem, steps) if goal.measure is Measure.TRAVEL else value
                 for goal, value in zip(problem.goals, worst, strict=True)
             ]
         return tuple(worst)
@@ -151,7 +151,7 @@ def plan_values(
         elif goal.measure is Measure.REGRIPS:
             out.append(float(sum(step.kind is StepKind.REPOSITION for step in steps)))
         elif goal.measure is Measure.TRAVEL:
-            out.append(travel_of(problem, steps))
+            out.append(_travel_of(problem, steps))
         else:
             costs = _costs(problem, goal, columns, len(steps))
             out.append(float(costs.max() if goal.measure is Measure.PEAK else costs.sum()))
@@ -188,7 +188,7 @@ def state_columns(problem: States, table: pd.DataFrame) -> Mapping[str, np.ndarr
     return out
 
 
-def travel_of(problem: States, steps: Sequence[Step]) -> float:
+def _travel_of(problem: States, steps: Sequence[Step]) -> float:
     """Return how far robots go from one grip to the next.
 
     Result: m; straight lines.

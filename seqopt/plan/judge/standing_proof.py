@@ -78,7 +78,7 @@ def proven_margins(problem: States, steps: Sequence[Step]) -> dict[str, float]:
         enough = standing is None or not result.tilt < standing.tilt - SURE
         if not (result.verdict is Verdict.STANDS and enough):
             raise _falls(step, f"{result.verdict.value}, tilt survived {result.tilt:.4g} rad")
-    return worst_margins(results)
+    return _worst_margins(results)
 
 
 def _falls(step: Step, what: str) -> SolverError:
@@ -95,7 +95,7 @@ def certified(problem: States, steps: Sequence[Step]) -> tuple[Stability, ...]:
     return tuple(problem.certified[step.bricks, step.grips] for step in steps)
 
 
-def worst_margins(results: Sequence[Stability]) -> dict[str, float]:
+def _worst_margins(results: Sequence[Stability]) -> dict[str, float]:
     """Return the worst margins of any step, as goals count them.
 
     Result: ``bond`` (Pa), ``friction``, and how far ``tilt`` is from a right angle (rad); NaN where
