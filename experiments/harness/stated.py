@@ -114,7 +114,7 @@ def stated() -> dict[str, str]:
     )
 
 
-PLAIN = r"^(?:[a-z ]+ )?[^ ]+: |^[^ ]+ (?=finds)|^'[^ ]+ (?=is not)"  # what a reason is about
+PLAIN = r"^(?:[a-z ]+ )?[^ ]+: |^[^ ]+ (?=finds|is )"  # what a reason is about
 
 
 def _composing(table: pd.DataFrame) -> dict[str, str]:

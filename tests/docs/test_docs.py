@@ -13,7 +13,7 @@ import pytest
 from experiments.harness.results import RESULTS, markdown, two
 from experiments.harness.stated import stated
 from seqopt.cli.main import main
-from seqopt.plan.calling.formulation import exhibits, formulations
+from seqopt.plan.calling.formulation import On, exhibits, formulations
 from tests.browser import browsed
 from tests.builders import ROOT
 from tests.docs.site_links import broken
@@ -208,7 +208,9 @@ def test_exhibits_stand_in_the_table_that_compares_them():
 def test_every_formulation_is_in_the_contest(table):
     rows = STATED[table].splitlines()[2:]
     names = [re.match(r"\| \[`(\w+)`\]", row)[1] for row in rows]
-    takers = [n for n, f in formulations().items() if f.takes_budgets or table == "free_table"]
+    takers = [
+        n for n, f in formulations(On.LAYERS).items() if f.takes_budgets or table == "free_table"
+    ]
     assert sorted(names) == takers
     for name in ("labels", "overlap_mip"):  # measured at every brick count
         (row,) = (text for text in rows if f"[`{name}`]" in text)
@@ -217,7 +219,7 @@ def test_every_formulation_is_in_the_contest(table):
 
 def test_every_formulation_has_a_page_with_an_example():
     shown = {param.id.rsplit("-", 1)[0] for param in examples()}
-    for name in formulations():
+    for name in formulations(On.LAYERS):
         page = (ROOT / "docs" / "formulations" / f"{name}.md").read_text(encoding="utf-8")
         for heading in ("Background", "Program", "Example", "When it fails"):
             assert f"## {heading}" in page, name
