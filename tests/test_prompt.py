@@ -14,9 +14,9 @@ from seqopt.errors import SceneError
 from seqopt.graph.layers.budgets import travel
 from seqopt.graph.orders.orders import AllOrders
 from seqopt.graph.states.states import build_states
-from seqopt.plan.free_front import FreeFront
 from seqopt.plan.front import find_front
 from seqopt.plan.out_of_sample import judge_unseen
+from seqopt.plan.state_front import StateFront
 from seqopt.report.comparison import compare
 from seqopt.scene.library import ArchForm, DomeShape, VaultShape
 from seqopt.stability.assessment import assess_steps
@@ -46,11 +46,11 @@ def met(problem25):
     asked = (posed.engine, posed.moves, posed.criterion)
     robust = seqopt.solve(seqopt.pose(*asked, scenarios=drawn))
     words = posed.criterion, "F_largest,M_sup"
-    loop = FreeFront(build_states(posed.engine, posed.schedule, *words))
+    loop = StateFront(build_states(posed.engine, posed.schedule, *words))
     rules, aim = seqopt.FreeRules(), "F_largest,steps"
     aims = build_states(posed.engine, rules, posed.criterion, aim)
     values = [plan, lean, free, robust, free.report()]
-    values += [judge_unseen(robust, drawn), drawn, loop, find_front(loop), FreeFront(aims)]
+    values += [judge_unseen(robust, drawn), drawn, loop, find_front(loop), StateFront(aims)]
     values += [
         seqopt.solve(AllOrders(free.states)),
         *engines(network),

@@ -27,7 +27,7 @@ from seqopt.graph.states.states import States
 from seqopt.graph.states.visits import FreeStates, explore
 from seqopt.interrupts import answered
 from seqopt.plan.calling.formulation import Formulation, FormulationKind, On
-from seqopt.plan.calling.schedule_selection import StatePath
+from seqopt.plan.calling.state_path import StatePath
 from seqopt.plan.calling.watch import Watch
 from seqopt.plan.search.sturdiest import best_margin
 from seqopt.work.memory import free_memory

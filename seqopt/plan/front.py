@@ -15,6 +15,9 @@ from seqopt.arrays import Floats, FrozenValue, Terse
 from seqopt.errors import InfeasibleError, ProblemError, SolverError, did_you_mean
 from seqopt.plan.calling.formulation import Formulation, On, as_formulation
 from seqopt.plan.calling.guard import called, readable, text
+from seqopt.plan.posing import states_of
+from seqopt.plan.state_front import StateFront
+from seqopt.problem.problem import Problem
 from seqopt.sequence.steps import Step, StepKind
 from seqopt.work.progress import Tell, told
 
@@ -127,20 +130,25 @@ class Front(Terse):
 
 
 def find_front(
-    problem: FrontProblem,
+    problem: Problem | FrontProblem,
     formulation: Formulation | str = "pareto_zones",
     *,
+    rounding: Mapping[str, float] | None = None,
     seconds: float = np.inf,
     progress: Tell = lambda _: None,
 ) -> Front:
     """Return the Pareto set of a problem, its points recomputed and its completeness judged.
 
+    ``problem``: whose goals are all to be small at once; ``rounding``: what numbers are rounded up
+    to multiples of, by name, SI units, which thins the set; of a problem that is posed.
     ``seconds``: after which the points found are returned; ``progress``: told how far it is, in a
     few words or as a `seqopt.work.Stage`. Raises `InfeasibleError` if no plan is allowed;
     `SolverError` if a plan is not worth what is claimed, or the set lacks a point.
     """
     start = time.perf_counter()
     formulation = as_formulation(formulation, On.FRONTS)
+    if isinstance(problem, Problem):
+        problem = StateFront(states_of(problem), rounding)
     twin, name = problem.anew(), formulation.name  # which no formulation can reach
     solve = partial(formulation.solve, problem, seconds=seconds, progress=progress)
     found = _found(name, (problem, twin), solve)

@@ -20,7 +20,7 @@ from seqopt.graph.scenarios.scenarios import ScenarioLayers
 from seqopt.graph.states.states import States
 from seqopt.plan.build import ShownBuild
 from seqopt.plan.calling.formulation import End, Formulation, FormulationKind, Reads, Selection
-from seqopt.plan.calling.schedule_selection import StatePath
+from seqopt.plan.calling.state_path import StatePath
 from seqopt.plan.calling.watch import Finding
 from seqopt.plan.judge.certificate import TOLERANCE, Certificate
 from seqopt.plan.judge.standing_proof import certified

@@ -15,7 +15,7 @@ from seqopt.graph.states.steps import steps_of
 from seqopt.plan.calling.fitting import require_proof
 from seqopt.plan.calling.formulation import Formulation, FormulationKind
 from seqopt.plan.calling.guard import called
-from seqopt.plan.calling.schedule_selection import StatePath, with_numbers
+from seqopt.plan.calling.state_path import StatePath, with_numbers
 from seqopt.plan.judge.infeasible import confirmed
 from seqopt.plan.judge.schedules import judge_schedule
 from seqopt.plan.plan import Plan

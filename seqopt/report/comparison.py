@@ -17,7 +17,7 @@ from seqopt.graph.layers.objectives import under_both
 from seqopt.graph.layers.ranking import rank_choice
 from seqopt.graph.states.states import build_states
 from seqopt.plan.calling.formulation import On, formulations
-from seqopt.plan.calling.schedule_selection import StatePath
+from seqopt.plan.calling.state_path import StatePath
 from seqopt.plan.judge.certificate import least_sum
 from seqopt.plan.layers import on_the_way
 from seqopt.plan.plan import Plan

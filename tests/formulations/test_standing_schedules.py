@@ -20,10 +20,10 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, MechanismError, ProblemError, SceneError, SolverError
 from seqopt.graph.states.states import build_states
 from seqopt.network.build import build_network
-from seqopt.plan.free_front import FreeFront
 from seqopt.plan.front import find_front
 from seqopt.plan.judge.infeasible import worst_least
 from seqopt.plan.judge.schedules import judge_schedule
+from seqopt.plan.state_front import StateFront
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.requirements import LIMIT_TOLERANCE
 from seqopt.problem.standing import Standing, StandingSets, without_implied
@@ -273,7 +273,7 @@ def test_tilts_by_steps_are_those_of_the_program(dry):
 @pytest.mark.slow
 def test_pareto_sets_with_a_margin(dry):
     problem = build_states(dry.engine, dry.rules, ONES, "F_largest,bond")
-    front = find_front(FreeFront(problem, {"F_largest": 10.0, "bond": 500.0}))
+    front = find_front(StateFront(problem, {"F_largest": 10.0, "bond": 500.0}))
     assert front.complete
     assert (front.table["bond"] % 500 == 0).all()
     assert front.table["bond"].is_monotonic_decreasing

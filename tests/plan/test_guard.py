@@ -14,10 +14,10 @@ from formulations.states.schedule_search import FORMULATION as PLAN
 from seqopt.errors import InfeasibleError, SolverError
 from seqopt.graph.orders.orders import AllOrders, OrderSelection
 from seqopt.graph.states.states import build_states
-from seqopt.plan.calling.schedule_selection import StatePath
-from seqopt.plan.free_front import FreeFront
+from seqopt.plan.calling.state_path import StatePath
 from seqopt.plan.front import FrontSelection, find_front
 from seqopt.plan.solving import solve
+from seqopt.plan.state_front import StateFront
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.goals import parse_goals
 from seqopt.problem.requirements import Limit
@@ -39,13 +39,13 @@ def order(**words):
 
 
 def front(**words):
-    return FreeFront(free(**words))
+    return StateFront(free(**words))
 
 
 def loop(limits=()):
     engine = free().engine
     schedule = seqopt.three_robot_loop(engine.network)
-    return FreeFront(build_states(engine, schedule, ONES, "F_largest,M_sup", limits))
+    return StateFront(build_states(engine, schedule, ONES, "F_largest,M_sup", limits))
 
 
 KINDS = {

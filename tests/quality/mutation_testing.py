@@ -64,7 +64,7 @@ PROOFS = {
         *("plan/test_proofs", "plan/test_free_proof", "plan/test_free_judge"),
     ),
     "seqopt.plan.judge.passable": ("plan/test_proofs", "plan/test_free_proof"),
-    "seqopt.plan.judge.free_moves": ("plan/test_free_proof", "plan/test_proofs"),
+    "seqopt.plan.judge.rule_moves": ("plan/test_free_proof", "plan/test_proofs"),
     "seqopt.graph.orders.bound": ("formulations/test_order_search",),
     "seqopt.plan.judge.orders": ("plan/test_proofs", "formulations/test_order_search"),
     "seqopt.graph.layers.partial_costs": ("plan/test_proofs", "agreement/test_pair_search"),

@@ -29,7 +29,6 @@ from seqopt.engines.registry import provenance
 from seqopt.errors import ProblemError, StepError, did_you_mean
 from seqopt.files import csv_text, require_folder
 from seqopt.graph.states.states import States
-from seqopt.plan.free_front import FreeFront
 from seqopt.plan.front import Front, find_front, pick
 from seqopt.plan.posing import states_of
 from seqopt.problem.goals import judged_by
@@ -126,9 +125,10 @@ def run(options: argparse.Namespace) -> Answer:
     asked = asked_problem(options)
     scene, free = asked.scene, states_of(asked.problem)
     rounding = parse_numbers("--round", options.round, dict.fromkeys(map(str, free.goals)))
-    problem = FreeFront(free, rounding)
     seconds = float(options.seconds)
-    front = find_front(problem, seconds=seconds, progress=within(options.tell, seconds))
+    front = find_front(
+        asked.problem, rounding=rounding, seconds=seconds, progress=within(options.tell, seconds)
+    )
     methods = _methods(free.engine)
     files, left = _front_files(front, free, methods, options)
     said = f"{len(front.steps)} points, {'complete' if front.complete else 'not complete'}"

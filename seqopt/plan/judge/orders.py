@@ -23,9 +23,9 @@ from seqopt.graph.paths import distances
 from seqopt.graph.states.states import States
 from seqopt.network.build import build_network
 from seqopt.plan.judge.answers import ask
-from seqopt.plan.judge.free_moves import Follows, RuleTables
 from seqopt.plan.judge.passable import Asked, Passable, Tables
 from seqopt.plan.judge.proof import BELOW
+from seqopt.plan.judge.rule_moves import Follows, RuleTables
 from seqopt.problem.goals import Measure
 from seqopt.scene.orders import Order
 from seqopt.sequence.free_check import RuleBook

@@ -12,7 +12,7 @@ from seqopt.graph.paths import tied
 from seqopt.graph.states.states import States
 from seqopt.graph.states.visits import move_amounts
 from seqopt.plan.judge.answers import ask
-from seqopt.plan.judge.free_moves import Follows, RuleTables
+from seqopt.plan.judge.rule_moves import Follows, RuleTables
 from seqopt.plan.judge.scheduled_moves import ScheduleTables
 from seqopt.plan.judge.standing_proof import StandingProof
 from seqopt.problem.goals import Measure

@@ -18,8 +18,8 @@ from seqopt.graph.duality import lexicographic_bounds
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import lexicographic, reached
 from seqopt.graph.states.states import States
-from seqopt.plan.judge.free_moves import Follows
 from seqopt.plan.judge.passable import Asked, Passable
+from seqopt.plan.judge.rule_moves import Follows
 from seqopt.problem.goals import Measure
 
 BELOW = 1e-9  # by how much a plan must be better, over the size of the value

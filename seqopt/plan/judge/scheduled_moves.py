@@ -13,7 +13,7 @@ import numpy as np
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.errors import StepError
 from seqopt.network.network import Network
-from seqopt.plan.judge.free_moves import Follows
+from seqopt.plan.judge.rule_moves import Follows
 from seqopt.sequence.schedule import Hold, OpenGrip, Schedule, holds
 from seqopt.sequence.steps import Step, StepKind
 

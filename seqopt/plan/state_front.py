@@ -27,7 +27,7 @@ DIGITS = 9  # after the first
 EDGE = 1e-9  # of a rounding step: how far above a multiple a value still counts as it
 
 
-class FreeFront:
+class StateFront:
     """The schedule of a problem whose goals are all to be small at once.
 
     ``problem``: its goals are responses, margins of stability, and of a free schedule steps and
@@ -45,11 +45,11 @@ class FreeFront:
         self._round, self._rounding = _rounding_steps(self.names, rounding), rounding
 
     def __repr__(self) -> str:
-        return f"<FreeFront of {self._problem}>"
+        return f"<StateFront of {self._problem}>"
 
-    def anew(self) -> FreeFront:
+    def anew(self) -> StateFront:
         """Return the same problem with nothing known of it, for its judge."""
-        return FreeFront(replace(self._problem), self._rounding)
+        return StateFront(replace(self._problem), self._rounding)
 
     @property
     def names(self) -> tuple[str, ...]:
