@@ -15,7 +15,7 @@ from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.plan.calling.formulation import On, find_formulation
 from seqopt.plan.plan import Plan
-from seqopt.plan.posing import pose
+from seqopt.plan.posing import in_layers, pose
 from seqopt.plan.solving import solve
 from seqopt.problem.criteria import WORST_OVER_METHODS
 from seqopt.problem.problem import Orders, Problem
@@ -166,8 +166,8 @@ def _is_free(schedule: object) -> bool:
 def _of_states(moves: Schedule | FreeRules, asked: dict[str, Any], formulation: str | None) -> bool:
     """Return whether states are chosen, and not candidates of moves."""
     said = any(asked.get(name) for name in (*STATE_WORDS, "orders"))
-    if said or isinstance(moves, FreeRules) or formulation is None:
-        return said or isinstance(moves, FreeRules)
+    if said or not in_layers(moves) or formulation is None:
+        return said or not in_layers(moves)
     return find_formulation(formulation).on is On.STATES
 
 

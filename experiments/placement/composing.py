@@ -84,7 +84,6 @@ GOES = {
 }
 OWN, FREE, ORDERS = [*SCHEDULES][2:]
 REFUSED = {
-    (OWN,): ["as it is"],
     (OWN, FREE, ORDERS): [
         *("overlap_dp", "rank_search"),  # they need moves with candidates
         *("the worst total of scenarios", "the mean of the worst scenarios"),

@@ -101,11 +101,16 @@ def natural(problem: Problem) -> On:
     """Return which graph answers a problem if no formulation says."""
     if problem.orders is not None:
         return On.ORDERS
-    if isinstance(problem.moves, FreeRules) or problem.goals or problem.stands is not None:
+    if not in_layers(problem.moves) or problem.goals or problem.stands is not None:
         return On.STATES
     if problem.scenarios and problem.over.aim is Aim.SUM:
         return On.SCENARIOS
     return On.LAYERS
+
+
+def in_layers(moves: Schedule | FreeRules) -> bool:
+    """Return whether candidates of moves can be chosen in layers: whatever is wrong, it says so."""
+    return not isinstance(moves, FreeRules) and getattr(moves, "has_pairs", True)
 
 
 def usual(problem: Problem) -> str:
@@ -228,6 +233,15 @@ def _states(problem: Problem) -> States:
     return over_scenarios(found, problem.scenarios) if problem.scenarios else found
 
 
+def _in_own_order(problem: Problem) -> States:
+    if problem.orders is not None:
+        raise ProblemError(
+            f"{problem.orders.value} orders: a Pareto set, or states alone, are of one order; take "
+            "order_search, or give an order"
+        )
+    return _states(problem)
+
+
 def _all_orders(problem: Problem) -> AllOrders:
     if problem.orders is None:
         raise ProblemError("an order is given; pose with orders='tied' to seek one")
@@ -237,9 +251,8 @@ def _all_orders(problem: Problem) -> AllOrders:
 MADE: dict[On, Callable[[Problem], Graph]] = {
     On.LAYERS: _layers,
     On.SCENARIOS: _scenarios,
-    On.STATES: _states,
+    On.STATES: _in_own_order,
     On.ORDERS: _all_orders,
-    On.FRONTS: _states,
 }
 
 

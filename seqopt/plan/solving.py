@@ -86,8 +86,9 @@ def _solved(problem: Any, formulation: Formulation | str | None, run: Run) -> Pl
         found = _of_graph(problem, formulation)
         return SOLVE[found.on](problem, found, run)
     found = as_formulation(formulation or usual(problem), *_able(problem))
+    graph = graph_of(problem, found.on)
     _require_goal(problem, found)
-    return replace(SOLVE[found.on](graph_of(problem, found.on), found, run), problem=problem)
+    return replace(SOLVE[found.on](graph, found, run), problem=problem)
 
 
 def _able(problem: Problem) -> tuple[On, ...]:

@@ -169,12 +169,25 @@ class Schedule(Shown):
 
         What ranks or compares candidates of moves needs that; what chooses states does not.
         """
+        step = self._crowded
+        if step is not None:
+            raise StepError(
+                f"step {step.number}: moves {[m + 1 for m in step.moves]} are open at once; "
+                "for costs of moves at most two neighboring ones can be; give an aim"
+            )
+
+    @property
+    def has_pairs(self) -> bool:
+        """Whether at most two moves, neighboring ones, share a step: moves form layers then."""
+        return self._crowded is None
+
+    @property
+    def _crowded(self) -> OpenStep | None:
+        """The first step that moves share which are more than two, or do not follow each other."""
         for step in self.steps:
             if len(step.moves) > 2 or (len(step.moves) == 2 and step.moves[1] != step.moves[0] + 1):
-                raise StepError(
-                    f"step {step.number}: moves {[m + 1 for m in step.moves]} are open at once; "
-                    "for costs of moves at most two neighboring ones can be; give an aim"
-                )
+                return step
+        return None
 
     def __repr__(self) -> str:
         counts = [len(move.candidates) for move in self.moves]

@@ -82,9 +82,12 @@ def _wants_states(options: argparse.Namespace) -> bool:
 
 
 def _criterion(options: argparse.Namespace, *, of_states: bool) -> Criterion | None:
-    if not of_states:
-        return asked_criterion(options)
-    return None if options.criteria is None else parse_criterion(options.criteria, options.crown)
+    """Return the criterion that is asked for; None leaves it to what is posed."""
+    if of_states:
+        asked = options.criteria is not None
+        return parse_criterion(options.criteria, options.crown) if asked else None
+    said = (options.criteria, options.crown, options.ranked, options.among)
+    return None if said == (None,) * 4 else asked_criterion(options)
 
 
 def _asked_moves(options: argparse.Namespace, network: Network) -> Schedule | FreeRules:
