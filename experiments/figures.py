@@ -31,10 +31,9 @@ from experiments.harness.yardstick import VALUES
 from seqopt.arrays import Floats
 from seqopt.engines.interface import Engine, Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.graph.states.states import build_states
 from seqopt.network.build import build_network
-from seqopt.plan.free_front import FreeFront
 from seqopt.plan.front import find_front
+from seqopt.plan.posing import pose
 from seqopt.report.charts import draw_responses, front_figure
 from seqopt.report.comparison import method_tables
 from seqopt.report.draw import (
@@ -258,8 +257,8 @@ def free_front(engine: Engine) -> Figure:
     """Draw the Pareto sets of the free schedule and of the loop, and the methods of the paper."""
     names = [*ROUNDED]
     rules = FreeRules(), three_robot_loop(engine.network)
-    posed = [build_states(engine, each, WORST_RATIO, ",".join(names)) for each in rules]
-    fronts = [find_front(FreeFront(problem, ROUNDED)) for problem in posed]
+    posed = [pose(engine, each, WORST_RATIO, ",".join(names)) for each in rules]
+    fronts = [find_front(problem, rounding=ROUNDED) for problem in posed]
     methods = method_tables(engine)[0]
     return front_figure(fronts[0], methods, {"three-robot loop": fronts[1].table})
 
