@@ -1,4 +1,4 @@
-r"""The free schedule by continuing the most promising path first (A*): exact.
+r"""The states of a build by continuing the most promising path first (A*): exact.
 
 A path to a state :math:`v` that takes :math:`z_g` of a goal takes at least
 

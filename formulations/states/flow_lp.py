@@ -1,4 +1,4 @@
-r"""The free schedule as a unit flow through the graph of its states, by linear programs: exact.
+r"""A build as a unit flow through the graph of its states, by linear programs: exact.
 
 With moves :math:`a = (u, v)` that take :math:`c_a`, for a goal that is a sum,
 

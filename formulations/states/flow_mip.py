@@ -1,4 +1,4 @@
-r"""The free schedule as a whole unit flow through the graph of its states (HiGHS): exact.
+r"""A build as a whole unit flow through the graph of its states (HiGHS): exact.
 
 With moves :math:`a = (u, v)` that take :math:`c_a`, for a goal that is a sum or a peak,
 

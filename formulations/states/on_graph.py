@@ -1,4 +1,4 @@
-"""What formulations of the free schedule share: the graph of states, and plans from its paths.
+"""What formulations of states share: the graph of states, and plans from its paths.
 
 A formulation over the graph is a function from a `seqopt.graph.Graph` to a `Choice`: a path, and
 what no path stays below; see `on_graph`.
@@ -64,7 +64,7 @@ def on_graph(
     choose: Callable[[Graph, Watch], Choice],
     kind: FormulationKind = FormulationKind.EXACT,
 ) -> Formulation:
-    """Return the formulation of the free schedule that chooses a path through the graph of states.
+    """Return the formulation of states that chooses a path through the graph of states.
 
     ``name``, ``summary``: what it is called, and what it does in a few words; ``choose``: returns a
     `Choice` of a graph whose moves are all on paths from the start to an end; stops when a
@@ -104,7 +104,7 @@ def _chosen(
         first = narrow(problem, WIDTH, tell)
         wide = explore(problem, first.objective[0] if first else np.inf, tell=tell)
         if not wide.whole:
-            raise InfeasibleError("no plan of the free schedule is allowed")
+            raise InfeasibleError("no plan is allowed")
         wide.refine()
         graph, states = wide.graph()
         with answered(watch.interrupt):
@@ -221,7 +221,7 @@ def watched(problem: States, watch: Watch, most: float, progress: Tell) -> Watch
 
     def tell(found: Explorer) -> None:
         share = found.level / problem.space.levels
-        progress(Stage(f"free schedule, pass {found.passes}", share))
+        progress(Stage(f"states, pass {found.passes}", share))
         if watch.over:
             raise StopError("time")
         room = min(most, free_memory() + found.nbytes)

@@ -1,4 +1,4 @@
-r"""The free schedule by a beam of given width: a heuristic that computes few responses.
+r"""The states of a build by a beam of given width: a heuristic that computes few responses.
 
 Brick count by brick count it keeps the ``width`` states :math:`s` of least value :math:`v` that
 those kept before lead to by placing a brick and letting go,
@@ -63,7 +63,7 @@ def solve(
             if found is None:
                 every = Explorer(FreeStates(rest), tell=tell)
                 if not every.rise():
-                    raise InfeasibleError("no plan of the free schedule is allowed")
+                    raise InfeasibleError("no plan is allowed")
                 found = best_standing(rest, every)
         except StopError as stop:
             return plan_by_then(None, stop)

@@ -1,4 +1,4 @@
-r"""The free schedule by dynamic programming over the whole graph of its states: exact.
+r"""The states of a build by dynamic programming over the whole graph of its states: exact.
 
 For one goal after the other, with moves :math:`a = (u, v)` that take :math:`c_a`,
 

@@ -1,4 +1,4 @@
-r"""The free schedule by setting labels, vectors of all goals at once: exact.
+r"""The states of a build by setting labels, vectors of all goals at once: exact.
 
 A label of a state :math:`v` is what goals take of a path to it, :math:`z = (z_1, z_2, \dots)`. With
 a move :math:`a = (v, w)` it becomes one of :math:`w`,

@@ -1,4 +1,4 @@
-r"""The free schedule by threshold and reachability, one goal after the other: exact.
+r"""The states of a build by threshold and reachability, one goal after the other: exact.
 
 A state is how many bricks stand and which node each robot holds; a plan is a path from the empty
 site to an end of the build, each of its moves a step. Goals :math:`g_1, g_2, \dots` are minimized
@@ -68,7 +68,7 @@ def solve(
     max_memory: float = np.inf,
     progress: Tell = lambda _: None,
 ) -> StatePath:
-    """Return the best free schedule.
+    """Return the best path.
 
     ``width``: from how many new states of a brick count the narrow search goes on; ``growth``: by
     how much the threshold rises from one search to the next, over itself; ``seconds``: after which
@@ -91,7 +91,7 @@ def solve(
 
 
 def _search(problem: States, options: tuple[int, float], tell: Watching) -> StatePath:
-    """Return the best free schedule, or the first one found where the search is stopped."""
+    """Return the best path, or the first one found where the search is stopped."""
     found, proven = None, [-np.inf]
     wide = Explorer(FreeStates(problem), tell=tell)
     try:
@@ -109,7 +109,7 @@ def _require_room(problem: States, tell: Watching) -> None:
     totals = problem.goals[len(problem.aims) :]
     every = Explorer(FreeStates(replace(problem, goals=totals, budgets=())), tell=tell)
     if every.rise() and is_beyond(every.graph().graph, problem.budgets):
-        raise InfeasibleError("no plan of the free schedule is within all budgets")
+        raise InfeasibleError("no plan is within all budgets")
 
 
 def _best(
@@ -131,7 +131,7 @@ def _best(
             except InfeasibleError:  # of what stands
                 pass
         if wide.excluded == np.inf:
-            raise InfeasibleError("no plan of the free schedule is allowed")
+            raise InfeasibleError("no plan is allowed")
         proven.append(wide.excluded)  # of a state that every plan would have to pass, or a larger
         grown = threshold * growth if np.isfinite(threshold) else -np.inf
         threshold = max(wide.excluded, min(ceiling, grown))
@@ -169,7 +169,7 @@ def _unproven(found: StatePath, wide: Explorer, proven: float) -> StatePath:
 
 FORMULATION = Formulation(
     "schedule_search",
-    "threshold and reachability among the states of the free schedule",
+    "threshold and reachability among the states of a build",
     FormulationKind.EXACT,
     None,
     solve,

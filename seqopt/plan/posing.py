@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from seqopt.contact.mortar import Mortar, find_mortar
+from seqopt.contact.mortar import Mortar
 from seqopt.engines.interface import Engine
 from seqopt.errors import ProblemError
 from seqopt.graph.layers.layers import Layers, candidate_layers
@@ -21,14 +21,13 @@ from seqopt.graph.scenarios.scenarios import ScenarioLayers, in_scenarios
 from seqopt.graph.states.states import States, build_states, over_scenarios, within
 from seqopt.plan.calling.formulation import On
 from seqopt.plan.shares import with_budgets
-from seqopt.problem.aims import WORST_PEAK, Aim, RobustAim, parse_robust
+from seqopt.problem.aims import WORST_PEAK, Aim, RobustAim
 from seqopt.problem.budgets import parse_budgets, parse_caps
-from seqopt.problem.goals import Goal, Measure, parse_goals
+from seqopt.problem.goals import Goal, Measure
 from seqopt.problem.problem import Orders, Problem
-from seqopt.problem.requirements import Criterion, Limit, as_limits
+from seqopt.problem.requirements import Criterion, Limit
 from seqopt.problem.standing import Standing
 from seqopt.responses.resources import HERE, Resources
-from seqopt.scene.checks import short
 from seqopt.scene.scenarios import Scenarios
 from seqopt.scene.scene import Scene
 from seqopt.sequence.free_rules import FreeRules
@@ -85,9 +84,10 @@ def pose(  # noqa: PLR0913  # every question is a word of its own
     >>> seqopt.pose(engine, seqopt.FreeRules(), worst, "minmax,steps", budgets="regrips=3")
     Problem('arch25', 'free', criterion 'worst-ratio', minmax, steps, 1 budgets)
     """
-    asked = (_goals(goals), as_limits(limits), _words(budgets), _standing(stands))
-    worlds = (_scenes(scenarios), _over(over), None if orders is None else Orders.of(orders))
-    return _scaled(Problem(engine, moves, criterion, *asked, *worlds, tuple(also), resources))
+    asked = {"goals": goals, "limits": limits, "budgets": budgets, "stands": stands}
+    worlds = {"scenarios": scenarios, "over": over, "orders": orders}
+    more = {"also": also, "resources": resources}
+    return _scaled(Problem.asked(engine, moves, criterion, **asked, **worlds, **more))
 
 
 def _scaled(problem: Problem) -> Problem:
@@ -254,34 +254,3 @@ MADE: dict[On, Callable[[Problem], Graph]] = {
     On.STATES: _in_own_order,
     On.ORDERS: _all_orders,
 }
-
-
-def _goals(given: Sequence[Goal] | str) -> tuple[Goal, ...]:
-    """Return goals that are given as such, or by their names."""
-    goals = parse_goals(given) if isinstance(given, str) else given
-    if not isinstance(goals, Sequence) or {*map(type, goals)} - {Goal}:
-        raise ProblemError(f"aims {short(given)}: give goals, or their names, as 'minmax,steps'")
-    return tuple(goals)
-
-
-def _words(given: Sequence[str] | str) -> tuple[str, ...]:
-    """Return budgets in words; what is none is refused with the others."""
-    if isinstance(given, str) or not isinstance(given, Sequence):
-        return (given,)
-    return tuple(given)
-
-
-def _standing(given: Standing | Mortar | str | None) -> Standing | None:
-    return given if isinstance(given, Standing | None) else Standing(find_mortar(given))
-
-
-def _scenes(given: Scenarios | Sequence[Scene]) -> tuple[Scene, ...]:
-    return given.scenes if isinstance(given, Scenarios) else tuple(given)
-
-
-def _over(given: RobustAim | str) -> RobustAim:
-    """Return an aim over scenarios that is given as such, or in words."""
-    aim = parse_robust(given) if isinstance(given, str) else given
-    if not isinstance(aim, RobustAim):
-        raise ProblemError(f"robust aim {short(aim)}: give worst-peak, worst-total or cvar=0.9")
-    return aim

@@ -59,7 +59,8 @@ def _parse(text: str) -> AskedBudget:
     found = SHAPE.fullmatch(text)
     if found is None or (found["level"] is None) != (found["kind"] == "travel"):
         hint = did_you_mean(re.split("[=:]", text)[0], ("travel", "steps_over", "robot_use"))
-        raise ProblemError(f"budget {text} does not exist{hint}; give {FORMS}")
+        states = f", or with an aim {CAPS}" if CAP.fullmatch(text) else ""
+        raise ProblemError(f"budget {text} does not exist{hint}; give {FORMS}{states}")
     is_travel = found["kind"] == "travel"
     if found["unit"] == "m" and not is_travel:
         raise ProblemError(f"budget {text}: steps have no meters; give a number of them")

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 from functools import cached_property
 from typing import Any
 
+from seqopt.contact.mortar import Mortar, find_mortar
 from seqopt.engines.interface import Engine
 from seqopt.errors import ProblemError
-from seqopt.problem.aims import WORST_PEAK, RobustAim
-from seqopt.problem.goals import Goal
-from seqopt.problem.requirements import Criterion, Limit
+from seqopt.problem.aims import WORST_PEAK, RobustAim, parse_robust
+from seqopt.problem.goals import Goal, parse_goals
+from seqopt.problem.requirements import Criterion, Limit, as_limits
 from seqopt.problem.standing import Standing
 from seqopt.responses.resources import HERE, Resources
+from seqopt.scene.checks import short
+from seqopt.scene.scenarios import Scenarios
 from seqopt.scene.scene import Scene
 from seqopt.sequence.free_rules import FREE, FreeRules
 from seqopt.sequence.schedule import Schedule
@@ -74,7 +78,7 @@ class Problem(Shown):
     >>> problem = seqopt.optimize("arch25", "free", aim="minmax,steps").problem
     >>> problem
     Problem('arch25', 'free', criterion 'worst-ratio', minmax, steps)
-    >>> seqopt.solve(problem.but(budgets=("regrips=3",))).status
+    >>> seqopt.solve(problem.but(budgets="regrips=3")).status
     <Status.OPTIMAL: 'optimal'>
     """
 
@@ -122,11 +126,73 @@ class Problem(Shown):
             raise ProblemError("the free schedule has no open grips; it has states")
         return self.moves
 
-    def but(self, **changes: Any) -> Problem:
-        """Return the same problem with something else asked; nothing that is known is kept."""
-        return replace(self, **changes)
+    @classmethod
+    def asked(
+        cls, engine: Engine, moves: Schedule | FreeRules, criterion: Criterion, **words: Any
+    ) -> Problem:
+        """Return a problem of what is asked, in values or in words, as of `seqopt.pose`."""
+        return cls(engine, moves, criterion, **_in_values(words))
+
+    def but(self, **words: Any) -> Problem:
+        """Return the same problem with something else asked, in values or in words."""
+        return replace(self, **_in_values(words))
 
     @cached_property
     def graphs(self) -> dict[str, Any]:
         """The graphs of choices that were made for it, which keep what was computed."""
         return {}
+
+
+def _in_values(words: Mapping[str, Any]) -> dict[str, Any]:
+    """Return values in the place of words, by what they are about."""
+    return {name: READ.get(name, _as_it_is)(value) for name, value in words.items()}
+
+
+def _as_it_is(given: object) -> object:
+    return given
+
+
+def _goals(given: Sequence[Goal] | str) -> tuple[Goal, ...]:
+    """Return goals that are given as such, or by their names."""
+    goals = parse_goals(given) if isinstance(given, str) else given
+    if not isinstance(goals, Sequence) or {*map(type, goals)} - {Goal}:
+        raise ProblemError(f"aims {short(given)}: give goals, or their names, as 'minmax,steps'")
+    return tuple(goals)
+
+
+def _budgets(given: Sequence[str] | str) -> tuple[str, ...]:
+    """Return budgets in words; what is none is refused where they are read."""
+    several = isinstance(given, Sequence) and not isinstance(given, str)
+    return tuple(given) if several else (given,)  # type: ignore[return-value]
+
+
+def _standing(given: Standing | Mortar | str | None) -> Standing | None:
+    return given if isinstance(given, Standing | None) else Standing(find_mortar(given))
+
+
+def _scenes(given: Scenarios | Sequence[Scene]) -> tuple[Scene, ...]:
+    return given.scenes if isinstance(given, Scenarios) else tuple(given)
+
+
+def _over(given: RobustAim | str) -> RobustAim:
+    """Return an aim over scenarios that is given as such, or in words."""
+    aim = parse_robust(given) if isinstance(given, str) else given
+    if not isinstance(aim, RobustAim):
+        raise ProblemError(f"robust aim {short(aim)}: give worst-peak, worst-total or cvar=0.9")
+    return aim
+
+
+def _orders(given: Orders | str | None) -> Orders | None:
+    return None if given is None else Orders.of(given)
+
+
+READ: dict[str, Callable[[Any], Any]] = {
+    "goals": _goals,
+    "limits": as_limits,
+    "budgets": _budgets,
+    "stands": _standing,
+    "scenarios": _scenes,
+    "over": _over,
+    "orders": _orders,
+    "also": tuple,
+}

@@ -249,3 +249,23 @@ def test_a_plan_that_is_not_the_best_is_seen():
     for wrong in ([0.9 * best[0], best[1]], [1.1 * best[0], best[1]], [best[0], best[1] - 1]):
         with pytest.raises(AssertionError):
             agree(problem, PLANS[0], wrong, 2)
+
+
+@pytest.mark.parametrize("scenarios", [0, 2])
+@pytest.mark.parametrize("name", ["three-robot", "modified-sequential"])
+def test_candidates_and_states_have_one_optimum(name, scenarios):
+    """The least worst step by layers, by states, and by every formulation of either."""
+    engine, schedule = engines_of(name, 0)[0], rules_of(name, "")
+    drawn = seqopt.scenarios(scene_of(name), count=2, seed=3) if scenarios else ()
+    problem = seqopt.pose(engine, schedule, ONES, scenarios=drawn)
+    given = [(s.bricks, s.grips) for s in schedule.steps if not s.moves]
+    closed = max((taken("minmax", state(name, scenarios, "", each)) for each in given), default=0.0)
+    exact = [f for f in PLANS if f.kind is FormulationKind.EXACT]
+    peaks = ["minimax", "minimax_layer"]
+    found = {f: seqopt.solve(problem, f) for f in (*exact, *peaks)}
+    least = [max(found[name].certificate.objective, closed) for name in peaks]
+    least += [found[f].certificate.objective for f in exact]
+    assert least == pytest.approx([least[0]] * len(least), rel=1e-6)
+    assert {plan.status for plan in found.values()} == {"optimal"}
+    other = seqopt.solve(problem.but(limits=[Limit("F_largest", 1e9)]), "minimax")
+    assert other.certificate.objective == pytest.approx(found["minimax"].certificate.objective)

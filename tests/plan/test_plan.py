@@ -17,6 +17,7 @@ from seqopt.graph.layers.interface import CostProblem
 from seqopt.graph.layers.layers import Layers, candidate_layers
 from seqopt.plan.calling.formulation import FormulationKind, On
 from seqopt.study.presets import find_criterion
+from tests.builders import small_arch
 
 WORST = seqopt.CRITERIA["worst-ratio-published"]
 
@@ -176,3 +177,47 @@ def test_a_problem_is_the_same_after_pickling(engine25):
     assert hash(costs) == hash(problem.sums)
     assert not costs.single[0].flags.writeable
     assert isinstance(problem, Layers)
+
+
+def test_every_plan_has_one_summary():
+    """Its keys do not depend on what was chosen from, but for the criterion's and the order's."""
+    scene, ones = small_arch(5), seqopt.CRITERIA["worst-ratio"]
+    plans = [
+        seqopt.optimize(scene, criterion=ones),
+        seqopt.optimize(scene, criterion=ones, formulation="cascade", proof=False),
+        seqopt.optimize(scene, criterion=ones, formulation="path_dp"),
+        seqopt.optimize(scene, "free"),
+        seqopt.optimize(scene, criterion=ones, scenarios=seqopt.scenarios(scene, count=2)),
+        seqopt.optimize(scene, "free", order="search"),
+    ]
+    own = {"criterion", *(name for plan in plans for name in criterion_of(plan).settings)}
+    keys = [{k for k in p.summary() if k not in own and not k.startswith("order")} for p in plans]
+    assert keys == [keys[0]] * len(plans)
+    assert [type(plan.summary()["objective"]) for plan in plans] == [dict] * len(plans)
+    assert {"order", "orders", "order_bound_proven"} <= set(plans[-1].summary())
+    for plan in plans:
+        assert len(plan.responses()) == len(plan.steps)
+        assert len(plan.table()) > 0
+
+
+def criterion_of(plan):
+    return plan.layers.criterion if hasattr(plan.selection, "choice") else plan.states.criterion
+
+
+def test_a_problem_is_changed_in_words():
+    scene = small_arch(5)
+    engine = seqopt.make_engine("compliance", scene)
+    problem = seqopt.pose(engine, seqopt.FreeRules(), seqopt.CRITERIA["worst-ratio"])
+    drawn = seqopt.scenarios(scene, count=2)
+    words = {"goals": "minmax,steps", "stands": "bond=1e6", "over": "worst-peak", "orders": "tied"}
+    changed = problem.but(
+        **words, scenarios=drawn, budgets="steps=40", limits=seqopt.Limit("T_max", 1e6)
+    )
+    posed = seqopt.pose(*(engine, seqopt.FreeRules(), problem.criterion), goals="minmax,steps")
+    assert changed.goals == posed.goals
+    assert changed.but(orders=None).orders is None
+    assert (changed.scenarios, changed.budgets) == (drawn.scenes, ("steps=40",))
+    assert str(changed.over) == "worst-peak"
+    for wrong in ({"goals": 5}, {"orders": "any order"}, {"over": 3}, {"stands": "jelly"}):
+        with pytest.raises(seqopt.SeqoptError):
+            problem.but(**wrong)
