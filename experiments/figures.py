@@ -51,8 +51,7 @@ from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.free_rules import FreeRules
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.study.presets import WORST_RATIO
-from seqopt.study.published import as_printed
-from seqopt.study.tables import printed_steps
+from seqopt.study.published import as_printed, printed_steps
 
 VIEW = View(azimuth=35, elevation=22)
 WORDS = (

@@ -36,8 +36,7 @@ from seqopt.scene.imports.contacts import flat_face
 from seqopt.scene.imports.detection import Surface, touching_faces
 from seqopt.scene.library.joints import overlaps
 from seqopt.stability.assessment import assess, bonded
-from seqopt.stability.held_program import first_directions
-from seqopt.stability.held_states import HoldingForces, Known
+from seqopt.stability.held_states import HoldingForces, Known, first_directions
 from seqopt.stability.prover import Prover
 from tests.blocks import box
 

@@ -76,8 +76,7 @@ from seqopt.responses.table import analyze
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import save_scene
 from seqopt.sequence.two_robots import METHODS
-from seqopt.study.published import as_printed
-from seqopt.study.tables import printed_steps
+from seqopt.study.published import as_printed, printed_steps
 
 SCENE = HOME.parent / "seqopt" / "data" / "scenes" / "arch25.json"
 MORE = 2  # times that a fit worse than the shipped one is continued

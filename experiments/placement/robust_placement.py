@@ -46,8 +46,7 @@ from seqopt.network.build import build_network
 from seqopt.plan.calling.watch import Watch
 from seqopt.plan.out_of_sample import judge_unseen
 from seqopt.plan.plan import Plan
-from seqopt.plan.search.in_order import solve_in_order
-from seqopt.plan.search.step_quantile import least_quantile
+from seqopt.plan.search.in_order import least_quantile, solve_in_order
 from seqopt.plan.solving import solve
 from seqopt.problem.aims import WORST_PEAK, WORST_TOTAL, Aim, RobustAim, cvar
 from seqopt.problem.requirements import Criterion

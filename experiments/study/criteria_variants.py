@@ -35,9 +35,8 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.graph.layers.layers import Layers, candidate_layers
 from seqopt.graph.layers.ranking import TIED, rank_choice, rank_of
 from seqopt.network.build import build_network
-from seqopt.problem.criteria import RankSum
+from seqopt.problem.criteria import RankSum, equal
 from seqopt.problem.ranks import mean_ranks
-from seqopt.problem.terms import equal
 from seqopt.report.style import BLUE, GRAY, GREEN, PURPLE, VERMILION, dress, new_figure, styled
 from seqopt.responses.choices import StepChoices
 from seqopt.scene.scene_file import load_scene

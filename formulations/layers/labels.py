@@ -36,8 +36,14 @@ from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.graph.layers.interface import PlacementProblem
 from seqopt.plan.calling.first_choice import stopped
 from seqopt.plan.calling.formulation import End, Formulation, FormulationKind, Selection
-from seqopt.plan.calling.priced_paths import ROUNDING, Path, PricedPaths, priced_paths
-from seqopt.plan.calling.prices import Priced, best_prices
+from seqopt.plan.calling.priced_paths import (
+    ROUNDING,
+    Path,
+    Priced,
+    PricedPaths,
+    best_prices,
+    priced_paths,
+)
 from seqopt.plan.calling.watch import Watch
 from seqopt.problem.aims import Aim
 

@@ -33,8 +33,7 @@ from seqopt.arrays import Floats
 from seqopt.graph.layers.interface import PlacementProblem
 from seqopt.plan.calling.first_choice import stopped
 from seqopt.plan.calling.formulation import End, Formulation, FormulationKind, Selection
-from seqopt.plan.calling.priced_paths import Path, PricedPaths, priced_paths
-from seqopt.plan.calling.prices import best_prices
+from seqopt.plan.calling.priced_paths import Path, PricedPaths, best_prices, priced_paths
 from seqopt.plan.calling.watch import Watch
 from seqopt.problem.aims import Aim
 

@@ -32,9 +32,8 @@ import numpy as np
 
 from seqopt.errors import InfeasibleError, ProblemError, TimeUpError
 from seqopt.graph.explore import Explorer
-from seqopt.graph.orders.bound import whole_bound
 from seqopt.graph.orders.orders import AllOrders, OrderSelection
-from seqopt.graph.orders.visits import OrderStates, TooManySetsError
+from seqopt.graph.orders.visits import OrderStates, TooManySetsError, whole_bound
 from seqopt.graph.orders.work import Trial, trying, worth
 from seqopt.graph.parts import Visited
 from seqopt.graph.paths import keep_best, lexicographic, reached

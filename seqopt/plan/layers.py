@@ -10,15 +10,12 @@ from seqopt.errors import ProblemError
 from seqopt.graph.layers.interface import PlacementProblem
 from seqopt.graph.layers.layers import Layers
 from seqopt.graph.scenarios.scenarios import ScenarioLayers
-from seqopt.plan.calling.fitting import require_fit, require_proof, require_time
 from seqopt.plan.calling.formulation import End, Formulation, On, Selection, formulations
-from seqopt.plan.calling.selecting import select
-from seqopt.plan.calling.watch import Watch
+from seqopt.plan.calling.selecting import require_fit, require_proof, require_time, select
+from seqopt.plan.calling.watch import Run, Watch, timed
 from seqopt.plan.judge.anew import require_anew
-from seqopt.plan.judge.certificate import Certificate, certify_partial, judge
-from seqopt.plan.judge.scenarios import certify_scenarios
+from seqopt.plan.judge.certificate import Certificate, certify_partial, certify_scenarios, judge
 from seqopt.plan.plan import Plan
-from seqopt.plan.run import Run, timed
 from seqopt.plan.search.pair_search import search_pairs
 from seqopt.plan.search.window_search import search_windows
 from seqopt.problem.aims import Aim

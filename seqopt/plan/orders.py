@@ -16,10 +16,10 @@ from seqopt.graph.orders.orders import AllOrders, OrderSelection
 from seqopt.plan.calling.formulation import Formulation, find_formulation
 from seqopt.plan.calling.guard import called, readable, text
 from seqopt.plan.calling.state_path import StatePath
+from seqopt.plan.calling.watch import Run
 from seqopt.plan.judge.certificate import TOLERANCE
 from seqopt.plan.judge.orders import finds_better_order
 from seqopt.plan.plan import Plan
-from seqopt.plan.run import Run
 from seqopt.plan.states import solve_states
 from seqopt.plan.status import FoundOrder
 from seqopt.responses.resources import HERE

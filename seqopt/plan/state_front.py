@@ -13,10 +13,9 @@ from seqopt.errors import ProblemError
 from seqopt.graph.graph import Graph
 from seqopt.graph.parts import Visited
 from seqopt.graph.paths import distances, fewest_moves, keep_best, reached
-from seqopt.graph.states.counts import steps_with, with_held
 from seqopt.graph.states.states import States
 from seqopt.graph.states.steps import steps_of
-from seqopt.graph.states.visits import explore
+from seqopt.graph.states.visits import explore, steps_with, with_held
 from seqopt.plan.judge.infeasible import confirmed
 from seqopt.plan.judge.schedules import plan_values
 from seqopt.problem.goals import Measure

@@ -12,14 +12,14 @@ from typing import Any
 from seqopt.errors import InfeasibleError
 from seqopt.graph.states.states import States
 from seqopt.graph.states.steps import steps_of
-from seqopt.plan.calling.fitting import require_proof
 from seqopt.plan.calling.formulation import Formulation, FormulationKind
 from seqopt.plan.calling.guard import called
+from seqopt.plan.calling.selecting import require_proof
 from seqopt.plan.calling.state_path import StatePath, with_numbers
+from seqopt.plan.calling.watch import Run
 from seqopt.plan.judge.infeasible import confirmed
 from seqopt.plan.judge.schedules import judge_schedule
 from seqopt.plan.plan import Plan
-from seqopt.plan.run import Run
 from seqopt.responses.resources import HERE
 from seqopt.work.workers import keep
 

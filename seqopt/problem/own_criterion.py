@@ -10,9 +10,9 @@ import numpy as np
 
 from seqopt.arrays import Floats
 from seqopt.errors import ProblemError, said
+from seqopt.problem.criteria import present, spell_out
 from seqopt.problem.requirements import ChoiceResponses
 from seqopt.problem.scales import SceneFacts
-from seqopt.problem.terms import present, spell_out
 from seqopt.scene.checks import short
 
 StepFunction = Callable[[Mapping[str, Floats], int], Floats]

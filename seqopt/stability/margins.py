@@ -21,8 +21,7 @@ from seqopt.network.build import network_of
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
 from seqopt.stability.assessment import ROUGHEST, bonded
-from seqopt.stability.held_program import CompileHeld, compile_held
-from seqopt.stability.held_states import HeldStates, node_assembly
+from seqopt.stability.held_states import CompileHeld, HeldStates, compile_held, node_assembly
 from seqopt.stability.limit_analysis import CAP, GAP, Case
 from seqopt.stability.prover import DIRECTIONS, FINE, NEAR, in_every_direction, sideways
 from seqopt.stability.screens import FALLS, STANDS, Screen, held_places

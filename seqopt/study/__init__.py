@@ -23,10 +23,11 @@ from seqopt.study.published import (
     IRREGULARITIES,
     as_printed,
     is_reference_arch,
+    printed,
     printed_maxima,
+    printed_steps,
     published_plan,
 )
-from seqopt.study.tables import printed, printed_steps
 
 __all__ = [
     "CRITERIA",

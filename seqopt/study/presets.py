@@ -10,9 +10,9 @@ from seqopt.problem.criteria import (
     RankSum,
     WeightedSum,
     WorstRatio,
+    equal,
 )
 from seqopt.problem.requirements import Criterion
-from seqopt.problem.terms import equal
 from seqopt.scene.parts import Anywhere, Robot, Side
 
 ROBOTS = (

@@ -20,7 +20,7 @@ from seqopt.responses.table import analyze, step_fields
 from seqopt.scene.scene_file import save_scene
 from seqopt.sequence.schedule_file import schedule_text
 from seqopt.sequence.two_robots import cantilever, sequential
-from seqopt.study.tables import printed_steps
+from seqopt.study.published import printed_steps
 from tests.builders import anywhere, from_both_ends
 
 

@@ -39,7 +39,7 @@ from experiments.calibration.parts.calibration_spread import (
 from experiments.harness.results import RESULTS
 from seqopt.network.build import build_network
 from seqopt.network.mechanics import spring_maps
-from seqopt.study.tables import printed
+from seqopt.study.published import printed
 
 VAULTS = vaults()
 MODELS = laws(VAULTS)

@@ -33,7 +33,7 @@ from experiments.placement import (
 from experiments.stability import dry_map, witnesses
 from experiments.study import criteria_variants, paper_counterparts
 from experiments.study.parts.paper_items import ITEMS
-from seqopt.study.tables import printed
+from seqopt.study.published import printed
 
 STUDY = printed("de_validation").set_index("bricks")["error_percent"]
 NUMBERED = [item for item in ITEMS if item.has_numbers]

@@ -29,7 +29,7 @@ from experiments.harness.results import RESULTS
 from seqopt.engines.discrete.engine import Across, Pinch, pad_stiffness
 from seqopt.sequence.two_robots import sequential
 from seqopt.study.presets import STUDY_PADS
-from seqopt.study.tables import printed
+from seqopt.study.published import printed
 
 
 @pytest.fixture(scope="module")

@@ -22,7 +22,7 @@ from experiments.calibration.parts.arch_numbers import (
     start_of,
 )
 from experiments.harness.results import RESULTS
-from seqopt.study.tables import printed_steps
+from seqopt.study.published import printed_steps
 
 
 @pytest.mark.parametrize("name", VARIANTS)

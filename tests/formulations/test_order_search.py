@@ -14,8 +14,8 @@ import seqopt
 from formulations.states.order_search import FORMULATION
 from seqopt.contact.mortar import find_mortar
 from seqopt.errors import InfeasibleError, ProblemError, SolverError, TimeUpError
-from seqopt.graph.orders.bound import whole_bound
 from seqopt.graph.orders.orders import AllOrders, OrderSelection
+from seqopt.graph.orders.visits import whole_bound
 from seqopt.graph.orders.work import trying
 from seqopt.graph.states.states import build_states, over_scenarios, within
 from seqopt.plan.calling.formulation import (

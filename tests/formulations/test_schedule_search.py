@@ -20,9 +20,8 @@ from seqopt.engines.interface import Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError, StepError, TimeUpError
 from seqopt.graph.paths import fewest_moves, keep_best, reached
-from seqopt.graph.states.counts import steps_with, with_held
 from seqopt.graph.states.states import build_states
-from seqopt.graph.states.visits import explore
+from seqopt.graph.states.visits import explore, steps_with, with_held
 from seqopt.network.build import build_network
 from seqopt.plan.front import find_front, pick, upper_bounds
 from seqopt.plan.judge.schedules import judge_schedule, plan_values

@@ -8,11 +8,17 @@ import numpy as np
 import pytest
 
 from seqopt.errors import ProblemError
-from seqopt.problem.criteria import OVER_METHODS, WORST_OVER_METHODS, RankSum, WeightedSum
+from seqopt.problem.criteria import (
+    OVER_METHODS,
+    WORST_OVER_METHODS,
+    RankSum,
+    WeightedSum,
+    equal,
+    present,
+)
 from seqopt.problem.criteria import WorstRatio as Worst
 from seqopt.problem.ranks import Ranked, mean_ranks, ranks_of, scaled_ranks
 from seqopt.problem.scales import NEVER, ROUNDED, Units
-from seqopt.problem.terms import equal, present
 
 NAN = np.nan
 

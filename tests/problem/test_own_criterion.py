@@ -17,8 +17,7 @@ from seqopt.graph.layers.interface import CostProblem
 from seqopt.graph.layers.layers import candidate_layers
 from seqopt.graph.states.states import build_states
 from seqopt.plan.judge.proof import Proof
-from seqopt.plan.search.in_order import solve_in_order
-from seqopt.plan.search.step_quantile import least_quantile
+from seqopt.plan.search.in_order import least_quantile, solve_in_order
 from seqopt.problem.aims import Aim
 from seqopt.problem.criteria import WeightedSum
 from seqopt.problem.own_criterion import StepCost

@@ -17,9 +17,8 @@ from seqopt.contact.mortar import bond_mortar
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import MechanismError, ProblemError, StepError
 from seqopt.network.build import build_network
-from seqopt.problem.criteria import OVER_METHODS, RankSum, WeightedSum
+from seqopt.problem.criteria import OVER_METHODS, RankSum, WeightedSum, equal
 from seqopt.problem.scales import NEVER, ROUNDED, SceneFacts, crown, own_scales
-from seqopt.problem.terms import equal
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.parts import Sphere
 from seqopt.sequence.free_rules import FreeRules

@@ -65,7 +65,7 @@ PROOFS = {
     ),
     "seqopt.plan.judge.passable": ("plan/test_proofs", "plan/test_free_proof"),
     "seqopt.plan.judge.rule_moves": ("plan/test_free_proof", "plan/test_proofs"),
-    "seqopt.graph.orders.bound": ("formulations/test_order_search",),
+    "seqopt.graph.orders.visits": ("formulations/test_order_search",),
     "seqopt.plan.judge.orders": ("plan/test_proofs", "formulations/test_order_search"),
     "seqopt.graph.layers.partial_costs": ("plan/test_proofs", "agreement/test_pair_search"),
 }  # what says that nothing is better, or that there is nothing
@@ -83,9 +83,10 @@ MODULES = {
     "seqopt.engines.rigid.growth": ("engines/test_operator", "engines/test_growth"),
     "seqopt.graph.layers.costs": ("graph/test_costs", "plan/test_values"),
     **PROOFS,
-    "seqopt.problem.criteria": ("problem/test_criteria", "graph/test_layers"),
+    "seqopt.problem.criteria": (
+        *("problem/test_criteria", "graph/test_layers", "problem/test_scales"),
+    ),
     "seqopt.problem.ranks": ("problem/test_criteria", "graph/test_layers"),
-    "seqopt.problem.terms": ("problem/test_criteria", "problem/test_scales"),
     "seqopt.plan.calling.flow": ("plan/test_flow", "plan/test_values", *CHOSEN),
     "formulations.layers.beam": CHOSEN,
     "formulations.layers.cascade": CHOSEN,

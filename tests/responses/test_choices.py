@@ -11,8 +11,7 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import ProblemError
 from seqopt.graph.layers.layers import candidate_layers
 from seqopt.network.build import build_network
-from seqopt.problem.criteria import RankSum
-from seqopt.problem.terms import equal
+from seqopt.problem.criteria import RankSum, equal
 from seqopt.responses import batches
 from seqopt.responses.choices import CHOICE_RESPONSES, evaluate_choices
 from seqopt.responses.quantities import responses_of

@@ -14,7 +14,7 @@ from seqopt.sequence.schedule import OpenGrip, Schedule
 from seqopt.sequence.steps import StepKind
 from seqopt.sequence.three_robots import modified_sequential, three_robot_loop
 from seqopt.sequence.two_robots import sequential
-from seqopt.study.tables import printed
+from seqopt.study.published import printed
 from tests.builders import far_reaching
 from tests.strategies import arches
 

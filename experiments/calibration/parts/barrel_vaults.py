@@ -25,7 +25,7 @@ from seqopt.engines.rigid.operator import OperatorBuilder
 from seqopt.network.build import build_network
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.scene import Scene
-from seqopt.study.tables import SOURCE, printed
+from seqopt.study.published import SOURCE, printed
 
 
 @dataclass(frozen=True, kw_only=True)

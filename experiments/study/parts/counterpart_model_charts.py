@@ -19,7 +19,7 @@ from experiments.study.parts.counterpart_rows import (
 )
 from seqopt.report.draw import View, draw_bricks
 from seqopt.report.style import BLUE, INK, VERMILION, dress, look, plain
-from seqopt.study.tables import printed
+from seqopt.study.published import printed
 
 OURS, STUDY, OFF = BLUE, "#222222", VERMILION
 

@@ -17,20 +17,21 @@ from seqopt.cli.words.asked import (
     exceeded,
     idle_notes,
     level_notes,
+    scene_facts,
     step_answers,
     strictly,
     timely,
 )
 from seqopt.cli.words.common_arguments import (
+    asked_steps,
     engine_arguments,
     form_arguments,
     group,
     scene_argument,
+    steps_arguments,
     strict_argument,
     time_argument,
 )
-from seqopt.cli.words.facts import scene_facts
-from seqopt.cli.words.steps_arguments import asked_steps, steps_arguments
 from seqopt.cli.words.values import parse_time_limit
 from seqopt.engines.interface import Fields
 from seqopt.engines.registry import provenance

@@ -9,10 +9,15 @@ from pathlib import Path
 from seqopt.cli.saying.answer import Answer
 from seqopt.cli.saying.outputs import keep_apart
 from seqopt.cli.status import Status
-from seqopt.cli.words.asked import asked_scene
-from seqopt.cli.words.common_arguments import Takes, form_arguments, group, scene_argument
-from seqopt.cli.words.facts import scene_facts
-from seqopt.cli.words.steps_arguments import asked_steps, steps_arguments
+from seqopt.cli.words.asked import asked_scene, scene_facts
+from seqopt.cli.words.common_arguments import (
+    Takes,
+    asked_steps,
+    form_arguments,
+    group,
+    scene_argument,
+    steps_arguments,
+)
 from seqopt.cli.words.values import parse_mortar
 from seqopt.contact.mortar import MORTARS
 from seqopt.engines.registry import versions

@@ -12,7 +12,14 @@ from seqopt.cli.saying.answer import Answer
 from seqopt.cli.saying.compare_text import printed_largest, tell_comparison
 from seqopt.cli.saying.layout import wrapped
 from seqopt.cli.saying.outputs import comparison_files, figure_notes, require_out, write_outputs
-from seqopt.cli.words.asked import asked_engine, asked_scene, exceeded, level_notes, strictly
+from seqopt.cli.words.asked import (
+    asked_engine,
+    asked_scene,
+    exceeded,
+    level_notes,
+    scene_facts,
+    strictly,
+)
 from seqopt.cli.words.common_arguments import (
     criterion_arguments,
     engine_arguments,
@@ -23,7 +30,6 @@ from seqopt.cli.words.common_arguments import (
     strict_argument,
 )
 from seqopt.cli.words.criteria import asked_criterion
-from seqopt.cli.words.facts import scene_facts
 from seqopt.cli.words.values import parse_robots
 from seqopt.engines.registry import provenance
 from seqopt.network.build import build_network

@@ -15,7 +15,7 @@ import shtab
 
 from seqopt.cli.arguments import COMMANDS, parser
 from seqopt.cli.saying.answer import Answer
-from seqopt.cli.words.rules import RULES
+from seqopt.cli.words.values import RULES
 from seqopt.plan.calling.formulation import formulation_names
 from seqopt.responses.choices import CHOICE_RESPONSES
 from seqopt.scene.library.by_words import KINDS

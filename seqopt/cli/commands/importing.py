@@ -6,8 +6,8 @@ import argparse
 from pathlib import Path
 
 from seqopt.cli.saying.answer import Answer
+from seqopt.cli.words.asked import scene_facts
 from seqopt.cli.words.common_arguments import form_arguments, group
-from seqopt.cli.words.facts import scene_facts
 from seqopt.cli.words.values import number_word
 from seqopt.errors import ProblemError
 from seqopt.files import require_apart, write_text

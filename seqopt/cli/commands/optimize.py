@@ -13,8 +13,7 @@ from seqopt.cli.saying.layout import wrapped
 from seqopt.cli.saying.outputs import plan_files, write_outputs, written_to
 from seqopt.cli.status import Status
 from seqopt.cli.words import optimize_arguments
-from seqopt.cli.words.asked import exceeded, idle_notes, posed_notes, strictly
-from seqopt.cli.words.facts import scene_facts
+from seqopt.cli.words.asked import exceeded, idle_notes, posed_notes, scene_facts, strictly
 from seqopt.cli.words.means import parse_size
 from seqopt.cli.words.posing import Asked, asked_problem
 from seqopt.cli.words.values import parse_options, parse_time_limit

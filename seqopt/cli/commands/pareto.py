@@ -11,17 +11,17 @@ import pandas as pd
 
 from seqopt.cli.saying.answer import Answer
 from seqopt.cli.saying.outputs import figure_notes, write_outputs, written_to
-from seqopt.cli.words.asked import level_notes, marked, scene_file
+from seqopt.cli.words.asked import level_notes, marked, scene_facts, scene_file
 from seqopt.cli.words.common_arguments import (
     Takes,
+    add_rules,
+    add_standing,
     engine_arguments,
     form_arguments,
     group,
     limit_argument,
     scene_argument,
 )
-from seqopt.cli.words.facts import scene_facts
-from seqopt.cli.words.free_arguments import add_rules, add_standing
 from seqopt.cli.words.posing import asked_problem
 from seqopt.cli.words.values import parse_numbers
 from seqopt.engines.interface import Engine

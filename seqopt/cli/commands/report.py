@@ -7,14 +7,13 @@ from pathlib import Path
 
 from seqopt.cli.saying.answer import Answer
 from seqopt.cli.saying.outputs import figure_notes, keep_apart
-from seqopt.cli.words.asked import asked_engine, asked_scene
+from seqopt.cli.words.asked import asked_engine, asked_scene, scene_facts
 from seqopt.cli.words.common_arguments import (
     engine_arguments,
     form_arguments,
     group,
     scene_argument,
 )
-from seqopt.cli.words.facts import scene_facts
 from seqopt.files import require_folder, write_folder, write_text
 from seqopt.network.build import build_network
 from seqopt.report.pages import PAGE, folder_builds, folder_page

@@ -8,9 +8,8 @@ from pathlib import Path
 
 from seqopt.cli.saying.answer import Answer
 from seqopt.cli.saying.outputs import keep_apart
-from seqopt.cli.words.asked import asked_scene
+from seqopt.cli.words.asked import asked_scene, network_facts, scene_facts
 from seqopt.cli.words.common_arguments import form_arguments, group, scene_argument
-from seqopt.cli.words.facts import network_facts, scene_facts
 from seqopt.files import write_text
 from seqopt.network.build import build_network
 from seqopt.scene.library.by_words import KINDS

@@ -7,6 +7,7 @@ import time
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
+import numpy as np
 import pandas as pd
 
 from seqopt.cli.saying.answer import Answer
@@ -30,6 +31,38 @@ from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import dump_scene, load_scene
 from seqopt.sequence.steps import AnyStep, Step, idle_robots
 from seqopt.work.progress import told
+
+
+def scene_facts(scene: Scene) -> dict[str, object]:
+    """Return what a scene is called, and how large it is.
+
+    Result: ``name``, ``bricks``, ``joints``, ``ground_ends`` and the names of ``robots``.
+    """
+    return {
+        "name": scene.name,
+        "bricks": len(scene.bricks),
+        "joints": len(scene.joints),
+        "ground_ends": len(scene.grounds),
+        "robots": [robot.name for robot in scene.robots],
+    }
+
+
+def network_facts(network: Network) -> dict[str, object]:
+    """Return how large the network of a scene is, what it weighs, and what its robots can do.
+
+    Result: ``nodes`` and ``edges`` of the whole structure, ``weight_N``, ``payloads_N`` and
+    ``reaches`` by robot, ``provenance``.
+    """
+    scene = network.scene
+    count = len(scene.bricks)
+    return {
+        "nodes": network.count_nodes(count),
+        "edges": network.count_edges(count),
+        "weight_N": float(np.linalg.norm(network.weight.sum(axis=0))),
+        "payloads_N": {robot.name: robot.payload for robot in scene.robots},
+        "reaches": {robot.name: type(robot.reach).__name__.lower() for robot in scene.robots},
+        "provenance": scene.provenance,
+    }
 
 
 def asked_scene(options: argparse.Namespace) -> Scene:

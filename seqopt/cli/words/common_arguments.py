@@ -3,14 +3,23 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 from typing import TypeAlias
 
+from seqopt.cli.words.values import parse_robots
 from seqopt.contact.mortar import MORTARS
 from seqopt.engines.registry import ENGINES
+from seqopt.errors import SceneError, StepError
+from seqopt.network.build import build_network
 from seqopt.problem.ranks import Among, Ranked
 from seqopt.scene.orders import ORDERS
+from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import builtin_scenes
+from seqopt.sequence.plan_file import read_plan
+from seqopt.sequence.steps import Step
+from seqopt.sequence.two_robots import METHODS
 from seqopt.study.presets import CRITERIA
+from seqopt.study.published import PUBLISHED, is_reference_arch, published_plan
 from seqopt.workflow import Defaults
 
 Takes: TypeAlias = argparse._ActionsContainer  # a parser, or a group of its arguments
@@ -149,3 +158,78 @@ def limit_argument(takes: Takes) -> None:
         help="no step may exceed it, whether or not a grip is open in it: payload (of every "
         "robot), or RESPONSE=VALUE in SI units, as F_largest=300; may be repeated",
     )
+
+
+RULES = (
+    "least_grips=N (2; from the second brick on), newest=either|placing|free (where the newest "
+    "brick is held), regrips=N|any (between two bricks), placers=NAME,NAME|any, "
+    "payload=kept|ignored, ending=held|released|one-by-one (how robots leave the finished "
+    "structure), candidates=near:JOINTS|within:METERS|all (as --candidates)"
+)
+
+
+def add_rules(takes: Takes) -> None:
+    """Add what a free schedule takes."""
+    takes.add_argument(
+        "--rule",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        help=f"what robots may do: {RULES}; may be repeated",
+    )
+
+
+def add_standing(takes: Takes) -> None:
+    """Add what demands that every state stands."""
+    takes.add_argument(
+        "--stands",
+        metavar="MORTAR",
+        help="every state must be proven to stand, robots within payload: "
+        "dry, epoxy or bond=STRENGTH (Pa)",
+    )
+    takes.add_argument("--friction", metavar="F", help="with --stands: coefficient of friction")
+    takes.add_argument(
+        "--tilt", metavar="DEG", help="with --stands: tilt that every state must survive"
+    )
+
+
+def steps_arguments(takes: Takes) -> None:
+    """Add the arguments that name a closed sequence of steps."""
+    steps = takes.add_mutually_exclusive_group(required=True)
+    steps.add_argument(
+        "--method",
+        choices=(*METHODS, PUBLISHED),
+        help=f"how it is built: by two robots, or {PUBLISHED}, the three-robot plan that Bruun et "
+        "al. print for arch25",
+    )
+    steps.add_argument(
+        "--plan",
+        type=Path,
+        metavar="FILE",
+        help="CSV file of the steps: step, type, bricks, and NAME_node for each robot",
+    )
+    robots_argument(takes, "--method")
+
+
+def asked_steps(scene: Scene, options: argparse.Namespace) -> tuple[Step, ...]:
+    """Return the closed sequence that a command is asked for.
+
+    ``options``: with ``method``, ``plan`` and ``robots``. Raises `SceneError`, `StepError` if the
+    method is not for the scene, or robots are named beside a plan.
+    """
+    robots = parse_robots(options.robots)
+    if robots and options.method not in METHODS:
+        raise StepError(
+            f"--robots {options.robots}: a plan says itself who holds; leave it out, or give "
+            f"--method {' or '.join(METHODS)}"
+        )
+    if options.plan is not None:
+        return read_plan(scene, options.plan)
+    if options.method != PUBLISHED:
+        return METHODS[options.method](build_network(scene), robots)
+    if not is_reference_arch(scene):
+        raise SceneError(
+            f"scene {scene.name}: --method {PUBLISHED} is the printed plan for arch25; "
+            "give --plan FILE for another scene"
+        )
+    return published_plan(scene)

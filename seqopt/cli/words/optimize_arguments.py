@@ -7,6 +7,8 @@ from pathlib import Path
 
 from seqopt.cli.words.common_arguments import (
     Takes,
+    add_rules,
+    add_standing,
     criterion_arguments,
     engine_arguments,
     form_arguments,
@@ -17,7 +19,6 @@ from seqopt.cli.words.common_arguments import (
     strict_argument,
     time_argument,
 )
-from seqopt.cli.words.free_arguments import add_rules, add_standing
 from seqopt.plan.calling.formulation import formulation_names
 from seqopt.sequence.free_rules import FREE
 from seqopt.sequence.three_robots import SCHEDULES

@@ -10,9 +10,8 @@ from seqopt.cli.saying.outputs import require_out
 from seqopt.cli.words.asked import asked_engine, asked_scene
 from seqopt.cli.words.criteria import asked_criterion, parse_criterion
 from seqopt.cli.words.means import parse_resources
-from seqopt.cli.words.rules import parse_rules, parse_standing
 from seqopt.cli.words.scenarios import asked_aim, asked_scenarios, require_no_scenarios
-from seqopt.cli.words.values import parse_limits, parse_robots
+from seqopt.cli.words.values import parse_limits, parse_robots, parse_rules, parse_standing
 from seqopt.errors import ProblemError, StepError
 from seqopt.network.build import build_network
 from seqopt.network.network import Network

@@ -13,14 +13,18 @@ import pandas as pd
 from seqopt.arrays import Floats
 from seqopt.engines.interface import Engine
 from seqopt.errors import InfeasibleError, ProblemError, did_you_mean
-from seqopt.graph.layers.costs import Budget, LayeredCosts
-from seqopt.graph.layers.joining import Joined
-from seqopt.graph.layers.possible import compared, spread_over_pairs
-from seqopt.graph.layers.windows import by_move, possible_after, window_anew, window_kept
+from seqopt.graph.layers.costs import Budget, Joined, LayeredCosts
+from seqopt.graph.layers.windows import (
+    by_move,
+    compared,
+    possible_after,
+    spread_over_pairs,
+    window_anew,
+    window_kept,
+)
 from seqopt.problem.aims import Aim
-from seqopt.problem.checks import robots_of
 from seqopt.problem.overloads import excesses
-from seqopt.problem.requirements import Criterion, Limit, ResponsesAsked, as_limits
+from seqopt.problem.requirements import Criterion, Limit, ResponsesAsked, as_limits, robots_of
 from seqopt.problem.scales import SceneFacts
 from seqopt.responses.choices import CHOICE_RESPONSES, Evaluation, StepChoices
 from seqopt.responses.quantities import robot_response

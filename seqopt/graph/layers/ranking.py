@@ -11,7 +11,7 @@ import pandas as pd
 from seqopt.arrays import Floats
 from seqopt.graph.layers.costs import LayeredCosts
 from seqopt.graph.layers.layers import Layers
-from seqopt.graph.layers.possible import compared
+from seqopt.graph.layers.windows import compared
 from seqopt.problem.criteria import RankSum, WeightedSum, WorstRatio
 from seqopt.problem.requirements import Criterion
 from seqopt.responses.choices import StepChoices

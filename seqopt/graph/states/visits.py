@@ -3,15 +3,37 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.graph.explore import Explorer, Moves
+from seqopt.graph.graph import Graph
 from seqopt.graph.states.states import States
 from seqopt.problem.goals import Measure
 from seqopt.sequence import free_space
+from seqopt.sequence.free_rules import Ending
+
+
+def steps_with(problem: States, regrips: Floats, held: Ints) -> Floats:
+    """Return how many steps plans have.
+
+    ``regrips`` (n,): infinite where there is no plan; ``held`` (n,): how many grips are held at the
+    end, or before the last step where that lets all go. Result (n,).
+    """
+    released = problem.free_rules.ending is not Ending.HELD
+    return np.asarray(2 * problem.space.levels + 2 * regrips - held + released)
+
+
+def with_held(problem: States, graph: Graph, held: Bools) -> Graph:
+    """Return a graph whose paths end in some states, or let all go in them last.
+
+    ``held`` (n,): which states hold as many grips as wanted.
+    """
+    if problem.free_rules.ending is Ending.HELD:
+        return replace(graph, ends=graph.ends & held)
+    return graph.only(~graph.ends[graph.target] | held[graph.source])
 
 
 @dataclass(frozen=True)

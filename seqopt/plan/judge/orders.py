@@ -22,8 +22,7 @@ from seqopt.graph.orders.orders import AllOrders
 from seqopt.graph.paths import distances
 from seqopt.graph.states.states import States
 from seqopt.network.build import build_network
-from seqopt.plan.judge.answers import ask
-from seqopt.plan.judge.passable import Asked, Passable, Tables
+from seqopt.plan.judge.passable import Asked, Passable, Tables, ask
 from seqopt.plan.judge.proof import BELOW
 from seqopt.plan.judge.rule_moves import Follows, RuleTables
 from seqopt.problem.goals import Measure

@@ -20,7 +20,7 @@ from seqopt.graph.states.states import States
 from seqopt.plan.calling.state_path import StatePath
 from seqopt.plan.judge.certificate import Certificate
 from seqopt.plan.judge.proof import BELOW, Hint, Proof
-from seqopt.plan.judge.scheduled_moves import check_scheduled
+from seqopt.plan.judge.rule_moves import check_scheduled
 from seqopt.plan.judge.standing_proof import proven_margins, require_margin
 from seqopt.problem.goals import LARGEST, Goal, Measure
 from seqopt.problem.standing import slack

@@ -20,11 +20,10 @@ import numpy as np
 
 from seqopt.arrays import Floats, Ints
 from seqopt.errors import InfeasibleError, ProblemError, SolverError, TimeUpError
-from seqopt.graph.layers.floors import floor_of
+from seqopt.graph.layers.costs import Joined
 from seqopt.graph.layers.interface import CostProblem
-from seqopt.graph.layers.joining import Joined
 from seqopt.graph.layers.layers import Layers
-from seqopt.graph.layers.partial_costs import PartialCosts
+from seqopt.graph.layers.partial_costs import PartialCosts, floor_of
 from seqopt.graph.layers.windows import pairs_as_moves, possible_after, window
 from seqopt.interrupts import answered
 from seqopt.plan.calling.formulation import End, Formulation, FormulationKind, Selection

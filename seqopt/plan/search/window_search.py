@@ -18,7 +18,7 @@ import numpy as np
 
 from seqopt.arrays import Floats, Terse
 from seqopt.errors import MemoryShortError, SolverError, TimeUpError
-from seqopt.graph.layers.joining import Joined
+from seqopt.graph.layers.costs import Joined
 from seqopt.graph.layers.layers import Layers
 from seqopt.graph.layers.windows import possible_after, window
 from seqopt.plan.calling.watch import Watch
