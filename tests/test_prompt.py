@@ -14,9 +14,8 @@ from seqopt.errors import SceneError
 from seqopt.graph.layers.budgets import travel
 from seqopt.graph.orders.orders import AllOrders
 from seqopt.graph.states.states import build_states
-from seqopt.plan.front import find_front
+from seqopt.plan.front import StateFront, find_front
 from seqopt.plan.out_of_sample import judge_unseen
-from seqopt.plan.state_front import StateFront
 from seqopt.report.comparison import compare
 from seqopt.scene.library import ArchForm, DomeShape, VaultShape
 from seqopt.stability.assessment import assess_steps

@@ -40,8 +40,7 @@ from experiments.harness.scenes import half_circle
 from formulations.scenarios.scenario_program import solve_program
 from seqopt.engines.registry import make_engine
 from seqopt.graph.layers.layers import Layers, candidate_layers
-from seqopt.graph.scenarios.arcs import Choice
-from seqopt.graph.scenarios.scenarios import ScenarioLayers, in_scenarios
+from seqopt.graph.scenarios.scenarios import Choice, ScenarioLayers, in_scenarios
 from seqopt.network.build import build_network
 from seqopt.plan.calling.watch import Watch
 from seqopt.plan.out_of_sample import judge_unseen

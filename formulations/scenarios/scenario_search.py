@@ -22,8 +22,13 @@ import numpy as np
 from formulations.scenarios.scenario_weights import Weighed, best_weights
 from seqopt.arrays import Floats, Ints
 from seqopt.errors import ProblemError
-from seqopt.graph.scenarios.arcs import Choice, ScenarioArcs, scenario_arcs
-from seqopt.graph.scenarios.scenarios import ScenarioLayers, largest_of
+from seqopt.graph.scenarios.scenarios import (
+    Choice,
+    ScenarioArcs,
+    ScenarioLayers,
+    largest_of,
+    scenario_arcs,
+)
 from seqopt.plan.calling.formulation import End, Formulation, FormulationKind, On, Selection
 from seqopt.plan.calling.watch import Watch
 from seqopt.problem.aims import Aim

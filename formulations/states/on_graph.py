@@ -19,15 +19,14 @@ from scipy import sparse
 from seqopt.arrays import Floats, Ints
 from seqopt.errors import InfeasibleError, ProblemError, SeqoptError, TimeUpError
 from seqopt.graph.budgets import Within, within_budgets
-from seqopt.graph.explore import Explorer
+from seqopt.graph.explore import Explorer, Key, Visited
 from seqopt.graph.graph import Graph
-from seqopt.graph.parts import Key, Visited
 from seqopt.graph.paths import Best, distances, lexicographic, reached, tied
 from seqopt.graph.states.states import States
 from seqopt.graph.states.visits import FreeStates, explore
 from seqopt.interrupts import answered
 from seqopt.plan.calling.formulation import Formulation, FormulationKind, On
-from seqopt.plan.calling.state_path import StatePath
+from seqopt.plan.calling.guard import StatePath
 from seqopt.plan.calling.watch import Watch
 from seqopt.plan.search.sturdiest import best_margin
 from seqopt.work.memory import free_memory

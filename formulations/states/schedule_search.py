@@ -51,7 +51,7 @@ from seqopt.graph.paths import distances
 from seqopt.graph.states.states import States
 from seqopt.graph.states.visits import FreeStates
 from seqopt.plan.calling.formulation import Formulation, FormulationKind, On
-from seqopt.plan.calling.state_path import StatePath
+from seqopt.plan.calling.guard import StatePath
 from seqopt.plan.calling.watch import Watch
 from seqopt.problem.goals import Measure
 from seqopt.work.progress import Tell

@@ -6,8 +6,7 @@ import sys
 from collections.abc import Sequence
 from contextlib import suppress
 
-from seqopt.cli.arguments import COMMANDS, asked_command, parser
-from seqopt.cli.hints import EXAMPLES
+from seqopt.cli.arguments import COMMANDS, EXAMPLES, asked_command, parser
 from seqopt.cli.saying.answer import Answer, print_answer
 from seqopt.cli.saying.terminal import flush, quiet_numbers, show, silence
 from seqopt.cli.status import Status, status_of

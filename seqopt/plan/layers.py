@@ -2,15 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from seqopt.errors import ProblemError
+from seqopt.graph.layers.budgets import steps_over, travel
+from seqopt.graph.layers.costs import Budget
 from seqopt.graph.layers.interface import PlacementProblem
 from seqopt.graph.layers.layers import Layers
 from seqopt.graph.scenarios.scenarios import ScenarioLayers
-from seqopt.plan.calling.formulation import End, Formulation, On, Selection, formulations
+from seqopt.plan.calling.formulation import (
+    End,
+    Formulation,
+    On,
+    Selection,
+    find_formulation,
+    formulations,
+)
 from seqopt.plan.calling.selecting import require_fit, require_proof, require_time, select
 from seqopt.plan.calling.watch import Run, Watch, timed
 from seqopt.plan.judge.anew import require_anew
@@ -19,7 +29,45 @@ from seqopt.plan.plan import Plan
 from seqopt.plan.search.pair_search import search_pairs
 from seqopt.plan.search.window_search import search_windows
 from seqopt.problem.aims import Aim
+from seqopt.problem.budgets import AskedBudget
 from seqopt.problem.ranks import Among
+
+CHOOSES = {Aim.PEAK: "minimax", Aim.SUM: "overlap_dp"}  # of one scenario, without budgets
+
+
+def with_budgets(problem: Layers, asked: Sequence[AskedBudget]) -> Layers:
+    """Return a problem with budgets; shares are those of its optimum without any.
+
+    ``problem``: posed with the responses that the budgets name.
+    """
+    budgets: list[Budget] = []
+    for each in asked:
+        bound = each.bound
+        if each.share:
+            free = best_choice(problem, Aim.SUM).choice
+            bound *= _budget(problem, each, np.inf).spent(free)
+        budgets.append(_budget(problem, each, bound))
+    return replace(problem, budgets=tuple(budgets))
+
+
+def _budget(problem: Layers, asked: AskedBudget, bound: float) -> Budget:
+    """Return the budget of how much there is, in its unit."""
+    if not asked.response:
+        return travel(problem, bound)
+    return steps_over(problem, asked.response, asked.level, bound)
+
+
+def best_choice(problem: PlacementProblem, aim: Aim) -> Selection:
+    """Return the best choice without budgets, judged; an interrupt ends more than this.
+
+    Raises `InfeasibleError` if no choice is allowed; `KeyboardInterrupt` if it was interrupted.
+    """
+    formulation = find_formulation(CHOOSES[aim])
+    found = select(formulation, problem)
+    if found.end is End.INTERRUPTED:
+        raise KeyboardInterrupt
+    judge(problem, found, formulation)
+    return found
 
 
 def solve_layers(graph: PlacementProblem, formulation: Formulation, run: Run) -> Plan:

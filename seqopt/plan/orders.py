@@ -14,8 +14,7 @@ import numpy as np
 from seqopt.errors import InfeasibleError, SolverError
 from seqopt.graph.orders.orders import AllOrders, OrderSelection
 from seqopt.plan.calling.formulation import Formulation, find_formulation
-from seqopt.plan.calling.guard import called, readable, text
-from seqopt.plan.calling.state_path import StatePath
+from seqopt.plan.calling.guard import StatePath, called, readable, text
 from seqopt.plan.calling.watch import Run
 from seqopt.plan.judge.certificate import TOLERANCE
 from seqopt.plan.judge.orders import finds_better_order

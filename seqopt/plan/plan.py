@@ -20,7 +20,7 @@ from seqopt.graph.scenarios.scenarios import ScenarioLayers
 from seqopt.graph.states.states import States
 from seqopt.plan.build import ShownBuild
 from seqopt.plan.calling.formulation import End, Formulation, FormulationKind, Reads, Selection
-from seqopt.plan.calling.state_path import StatePath
+from seqopt.plan.calling.guard import StatePath
 from seqopt.plan.calling.watch import Finding
 from seqopt.plan.judge.certificate import TOLERANCE, Certificate
 from seqopt.plan.judge.standing_proof import certified
@@ -29,8 +29,8 @@ from seqopt.plan.status import ENDS, FoundOrder, Status
 from seqopt.plan.tables import Objectives, alternatives, chosen_table, moves_table, split_objectives
 from seqopt.problem.aims import Aim
 from seqopt.problem.goals import judged_by
-from seqopt.problem.overloads import Excess, overloads
 from seqopt.problem.problem import Problem
+from seqopt.problem.requirements import Excess, overloads
 from seqopt.responses.choices import window_models
 from seqopt.responses.table import analyze
 from seqopt.sequence.free_rules import Ending

@@ -20,7 +20,7 @@ from seqopt.graph.orders.orders import AllOrders
 from seqopt.graph.scenarios.scenarios import ScenarioLayers, in_scenarios
 from seqopt.graph.states.states import States, build_states, over_scenarios, within
 from seqopt.plan.calling.formulation import On
-from seqopt.plan.shares import with_budgets
+from seqopt.plan.layers import with_budgets
 from seqopt.problem.aims import WORST_PEAK, Aim, RobustAim
 from seqopt.problem.budgets import parse_budgets, parse_caps
 from seqopt.problem.goals import Goal, Measure

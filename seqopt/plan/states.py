@@ -11,11 +11,10 @@ from typing import Any
 
 from seqopt.errors import InfeasibleError
 from seqopt.graph.states.states import States
-from seqopt.graph.states.steps import steps_of
+from seqopt.graph.states.visits import steps_of
 from seqopt.plan.calling.formulation import Formulation, FormulationKind
-from seqopt.plan.calling.guard import called
+from seqopt.plan.calling.guard import StatePath, called, with_numbers
 from seqopt.plan.calling.selecting import require_proof
-from seqopt.plan.calling.state_path import StatePath, with_numbers
 from seqopt.plan.calling.watch import Run
 from seqopt.plan.judge.infeasible import confirmed
 from seqopt.plan.judge.schedules import judge_schedule

@@ -17,15 +17,14 @@ from seqopt.graph.layers.objectives import under_both
 from seqopt.graph.layers.ranking import rank_choice
 from seqopt.graph.states.states import build_states
 from seqopt.plan.calling.formulation import On, formulations
-from seqopt.plan.calling.state_path import StatePath
+from seqopt.plan.calling.guard import StatePath
 from seqopt.plan.judge.certificate import least_sum
 from seqopt.plan.layers import on_the_way
 from seqopt.plan.plan import Plan
 from seqopt.plan.solving import solve
 from seqopt.problem.aims import Aim
 from seqopt.problem.criteria import RankSum, WorstRatio
-from seqopt.problem.overloads import overloads
-from seqopt.problem.requirements import Criterion
+from seqopt.problem.requirements import Criterion, overloads
 from seqopt.responses.linear_range import Departure, LinearRange
 from seqopt.responses.quantities import CHOSEN_BY, RESPONSES, robot_response
 from seqopt.responses.resources import Resources

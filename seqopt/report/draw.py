@@ -24,8 +24,7 @@ from matplotlib.patheffects import withStroke
 from seqopt.arrays import Floats, Ints
 from seqopt.network.network import Network, PartKind
 from seqopt.report.style import BLUE, SMALL, VERMILION
-from seqopt.scene.blocks import vertices_of
-from seqopt.scene.boxes import boxes
+from seqopt.scene.boxes import boxes, vertices_of
 from seqopt.scene.parts import Brick
 from seqopt.scene.shape import normal_of
 

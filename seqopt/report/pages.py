@@ -13,7 +13,7 @@ from seqopt.engines.interface import Engine
 from seqopt.errors import FileError, ProblemError, StepError
 from seqopt.files import csv_text
 from seqopt.plan.build import ShownBuild
-from seqopt.problem.overloads import overloads
+from seqopt.problem.requirements import overloads
 from seqopt.report.comparison import CLOSED, LARGEST, Comparison, largest, method_tables
 from seqopt.report.page import Build, Scatter, report_page
 from seqopt.responses.linear_range import OUTSIDE, REMEDY, Departure, LinearRange, builds_in_words

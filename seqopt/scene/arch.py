@@ -11,7 +11,7 @@ import numpy as np
 
 from seqopt.arrays import Floats, Terse, Vector
 from seqopt.errors import SceneError, SceneWarning
-from seqopt.scene.blocks import as_vector
+from seqopt.scene.boxes import as_vector
 from seqopt.scene.checks import short
 from seqopt.scene.parts import THICKEST, Anywhere, Brick, Ground, Joint, Reach, Robot, Side
 from seqopt.scene.scene import Scene

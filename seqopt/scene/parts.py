@@ -130,7 +130,7 @@ class Brick(Terse):
     placing_node : int
         The node held while the brick is placed by a robot that is on no side of the structure.
     shape : Polyhedron, optional
-        The shape of a block that is not a box; see `seqopt.scene.blocks.block_brick`.
+        The shape of a block that is not a box; see `seqopt.scene.boxes.block_brick`.
     node_offsets : tuple of 2 Vector, optional
         Where the inner nodes are if they are elsewhere, from the centroid, m.
 

@@ -11,7 +11,7 @@ from seqopt.errors import StepError, did_you_mean
 from seqopt.scene.checks import short
 from seqopt.scene.parts import Robot
 from seqopt.scene.scene import Scene
-from seqopt.sequence.near import Near
+from seqopt.sequence.schedule import Near
 
 FREE = "free"  # the schedule that is no list of steps
 _MOST_ROBOTS = 5
@@ -62,7 +62,7 @@ class FreeRules:
         How the build ends.
     candidates : str
         Where bricks that stand may be taken hold of: ``near:6`` or ``within:1.5``, as of
-        `seqopt.sequence.near.Near`; by default wherever robots reach.
+        `seqopt.sequence.schedule.Near`; by default wherever robots reach.
 
     Raises
     ------

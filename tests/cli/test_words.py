@@ -9,9 +9,8 @@ import sys
 import pytest
 
 import seqopt
-from seqopt.cli.arguments import COMMANDS, parser
+from seqopt.cli.arguments import COMMANDS, EXAMPLES, parser
 from seqopt.cli.commands.completion import _commands
-from seqopt.cli.hints import EXAMPLES
 from seqopt.cli.main import main
 from tests.builders import ROOT
 

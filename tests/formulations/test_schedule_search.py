@@ -23,9 +23,8 @@ from seqopt.graph.paths import fewest_moves, keep_best, reached
 from seqopt.graph.states.states import build_states
 from seqopt.graph.states.visits import explore, steps_with, with_held
 from seqopt.network.build import build_network
-from seqopt.plan.front import find_front, pick, upper_bounds
+from seqopt.plan.front import StateFront, find_front, pick, upper_bounds
 from seqopt.plan.judge.schedules import judge_schedule, plan_values
-from seqopt.plan.state_front import StateFront
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.requirements import Limit
 from seqopt.sequence.free_rules import FreeRules, with_robots

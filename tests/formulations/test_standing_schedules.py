@@ -20,10 +20,9 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, MechanismError, ProblemError, SceneError, SolverError
 from seqopt.graph.states.states import build_states
 from seqopt.network.build import build_network
-from seqopt.plan.front import find_front
+from seqopt.plan.front import StateFront, find_front
 from seqopt.plan.judge.infeasible import worst_least
 from seqopt.plan.judge.schedules import judge_schedule
-from seqopt.plan.state_front import StateFront
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.requirements import LIMIT_TOLERANCE
 from seqopt.problem.standing import Standing, StandingSets, without_implied

@@ -13,10 +13,9 @@ from seqopt.errors import ProblemError, SeqoptError, SolverError, StepError
 from seqopt.graph.states.states import build_states
 from seqopt.network.build import build_network
 from seqopt.plan.calling.formulation import Formulation, FormulationKind, On, find_formulation
-from seqopt.plan.front import FrontSelection, find_front
+from seqopt.plan.front import FrontSelection, StateFront, find_front
 from seqopt.plan.judge.schedules import judge_schedule
 from seqopt.plan.solving import solve
-from seqopt.plan.state_front import StateFront
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.requirements import Limit
 from seqopt.sequence.free_rules import FreeRules

@@ -14,10 +14,9 @@ from formulations.states.schedule_search import FORMULATION as PLAN
 from seqopt.errors import InfeasibleError, SolverError
 from seqopt.graph.orders.orders import AllOrders, OrderSelection
 from seqopt.graph.states.states import build_states
-from seqopt.plan.calling.state_path import StatePath
-from seqopt.plan.front import FrontSelection, find_front
+from seqopt.plan.calling.guard import StatePath
+from seqopt.plan.front import FrontSelection, StateFront, find_front
 from seqopt.plan.solving import solve
-from seqopt.plan.state_front import StateFront
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.goals import parse_goals
 from seqopt.problem.requirements import Limit

@@ -15,8 +15,7 @@ from seqopt.graph.layers.interface import CostProblem
 from seqopt.graph.layers.layers import candidate_layers
 from seqopt.plan.judge.certificate import certify
 from seqopt.problem.aims import Aim
-from seqopt.problem.overloads import Excess, overloads
-from seqopt.problem.requirements import Limit, payload_limits
+from seqopt.problem.requirements import Excess, Limit, overloads, payload_limits
 
 
 def weak(scene, payload):

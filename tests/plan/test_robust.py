@@ -19,9 +19,8 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.graph.layers.costs import LayeredCosts
 from seqopt.graph.layers.layers import candidate_layers
-from seqopt.graph.scenarios.arcs import scenario_arcs
 from seqopt.graph.scenarios.costs import ScenarioCosts
-from seqopt.graph.scenarios.scenarios import ScenarioLayers, in_scenarios, largest_of
+from seqopt.graph.scenarios.scenarios import ScenarioLayers, in_scenarios, largest_of, scenario_arcs
 from seqopt.plan.calling.watch import Watch
 from seqopt.plan.out_of_sample import judge_unseen
 from seqopt.plan.posing import graph_of, layers_of

@@ -23,7 +23,7 @@ from seqopt.report.comparison import compare
 from seqopt.report.page import LARGEST, Build, Scatter, build_data, report_page, structure_data
 from seqopt.report.pages import OVER, comparison_page, plan_page
 from seqopt.responses.table import analyze
-from seqopt.scene.blocks import block_brick
+from seqopt.scene.boxes import block_brick
 from seqopt.scene.imports.contacts import face_ground, flat_face
 from seqopt.scene.library.common import MASONRY
 from seqopt.scene.parts import Robot

@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from seqopt.errors import SceneError
-from seqopt.scene.blocks import as_vectors
+from seqopt.scene.boxes import as_vectors
 from seqopt.scene.imports.contacts import face_ground, face_joint, flat_face
 from seqopt.scene.imports.detection import touching_faces
 from seqopt.scene.library.common import MASONRY

@@ -12,7 +12,7 @@ from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
 from seqopt.errors import SceneError
-from seqopt.scene.blocks import as_vectors, block_brick, vertices_of
+from seqopt.scene.boxes import as_vectors, block_brick, vertices_of
 from seqopt.scene.shape import Polyhedron
 from tests.blocks import C_SHAPE, L_SHAPE, box, prism
 from tests.builders import six_bricks

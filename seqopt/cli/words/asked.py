@@ -20,8 +20,8 @@ from seqopt.engines.registry import make_engine
 from seqopt.errors import ProblemError, SceneError
 from seqopt.interrupts import ending
 from seqopt.network.network import Network
-from seqopt.problem.overloads import overloads
 from seqopt.problem.problem import Problem
+from seqopt.problem.requirements import overloads
 from seqopt.problem.scales import OWN
 from seqopt.responses.linear_range import OUTSIDE, REMEDY
 from seqopt.responses.staged import staged_fields

@@ -23,8 +23,14 @@ from seqopt.graph.layers.windows import (
     window_kept,
 )
 from seqopt.problem.aims import Aim
-from seqopt.problem.overloads import excesses
-from seqopt.problem.requirements import Criterion, Limit, ResponsesAsked, as_limits, robots_of
+from seqopt.problem.requirements import (
+    Criterion,
+    Limit,
+    ResponsesAsked,
+    as_limits,
+    excesses,
+    robots_of,
+)
 from seqopt.problem.scales import SceneFacts
 from seqopt.responses.choices import CHOICE_RESPONSES, Evaluation, StepChoices
 from seqopt.responses.quantities import robot_response

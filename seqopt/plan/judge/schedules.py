@@ -17,7 +17,7 @@ import pandas as pd
 
 from seqopt.errors import SolverError
 from seqopt.graph.states.states import States
-from seqopt.plan.calling.state_path import StatePath
+from seqopt.plan.calling.guard import StatePath
 from seqopt.plan.judge.certificate import Certificate
 from seqopt.plan.judge.proof import BELOW, Hint, Proof
 from seqopt.plan.judge.rule_moves import check_scheduled

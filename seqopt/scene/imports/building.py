@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 
 from seqopt.errors import SceneError
-from seqopt.scene.blocks import as_vectors, block_brick
+from seqopt.scene.boxes import as_vectors, block_brick
 from seqopt.scene.checks import LARGEST_NUMBER, positive, short
 from seqopt.scene.imports.contacts import GROUND, Contacts, face_ground, face_joint, find_contacts
 from seqopt.scene.imports.content import MOST_CORNERS, UNITS, UPS, Content, FileJoint, Given

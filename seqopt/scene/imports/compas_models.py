@@ -22,7 +22,7 @@ import numpy as np
 
 from seqopt.arrays import Floats
 from seqopt.errors import SceneError
-from seqopt.scene.blocks import BOX_CORNERS, BOX_FACES
+from seqopt.scene.boxes import BOX_CORNERS, BOX_FACES
 from seqopt.scene.imports.compas_data import (
     Element,
     by_guid,

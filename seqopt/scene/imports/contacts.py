@@ -11,7 +11,7 @@ import numpy as np
 
 from seqopt.arrays import Floats, FrozenValue, Vector
 from seqopt.errors import SceneError
-from seqopt.scene.blocks import as_vectors
+from seqopt.scene.boxes import as_vectors
 from seqopt.scene.checks import positive, short
 from seqopt.scene.imports.content import Content, FileJoint, Given
 from seqopt.scene.imports.detection import (

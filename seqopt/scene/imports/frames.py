@@ -15,7 +15,7 @@ import numpy as np
 from seqopt.arrays import Floats
 from seqopt.errors import SceneError
 from seqopt.scene.arch import STANDARD_GRAVITY
-from seqopt.scene.blocks import BOX_CORNERS, BOX_FACES
+from seqopt.scene.boxes import BOX_CORNERS, BOX_FACES
 from seqopt.scene.checks import short
 from seqopt.scene.imports.content import Content, FileBlock, FileJoint
 from seqopt.scene.imports.json_reading import Entry, entry, listing, mapping, number, point

@@ -10,7 +10,7 @@ import numpy as np
 
 from seqopt.arrays import Floats
 from seqopt.errors import SceneError
-from seqopt.scene.blocks import as_vectors
+from seqopt.scene.boxes import as_vectors
 from seqopt.scene.imports.content import FileBlock
 from seqopt.scene.imports.detection import Surface
 from seqopt.scene.shape import FLAT, Polyhedron, bend

@@ -10,8 +10,7 @@ import numpy as np
 
 from seqopt.arrays import Floats
 from seqopt.errors import SceneError
-from seqopt.scene.blocks import as_vector
-from seqopt.scene.boxes import require_apart
+from seqopt.scene.boxes import as_vector, require_apart
 from seqopt.scene.checks import positive, short
 from seqopt.scene.library.common import (
     MASONRY,

@@ -9,8 +9,7 @@ import numpy as np
 
 from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.errors import SceneError
-from seqopt.scene.blocks import as_vector
-from seqopt.scene.boxes import Boxes, boxes
+from seqopt.scene.boxes import Boxes, as_vector, boxes
 from seqopt.scene.library.common import JointLaw
 from seqopt.scene.parts import THICKEST, Brick, Ground, Joint
 

@@ -20,8 +20,7 @@ import numpy as np
 
 from seqopt.arrays import Floats
 from seqopt.errors import SceneError
-from seqopt.scene.blocks import as_vector
-from seqopt.scene.boxes import require_apart
+from seqopt.scene.boxes import as_vector, require_apart
 from seqopt.scene.checks import finite, positive
 from seqopt.scene.library.common import JointLaw, mobile_robots, touching_order, whole_number
 from seqopt.scene.library.herringbone import Tile, neighbors, tiles

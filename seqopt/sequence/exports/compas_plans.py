@@ -17,7 +17,7 @@ import numpy as np
 from seqopt.arrays import Floats
 from seqopt.errors import StepError
 from seqopt.files import read_text
-from seqopt.scene.blocks import vertices_of
+from seqopt.scene.boxes import vertices_of
 from seqopt.scene.imports.building import block_numbers
 from seqopt.scene.imports.compas_data import by_guid, kind, payload
 from seqopt.scene.imports.compas_models import assembly_graph

@@ -10,7 +10,7 @@ import trimesh
 
 from seqopt.cli.main import main
 from seqopt.errors import SceneError, SceneWarning
-from seqopt.scene.blocks import as_vectors
+from seqopt.scene.boxes import as_vectors
 from seqopt.scene.imports.content import Given
 from seqopt.scene.imports.formats import import_scene, read_content
 from seqopt.scene.imports.meshes import read_obj
