@@ -36,13 +36,7 @@ from seqopt.plan.front import find_front
 from seqopt.plan.posing import pose
 from seqopt.report.charts import draw_responses, front_figure
 from seqopt.report.comparison import method_tables
-from seqopt.report.draw import (
-    View,
-    draw_bricks,
-    draw_grips,
-    draw_network,
-    force_key,
-)
+from seqopt.report.draw import View, draw_bricks, draw_grips, draw_network, force_key
 from seqopt.report.style import BLUE, DPI, GRAY, GREEN, VERMILION, new_figure, plain, styled
 from seqopt.report.wording import in_words
 from seqopt.scene.boxes import boxes

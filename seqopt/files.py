@@ -130,10 +130,7 @@ def write_folder(folder: Path, files: Mapping[str, bytes | str]) -> None:
             _put_all([(target / name, content) for name, content in files.items()])
             return
         make_folder(target.parent)
-        with (
-            undisturbed(),
-            tempfile.TemporaryDirectory(dir=target.parent, prefix=HIDDEN) as hidden,
-        ):
+        with undisturbed(), tempfile.TemporaryDirectory(dir=target.parent, prefix=HIDDEN) as hidden:
             whole = Path(hidden) / "whole"
             whole.mkdir()  # as open as any new folder; the one around it is private
             _put_all([(whole / name, content) for name, content in files.items()])

@@ -65,10 +65,7 @@ def legacy():
         "1": {"2": {"interface_points": UPPER, "interface_type": "face_face"}},
     }
     common = {"is_support": False, "course": None, "x": 0.0, "y": 0.0, "z": 0.0}
-    return {
-        "assembly": {"node": nodes, "edge": edges, "node_attributes": common},
-        "blocks": blocks,
-    }
+    return {"assembly": {"node": nodes, "edge": edges, "node_attributes": common}, "blocks": blocks}
 
 
 FLOOR = [[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [2.0, 1.0, 0.0], [0.0, 1.0, 0.0]]

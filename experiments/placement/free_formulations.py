@@ -27,12 +27,7 @@ from experiments.harness.runs import scene_named
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.graph.states.states import build_states
 from seqopt.network.build import build_network
-from seqopt.plan.calling.formulation import (
-    FormulationKind,
-    On,
-    find_formulation,
-    formulation_names,
-)
+from seqopt.plan.calling.formulation import FormulationKind, On, find_formulation, formulation_names
 from seqopt.plan.plan import Plan
 from seqopt.plan.solving import solve
 from seqopt.sequence.free_rules import FreeRules

@@ -49,10 +49,7 @@ def write(problem: PlacementProblem) -> WholeProgram:
     out = sparse.csr_array((np.ones(inner.sum()), (tail[inner], np.flatnonzero(inner))), shape)
     into = sparse.csr_array((np.ones(len(head)), (head, np.arange(len(head)))), shape)
     continued = int(starts[-2])
-    rules = [
-        cp.Zero(one_each @ picks - np.ones(len(sizes))),
-        cp.Zero(into @ pairs - picks),
-    ]
+    rules = [cp.Zero(one_each @ picks - np.ones(len(sizes))), cp.Zero(into @ pairs - picks)]
     if continued:
         rules.append(cp.Zero(out[:continued] @ pairs - picks[:continued]))
     program = cp.Problem(cp.Minimize(flow.cost @ pairs), rules)

@@ -92,10 +92,7 @@ def on_graph(
 
 
 def _chosen(
-    problem: States,
-    choose: Callable[[Graph, Watch], Choice],
-    watch: Watch,
-    tell: Watching,
+    problem: States, choose: Callable[[Graph, Watch], Choice], watch: Watch, tell: Watching
 ) -> StatePath:
     """Return the plan of a choice; where time was over, the better one of it and a first plan."""
     first = None

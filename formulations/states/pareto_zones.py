@@ -28,10 +28,7 @@ from seqopt.work.progress import Tell
 
 
 def solve(
-    problem: FrontProblem,
-    *,
-    seconds: float = np.inf,
-    progress: Tell = lambda _: None,
+    problem: FrontProblem, *, seconds: float = np.inf, progress: Tell = lambda _: None
 ) -> FrontSelection:
     """Return all vectors that no plan dominates, and a plan for each.
 

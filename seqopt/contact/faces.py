@@ -115,10 +115,7 @@ class Contacts(dict[int, tuple[str, Floats, Floats]]):
 
 
 def step_assembly(
-    network: Network,
-    bricks: int,
-    grips: Sequence[int | None],
-    known: Contacts | None = None,
+    network: Network, bricks: int, grips: Sequence[int | None], known: Contacts | None = None
 ) -> Assembly:
     """Return a partial structure with the grips that hold it: blocks and their contacts.
 

@@ -297,10 +297,7 @@ def _judge(
     refusal: MechanismError | SolverError | None,
 ) -> tuple[Finding, str]:
     if not lowest:
-        return (
-            Finding.MECHANISM,
-            "neither joints nor ground nor grips resist the motion",
-        )
+        return (Finding.MECHANISM, "neither joints nor ground nor grips resist the motion")
     if residuals is None:
         return Finding.ILL_CONDITIONED, f"condition {condition:.1e}; the engine refused: {refusal}"
     error = residuals.backward_error

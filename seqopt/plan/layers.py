@@ -104,11 +104,7 @@ def on_the_way(plan: Plan) -> Plan:
     return plan
 
 
-def _solve_all(
-    graph: PlacementProblem,
-    formulation: Formulation,
-    run: Run,
-) -> Plan:
+def _solve_all(graph: PlacementProblem, formulation: Formulation, run: Run) -> Plan:
     """Return the certified plan of a formulation that is given the costs of all choices."""
     seconds: dict[str, float] = {}
     stages = graph.seconds(formulation.aim or Aim.SUM)  # computes costs: solving is timed alone

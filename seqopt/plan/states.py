@@ -42,11 +42,7 @@ def solve_states(graph: States, formulation: Formulation, run: Run) -> Plan:
 
 
 def _solved(
-    problem: States,
-    formulation: Formulation,
-    options: Mapping[str, Any],
-    *,
-    proof: bool,
+    problem: States, formulation: Formulation, options: Mapping[str, Any], *, proof: bool
 ) -> Plan:
     """Return the plan of a formulation, judged."""
     start, twin = time.perf_counter(), replace(problem)  # which no formulation can reach
@@ -69,10 +65,7 @@ def _judged(problem: States) -> States:
 
 
 def _selected(
-    formulation: Formulation,
-    problem: States,
-    twin: States,
-    options: Mapping[str, Any],
+    formulation: Formulation, problem: States, twin: States, options: Mapping[str, Any]
 ) -> StatePath:
     """Return what a formulation says, with numbers where numbers belong; or why there is none."""
     start, name = time.perf_counter(), formulation.name

@@ -190,11 +190,7 @@ class StandingSets:
         return self._tilts_known[step]
 
     def _ask(
-        self,
-        name: str,
-        bricks: int,
-        grips: tuple[Ints, Floats],
-        compute: Callable[[Ints], Floats],
+        self, name: str, bricks: int, grips: tuple[Ints, Floats], compute: Callable[[Ints], Floats]
     ) -> Floats:
         held, payload = grips
         kinds = np.where(held > 0, np.searchsorted(self._payloads, payload), 0)

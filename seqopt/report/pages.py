@@ -31,10 +31,7 @@ WORDS = {
     "D_max": "displacement, 1e-3 mm",
 }  # as of seqopt.report.comparison.LARGEST
 OVER = "over payload"
-LEGEND = {
-    OVER: "a robot would hold more than it can",
-    OUTSIDE: "its numbers are not reliable",
-}
+LEGEND = {OVER: "a robot would hold more than it can", OUTSIDE: "its numbers are not reliable"}
 PAGE = "report.html"
 FORCES = {"F_largest": "F_rob"}  # another name for the same
 FIRST = (CLOSED, FREE)  # of a comparison: its other rows may be more than are seen at once

@@ -93,7 +93,7 @@ def network_picture(network: Network, bricks: int | None = None, width: float = 
     draw_network(axes, network, count, VIEW, numbers=count <= NUMBERED and width >= WIDTH)
     axes.set_title(
         f"network of {network.scene.name}, {count} bricks\n"
-        "filled circles can be held, open ones are joints, squares are supports",
+        "filled circles can be held, open ones are joints, squares are supports"
     )
     return figure
 

@@ -105,9 +105,7 @@ def look(number: int) -> Look:
     first ten each marker.
     """
     return Look(
-        COLORS[number % len(COLORS)],
-        MARKERS[number % len(MARKERS)],
-        DASHES[number % len(DASHES)],
+        COLORS[number % len(COLORS)], MARKERS[number % len(MARKERS)], DASHES[number % len(DASHES)]
     )
 
 

@@ -90,10 +90,7 @@ def first_directions(corners: int, grips: int) -> Directions:
     flat = np.stack([np.zeros(_SIDES), np.cos(angle), np.sin(angle)], axis=1)
     space = _SPREAD / np.linalg.norm(_SPREAD, axis=1, keepdims=True)
     owner = np.concatenate(
-        [
-            np.repeat(np.arange(corners), _SIDES),
-            corners + np.repeat(np.arange(grips), len(space)),
-        ]
+        [np.repeat(np.arange(corners), _SIDES), corners + np.repeat(np.arange(grips), len(space))]
     )
     return Directions(
         owner, np.concatenate([np.tile(flat, (corners, 1)), np.tile(space, (grips, 1))])
@@ -321,11 +318,7 @@ class HeldStates:
     """
 
     def __init__(
-        self,
-        assembly: Assembly,
-        case: Case,
-        compiled: CompileHeld,
-        easier: Case | None = None,
+        self, assembly: Assembly, case: Case, compiled: CompileHeld, easier: Case | None = None
     ) -> None:
         self.assembly = assembly
         self._case = case

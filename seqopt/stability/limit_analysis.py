@@ -110,11 +110,7 @@ def limits(
     own = assembly.payload if own is None else own
     payload = case.payload[0] * own / assembly.scales[0] + z * case.payload[1]
     tension, cohesion = case.tension, case.cohesion
-    return (
-        share * (tension[0] + z * tension[1]),
-        share * (cohesion[0] + z * cohesion[1]),
-        payload,
-    )
+    return (share * (tension[0] + z * tension[1]), share * (cohesion[0] + z * cohesion[1]), payload)
 
 
 def violation(assembly: Assembly, case: Case, answer: Answer, own: Floats | None = None) -> float:

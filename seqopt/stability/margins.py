@@ -55,10 +55,7 @@ class Margins:
     """
 
     def __init__(
-        self,
-        network: Network | Scene,
-        mortar: Mortar | str,
-        compiled: CompileHeld = compile_held,
+        self, network: Network | Scene, mortar: Mortar | str, compiled: CompileHeld = compile_held
     ) -> None:
         self.network = network_of(network)
         self.mortar = find_mortar(mortar)
@@ -141,11 +138,7 @@ class Margins:
         return np.asarray(np.arctan(np.stack([np.array(least), most], axis=1)))
 
     def friction(
-        self,
-        bricks: int,
-        held: ArrayLike,
-        payload: ArrayLike | None = None,
-        step: float = 2.0**-7,
+        self, bricks: int, held: ArrayLike, payload: ArrayLike | None = None, step: float = 2.0**-7
     ) -> Floats:
         """Return the least coefficient of friction at the mortar's bond, by halving intervals.
 

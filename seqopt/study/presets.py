@@ -49,14 +49,7 @@ WORST_RATIO = WorstRatio("worst-ratio-published", PUBLISHED_BEST)
 
 CRITERIA: dict[str, Criterion] = {
     criterion.name: criterion
-    for criterion in (
-        EQUATIONS,
-        CLOSEST,
-        OVER_METHODS,
-        WORST_OVER_METHODS,
-        WEIGHTED,
-        WORST_RATIO,
-    )
+    for criterion in (EQUATIONS, CLOSEST, OVER_METHODS, WORST_OVER_METHODS, WEIGHTED, WORST_RATIO)
 }
 """What a step may cost, by name.
 

@@ -92,11 +92,7 @@ IRREGULARITIES = (
 """Inconsistencies in the paper's own numbers, one sentence each."""
 
 PUBLISHED = "published"  # the name of the printed three-robot plan, where methods are listed
-PRINTED_COLUMN = {
-    "sequential": "sequential",
-    "cantilever": "cantilever",
-    PUBLISHED: "three_robot",
-}
+PRINTED_COLUMN = {"sequential": "sequential", "cantilever": "cantilever", PUBLISHED: "three_robot"}
 
 
 def is_reference_arch(scene: Scene) -> bool:

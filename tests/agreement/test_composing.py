@@ -18,12 +18,7 @@ from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import find_mortar
 from seqopt.errors import InfeasibleError, StepError
 from seqopt.graph.states.states import build_states
-from seqopt.plan.calling.formulation import (
-    FormulationKind,
-    On,
-    find_formulation,
-    formulation_names,
-)
+from seqopt.plan.calling.formulation import FormulationKind, On, find_formulation, formulation_names
 from seqopt.problem.requirements import LIMIT_TOLERANCE, Limit
 from seqopt.sequence.free_rules import FreeRules, with_robots
 from seqopt.sequence.schedule import thin

@@ -196,14 +196,7 @@ def test_optimize(capsys, tmp_path):
     assert report["status"] == "optimal"
     assert report["gap"] == pytest.approx(0)
     assert report["models_paper_count"] == {"cascading": 2576, "overlap": 22724}
-    assert set(report["seconds"]) == {
-        "assemble",
-        "respond",
-        "rank",
-        "compile",
-        "solve",
-        "verify",
-    }
+    assert set(report["seconds"]) == {"assemble", "respond", "rank", "compile", "solve", "verify"}
     plan = pd.read_csv(folder / "plan.csv")
     study = list(printed_steps("sequential").columns[:21])
     assert list(plan.columns[:21]) == study
@@ -299,10 +292,7 @@ def test_the_loop_of_two_is_compared_where_there_is_no_third(capsys, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "named"),
     [
-        (
-            ("--formulation", "overlap_dp", "--schedule", "ring"),
-            "schedule 'ring' does not exist",
-        ),
+        (("--formulation", "overlap_dp", "--schedule", "ring"), "schedule 'ring' does not exist"),
         (("--formulation", "overlap_dp", "--schedule", "no.csv"), "cannot read no.csv"),
         (("--schedule", "three-robot", "--robots", "rob1,rob2"), "three-robot takes three"),
         (("--formulation", "overlap_dp", "--robots", "rob1,,rob2"), "robot '' does not exist"),

@@ -29,11 +29,7 @@ def shifted(by, joint=(0.0, 0.0, 0.0), thickness=None):
         WALL,
         bricks=(WALL.bricks[0], replace(top, position=tuple(np.add(top.position, by)))),
         joints=(
-            replace(
-                spring,
-                position=tuple(np.add(spring.position, joint)),
-                thickness=thickness,
-            ),
+            replace(spring, position=tuple(np.add(spring.position, joint)), thickness=thickness),
         ),
     )
 

@@ -28,14 +28,7 @@ from seqopt.engines.rigid.trial import solve_batch
 from seqopt.engines.rigid.ungripped import ungripped_system
 from seqopt.network.build import build_network
 from seqopt.scene.arch import ArchShape, arch_scene
-from tests.builders import (
-    branch,
-    from_both_sides,
-    hinged,
-    six_bricks,
-    small_arch,
-    torsion_free,
-)
+from tests.builders import branch, from_both_sides, hinged, six_bricks, small_arch, torsion_free
 
 SCENES = {
     "arch": small_arch(5),

@@ -29,9 +29,7 @@ def test_the_plane_is_looked_for():
         PlanarEngine(build_network(replace(scene, bricks=(scene.bricks[0], off, scene.bricks[2]))))
     a, _, c = scene.joints[0].along
     turned = replace(
-        scene.joints[0],
-        across=(-0.8 * c, 0.6, 0.8 * a),
-        translational_stiffness=(3e8, 2e8, 1e8),
+        scene.joints[0], across=(-0.8 * c, 0.6, 0.8 * a), translational_stiffness=(3e8, 2e8, 1e8)
     )
     with pytest.raises(SceneError, match="joint 1-2: its axes are turned"):
         PlanarEngine(build_network(replace(scene, joints=(turned, scene.joints[1]))))

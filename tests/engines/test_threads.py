@@ -37,8 +37,7 @@ def test_one_thread_inside_and_two_after(two_threads):
 
 
 @pytest.mark.parametrize(
-    ("owner", "name", "loose"),
-    [(OperatorBuilder, "operator", False), (Refinement, "solve", True)],
+    ("owner", "name", "loose"), [(OperatorBuilder, "operator", False), (Refinement, "solve", True)]
 )
 def test_engines_keep_to_one_thread(two_threads, monkeypatch, owner, name, loose):
     seen = []

@@ -89,9 +89,7 @@ CHECKS = {
         *("least_payload", 2.0, {"bricks": 13, "thickness_m": 0.053, "robots": 3}),
     ),
     "dry_map grips": Check(
-        dry_map.grips_hold,
-        ("dry_grips", "dry_grips_build"),
-        *("placed", 25, {"robots": 2}, 1),
+        dry_map.grips_hold, ("dry_grips", "dry_grips_build"), *("placed", 25, {"robots": 2}, 1)
     ),
     "dry_map methods": Check(
         lambda *tables: all(dry_map.methods_hold(*tables).values()),
@@ -134,14 +132,10 @@ CHECKS = {
         *("displacement", 1e-5, {"contrast": 1e7}),
     ),
     "free_growth": Check(
-        free_growth.holds,
-        ("free_growth",),
-        *("status", "feasible", {"bricks": 49, "robots": 4}),
+        free_growth.holds, ("free_growth",), *("status", "feasible", {"bricks": 49, "robots": 4})
     ),
     "heuristic_gaps": Check(
-        heuristic_gaps.holds,
-        ("heuristic_gaps",),
-        *("gap", 0.02, {"formulation": "beam"}),
+        heuristic_gaps.holds, ("heuristic_gaps",), *("gap", 0.02, {"formulation": "beam"})
     ),
     "identify_arch25": Check(
         lambda table: arch_numbers.holds(table, quick=False),
@@ -154,9 +148,7 @@ CHECKS = {
         *("said", "feasible", {"file": "bridge.json"}),
     ),
     "composing": Check(
-        composing.holds,
-        ("composing",),
-        *("value", 1.0, {"schedule": "free", "with": "overlap_dp"}),
+        composing.holds, ("composing",), *("value", 1.0, {"schedule": "free", "with": "overlap_dp"})
     ),
     "free_formulations": Check(
         free_formulations.holds,
@@ -169,9 +161,7 @@ CHECKS = {
         *("error_pct", 50.0, {"id": "table:experimental_data3"}),
     ),
     "parallel": Check(
-        parallel.holds,
-        ("parallel",),
-        *("times_as_fast_by_cpu", 1.5, {"way": "two processes"}),
+        parallel.holds, ("parallel",), *("times_as_fast_by_cpu", 1.5, {"way": "two processes"})
     ),
     "peers": Check(
         peers.judge,

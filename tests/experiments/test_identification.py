@@ -6,13 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from experiments.calibration.identify_arch25 import (
-    beside_shipped,
-    fit,
-    holds,
-    residuals,
-    target,
-)
+from experiments.calibration.identify_arch25 import beside_shipped, fit, holds, residuals, target
 from experiments.calibration.parts.arch_numbers import (
     OFFSETS,
     SHAPE,

@@ -18,12 +18,7 @@ from experiments.stability.parts.witness_cra import (
     sample_scene,
     without_tension,
 )
-from experiments.stability.parts.witness_lmgc90 import (
-    GRAVITY,
-    STEP,
-    STEPS,
-    verdict,
-)
+from experiments.stability.parts.witness_lmgc90 import GRAVITY, STEP, STEPS, verdict
 from experiments.stability.parts.witness_scenes import incline, scene_of
 from experiments.stability.witnesses import (
     Trial,

@@ -371,10 +371,7 @@ def test_limits_hold_or_are_infeasible(engine25):
 
 def test_budgets_of_the_reference_arch(problem25):
     free = ALL["overlap_dp"].solve(problem25)
-    for budget in (
-        travel(problem25, 20.0),
-        steps_over(problem25, "F_largest", 300.0, 5.0),
-    ):
+    for budget in (travel(problem25, 20.0), steps_over(problem25, "F_largest", 300.0, 5.0)):
         assert budget.spent(free.choice) > budget.bound
         capped = replace(problem25, budgets=(budget,))
         plan = solve(capped, ALL["labels"])

@@ -47,8 +47,7 @@ def hanging():
 
 def case(sense, **numbers):
     return Case(
-        sense=sense,
-        **({"friction": 0.3, "tension": (0.0, 0.0), "cohesion": (0.0, 0.0)} | numbers),
+        sense=sense, **({"friction": 0.3, "tension": (0.0, 0.0), "cohesion": (0.0, 0.0)} | numbers)
     )
 
 

@@ -18,9 +18,7 @@ from seqopt.graph.orders.orders import AllOrders, OrderSelection
 from seqopt.graph.orders.visits import whole_bound
 from seqopt.graph.orders.work import trying
 from seqopt.graph.states.states import build_states, over_scenarios, within
-from seqopt.plan.calling.formulation import (
-    find_formulation,
-)
+from seqopt.plan.calling.formulation import find_formulation
 from seqopt.plan.judge.orders import finds_better_order
 from seqopt.plan.solving import solve
 from seqopt.problem.criteria import WorstRatio

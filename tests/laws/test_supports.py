@@ -27,11 +27,7 @@ def left_over(net, bricks, grips, fields):
     """Force and moment about the origin, (6,), of weight, grips and ground ends summed."""
     places = [net.index_of_node[int(node)] for node in grips[0]]
     points = np.vstack(
-        [
-            net.centroid[:bricks],
-            net.node_position[places],
-            net.springs.anchor[net.springs.support],
-        ]
+        [net.centroid[:bricks], net.node_position[places], net.springs.anchor[net.springs.support]]
     )
     reaction = fields.support[0]
     forces = np.vstack([net.weight[:bricks], fields.grip_force[0], reaction[:, :3]])

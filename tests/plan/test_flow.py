@@ -32,8 +32,7 @@ def problem(*bounds):
         )
     )
     taken = amounts(
-        ([30, 0, 50], [0, 0], [0, 0]),
-        ([[0, 0, 0]], [[1, 2], [0, 0], [3, 0]], [[0, 0], [0, 0]]),
+        ([30, 0, 50], [0, 0], [0, 0]), ([[0, 0, 0]], [[1, 2], [0, 0], [3, 0]], [[0, 0], [0, 0]])
     )
     return CostProblem(costs, tuple(Budget(f"use {i}", *taken, b) for i, b in enumerate(bounds)))
 

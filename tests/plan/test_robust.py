@@ -24,14 +24,7 @@ from seqopt.graph.scenarios.scenarios import ScenarioLayers, in_scenarios, large
 from seqopt.plan.calling.watch import Watch
 from seqopt.plan.out_of_sample import judge_unseen
 from seqopt.plan.posing import graph_of, layers_of
-from seqopt.problem.aims import (
-    WORST_PEAK,
-    WORST_TOTAL,
-    Aim,
-    RobustAim,
-    cvar,
-    parse_robust,
-)
+from seqopt.problem.aims import WORST_PEAK, WORST_TOTAL, Aim, RobustAim, cvar, parse_robust
 from seqopt.responses.resources import Resources
 from seqopt.scene.scenarios import scenarios
 from tests.builders import six_bricks, small_arch
@@ -176,10 +169,7 @@ def test_aims_are_ordered(layers):
         assert all(a <= b + 1e-7 for a, b in pairwise(worth))
 
 
-@given(
-    each=st.lists(st.floats(-100, 100), min_size=1, max_size=8),
-    level=st.floats(0, 0.99),
-)
+@given(each=st.lists(st.floats(-100, 100), min_size=1, max_size=8), level=st.floats(0, 0.99))
 def test_a_tail_is_the_least_over_thresholds(each, level):
     aim = cvar(level)
     assert aim.value(np.array(each)) == pytest.approx(tail(each, aim), abs=1e-9)

@@ -137,10 +137,7 @@ def test_a_weighted_sum_divides_by_its_scales():
     assert own.costs(RESPONSES, 1, 3).tolist() == [21, 17, 28]
     assert own.wanted(1) == ("T_max", "M_sup", "F_a")
     weights = {"T_max": 2.0, "M_sup": 3.0, "F_a": 9.0}
-    assert own.settings == {
-        "scales": {"T_max": 4.0, "M_sup": 0.5, "F_a": 1.0},
-        "weights": weights,
-    }
+    assert own.settings == {"scales": {"T_max": 4.0, "M_sup": 0.5, "F_a": 1.0}, "weights": weights}
     partly = replace(own, terms=(("D_max", 1.0, 1e-3),)).costs(RESPONSES, 1, 3)
     assert partly == pytest.approx([2, NAN, 1], nan_ok=True)
 

@@ -64,10 +64,7 @@ PANELS = {
     "wall": ("wall in running bond", "bricks"),
     "slenderness": ("25 slender bricks", "length over width"),
     "joint held": ("one loose joint,\nthree grips beyond it", "its stiffness over the others'"),
-    "turning held": (
-        "the same, loose\nin turning only",
-        "its stiffness over the others'",
-    ),
+    "turning held": ("the same, loose\nin turning only", "its stiffness over the others'"),
     "joint free": ("one loose joint,\nnothing beyond it", "its stiffness over the others'"),
     "grips": ("grips at the tip\nof 100 bricks", ""),
     "parted": ("one joint missing:\n12 and 13 bricks", ""),

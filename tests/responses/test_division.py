@@ -21,10 +21,7 @@ def portions_of(works):
     return [Portion((Stub(work),)) for work in works]
 
 
-@given(
-    works=st.lists(st.floats(0.0, 1e9), max_size=40),
-    lanes=st.integers(1, 5),
-)
+@given(works=st.lists(st.floats(0.0, 1e9), max_size=40), lanes=st.integers(1, 5))
 def test_every_portion_is_taken_once_and_its_answer_comes_in_its_place(works, lanes):
     portions = portions_of(works)
     places, turns = take_turns(portions, lanes)

@@ -15,12 +15,7 @@ from seqopt.graph.layers.layers import candidate_layers
 from seqopt.network.build import build_network
 from seqopt.problem.criteria import WeightedSum
 from seqopt.problem.requirements import Limit
-from seqopt.responses.quantities import (
-    RESPONSES,
-    responses_of,
-    support_forces,
-    support_moments,
-)
+from seqopt.responses.quantities import RESPONSES, responses_of, support_forces, support_moments
 from seqopt.responses.table import analyze, support_columns
 from seqopt.sequence.schedule import Move, OpenGrip, OpenStep, Schedule
 from seqopt.sequence.steps import Step, StepKind

@@ -118,11 +118,7 @@ def test_robots_by_name_take_the_roles_in_their_order():
 @pytest.mark.parametrize(
     ("method", "names", "named"),
     [
-        (
-            "sequential",
-            ("rob1", "robot"),
-            "robot 'robot' does not exist; give some of rob1, rob2",
-        ),
+        ("sequential", ("rob1", "robot"), "robot 'robot' does not exist; give some of rob1, rob2"),
         ("sequential", ("rob1", "rob1"), "robots rob1, rob1: one occurs twice"),
         ("cantilever", ("rob1",), "robots rob1: 1 named; cantilever takes two"),
         ("two-robot", ("rob1", "rob2", "rob3"), "3 named; two-robot takes two"),

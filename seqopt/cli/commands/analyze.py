@@ -113,12 +113,7 @@ def run(options: argparse.Namespace) -> Answer:
     if options.out is not None:
         write_csv(options.out, table)
     answer = Answer(
-        facts={
-            "scene": scene_facts(scene),
-            "units": UNITS,
-            "steps": table,
-            **provenance(engine),
-        },
+        facts={"scene": scene_facts(scene), "units": UNITS, "steps": table, **provenance(engine)},
         text="" if options.out is None else _said(table, options.out),
         data=csv_text(table) if options.out is None else "",
         written=tuple(written),

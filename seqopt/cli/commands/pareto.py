@@ -92,9 +92,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 
 def _choice(takes: Takes) -> None:
     takes.add_argument(
-        "--pick",
-        metavar="NAME",
-        help="also write the plan with the least of a column of the table",
+        "--pick", metavar="NAME", help="also write the plan with the least of a column of the table"
     )
     takes.add_argument(
         "--round",
@@ -164,10 +162,7 @@ def _methods(engine: Engine) -> dict[str, pd.DataFrame]:
 
 
 def _front_files(
-    front: Front,
-    free: States,
-    methods: Mapping[str, pd.DataFrame],
-    options: argparse.Namespace,
+    front: Front, free: States, methods: Mapping[str, pd.DataFrame], options: argparse.Namespace
 ) -> tuple[dict[str, bytes | str], tuple[str, ...]]:
     """Return the files of a Pareto set by name, and which points leave the linear range."""
     engine, tell = free.engine, options.tell

@@ -46,12 +46,7 @@ def tell_comparison(comparison: Comparison, scene: Scene, criterion: Criterion) 
     """
     blocks = [
         [f"{scene.name}: {len(scene.bricks)} bricks, {len(scene.robots)} robots"],
-        [
-            "Largest response of any step",
-            *_responses(comparison),
-            "",
-            _about(comparison),
-        ],
+        ["Largest response of any step", *_responses(comparison), "", _about(comparison)],
     ]
     if comparison.loop is None:
         blocks.append([wrapped(f"Loop of robots: not possible here; {comparison.refusal}")])

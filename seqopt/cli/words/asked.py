@@ -149,10 +149,7 @@ def marked(answer: Answer, outside: Sequence[object]) -> Answer:
 
 
 def strictly(
-    answer: Answer,
-    options: argparse.Namespace,
-    over: Sequence[str],
-    outside: Sequence[object] = (),
+    answer: Answer, options: argparse.Namespace, over: Sequence[str], outside: Sequence[object] = ()
 ) -> Answer:
     """Return an answer with the payloads that are exceeded, and the status of ``--strict``.
 

@@ -51,11 +51,7 @@ class Tried:
 
 
 def try_forces(
-    operator: ComplianceOperator,
-    columns: Ints,
-    *,
-    even: bool,
-    accuracy: float,
+    operator: ComplianceOperator, columns: Ints, *, even: bool, accuracy: float
 ) -> Tried:
     """Return what an operator alone says about grip sets, and which of them it answers well enough.
 

@@ -16,13 +16,7 @@ from seqopt.graph.scenarios.engines import engine_for, require_alike
 from seqopt.network.network import Network
 from seqopt.problem.criteria import RankSum
 from seqopt.problem.goals import LARGEST, STATE_RESPONSES, Goal, Measure, parse_goals
-from seqopt.problem.requirements import (
-    LIMIT_TOLERANCE,
-    Criterion,
-    Limit,
-    as_limits,
-    state_costs,
-)
+from seqopt.problem.requirements import LIMIT_TOLERANCE, Criterion, Limit, as_limits, state_costs
 from seqopt.problem.scales import SceneFacts
 from seqopt.problem.standing import Standing, StandingSets
 from seqopt.responses.grip_sets import GripSets
@@ -274,10 +268,7 @@ class States(Shown):
         return np.asarray(self.stability.stand(bricks, *self._grips(states, stand=True)))
 
     def _worst(
-        self,
-        valued: Sequence[Callable[[Ints], tuple[Floats, Bools]]],
-        states: Ints,
-        most: float,
+        self, valued: Sequence[Callable[[Ints], tuple[Floats, Bools]]], states: Ints, most: float
     ) -> tuple[Floats, Bools]:
         """Return the largest values in all scenarios; what one rules out the next is not asked."""
         out = np.zeros((len(states), len(self.goals)))

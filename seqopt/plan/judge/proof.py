@@ -54,10 +54,7 @@ class Proof:
                 return out
 
     def budget_bounds(
-        self,
-        values: Sequence[float],
-        claimed: Sequence[float],
-        prices: Sequence[Sequence[float]],
+        self, values: Sequence[float], claimed: Sequence[float], prices: Sequence[Sequence[float]]
     ) -> tuple[float, ...]:
         """Return the same for plans within budgets, by prices that a formulation gives."""
         caps = self._passable.problem.budgets

@@ -87,10 +87,7 @@ def _bounds(problem: States, proof: Proof, values: tuple[float, ...]) -> tuple[f
 
 
 def _within_budgets(
-    problem: States,
-    selection: StatePath,
-    values: tuple[float, ...],
-    proof: Proof,
+    problem: States, selection: StatePath, values: tuple[float, ...], proof: Proof
 ) -> Certificate:
     """Return the certificate of a plan within budgets: what prices leave open is its gap."""
     aims = len(problem.aims)

@@ -100,11 +100,7 @@ def _best_known(costs: PartialCosts, formulation: Formulation, watch: Watch) -> 
         end = End.INTERRUPTED if watch.interrupted else End.STOPPED
     watch.tell(found.objective, costs.bound)
     return replace(
-        found,
-        choice=choice,
-        bound=min(found.objective, costs.bound),
-        end=end,
-        trace=watch.trace,
+        found, choice=choice, bound=min(found.objective, costs.bound), end=end, trace=watch.trace
     )
 
 

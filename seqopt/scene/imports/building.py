@@ -164,11 +164,7 @@ def _tidied(content: Content, supports: set[int], said: list[str]) -> list[Repai
 
 
 def _bricks(
-    content: Content,
-    given: Given,
-    blocks: Sequence[Repaired],
-    supports: set[int],
-    said: list[str],
+    content: Content, given: Given, blocks: Sequence[Repaired], supports: set[int], said: list[str]
 ) -> dict[int, Brick]:
     """Return the bricks of the blocks that are built, by their places in the file."""
     keys = [block.key for block in content.blocks]

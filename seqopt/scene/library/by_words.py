@@ -40,11 +40,7 @@ def _vault338(arch: Scene) -> Scene:
     ``arch``: ``arch25``.
     """
     shape = VaultShape(
-        bricks=338,
-        spacing=0.1327,
-        plan_angle=math.radians(5.1),
-        skew=1.74,
-        widening=0.0234,
+        bricks=338, spacing=0.1327, plan_angle=math.radians(5.1), skew=1.74, widening=0.0234
     )
     return replace(herringbone_vault(arch, shape, "vault338"), provenance=_VAULT)
 

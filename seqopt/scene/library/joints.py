@@ -54,9 +54,7 @@ def contact_areas(first: Floats, second: Floats) -> _ContactAreas:
     squares = start**2 + start * end + end**2
     moments = (_cross(start, end)[:, :, None] * squares).sum(axis=1)[:, ::-1] / 12
     return _ContactAreas(
-        np.where(real, area, 0.0),
-        centroid + near[:, 0],
-        np.where(real[:, None], moments, 0.0),
+        np.where(real, area, 0.0), centroid + near[:, 0], np.where(real[:, None], moments, 0.0)
     )
 
 
