@@ -1,4 +1,4 @@
-"""The requirements on a plan: a criterion, limits, and the responses that these need."""
+"""The requirements on a plan: a criterion, limits, what these need, and which steps exceed them."""
 
 from __future__ import annotations
 

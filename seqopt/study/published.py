@@ -1,4 +1,4 @@
-"""The published three-robot plan, the paper's counts, and the inconsistencies in its numbers."""
+"""The published three-robot plan, the tables of the paper, its counts, and what is inconsistent."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Windows of a schedule: the steps that one move decides, given the move before."""
+"""Windows of a schedule: the steps that one move decides, and what is possible in them."""
 
 from __future__ import annotations
 

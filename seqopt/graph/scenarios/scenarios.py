@@ -1,4 +1,4 @@
-"""The problem of a plan that is to be good in many scenarios at once."""
+"""Layers of candidates in many scenarios at once, and the costs of pairs in all of them."""
 
 from __future__ import annotations
 

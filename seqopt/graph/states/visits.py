@@ -1,4 +1,4 @@
-"""The states and moves of a schedule, as an `seqopt.graph.Explorer` visits them."""
+"""The states and moves of a schedule as an explorer visits them, and the steps that they are."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How a formulation is called: what it returns is read as a selection, or it has failed."""
+"""How formulations are called: what fits together, and what they return read as a selection."""
 
 from __future__ import annotations
 

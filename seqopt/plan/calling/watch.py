@@ -1,4 +1,4 @@
-"""A watch on a formulation at work: its time limit, and what it has found so far."""
+"""How a formulation is run, and a watch on it: its time limit, and what it has found so far."""
 
 from __future__ import annotations
 

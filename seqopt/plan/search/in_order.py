@@ -1,4 +1,4 @@
-"""Several aims in order of importance (lexicographic), solved exactly.
+"""Aims in order of importance, and the least level that most steps keep, solved exactly.
 
 The choices that are best for the first aim are a part of the same layered graph: those pairs that
 lie on a best path. Among these the second aim is minimized, and so on.
