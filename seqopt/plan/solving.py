@@ -96,7 +96,7 @@ def _able(problem: Problem) -> tuple[On, ...]:
     first = natural(problem)
     if first is On.LAYERS:
         return (On.LAYERS, On.STATES)
-    chosen_from_candidates = not isinstance(problem.moves, FreeRules) and len(problem.goals) == 1
+    chosen_from_candidates = not isinstance(problem.moves, FreeRules) and len(problem.goals) <= 1
     return (first, On.LAYERS) if first is On.STATES and chosen_from_candidates else (first,)
 
 

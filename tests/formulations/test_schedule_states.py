@@ -238,7 +238,8 @@ def test_the_judge_sees_a_worse_plan_and_one_of_another_schedule():
 
 def test_what_does_not_go_together_is_said_in_a_line():
     engine, schedule = built("four")
+    assert seqopt.solve(seqopt.pose(engine, schedule, ONES)).goals == ("minmax",)
     with pytest.raises(StepError, match=r"open at once; .* give an aim"):
-        seqopt.pose(engine, schedule, ONES)
+        seqopt.solve(seqopt.pose(engine, schedule, ONES), "minimax")
     with pytest.raises(ProblemError, match="ranks the choices of a move"):
         build_states(engine, schedule, seqopt.CRITERIA["equations-2-3"], "sum")
