@@ -39,6 +39,8 @@ def load(words: Sequence[str]) -> None:
     """
     asked = asked_command(words)
     if asked in COMMANDS:
+        import jsonschema  # noqa: F401, PLC0415  # scene files need it
+
         import seqopt.cli.saying.watcher  # noqa: F401, PLC0415  # of which help needs nothing
 
         COMMANDS[asked].load()
