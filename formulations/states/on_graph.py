@@ -262,14 +262,19 @@ def after_margins(problem: States, search: Search, tell: Watching) -> StatePath:
     return replace(after, objective=(value, *after.objective), bound=(bound, *after.bound))
 
 
-def narrow(problem: States, width: int, tell: Watching) -> StatePath | None:
+def narrow(
+    problem: States, width: int, tell: Watching, most: Sequence[float] | None = None
+) -> StatePath | None:
     """Return the best plan through a few states of every brick count, if there is one.
 
-    Where states must stand it is asked of all of them only if the best paths fall.
+    Where states must stand it is asked of all of them only if the best paths fall; and if ``most``
+    is given, only where goals take no more than that without it.
     """
     for standing in (False, True)[: 1 + bool(problem.demands)]:
         found = Explorer(FreeStates(problem, regrips=False, standing=standing), width, tell)
         if found.rise():
+            if most is not None and not all(map(le, _exact(problem, found)[1].values, most)):
+                return None
             try:
                 return best_standing(problem, found)
             except InfeasibleError:

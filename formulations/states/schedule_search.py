@@ -14,23 +14,27 @@ in their order,
    g(s_1, \dots, s_N) = \sum_i c(s_{i-1}, s_i),
 
 with :math:`v` the value of a state and :math:`c` the cost of a step. A narrow search without
-regrips, which keeps the best states of every brick count, gives a first plan; where states must
-stand or be good in scenarios, which is dear to ask of them all, only if time or memory is limited;
-what the best plan of the first scenario takes in all is then where the threshold starts. It rises
-until states below it connect the empty site to an end; responses are computed only for states
-next to those that are reached below it, and with six digits until their value is close to that of
-the plan. Among these every goal is a shortest path, with the maximum instead of the sum for a peak;
-what is not on a best path of one goal is left out before the next. Whether states stand is asked
-only of those on the best path; where one falls, the next best path is sought without it (Dellin and
-Srinivasa, A unifying formalism for shortest path problems with expensive edge evaluations via lazy
-best-first search over paths with edge selectors, 2016). A margin of stability comes first: the best
+regrips, which keeps the best states of every brick count, gives a first plan. It is the best if it
+takes no more than what all plans have in common: the finished structure at their end, and as many
+steps as bricks and robots call for. Where states must stand or be good in scenarios, which is dear
+to ask of them all, it is sought without that, and kept only if it is then the best; what the best
+plan of the first scenario takes in all is then where the threshold starts. It rises until states
+below it connect the empty site to an end; responses are computed only for states next to those that
+are reached below it, and with six digits until their value is close to that of the plan. Among
+these every goal is a shortest path, with the maximum instead of the sum for a peak; what is not on
+a best path of one goal is left out before the next. Whether states stand is asked only of those on
+the best path; where one falls, the next best path is sought without it (Dellin and Srinivasa, A
+unifying formalism for shortest path problems with expensive edge evaluations via lazy best-first
+search over paths with edge selectors, 2016). A margin of stability comes first: the best
 one with which states still connect both ends is found by halving an interval, and all further
 states must have it.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from math import comb
+from operator import le
 
 import numpy as np
 
@@ -47,9 +51,9 @@ from formulations.states.on_graph import (
 from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.graph.budgets import is_beyond
 from seqopt.graph.explore import Explorer
-from seqopt.graph.paths import distances
+from seqopt.graph.paths import distances, tied
 from seqopt.graph.states.states import States
-from seqopt.graph.states.visits import FreeStates
+from seqopt.graph.states.visits import FreeStates, floors_of_goals
 from seqopt.plan.calling.formulation import Formulation, FormulationKind, On
 from seqopt.plan.calling.guard import StatePath
 from seqopt.plan.calling.watch import Watch
@@ -57,6 +61,8 @@ from seqopt.problem.goals import Measure
 from seqopt.work.progress import Tell
 
 FAR_BELOW = 4.0  # what the narrow search finds, over the first threshold
+MANY = 1_000_000  # grip sets, about: to look at all takes longer than a second narrow search
+WIDER = 20  # how many times as wide that one is
 
 
 def solve(
@@ -85,23 +91,47 @@ def solve(
             "number above 1"
         )
     tell = watched(problem, Watch(seconds), max_memory, progress)
-    if (problem.demands or problem.each) and min(seconds, max_memory) == np.inf:
-        width = 0
-    return after_margins(problem, lambda rest: _search(rest, (width, growth), tell), tell)
+    dear = bool(problem.demands or problem.each) and min(seconds, max_memory) == np.inf
+    options = _Options(width, growth, dear)
+    return after_margins(problem, lambda rest: _search(rest, options, tell), tell)
 
 
-def _search(problem: States, options: tuple[int, float], tell: Watching) -> StatePath:
+@dataclass(frozen=True)
+class _Options:
+    """How to search; ``dear``: whether a first plan is worth its time only if it is the best."""
+
+    width: int
+    growth: float
+    dear: bool
+
+
+def _search(problem: States, options: _Options, tell: Watching) -> StatePath:
     """Return the best path, or the first one found where the search is stopped."""
-    found, proven = None, [-np.inf]
+    floors = tuple(map(tied, floors_of_goals(problem)))
+    found, proven = None, [floors[0]]
     wide = Explorer(FreeStates(problem), tell=tell)
+    many = comb(2 * len(problem.network.inner), problem.space.robots) * problem.space.levels > MANY
     try:
-        found = narrow(problem, options[0], tell) if options[0] else None
+        for width in (options.width, WIDER * options.width)[: 1 + many]:
+            plans = [found, _first(problem, replace(options, width=width), floors, tell)]
+            found = min(filter(None, plans), key=lambda p: p.objective, default=None)
+            if found and not problem.budgets and all(map(le, found.objective, floors)):
+                return found  # no plan is better
         ceiling = found.objective[0] if found else np.inf
         if found is None and problem.budgets:
             _require_room(problem, tell)
-        return _best(problem, wide, (ceiling, options[1]), proven)
+        return _best(problem, wide, (ceiling, options.growth), proven)
     except (StopError, KeyboardInterrupt) as stop:
         return _unproven(plan_by_then(found, stop), wide, proven[-1])
+
+
+def _first(
+    problem: States, options: _Options, floors: tuple[float, ...], tell: Watching
+) -> StatePath | None:
+    """Return a first plan; where that is dear, only if it takes no more than floors of goals."""
+    if options.dear and problem.each and not problem.demands:
+        return _in_all(problem, narrow(problem.each[0], options.width, tell), floors)
+    return narrow(problem, options.width, tell, floors if options.dear else None)
 
 
 def _require_room(problem: States, tell: Watching) -> None:
@@ -123,7 +153,7 @@ def _best(
     if np.isfinite(ceiling) or problem.goals[0].measure is not Measure.PEAK:
         threshold = ceiling / FAR_BELOW
     if problem.each and problem.goals[0].measure is Measure.PEAK:
-        threshold = _of_one(problem, options)
+        threshold = max(_of_one(problem, options), proven[0])
     while True:
         if wide.rise(threshold):
             try:
@@ -145,14 +175,28 @@ def _of_one(problem: States, options: tuple[float, float]) -> float:
     first = replace(problem.each[0], goals=problem.aims, budgets=())  # budgets are of the scene
     found = narrow(first, WIDTH, lambda _: None)
     ceiling = np.inf if found is None else found.objective[0]
-    one = _best(first, Explorer(FreeStates(first)), (ceiling, options[1]), [])
-    worst = -np.inf
-    for level, *state in one.states:
+    one = _best(first, Explorer(FreeStates(first)), (ceiling, options[1]), [-np.inf])
+    inside = _in_all(problem, one, (np.inf,) * len(problem.goals))
+    return (inside or one).objective[0]
+
+
+def _in_all(problem: States, one: StatePath | None, most: tuple[float, ...]) -> StatePath | None:
+    """Return a plan of one scenario, valued in all; None if in any it is not allowed.
+
+    Or if goals then take more of it than ``most``.
+    """
+    worst = np.full(len(problem.goals), -np.inf)
+    for level, *state in one.states if one else ():
         values, allowed = problem.values(level, np.array([state]))
         if not allowed[0]:
-            return one.objective[0]
-        worst = max(worst, float(values[0, 0]))
-    return worst
+            return None
+        worst = np.maximum(worst, values[0])
+    if one is None:
+        return None
+    pairs = zip(problem.goals, worst.tolist(), one.objective, strict=False)
+    objective = tuple(w if goal.measure is Measure.PEAK else value for goal, w, value in pairs)
+    inside = all(map(le, objective, most))
+    return replace(one, objective=objective, bound=objective) if inside else None
 
 
 def _unproven(found: StatePath, wide: Explorer, proven: float) -> StatePath:

@@ -197,6 +197,18 @@ class FreeSpace(Terse):
         """Return how many bricks stand on a level."""
         return level
 
+    @property
+    def ends_bare(self) -> bool:
+        """Whether every build ends in the finished structure that nobody holds."""
+        return self.rules.ending is not Ending.HELD
+
+    @property
+    def fewest_steps(self) -> int:
+        """How many steps a build has at least: all but a grip per robot are let go one by one."""
+        if self.rules.ending is Ending.ONE_BY_ONE:
+            return 2 * self.bricks
+        return max(self.bricks, 2 * self.bricks - self.robots) + self.ends_bare
+
     def within(self, level: int, states: Ints) -> tuple[tuple[Moves, bool], ...]:
         """Return the moves that place no brick, and whether they are regrips."""
         return (self.releases(level, states), False), (self.holds(level, states), True)

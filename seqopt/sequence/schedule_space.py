@@ -54,6 +54,16 @@ class ScheduleSpace(Terse):
         """How many steps there are."""
         return len(self.schedule.steps)
 
+    @property
+    def ends_bare(self) -> bool:
+        """Whether nobody holds anything in the last step."""
+        return all(grip is None for grip in self.schedule.steps[-1].grips)
+
+    @property
+    def fewest_steps(self) -> int:
+        """How many steps a build has: all have as many."""
+        return self.levels
+
     def bricks_at(self, level: int) -> int:
         """Return how many bricks stand after so many steps."""
         return self.schedule.steps[level - 1].bricks if level else 0

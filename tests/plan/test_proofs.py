@@ -18,12 +18,15 @@ from seqopt.graph.layers.interface import CostProblem
 from seqopt.graph.layers.partial_costs import PartialCosts
 from seqopt.graph.orders.orders import AllOrders
 from seqopt.graph.orders.visits import OrderStates
+from seqopt.graph.paths import keep_best, least_peak
 from seqopt.graph.states.states import build_states
+from seqopt.graph.states.visits import explore, floors_of_goals
 from seqopt.plan.calling.formulation import Selection
 from seqopt.plan.judge import budget_proof
 from seqopt.plan.judge.budget_proof import least_within
 from seqopt.plan.judge.certificate import TOLERANCE, certify_partial
 from seqopt.plan.judge.orders import finds_better_order
+from seqopt.plan.judge.passable import Passable
 from seqopt.plan.judge.proof import Proof
 from seqopt.plan.solving import solve
 from seqopt.problem.aims import Aim
@@ -31,15 +34,16 @@ from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.requirements import Limit
 from seqopt.responses.quantities import CHOSEN_BY
 from seqopt.sequence.free_check import RuleBook
-from seqopt.sequence.free_rules import FreeRules
+from seqopt.sequence.free_rules import Ending, FreeRules, with_robots
 from tests.builders import small_arch
 
 ONES = WorstRatio("ones", (("F_largest", 100.0), ("M_sup", 10.0)))
+FREE_RULES = FreeRules()
 
 
-def posed(aim, scene=None, limits=(), count=5):
+def posed(aim, scene=None, limits=(), count=5, rules=FREE_RULES):
     engine = seqopt.make_engine("compliance", scene or small_arch(count))
-    return build_states(engine, FreeRules(), ONES, aim, limits)
+    return build_states(engine, rules, ONES, aim, limits)
 
 
 def states_below(problem, bound, join):
@@ -67,13 +71,39 @@ def states_below(problem, bound, join):
 
 @pytest.mark.parametrize(("aim", "join"), [("M_sup", max), ("sum(M_sup)", lambda a, b: a + b)])
 def test_the_proof_looks_at_every_state_that_a_better_plan_could_pass(aim, join):
-    problem = posed(aim, count=6)
+    problem = posed(aim, count=6, rules=FreeRules(ending=Ending.HELD))
     best = solve(problem, "schedule_search", proof=False).selection.objective
     proof = Proof(problem)
     assert proof.bounds(best) == pytest.approx(best, rel=1e-12)
     most = best[0] * (1 + 1e-9) if join is max else np.inf  # any state may be on a way to less
     assert proof.states == states_below(problem, most, join)
     assert proof.states > 200  # enough for one that stops early to look at less
+
+
+@pytest.mark.parametrize("ending", list(Ending))
+@pytest.mark.parametrize(("robots", "regrips"), [(2, None), (3, None), (4, 0), (4, 2)])
+def test_what_all_plans_have_in_common_bounds_every_path(ending, robots, regrips):
+    """The search and the judge say the same, and no path through all states stays below."""
+    rules = FreeRules(ending=ending, regrips=regrips, least_grips=1)
+    problem = posed("minmax,steps", with_robots(small_arch(5), robots), rules=rules)
+    floors = floors_of_goals(problem)
+    assert Passable(problem).least() == pytest.approx(floors, rel=1e-12)
+    graph = explore(problem).graph().graph
+    assert least_peak(graph, 0) >= floors[0] * (1 - 1e-12)
+    fewest = keep_best(graph, 1)[1]
+    assert fewest == floors[1] or (regrips == 0 and fewest > floors[1])
+    assert np.isfinite(floors[0]) == (ending is not Ending.HELD)
+
+
+def test_a_proof_by_the_end_alone_is_not_given_to_a_worse_plan():
+    problem = posed("minmax,steps", count=6)
+    floors, proof = floors_of_goals(problem), Proof(problem)
+    assert proof.bounds(floors) == floors
+    assert proof.states == 1
+    best = solve(problem, "schedule_search", proof=False).selection.objective
+    assert best[0] > floors[0]
+    assert proof.bounds((best[0] * 1.01, best[1])) == pytest.approx(best, rel=1e-9)
+    assert proof.states > 200
 
 
 @pytest.mark.parametrize("aim", ["F_largest", "sum(M_sup)"])

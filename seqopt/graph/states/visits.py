@@ -187,6 +187,24 @@ def move_amounts(problem: States, values: Floats, taken: Floats) -> Floats:
     return out
 
 
+def floors_of_goals(problem: States) -> tuple[float, ...]:
+    """Return what every plan takes at least of each goal, known before anything is searched.
+
+    No worst step is better than the end that all builds have in common, no build shorter than its
+    bricks and robots allow. Minus infinity where nothing is known.
+    """
+    space, out = problem.space, [-np.inf] * len(problem.goals)
+    if space.ends_bare:
+        values, within = problem.values(space.levels, np.zeros_like(space.start()))
+        for k, goal in enumerate(problem.goals):
+            if within[0] and goal.measure is Measure.PEAK:
+                out[k] = float(values[0, k])
+    for k, goal in enumerate(problem.goals):
+        if goal.measure is Measure.STEPS:
+            out[k] = float(space.fewest_steps)
+    return tuple(out)
+
+
 def explore(
     problem: States,
     ceiling: float = np.inf,

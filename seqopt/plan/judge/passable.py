@@ -129,6 +129,20 @@ class Passable:
         self._known = KnownRows()
         self.margins = sum(goal.of_margins for goal in problem.goals)
 
+    def least(self) -> tuple[float, ...]:
+        """Return what goals take at least of any plan, for its end and the count of its steps.
+
+        Every move to the one end that builds have is a cut. Minus infinity where nothing is known.
+        """
+        goals, tables = self.problem.goals, self.tables
+        end, counted = tables.only_end(), float(tables.least_steps())
+        last = np.full((1, len(goals)), -np.inf)
+        if end is not None:
+            last = self._answers(tables.bricks_at(tables.last), end, np.inf)[0]
+        known = {Measure.PEAK: last[0], Measure.STEPS: np.full(len(goals), counted)}
+        none = np.full(len(goals), -np.inf)
+        return tuple(float(known.get(goal.measure, none)[k]) for k, goal in enumerate(goals))
+
     def closed(self, level: int, entries: Ints, asked: Asked) -> Closed:
         """Return the states that are reached from some without placing a brick.
 

@@ -45,6 +45,10 @@ class Proof:
         ``values``: of every goal; what is said of margins of stability means nothing. Result:
         infinite where there is no plan.
         """
+        least = self._passable.least()
+        if self._is_better(values, least) is None:
+            self.states = 1  # a cut before the end alone
+            return least
         while True:
             levels = _Levels(self._passable, self._told, Asked(values))
             self.states = sum(map(len, levels.states))

@@ -180,6 +180,21 @@ class RuleTables:
             after[:, : self.robots] = 0
             yield source, after
 
+    def only_end(self) -> Ints | None:
+        """Return the places held (1, robots) in the one state that ends builds, if it is one."""
+        held = self._rules.ending is Ending.HELD
+        return None if held else np.zeros((1, self.robots), dtype=np.int64)
+
+    def least_steps(self) -> int:
+        """Return how many steps a build has at least.
+
+        Each brick is placed by a robot that is free, so that others let go before, one in a step,
+        of all that it is not holding at the end: there they let go together, one by one or never.
+        """
+        together = self._rules.ending is not Ending.ONE_BY_ONE
+        kept = min(self.robots, self.last) if together else 0
+        return 2 * self.last - kept + (self._rules.ending is Ending.RELEASED)
+
     def keep(self, bricks: int, states: Ints) -> Bools:
         """Return which states (n, c) keep the rules as long as the build goes on, from 1 brick."""
         grips = states[:, : self.robots].clip(min=0)
@@ -288,6 +303,15 @@ class ScheduleTables:
         """Return the places that a hold may take."""
         nodes = (hold.node,) if hold.move is None else self._schedule.moves[hold.move].candidates
         return np.array([self._place[node] for node in nodes if node is not None], dtype=np.int64)
+
+    def only_end(self) -> Ints | None:
+        """Return the places held (1, robots) in the last step, if all builds end alike."""
+        fixed = all(grip is None for grip in self._schedule.steps[-1].grips)
+        return np.zeros((1, self.robots), dtype=np.int64) if fixed else None
+
+    def least_steps(self) -> int:
+        """Return how many steps a build has."""
+        return self.last
 
     def ends(self, level: int, states: Ints) -> Bools:
         """Return which states (n, robots) end the build: all after the last step."""
