@@ -88,10 +88,7 @@ REFUSED = {
         *("overlap_dp", "rank_search"),  # they need moves with candidates
         *("the worst total of scenarios", "the mean of the worst scenarios"),
     ],
-    (ORDERS,): [
-        *("friction", "a budget", "Pareto"),
-        *("path_dp", "path_labels", "path_beam", "best_first", "flow_lp", "flow_mip"),
-    ],
+    (ORDERS,): ["friction", "a budget", "Pareto"],
 }
 
 

@@ -21,6 +21,10 @@ from seqopt.errors import InfeasibleError, ProblemError, SeqoptError, TimeUpErro
 from seqopt.graph.budgets import Within, within_budgets
 from seqopt.graph.explore import Explorer, Key, Visited
 from seqopt.graph.graph import Graph
+from seqopt.graph.orders.orders import AllOrders, OrderSelection
+from seqopt.graph.orders.visits import OrderStates, TooManySetsError
+from seqopt.graph.orders.work import Trial
+from seqopt.graph.orders.work import worth as worth_of
 from seqopt.graph.paths import Best, distances, lexicographic, reached, tied
 from seqopt.graph.states.states import States
 from seqopt.graph.states.visits import FreeStates, explore
@@ -29,10 +33,12 @@ from seqopt.plan.calling.formulation import Formulation, FormulationKind, On
 from seqopt.plan.calling.guard import StatePath
 from seqopt.plan.calling.watch import Watch
 from seqopt.plan.search.sturdiest import best_margin
+from seqopt.responses.resources import HERE, Resources
 from seqopt.work.memory import free_memory
 from seqopt.work.progress import Stage, Tell
 
 WIDTH = 50  # new states of a brick count from which the narrow search goes on
+MOST_PARTS = 5000  # sets of bricks with a newest one, of all orders
 COPIES = 2.0  # of what is kept, that are needed at once while it grows
 
 _Values = tuple[float, ...]
@@ -74,21 +80,65 @@ def on_graph(
     """
 
     def solve(
-        problem: States,
+        problem: States | AllOrders,
         *,
         seconds: float = np.inf,
         max_memory: float = np.inf,
         progress: Tell = lambda _: None,
-    ) -> StatePath:
+        resources: Resources = HERE,
+    ) -> StatePath | OrderSelection:
+        watch, told = Watch(seconds), resources.progress or progress
+        if isinstance(problem, AllOrders):
+            asked = watched(problem.states, watch, max_memory, told)
+            return best_order(problem, choose, watch, asked)
         if problem.budgets:
             raise ProblemError(
                 f"formulation {name}: it takes no budgets; take schedule_search or path_beam"
             )
-        watch = Watch(seconds)
-        tell = watched(problem, watch, max_memory, progress)
+        tell = watched(problem, watch, max_memory, told)
         return after_margins(problem, lambda rest: _chosen(rest, choose, watch, tell), tell)
 
-    return Formulation(name, summary, kind, None, solve, on=On.STATES)
+    return Formulation(name, summary, kind, None, solve, on=On.STATES, also=(On.ORDERS,))
+
+
+def best_order(
+    problem: AllOrders,
+    choose: Callable[[Graph, Watch], Choice],
+    watch: Watch,
+    tell: Watching,
+    width: int | None = None,
+) -> OrderSelection:
+    """Return the order of the path that is chosen through the states of all orders at once.
+
+    ``width``: how many new states of a set of bricks are kept; by default, if the first goal is a
+    peak, those below that of the scene's own order.
+    """
+    space, order = OrderStates(problem, MOST_PARTS), problem.scene.build_order
+    found, own = Explorer(space, width, tell), np.inf
+    try:
+        if width is None and problem.allows(order):
+            own = worth_of(problem, Trial(order, np.inf))
+        found.rise(own if space.peaks[0] else np.inf)
+        if not found.whole:
+            raise InfeasibleError("no order of the bricks has a plan")
+        found.refine()
+        visited = found.graph()
+        choice = choose(on_paths(visited.graph), watch)
+    except TooManySetsError:
+        raise ProblemError(
+            f"scene {problem.scene.name}: its orders have more than {MOST_PARTS} sets of bricks; "
+            "take order_search, or give an order"
+        ) from None
+    except StopError as stop:
+        raise _too_little(stop) from None
+    value, stopped = own, "time" * choice.stopped
+    if choice.path and worth(visited.graph, choice.path)[0] < own:
+        value = worth(visited.graph, choice.path)[0]
+        order = tuple(dict.fromkeys(part[1] for _, part, _ in visited.of(choice.path)))
+    if not np.isfinite(value):
+        raise TimeUpError("no order with a plan was found yet; give more")
+    bound = min(choice.bounds[0] if choice.bounds else -np.inf, value)
+    return OrderSelection(order, value, bound, len(space.parts) - 1, stopped)
 
 
 def _chosen(

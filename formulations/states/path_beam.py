@@ -20,8 +20,10 @@ from dataclasses import replace
 import numpy as np
 
 from formulations.states.on_graph import (
+    Choice,
     StopError,
     after_margins,
+    best_order,
     best_standing,
     narrow,
     plan_by_then,
@@ -29,33 +31,41 @@ from formulations.states.on_graph import (
 )
 from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.graph.explore import Explorer
+from seqopt.graph.orders.orders import AllOrders, OrderSelection
+from seqopt.graph.paths import lexicographic
 from seqopt.graph.states.states import States
 from seqopt.graph.states.visits import FreeStates
 from seqopt.plan.calling.formulation import Formulation, FormulationKind, On
 from seqopt.plan.calling.guard import StatePath
 from seqopt.plan.calling.watch import Watch
+from seqopt.responses.resources import HERE, Resources
 from seqopt.work.progress import Tell
 
 
 def solve(
-    problem: States,
+    problem: States | AllOrders,
     *,
     width: int = 50,
     seconds: float = np.inf,
     max_memory: float = np.inf,
     progress: Tell = lambda _: None,
-) -> StatePath:
+    resources: Resources = HERE,
+) -> StatePath | OrderSelection:
     """Return a plan through the states of a beam.
 
     ``width``: how many new states of a brick count are kept, from 1; ``seconds``, ``max_memory``:
-    after which, or above how many bytes, it ends without a plan; ``progress``: told as a
-    `seqopt.work.Stage` how far it is. Result: without a bound, but of margins of stability. Raises
-    `InfeasibleError` if no plan is allowed; `ProblemError`, `TimeUpError` if the width is not
-    positive, or memory or time is up.
+    after which, or above how many bytes, it ends without a plan; ``progress``, or that of
+    ``resources``: told as a `seqopt.work.Stage` how far it is. Result: without a bound, but of
+    margins of stability. Raises `InfeasibleError` if no plan is allowed; `ProblemError`,
+    `TimeUpError` if the width is not positive, or memory or time is up.
     """
     if width < 1:
         raise ProblemError(f"option width={width}: give a whole number from 1 on")
-    tell = watched(problem, Watch(seconds), max_memory, progress)
+    states = problem.states if isinstance(problem, AllOrders) else problem
+    watch = Watch(seconds)
+    tell = watched(states, watch, max_memory, resources.progress or progress)
+    if isinstance(problem, AllOrders):
+        return best_order(problem, lambda g, _: Choice(lexicographic(g).path), watch, tell, width)
 
     def search(rest: States) -> StatePath:
         try:
@@ -79,4 +89,5 @@ FORMULATION = Formulation(
     None,
     solve,
     on=On.STATES,
+    also=(On.ORDERS,),
 )

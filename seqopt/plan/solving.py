@@ -84,11 +84,12 @@ def _solved(problem: Any, formulation: Formulation | str | None, run: Run) -> Pl
     """Return the plan of a problem, or of a graph of choices that is given."""
     if not isinstance(problem, Problem):
         found = _of_graph(problem, formulation)
-        return SOLVE[found.on](problem, found, run)
+        on = On.ORDERS if isinstance(problem, AllOrders) else found.on
+        return SOLVE[on](problem, found, run)
     found = as_formulation(formulation or usual(problem), *_able(problem))
-    graph = graph_of(problem, found.on)
+    on = natural(problem) if natural(problem) in found.also else found.on
     _require_goal(problem, found)
-    return replace(SOLVE[found.on](graph, found, run), problem=problem)
+    return replace(SOLVE[on](graph_of(problem, on), found, run), problem=problem)
 
 
 def _able(problem: Problem) -> tuple[On, ...]:

@@ -18,7 +18,7 @@ from seqopt.graph.orders.orders import AllOrders, OrderSelection
 from seqopt.graph.orders.visits import whole_bound
 from seqopt.graph.orders.work import trying
 from seqopt.graph.states.states import build_states, over_scenarios, within
-from seqopt.plan.calling.formulation import find_formulation
+from seqopt.plan.calling.formulation import FormulationKind, On, find_formulation
 from seqopt.plan.judge.orders import finds_better_order
 from seqopt.plan.solving import solve
 from seqopt.problem.criteria import WorstRatio
@@ -91,6 +91,27 @@ def test_what_adds_up_equals_brute_force(aim, bricks, robots):
     least = min(worths.values())
     assert finds_better_order(problem, least + 1e-6 * max(1.0, least)) is True
     assert finds_better_order(problem, least) is False
+
+
+TAKE_ORDERS = [name for name, found in seqopt.formulations().items() if On.ORDERS in found.also]
+
+
+@pytest.mark.parametrize("aim", ["minmax", "sum"])
+@pytest.mark.parametrize("name", TAKE_ORDERS)
+def test_formulations_of_states_find_the_best_order_too(name, aim):
+    problem = posed(small_arch(4), FreeRules(robots=("rob1", "rob2"), least_grips=1), aim)
+    least, found = min(brute_force(problem).values()), seqopt.solve(problem, name)
+    exact = find_formulation(name).kind is FormulationKind.EXACT
+    assert found.order.selection.objective >= least * (1 - 1e-9)
+    if exact:
+        assert found.order.selection.objective == pytest.approx(least, rel=1e-8)
+    assert found.status == ("optimal" if exact else "feasible")
+
+
+def test_orders_of_too_many_sets_are_left_to_the_search(monkeypatch):
+    monkeypatch.setattr("formulations.states.on_graph.MOST_PARTS", 2)
+    with pytest.raises(ProblemError, match="more than 2 sets of bricks; take order_search"):
+        seqopt.solve(posed(small_arch(4)), "path_dp")
 
 
 def test_another_order_is_found_where_the_own_one_has_no_plan():

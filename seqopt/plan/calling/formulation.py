@@ -101,6 +101,8 @@ class Formulation:
         Options with which it looks at one window after the other, if it does so only with these.
     on : On, optional
         What it is given: layers, states, orders, scenarios.
+    also : tuple of On, optional
+        What else it can be given.
 
     Examples
     --------
@@ -119,6 +121,7 @@ class Formulation:
     takes_budgets: bool = False
     windowed: tuple[tuple[str, int | str], ...] | None = None
     on: On = On.LAYERS
+    also: tuple[On, ...] = ()
 
     def __repr__(self) -> str:
         what = f"{self.kind.value}, on {self.on.value}"
@@ -239,9 +242,10 @@ def as_formulation(given: object, *on: On) -> Formulation:
     if not isinstance(given, Formulation):
         known = ", ".join(formulation_names(*on))
         raise ProblemError(f"a {type(given).__name__} is not a formulation; give one of {known}")
-    if on and given.on not in on:
+    if on and not {given.on, *given.also} & {*on}:
+        able = [n for n, f in formulations().items() if {f.on, *f.also} & {*on}]
         raise ProblemError(
             f"{given.name} is for {given.on.value}, and {on[0].value} are asked for; "
-            f"use {' or '.join(formulation_names(*on))}"
+            f"use {' or '.join(able)}"
         )
     return given
