@@ -12,11 +12,11 @@ from formulations.solvers import minimize_whole
 from seqopt.arrays import Floats
 from seqopt.graph.layers.costs import LayeredCosts
 from seqopt.graph.layers.interface import CostProblem, PlacementProblem
-from seqopt.plan.calling.first_choice import stopped
 from seqopt.plan.calling.flow import ACCURACY, LayeredFlow, layered_flow
 from seqopt.plan.calling.formulation import End, Selection
+from seqopt.plan.calling.priced_paths import stopped
 from seqopt.plan.calling.watch import Watch
-from seqopt.problem.aims import Aim
+from seqopt.problem.goals import Aim
 
 Choice = tuple[int, ...]
 

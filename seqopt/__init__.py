@@ -30,13 +30,13 @@ if TYPE_CHECKING:
     from seqopt.errors import SeqoptError
     from seqopt.network.build import build_network
     from seqopt.network.network import Network
+    from seqopt.plan.build import GivenSequence
     from seqopt.plan.calling.formulation import Formulation, formulations
-    from seqopt.plan.given import GivenSequence
     from seqopt.plan.judge.certificate import Certificate
     from seqopt.plan.plan import Plan
     from seqopt.plan.posing import pose
     from seqopt.plan.solving import solve
-    from seqopt.problem.own_criterion import StepCost
+    from seqopt.problem.criteria import StepCost
     from seqopt.problem.problem import Problem
     from seqopt.problem.requirements import Limit
     from seqopt.responses.table import analyze
@@ -46,14 +46,13 @@ if TYPE_CHECKING:
     from seqopt.scene.scene import Scene
     from seqopt.scene.scene_file import load_scene, save_scene
     from seqopt.sequence.free_rules import FreeRules
-    from seqopt.sequence.plan_file import read_plan
     from seqopt.sequence.schedule import Schedule
-    from seqopt.sequence.schedule_file import read_schedule
+    from seqopt.sequence.schedule_file import read_plan, read_schedule
     from seqopt.sequence.steps import Step
     from seqopt.sequence.three_robots import modified_sequential, three_robot_loop
     from seqopt.sequence.two_robots import cantilever, sequential
     from seqopt.stability.assessment import Stability, assess_steps
-    from seqopt.study.presets import CRITERIA
+    from seqopt.study.published import CRITERIA
     from seqopt.workflow import optimize
 
 _HOMES = {
@@ -64,12 +63,12 @@ _HOMES = {
     "network.build": ("build_network",),
     "network.network": ("Network",),
     "plan.calling.formulation": ("Formulation", "formulations"),
-    "plan.given": ("GivenSequence",),
+    "plan.build": ("GivenSequence",),
     "plan.judge.certificate": ("Certificate",),
     "plan.plan": ("Plan",),
     "plan.posing": ("pose",),
     "plan.solving": ("solve",),
-    "problem.own_criterion": ("StepCost",),
+    "problem.criteria": ("StepCost",),
     "problem.problem": ("Problem",),
     "problem.requirements": ("Limit",),
     "responses.table": ("analyze",),
@@ -79,14 +78,13 @@ _HOMES = {
     "scene.scene": ("Scene",),
     "scene.scene_file": ("load_scene", "save_scene"),
     "sequence.free_rules": ("FreeRules",),
-    "sequence.plan_file": ("read_plan",),
     "sequence.schedule": ("Schedule",),
-    "sequence.schedule_file": ("read_schedule",),
+    "sequence.schedule_file": ("read_plan", "read_schedule"),
     "sequence.steps": ("Step",),
     "sequence.three_robots": ("modified_sequential", "three_robot_loop"),
     "sequence.two_robots": ("cantilever", "sequential"),
     "stability.assessment": ("Stability", "assess_steps"),
-    "study.presets": ("CRITERIA",),
+    "study.published": ("CRITERIA",),
     "workflow": ("optimize",),
 }
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}

@@ -28,7 +28,7 @@ from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.free_rules import FREE, FreeRules, with_robots
 from seqopt.sequence.schedule import Schedule, thin
 from seqopt.sequence.schedule_file import find_schedule
-from seqopt.study.presets import EQUATIONS, find_criterion
+from seqopt.study.published import EQUATIONS, find_criterion
 
 SEARCH = "search"  # the order that is sought
 RULES = tuple(field.name for field in fields(FreeRules) if field.name != "robots")

@@ -18,7 +18,7 @@ from seqopt.graph.layers.layers import candidate_layers
 from seqopt.network.build import build_network
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.three_robots import three_robot_loop
-from seqopt.study.presets import EQUATIONS
+from seqopt.study.published import EQUATIONS
 
 settings.register_profile(
     "seqopt",

@@ -13,7 +13,7 @@ from scipy import linalg, sparse
 
 from seqopt.arrays import Floats, Ints
 from seqopt.engines.interface import Fields
-from seqopt.engines.rigid.recovery import Solution, respond
+from seqopt.engines.rigid.mixed import Solution, respond
 from seqopt.errors import SolverError
 from seqopt.network.mechanics import build_statics, node_motion
 from seqopt.network.network import GROUND, Network

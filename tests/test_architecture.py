@@ -38,7 +38,7 @@ SOLVERS = {"cvxpy", "clarabel", "highspy"}
 SOLVER_HOME = "formulations"
 SHARED = {  # what formulations may import
     *(
-        "formulations.cones",
+        "formulations.solvers",
         "formulations.states.on_graph",
         "formulations.scenarios.scenario_weights",
     ),

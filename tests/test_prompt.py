@@ -11,8 +11,8 @@ import seqopt
 from seqopt.arrays import _LONGEST, Terse
 from seqopt.engines.registry import ENGINES
 from seqopt.errors import SceneError
-from seqopt.graph.layers.budgets import travel
-from seqopt.graph.orders.orders import AllOrders
+from seqopt.graph.layers.layers import travel
+from seqopt.graph.orders import AllOrders
 from seqopt.graph.states.states import build_states
 from seqopt.plan.front import StateFront, find_front
 from seqopt.plan.out_of_sample import judge_unseen

@@ -14,21 +14,18 @@ from seqopt.arrays import Floats, FrozenValue
 from seqopt.contact.elastic_limits import face_quadrature, find_elastic_limits
 from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import EPOXY
-from seqopt.engines.basis import SPACE
 from seqopt.engines.diagnosis import diagnose
 from seqopt.engines.discrete.engine import held_nodes
 from seqopt.engines.discrete.equilibrium_path import settle
 from seqopt.engines.discrete.system import build_system
-from seqopt.engines.interface import Fields, Want
+from seqopt.engines.interface import SPACE, Fields, Want
 from seqopt.engines.planar import Plane
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.engines.rigid.growth import grow_tree
-from seqopt.engines.rigid.mechanism import rigid_structure
-from seqopt.engines.rigid.mixed import mixed_system
+from seqopt.engines.rigid.mechanism import rigid_structure, share, ungripped_system
+from seqopt.engines.rigid.mixed import Solution, mixed_system
 from seqopt.engines.rigid.operator import OperatorBuilder
-from seqopt.engines.rigid.recovery import Solution
 from seqopt.engines.rigid.response_maps import ResponseMaps, scene_maps
-from seqopt.engines.rigid.ungripped import share, ungripped_system
 from seqopt.network.build import build_network
 from seqopt.network.mechanics import build_statics
 from seqopt.scene.boxes import boxes

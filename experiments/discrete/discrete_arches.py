@@ -47,8 +47,7 @@ from seqopt.network.build import build_network
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.steps import Step
 from seqopt.sequence.two_robots import sequential
-from seqopt.study.presets import STUDY_PADS
-from seqopt.study.published import printed
+from seqopt.study.published import STUDY_PADS, printed
 
 SIDES = 1e-3 * np.arange(4.0, 51.0)  # m, of the scan
 NEAR = 10.0  # points of percent within which an error counts as reproduced

@@ -66,10 +66,9 @@ from experiments.harness.scenes import grip_sets
 from experiments.harness.timing import best
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import Want, grip_columns
-from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.engines.rigid.compliance import ComplianceEngine, solve_batch
 from seqopt.engines.rigid.growth import SpanningTree, grow_tree
 from seqopt.engines.rigid.operator import OperatorBuilder
-from seqopt.engines.rigid.trial import solve_batch
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.report.style import GRAY, SMALL, dress, looks, new_figure, plain, styled

@@ -10,11 +10,11 @@ from seqopt.arrays import Ints
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.scene.arch import ArchShape, arch_scene
-from seqopt.scene.library.chain import chain
+from seqopt.scene.library.arch_form import chain
 from seqopt.scene.library.wall import WallShape, wall
 from seqopt.scene.parts import Robot
 from seqopt.scene.scene import Scene
-from seqopt.study.presets import ROBOTS
+from seqopt.study.published import ROBOTS
 
 
 def half_circle(count: int) -> Network:

@@ -43,16 +43,15 @@ from seqopt.graph.layers.ranking import move_costs, rank_of
 from seqopt.network.build import build_network
 from seqopt.plan.calling.formulation import find_formulation
 from seqopt.plan.solving import solve
-from seqopt.problem.requirements import Criterion
-from seqopt.problem.scales import SceneFacts
+from seqopt.problem.requirements import Criterion, SceneFacts
 from seqopt.report.style import dress, looks, new_figure, styled
-from seqopt.report.wording import in_words
+from seqopt.report.text import in_words
 from seqopt.scene.scenarios import shifted, stiffened, weighed
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.three_robots import three_robot_loop
-from seqopt.study.presets import CLOSEST, EQUATIONS, WEIGHTED, WORST_RATIO
+from seqopt.study.published import CLOSEST, EQUATIONS, WEIGHTED, WORST_RATIO
 
 Grids = dict[str, tuple[float, ...]]
 FACTORS = (1 / 3, 1 / 2, 2 / 3, 3 / 2, 2.0, 3.0)

@@ -70,11 +70,11 @@ from seqopt.plan.calling.formulation import On, find_formulation, formulations
 from seqopt.plan.calling.watch import Watch, trace_rows
 from seqopt.plan.judge.certificate import least
 from seqopt.plan.solving import solve
-from seqopt.problem.aims import Aim
+from seqopt.problem.goals import Aim
 from seqopt.problem.requirements import Criterion
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.three_robots import three_robot_loop
-from seqopt.study.presets import EQUATIONS, WEIGHTED, WORST_RATIO
+from seqopt.study.published import EQUATIONS, WEIGHTED, WORST_RATIO
 
 GENERAL = ("overlap_lp", "overlap_mip")
 ANYWHERE, ON_THE_ARCH = 20.0, 100.0  # ratios that are claimed

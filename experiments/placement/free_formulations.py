@@ -31,7 +31,7 @@ from seqopt.plan.calling.formulation import FormulationKind, On, find_formulatio
 from seqopt.plan.plan import Plan
 from seqopt.plan.solving import solve
 from seqopt.sequence.free_rules import FreeRules
-from seqopt.study.presets import CRITERIA
+from seqopt.study.published import CRITERIA
 
 SIZES = ("chain7", "chain11", "chain15", "arch25", "chain49", "chain97")
 AIMS = ("minmax,steps", "sum")

@@ -31,7 +31,7 @@ from seqopt.plan.posing import pose
 from seqopt.plan.solving import solve
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.sequence.three_robots import three_robot_loop
-from seqopt.study.presets import CRITERIA
+from seqopt.study.published import CRITERIA
 
 COMPARED = ("equations-2-3", "weighted", "worst-ratio")
 MEDIAN, WORST, BEAM = 0.01, 0.1, 0.01

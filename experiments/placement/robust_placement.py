@@ -40,21 +40,21 @@ from experiments.harness.scenes import half_circle
 from formulations.scenarios.scenario_program import solve_program
 from seqopt.engines.registry import make_engine
 from seqopt.graph.layers.layers import Layers, candidate_layers
-from seqopt.graph.scenarios.scenarios import Choice, ScenarioLayers, in_scenarios
+from seqopt.graph.scenarios import Choice, ScenarioLayers, in_scenarios
 from seqopt.network.build import build_network
 from seqopt.plan.calling.watch import Watch
 from seqopt.plan.out_of_sample import judge_unseen
 from seqopt.plan.plan import Plan
 from seqopt.plan.search.in_order import least_quantile, solve_in_order
 from seqopt.plan.solving import solve
-from seqopt.problem.aims import WORST_PEAK, WORST_TOTAL, Aim, RobustAim, cvar
+from seqopt.problem.goals import WORST_PEAK, WORST_TOTAL, Aim, RobustAim, cvar
 from seqopt.problem.requirements import Criterion
 from seqopt.report.style import BLUE, GRAY, VERMILION, dress, new_figure, styled
 from seqopt.scene.scenarios import scenarios
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.three_robots import three_robot_loop
-from seqopt.study.presets import EQUATIONS, WEIGHTED, WORST_RATIO
+from seqopt.study.published import EQUATIONS, WEIGHTED, WORST_RATIO
 
 AIMS: dict[RobustAim, Criterion] = {
     WORST_PEAK: WORST_RATIO,

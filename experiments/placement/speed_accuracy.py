@@ -43,7 +43,7 @@ from experiments.placement.parts.speed_charts import (
     worst_step_chart,
 )
 from experiments.placement.parts.worst_ratios import WAYS
-from seqopt.study.presets import CLOSEST, EQUATIONS, WEIGHTED, WORST_RATIO
+from seqopt.study.published import CLOSEST, EQUATIONS, WEIGHTED, WORST_RATIO
 
 STORE = RESULTS / "runs.csv"
 RATIOS = RESULTS / "worst_ratios.csv"

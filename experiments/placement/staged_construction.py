@@ -36,7 +36,7 @@ from experiments.harness.claim import Claim, Finding, Options, told
 from experiments.harness.results import drawn
 from seqopt.engines.interface import Engine, Fields
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.engines.rigid.ungripped import Ungripped, ungripped_system
+from seqopt.engines.rigid.mechanism import Ungripped, ungripped_system
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.plan.posing import pose
@@ -50,8 +50,7 @@ from seqopt.sequence.schedule import OpenGrip, OpenStep, Schedule
 from seqopt.sequence.steps import Step
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.sequence.two_robots import METHODS
-from seqopt.study.presets import EQUATIONS, PUBLISHED_BEST
-from seqopt.study.published import published_plan
+from seqopt.study.published import EQUATIONS, PUBLISHED_BEST, published_plan
 
 History = TypeVar("History")
 Advance = Callable[[History, Step], tuple[History, Fields]]

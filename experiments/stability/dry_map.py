@@ -87,8 +87,7 @@ from seqopt.sequence.two_robots import METHODS
 from seqopt.stability.assessment import Verdict, assess_steps, bonded, stability_table, verdict_of
 from seqopt.stability.prover import Prover
 from seqopt.stability.screens import FALLS, OPEN, STANDS, Screen
-from seqopt.study.presets import EQUATIONS
-from seqopt.study.published import published_plan
+from seqopt.study.published import EQUATIONS, published_plan
 
 BRICKS, THICKNESSES = (7, 10, 13, 16), (0.03, 0.053, 0.116)  # m
 FRICTIONS, ROBOTS = (0.2, 0.3, 0.466, 0.8), (2, 3, 4)

@@ -35,14 +35,12 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.graph.layers.layers import Layers, candidate_layers
 from seqopt.graph.layers.ranking import TIED, rank_choice, rank_of
 from seqopt.network.build import build_network
-from seqopt.problem.criteria import RankSum, equal
-from seqopt.problem.ranks import mean_ranks
+from seqopt.problem.criteria import RankSum, equal, mean_ranks
 from seqopt.report.style import BLUE, GRAY, GREEN, PURPLE, VERMILION, dress, new_figure, styled
 from seqopt.responses.choices import StepChoices
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.three_robots import three_robot_loop
-from seqopt.study.presets import CLOSEST, EQUATIONS, RESOLUTION
-from seqopt.study.published import published_choice
+from seqopt.study.published import CLOSEST, EQUATIONS, RESOLUTION, published_choice
 
 CROWN = 13  # bricks of the arch of Bruun et al. up to its crown
 BEFORE = ("T_max", "M_sup", "F_sum")

@@ -25,7 +25,7 @@ import clarabel
 import numpy as np
 from scipy import sparse
 
-from formulations.cones import solve_cones
+from formulations.solvers import solve_cones
 from seqopt.arrays import Floats
 from seqopt.contact.assembly import Assembly
 from seqopt.stability.limit_analysis import CAP, Answer, Case, Claim, Program, limits

@@ -23,7 +23,7 @@ from seqopt.graph.layers.interface import PlacementProblem
 from seqopt.plan.calling.flow import layered_flow
 from seqopt.plan.calling.formulation import Formulation, FormulationKind, Selection
 from seqopt.plan.calling.watch import Watch
-from seqopt.problem.aims import Aim
+from seqopt.problem.goals import Aim
 
 
 def write(problem: PlacementProblem) -> WholeProgram:

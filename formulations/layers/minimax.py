@@ -17,10 +17,10 @@ import numpy as np
 
 from seqopt.graph.layers.costs import LayeredCosts
 from seqopt.graph.layers.interface import PlacementProblem
-from seqopt.plan.calling.first_choice import stopped
 from seqopt.plan.calling.formulation import Formulation, FormulationKind, Selection
+from seqopt.plan.calling.priced_paths import stopped
 from seqopt.plan.calling.watch import Watch
-from seqopt.problem.aims import Aim
+from seqopt.problem.goals import Aim
 
 
 def solve(problem: PlacementProblem, *, watch: Watch | None = None) -> Selection:

@@ -21,7 +21,7 @@ from formulations.whole_program import WholeProgram, flow_of_peaks, solve_whole
 from seqopt.graph.layers.interface import PlacementProblem
 from seqopt.plan.calling.formulation import Formulation, FormulationKind, Selection
 from seqopt.plan.calling.watch import Watch
-from seqopt.problem.aims import Aim
+from seqopt.problem.goals import Aim
 
 
 def write(problem: PlacementProblem) -> WholeProgram:

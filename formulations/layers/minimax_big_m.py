@@ -31,7 +31,7 @@ from seqopt.arrays import Floats
 from seqopt.graph.layers.interface import PlacementProblem
 from seqopt.plan.calling.formulation import Formulation, FormulationKind, Selection
 from seqopt.plan.calling.watch import Watch
-from seqopt.problem.aims import Aim
+from seqopt.problem.goals import Aim
 
 
 def write(problem: PlacementProblem) -> WholeProgram:

@@ -7,7 +7,7 @@ r"""The full overlap formulation as a mixed-integer program (cvxpy, HiGHS): exac
    & \sum_k \sum_{i,j} a_k(i, j)\, y_k(i, j) \le b \quad \text{for every budget.}
 
 It earns its price where budgets couple all moves: a cap on robot travel, on how often a robot is
-used, on the count of steps over a level (`seqopt.graph.layers.budgets`). Without them dynamic
+used, on the count of steps over a level (`seqopt.graph.layers.layers`). Without them dynamic
 programming gives the same answer hundreds of times faster.
 """
 
@@ -20,7 +20,7 @@ from seqopt.graph.layers.interface import PlacementProblem
 from seqopt.plan.calling.flow import layered_flow
 from seqopt.plan.calling.formulation import Formulation, FormulationKind, Selection
 from seqopt.plan.calling.watch import Watch
-from seqopt.problem.aims import Aim
+from seqopt.problem.goals import Aim
 
 
 def write(problem: PlacementProblem) -> WholeProgram:

@@ -21,7 +21,7 @@ from scipy.optimize import linprog
 
 from seqopt.arrays import Floats
 from seqopt.errors import SolverError
-from seqopt.graph.scenarios.scenarios import Choice, ScenarioArcs
+from seqopt.graph.scenarios import Choice, ScenarioArcs
 from seqopt.plan.calling.watch import Watch
 
 STEPS = 400  # weights that are tried at most

@@ -21,10 +21,8 @@ from seqopt.errors import InfeasibleError, ProblemError, SeqoptError, TimeUpErro
 from seqopt.graph.budgets import Within, within_budgets
 from seqopt.graph.explore import Explorer, Key, Visited
 from seqopt.graph.graph import Graph
-from seqopt.graph.orders.orders import AllOrders, OrderSelection
-from seqopt.graph.orders.visits import OrderStates, TooManySetsError
-from seqopt.graph.orders.work import Trial
-from seqopt.graph.orders.work import worth as worth_of
+from seqopt.graph.orders import AllOrders, OrderSelection, OrderStates, TooManySetsError, Trial
+from seqopt.graph.orders import worth as worth_of
 from seqopt.graph.paths import Best, distances, lexicographic, reached, tied
 from seqopt.graph.states.states import States
 from seqopt.graph.states.visits import FreeStates, explore

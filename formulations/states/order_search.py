@@ -32,9 +32,16 @@ import numpy as np
 
 from seqopt.errors import InfeasibleError, ProblemError, TimeUpError
 from seqopt.graph.explore import Explorer, Visited
-from seqopt.graph.orders.orders import AllOrders, OrderSelection
-from seqopt.graph.orders.visits import OrderStates, TooManySetsError, whole_bound
-from seqopt.graph.orders.work import Trial, trying, worth
+from seqopt.graph.orders import (
+    AllOrders,
+    OrderSelection,
+    OrderStates,
+    TooManySetsError,
+    Trial,
+    trying,
+    whole_bound,
+    worth,
+)
 from seqopt.graph.paths import keep_best, lexicographic, reached
 from seqopt.plan.calling.formulation import Formulation, FormulationKind, On
 from seqopt.responses.resources import HERE, Resources

@@ -31,7 +31,7 @@ from formulations.states.on_graph import (
 )
 from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.graph.explore import Explorer
-from seqopt.graph.orders.orders import AllOrders, OrderSelection
+from seqopt.graph.orders import AllOrders, OrderSelection
 from seqopt.graph.paths import lexicographic
 from seqopt.graph.states.states import States
 from seqopt.graph.states.visits import FreeStates

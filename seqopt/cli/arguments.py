@@ -11,8 +11,7 @@ from importlib.metadata import version
 from types import ModuleType
 from typing import Any, NoReturn
 
-from seqopt.cli.saying.layout import columns, wrapped
-from seqopt.cli.saying.terminal import complain, show
+from seqopt.cli.saying.terminal import columns, complain, show, wrapped
 from seqopt.cli.status import Status
 from seqopt.errors import did_you_mean
 

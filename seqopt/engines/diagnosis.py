@@ -22,9 +22,8 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 
 from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.engines.interface import Engine, Fields, Want, grip_columns
-from seqopt.engines.rigid.mechanism import free_motion
+from seqopt.engines.rigid.mechanism import free_motion, ungripped_system
 from seqopt.engines.rigid.mixed import MixedSystem, factorize, mixed_system, solve_mixed
-from seqopt.engines.rigid.ungripped import ungripped_system
 from seqopt.errors import MechanismError, SolverError
 from seqopt.network.network import GROUND, Network
 

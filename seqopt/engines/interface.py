@@ -3,18 +3,93 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, fields, replace
 from enum import Flag, auto
-from functools import cache, wraps
+from functools import cache, cached_property, wraps
 from itertools import combinations
-from typing import TYPE_CHECKING, ParamSpec, Protocol, TypeVar
+from typing import TYPE_CHECKING, ParamSpec, Protocol, SupportsIndex, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy import linalg
+from scipy.linalg import blas, lapack
+from threadpoolctl import ThreadpoolController
 
-from seqopt.arrays import Bools, Floats, FrozenValue, Ints
-from seqopt.errors import GripError, SolverError
+from seqopt.arrays import Bools, Floats, FrozenValue, Ints, frozen
+from seqopt.errors import GripError, MemoryShortError, SolverError
 from seqopt.network.network import Network
+from seqopt.work.memory import free_memory
+
+_BUFFERS = 100e6  # bytes; taken at once: OpenBLAS waits without end for buffers it does not get
+_SOME = 200  # rows of a matrix whose product and factors need them
+
+
+def one_thread() -> AbstractContextManager[object]:
+    """Return a context in which BLAS uses one thread; on leaving, it uses as many as before.
+
+    The matrices of a partial structure are small enough for one core. Threads that share them spend
+    their time waiting, without end where another process wants the second core.
+
+    Result: entered for a whole operator or pass of grip sets, it costs some 10 µs.
+    """
+    limited: AbstractContextManager[object] = _libraries().limit(limits=1, user_api="blas")
+    return limited
+
+
+@cache
+def _libraries() -> ThreadpoolController:
+    """Return the handle to the linear algebra of the process; finding it takes milliseconds."""
+    free = free_memory()
+    if free < _BUFFERS:
+        raise MemoryShortError(
+            f"linear algebra takes buffers of {_BUFFERS / 1e6:.0f} MB, and {free / 1e6:.0f} MB are "
+            "free; raise the limit"
+        )
+    found = ThreadpoolController()
+    with found.limit(limits=1, user_api="blas"):
+        some = np.eye(_SOME)
+        _ = some @ some, np.linalg.inv(some)  # of NumPy's library, and
+        _ = blas.dgemm(1.0, some, some), lapack.dgetrf(some)  # of SciPy's
+    return found
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Basis(FrozenValue):
+    """The directions in which a structure is loaded and moves.
+
+    ``force``, ``moment`` (d, 3), (m, 3): unit vectors of forces and translations, of moments and
+    rotations.
+    """
+
+    force: Floats
+    moment: Floats
+
+    def __reduce_ex__(self, protocol: SupportsIndex) -> str | tuple[object, ...]:
+        # where a copy arrives, all of space must be the one that others are compared with
+        return "SPACE" if self is SPACE else super().__reduce_ex__(protocol)
+
+    @cached_property
+    def wrench(self) -> Floats:
+        """Both as rows, (k, 6) with k = d + m."""
+        return frozen(linalg.block_diag(self.force, self.moment))
+
+    def levers(self, arms: Floats) -> Floats:
+        """Return the moments of unit forces at the ends of arms.
+
+        ``arms`` (..., 3). Result (..., m, d).
+        """
+        sizes = len(self.moment), len(self.force)
+        return np.asarray((arms @ self._turns.T).reshape(*arms.shape[:-1], *sizes))
+
+    @cached_property
+    def _turns(self) -> Floats:
+        """What arms are multiplied by, (md, 3): (r × f) · n = r · (f × n)."""
+        return frozen(np.cross(self.force[None], self.moment[:, None]).reshape(-1, 3))
+
+
+SPACE = Basis(np.eye(3), np.eye(3))
+"""All of space: d = m = 3."""
 
 
 class Want(Flag):

@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from seqopt.arrays import Floats, FrozenValue, Ints
-from seqopt.engines.basis import Basis
-from seqopt.engines.interface import Fields, NamedEngine, Want, grip_columns
+from seqopt.engines.interface import Basis, Fields, NamedEngine, Want, grip_columns
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import GripError, SceneError
 from seqopt.network.build import network_of

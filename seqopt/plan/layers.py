@@ -8,11 +8,10 @@ from dataclasses import replace
 import numpy as np
 
 from seqopt.errors import ProblemError
-from seqopt.graph.layers.budgets import steps_over, travel
 from seqopt.graph.layers.costs import Budget
 from seqopt.graph.layers.interface import PlacementProblem
-from seqopt.graph.layers.layers import Layers
-from seqopt.graph.scenarios.scenarios import ScenarioLayers
+from seqopt.graph.layers.layers import Layers, steps_over, travel
+from seqopt.graph.scenarios import ScenarioLayers
 from seqopt.plan.calling.formulation import (
     End,
     Formulation,
@@ -23,14 +22,19 @@ from seqopt.plan.calling.formulation import (
 )
 from seqopt.plan.calling.selecting import require_fit, require_proof, require_time, select
 from seqopt.plan.calling.watch import Run, Watch, timed
-from seqopt.plan.judge.anew import require_anew
-from seqopt.plan.judge.certificate import Certificate, certify_partial, certify_scenarios, judge
+from seqopt.plan.judge.certificate import (
+    Certificate,
+    certify_partial,
+    certify_scenarios,
+    judge,
+    require_anew,
+)
 from seqopt.plan.plan import Plan
 from seqopt.plan.search.pair_search import search_pairs
 from seqopt.plan.search.window_search import search_windows
-from seqopt.problem.aims import Aim
-from seqopt.problem.budgets import AskedBudget
-from seqopt.problem.ranks import Among
+from seqopt.problem.criteria import Among
+from seqopt.problem.goals import Aim
+from seqopt.problem.problem import AskedBudget
 
 CHOOSES = {Aim.PEAK: "minimax", Aim.SUM: "overlap_dp"}  # of one scenario, without budgets
 

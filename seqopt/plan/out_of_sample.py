@@ -16,13 +16,12 @@ import pandas as pd
 from seqopt.arrays import Terse
 from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.graph.layers.interface import CostProblem
-from seqopt.graph.scenarios.costs import ScenarioCosts
-from seqopt.graph.scenarios.scenarios import Choice, ScenarioLayers, in_scenarios
+from seqopt.graph.scenarios import Choice, ScenarioCosts, ScenarioLayers, in_scenarios
 from seqopt.graph.states.states import over_scenarios
 from seqopt.plan.judge.schedules import plan_values
 from seqopt.plan.layers import best_choice
 from seqopt.plan.plan import Plan
-from seqopt.problem.aims import Aim
+from seqopt.problem.goals import Aim
 from seqopt.scene.orders import in_order
 from seqopt.scene.scenarios import Scenarios
 from seqopt.scene.scene import Scene

@@ -15,8 +15,8 @@ from seqopt.engines.registry import provenance
 from seqopt.errors import ProblemError
 from seqopt.graph.layers.interface import PlacementProblem
 from seqopt.graph.layers.layers import Layers
-from seqopt.graph.orders.orders import AllOrders
-from seqopt.graph.scenarios.scenarios import ScenarioLayers
+from seqopt.graph.orders import AllOrders
+from seqopt.graph.scenarios import ScenarioLayers
 from seqopt.graph.states.states import States
 from seqopt.plan.build import ShownBuild
 from seqopt.plan.calling.formulation import End, Formulation, FormulationKind, Reads, Selection
@@ -27,8 +27,7 @@ from seqopt.plan.judge.standing_proof import certified
 from seqopt.plan.search.window_search import WindowSearch
 from seqopt.plan.status import ENDS, FoundOrder, Status
 from seqopt.plan.tables import Objectives, alternatives, chosen_table, moves_table, split_objectives
-from seqopt.problem.aims import Aim
-from seqopt.problem.goals import judged_by
+from seqopt.problem.goals import Aim, judged_by
 from seqopt.problem.problem import Problem
 from seqopt.problem.requirements import Excess, overloads
 from seqopt.responses.choices import window_models
@@ -316,7 +315,7 @@ class Plan(ShownBuild):
     def objectives(self) -> Objectives:
         """Return the sum of ranks under both objectives, and the two parts of a heuristic's gap.
 
-        Result: ``objectives`` as of `seqopt.graph.layers.objectives.under_both`; ``gap_parts`` with
+        Result: ``objectives`` as of `seqopt.graph.layers.ranking.under_both`; ``gap_parts`` with
         ``short_sight`` and ``objective``, as of `split_gap`, for heuristics. None where there is no
         proof, or no ranks.
         """

@@ -16,15 +16,13 @@ from seqopt.contact.mortar import Mortar
 from seqopt.engines.interface import Engine
 from seqopt.errors import ProblemError
 from seqopt.graph.layers.layers import Layers, candidate_layers
-from seqopt.graph.orders.orders import AllOrders
-from seqopt.graph.scenarios.scenarios import ScenarioLayers, in_scenarios
+from seqopt.graph.orders import AllOrders
+from seqopt.graph.scenarios import ScenarioLayers, in_scenarios
 from seqopt.graph.states.states import States, build_states, over_scenarios, within
 from seqopt.plan.calling.formulation import On
 from seqopt.plan.layers import with_budgets
-from seqopt.problem.aims import WORST_PEAK, Aim, RobustAim
-from seqopt.problem.budgets import parse_budgets, parse_caps
-from seqopt.problem.goals import Goal, Measure
-from seqopt.problem.problem import Orders, Problem
+from seqopt.problem.goals import WORST_PEAK, Aim, Goal, Measure, RobustAim
+from seqopt.problem.problem import Orders, Problem, parse_budgets, parse_caps
 from seqopt.problem.requirements import Criterion, Limit
 from seqopt.problem.standing import Standing
 from seqopt.responses.resources import HERE, Resources

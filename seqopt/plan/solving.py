@@ -9,17 +9,16 @@ from typing import Any
 
 from seqopt.errors import ProblemError
 from seqopt.graph.layers.interface import PlacementProblem
-from seqopt.graph.orders.orders import AllOrders
-from seqopt.graph.scenarios.scenarios import ScenarioLayers
+from seqopt.graph.orders import AllOrders
+from seqopt.graph.scenarios import ScenarioLayers
 from seqopt.graph.states.states import States
 from seqopt.plan.calling.formulation import Formulation, On, as_formulation
 from seqopt.plan.calling.watch import Run
 from seqopt.plan.layers import solve_layers
-from seqopt.plan.orders import solve_orders
 from seqopt.plan.plan import Plan
 from seqopt.plan.posing import AIMS, graph_of, natural, usual
-from seqopt.plan.states import solve_states
-from seqopt.problem.aims import Aim
+from seqopt.plan.states import solve_orders, solve_states
+from seqopt.problem.goals import Aim
 from seqopt.problem.problem import Problem
 from seqopt.sequence.free_rules import FreeRules
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from math import isfinite
 
-from seqopt.graph.orders.orders import AllOrders, OrderSelection
+from seqopt.graph.orders import AllOrders, OrderSelection
 from seqopt.plan.calling.formulation import End
 from seqopt.plan.judge.certificate import TOLERANCE
 

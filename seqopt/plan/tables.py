@@ -10,11 +10,10 @@ import pandas as pd
 
 from seqopt.arrays import Floats
 from seqopt.graph.layers.layers import Layers
-from seqopt.graph.layers.objectives import split_gap, under_both
-from seqopt.graph.layers.ranking import move_costs, rank_of
+from seqopt.graph.layers.ranking import move_costs, rank_of, split_gap, under_both
 from seqopt.plan.calling.formulation import Selection
 from seqopt.plan.search.window_search import WindowSearch
-from seqopt.problem.aims import Aim
+from seqopt.problem.goals import Aim
 from seqopt.responses.choices import StepChoices
 
 Objectives = dict[str, dict[str, float | None] | None]
@@ -57,7 +56,7 @@ def _worths(
 def split_objectives(problem: Layers, choice: tuple[int, ...], *, heuristic: bool) -> Objectives:
     """Return the sum of ranks under both objectives, and the two parts of a heuristic's gap.
 
-    Result: ``objectives`` as of `seqopt.graph.layers.objectives.under_both`; ``gap_parts`` as of
+    Result: ``objectives`` as of `seqopt.graph.layers.ranking.under_both`; ``gap_parts`` as of
     `split_gap`; None where there are no ranks.
     """
     values = under_both(problem, choice)

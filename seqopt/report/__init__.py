@@ -7,7 +7,7 @@ this page does not import.
 >>> from seqopt.network.build import build_network
 >>> from seqopt.report import compare, format_comparison
 >>> from seqopt.scene.scene_file import load_scene
->>> from seqopt.study.presets import CRITERIA
+>>> from seqopt.study.published import CRITERIA
 >>> scene, criterion = load_scene("arch25"), CRITERIA["worst-ratio-published"]
 >>> comparison = compare(make_engine("compliance", build_network(scene)), criterion)
 >>> comparison.table.loc[["cascade", "overlap_dp"], "gap"].astype(float).round(3).tolist()

@@ -31,7 +31,7 @@ from seqopt.report.style import (
     plain,
     styled,
 )
-from seqopt.report.wording import in_words, typed
+from seqopt.report.text import in_words, typed
 from seqopt.study.published import PUBLISHED
 
 EXACT = 1e-7  # %: gaps below are rounding

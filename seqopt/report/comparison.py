@@ -13,8 +13,7 @@ from seqopt.engines.interface import Engine
 from seqopt.errors import ProblemError, SeqoptError, StepError
 from seqopt.graph.layers.costs import TINY
 from seqopt.graph.layers.layers import Layers, candidate_layers
-from seqopt.graph.layers.objectives import under_both
-from seqopt.graph.layers.ranking import rank_choice
+from seqopt.graph.layers.ranking import rank_choice, under_both
 from seqopt.graph.states.states import build_states
 from seqopt.plan.calling.formulation import On, formulations
 from seqopt.plan.calling.guard import StatePath
@@ -22,13 +21,12 @@ from seqopt.plan.judge.certificate import least_sum
 from seqopt.plan.layers import on_the_way
 from seqopt.plan.plan import Plan
 from seqopt.plan.solving import solve
-from seqopt.problem.aims import Aim
 from seqopt.problem.criteria import RankSum, WorstRatio
+from seqopt.problem.goals import Aim
 from seqopt.problem.requirements import Criterion, overloads
-from seqopt.responses.linear_range import Departure, LinearRange
 from seqopt.responses.quantities import CHOSEN_BY, RESPONSES, robot_response
 from seqopt.responses.resources import Resources
-from seqopt.responses.table import analyze, force_column
+from seqopt.responses.table import Departure, LinearRange, analyze, force_column
 from seqopt.scene.scene import Scene
 from seqopt.sequence.free_rules import FREE, FreeRules
 from seqopt.sequence.schedule_file import MOST, find_schedule

@@ -24,9 +24,9 @@ from seqopt.problem.problem import Problem
 from seqopt.problem.requirements import Limit
 from seqopt.report.comparison import largest
 from seqopt.report.pages import WORDS
-from seqopt.report.wording import typed
-from seqopt.responses.linear_range import OUTSIDE, REMEDY
+from seqopt.report.text import typed
 from seqopt.responses.quantities import number_text
+from seqopt.responses.table import OUTSIDE, REMEDY
 from seqopt.scene.boxes import boxes
 from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import Schedule

@@ -26,9 +26,8 @@ from seqopt.errors import ProblemError
 from seqopt.files import csv_text
 from seqopt.network.network import GROUND, Network, PartKind
 from seqopt.problem.requirements import Excess, overloads
-from seqopt.responses.linear_range import OUTSIDE, Departure
 from seqopt.responses.quantities import number_text
-from seqopt.responses.table import force_column
+from seqopt.responses.table import OUTSIDE, Departure, force_column
 from seqopt.scene.boxes import boxes, vertices_of
 from seqopt.scene.scene import Scene
 from seqopt.scene.shape import normal_of

@@ -16,12 +16,11 @@ from seqopt.plan.build import ShownBuild
 from seqopt.problem.requirements import overloads
 from seqopt.report.comparison import CLOSED, LARGEST, Comparison, largest, method_tables
 from seqopt.report.page import Build, Scatter, report_page
-from seqopt.responses.linear_range import OUTSIDE, REMEDY, Departure, LinearRange, builds_in_words
 from seqopt.responses.quantities import length_text, number_text
-from seqopt.responses.table import analyze
+from seqopt.responses.table import OUTSIDE, REMEDY, Departure, LinearRange, analyze, builds_in_words
 from seqopt.scene.scene import Scene
 from seqopt.sequence.free_rules import FREE
-from seqopt.sequence.plan_file import parse_plan, read_plan
+from seqopt.sequence.schedule_file import parse_plan, read_plan
 from seqopt.showing import Page
 
 WORDS = {

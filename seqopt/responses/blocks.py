@@ -10,7 +10,7 @@ In a folder of answers every block is a file of its own, written whole: a checks
 follows, the numbers, then what the engine counted. No more is read than an answer to the block can
 be, and a file is believed only if it is whole and its block's own: whatever is damaged is computed
 again. Against somebody who writes false numbers with their checksum there is
-`seqopt.plan.judge.anew`.
+`seqopt.plan.judge.certificate`.
 """
 
 from __future__ import annotations
@@ -31,9 +31,8 @@ import numpy as np
 
 from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.engines.auto import Level, LevelChoice
-from seqopt.engines.interface import Engine, Want
+from seqopt.engines.interface import Engine, Want, one_thread
 from seqopt.engines.registry import Recipe, make_engine, recipe_of
-from seqopt.engines.threads import one_thread
 from seqopt.errors import FileError, SceneError
 from seqopt.files import HIDDEN, make_folder, require_folder, write_bytes
 from seqopt.responses.quantities import CHOSEN_BY, lengths, require_finite

@@ -20,9 +20,8 @@ from scipy import linalg
 
 from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.engines.interface import Fields, grip_columns
-from seqopt.engines.rigid.mixed import solve_load
-from seqopt.engines.rigid.recovery import edge_forces, reactions, split_pairs
-from seqopt.engines.rigid.ungripped import Ungripped, ungripped_system
+from seqopt.engines.rigid.mechanism import Ungripped, ungripped_system
+from seqopt.engines.rigid.mixed import edge_forces, reactions, solve_load, split_pairs
 from seqopt.errors import MechanismError, SolverError, StepError
 from seqopt.network.build import network_of
 from seqopt.network.mechanics import spring_maps

@@ -18,9 +18,8 @@ its scene. A schedule is a sequence in which some grips are still to be chosen.
 Loops of two robots and of more are in `seqopt.sequence.three_robots`.
 """
 
-from seqopt.sequence.plan_file import read_plan
 from seqopt.sequence.schedule import Schedule
-from seqopt.sequence.schedule_file import read_schedule
+from seqopt.sequence.schedule_file import read_plan, read_schedule
 from seqopt.sequence.steps import Step
 from seqopt.sequence.three_robots import modified_sequential, three_robot_loop
 from seqopt.sequence.two_robots import cantilever, sequential

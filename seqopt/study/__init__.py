@@ -18,9 +18,10 @@ The paper is arXiv 2104.04856. No other part of seqopt uses numbers from it.
 21.5
 """
 
-from seqopt.study.presets import CRITERIA, ROBOTS
 from seqopt.study.published import (
+    CRITERIA,
     IRREGULARITIES,
+    ROBOTS,
     as_printed,
     is_reference_arch,
     printed,

@@ -19,8 +19,7 @@ from seqopt.network.build import build_network
 from seqopt.responses.table import step_fields
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.sequence.two_robots import METHODS
-from seqopt.study.presets import WEIGHTED
-from seqopt.study.published import published_plan
+from seqopt.study.published import WEIGHTED, published_plan
 from tests.builders import block, hinged, scaled, six_bricks, small_arch
 from tests.strategies import arches, both_sided, loosened, states, walls
 

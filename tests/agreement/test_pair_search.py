@@ -23,12 +23,11 @@ from seqopt.plan.calling.formulation import End, Selection
 from seqopt.plan.judge.certificate import certify_partial
 from seqopt.plan.search.window_search import search_windows
 from seqopt.plan.solving import solve
-from seqopt.problem.aims import Aim
-from seqopt.problem.own_criterion import StepCost
-from seqopt.problem.ranks import Among, Ranked
+from seqopt.problem.criteria import Among, Ranked, StepCost
+from seqopt.problem.goals import Aim
 from seqopt.problem.requirements import Limit
 from seqopt.sequence.three_robots import three_robot_loop
-from seqopt.study.presets import EQUATIONS, WEIGHTED, WORST_RATIO
+from seqopt.study.published import EQUATIONS, WEIGHTED, WORST_RATIO
 from tests.builders import far_reaching
 from tests.strategies import arches, problems
 

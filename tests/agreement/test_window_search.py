@@ -16,7 +16,7 @@ from seqopt.plan.solving import solve
 from seqopt.problem.requirements import Limit
 from seqopt.responses.choices import window_models
 from seqopt.sequence.three_robots import SCHEDULES, three_robot_loop
-from seqopt.study.presets import CRITERIA, EQUATIONS, WEIGHTED
+from seqopt.study.published import CRITERIA, EQUATIONS, WEIGHTED
 from tests.builders import far_reaching
 from tests.strategies import arches
 

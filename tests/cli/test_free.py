@@ -10,7 +10,7 @@ import pytest
 
 from seqopt.cli.main import main
 from seqopt.scene.scene_file import load_scene, save_scene
-from seqopt.sequence.plan_file import read_plan
+from seqopt.sequence.schedule_file import read_plan
 from tests.builders import small_arch
 
 

@@ -11,8 +11,7 @@ import pytest
 
 from seqopt.cli.main import main
 from seqopt.cli.saying import watcher
-from seqopt.cli.saying.layout import colored, columns, painted, wrapped
-from seqopt.cli.saying.terminal import complain, note, show_text
+from seqopt.cli.saying.terminal import colored, columns, complain, note, painted, show_text, wrapped
 from seqopt.cli.saying.watcher import Watcher
 from seqopt.work.progress import Stage, told, within
 

@@ -10,14 +10,14 @@ import pytest
 
 from seqopt.engines.interface import _NAMES, Want, grip_columns
 from seqopt.engines.planar import PlanarEngine
-from seqopt.engines.rigid import compliance, trial
-from seqopt.engines.rigid.compliance import _EVEN, ComplianceEngine
+from seqopt.engines.rigid import compliance
+from seqopt.engines.rigid import compliance as trial
+from seqopt.engines.rigid.compliance import _CANCEL, _EVEN, ComplianceEngine, cancels, solve_batch
 from seqopt.engines.rigid.growth import grow_tree
 from seqopt.engines.rigid.mixed import solve_mixed
 from seqopt.engines.rigid.operator import OperatorBuilder
 from seqopt.engines.rigid.refinement import Corrector
 from seqopt.engines.rigid.response_maps import loads_of
-from seqopt.engines.rigid.trial import _CANCEL, cancels, solve_batch
 from seqopt.network.build import build_network
 from tests.builders import from_both_sides, six_bricks, small_arch
 from tests.limit_scenes import LOOSE_AT, chain, loosened

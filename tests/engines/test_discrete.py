@@ -15,7 +15,7 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import SceneError
 from seqopt.network.build import build_network
 from seqopt.scene.scene_file import load_scene
-from seqopt.study.presets import STUDY_BED, STUDY_PADS
+from seqopt.study.published import STUDY_BED, STUDY_PADS
 from tests.builders import largest_difference
 
 

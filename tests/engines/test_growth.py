@@ -9,13 +9,13 @@ from hypothesis import strategies as st
 
 from experiments.harness.scenes import grip_sets, half_circle, running_bond
 from seqopt.engines.interface import _NAMES, Want, grip_columns
-from seqopt.engines.rigid import compliance, growth, trial
-from seqopt.engines.rigid.compliance import ComplianceEngine, Kept
+from seqopt.engines.rigid import compliance, growth
+from seqopt.engines.rigid import compliance as trial
+from seqopt.engines.rigid.compliance import ComplianceEngine, Kept, solve_batch
 from seqopt.engines.rigid.growth import grow_tree
 from seqopt.engines.rigid.mixed import solve_mixed
 from seqopt.engines.rigid.operator import OperatorBuilder
 from seqopt.engines.rigid.refinement import Refinement
-from seqopt.engines.rigid.trial import solve_batch
 from seqopt.network.build import build_network
 from tests.strategies import arches, both_sided, walls
 

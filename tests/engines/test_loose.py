@@ -14,21 +14,19 @@ from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import _NAMES, Want, grip_columns
 from seqopt.engines.planar import PlanarEngine
 from seqopt.engines.rigid import compliance, refinement
-from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.engines.rigid.compliance import ComplianceEngine, solve_batch
 from seqopt.engines.rigid.grip_equations import solve_positive
 from seqopt.engines.rigid.growth import grow_tree
-from seqopt.engines.rigid.mechanism import require_resistance
+from seqopt.engines.rigid.mechanism import require_resistance, ungripped_system
 from seqopt.engines.rigid.mixed import solve_dense, solve_mixed
 from seqopt.engines.rigid.operator import OperatorBuilder
 from seqopt.engines.rigid.refinement import Corrector, Refinement, held_operator, hold_loose
-from seqopt.engines.rigid.trial import solve_batch
-from seqopt.engines.rigid.ungripped import ungripped_system
 from seqopt.errors import MechanismError, SolverError
 from seqopt.graph.layers.layers import candidate_layers
 from seqopt.network.build import build_network
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.sequence.three_robots import three_robot_loop
-from seqopt.study.presets import EQUATIONS
+from seqopt.study.published import EQUATIONS
 from tests.builders import all_nodes, block, hinged, on_soft_ground, six_bricks, torsion_free
 from tests.limit_scenes import HELD, chain, loosened, without_joint
 from tests.reference_chain import solve_exactly

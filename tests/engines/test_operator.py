@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 
 from experiments.harness.scenes import running_bond
-from seqopt.engines.basis import SPACE
-from seqopt.engines.interface import _NAMES, FLAGS, Want, grip_columns
+from seqopt.engines.interface import _NAMES, FLAGS, SPACE, Want, grip_columns
 from seqopt.engines.planar import PlanarEngine
-from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.engines.rigid.compliance import ComplianceEngine, solve_batch
 from seqopt.engines.rigid.grip_equations import (
     doubts,
     grip_forces,
@@ -20,12 +19,11 @@ from seqopt.engines.rigid.grip_equations import (
     trusted,
 )
 from seqopt.engines.rigid.growth import grow_tree
+from seqopt.engines.rigid.mechanism import ungripped_system
 from seqopt.engines.rigid.mixed import solve_dense
 from seqopt.engines.rigid.operator import OperatorBuilder
 from seqopt.engines.rigid.refinement import held_operator, hold_loose
 from seqopt.engines.rigid.response_maps import _GATHERED, loads_of
-from seqopt.engines.rigid.trial import solve_batch
-from seqopt.engines.rigid.ungripped import ungripped_system
 from seqopt.network.build import build_network
 from seqopt.scene.arch import ArchShape, arch_scene
 from tests.builders import branch, from_both_sides, hinged, six_bricks, small_arch, torsion_free

@@ -8,12 +8,11 @@ import numpy as np
 import pytest
 
 from seqopt.engines.interface import Want, grip_columns
-from seqopt.engines.rigid import trial
-from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.engines.rigid import compliance as trial
+from seqopt.engines.rigid.compliance import ComplianceEngine, solve_batch
 from seqopt.engines.rigid.grip_equations import solve_positive
 from seqopt.engines.rigid.growth import grow_tree
 from seqopt.engines.rigid.operator import OperatorBuilder
-from seqopt.engines.rigid.trial import solve_batch
 from seqopt.errors import MechanismError, SolverError
 from seqopt.network.build import build_network
 from tests.builders import hinged, six_bricks

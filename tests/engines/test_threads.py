@@ -5,10 +5,10 @@ from __future__ import annotations
 import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
+from seqopt.engines.interface import one_thread
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.engines.rigid.operator import OperatorBuilder
 from seqopt.engines.rigid.refinement import Refinement
-from seqopt.engines.threads import one_thread
 from seqopt.network.build import build_network
 from tests.builders import hinged, six_bricks
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from seqopt.engines.interface import Want, grip_columns
-from seqopt.engines.rigid import trial
+from seqopt.engines.rigid import compliance as trial
+from seqopt.engines.rigid.compliance import ACCURACY, solve_batch, try_forces
 from seqopt.engines.rigid.growth import grow_tree
 from seqopt.engines.rigid.operator import OperatorBuilder
-from seqopt.engines.rigid.trial import ACCURACY, solve_batch, try_forces
 from seqopt.network.build import build_network
 from tests.builders import small_arch
 

@@ -37,7 +37,7 @@ from seqopt.engines.discrete.engine import Across, Pinch
 from seqopt.engines.discrete.system import BedStiffness
 from seqopt.network.network import GROUND
 from seqopt.sequence.two_robots import sequential
-from seqopt.study.presets import STUDY_BED, STUDY_PADS
+from seqopt.study.published import STUDY_BED, STUDY_PADS
 
 PYTHON = python_with_lmgc90(os.environ.get("SEQOPT_LMGC90", sys.executable))
 with_lmgc90 = pytest.mark.skipif(PYTHON is None, reason="LMGC90 is not installed")

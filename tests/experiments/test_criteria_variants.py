@@ -15,8 +15,7 @@ from experiments.study.criteria_variants import (
     rules,
 )
 from seqopt.graph.layers.layers import candidate_layers
-from seqopt.study.presets import EQUATIONS
-from seqopt.study.published import published_choice
+from seqopt.study.published import EQUATIONS, published_choice
 
 OBSERVED = pd.read_csv(RESULTS / "criteria_compression.csv")
 COUNTS = ["alone", "first", "among_three", "first_after_crown"]

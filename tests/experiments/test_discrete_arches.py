@@ -28,8 +28,7 @@ from experiments.discrete.parts.arches_lmgc90 import error, moved
 from experiments.harness.results import RESULTS
 from seqopt.engines.discrete.engine import Across, Pinch, pad_stiffness
 from seqopt.sequence.two_robots import sequential
-from seqopt.study.presets import STUDY_PADS
-from seqopt.study.published import printed
+from seqopt.study.published import STUDY_PADS, printed
 
 
 @pytest.fixture(scope="module")

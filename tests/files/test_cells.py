@@ -16,8 +16,7 @@ from seqopt.files import _FORMULA, csv_text, harmless, plain
 from seqopt.network.build import build_network
 from seqopt.responses.table import analyze
 from seqopt.sequence.exports.tables import plan_csv
-from seqopt.sequence.plan_file import parse_plan
-from seqopt.sequence.schedule_file import parse_schedule, schedule_text
+from seqopt.sequence.schedule_file import parse_plan, parse_schedule, schedule_text
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.sequence.two_robots import METHODS
 from tests.builders import small_arch

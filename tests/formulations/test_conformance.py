@@ -13,10 +13,9 @@ from hypothesis import strategies as st
 
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
-from seqopt.graph.layers.budgets import robot_use, steps_over, travel
 from seqopt.graph.layers.costs import Budget, LayeredCosts
 from seqopt.graph.layers.interface import CostProblem
-from seqopt.graph.layers.layers import candidate_layers
+from seqopt.graph.layers.layers import candidate_layers, robot_use, steps_over, travel
 from seqopt.network.build import build_network
 from seqopt.plan.calling.formulation import (
     End,
@@ -27,10 +26,10 @@ from seqopt.plan.calling.formulation import (
     formulations,
 )
 from seqopt.plan.solving import solve
-from seqopt.problem.aims import Aim
+from seqopt.problem.goals import Aim
 from seqopt.problem.requirements import Limit
 from seqopt.sequence.three_robots import SCHEDULES, three_robot_loop
-from seqopt.study.presets import CRITERIA, EQUATIONS, WORST_RATIO
+from seqopt.study.published import CRITERIA, EQUATIONS, WORST_RATIO
 from tests.builders import small_arch
 from tests.strategies import budgeted, problems
 

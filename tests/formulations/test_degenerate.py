@@ -22,7 +22,7 @@ from seqopt.plan.calling.formulation import (
 )
 from seqopt.plan.judge.certificate import certify
 from seqopt.plan.solving import solve
-from seqopt.problem.aims import Aim
+from seqopt.problem.goals import Aim
 from tests.quality.degenerate import MALFORMED, judge, outcomes
 from tests.quality.degenerate_cases import CASES, Size, capped, costs, opposed, whole
 

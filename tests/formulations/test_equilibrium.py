@@ -16,9 +16,16 @@ import pytest
 
 import formulations.contact.limit_analysis
 from experiments.stability.parts.blocks import stack
-from formulations.cones import CONE_OPTIONS, ENDS, SECONDS, solve_cones
 from formulations.contact.limit_analysis import compile_equilibrium
-from formulations.solvers import GAPS, minimize, minimize_whole
+from formulations.solvers import (
+    CONE_OPTIONS,
+    ENDS,
+    GAPS,
+    SECONDS,
+    minimize,
+    minimize_whole,
+    solve_cones,
+)
 from seqopt.stability.limit_analysis import CAP, Case, Claim, Sense, limits
 from tests.builders import held
 

@@ -14,15 +14,12 @@ import seqopt
 from formulations.states.order_search import FORMULATION
 from seqopt.contact.mortar import find_mortar
 from seqopt.errors import InfeasibleError, ProblemError, SolverError, TimeUpError
-from seqopt.graph.orders.orders import AllOrders, OrderSelection
-from seqopt.graph.orders.visits import whole_bound
-from seqopt.graph.orders.work import trying
+from seqopt.graph.orders import AllOrders, OrderSelection, trying, whole_bound
 from seqopt.graph.states.states import build_states, over_scenarios, within
 from seqopt.plan.calling.formulation import FormulationKind, On, find_formulation
 from seqopt.plan.judge.orders import finds_better_order
 from seqopt.plan.solving import solve
-from seqopt.problem.criteria import WorstRatio
-from seqopt.problem.own_criterion import StepCost
+from seqopt.problem.criteria import StepCost, WorstRatio
 from seqopt.problem.standing import Standing
 from seqopt.responses.resources import Resources
 from seqopt.scene.library.wall import WallShape, wall

@@ -19,7 +19,7 @@ from seqopt.graph.layers.interface import CostProblem
 from seqopt.plan.calling.formulation import End, FormulationKind, Reads
 from seqopt.plan.calling.formulation import formulations as registered
 from seqopt.plan.calling.watch import Watch
-from seqopt.problem.aims import Aim
+from seqopt.problem.goals import Aim
 from tests.strategies import problems
 
 ALL = registered()

@@ -12,12 +12,17 @@ from seqopt.graph.layers.layers import candidate_layers
 from seqopt.graph.layers.ranking import move_costs, rank_moves
 from seqopt.plan.solving import solve
 from seqopt.plan.tables import choice_table
-from seqopt.problem.ranks import mean_ranks, scaled_ranks
-from seqopt.problem.requirements import payload_limits
-from seqopt.problem.scales import SceneFacts
+from seqopt.problem.criteria import mean_ranks, scaled_ranks
+from seqopt.problem.requirements import SceneFacts, payload_limits
 from seqopt.sequence.three_robots import modified_sequential
-from seqopt.study.presets import CRITERIA, EQUATIONS, WEIGHTED, WORST_RATIO
-from seqopt.study.published import paper_models, published_choice
+from seqopt.study.published import (
+    CRITERIA,
+    EQUATIONS,
+    WEIGHTED,
+    WORST_RATIO,
+    paper_models,
+    published_choice,
+)
 
 
 def test_a_third_support_ends_twisting(engine25):

@@ -15,15 +15,20 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import ProblemError
 from seqopt.graph.layers.costs import LayeredCosts
 from seqopt.graph.layers.layers import candidate_layers
-from seqopt.graph.layers.objectives import least_among_least, split_gap, under, under_both
-from seqopt.graph.layers.ranking import move_costs, rank_choice
+from seqopt.graph.layers.ranking import (
+    least_among_least,
+    move_costs,
+    rank_choice,
+    split_gap,
+    under,
+    under_both,
+)
 from seqopt.network.build import build_network
 from seqopt.plan.solving import solve
-from seqopt.problem.ranks import Among, Ranked, row_ranks, scaled_ranks
+from seqopt.problem.criteria import Among, Ranked, row_ranks, scaled_ranks
 from seqopt.problem.requirements import Limit
 from seqopt.sequence.three_robots import three_robot_loop
-from seqopt.study.presets import EQUATIONS, WEIGHTED
-from seqopt.study.published import published_choice
+from seqopt.study.published import EQUATIONS, WEIGHTED, published_choice
 from tests.builders import small_arch
 from tests.strategies import problems
 

@@ -17,7 +17,7 @@ from seqopt.plan.solving import solve
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.sequence.two_robots import cantilever
 from seqopt.stability.assessment import assess
-from seqopt.study.presets import CLOSEST, EQUATIONS, RESOLUTION
+from seqopt.study.published import CLOSEST, EQUATIONS, RESOLUTION
 from tests.builders import rescaled
 
 SCALES = [(1e3, 1, 1), (1, 1e3, 1), (1, 1, 1e3), (1e3, 1e-3, 1e3)]

@@ -12,13 +12,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from seqopt.errors import InfeasibleError, SolverError
-from seqopt.graph.layers.budgets import steps_over, travel
 from seqopt.graph.layers.costs import Budget, LayeredCosts
 from seqopt.graph.layers.interface import CostProblem
+from seqopt.graph.layers.layers import steps_over, travel
 from seqopt.plan.calling.formulation import End, FormulationKind, On, formulations
 from seqopt.plan.judge import budget_proof
 from seqopt.plan.judge.budget_proof import least_within
-from seqopt.plan.judge.conflicts import smallest_conflict
+from seqopt.plan.judge.infeasible import smallest_conflict
 from seqopt.plan.price_curve import price_curve
 from seqopt.plan.solving import solve
 from tests.strategies import budgeted

@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given
 
 from seqopt.errors import SolverError
-from seqopt.graph.layers.budgets import travel
 from seqopt.graph.layers.costs import Budget, LayeredCosts
 from seqopt.graph.layers.interface import CostProblem
+from seqopt.graph.layers.layers import travel
 from seqopt.plan.calling.formulation import (
     Formulation,
     FormulationKind,
@@ -22,7 +22,7 @@ from seqopt.plan.calling.formulation import (
 )
 from seqopt.plan.judge.certificate import TOLERANCE, certify, judge, least_peak, least_sum
 from seqopt.plan.solving import solve
-from seqopt.problem.aims import Aim
+from seqopt.problem.goals import Aim
 from tests.strategies import problems
 
 ALL = formulations(On.LAYERS)

@@ -12,7 +12,7 @@ from formulations.states.order_search import FORMULATION as ORDER
 from formulations.states.pareto_zones import FORMULATION as FRONT
 from formulations.states.schedule_search import FORMULATION as PLAN
 from seqopt.errors import InfeasibleError, SolverError
-from seqopt.graph.orders.orders import AllOrders, OrderSelection
+from seqopt.graph.orders import AllOrders, OrderSelection
 from seqopt.graph.states.states import build_states
 from seqopt.plan.calling.guard import StatePath
 from seqopt.plan.front import FrontSelection, StateFront, find_front

@@ -22,7 +22,7 @@ from seqopt.responses import batches
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.scene_file import save_scene
 from seqopt.sequence.three_robots import modified_sequential, three_robot_loop
-from seqopt.study.presets import EQUATIONS
+from seqopt.study.published import EQUATIONS
 from tests.builders import six_bricks
 
 

@@ -9,12 +9,11 @@ import pytest
 
 import seqopt
 from seqopt.errors import InfeasibleError, SolverError
-from seqopt.graph.layers.budgets import travel
 from seqopt.graph.layers.costs import LayeredCosts
 from seqopt.graph.layers.interface import CostProblem
-from seqopt.graph.layers.layers import candidate_layers
+from seqopt.graph.layers.layers import candidate_layers, travel
 from seqopt.plan.judge.certificate import certify
-from seqopt.problem.aims import Aim
+from seqopt.problem.goals import Aim
 from seqopt.problem.requirements import Excess, Limit, overloads, payload_limits
 
 

@@ -11,12 +11,11 @@ import pytest
 import seqopt
 from seqopt.engines.interface import Want
 from seqopt.errors import ProblemError, StepError
-from seqopt.graph.layers.budgets import travel
 from seqopt.graph.layers.costs import LayeredCosts
 from seqopt.graph.layers.interface import CostProblem
-from seqopt.graph.layers.layers import Layers, candidate_layers
+from seqopt.graph.layers.layers import Layers, candidate_layers, travel
 from seqopt.plan.calling.formulation import FormulationKind, On
-from seqopt.study.presets import find_criterion
+from seqopt.study.published import find_criterion
 from tests.builders import small_arch
 
 WORST = seqopt.CRITERIA["worst-ratio-published"]

@@ -16,8 +16,7 @@ from seqopt.graph import Explorer
 from seqopt.graph.layers.costs import Budget, LayeredCosts
 from seqopt.graph.layers.interface import CostProblem
 from seqopt.graph.layers.partial_costs import PartialCosts
-from seqopt.graph.orders.orders import AllOrders
-from seqopt.graph.orders.visits import OrderStates
+from seqopt.graph.orders import AllOrders, OrderStates
 from seqopt.graph.paths import keep_best, least_peak
 from seqopt.graph.states.states import build_states
 from seqopt.graph.states.visits import explore, floors_of_goals
@@ -26,11 +25,10 @@ from seqopt.plan.judge import budget_proof
 from seqopt.plan.judge.budget_proof import least_within
 from seqopt.plan.judge.certificate import TOLERANCE, certify_partial
 from seqopt.plan.judge.orders import finds_better_order
-from seqopt.plan.judge.passable import Passable
-from seqopt.plan.judge.proof import Proof
+from seqopt.plan.judge.proof import Passable, Proof
 from seqopt.plan.solving import solve
-from seqopt.problem.aims import Aim
 from seqopt.problem.criteria import WorstRatio
+from seqopt.problem.goals import Aim
 from seqopt.problem.requirements import Limit
 from seqopt.responses.quantities import CHOSEN_BY
 from seqopt.sequence.free_check import RuleBook

@@ -19,12 +19,17 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.graph.layers.costs import LayeredCosts
 from seqopt.graph.layers.layers import candidate_layers
-from seqopt.graph.scenarios.costs import ScenarioCosts
-from seqopt.graph.scenarios.scenarios import ScenarioLayers, in_scenarios, largest_of, scenario_arcs
+from seqopt.graph.scenarios import (
+    ScenarioCosts,
+    ScenarioLayers,
+    in_scenarios,
+    largest_of,
+    scenario_arcs,
+)
 from seqopt.plan.calling.watch import Watch
 from seqopt.plan.out_of_sample import judge_unseen
 from seqopt.plan.posing import graph_of, layers_of
-from seqopt.problem.aims import WORST_PEAK, WORST_TOTAL, Aim, RobustAim, cvar, parse_robust
+from seqopt.problem.goals import WORST_PEAK, WORST_TOTAL, Aim, RobustAim, cvar, parse_robust
 from seqopt.responses.resources import Resources
 from seqopt.scene.scenarios import scenarios
 from tests.builders import six_bricks, small_arch

@@ -12,7 +12,7 @@ from seqopt.graph.layers.interface import CostProblem
 from seqopt.plan.calling.flow import layered_flow
 from seqopt.plan.calling.formulation import Selection
 from seqopt.plan.judge.certificate import certify
-from seqopt.problem.aims import Aim
+from seqopt.problem.goals import Aim
 
 
 def made(cost=1.0):

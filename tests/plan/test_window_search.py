@@ -11,7 +11,7 @@ from seqopt.plan.search.window_search import search_windows, window
 from seqopt.plan.solving import solve
 from seqopt.problem.requirements import Limit
 from seqopt.sequence.three_robots import three_robot_loop
-from seqopt.study.presets import EQUATIONS, WEIGHTED
+from seqopt.study.published import EQUATIONS, WEIGHTED
 
 
 def test_a_dead_end_that_the_cascade_foresees(engine25):

@@ -11,14 +11,17 @@ from seqopt.errors import ProblemError
 from seqopt.problem.criteria import (
     OVER_METHODS,
     WORST_OVER_METHODS,
+    Ranked,
     RankSum,
     WeightedSum,
     equal,
+    mean_ranks,
     present,
+    ranks_of,
+    scaled_ranks,
 )
 from seqopt.problem.criteria import WorstRatio as Worst
-from seqopt.problem.ranks import Ranked, mean_ranks, ranks_of, scaled_ranks
-from seqopt.problem.scales import NEVER, ROUNDED, Units
+from seqopt.problem.requirements import NEVER, ROUNDED, Units
 
 NAN = np.nan
 

@@ -12,15 +12,13 @@ from hypothesis import strategies as st
 
 import seqopt
 from seqopt.errors import InfeasibleError, ProblemError
-from seqopt.graph.layers.budgets import travel
 from seqopt.graph.layers.interface import CostProblem
-from seqopt.graph.layers.layers import candidate_layers
+from seqopt.graph.layers.layers import candidate_layers, travel
 from seqopt.graph.states.states import build_states
 from seqopt.plan.judge.proof import Proof
 from seqopt.plan.search.in_order import least_quantile, solve_in_order
-from seqopt.problem.aims import Aim
-from seqopt.problem.criteria import WeightedSum
-from seqopt.problem.own_criterion import StepCost
+from seqopt.problem.criteria import StepCost, WeightedSum
+from seqopt.problem.goals import Aim
 from seqopt.sequence.free_rules import FreeRules
 from tests.builders import six_bricks, small_arch
 from tests.strategies import problems

@@ -18,12 +18,12 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import MechanismError, ProblemError, StepError
 from seqopt.network.build import build_network
 from seqopt.problem.criteria import OVER_METHODS, RankSum, WeightedSum, equal
-from seqopt.problem.scales import NEVER, ROUNDED, SceneFacts, crown, own_scales
+from seqopt.problem.requirements import NEVER, ROUNDED, SceneFacts, crown, own_scales
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.parts import Sphere
 from seqopt.sequence.free_rules import FreeRules
 from seqopt.sequence.two_robots import METHODS
-from seqopt.study.presets import CLOSEST, EQUATIONS, RESOLUTION
+from seqopt.study.published import CLOSEST, EQUATIONS, RESOLUTION
 from tests.builders import anywhere, far_reaching, rescaled, small_arch
 from tests.strategies import arches
 

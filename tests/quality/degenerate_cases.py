@@ -18,11 +18,11 @@ from seqopt.graph.layers.costs import Budget, LayeredCosts
 from seqopt.graph.layers.interface import CostProblem, PlacementProblem
 from seqopt.graph.layers.layers import Layers, candidate_layers
 from seqopt.network.network import Network
-from seqopt.problem.aims import Aim
 from seqopt.problem.criteria import WorstRatio
+from seqopt.problem.goals import Aim
 from seqopt.problem.requirements import Criterion, Limit
 from seqopt.sequence.three_robots import three_robot_loop
-from seqopt.study.presets import EQUATIONS, RESOLUTION
+from seqopt.study.published import EQUATIONS, RESOLUTION
 
 COARSE = replace(
     EQUATIONS, name="coarse", resolution=tuple((name, 100 * size) for name, size in RESOLUTION)

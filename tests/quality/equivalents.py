@@ -42,12 +42,12 @@ class Equivalent:
 
 
 COMPLIANCE = "seqopt.engines.rigid.compliance"
-TRIAL = "seqopt.engines.rigid.trial"
+TRIAL = "seqopt.engines.rigid.compliance"
 OPERATOR = "seqopt.engines.rigid.operator"
 GROWTH = "seqopt.engines.rigid.growth"
 GRIPS = "seqopt.engines.rigid.grip_equations"
 COSTS, CERTIFICATE = "seqopt.graph.layers.costs", "seqopt.plan.judge.certificate"
-CRITERIA, RANKS = "seqopt.problem.criteria", "seqopt.problem.ranks"
+CRITERIA, RANKS = "seqopt.problem.criteria", "seqopt.problem.criteria"
 LENGTHS = "both have a length: costs that have not are refused when they are made"
 EQUIVALENT = (
     *(
@@ -112,7 +112,7 @@ EQUIVALENT = (
         "seqopt.plan.calling.flow", "known and", "== 1", "<= 1", "there is this one at least"
     ),
     *(
-        Equivalent("formulations.cones", "SECONDS", "300.0", size, "when a solver has stalled")
+        Equivalent("formulations.solvers", "SECONDS", "300.0", size, "when a solver has stalled")
         for size in ("299.0", "301.0")
     ),
     Equivalent(

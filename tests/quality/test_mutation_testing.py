@@ -121,7 +121,7 @@ OUTCOMES = """
 from tests.quality.mutant_trials import limit, preload, trial
 from tests.quality.mutants import path_of
 preload()
-module, tests = "seqopt.problem.ranks", ["tests/problem/test_criteria.py"]
+module, tests = "seqopt.problem.criteria", ["tests/problem/test_criteria.py"]
 text = path_of(module).read_text(encoding="utf-8")
 line = "    flat = values.ravel()\\n"
 assert line in text

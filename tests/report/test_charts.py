@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 
 from seqopt.engines.registry import make_engine
-from seqopt.graph.layers.budgets import travel
+from seqopt.graph.layers.layers import travel
 from seqopt.network.build import build_network
 from seqopt.plan.solving import solve
 from seqopt.report.charts import comparison_figures, trace_figure
 from seqopt.report.comparison import compare
 from seqopt.report.style import WIDTH
-from seqopt.study.presets import CRITERIA
+from seqopt.study.published import CRITERIA
 from tests.builders import six_bricks
 from tests.pictures import flaws
 

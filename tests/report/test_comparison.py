@@ -9,7 +9,7 @@ import pytest
 from seqopt.engines.registry import make_engine
 from seqopt.plan.calling.formulation import On, formulations
 from seqopt.report.comparison import LARGEST, compare
-from seqopt.study.presets import CRITERIA, EQUATIONS
+from seqopt.study.published import CRITERIA, EQUATIONS
 from tests.builders import small_arch
 
 

@@ -7,7 +7,7 @@ import pytest
 from matplotlib.colors import to_rgba
 
 from seqopt.errors import StepError
-from seqopt.plan.given import GivenSequence
+from seqopt.plan.build import GivenSequence
 from seqopt.plan.solving import solve
 from seqopt.report.gantt import gantt_picture
 from seqopt.sequence.schedule import holds

@@ -8,7 +8,7 @@ import pytest
 from PIL import Image
 
 from seqopt.errors import FileError, StepError
-from seqopt.plan.given import GivenSequence
+from seqopt.plan.build import GivenSequence
 from seqopt.report.pictures import Film, spread_steps
 from seqopt.sequence.two_robots import sequential
 

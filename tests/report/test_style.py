@@ -15,7 +15,7 @@ from matplotlib.colors import to_rgb
 from seqopt.report.charts import front_figure, merged, worst_steps
 from seqopt.report.draw import POINTS, aside
 from seqopt.report.style import COLORS, look, looks, new_figure, picture_files, plain, styled
-from seqopt.report.wording import WORDS, in_words, typed
+from seqopt.report.text import WORDS, in_words, typed
 from tests.pictures import flaws
 
 

@@ -17,7 +17,7 @@ from seqopt.responses.choices import CHOICE_RESPONSES, evaluate_choices
 from seqopt.responses.quantities import responses_of
 from seqopt.responses.table import step_fields
 from seqopt.sequence.three_robots import SCHEDULES, three_robot_loop
-from seqopt.study.presets import EQUATIONS
+from seqopt.study.published import EQUATIONS
 
 COMPARED = ("T_max", "M_sup", "D_max")
 

@@ -17,7 +17,7 @@ from seqopt.network.build import build_network
 from seqopt.responses.table import analyze
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.sequence.two_robots import sequential
-from seqopt.study.presets import EQUATIONS
+from seqopt.study.published import EQUATIONS
 from tests.builders import six_bricks
 
 

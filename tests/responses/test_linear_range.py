@@ -15,9 +15,8 @@ from seqopt.engines.registry import make_engine
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network
 from seqopt.report.notebook import card
-from seqopt.responses.linear_range import _STRAIN, LinearRange
 from seqopt.responses.staged import staged_fields
-from seqopt.responses.table import analyze, response_table
+from seqopt.responses.table import _STRAIN, LinearRange, analyze, response_table
 from seqopt.scene.library.by_words import scene_by_words
 from seqopt.scene.scene_file import save_scene
 from seqopt.sequence.two_robots import cantilever, sequential

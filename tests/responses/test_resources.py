@@ -19,13 +19,14 @@ from seqopt.errors import MemoryShortError, ProblemError, SceneError
 from seqopt.graph.layers.layers import candidate_layers
 from seqopt.network.build import build_network
 from seqopt.plan.solving import solve
-from seqopt.responses import batches, division
+from seqopt.responses import batches
+from seqopt.responses import choices as division
 from seqopt.responses.blocks import Block, answer, pack, worker_for
 from seqopt.responses.choices import CHOICE_RESPONSES, Evaluation
 from seqopt.responses.resources import Resources
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.sequence.three_robots import three_robot_loop
-from seqopt.study.presets import CRITERIA, EQUATIONS
+from seqopt.study.published import CRITERIA, EQUATIONS
 from seqopt.work.workers import Processes
 
 

@@ -11,11 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from seqopt.cli.main import main
-from seqopt.cli.words.criteria import parse_criterion
-from seqopt.cli.words.values import parse_limits
+from seqopt.cli.words.values import parse_criterion, parse_limits
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.graph.layers.budgets import robot_use
-from seqopt.graph.layers.layers import candidate_layers
+from seqopt.graph.layers.layers import candidate_layers, robot_use
 from seqopt.network.build import build_network
 from seqopt.plan.solving import solve
 from seqopt.problem.requirements import Limit, payload_limits
@@ -26,7 +24,7 @@ from seqopt.responses.table import analyze
 from seqopt.scene.scene_file import save_scene
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.sequence.two_robots import sequential
-from seqopt.study.presets import EQUATIONS, WORST_RATIO
+from seqopt.study.published import EQUATIONS, WORST_RATIO
 from tests.builders import six_bricks
 
 NAMES = [

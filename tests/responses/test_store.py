@@ -17,16 +17,16 @@ from seqopt.engines.registry import make_engine
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import FileError, SceneError
 from seqopt.graph.layers.layers import candidate_layers
-from seqopt.graph.scenarios.scenarios import in_scenarios
+from seqopt.graph.scenarios import in_scenarios
 from seqopt.plan.solving import solve
-from seqopt.problem.aims import WORST_TOTAL
 from seqopt.problem.criteria import WeightedSum
+from seqopt.problem.goals import WORST_TOTAL
 from seqopt.responses import blocks
 from seqopt.responses.blocks import Store
 from seqopt.responses.choices import Evaluation
 from seqopt.responses.resources import Resources
 from seqopt.sequence.three_robots import three_robot_loop
-from seqopt.study.presets import EQUATIONS
+from seqopt.study.published import EQUATIONS
 from tests.builders import ROOT, six_bricks
 
 SCENE = six_bricks()

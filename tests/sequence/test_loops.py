@@ -15,7 +15,7 @@ from seqopt.plan.solving import solve
 from seqopt.sequence.steps import StepKind, idle_robots
 from seqopt.sequence.three_robots import SCHEDULES, robot_loop, three_robot_loop, two_robot_loop
 from seqopt.sequence.two_robots import placing_node, sequential
-from seqopt.study.presets import EQUATIONS, WEIGHTED
+from seqopt.study.published import EQUATIONS, WEIGHTED
 from tests.builders import anywhere, small_arch
 
 

@@ -15,7 +15,7 @@ from seqopt.engines.discrete.system import BedStiffness, build_system
 from seqopt.engines.interface import Want
 from seqopt.errors import MechanismError
 from seqopt.network.build import build_network
-from seqopt.study.presets import STUDY_BED
+from seqopt.study.published import STUDY_BED
 from tests.builders import HERE, block
 
 

@@ -8,8 +8,7 @@ import pytest
 from seqopt.graph.layers.layers import candidate_layers
 from seqopt.graph.layers.ranking import rank_choice
 from seqopt.sequence.two_robots import METHODS
-from seqopt.study.presets import CLOSEST
-from seqopt.study.published import printed_steps, published_choice
+from seqopt.study.published import CLOSEST, printed_steps, published_choice
 
 GRIPS = [f"rob{i}_node" for i in (1, 2, 3)]
 

@@ -10,8 +10,7 @@ from experiments.harness.yardstick import errors, percentiles, tension_share
 from seqopt.report.comparison import compare
 from seqopt.responses.table import analyze
 from seqopt.sequence.two_robots import METHODS
-from seqopt.study.presets import EQUATIONS
-from seqopt.study.published import as_printed, printed, printed_steps, published_plan
+from seqopt.study.published import EQUATIONS, as_printed, printed, printed_steps, published_plan
 
 FITTED = {"sequential": "Table A.1", "cantilever": "Table A.2"}
 PREDICTED = (0.12, 1.36, 2.82)  # percent, Table B.1, which took no part in the identification

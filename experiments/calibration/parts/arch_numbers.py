@@ -19,8 +19,7 @@ from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.two_robots import METHODS
-from seqopt.study.presets import ROBOTS
-from seqopt.study.published import PUBLISHED, as_printed, printed_steps, published_plan
+from seqopt.study.published import PUBLISHED, ROBOTS, as_printed, printed_steps, published_plan
 
 SPAN, HEIGHT, BRICKS = 2.08, 1.93, 25  # m, section 3.1
 # Which node of a brick that lies across is on the arch line: the grips that twist in A.1 and A.2.

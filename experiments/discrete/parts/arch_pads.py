@@ -28,7 +28,7 @@ from seqopt.engines.discrete.system import BedStiffness, System, build_system
 from seqopt.engines.interface import Fields, Want
 from seqopt.network.network import GROUND, Network
 from seqopt.sequence.steps import Step
-from seqopt.study.presets import STUDY_BED, STUDY_PADS
+from seqopt.study.published import STUDY_BED, STUDY_PADS
 
 STIFFER = 10  # contacts per pad: its joint over those between bricks, as in section 3.2.3
 CLEAR = 1e-3  # m, between a pad's plane and the joints' corners: on one plane, facets would merge

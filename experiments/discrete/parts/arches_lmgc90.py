@@ -40,7 +40,7 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.mechanics import node_motion
 from seqopt.network.network import GROUND, Network
 from seqopt.sequence.steps import Step
-from seqopt.study.presets import STUDY_BED, STUDY_PADS
+from seqopt.study.published import STUDY_BED, STUDY_PADS
 
 PAD = 0.02  # m, side of the square that a pad touches: not printed
 THICK = 0.02  # m, of pads and ground; they are fixed and have no weight

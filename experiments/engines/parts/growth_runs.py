@@ -18,7 +18,7 @@ import seqopt
 from experiments.harness.runs import scene_named
 from seqopt.engines.interface import Engine, Want
 from seqopt.sequence.steps import Step
-from seqopt.study.presets import EQUATIONS, WORST_RATIO
+from seqopt.study.published import EQUATIONS, WORST_RATIO
 
 Row = dict[str, object]
 Done = tuple[Engine, Sequence[Step], int]

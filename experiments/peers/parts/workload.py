@@ -20,7 +20,7 @@ from seqopt.graph.layers.layers import Layers, candidate_layers
 from seqopt.network.network import Network
 from seqopt.plan.calling.formulation import find_formulation
 from seqopt.sequence.three_robots import three_robot_loop
-from seqopt.study.presets import EQUATIONS
+from seqopt.study.published import EQUATIONS
 
 SETTINGS = ("reactions", "criterion", "all fields")
 

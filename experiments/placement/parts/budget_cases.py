@@ -21,16 +21,15 @@ import numpy as np
 from experiments.harness.runs import scene_named
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, SeqoptError
-from seqopt.graph.layers.budgets import steps_over, travel
 from seqopt.graph.layers.costs import Budget
-from seqopt.graph.layers.layers import Layers, candidate_layers
+from seqopt.graph.layers.layers import Layers, candidate_layers, steps_over, travel
 from seqopt.network.build import build_network
 from seqopt.plan.calling.formulation import Formulation, Selection, find_formulation
 from seqopt.plan.calling.watch import Watch
 from seqopt.plan.judge.certificate import judge
 from seqopt.plan.solving import solve
 from seqopt.sequence.three_robots import three_robot_loop
-from seqopt.study.presets import CRITERIA
+from seqopt.study.published import CRITERIA
 
 COUNTED = ("F_largest", "M_sup")
 COMPARED = ("equations-2-3", "weighted")

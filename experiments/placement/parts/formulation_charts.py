@@ -19,7 +19,7 @@ from seqopt.report.style import (
     plain,
     styled,
 )
-from seqopt.report.wording import in_words, typed
+from seqopt.report.text import in_words, typed
 
 FORMULATIONS = (
     *("overlap_dp", "minimax", "lagrangian", "labels", "cascade", "beam", "rank_search"),

@@ -31,7 +31,7 @@ from seqopt.report.style import (
     plain,
     styled,
 )
-from seqopt.report.wording import in_words
+from seqopt.report.text import in_words
 
 
 def pareto(cost: Floats, loss: Floats) -> np.ndarray:

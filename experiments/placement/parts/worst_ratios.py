@@ -26,8 +26,7 @@ from seqopt.plan.judge.schedules import state_columns
 from seqopt.plan.plan import Plan
 from seqopt.sequence.free_rules import with_robots
 from seqopt.sequence.steps import Step
-from seqopt.study.presets import WORST_RATIO
-from seqopt.study.published import published_plan
+from seqopt.study.published import WORST_RATIO, published_plan
 
 Steps = Sequence[Step]
 Row = dict[str, object]

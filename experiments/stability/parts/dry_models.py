@@ -34,7 +34,7 @@ from seqopt.sequence.two_robots import METHODS
 from seqopt.stability.assessment import bonded
 from seqopt.stability.prover import Prover
 from seqopt.stability.screens import Screen
-from seqopt.study.presets import CRITERIA, EQUATIONS
+from seqopt.study.published import CRITERIA, EQUATIONS
 
 STEEPEST = 2.0  # slope of the catenary at its ends
 LENGTH, WIDTH, GAP = 0.246, 0.116, 0.01  # m

@@ -32,8 +32,7 @@ from seqopt.sequence.schedule import OpenGrip, OpenStep
 from seqopt.sequence.steps import Step
 from seqopt.sequence.three_robots import modified_sequential, three_robot_loop
 from seqopt.sequence.two_robots import METHODS
-from seqopt.study.presets import EQUATIONS
-from seqopt.study.published import as_printed, printed, printed_steps, published_choice
+from seqopt.study.published import EQUATIONS, as_printed, printed, printed_steps, published_choice
 
 Rows = Iterator["Row"]
 

@@ -37,9 +37,8 @@ from seqopt.engines.interface import Fields
 from seqopt.engines.registry import provenance
 from seqopt.files import csv_text, write_bytes, write_csv
 from seqopt.network.build import build_network
-from seqopt.responses.linear_range import LinearRange
 from seqopt.responses.staged import Placing, staged_fields
-from seqopt.responses.table import archive, response_table
+from seqopt.responses.table import LinearRange, archive, response_table
 from seqopt.sequence.steps import Step
 
 DESCRIPTION = (

@@ -10,8 +10,8 @@ import pandas as pd
 
 from seqopt.cli.saying.answer import Answer
 from seqopt.cli.saying.compare_text import printed_largest, tell_comparison
-from seqopt.cli.saying.layout import wrapped
 from seqopt.cli.saying.outputs import comparison_files, figure_notes, require_out, write_outputs
+from seqopt.cli.saying.terminal import wrapped
 from seqopt.cli.words.asked import (
     asked_engine,
     asked_scene,
@@ -29,14 +29,13 @@ from seqopt.cli.words.common_arguments import (
     scene_argument,
     strict_argument,
 )
-from seqopt.cli.words.criteria import asked_criterion
-from seqopt.cli.words.values import parse_robots
+from seqopt.cli.words.values import asked_criterion, parse_robots
 from seqopt.engines.registry import provenance
 from seqopt.network.build import build_network
 from seqopt.report.comparison import Comparison, compare
 from seqopt.report.pages import PAGE, comparison_page
 from seqopt.report.text import format_details
-from seqopt.responses.linear_range import builds_in_words
+from seqopt.responses.table import builds_in_words
 
 DESCRIPTION = (
     "Build a scene in every way that seqopt knows, on paper: the fixed sequences, a loop of robots "

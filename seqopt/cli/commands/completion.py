@@ -24,8 +24,7 @@ from seqopt.scene.scene_file import builtin_scenes
 from seqopt.sequence.free_rules import FREE
 from seqopt.sequence.three_robots import SCHEDULES
 from seqopt.sequence.two_robots import METHODS
-from seqopt.study.presets import CRITERIA
-from seqopt.study.published import PUBLISHED
+from seqopt.study.published import CRITERIA, PUBLISHED
 
 SHELLS = ("bash", "zsh", "fish")
 DESCRIPTION = (

@@ -9,14 +9,13 @@ from functools import cached_property
 from typing import Any
 
 from seqopt.cli.saying.answer import Answer
-from seqopt.cli.saying.layout import wrapped
 from seqopt.cli.saying.outputs import plan_files, write_outputs, written_to
+from seqopt.cli.saying.terminal import wrapped
 from seqopt.cli.status import Status
 from seqopt.cli.words import optimize_arguments
 from seqopt.cli.words.asked import exceeded, idle_notes, posed_notes, scene_facts, strictly
-from seqopt.cli.words.means import parse_size
 from seqopt.cli.words.posing import Asked, asked_problem
-from seqopt.cli.words.values import parse_options, parse_time_limit
+from seqopt.cli.words.values import parse_options, parse_size, parse_time_limit
 from seqopt.errors import ProblemError
 from seqopt.graph.states.states import States
 from seqopt.plan.calling.formulation import End, Formulation, On, as_formulation

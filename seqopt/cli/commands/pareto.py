@@ -34,8 +34,7 @@ from seqopt.plan.posing import states_of
 from seqopt.problem.goals import judged_by
 from seqopt.report.comparison import method_tables, shown_table, worst_of
 from seqopt.report.pages import PAGE, front_page
-from seqopt.responses.linear_range import LinearRange, builds_in_words
-from seqopt.responses.table import analyze
+from seqopt.responses.table import LinearRange, analyze, builds_in_words
 from seqopt.sequence.free_rules import FREE
 from seqopt.sequence.steps import Step
 from seqopt.sequence.three_robots import SCHEDULES

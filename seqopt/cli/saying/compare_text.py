@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from seqopt.cli.saying.layout import wrapped
+from seqopt.cli.saying.terminal import wrapped
 from seqopt.plan.calling.formulation import FormulationKind, formulations
 from seqopt.problem.criteria import RankSum
 from seqopt.problem.requirements import Criterion

@@ -8,8 +8,7 @@ import time
 from types import TracebackType
 from typing import TYPE_CHECKING
 
-from seqopt.cli.saying.layout import columns, is_terminal
-from seqopt.cli.saying.terminal import harmless
+from seqopt.cli.saying.terminal import columns, harmless, is_terminal
 from seqopt.work.progress import Stage, duration
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from seqopt.cli.saying.answer import Answer
-from seqopt.cli.saying.layout import wrapped
+from seqopt.cli.saying.terminal import wrapped
 from seqopt.cli.status import Status
 from seqopt.contact.mortar import MORTARS
 from seqopt.engines.auto import AutoEngine
@@ -21,11 +21,9 @@ from seqopt.errors import ProblemError, SceneError
 from seqopt.interrupts import ending
 from seqopt.network.network import Network
 from seqopt.problem.problem import Problem
-from seqopt.problem.requirements import overloads
-from seqopt.problem.scales import OWN
-from seqopt.responses.linear_range import OUTSIDE, REMEDY
+from seqopt.problem.requirements import OWN, overloads
 from seqopt.responses.staged import staged_fields
-from seqopt.responses.table import step_fields
+from seqopt.responses.table import OUTSIDE, REMEDY, step_fields
 from seqopt.scene.orders import in_order
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import dump_scene, load_scene

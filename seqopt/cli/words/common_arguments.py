@@ -11,15 +11,14 @@ from seqopt.contact.mortar import MORTARS
 from seqopt.engines.registry import ENGINES
 from seqopt.errors import SceneError, StepError
 from seqopt.network.build import build_network
-from seqopt.problem.ranks import Among, Ranked
+from seqopt.problem.criteria import Among, Ranked
 from seqopt.scene.orders import ORDERS
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import builtin_scenes
-from seqopt.sequence.plan_file import read_plan
+from seqopt.sequence.schedule_file import read_plan
 from seqopt.sequence.steps import Step
 from seqopt.sequence.two_robots import METHODS
-from seqopt.study.presets import CRITERIA
-from seqopt.study.published import PUBLISHED, is_reference_arch, published_plan
+from seqopt.study.published import CRITERIA, PUBLISHED, is_reference_arch, published_plan
 from seqopt.workflow import Defaults
 
 Takes: TypeAlias = argparse._ActionsContainer  # a parser, or a group of its arguments

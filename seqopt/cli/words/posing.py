@@ -8,17 +8,24 @@ from typing import Any
 
 from seqopt.cli.saying.outputs import require_out
 from seqopt.cli.words.asked import asked_engine, asked_scene
-from seqopt.cli.words.criteria import asked_criterion, parse_criterion
-from seqopt.cli.words.means import parse_resources
-from seqopt.cli.words.scenarios import asked_aim, asked_scenarios, require_no_scenarios
-from seqopt.cli.words.values import parse_limits, parse_robots, parse_rules, parse_standing
+from seqopt.cli.words.values import (
+    asked_aim,
+    asked_criterion,
+    asked_scenarios,
+    parse_criterion,
+    parse_limits,
+    parse_resources,
+    parse_robots,
+    parse_rules,
+    parse_standing,
+    require_no_scenarios,
+)
 from seqopt.errors import ProblemError, StepError
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.plan.calling.formulation import On, find_formulation
-from seqopt.problem.aims import RobustAim
-from seqopt.problem.budgets import parse_budgets, parse_caps
-from seqopt.problem.problem import Orders, Problem
+from seqopt.problem.goals import RobustAim
+from seqopt.problem.problem import Orders, Problem, parse_budgets, parse_caps
 from seqopt.problem.requirements import Criterion
 from seqopt.scene.scenarios import Scenarios
 from seqopt.scene.scene import Scene

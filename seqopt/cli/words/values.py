@@ -13,16 +13,19 @@ from typing import Any
 from seqopt.contact.mortar import MORTARS, Mortar, find_mortar
 from seqopt.errors import ProblemError, StepError, did_you_mean
 from seqopt.plan.calling.formulation import Formulation, as_formulation
-from seqopt.problem.requirements import Limit, payload_limits
+from seqopt.problem.criteria import Among, Ranked, RankSum
+from seqopt.problem.goals import RobustAim, parse_robust
+from seqopt.problem.requirements import NEVER, Criterion, Limit, payload_limits
 from seqopt.problem.standing import Standing
 from seqopt.responses.choices import CHOICE_RESPONSES
+from seqopt.responses.resources import Resources
+from seqopt.scene.scenarios import MOST, Scenarios, scenarios
 from seqopt.scene.scene import Scene
 from seqopt.sequence.free_rules import FreeRules
-from seqopt.study.presets import CRITERIA
+from seqopt.study.published import CRITERIA
+from seqopt.work.progress import Tell
+from seqopt.workflow import DEFAULTS
 
-BETWEEN = re.compile(r",(?![^\[]*\])")  # a comma that is not in brackets
-SIZE = re.compile(r"([0-9]*\.?[0-9]+(?:e[0-9]+)?) *((?:[kmgt]i?)?b?)", re.IGNORECASE)
-MOST_WORKERS = 1024
 LARGEST = 1e100  # number: products of larger ones overflow
 RESPONSES = (*CHOICE_RESPONSES, "F_each")
 
@@ -208,3 +211,160 @@ def parse_rules(texts: Sequence[str], robots: tuple[str, ...]) -> FreeRules:
         else:
             given[name] = value
     return FreeRules(**given)  # type: ignore[arg-type]
+
+
+ALONE = ("scenarios", "unseen", "seed", "vary")  # options that mean something with --robust alone
+COUNT = 30
+SPREADS = ("stiffness", "density", "position")
+
+
+def require_no_scenarios(options: argparse.Namespace) -> None:
+    """Raise an error if options of scenarios are given without an aim over them.
+
+    ``options``: of the command ``optimize``. Raises `ProblemError`, naming the option.
+    """
+    for name in ALONE:
+        if options.robust is None and getattr(options, name):
+            raise ProblemError(
+                f"--{name}: plans over scenarios alone have it; give --robust worst-peak, "
+                "worst-total or as cvar=0.9"
+            )
+
+
+def asked_scenarios(options: argparse.Namespace, scene: Scene) -> tuple[Scenarios, Scenarios]:
+    """Return the scenarios to choose by, and those that judge."""
+    (count, other), seed = _counts(options)
+    return _drawn(scene, options, count, seed), _drawn(scene, options, other, seed + 1)
+
+
+def _counts(options: argparse.Namespace) -> tuple[tuple[int, int], int]:
+    """Return how many scenarios are asked for, known and unseen, and the seed of the former."""
+    count = _count("--scenarios", options.scenarios, COUNT)
+    other = _count("--unseen", options.unseen, count)
+    return (count, other), _count("--seed", options.seed, 0, least=0)
+
+
+def asked_aim(options: argparse.Namespace) -> RobustAim:
+    """Return the aim over scenarios."""
+    try:
+        return parse_robust(options.robust)
+    except ProblemError as error:
+        raise ProblemError(f"--robust: {error}") from error
+
+
+def _count(name: str, text: str | None, otherwise: int, least: int = 1) -> int:
+    """Return a whole number from words."""
+    if text is None:
+        return otherwise
+    if not (text.isascii() and text.isdecimal()) or not least <= int(text[:12]) <= MOST:
+        raise ProblemError(f"{name} {text}: give a whole number from {least} to {MOST}")
+    return int(text)
+
+
+def _drawn(scene: Scene, options: argparse.Namespace, count: int, seed: int) -> Scenarios:
+    """Return the scenarios that are asked for."""
+    asked: dict[str, float] = {}
+    for text in options.vary:
+        name, value = split_word(text)
+        if name not in SPREADS:
+            raise ProblemError(
+                f"--vary {text} does not exist{did_you_mean(name, SPREADS)}; give one of "
+                f"{', '.join(SPREADS)}, as stiffness=3"
+            )
+        asked[name] = number_word(value, f"--vary {text}", zero="allowed")
+    factor = asked.pop("stiffness", 3.0)
+    if factor < 1:
+        raise ProblemError(f"--vary stiffness={factor:g}: give a factor from 1")
+    return scenarios(scene, stiffness=(1 / factor, factor), count=count, seed=seed, **asked)
+
+
+BETWEEN = re.compile(r",(?![^\[]*\])")  # a comma that is not in brackets
+
+
+def asked_criterion(options: argparse.Namespace) -> Criterion:
+    """Return the criterion that a command is asked for.
+
+    ``options``: with ``criteria``, ``crown``, ``ranked`` and ``among``.
+    """
+    usual = DEFAULTS["any other"].criterion.name
+    criterion = parse_criterion(options.criteria or usual, options.crown)
+    return _rank_otherwise(criterion, options.ranked, options.among)
+
+
+def parse_criterion(text: str, crown: str | None = None) -> Criterion:
+    """Return a criterion by name, or a rank sum of named responses with weights.
+
+    ``text``: a name of `seqopt.CRITERIA`, or responses as ``T_max,M_sup=2``; a weight is 1 by
+    default; ``crown``: bricks placed at the crown, or ``none``. Raises `ProblemError` if there is
+    no such criterion or response, a weight is not positive, or the criterion has no crown.
+    """
+    if crown is not None:
+        named = CRITERIA.get(text)
+        if not isinstance(named, RankSum):
+            raise ProblemError(f"--crown {crown}: {text} has none; leave it out")
+        return replace(named, crown=NEVER if crown == "none" else number_word(crown, "--crown"))
+    if text in CRITERIA:
+        return CRITERIA[text]
+    terms = []
+    for part in BETWEEN.split(text):
+        name, weight = split_word(part)
+        terms.append(
+            (response_word(name, "--criteria"), number_word(weight or "1", f"--criteria {part}"))
+        )
+    return RankSum(text, tuple(terms), tuple(terms))
+
+
+def _rank_otherwise(criterion: Criterion, ranked: str | None, among: str | None) -> Criterion:
+    """Return a criterion of ranks with what it ranks among.
+
+    ``ranked``, ``among``: values of `seqopt.problem.criteria.Ranked` and
+    `seqopt.problem.criteria.Among`. Raises `ProblemError` if either is given and the criterion has
+    no ranks.
+    """
+    if ranked is None and among is None:
+        return criterion
+    if not isinstance(criterion, RankSum):
+        flag = f"--ranked {ranked}" if ranked else f"--among {among}"
+        raise ProblemError(f"{flag}: {criterion.name} has no ranks; leave it out")
+    return replace(
+        criterion,
+        ranked=criterion.ranked if ranked is None else Ranked(ranked),
+        among=criterion.among if among is None else Among(among),
+    )
+
+
+SIZE = re.compile(r"([0-9]*\.?[0-9]+(?:e[0-9]+)?) *((?:[kmgt]i?)?b?)", re.IGNORECASE)
+MOST_WORKERS = 1024
+
+
+def parse_resources(options: argparse.Namespace, progress: Tell | None = None) -> Resources:
+    """Return what a computation may use.
+
+    ``options``: with ``workers``, ``cache`` and ``max_memory``; ``progress``: told how far it is.
+    Raises `ProblemError` if a number is none that can be meant.
+    """
+    if not options.workers.isdecimal() or not 1 <= int(options.workers) <= MOST_WORKERS:
+        raise ProblemError(
+            f"--workers {options.workers}: give a whole number from 1 to {MOST_WORKERS}"
+        )
+    most = None if options.max_memory is None else parse_size(options.max_memory)
+    return Resources(int(options.workers), None, options.cache, most, progress)
+
+
+def parse_size(text: str) -> float:
+    """Return a number of bytes.
+
+    ``text``: as ``2GB``, ``500 MB`` or ``1.5GiB``; bytes without a unit. Raises `ProblemError` if
+    it is none.
+
+    Examples
+    --------
+    >>> parse_size("1.5GB")
+    1500000000.0
+    """
+    found = SIZE.fullmatch(text.strip())
+    if found is None or not 0 < float(found[1]) < LARGEST:
+        raise ProblemError(f"--max-memory {text}: give a size, as 500MB or 2GB")
+    unit = found[2].upper()
+    power = "KMGT".find(unit[:1]) + 1 if unit[:1] in "KMGT" and unit[:1] else 0
+    return float(found[1]) * float(1024 if "I" in unit else 1000) ** power

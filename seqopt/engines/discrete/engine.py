@@ -35,7 +35,7 @@ from seqopt.engines.interface import (
     require_finite,
 )
 from seqopt.engines.rigid.mechanism import mechanism_error, require_resistance
-from seqopt.engines.rigid.recovery import Solution, respond
+from seqopt.engines.rigid.mixed import Solution, respond
 from seqopt.errors import SeqoptError, SolverError
 from seqopt.network.build import network_of
 from seqopt.network.mechanics import build_statics, node_motion, point_motion

@@ -22,7 +22,7 @@ import numpy as np
 from scipy import linalg
 
 from seqopt.arrays import Floats, FrozenValue, Ints
-from seqopt.engines.basis import SPACE, Basis
+from seqopt.engines.interface import SPACE, Basis
 from seqopt.network.network import GROUND, Network
 
 

@@ -11,8 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from seqopt.arrays import Floats, FrozenValue, Ints, frozen
-from seqopt.engines.basis import SPACE, Basis
-from seqopt.engines.interface import FLAGS
+from seqopt.engines.interface import FLAGS, SPACE, Basis
 from seqopt.engines.rigid.growth import Growth, SpanningTree
 from seqopt.engines.rigid.response_maps import (
     AT_ONCE,

@@ -29,15 +29,20 @@ from scipy.sparse import csgraph
 from scipy.sparse.linalg import SuperLU, splu
 
 from seqopt.arrays import Bools, Floats, Ints
-from seqopt.engines.basis import SPACE, Basis
-from seqopt.engines.interface import Fields, join_sets, merge_sets, no_sets
+from seqopt.engines.interface import SPACE, Basis, Fields, join_sets, merge_sets, no_sets
 from seqopt.engines.rigid.grip_equations import grip_forces, still_forces
-from seqopt.engines.rigid.mechanism import require_resistance
-from seqopt.engines.rigid.mixed import LAST_CORRECTION, rescaled, solve_mixed, unchanged, unscaled
+from seqopt.engines.rigid.mechanism import Shared, Ungripped, require_resistance, ungripped_system
+from seqopt.engines.rigid.mixed import (
+    LAST_CORRECTION,
+    Solution,
+    rescaled,
+    respond,
+    solve_mixed,
+    unchanged,
+    unscaled,
+)
 from seqopt.engines.rigid.operator import ComplianceOperator
-from seqopt.engines.rigid.recovery import Solution, respond
 from seqopt.engines.rigid.response_maps import ResponseMaps, inner_edges, loads_of, scene_maps
-from seqopt.engines.rigid.ungripped import Shared, Ungripped, ungripped_system
 from seqopt.errors import SolverError
 from seqopt.network.mechanics import point_motion
 from seqopt.network.network import GROUND, Network

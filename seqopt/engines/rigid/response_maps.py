@@ -9,7 +9,7 @@ import numpy as np
 from scipy import sparse
 
 from seqopt.arrays import Floats, FrozenValue, Ints, frozen
-from seqopt.engines.basis import SPACE, Basis
+from seqopt.engines.interface import SPACE, Basis
 from seqopt.network.mechanics import build_statics, node_motion
 from seqopt.network.network import Network
 

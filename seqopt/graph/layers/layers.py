@@ -2,43 +2,169 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import chain
 
 import numpy as np
 import pandas as pd
 
-from seqopt.arrays import Floats
+from seqopt.arrays import Bools, Floats, Ints
 from seqopt.engines.interface import Engine
 from seqopt.errors import InfeasibleError, ProblemError, did_you_mean
 from seqopt.graph.layers.costs import Budget, Joined, LayeredCosts
-from seqopt.graph.layers.windows import (
-    by_move,
-    compared,
-    possible_after,
-    spread_over_pairs,
-    window_anew,
-    window_kept,
-)
-from seqopt.problem.aims import Aim
+from seqopt.problem.criteria import Among, Ranked, RankSum
+from seqopt.problem.goals import Aim
 from seqopt.problem.requirements import (
     Criterion,
     Limit,
     ResponsesAsked,
+    SceneFacts,
     as_limits,
     excesses,
     robots_of,
 )
-from seqopt.problem.scales import SceneFacts
 from seqopt.responses.choices import CHOICE_RESPONSES, Evaluation, StepChoices
 from seqopt.responses.quantities import robot_response
 from seqopt.responses.resources import HERE, Resources
 from seqopt.responses.table import analyze
-from seqopt.sequence.schedule import OpenStep, Schedule
+from seqopt.sequence.schedule import OpenGrip, OpenStep, Schedule
 from seqopt.sequence.steps import Step
 from seqopt.showing import Shown
+
+
+def compared(
+    choices: StepChoices, schedule: Schedule, criterion: Criterion, after: int | None = None
+) -> StepChoices:
+    """Return a step as its choices are compared: for itself, or after every choice before.
+
+    ``choices``: with one open move, or two; ``after``: the candidate chosen for the move before,
+    where responses are (C_k,) of that choice. Result: the same, or over pairs with responses
+    (C_{k-1}, C_k), NaN where both would be one node; of one choice before (C_k,).
+    """
+    among = getattr(criterion, "among", Among.ALL)
+    move = choices.moves[-1]
+    if among is Among.ALL or len(choices.moves) == 2 or not _meets(schedule, move):
+        return choices
+    before, now = (np.array(schedule.moves[k].candidates) for k in (move - 1, move))
+    same = before[:, None] == now if after is None else before[after] == now
+    responses = {name: np.where(same, np.nan, v) for name, v in choices.responses.items()}
+    return replace(choices, moves=(move - 1, move), responses=responses)
+
+
+def _meets(schedule: Schedule, move: int) -> bool:
+    """Return whether a move shares a step with the one before."""
+    return any(step.moves == (move - 1, move) for step in schedule.steps)
+
+
+def spread_over_pairs(choices: StepChoices, criterion: Criterion) -> Criterion:
+    """Return the criterion by which a step as it is compared is judged.
+
+    ``choices``: from `compared`. Result: that ranks row by row if one open move was spread over
+    pairs.
+    """
+    if len(choices.moves) == len(choices.step.moves) or not isinstance(criterion, RankSum):
+        return criterion
+    return replace(criterion, ranked=Ranked.CONDITIONAL)
+
+
+def window(
+    schedule: Schedule, move: int, nodes: Sequence[int] | Mapping[int, int], *, alone: bool = False
+) -> Schedule:
+    """Return the steps that a move shares with the one before, as a schedule of that move alone.
+
+    ``schedule``: with all moves open; ``move``: index of a move; ``nodes``: chosen for the moves
+    before; that of the last of them is asked for; ``alone``: whether the steps in which the move
+    alone is open belong to it too. Result: of one move; without steps if it shares none.
+    """
+
+    def grip(held: int | OpenGrip | None) -> int | OpenGrip | None:
+        if not isinstance(held, OpenGrip):
+            return held
+        return OpenGrip(0) if held.move == move else nodes[held.move]
+
+    found = schedule.steps_of.get((move - 1, move), ())
+    if alone:
+        found = (*found, *schedule.steps_of.get((move,), ()))
+    steps = [
+        replace(step, grips=tuple(grip(held) for held in step.grips))
+        for step in sorted(found, key=lambda step: step.number)
+    ]
+    return replace(schedule, steps=tuple(steps), moves=(schedule.moves[move],))
+
+
+def possible_after(schedule: Schedule, move: int, before: int) -> Bools:
+    """Return which candidates of a move are possible while the choice before is still held.
+
+    Responses do not tell where all candidates are impossible: then nothing is known of any.
+
+    ``move``, ``before``: a move, and the candidate chosen for the move before it. Result (C_k,).
+    """
+    candidates = np.array(schedule.moves[move].candidates)
+    if (move - 1, move) not in schedule.steps_of:
+        return np.ones(len(candidates), dtype=bool)
+    return np.asarray(candidates != schedule.moves[move - 1].candidates[before])
+
+
+def window_anew(evaluation: Evaluation, move: int, before: int) -> tuple[StepChoices, ...]:
+    """Return the steps that a move decides, solved for its candidates alone.
+
+    ``evaluation``: whose responses are not kept; ``move``, ``before``: a move, and the candidate
+    chosen for the move before it. Result: in order.
+    """
+    schedule = evaluation.schedule
+    nodes = {move - 1: schedule.moves[move - 1].candidates[before]} if move else {}
+    found = replace(
+        evaluation,
+        schedule=window(schedule, move, nodes, alone=True),
+        resources=evaluation.resources.alone(),
+    )
+    moves = {step.number: step.moves for step in schedule.steps}
+    return tuple(replace(each, moves=moves[each.step.number]) for each in found.steps)
+
+
+def by_move(steps: Sequence[StepChoices]) -> Mapping[int, Sequence[StepChoices]]:
+    """Return the steps that each move decides: those in which it is the last that is open."""
+    found: dict[int, list[StepChoices]] = {}
+    for choices in steps:
+        found.setdefault(choices.moves[-1], []).append(choices)
+    return found
+
+
+def window_kept(decided: Sequence[StepChoices], before: int) -> tuple[StepChoices, ...]:
+    """Return the steps that a move decides, for its candidates alone, from those of all choices.
+
+    ``before``: the candidate chosen for the move before it. Result: in order.
+    """
+    out = []
+    for choices in decided:
+        row = before if len(choices.moves) == 2 else slice(None)
+        responses = {name: values[row] for name, values in choices.responses.items()}
+        out.append(StepChoices(choices.step, choices.moves, responses))
+    return tuple(out)
+
+
+def pairs_as_moves(
+    schedule: Schedule, asked: Sequence[tuple[int, int]], wanted: Sequence[Ints]
+) -> Schedule:
+    """Return the steps of pairs as a schedule with a move for every row.
+
+    ``asked`` (sequence of (int, int)): a move, and a candidate of the move before it; ``wanted``
+    (sequence of (c,) int): the candidates of the move that are looked at.
+    """
+    moves, steps = [], []
+    for n, ((k, before), some) in enumerate(zip(asked, wanted, strict=True)):
+        move = schedule.moves[k]
+        moves.append(replace(move, candidates=tuple(move.candidates[i] for i in some)))
+        node = schedule.moves[k - 1].candidates[before]
+        takes: dict[object, int | OpenGrip] = {OpenGrip(k): OpenGrip(n), OpenGrip(k - 1): node}
+        for step in schedule.steps_of[k - 1, k]:
+            grips = tuple(takes[g] if isinstance(g, OpenGrip) else g for g in step.grips)
+            steps.append(replace(step, grips=grips))
+    return replace(schedule, steps=tuple(steps), moves=tuple(moves))
 
 
 @dataclass(frozen=True, repr=False)
@@ -260,3 +386,68 @@ def candidate_layers(
         raise ProblemError(f"response {min(unknown)} {why}; give {', '.join(sorted(known))}")
     schedule.require_pairs()
     return Layers(asked.criterion, asked.limits, Evaluation(engine, schedule, asked, resources))
+
+
+def steps_over(problem: Layers, response: str, level: float, bound: float) -> Budget:
+    """Return a bound on the number of open steps in which a response exceeds a level.
+
+    ``problem``: whose choices the budget is for; ``response``: among those that the problem
+    evaluates (``also`` of `seqopt.pose`); ``level``: SI units; ``bound``: how many steps may exceed
+    it. Result: each choice, and each pair, takes the number of its steps that exceed the level.
+    Raises `ProblemError` if the problem does not evaluate the response.
+    """
+    single, shared = _empty(problem)
+    for choices in chain.from_iterable(problem.evaluation.levels()):
+        if response not in choices.responses:
+            raise ProblemError(
+                f"budget on {response}: step {choices.step.number} has only "
+                f"{', '.join(choices.responses)}; name it in `also` when the problem is posed"
+            )
+        target = single if len(choices.moves) == 1 else shared
+        target[choices.moves[-1]] += choices.responses[response] > level
+    return Budget(f"steps with {response} over {level:g}", tuple(single), tuple(shared), bound)
+
+
+def robot_use(problem: Layers, robot: str, force: float, bound: float) -> Budget:
+    """Return a bound on the number of open steps in which a robot carries more than a force.
+
+    ``problem``: whose choices the budget is for; it evaluates the robot's force; ``robot``: name of
+    the robot; ``force``: n; ``bound``: how many steps there may be. Result: as of `steps_over`.
+    Raises `ProblemError` if the problem does not evaluate the force of this robot.
+    """
+    return steps_over(problem, robot_response(robot), force, bound)
+
+
+def travel(problem: Layers, bound: float) -> Budget:
+    """Return a bound on the distance that robots travel to chosen grips and on to their next ones.
+
+    ``problem``: whose choices the budget is for; ``bound``: m. Result: each choice takes straight
+    lines between its node and the given nodes that its robot holds before and after, each pair the
+    line between its two nodes; m.
+    """
+    single, shared = _empty(problem)
+    schedule = problem.schedule
+    for k, move in enumerate(schedule.moves):
+        robot = [r.name for r in schedule.scene.robots].index(move.robot)
+        grips = [step.grips[robot] for step in schedule.steps]
+        steps = range(len(grips))
+        mine = [i for i in steps if grips[i] == OpenGrip(k)]
+        before = next((grips[i] for i in reversed(steps[: mine[0]]) if grips[i] is not None), None)
+        after = next((grips[i] for i in steps[mine[-1] + 1 :] if grips[i] is not None), None)
+        for other in (before, after):
+            if isinstance(other, int):
+                single[k] += _distances(problem, move.candidates, (other,))[:, 0]
+        if before == OpenGrip(k - 1):
+            shared[k] += _distances(problem, schedule.moves[k - 1].candidates, move.candidates)
+    return Budget("robot travel [m]", tuple(single), tuple(shared), bound)
+
+
+def _empty(problem: Layers) -> tuple[list[Floats], list[Floats]]:
+    sizes = problem.sums.sizes
+    pairs = zip((1, *sizes[:-1]), sizes, strict=True)
+    return [np.zeros(size) for size in sizes], [np.zeros(pair) for pair in pairs]
+
+
+def _distances(problem: Layers, first: tuple[int, ...], second: tuple[int, ...]) -> Floats:
+    at = problem.schedule.scene.node_position
+    return np.array([[math.dist(at(a), at(b)) for b in second] for a in first])

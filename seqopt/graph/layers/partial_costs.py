@@ -15,10 +15,8 @@ import numpy as np
 
 from seqopt.arrays import Bools, Floats, FrozenValue
 from seqopt.graph.layers.costs import LayeredCosts
-from seqopt.problem.aims import Aim
-from seqopt.problem.criteria import RankSum, WeightedSum, WorstRatio
-from seqopt.problem.own_criterion import StepCost
-from seqopt.problem.ranks import Among, Ranked
+from seqopt.problem.criteria import Among, Ranked, RankSum, StepCost, WeightedSum, WorstRatio
+from seqopt.problem.goals import Aim
 from seqopt.problem.requirements import Criterion
 
 

@@ -12,12 +12,18 @@ from seqopt.arrays import Bools, Floats, Ints
 from seqopt.contact.mortar import Mortar, find_mortar
 from seqopt.engines.interface import Engine
 from seqopt.errors import ProblemError
-from seqopt.graph.scenarios.engines import engine_for, require_alike
+from seqopt.graph.scenarios import engine_for, require_alike
 from seqopt.network.network import Network
 from seqopt.problem.criteria import RankSum
 from seqopt.problem.goals import LARGEST, STATE_RESPONSES, Goal, Measure, parse_goals
-from seqopt.problem.requirements import LIMIT_TOLERANCE, Criterion, Limit, as_limits, state_costs
-from seqopt.problem.scales import SceneFacts
+from seqopt.problem.requirements import (
+    LIMIT_TOLERANCE,
+    Criterion,
+    Limit,
+    SceneFacts,
+    as_limits,
+    state_costs,
+)
 from seqopt.problem.standing import Standing, StandingSets
 from seqopt.responses.grip_sets import GripSets
 from seqopt.responses.quantities import robot_response

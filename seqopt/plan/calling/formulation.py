@@ -15,7 +15,7 @@ from seqopt.arrays import FrozenValue
 from seqopt.errors import ProblemError, did_you_mean, said
 from seqopt.plan.calling.watch import Finding
 from seqopt.plugins import plugins
-from seqopt.problem.aims import Aim
+from seqopt.problem.goals import Aim
 
 GROUP = "seqopt.formulations"
 EXHIBITS = "seqopt.exhibits"

@@ -13,7 +13,7 @@ import numpy as np
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.graph.layers.costs import LayeredCosts
 from seqopt.graph.layers.interface import PlacementProblem
-from seqopt.graph.scenarios.scenarios import ScenarioLayers, largest_of
+from seqopt.graph.scenarios import ScenarioLayers, largest_of
 from seqopt.interrupts import answered
 from seqopt.plan.calling.formulation import (
     WATCH,
@@ -26,8 +26,8 @@ from seqopt.plan.calling.formulation import (
 from seqopt.plan.calling.guard import called, readable
 from seqopt.plan.calling.watch import Finding, Watch
 from seqopt.plan.judge.certificate import least_sum
-from seqopt.plan.judge.conflicts import refusal
-from seqopt.problem.aims import Aim
+from seqopt.plan.judge.infeasible import refusal
+from seqopt.problem.goals import Aim
 from seqopt.scene.checks import short
 
 

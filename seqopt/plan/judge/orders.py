@@ -18,12 +18,11 @@ import numpy as np
 
 from seqopt.arrays import Floats, Ints
 from seqopt.graph.graph import Graph
-from seqopt.graph.orders.orders import AllOrders
+from seqopt.graph.orders import AllOrders
 from seqopt.graph.paths import distances
 from seqopt.graph.states.states import States
 from seqopt.network.build import build_network
-from seqopt.plan.judge.passable import Asked, Passable, Tables, ask
-from seqopt.plan.judge.proof import BELOW
+from seqopt.plan.judge.proof import BELOW, Asked, Passable, Tables, ask
 from seqopt.plan.judge.rule_moves import Follows, RuleTables
 from seqopt.problem.goals import Measure
 from seqopt.scene.orders import Order

@@ -17,11 +17,10 @@ from seqopt.arrays import Bools, Floats
 from seqopt.errors import ProblemError
 from seqopt.graph.layers.costs import TINY, Joined, LayeredCosts
 from seqopt.graph.layers.interface import CostProblem, PlacementProblem
-from seqopt.graph.layers.layers import Layers
-from seqopt.graph.layers.objectives import TIED, on_a_least_path
-from seqopt.graph.layers.windows import compared
+from seqopt.graph.layers.layers import Layers, compared
+from seqopt.graph.layers.ranking import TIED_SUMS, on_a_least_path
 from seqopt.plan.judge.certificate import least_sum
-from seqopt.problem.aims import Aim
+from seqopt.problem.goals import Aim
 from seqopt.scene.checks import short
 
 
@@ -39,7 +38,7 @@ class InOrder:
 def solve_in_order(goals: Sequence[tuple[PlacementProblem, Aim]]) -> InOrder:
     """Return the choice that is best for the first aim; among these best for the second; and so on.
 
-    Exact, sums that differ by less than `seqopt.graph.layers.objectives.TIED` counting as equal.
+    Exact, sums that differ by less than `seqopt.graph.layers.ranking.TIED_SUMS` counting as equal.
 
     ``goals`` (sequence of (PlacementProblem, Aim)): problems of the same moves, each under its own
     criterion, and whether its sum or its peak is to minimize; the most important first. Raises
@@ -112,7 +111,7 @@ def _least_sums(costs: LayeredCosts, masks: Sequence[Bools]) -> list[Bools]:
     ways = _ways(arcs)
     least = float((ways[-1][:, None] + arcs[-1]).min())
     size = sum(float(np.abs(arc[mask]).max()) for arc, mask in zip(arcs, masks, strict=True))
-    return on_a_least_path(arcs, ways, least + TIED * max(abs(least), TINY, 1e-6 * size))
+    return on_a_least_path(arcs, ways, least + TIED_SUMS * max(abs(least), TINY, 1e-6 * size))
 
 
 def _least_peaks(costs: LayeredCosts, masks: Sequence[Bools]) -> list[Bools]:

@@ -22,16 +22,15 @@ from seqopt.arrays import Floats, Ints
 from seqopt.errors import InfeasibleError, ProblemError, SolverError, TimeUpError
 from seqopt.graph.layers.costs import Joined
 from seqopt.graph.layers.interface import CostProblem
-from seqopt.graph.layers.layers import Layers
+from seqopt.graph.layers.layers import Layers, pairs_as_moves, possible_after, window
 from seqopt.graph.layers.partial_costs import PartialCosts, floor_of
-from seqopt.graph.layers.windows import pairs_as_moves, possible_after, window
 from seqopt.interrupts import answered
 from seqopt.plan.calling.formulation import End, Formulation, FormulationKind, Selection
 from seqopt.plan.calling.selecting import select
 from seqopt.plan.calling.watch import Watch
 from seqopt.plan.search.window_search import WindowSearch, search_windows
-from seqopt.problem.aims import Aim
 from seqopt.problem.criteria import WeightedSum, WorstRatio
+from seqopt.problem.goals import Aim
 from seqopt.responses.resources import Resources
 from seqopt.sequence.schedule import Schedule
 

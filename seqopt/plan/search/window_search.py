@@ -19,8 +19,7 @@ import numpy as np
 from seqopt.arrays import Floats, Terse
 from seqopt.errors import MemoryShortError, SolverError, TimeUpError
 from seqopt.graph.layers.costs import Joined
-from seqopt.graph.layers.layers import Layers
-from seqopt.graph.layers.windows import possible_after, window
+from seqopt.graph.layers.layers import Layers, possible_after, window
 from seqopt.plan.calling.watch import Watch
 from seqopt.responses.choices import StepChoices
 from seqopt.responses.resources import Resources

@@ -12,8 +12,8 @@ from scipy.spatial.transform import Rotation
 from seqopt.errors import SceneError
 from seqopt.scene.boxes import BOX_CORNERS, BOX_FACES
 from seqopt.scene.checks import short
+from seqopt.scene.imports.compas_data import LARGEST
 from seqopt.scene.imports.content import MOST_BLOCKS, Content, FileBlock
-from seqopt.scene.imports.json_reading import LARGEST
 
 _NEEDED = ("x", "y", "z", "length", "width", "height")
 _TURNS = ("roll", "pitch", "yaw")

@@ -25,16 +25,21 @@ from seqopt.errors import SceneError
 from seqopt.scene.boxes import BOX_CORNERS, BOX_FACES
 from seqopt.scene.imports.compas_data import (
     Element,
+    Entry,
     by_guid,
+    entry,
     frame,
     kind,
+    listing,
+    mapping,
     mesh,
     moved,
+    number,
     payload,
+    point,
     read_elements,
 )
 from seqopt.scene.imports.content import Content, FileBlock, FileFace, FileJoint
-from seqopt.scene.imports.json_reading import Entry, entry, listing, mapping, number, point
 from seqopt.scene.library.common import JointLaw
 
 

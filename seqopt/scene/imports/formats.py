@@ -12,11 +12,10 @@ from seqopt.files import read_bytes, read_text
 from seqopt.scene.checks import printable, short
 from seqopt.scene.imports.boxes_csv import read_boxes
 from seqopt.scene.imports.building import build_scene
-from seqopt.scene.imports.compas_data import kind
+from seqopt.scene.imports.compas_data import kind, parse_json
 from seqopt.scene.imports.compas_models import read_assembly, read_model, read_timber
 from seqopt.scene.imports.content import Content, Given
 from seqopt.scene.imports.frames import read_frame
-from seqopt.scene.imports.json_reading import parse_json
 from seqopt.scene.imports.meshes import read_mesh, read_obj
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import warn_of

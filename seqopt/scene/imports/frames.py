@@ -17,8 +17,8 @@ from seqopt.errors import SceneError
 from seqopt.scene.arch import STANDARD_GRAVITY
 from seqopt.scene.boxes import BOX_CORNERS, BOX_FACES
 from seqopt.scene.checks import short
+from seqopt.scene.imports.compas_data import Entry, entry, listing, mapping, number, point
 from seqopt.scene.imports.content import Content, FileBlock, FileJoint
-from seqopt.scene.imports.json_reading import Entry, entry, listing, mapping, number, point
 
 _UNITS = {"meter": "m", "m": "m", "centimeter": "cm", "cm": "cm", "millimeter": "mm", "mm": "mm"}
 _MEASURES = {

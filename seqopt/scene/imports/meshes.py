@@ -20,8 +20,8 @@ from scipy.sparse.csgraph import connected_components
 from seqopt.arrays import Floats, Ints
 from seqopt.errors import FileError, SceneError
 from seqopt.scene.checks import short
+from seqopt.scene.imports.compas_data import LARGEST
 from seqopt.scene.imports.content import MOST_BLOCKS, Content, FileBlock
-from seqopt.scene.imports.json_reading import LARGEST
 from seqopt.scene.imports.repair import WELD
 
 _Polygons = Sequence[Sequence[int]]

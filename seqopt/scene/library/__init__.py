@@ -33,9 +33,7 @@ from `seqopt.scene.arch_scene`. The same in words, wherever a scene is named:
 <Scene dome 39: 39 bricks, 82 joints, 12 ground ends, 3 robots>
 """
 
-from seqopt.scene.library.arch_form import ArchForm, arch
-from seqopt.scene.library.barrel_vault import barrel_vault
-from seqopt.scene.library.chain import chain
+from seqopt.scene.library.arch_form import ArchForm, arch, barrel_vault, chain
 from seqopt.scene.library.common import JointLaw
 from seqopt.scene.library.dome import DomeShape, dome
 from seqopt.scene.library.vault import VaultShape, herringbone_vault

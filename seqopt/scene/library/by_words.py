@@ -10,9 +10,7 @@ from typing import Any, get_type_hints
 
 from seqopt.arrays import Vector
 from seqopt.errors import SceneError, did_you_mean
-from seqopt.scene.library.arch_form import ArchForm, arch
-from seqopt.scene.library.barrel_vault import barrel_vault
-from seqopt.scene.library.chain import chain
+from seqopt.scene.library.arch_form import ArchForm, arch, barrel_vault, chain
 from seqopt.scene.library.dome import DomeShape, dome
 from seqopt.scene.library.vault import VaultShape, herringbone_vault
 from seqopt.scene.library.wall import WallShape, wall

@@ -14,14 +14,15 @@ from seqopt.scene.boxes import as_vector, require_apart
 from seqopt.scene.checks import positive, short
 from seqopt.scene.library.common import (
     MASONRY,
+    REPEAT,
     JointLaw,
     few_enough,
     joint_width,
     mobile_robots,
+    tiles,
     touching_order,
     whole_number,
 )
-from seqopt.scene.library.herringbone import REPEAT, tiles
 from seqopt.scene.library.joints import ground_under, joints_between, shares
 from seqopt.scene.parts import Brick, Robot
 from seqopt.scene.scene import Scene

@@ -22,8 +22,15 @@ from seqopt.arrays import Floats
 from seqopt.errors import SceneError
 from seqopt.scene.boxes import as_vector, require_apart
 from seqopt.scene.checks import finite, positive
-from seqopt.scene.library.common import JointLaw, mobile_robots, touching_order, whole_number
-from seqopt.scene.library.herringbone import Tile, neighbors, tiles
+from seqopt.scene.library.common import (
+    JointLaw,
+    Tile,
+    mobile_robots,
+    neighbors,
+    tiles,
+    touching_order,
+    whole_number,
+)
 from seqopt.scene.library.joints import ground_under, joints_between
 from seqopt.scene.parts import Brick, Ground, Joint, Robot
 from seqopt.scene.scene import Scene

@@ -11,7 +11,7 @@ from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.exports.compas_plans import Source, compas_assembly, read_source, timber_plan
 from seqopt.sequence.exports.tables import plan_csv, plan_json, sequencer_json
-from seqopt.sequence.plan_file import read_plan
+from seqopt.sequence.schedule_file import read_plan
 from seqopt.sequence.steps import Step
 
 _PLAIN: dict[str, Callable[[Scene, Sequence[Step]], str]] = {

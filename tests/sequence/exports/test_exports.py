@@ -16,7 +16,7 @@ from seqopt.scene.imports.formats import import_scene
 from seqopt.scene.scene_file import save_scene
 from seqopt.sequence.exports.formats import EXPORTS, export_plan, read_folder
 from seqopt.sequence.exports.tables import BlockState, parse_plan_json, step_states
-from seqopt.sequence.plan_file import parse_plan
+from seqopt.sequence.schedule_file import parse_plan
 from seqopt.sequence.two_robots import METHODS
 from tests.builders import six_bricks
 from tests.documents import BOXES, DOCUMENTS, HIGH, LOW, TOP, obj

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import pickle
+import time
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -10,16 +13,167 @@ import numpy as np
 
 from seqopt.arrays import Bools, Floats, FrozenValue
 from seqopt.engines.interface import Engine
-from seqopt.errors import InfeasibleError, ProblemError
+from seqopt.engines.registry import Recipe, make_engine, recipe_of
+from seqopt.errors import InfeasibleError, MechanismError, ProblemError, SolverError
 from seqopt.graph.layers.costs import Budget, LayeredCosts
 from seqopt.graph.layers.layers import Layers
-from seqopt.graph.scenarios.costs import ScenarioCosts, scenario_costs, tasks_of
-from seqopt.graph.scenarios.engines import require_alike
-from seqopt.problem.aims import Aim, RobustAim
+from seqopt.problem.goals import Aim, RobustAim
+from seqopt.problem.requirements import Criterion, Limit, ResponsesAsked
+from seqopt.responses.choices import Evaluation
+from seqopt.responses.resources import Resources
+from seqopt.scene.checks import short
 from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import Step
 from seqopt.showing import Shown
+from seqopt.work.progress import Progress
+from seqopt.work.workers import Crew, hire, map_ordered
+
+
+def recipe_for(engine: Engine, scene: Scene) -> Recipe:
+    """Return how to make an engine for another scene; a `ProblemError` where nobody knows."""
+    recipe = recipe_of(engine)
+    if recipe is None:
+        raise ProblemError(
+            f"engine {type(engine).__name__}: scenarios need engines of their own; take "
+            "one of seqopt.make_engine"
+        )
+    return Recipe(recipe.engine, scene, recipe.options)
+
+
+def engine_for(engine: Engine, scene: Scene) -> Engine:
+    """Return an engine of the same kind and settings for another scene."""
+    recipe = recipe_for(engine, scene)
+    return make_engine(recipe.engine, recipe.scene, **recipe.options)  # type: ignore[arg-type]
+
+
+def require_alike(nominal: Scene, scene: Scene, number: int) -> None:
+    """Raise an error if the choices of a schedule do not mean the same in a scenario."""
+    if not isinstance(scene, Scene):
+        raise ProblemError(f"scenario {number}: {short(scene)} is not a scene")
+
+    def meant(it: Scene) -> tuple[object, ...]:
+        joints = tuple(joint.bricks for joint in it.joints)
+        ends = tuple((ground.brick, ground.closes_with) for ground in it.grounds)
+        nodes = tuple((brick.name, brick.nodes) for brick in it.placed)
+        robots = tuple(robot.name for robot in it.robots)
+        return joints, ends, nodes, robots, it.blocked_nodes
+
+    if meant(nominal) != meant(scene):
+        raise ProblemError(
+            f"scenario {number}: it has other bricks, nodes, joints, robots or another build order "
+            f"than {nominal.name}; vary stiffnesses, densities and positions alone"
+        )
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ScenarioCosts(FrozenValue):
+    """What the choices of a schedule cost in one scenario.
+
+    ``sums``, ``peaks``: as of `seqopt.graph.layers.layers.Layers`; infinite where a limit is
+    exceeded; ``models``: how many different models were solved; ``seconds``: that solving them
+    took, s.
+    """
+
+    sums: LayeredCosts
+    peaks: LayeredCosts
+    models: int
+    seconds: float
+
+
+@dataclass(frozen=True)
+class ScenarioTask:
+    """One scenario, as it is sent to a worker.
+
+    ``name``: for messages; ``recipe``: of its engine; ``schedule``: the nominal one, whose steps
+    and candidates hold in every scenario; ``criterion``: with the numbers of the nominal scene;
+    ``also``: responses that are evaluated beside those that these name.
+    """
+
+    name: str
+    recipe: Recipe
+    schedule: Schedule
+    criterion: Criterion
+    limits: tuple[Limit, ...]
+    also: tuple[str, ...]
+    resources: Resources
+
+    def problem(self) -> Layers:
+        """Return the placement problem of this scenario."""
+        recipe = self.recipe
+        engine = make_engine(recipe.engine, recipe.scene, **recipe.options)  # type: ignore[arg-type]
+        asked = ResponsesAsked(self.criterion, self.limits, self.also)
+        evaluation = Evaluation(engine, self.schedule, asked, self.resources)
+        return Layers(self.criterion, self.limits, evaluation)
+
+
+def tasks_of(problem: Layers, scenes: Sequence[Scene]) -> tuple[ScenarioTask, ...]:
+    """Return the tasks of scenarios.
+
+    ``problem``: the nominal one. Raises `ProblemError` if the engine was not made by name, so that
+    nobody knows how to make it for another scene.
+    """
+    asked = problem.evaluation.wanted
+    also = asked.also if isinstance(asked, ResponsesAsked) else ()
+    alone = problem.evaluation.resources.alone()
+    return tuple(
+        ScenarioTask(
+            f"scenario {i}",
+            recipe_for(problem.engine, scene),
+            problem.schedule,
+            problem.criterion,
+            problem.limits,
+            also,
+            alone,
+        )
+        for i, scene in enumerate(scenes, start=1)
+    )
+
+
+def scenario_costs(
+    tasks: Sequence[ScenarioTask], resources: Resources
+) -> tuple[tuple[ScenarioCosts, ...], float]:
+    """Return the costs in every scenario, and what they took.
+
+    ``resources``: a worker takes one scenario after the other. Results: ``seconds``: from the first
+    to the last, s. Raises `InfeasibleError` if a step without an open grip exceeds a limit in a
+    scenario; `MechanismError`, `SolverError`, `WorkerError` as engines and workers do, the scenario
+    named.
+    """
+    start = time.perf_counter()
+    progress = Progress("scenarios", len(tasks), resources.progress)
+    with hire(resources.executor, resources.workers) as crew:
+        _require_sendable(tasks, crew)
+        with closing(map_ordered(_costs, tasks, crew, done=lambda *_: progress.add(1))) as found:
+            costs = tuple(found)
+    return costs, time.perf_counter() - start
+
+
+def _costs(task: ScenarioTask) -> ScenarioCosts:
+    problem = task.problem()
+    try:
+        problem.require_possible()
+        sums, peaks = problem.sums, problem.peaks
+    except MechanismError as error:
+        raise MechanismError(f"{task.name}: {error}", error.mode) from error
+    except SolverError as error:
+        raise SolverError(f"{task.name}: {error}") from error
+    evaluation = problem.evaluation
+    return ScenarioCosts(sums, peaks, evaluation.models, evaluation.seconds)
+
+
+def _require_sendable(tasks: Sequence[ScenarioTask], crew: Crew | None) -> None:
+    """Raise an error if tasks are to go to other processes and cannot be sent."""
+    if crew is None:
+        return
+    try:
+        pickle.dumps(tasks[:1])
+    except Exception as error:  # whatever objects of others may raise
+        raise ProblemError(
+            f"criterion {tasks[0].criterion.name}: it cannot be sent to other processes ({error}); "
+            "define it in a module, or let this process work alone"
+        ) from error
+
 
 Choice = tuple[int, ...]
 BETTER = 1e-12  # by which a value is better than another, over the size of both

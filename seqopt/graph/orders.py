@@ -1,0 +1,340 @@
+"""The problem of finding the build order whose best plan is best."""
+
+from __future__ import annotations
+
+import pickle
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, fields, replace
+from functools import cached_property, partial
+from itertools import combinations
+
+import numpy as np
+
+from seqopt.arrays import Bools, Floats, FrozenValue, Ints
+from seqopt.engines.interface import Engine
+from seqopt.engines.registry import make_engine, recipe_of
+from seqopt.errors import ProblemError
+from seqopt.graph.explore import Moves
+from seqopt.graph.paths import keep_best
+from seqopt.graph.states.states import States
+from seqopt.graph.states.visits import FreeStates, explore, move_amounts
+from seqopt.network.build import build_network
+from seqopt.problem.goals import LARGEST, Measure
+from seqopt.problem.problem import Orders
+from seqopt.responses.blocks import Shipment, engine_of, pack
+from seqopt.scene.orders import Order
+from seqopt.scene.scene import Scene
+from seqopt.sequence.free_rules import Ending
+from seqopt.sequence.free_space import node_numbers, sort_entries
+from seqopt.showing import Shown
+
+
+@dataclass(frozen=True, repr=False)
+class AllOrders(Shown):
+    """The free schedule of a scene whose build order is free too.
+
+    The value of an order is the first goal of its best plan; the criterion keeps the numbers that
+    it has in the scene's own order.
+
+    ``states``: in the scene's own order; their first goal is no margin. Raises `ProblemError` if it
+    is one, the engine was not made by name, or there are no such orders.
+    """
+
+    states: States
+    among: Orders = Orders.TIED
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "among", Orders.of(self.among))
+        goal = self.states.goals[0]
+        if goal.of_margins:
+            raise ProblemError(
+                f"aim {goal}: an order is not chosen by a margin; name minmax, a response, sum, "
+                "steps, regrips or travel first"
+            )
+        if self.states.budgets:
+            raise ProblemError(
+                f"budget {self.states.goals[-1]}: an order is chosen by its first aim alone; leave "
+                "it out, or give an order"
+            )
+        if recipe_of(self.states.engine) is None:
+            raise ProblemError(
+                f"engine {type(self.states.engine).__name__}: orders need engines of their own; "
+                "take one of seqopt.make_engine"
+            )
+
+    def __repr__(self) -> str:
+        return f"AllOrders({self.scene.name!r}, {self.states.goals[0]}, {self.among.value} orders)"
+
+    @property
+    def scene(self) -> Scene:
+        """What is built."""
+        return self.states.network.scene
+
+    @cached_property
+    def ties(self) -> dict[int, frozenset[int]]:
+        """By brick, those that a joint ties to it; zero joints tie nothing."""
+        out: dict[int, set[int]] = {name: set() for name in self.scene.build_order}
+        for joint in self.scene.joints:
+            if any((*joint.translational_stiffness, *joint.rotational_stiffness)):
+                first, second = joint.bricks
+                out[first].add(second)
+                out[second].add(first)
+        return {name: frozenset(others) for name, others in out.items()}
+
+    def next_bricks(self, placed: frozenset[int]) -> tuple[int, ...]:
+        """Return the bricks that may be placed next.
+
+        ``placed``: names of those that stand.
+        """
+        left = [name for name in self.scene.build_order if name not in placed]
+        if self.among is Orders.ANY:
+            return tuple(left)
+        return tuple(b for b in left if self.ties[b] & placed or self._on_ground(b, placed))
+
+    def _on_ground(self, brick: int, placed: frozenset[int]) -> bool:
+        grounds = (ground for ground in self.scene.grounds if ground.brick == brick)
+        return any(g.closes_with is None or g.closes_with in {*placed, brick} for g in grounds)
+
+    def allows(self, order: Sequence[int]) -> bool:
+        """Return whether an order is one of those among which the best is sought.
+
+        ``order``: names of all bricks.
+        """
+        return all(b in self.next_bricks(frozenset(order[:k])) for k, b in enumerate(order))
+
+    def judging(self, order: Order) -> States:
+        """Return the free schedule of one order with the goal that orders are judged by alone."""
+        alone = self.states.resources.alone()  # orders are shared out, not their grip sets
+        return replace(self.at(order), goals=self.states.goals[:1], resources=alone)
+
+    def at(self, order: Order) -> States:
+        """Return the free schedule of one order."""
+        engine, *others = (_anew(e, order) for e in (self.states.engine, *self.states.scenarios))
+        return replace(self.states, engine=engine, scenarios=tuple(others))
+
+
+def _anew(engine: Engine, order: Order) -> Engine:
+    """Return an engine of the same kind for the same scene in another order."""
+    recipe, network = recipe_of(engine), build_network(engine.network.scene, order)
+    assert recipe is not None
+    return make_engine(recipe.engine, network, **recipe.options)  # type: ignore[arg-type]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class OrderSelection(FrozenValue):
+    """An order, and what its formulation claims of it.
+
+    ``order``: names of all bricks; ``objective``: claimed value of the first goal of its best plan;
+    ``bound``: claimed lower bound over all orders; the value itself where it is proven the least;
+    ``evaluated``: how many orders, or sets of bricks with a newest one, were looked at;
+    ``stopped``: why the search ended before all was proven: ``size``, ``time`` or ``interrupt``;
+    empty if it did not.
+    """
+
+    order: Order
+    objective: float
+    bound: float
+    evaluated: int
+    stopped: str = ""
+
+
+MOST_SETS = 200_000  # grip sets of the whole structure that are looked at
+
+
+def whole_bound(problem: AllOrders) -> float:
+    """Return the least value with which all bricks stand, whoever holds them.
+
+    Every plan of every order passes such a state, and the one in which nobody holds if it ends so.
+
+    Result: minus infinity where there are too many grip sets to look at.
+    """
+    free = problem.judging(problem.scene.build_order)
+    if free.goals[0].measure is not Measure.PEAK:
+        return -np.inf
+    numbers = node_numbers(free.network)
+    places = [i for i, n in enumerate(numbers, 1) if n not in problem.scene.blocked_nodes]
+    least = -np.inf
+    sets = _sets(places, max(1, free.free_rules.least_grips), free.space.robots)
+    if len(sets):
+        least = float(_values(free, sets).min())
+    if free.free_rules.ending is not Ending.HELD:
+        least = max(least, float(_values(free, np.zeros((1, free.space.robots), int))[0]))
+    return least
+
+
+def _sets(places: list[int], fewest: int, robots: int) -> Ints:
+    """Return all grip sets, zeros for robots that are free first; none if they are too many."""
+    rows: list[tuple[int, ...]] = []
+    for count in range(fewest, robots + 1):
+        for nodes in combinations(places, count):
+            rows.append((*[0] * (robots - count), *nodes))
+            if len(rows) > MOST_SETS:
+                return np.zeros((0, robots), dtype=np.int64)
+    return np.array(rows, dtype=np.int64).reshape(-1, robots)
+
+
+def _values(free: States, held: Ints) -> Floats:
+    """Return what the goal takes of grip sets of the whole; infinite where something is loose."""
+    bricks, goal = len(free.network.inner), free.goals[0]
+    answers, forces = free.sets.answers(bricks, held)
+    names = [name for name in free.named if name != LARGEST]
+    found = dict(zip(names, answers.T, strict=True)) | {LARGEST: forces.max(axis=1, initial=0.0)}
+    loose = ~np.isfinite(answers).all(axis=1)
+    finite = {name: np.where(loose, 0.0, values) for name, values in found.items()}
+    if goal.response:
+        return np.where(loose, np.inf, finite[goal.response])
+    return np.where(loose, np.inf, free.criterion.costs(finite, bricks, len(held)))
+
+
+Key = tuple[frozenset[int], int]  # bricks that stand, and the newest
+
+
+class TooManySetsError(Exception):
+    """There are more sets of bricks than may be looked at."""
+
+
+@dataclass(frozen=True)
+class OrderStates:
+    """The states of a free schedule in all orders, a part for every set of bricks and newest brick.
+
+    ``most``: how many parts there may be; ``parts``: those that were looked at, each in an order
+    that begins with its set.
+    """
+
+    problem: AllOrders
+    most: int
+    parts: dict[Key, FreeStates] = field(default_factory=dict)
+
+    @property
+    def levels(self) -> int:
+        """How many bricks there are."""
+        return len(self.problem.scene.bricks)
+
+    @property
+    def peaks(self) -> tuple[bool, ...]:
+        """Whether the worst step counts, or what all steps take."""
+        return (self.problem.states.goals[0].measure is Measure.PEAK,)
+
+    def start(self) -> tuple[Key, Ints]:
+        """Return the empty site."""
+        empty: Key = (frozenset(), 0)
+        return empty, self._of(empty).start()[1]
+
+    def codes(self, part: Key, states: Ints) -> Ints:
+        """Return a number for every state."""
+        return self._of(part).codes(len(part[0]), states)
+
+    def within(self, part: Key, states: Ints) -> Moves:
+        """Return the moves that place no brick."""
+        return self._of(part).within(len(part[0]), states)
+
+    def onward(self, part: Key, states: Ints) -> Iterator[tuple[Key, Moves]]:
+        """Yield the moves that place one of the bricks that may come next."""
+        old = self._of(part).problem
+        for brick in self.problem.next_bricks(part[0]):
+            key = (part[0] | {brick}, brick)
+            new = self._of(key)
+            yield key, new.placed(len(part[0]), _renumbered(old, new.problem, states))
+
+    @property
+    def floors(self) -> bool:
+        """Whether there are scenarios."""
+        return bool(self.problem.states.each)
+
+    def values(self, part: Key, states: Ints, *, rough: bool, most: float) -> tuple[Floats, Bools]:
+        """Return what the first goal takes of states, and which are allowed."""
+        return self._of(part).values(len(part[0]), states, rough=rough, most=most)
+
+    def amounts(self, values: Floats, taken: Floats) -> Floats:
+        """Return what the first goal takes of moves, (m, 1)."""
+        return move_amounts(self._first, values, taken)
+
+    @cached_property
+    def _first(self) -> States:
+        return replace(self.problem.states, goals=self.problem.states.goals[:1])
+
+    def ended(self, part: Key, states: Ints) -> Bools:
+        """Return which states end the build."""
+        return self._of(part).ended(len(part[0]), states)
+
+    def _of(self, part: Key) -> FreeStates:
+        """Return the free schedule in an order that begins with a set, its newest brick last."""
+        if part not in self.parts:
+            if len(self.parts) > self.most:
+                raise TooManySetsError
+            own = self.problem.scene.build_order
+            first = [name for name in own if name in part[0] and name != part[1]]
+            rest = [name for name in own if name not in part[0]]
+            newest = (part[1],) if part[0] else ()
+            problem = self.problem.judging((*first, *newest, *rest))
+            self.parts[part] = FreeStates(problem, standing=bool(problem.demands))
+        return self.parts[part]
+
+
+def _renumbered(old: States, new: States, states: Ints) -> Ints:
+    """Return states with the places that nodes have in another order."""
+    place = {node: i for i, node in enumerate(node_numbers(new.network), start=1)}
+    map_to = np.array([0, *(place[node] for node in node_numbers(old.network))])
+    out, robots = states.copy(), old.space.robots
+    nodes = states[:, :robots]  # negative where a free robot was last
+    out[:, :robots] = np.sign(nodes) * map_to[np.abs(nodes)]
+    for first, end in new.space.slots:
+        sort_entries(out, first, end)
+    return out
+
+
+NARROW = 50  # states of a brick count with which an order is tried first
+
+
+@dataclass(frozen=True)
+class Trial:
+    """An order to be tried.
+
+    ``order``: names of all bricks; ``ceiling``: what it must stay below.
+    """
+
+    order: Order
+    ceiling: float
+
+
+def worth(problem: AllOrders, trial: Trial) -> float:
+    """Return the first goal of the best plan of an order.
+
+    Result: infinite where no plan of it stays below the ceiling.
+    """
+    judged, ceiling, found = problem.judging(trial.order), trial.ceiling, np.inf
+    for width in (NARROW, None):
+        visited = explore(judged, ceiling, width)
+        if visited.whole:
+            visited.refine()
+            found = ceiling = keep_best(visited.graph().graph, 0)[1]
+    return found
+
+
+def trying(problem: AllOrders, *, elsewhere: bool) -> Callable[[Trial], float]:
+    """Return the function that tries orders.
+
+    ``elsewhere``: whether it is to be sent to other processes: then with the scene, not with an
+    engine. Result: takes a trial, returns its `worth`. Raises `ProblemError`, `SceneError` if a
+    criterion or an engine of one's own cannot be sent.
+    """
+    if not elsewhere:
+        return partial(worth, problem)
+    free = replace(problem.states, resources=problem.states.resources.alone())
+    sent = ("engine", "scenarios")
+    rest = {f.name: getattr(free, f.name) for f in fields(free) if f.name not in sent}
+    others = tuple(map(pack, free.scenarios))
+    try:
+        content = pickle.dumps((rest, others, problem.among))
+    except Exception as error:  # whatever objects of others may raise
+        raise ProblemError(
+            f"criterion {free.criterion.name}: it cannot be sent to other processes ({error}); "
+            "define it in a module, or let this process work alone"
+        ) from error
+    return partial(_sent, pack(free.engine), content)
+
+
+def _sent(shipment: Shipment, content: bytes, trial: Trial) -> float:
+    rest, others, among = pickle.loads(content)  # our own, from `trying`
+    rest["scenarios"] = tuple(map(engine_of, others))
+    return worth(AllOrders(States(engine=engine_of(shipment), **rest), among), trial)

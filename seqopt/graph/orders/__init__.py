@@ -1,1 +1,0 @@
-"""All build orders at once: states by which bricks stand."""

@@ -1,1 +1,0 @@
-"""Layers of candidates with a copy of their costs for every scenario."""
