@@ -18,7 +18,7 @@ from scipy import sparse
 
 from seqopt.arrays import Floats
 from seqopt.errors import InfeasibleError, SolverError
-from seqopt.plan.calling.watch import Watch
+from seqopt.plan.calling.formulation import Watch
 from seqopt.stability.limit_analysis import Claim
 
 CONE_OPTIONS: tuple[dict[str, object], ...] = (

@@ -12,11 +12,9 @@ from formulations.solvers import minimize_whole
 from seqopt.arrays import Floats
 from seqopt.graph.layers.costs import LayeredCosts
 from seqopt.graph.layers.interface import CostProblem, PlacementProblem
-from seqopt.plan.calling.flow import ACCURACY, LayeredFlow, layered_flow
-from seqopt.plan.calling.formulation import End, Selection
-from seqopt.plan.calling.priced_paths import stopped
-from seqopt.plan.calling.watch import Watch
-from seqopt.problem.goals import Aim
+from seqopt.plan.calling.formulation import End, Selection, Watch
+from seqopt.plan.calling.priced_paths import ACCURACY, LayeredFlow, layered_flow, stopped
+from seqopt.problem.problem import Aim
 
 Choice = tuple[int, ...]
 

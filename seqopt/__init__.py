@@ -34,8 +34,7 @@ if TYPE_CHECKING:
     from seqopt.plan.calling.formulation import Formulation, formulations
     from seqopt.plan.judge.certificate import Certificate
     from seqopt.plan.plan import Plan
-    from seqopt.plan.posing import pose
-    from seqopt.plan.solving import solve
+    from seqopt.plan.solving import pose, solve
     from seqopt.problem.criteria import StepCost
     from seqopt.problem.problem import Problem
     from seqopt.problem.requirements import Limit
@@ -66,8 +65,7 @@ _HOMES = {
     "plan.build": ("GivenSequence",),
     "plan.judge.certificate": ("Certificate",),
     "plan.plan": ("Plan",),
-    "plan.posing": ("pose",),
-    "plan.solving": ("solve",),
+    "plan.solving": ("pose", "solve"),
     "problem.criteria": ("StepCost",),
     "problem.problem": ("Problem",),
     "problem.requirements": ("Limit",),

@@ -15,15 +15,13 @@ from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.plan.calling.formulation import On, find_formulation
 from seqopt.plan.plan import Plan
-from seqopt.plan.posing import in_layers, pose
-from seqopt.plan.solving import solve
+from seqopt.plan.solving import in_layers, pose, solve
 from seqopt.problem.criteria import WORST_OVER_METHODS
 from seqopt.problem.problem import Orders, Problem
 from seqopt.problem.requirements import Criterion, Limit
 from seqopt.responses.resources import Resources
 from seqopt.scene.checks import short
-from seqopt.scene.orders import in_order
-from seqopt.scene.scene import Scene
+from seqopt.scene.scene import Scene, in_order
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.free_rules import FREE, FreeRules, with_robots
 from seqopt.sequence.schedule import Schedule, thin

@@ -15,7 +15,7 @@ from seqopt.engines.planar import PlanarEngine
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import SeqoptError
 from seqopt.graph.layers.layers import candidate_layers
-from seqopt.plan.calling.selecting import require_fit
+from seqopt.plan.calling.guard import require_fit
 from seqopt.plan.judge.certificate import judge
 from seqopt.problem.criteria import RankSum, WeightedSum, WorstRatio
 from seqopt.scene.parts import Anywhere, Robot

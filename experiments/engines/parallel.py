@@ -35,7 +35,7 @@ from experiments.harness.scenes import half_circle, running_bond
 from seqopt.engines.registry import make_engine
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
-from seqopt.responses.batches import StepChoices
+from seqopt.responses.blocks import StepChoices
 from seqopt.responses.choices import Evaluation
 from seqopt.responses.resources import Resources
 from seqopt.scene.scene_file import load_scene

@@ -36,7 +36,7 @@ from seqopt.plan.calling.formulation import Formulation, On, formulations
 from seqopt.plan.judge.certificate import least
 from seqopt.plan.plan import Plan
 from seqopt.plan.solving import solve
-from seqopt.problem.goals import Aim
+from seqopt.problem.problem import Aim
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.three_robots import three_robot_loop

@@ -66,11 +66,10 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.graph.layers.layers import Layers, candidate_layers
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
-from seqopt.plan.calling.formulation import On, find_formulation, formulations
-from seqopt.plan.calling.watch import Watch, trace_rows
+from seqopt.plan.calling.formulation import On, Watch, find_formulation, formulations, trace_rows
 from seqopt.plan.judge.certificate import least
 from seqopt.plan.solving import solve
-from seqopt.problem.goals import Aim
+from seqopt.problem.problem import Aim
 from seqopt.problem.requirements import Criterion
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.three_robots import three_robot_loop

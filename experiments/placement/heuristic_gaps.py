@@ -27,8 +27,7 @@ from seqopt.errors import StepError
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.plan.calling.formulation import FormulationKind, On, formulations
-from seqopt.plan.posing import pose
-from seqopt.plan.solving import solve
+from seqopt.plan.solving import pose, solve
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.study.published import CRITERIA

@@ -42,12 +42,12 @@ from seqopt.engines.registry import make_engine
 from seqopt.graph.layers.layers import Layers, candidate_layers
 from seqopt.graph.scenarios import Choice, ScenarioLayers, in_scenarios
 from seqopt.network.build import build_network
-from seqopt.plan.calling.watch import Watch
+from seqopt.plan.calling.formulation import Watch
 from seqopt.plan.out_of_sample import judge_unseen
 from seqopt.plan.plan import Plan
 from seqopt.plan.search.in_order import least_quantile, solve_in_order
 from seqopt.plan.solving import solve
-from seqopt.problem.goals import WORST_PEAK, WORST_TOTAL, Aim, RobustAim, cvar
+from seqopt.problem.problem import WORST_PEAK, WORST_TOTAL, Aim, RobustAim, cvar
 from seqopt.problem.requirements import Criterion
 from seqopt.report.style import BLUE, GRAY, VERMILION, dress, new_figure, styled
 from seqopt.scene.scenarios import scenarios

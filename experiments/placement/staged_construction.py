@@ -39,8 +39,7 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.engines.rigid.mechanism import Ungripped, ungripped_system
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
-from seqopt.plan.posing import pose
-from seqopt.plan.solving import solve
+from seqopt.plan.solving import pose, solve
 from seqopt.report.style import BLUE, INK, VERMILION, dress, new_figure, styled
 from seqopt.responses.quantities import CHOSEN_BY, RESPONSES, TO_1E_3MM, lengths
 from seqopt.responses.staged import Placing, StagedState, next_state, staged_fields, state_fields

@@ -77,8 +77,7 @@ from seqopt.contact.mortar import DRY, EPOXY, Mortar, bond_mortar
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network
 from seqopt.network.network import GROUND, Network
-from seqopt.plan.posing import pose
-from seqopt.plan.solving import solve
+from seqopt.plan.solving import pose, solve
 from seqopt.responses.table import analyze, force_column
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.steps import Step

@@ -19,10 +19,9 @@ import numpy as np
 
 from seqopt.errors import ProblemError
 from seqopt.graph.layers.interface import PlacementProblem
-from seqopt.plan.calling.formulation import End, Formulation, FormulationKind, Selection
+from seqopt.plan.calling.formulation import End, Formulation, FormulationKind, Selection, Watch
 from seqopt.plan.calling.priced_paths import stopped
-from seqopt.plan.calling.watch import Watch
-from seqopt.problem.goals import Aim
+from seqopt.problem.problem import Aim
 
 
 def solve(problem: PlacementProblem, *, watch: Watch | None = None, width: int = 5) -> Selection:

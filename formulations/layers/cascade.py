@@ -27,10 +27,9 @@ import numpy as np
 from seqopt.arrays import Floats
 from seqopt.errors import ProblemError
 from seqopt.graph.layers.interface import PlacementProblem
-from seqopt.plan.calling.formulation import Formulation, FormulationKind, Reads, Selection
+from seqopt.plan.calling.formulation import Formulation, FormulationKind, Reads, Selection, Watch
 from seqopt.plan.calling.priced_paths import stopped
-from seqopt.plan.calling.watch import Watch
-from seqopt.problem.goals import Aim
+from seqopt.problem.problem import Aim
 
 CHARGES = ("later", "earlier")
 

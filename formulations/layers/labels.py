@@ -34,7 +34,7 @@ import numpy as np
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.graph.layers.interface import PlacementProblem
-from seqopt.plan.calling.formulation import End, Formulation, FormulationKind, Selection
+from seqopt.plan.calling.formulation import End, Formulation, FormulationKind, Selection, Watch
 from seqopt.plan.calling.priced_paths import (
     ROUNDING,
     Path,
@@ -44,8 +44,7 @@ from seqopt.plan.calling.priced_paths import (
     priced_paths,
     stopped,
 )
-from seqopt.plan.calling.watch import Watch
-from seqopt.problem.goals import Aim
+from seqopt.problem.problem import Aim
 
 NARROW, WIDER = 256, 16  # labels kept at first, and how many times as many then
 AT_ONCE = 2_000_000  # pairs of a label and a candidate that are looked at together

@@ -31,10 +31,9 @@ import numpy as np
 
 from seqopt.arrays import Floats
 from seqopt.graph.layers.interface import PlacementProblem
-from seqopt.plan.calling.formulation import End, Formulation, FormulationKind, Selection
+from seqopt.plan.calling.formulation import End, Formulation, FormulationKind, Selection, Watch
 from seqopt.plan.calling.priced_paths import Path, PricedPaths, best_prices, priced_paths, stopped
-from seqopt.plan.calling.watch import Watch
-from seqopt.problem.goals import Aim
+from seqopt.problem.problem import Aim
 
 MIXED = 12  # choices that are followed by turns: those that cost least at the best prices
 ROUNDS = 3  # of doing so

@@ -19,9 +19,8 @@ from scipy import sparse
 
 from formulations.whole_program import WholeProgram, flow_of_peaks, solve_whole
 from seqopt.graph.layers.interface import PlacementProblem
-from seqopt.plan.calling.formulation import Formulation, FormulationKind, Selection
-from seqopt.plan.calling.watch import Watch
-from seqopt.problem.goals import Aim
+from seqopt.plan.calling.formulation import Formulation, FormulationKind, Selection, Watch
+from seqopt.problem.problem import Aim
 
 
 def write(problem: PlacementProblem) -> WholeProgram:

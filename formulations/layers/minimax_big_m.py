@@ -29,9 +29,8 @@ from formulations.whole_program import (
 )
 from seqopt.arrays import Floats
 from seqopt.graph.layers.interface import PlacementProblem
-from seqopt.plan.calling.formulation import Formulation, FormulationKind, Selection
-from seqopt.plan.calling.watch import Watch
-from seqopt.problem.goals import Aim
+from seqopt.plan.calling.formulation import Formulation, FormulationKind, Selection, Watch
+from seqopt.problem.problem import Aim
 
 
 def write(problem: PlacementProblem) -> WholeProgram:

@@ -20,11 +20,9 @@ import numpy as np
 
 from formulations.solvers import minimize
 from seqopt.graph.layers.interface import PlacementProblem
-from seqopt.plan.calling.flow import layered_flow
-from seqopt.plan.calling.formulation import Formulation, FormulationKind, Selection
-from seqopt.plan.calling.priced_paths import stopped
-from seqopt.plan.calling.watch import Watch
-from seqopt.problem.goals import Aim
+from seqopt.plan.calling.formulation import Formulation, FormulationKind, Selection, Watch
+from seqopt.plan.calling.priced_paths import layered_flow, stopped
+from seqopt.problem.problem import Aim
 
 
 def solve(problem: PlacementProblem, *, watch: Watch | None = None) -> Selection:

@@ -17,10 +17,9 @@ import cvxpy as cp
 
 from formulations.whole_program import WholeProgram, solve_whole
 from seqopt.graph.layers.interface import PlacementProblem
-from seqopt.plan.calling.flow import layered_flow
-from seqopt.plan.calling.formulation import Formulation, FormulationKind, Selection
-from seqopt.plan.calling.watch import Watch
-from seqopt.problem.goals import Aim
+from seqopt.plan.calling.formulation import Formulation, FormulationKind, Selection, Watch
+from seqopt.plan.calling.priced_paths import layered_flow
+from seqopt.problem.problem import Aim
 
 
 def write(problem: PlacementProblem) -> WholeProgram:

@@ -26,10 +26,9 @@ from seqopt.arrays import Floats
 from seqopt.errors import ProblemError
 from seqopt.graph.layers.costs import LayeredCosts
 from seqopt.graph.layers.interface import PlacementProblem
-from seqopt.plan.calling.formulation import Formulation, FormulationKind, Selection
+from seqopt.plan.calling.formulation import Formulation, FormulationKind, Selection, Watch
 from seqopt.plan.calling.priced_paths import stopped
-from seqopt.plan.calling.watch import Watch
-from seqopt.problem.goals import Aim
+from seqopt.problem.problem import Aim
 
 MOST = 20_000_000  # combinations in one enumeration: 160 MB
 

@@ -24,8 +24,8 @@ import numpy as np
 from formulations.solvers import minimize, minimize_whole
 from seqopt.graph.layers.costs import TINY, Budget, LayeredCosts
 from seqopt.graph.layers.interface import CostProblem
-from seqopt.plan.calling.flow import LayeredFlow, layered_flow
-from seqopt.plan.calling.watch import Watch
+from seqopt.plan.calling.formulation import Watch
+from seqopt.plan.calling.priced_paths import LayeredFlow, layered_flow
 
 
 @dataclass(frozen=True)

@@ -23,9 +23,8 @@ from formulations.scenarios.scenario_weights import Weighed, best_weights
 from seqopt.arrays import Floats, Ints
 from seqopt.errors import ProblemError
 from seqopt.graph.scenarios import Choice, ScenarioArcs, ScenarioLayers, largest_of, scenario_arcs
-from seqopt.plan.calling.formulation import End, Formulation, FormulationKind, On, Selection
-from seqopt.plan.calling.watch import Watch
-from seqopt.problem.goals import Aim
+from seqopt.plan.calling.formulation import End, Formulation, FormulationKind, On, Selection, Watch
+from seqopt.problem.problem import Aim
 
 WIDTH = 20_000  # beginnings that are kept after every move
 CLOSE = 1e-9  # differences that are none, over the size of the values

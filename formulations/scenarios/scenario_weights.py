@@ -22,7 +22,7 @@ from scipy.optimize import linprog
 from seqopt.arrays import Floats
 from seqopt.errors import SolverError
 from seqopt.graph.scenarios import Choice, ScenarioArcs
-from seqopt.plan.calling.watch import Watch
+from seqopt.plan.calling.formulation import Watch
 
 STEPS = 400  # weights that are tried at most
 CLOSE = 1e-9  # distance of bound and roof treated as zero, over their size

@@ -32,7 +32,7 @@ from formulations.solvers import STOPS, minimize_rows
 from formulations.states.on_graph import Choice, on_graph, unit_flow, worth
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import TIED, fewest_moves, tied
-from seqopt.plan.calling.watch import Watch
+from seqopt.plan.calling.formulation import Watch
 
 
 def choose(graph: Graph, watch: Watch) -> Choice:

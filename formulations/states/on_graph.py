@@ -27,13 +27,12 @@ from seqopt.graph.paths import Best, distances, lexicographic, reached, tied
 from seqopt.graph.states.states import States
 from seqopt.graph.states.visits import FreeStates, explore
 from seqopt.interrupts import answered
-from seqopt.plan.calling.formulation import Formulation, FormulationKind, On
+from seqopt.plan.calling.formulation import Formulation, FormulationKind, On, Watch
 from seqopt.plan.calling.guard import StatePath
-from seqopt.plan.calling.watch import Watch
 from seqopt.plan.search.sturdiest import best_margin
 from seqopt.responses.resources import HERE, Resources
-from seqopt.work.memory import free_memory
 from seqopt.work.progress import Stage, Tell
+from seqopt.work.workers import free_memory
 
 WIDTH = 50  # new states of a brick count from which the narrow search goes on
 MOST_PARTS = 5000  # sets of bricks with a newest one, of all orders
@@ -71,7 +70,7 @@ def on_graph(
 
     ``name``, ``summary``: what it is called, and what it does in a few words; ``choose``: returns a
     `Choice` of a graph whose moves are all on paths from the start to an end; stops when a
-    `seqopt.plan.calling.watch.Watch` says so; ``kind``: what it promises. Result: it takes no
+    `seqopt.plan.calling.formulation.Watch` says so; ``kind``: what it promises. Result: it takes no
     budgets; its options are ``seconds`` and ``max_memory``. If its first goal is a peak, the graph
     has the states below that of a first plan, by a narrow search. Where time or memory ends early,
     that plan is returned.

@@ -45,7 +45,7 @@ from seqopt.graph.orders import (
 from seqopt.graph.paths import keep_best, lexicographic, reached
 from seqopt.plan.calling.formulation import Formulation, FormulationKind, On
 from seqopt.responses.resources import HERE, Resources
-from seqopt.scene.orders import ORDERS, Order
+from seqopt.scene.scene import ORDERS, Order
 from seqopt.work.progress import Stage
 from seqopt.work.workers import hire, map_ordered
 

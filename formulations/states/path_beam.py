@@ -35,9 +35,8 @@ from seqopt.graph.orders import AllOrders, OrderSelection
 from seqopt.graph.paths import lexicographic
 from seqopt.graph.states.states import States
 from seqopt.graph.states.visits import FreeStates
-from seqopt.plan.calling.formulation import Formulation, FormulationKind, On
+from seqopt.plan.calling.formulation import Formulation, FormulationKind, On, Watch
 from seqopt.plan.calling.guard import StatePath
-from seqopt.plan.calling.watch import Watch
 from seqopt.responses.resources import HERE, Resources
 from seqopt.work.progress import Tell
 

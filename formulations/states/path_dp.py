@@ -19,7 +19,7 @@ from __future__ import annotations
 from formulations.states.on_graph import Choice, on_graph
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import lexicographic
-from seqopt.plan.calling.watch import Watch
+from seqopt.plan.calling.formulation import Watch
 
 
 def choose(graph: Graph, _: Watch) -> Choice:

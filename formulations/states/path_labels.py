@@ -18,7 +18,7 @@ import numpy as np
 
 from formulations.states.on_graph import Choice, best_label, on_graph
 from seqopt.graph.graph import Graph
-from seqopt.plan.calling.watch import Watch
+from seqopt.plan.calling.formulation import Watch
 
 
 def choose(graph: Graph, watch: Watch) -> Choice:

@@ -54,10 +54,9 @@ from seqopt.graph.explore import Explorer
 from seqopt.graph.paths import distances, tied
 from seqopt.graph.states.states import States
 from seqopt.graph.states.visits import FreeStates, floors_of_goals
-from seqopt.plan.calling.formulation import Formulation, FormulationKind, On
+from seqopt.plan.calling.formulation import Formulation, FormulationKind, On, Watch
 from seqopt.plan.calling.guard import StatePath
-from seqopt.plan.calling.watch import Watch
-from seqopt.problem.goals import Measure
+from seqopt.problem.problem import Measure
 from seqopt.work.progress import Tell
 
 FAR_BELOW = 4.0  # what the narrow search finds, over the first threshold

@@ -19,11 +19,9 @@ from seqopt.graph.paths import keep_best
 from seqopt.graph.states.states import States
 from seqopt.graph.states.visits import FreeStates, explore, move_amounts
 from seqopt.network.build import build_network
-from seqopt.problem.goals import LARGEST, Measure
-from seqopt.problem.problem import Orders
+from seqopt.problem.problem import LARGEST, Measure, Orders
 from seqopt.responses.blocks import Shipment, engine_of, pack
-from seqopt.scene.orders import Order
-from seqopt.scene.scene import Scene
+from seqopt.scene.scene import Order, Scene
 from seqopt.sequence.free_rules import Ending
 from seqopt.sequence.free_space import node_numbers, sort_entries
 from seqopt.showing import Shown

@@ -17,7 +17,7 @@ from seqopt.engines.registry import Recipe, make_engine, recipe_of
 from seqopt.errors import InfeasibleError, MechanismError, ProblemError, SolverError
 from seqopt.graph.layers.costs import Budget, LayeredCosts
 from seqopt.graph.layers.layers import Layers
-from seqopt.problem.goals import Aim, RobustAim
+from seqopt.problem.problem import Aim, RobustAim
 from seqopt.problem.requirements import Criterion, Limit, ResponsesAsked
 from seqopt.responses.choices import Evaluation
 from seqopt.responses.resources import Resources

@@ -10,9 +10,8 @@ import numpy as np
 from seqopt.arrays import Floats, Ints
 from seqopt.errors import SceneError
 from seqopt.network.network import GROUND, Network, PartKind, Springs
-from seqopt.scene.orders import in_order
 from seqopt.scene.parts import Brick, Ground, Joint
-from seqopt.scene.scene import Scene
+from seqopt.scene.scene import Scene, in_order
 
 _EQUALLY_FAR = 1e-6  # inner nodes whose distances from a joint differ by no larger share
 
@@ -43,7 +42,7 @@ def build_network(scene: Scene, order: Sequence[int] | str | None = None) -> Net
     ----------
     scene : Scene
     order : sequence of int or str, optional
-        The order in which bricks are placed, in a form that `seqopt.scene.orders.in_order`
+        The order in which bricks are placed, in a form that `seqopt.scene.scene.in_order`
         accepts; by default the scene's own.
 
     Returns

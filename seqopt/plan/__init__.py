@@ -18,7 +18,6 @@ value and a lower bound, both computed again from the problem's data.
 
 from seqopt.plan.judge.certificate import Certificate
 from seqopt.plan.plan import Plan
-from seqopt.plan.posing import pose
-from seqopt.plan.solving import solve
+from seqopt.plan.solving import pose, solve
 
 __all__ = ["Certificate", "Plan", "pose", "solve"]

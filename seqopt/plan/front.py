@@ -22,9 +22,8 @@ from seqopt.plan.calling.formulation import Formulation, On, as_formulation
 from seqopt.plan.calling.guard import called, readable, text
 from seqopt.plan.judge.infeasible import confirmed
 from seqopt.plan.judge.schedules import plan_values
-from seqopt.plan.posing import states_of
-from seqopt.problem.goals import Measure
-from seqopt.problem.problem import Problem
+from seqopt.plan.solving import states_of
+from seqopt.problem.problem import Measure, Problem
 from seqopt.sequence.free_rules import Ending
 from seqopt.sequence.steps import Step, StepKind
 from seqopt.work.progress import Tell, told

@@ -16,12 +16,14 @@ from seqopt.plan.calling.formulation import (
     End,
     Formulation,
     On,
+    Run,
     Selection,
+    Watch,
     find_formulation,
     formulations,
+    timed,
 )
-from seqopt.plan.calling.selecting import require_fit, require_proof, require_time, select
-from seqopt.plan.calling.watch import Run, Watch, timed
+from seqopt.plan.calling.guard import require_fit, require_proof, require_time, select
 from seqopt.plan.judge.certificate import (
     Certificate,
     certify_partial,
@@ -33,8 +35,7 @@ from seqopt.plan.plan import Plan
 from seqopt.plan.search.pair_search import search_pairs
 from seqopt.plan.search.window_search import search_windows
 from seqopt.problem.criteria import Among
-from seqopt.problem.goals import Aim
-from seqopt.problem.problem import AskedBudget
+from seqopt.problem.problem import Aim, AskedBudget
 
 CHOOSES = {Aim.PEAK: "minimax", Aim.SUM: "overlap_dp"}  # of one scenario, without budgets
 

@@ -21,10 +21,9 @@ from seqopt.graph.states.states import over_scenarios
 from seqopt.plan.judge.schedules import plan_values
 from seqopt.plan.layers import best_choice
 from seqopt.plan.plan import Plan
-from seqopt.problem.goals import Aim
-from seqopt.scene.orders import in_order
+from seqopt.problem.problem import Aim
 from seqopt.scene.scenarios import Scenarios
-from seqopt.scene.scene import Scene
+from seqopt.scene.scene import Scene, in_order
 
 PLANS = ("robust", "nominal", "knows_it")
 

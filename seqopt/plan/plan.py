@@ -19,16 +19,21 @@ from seqopt.graph.orders import AllOrders
 from seqopt.graph.scenarios import ScenarioLayers
 from seqopt.graph.states.states import States
 from seqopt.plan.build import ShownBuild
-from seqopt.plan.calling.formulation import End, Formulation, FormulationKind, Reads, Selection
+from seqopt.plan.calling.formulation import (
+    End,
+    Finding,
+    Formulation,
+    FormulationKind,
+    Reads,
+    Selection,
+)
 from seqopt.plan.calling.guard import StatePath
-from seqopt.plan.calling.watch import Finding
 from seqopt.plan.judge.certificate import TOLERANCE, Certificate
 from seqopt.plan.judge.standing_proof import certified
 from seqopt.plan.search.window_search import WindowSearch
 from seqopt.plan.status import ENDS, FoundOrder, Status
 from seqopt.plan.tables import Objectives, alternatives, chosen_table, moves_table, split_objectives
-from seqopt.problem.goals import Aim, judged_by
-from seqopt.problem.problem import Problem
+from seqopt.problem.problem import Aim, Problem, judged_by
 from seqopt.problem.requirements import Excess, overloads
 from seqopt.responses.choices import window_models
 from seqopt.responses.table import analyze

@@ -3,24 +3,263 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
+from seqopt.contact.mortar import Mortar
+from seqopt.engines.interface import Engine
 from seqopt.errors import ProblemError
 from seqopt.graph.layers.interface import PlacementProblem
+from seqopt.graph.layers.layers import Layers, candidate_layers
 from seqopt.graph.orders import AllOrders
-from seqopt.graph.scenarios import ScenarioLayers
-from seqopt.graph.states.states import States
-from seqopt.plan.calling.formulation import Formulation, On, as_formulation
-from seqopt.plan.calling.watch import Run
-from seqopt.plan.layers import solve_layers
+from seqopt.graph.scenarios import ScenarioLayers, in_scenarios
+from seqopt.graph.states.states import States, build_states, over_scenarios, within
+from seqopt.plan.calling.formulation import Formulation, On, Run, as_formulation
+from seqopt.plan.layers import solve_layers, with_budgets
 from seqopt.plan.plan import Plan
-from seqopt.plan.posing import AIMS, graph_of, natural, usual
 from seqopt.plan.states import solve_orders, solve_states
-from seqopt.problem.goals import Aim
-from seqopt.problem.problem import Problem
+from seqopt.problem.problem import (
+    WORST_PEAK,
+    Aim,
+    Goal,
+    Measure,
+    Orders,
+    Problem,
+    RobustAim,
+    parse_budgets,
+    parse_caps,
+)
+from seqopt.problem.requirements import Criterion, Limit
+from seqopt.problem.standing import Standing
+from seqopt.responses.resources import HERE, Resources
+from seqopt.scene.scenarios import Scenarios
+from seqopt.scene.scene import Scene
 from seqopt.sequence.free_rules import FreeRules
+from seqopt.sequence.schedule import Schedule
+
+Graph = Layers | ScenarioLayers | States | AllOrders
+AIMS = {Aim.SUM: Goal(Measure.SUM), Aim.PEAK: Goal(Measure.PEAK)}
+USUAL = {On.LAYERS: "overlap_dp", On.STATES: "schedule_search", On.ORDERS: "order_search"}
+
+
+def pose(  # noqa: PLR0913  # every question is a word of its own
+    engine: Engine,
+    moves: Schedule | FreeRules,
+    criterion: Criterion,
+    goals: Sequence[Goal] | str = (),
+    limits: Sequence[Limit] = (),
+    *,
+    budgets: Sequence[str] | str = (),
+    stands: Standing | Mortar | str | None = None,
+    scenarios: Scenarios | Sequence[Scene] = (),
+    over: RobustAim | str = WORST_PEAK,
+    orders: Orders | str | None = None,
+    also: Sequence[str] = (),
+    resources: Resources = HERE,
+) -> Problem:
+    """Return the problem of a build, of whatever schedule; words stand for values everywhere.
+
+    Parameters
+    ----------
+    engine, moves, criterion : Engine, Schedule or FreeRules, Criterion
+        What has the scene, what can be chosen, and what a step costs.
+    goals : sequence of Goal or str, optional
+        As ``"minmax,steps"``, over states; by default the sum of the costs of open grips or the
+        largest, as the formulation minimizes, and of rules the worst step.
+    limits, budgets, stands, scenarios, over, orders, also, resources : optional
+        As of `Problem`: ``"travel=3.5m"``, ``"dry"``, `seqopt.scenarios`, ``"cvar=0.9"`` (or
+        ``worst-peak``, ``worst-total``), ``"tied"`` or ``"any"``.
+
+    Returns
+    -------
+    Problem
+        Nothing is computed yet, except scales that a criterion takes from the scene.
+
+    Raises
+    ------
+    ProblemError
+        If there is no such response, no grip is open, or questions do not go together.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> engine = seqopt.make_engine("auto", seqopt.load_scene("arch25"))
+    >>> worst = seqopt.CRITERIA["worst-ratio"]
+    >>> seqopt.pose(engine, seqopt.FreeRules(), worst, "minmax,steps", budgets="regrips=3")
+    Problem('arch25', 'free', criterion 'worst-ratio', minmax, steps, 1 budgets)
+    """
+    asked = {"goals": goals, "limits": limits, "budgets": budgets, "stands": stands}
+    worlds = {"scenarios": scenarios, "over": over, "orders": orders}
+    more = {"also": also, "resources": resources}
+    return _scaled(Problem.asked(engine, moves, criterion, **asked, **worlds, **more))
+
+
+def _scaled(problem: Problem) -> Problem:
+    """Return a problem whose criterion has the numbers of the scene; raise what does not fit."""
+    posed = replace(problem, criterion=_usual_criterion(problem))
+    posed.graphs.update(problem.graphs)
+    return posed
+
+
+def natural(problem: Problem) -> On:
+    """Return which graph answers a problem if no formulation says."""
+    if problem.orders is not None:
+        return On.ORDERS
+    if not in_layers(problem.moves) or problem.goals or problem.stands is not None:
+        return On.STATES
+    if problem.scenarios and problem.over.aim is Aim.SUM:
+        return On.SCENARIOS
+    return On.LAYERS
+
+
+def in_layers(moves: Schedule | FreeRules) -> bool:
+    """Return whether candidates of moves can be chosen in layers: whatever is wrong, it says so."""
+    return not isinstance(moves, FreeRules) and getattr(moves, "has_pairs", True)
+
+
+def usual(problem: Problem) -> str:
+    """Return the name of the formulation that solves a problem if none is named."""
+    on = natural(problem)
+    if on is On.SCENARIOS:
+        return "scenario_search"
+    if on is On.LAYERS and problem.scenarios:
+        return "minimax"
+    return "labels" if on is On.LAYERS and problem.budgets else USUAL[on]
+
+
+def graph_of(problem: Problem, on: On | None = None) -> Graph:
+    """Return the graph of choices of a problem; what was computed for it before is kept.
+
+    ``on``: what a formulation is given; by default as `natural`. Raises `ProblemError` if the
+    problem has no such graph.
+    """
+    on = natural(problem) if on is None else on
+    if on.name not in problem.graphs:
+        problem.graphs[on.name] = MADE[on](problem)
+    found: Graph = problem.graphs[on.name]
+    return found
+
+
+def layers_of(problem: Problem) -> Layers:
+    """Return the open grips of a problem in layers of candidates, budgets included."""
+    found = graph_of(problem, On.LAYERS)
+    assert isinstance(found, Layers)
+    return found
+
+
+def states_of(problem: Problem) -> States:
+    """Return the states and moves of a problem."""
+    found = graph_of(problem, On.STATES)
+    assert isinstance(found, States)
+    return found
+
+
+def _usual_criterion(problem: Problem) -> Criterion:
+    """Return the criterion with the numbers of the scene; raise what the usual graph says."""
+    on = natural(problem)
+    if on in (On.STATES, On.ORDERS):
+        graph = graph_of(problem, on)
+        states = graph.states if isinstance(graph, AllOrders) else graph
+        assert isinstance(states, States)  # it was made of rules or goals
+        return states.criterion
+    parse_budgets(problem.budgets)
+    if problem.scenarios:
+        return _scenarios(problem).nominal.criterion
+    return _plain_layers(problem).criterion
+
+
+def _plain_layers(problem: Problem) -> Layers:
+    """Return layers of candidates without budgets."""
+    if "plain" not in problem.graphs:
+        counted = [b.response for b in parse_budgets(problem.budgets) if b.response]
+        problem.graphs["plain"] = candidate_layers(
+            problem.engine,
+            problem.schedule,
+            problem.criterion,
+            problem.limits,
+            (*problem.also, *counted),
+            problem.resources,
+        )
+    found: Layers = problem.graphs["plain"]
+    return found
+
+
+def _layers(problem: Problem) -> Layers | ScenarioLayers:
+    """Return the layers of a problem; with scenarios the largest costs in any."""
+    _require_candidates(problem)
+    if problem.scenarios:
+        return _scenarios(problem)
+    asked = parse_budgets(problem.budgets)
+    layers = _plain_layers(problem)
+    return with_budgets(layers, asked) if asked else layers
+
+
+def _scenarios(problem: Problem) -> ScenarioLayers:
+    _require_candidates(problem)
+    if problem.budgets:
+        raise ProblemError(
+            f"budget {problem.budgets[0]}: aims over scenarios take none where candidates are "
+            "chosen; leave it out, or name aims"
+        )
+    return in_scenarios(_plain_layers(problem), problem.scenarios, problem.over)
+
+
+def _require_candidates(problem: Problem) -> None:
+    """Raise an error if something is asked that layers of candidates do not know."""
+    why = {
+        "orders": problem.orders is not None,
+        f"aim {', '.join(map(str, problem.goals))}": len(problem.goals) > 1
+        or any(goal not in AIMS.values() for goal in problem.goals),
+        "stands": problem.stands is not None,
+    }
+    for name, asked in why.items():
+        if asked:
+            raise ProblemError(
+                f"{name}: it is about states of the build, not about candidates alone; take "
+                "schedule_search or another formulation of states"
+            )
+
+
+def _states(problem: Problem) -> States:
+    """Return the states of a problem, with all that is asked of them."""
+    if problem.scenarios and problem.over != WORST_PEAK:
+        raise ProblemError(
+            f"robust aim {problem.over}: where states are chosen, worst steps count; "
+            "give worst-peak"
+        )
+    goals = problem.goals or (AIMS[Aim.PEAK],)
+    found = build_states(
+        problem.engine, problem.moves, problem.criterion, goals, problem.limits, problem.stands
+    )
+    found = replace(found, resources=problem.resources)
+    if caps := parse_caps(problem.budgets):
+        found = within(found, caps)
+    return over_scenarios(found, problem.scenarios) if problem.scenarios else found
+
+
+def _in_own_order(problem: Problem) -> States:
+    if problem.orders is not None:
+        raise ProblemError(
+            f"{problem.orders.value} orders: a Pareto set, or states alone, are of one order; take "
+            "order_search, or give an order"
+        )
+    return _states(problem)
+
+
+def _all_orders(problem: Problem) -> AllOrders:
+    if problem.orders is None:
+        raise ProblemError("an order is given; pose with orders='tied' to seek one")
+    return AllOrders(_states(problem), problem.orders)
+
+
+MADE: dict[On, Callable[[Problem], Graph]] = {
+    On.LAYERS: _layers,
+    On.SCENARIOS: _scenarios,
+    On.STATES: _in_own_order,
+    On.ORDERS: _all_orders,
+}
+
 
 SOLVE: dict[On, Callable[[Any, Formulation, Run], Plan]] = {
     On.LAYERS: solve_layers,

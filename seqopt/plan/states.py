@@ -17,10 +17,8 @@ from seqopt.errors import InfeasibleError, SolverError
 from seqopt.graph.orders import AllOrders, OrderSelection
 from seqopt.graph.states.states import States
 from seqopt.graph.states.visits import steps_of
-from seqopt.plan.calling.formulation import Formulation, FormulationKind, find_formulation
-from seqopt.plan.calling.guard import StatePath, called, readable, text, with_numbers
-from seqopt.plan.calling.selecting import require_proof
-from seqopt.plan.calling.watch import Run
+from seqopt.plan.calling.formulation import Formulation, FormulationKind, Run, find_formulation
+from seqopt.plan.calling.guard import StatePath, called, readable, require_proof, text, with_numbers
 from seqopt.plan.judge.certificate import TOLERANCE
 from seqopt.plan.judge.infeasible import confirmed
 from seqopt.plan.judge.orders import finds_better_order
@@ -28,7 +26,7 @@ from seqopt.plan.judge.schedules import judge_schedule
 from seqopt.plan.plan import Plan
 from seqopt.plan.status import FoundOrder
 from seqopt.responses.resources import HERE
-from seqopt.scene.orders import Order, in_order
+from seqopt.scene.scene import Order, in_order
 from seqopt.work.workers import keep
 
 COUNTED = ("each", "sets", "screened", "stability")  # of a problem: they know what was computed

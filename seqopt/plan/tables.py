@@ -13,7 +13,7 @@ from seqopt.graph.layers.layers import Layers
 from seqopt.graph.layers.ranking import move_costs, rank_of, split_gap, under_both
 from seqopt.plan.calling.formulation import Selection
 from seqopt.plan.search.window_search import WindowSearch
-from seqopt.problem.goals import Aim
+from seqopt.problem.problem import Aim
 from seqopt.responses.choices import StepChoices
 
 Objectives = dict[str, dict[str, float | None] | None]

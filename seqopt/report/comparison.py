@@ -22,7 +22,7 @@ from seqopt.plan.layers import on_the_way
 from seqopt.plan.plan import Plan
 from seqopt.plan.solving import solve
 from seqopt.problem.criteria import RankSum, WorstRatio
-from seqopt.problem.goals import Aim
+from seqopt.problem.problem import Aim
 from seqopt.problem.requirements import Criterion, overloads
 from seqopt.responses.quantities import CHOSEN_BY, RESPONSES, robot_response
 from seqopt.responses.resources import Resources

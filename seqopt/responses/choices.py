@@ -24,25 +24,23 @@ import numpy as np
 from seqopt.arrays import Terse
 from seqopt.engines.interface import Engine
 from seqopt.errors import MemoryShortError
-from seqopt.responses.batches import (
+from seqopt.responses.blocks import (
+    Answers,
     Batch,
+    Block,
+    Blocks,
     Keeping,
     StepChoices,
+    Store,
     Wanted,
     batch_of,
     choices_of,
     combinations,
     distinct,
     no_node_twice,
+    open_store,
     require_memory,
     steps_of_batches,
-)
-from seqopt.responses.blocks import (
-    Answers,
-    Block,
-    Blocks,
-    Store,
-    open_store,
     tally_of,
     work,
     worker_for,

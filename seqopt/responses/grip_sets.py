@@ -15,8 +15,8 @@ import numpy as np
 from seqopt.arrays import Floats, Ints
 from seqopt.engines.interface import Engine
 from seqopt.errors import MechanismError
-from seqopt.responses.batches import BLOCK
 from seqopt.responses.blocks import (
+    BLOCK,
     Answers,
     Block,
     Shipment,

@@ -13,8 +13,8 @@ from functools import cached_property
 from seqopt.errors import StepError
 from seqopt.network.network import Network
 from seqopt.sequence.free_rules import Ending, FreeRules, Newest
+from seqopt.sequence.schedule import islands
 from seqopt.sequence.steps import Grips, Step, StepKind, reachable
-from seqopt.sequence.support import islands
 from seqopt.sequence.two_robots import placing_node
 
 

@@ -22,7 +22,7 @@ from seqopt.errors import StepError
 from seqopt.network.network import Network
 from seqopt.scene.parts import Robot
 from seqopt.sequence.free_rules import Ending, FreeRules, Newest, Payload
-from seqopt.sequence.support import islands
+from seqopt.sequence.schedule import islands
 from seqopt.sequence.two_robots import placing_node
 
 

@@ -11,9 +11,8 @@ from seqopt.errors import StepError, did_you_mean
 from seqopt.network.build import network_of
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
-from seqopt.sequence.schedule import Move, OpenGrip, OpenStep, Schedule
+from seqopt.sequence.schedule import Move, OpenGrip, OpenStep, Schedule, check_support
 from seqopt.sequence.steps import Step, StepKind, reachable
-from seqopt.sequence.support import check_support
 from seqopt.sequence.two_robots import (
     alternate,
     cast,

@@ -18,8 +18,8 @@ from seqopt.network.build import network_of
 from seqopt.network.network import Network, PartKind
 from seqopt.scene.parts import Brick, Robot, Side
 from seqopt.scene.scene import Scene
+from seqopt.sequence.schedule import acting_bodies, check_support
 from seqopt.sequence.steps import Step, StepKind, check_sequence
-from seqopt.sequence.support import acting_bodies, check_support
 
 _Pair = tuple[int, int]  # who places, who holds meanwhile: indices of the scene's robots
 _Ways = dict[_Pair, tuple[int, tuple[_Pair, ...]]]  # by pair: changes so far, pairs so far

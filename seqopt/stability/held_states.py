@@ -16,8 +16,8 @@ import numpy as np
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints
 from seqopt.contact.assembly import Assembly
 from seqopt.contact.faces import Contacts, bare_assembly
+from seqopt.errors import plugins
 from seqopt.network.network import Network
-from seqopt.plugins import plugins
 from seqopt.stability.limit_analysis import (
     CAP,
     LARGEST_FORCE,

@@ -23,7 +23,7 @@ import numpy as np
 
 from seqopt.arrays import Floats, FrozenValue, Vector
 from seqopt.contact.assembly import Assembly
-from seqopt.plugins import plugins
+from seqopt.errors import plugins
 
 EXACT = 1e-6  # largest violation of an accepted proof, over the force scale and max(1, z)
 GAP = 1e-3  # largest difference between the two proofs, relative to max(1, z)

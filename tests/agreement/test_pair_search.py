@@ -24,7 +24,7 @@ from seqopt.plan.judge.certificate import certify_partial
 from seqopt.plan.search.window_search import search_windows
 from seqopt.plan.solving import solve
 from seqopt.problem.criteria import Among, Ranked, StepCost
-from seqopt.problem.goals import Aim
+from seqopt.problem.problem import Aim
 from seqopt.problem.requirements import Limit
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.study.published import EQUATIONS, WEIGHTED, WORST_RATIO

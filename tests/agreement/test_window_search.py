@@ -10,7 +10,7 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import SolverError, TimeUpError
 from seqopt.graph.layers.layers import candidate_layers
 from seqopt.network.build import build_network
-from seqopt.plan.calling.watch import Watch
+from seqopt.plan.calling.formulation import Watch
 from seqopt.plan.search.window_search import search_windows
 from seqopt.plan.solving import solve
 from seqopt.problem.requirements import Limit

@@ -26,7 +26,7 @@ from seqopt.plan.calling.formulation import (
     formulations,
 )
 from seqopt.plan.solving import solve
-from seqopt.problem.goals import Aim
+from seqopt.problem.problem import Aim
 from seqopt.problem.requirements import Limit
 from seqopt.sequence.three_robots import SCHEDULES, three_robot_loop
 from seqopt.study.published import CRITERIA, EQUATIONS, WORST_RATIO
@@ -174,7 +174,7 @@ def test_an_answer_stopped_early_is_allowed_and_its_bound_holds(name, problem, l
     best = brute_force(problem, formulation.aim)
     told = []
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("seqopt.plan.calling.watch.time", Clock())
+        patch.setattr("seqopt.plan.calling.formulation.time", Clock())
         plan, wrongly_refused = None, False
         try:
             plan = solve(problem, formulation, time_limit=float(limit), progress=told.append)

@@ -12,7 +12,6 @@ from formulations import solvers
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.graph.layers.costs import Budget, LayeredCosts
 from seqopt.graph.layers.interface import CostProblem
-from seqopt.plan.calling.flow import LayeredFlow
 from seqopt.plan.calling.formulation import (
     Formulation,
     FormulationKind,
@@ -20,9 +19,10 @@ from seqopt.plan.calling.formulation import (
     Selection,
     formulations,
 )
+from seqopt.plan.calling.priced_paths import LayeredFlow
 from seqopt.plan.judge.certificate import certify
 from seqopt.plan.solving import solve
-from seqopt.problem.goals import Aim
+from seqopt.problem.problem import Aim
 from tests.quality.degenerate import MALFORMED, judge, outcomes
 from tests.quality.degenerate_cases import CASES, Size, capped, costs, opposed, whole
 

@@ -17,8 +17,13 @@ from seqopt.graph.paths import fewest_moves, lexicographic
 from seqopt.graph.states.states import build_states
 from seqopt.graph.states.visits import explore
 from seqopt.network.build import build_network
-from seqopt.plan.calling.formulation import FormulationKind, On, find_formulation, formulation_names
-from seqopt.plan.calling.watch import Watch
+from seqopt.plan.calling.formulation import (
+    FormulationKind,
+    On,
+    Watch,
+    find_formulation,
+    formulation_names,
+)
 from seqopt.plan.solving import solve
 from seqopt.problem.requirements import Limit
 from seqopt.sequence.free_rules import FreeRules, with_robots

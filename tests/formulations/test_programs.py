@@ -16,10 +16,9 @@ from formulations.solvers import anatomy, minimize, minimize_whole
 from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.graph.layers.costs import LayeredCosts
 from seqopt.graph.layers.interface import CostProblem
-from seqopt.plan.calling.formulation import End, FormulationKind, Reads
+from seqopt.plan.calling.formulation import End, FormulationKind, Reads, Watch
 from seqopt.plan.calling.formulation import formulations as registered
-from seqopt.plan.calling.watch import Watch
-from seqopt.problem.goals import Aim
+from seqopt.problem.problem import Aim
 from tests.strategies import problems
 
 ALL = registered()

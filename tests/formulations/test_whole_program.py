@@ -26,9 +26,8 @@ from formulations.whole_program import (
 from seqopt.errors import InfeasibleError
 from seqopt.graph.layers.costs import LayeredCosts
 from seqopt.graph.layers.interface import CostProblem
-from seqopt.plan.calling.flow import ACCURACY
-from seqopt.plan.calling.formulation import End
-from seqopt.plan.calling.watch import Watch
+from seqopt.plan.calling.formulation import End, Watch
+from seqopt.plan.calling.priced_paths import ACCURACY
 
 PROGRAMS = {
     module.FORMULATION.name: module

@@ -12,7 +12,7 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import MechanismError
 from seqopt.network.build import build_network
 from seqopt.responses.quantities import CHOSEN_BY, lengths
-from seqopt.sequence.support import islands
+from seqopt.sequence.schedule import islands
 from tests.strategies import arches, both_sided
 
 few = settings(max_examples=15, deadline=None)

@@ -19,7 +19,6 @@ from seqopt.plan.calling.formulation import End, FormulationKind, On, formulatio
 from seqopt.plan.judge import budget_proof
 from seqopt.plan.judge.budget_proof import least_within
 from seqopt.plan.judge.infeasible import smallest_conflict
-from seqopt.plan.price_curve import price_curve
 from seqopt.plan.solving import solve
 from tests.strategies import budgeted
 
@@ -182,17 +181,24 @@ def test_few_labels_stop_with_a_bound(problem25):
 
 
 def test_what_a_budget_costs(problem25):
-    budget = travel(problem25, np.inf)
-    table = price_curve(problem25, budget, [10.0, 12.0, 16.0, 20.0, 30.0])
-    assert np.isnan(table["objective"].iloc[0])
-    rest = table.iloc[1:]
-    assert rest["objective"].is_monotonic_decreasing
-    assert (rest["spent"] <= rest["bound"]).all()
-    assert (rest["gap"] <= 1e-6).all()
-    assert rest["price"].iloc[-1] == 0
-    assert rest["price"].is_monotonic_decreasing
-    relaxed = price_curve(problem25, budget, [12.0, 16.0], "lagrangian")
-    np.testing.assert_allclose(relaxed["price"], rest["price"].iloc[:2])
+    """Less travel costs more, at a price that rises; both formulations name it."""
+    bounds = (12.0, 16.0, 20.0, 30.0)
+    capped = [replace(problem25, budgets=(travel(problem25, bound),)) for bound in bounds]
+    plans = [solve(problem, "labels") for problem in capped]
+    proofs = [plan.certificate for plan in plans]
+    values = [proof.objective for proof in proofs]
+    prices = [plan.selection.prices["robot travel [m]"] for plan in plans]
+    assert values == sorted(values, reverse=True)
+    assert all(p.spent["robot travel [m]"] <= b for p, b in zip(proofs, bounds, strict=True))
+    assert all(proof.gap <= 1e-6 for proof in proofs)
+    assert prices == sorted(prices, reverse=True)
+    assert prices[-1] == 0
+    relaxed = [
+        solve(problem, "lagrangian").selection.prices["robot travel [m]"] for problem in capped[:2]
+    ]
+    np.testing.assert_allclose(relaxed, prices[:2])
+    with pytest.raises(InfeasibleError):
+        solve(replace(problem25, budgets=(travel(problem25, 10.0),)), "labels")
 
 
 def test_a_budget_without_a_bound_is_none(problem25):

@@ -22,7 +22,7 @@ from seqopt.plan.calling.formulation import (
 )
 from seqopt.plan.judge.certificate import TOLERANCE, certify, judge, least_peak, least_sum
 from seqopt.plan.solving import solve
-from seqopt.problem.goals import Aim
+from seqopt.problem.problem import Aim
 from tests.strategies import problems
 
 ALL = formulations(On.LAYERS)

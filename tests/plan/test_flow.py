@@ -10,7 +10,7 @@ import pytest
 from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.graph.layers.costs import Budget, LayeredCosts
 from seqopt.graph.layers.interface import CostProblem
-from seqopt.plan.calling.flow import ACCURACY, layered_flow
+from seqopt.plan.calling.priced_paths import ACCURACY, layered_flow
 from seqopt.plan.judge.certificate import TOLERANCE
 
 INF = np.inf

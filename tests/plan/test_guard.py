@@ -18,7 +18,7 @@ from seqopt.plan.calling.guard import StatePath
 from seqopt.plan.front import FrontSelection, StateFront, find_front
 from seqopt.plan.solving import solve
 from seqopt.problem.criteria import WorstRatio
-from seqopt.problem.goals import parse_goals
+from seqopt.problem.problem import parse_goals
 from seqopt.problem.requirements import Limit
 from seqopt.sequence.free_rules import FreeRules
 from tests.builders import small_arch

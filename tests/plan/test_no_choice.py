@@ -18,7 +18,7 @@ from seqopt.network.build import build_network
 from seqopt.plan.calling import formulation as registry
 from seqopt.plan.calling.formulation import Selection, find_formulation
 from seqopt.plan.solving import solve
-from seqopt.responses import batches
+from seqopt.responses import blocks as batches
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.scene_file import save_scene
 from seqopt.sequence.three_robots import modified_sequential, three_robot_loop

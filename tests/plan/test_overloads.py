@@ -13,7 +13,7 @@ from seqopt.graph.layers.costs import LayeredCosts
 from seqopt.graph.layers.interface import CostProblem
 from seqopt.graph.layers.layers import candidate_layers, travel
 from seqopt.plan.judge.certificate import certify
-from seqopt.problem.goals import Aim
+from seqopt.problem.problem import Aim
 from seqopt.problem.requirements import Excess, Limit, overloads, payload_limits
 
 

@@ -28,7 +28,7 @@ from seqopt.plan.judge.orders import finds_better_order
 from seqopt.plan.judge.proof import Passable, Proof
 from seqopt.plan.solving import solve
 from seqopt.problem.criteria import WorstRatio
-from seqopt.problem.goals import Aim
+from seqopt.problem.problem import Aim
 from seqopt.problem.requirements import Limit
 from seqopt.responses.quantities import CHOSEN_BY
 from seqopt.sequence.free_check import RuleBook

@@ -26,10 +26,10 @@ from seqopt.graph.scenarios import (
     largest_of,
     scenario_arcs,
 )
-from seqopt.plan.calling.watch import Watch
+from seqopt.plan.calling.formulation import Watch
 from seqopt.plan.out_of_sample import judge_unseen
-from seqopt.plan.posing import graph_of, layers_of
-from seqopt.problem.goals import WORST_PEAK, WORST_TOTAL, Aim, RobustAim, cvar, parse_robust
+from seqopt.plan.solving import graph_of, layers_of
+from seqopt.problem.problem import WORST_PEAK, WORST_TOTAL, Aim, RobustAim, cvar, parse_robust
 from seqopt.responses.resources import Resources
 from seqopt.scene.scenarios import scenarios
 from tests.builders import six_bricks, small_arch

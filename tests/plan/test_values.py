@@ -9,10 +9,10 @@ import pytest
 
 from seqopt.graph.layers.costs import Budget, LayeredCosts
 from seqopt.graph.layers.interface import CostProblem
-from seqopt.plan.calling.flow import layered_flow
 from seqopt.plan.calling.formulation import Selection
+from seqopt.plan.calling.priced_paths import layered_flow
 from seqopt.plan.judge.certificate import certify
-from seqopt.problem.goals import Aim
+from seqopt.problem.problem import Aim
 
 
 def made(cost=1.0):

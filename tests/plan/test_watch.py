@@ -10,8 +10,7 @@ import pytest
 from seqopt.errors import ProblemError
 from seqopt.graph.layers.costs import LayeredCosts
 from seqopt.graph.layers.interface import CostProblem
-from seqopt.plan.calling.formulation import find_formulation
-from seqopt.plan.calling.watch import Finding, Watch
+from seqopt.plan.calling.formulation import Finding, Watch, find_formulation
 from seqopt.plan.solving import solve
 
 

@@ -18,7 +18,7 @@ from seqopt.graph.states.states import build_states
 from seqopt.plan.judge.proof import Proof
 from seqopt.plan.search.in_order import least_quantile, solve_in_order
 from seqopt.problem.criteria import StepCost, WeightedSum
-from seqopt.problem.goals import Aim
+from seqopt.problem.problem import Aim
 from seqopt.sequence.free_rules import FreeRules
 from tests.builders import six_bricks, small_arch
 from tests.strategies import problems

@@ -19,7 +19,7 @@ from seqopt.graph.layers.interface import CostProblem, PlacementProblem
 from seqopt.graph.layers.layers import Layers, candidate_layers
 from seqopt.network.network import Network
 from seqopt.problem.criteria import WorstRatio
-from seqopt.problem.goals import Aim
+from seqopt.problem.problem import Aim
 from seqopt.problem.requirements import Criterion, Limit
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.study.published import EQUATIONS, RESOLUTION

@@ -54,7 +54,7 @@ EQUIVALENT = (
         Equivalent(module, line, "strict=True", "strict=False", why)
         for module, line, why in (
             ("formulations.*", "zip(", LENGTHS),
-            ("seqopt.plan.calling.flow", "zip(", LENGTHS),
+            ("seqopt.plan.calling.priced_paths", "zip(", LENGTHS),
             (COSTS, "enumerate(zip(", LENGTHS),
             (COSTS, "zip(self.single[-2::-1]", LENGTHS),
             (CERTIFICATE, "shared in zip(", LENGTHS),
@@ -109,7 +109,11 @@ EQUIVALENT = (
         CERTIFICATE, "low, high", "- 1", "* 1", "the largest of all costs is never looked at"
     ),
     Equivalent(
-        "seqopt.plan.calling.flow", "known and", "== 1", "<= 1", "there is this one at least"
+        "seqopt.plan.calling.priced_paths",
+        "known and",
+        "== 1",
+        "<= 1",
+        "there is this one at least",
     ),
     *(
         Equivalent("formulations.solvers", "SECONDS", "300.0", size, "when a solver has stalled")

@@ -82,7 +82,7 @@ MODULES = {
     "seqopt.problem.criteria": (
         *("problem/test_criteria", "graph/test_layers", "problem/test_scales"),
     ),
-    "seqopt.plan.calling.flow": ("plan/test_flow", "plan/test_values", *CHOSEN),
+    "seqopt.plan.calling.priced_paths": ("plan/test_flow", "plan/test_values", *CHOSEN),
     "formulations.layers.beam": CHOSEN,
     "formulations.layers.cascade": CHOSEN,
     "formulations.contact.limit_analysis": STANDING,

@@ -12,7 +12,7 @@ from seqopt.errors import ProblemError
 from seqopt.graph.layers.layers import candidate_layers
 from seqopt.network.build import build_network
 from seqopt.problem.criteria import RankSum, equal
-from seqopt.responses import batches
+from seqopt.responses import blocks as batches
 from seqopt.responses.choices import CHOICE_RESPONSES, evaluate_choices
 from seqopt.responses.quantities import responses_of
 from seqopt.responses.table import step_fields

@@ -10,7 +10,7 @@ import time
 import pytest
 
 from seqopt.engines.registry import make_engine
-from seqopt.responses import batches
+from seqopt.responses import blocks as batches
 from seqopt.responses.choices import CHOICE_RESPONSES, Evaluation
 from seqopt.responses.resources import HERE, Resources
 from seqopt.workflow import optimize

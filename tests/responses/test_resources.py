@@ -19,7 +19,7 @@ from seqopt.errors import MemoryShortError, ProblemError, SceneError
 from seqopt.graph.layers.layers import candidate_layers
 from seqopt.network.build import build_network
 from seqopt.plan.solving import solve
-from seqopt.responses import batches
+from seqopt.responses import blocks as batches
 from seqopt.responses import choices as division
 from seqopt.responses.blocks import Block, answer, pack, worker_for
 from seqopt.responses.choices import CHOICE_RESPONSES, Evaluation

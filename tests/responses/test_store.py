@@ -20,7 +20,7 @@ from seqopt.graph.layers.layers import candidate_layers
 from seqopt.graph.scenarios import in_scenarios
 from seqopt.plan.solving import solve
 from seqopt.problem.criteria import WeightedSum
-from seqopt.problem.goals import WORST_TOTAL
+from seqopt.problem.problem import WORST_TOTAL
 from seqopt.responses import blocks
 from seqopt.responses.blocks import Store
 from seqopt.responses.choices import Evaluation

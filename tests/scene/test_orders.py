@@ -10,8 +10,8 @@ import seqopt
 from seqopt.cli.main import main
 from seqopt.errors import SceneError
 from seqopt.scene.library.wall import WallShape, wall
-from seqopt.scene.orders import from_all_ends, in_order, parse_order
-from seqopt.sequence.support import islands
+from seqopt.scene.scene import from_all_ends, in_order, parse_order
+from seqopt.sequence.schedule import islands
 from tests.builders import small_arch
 
 

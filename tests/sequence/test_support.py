@@ -10,9 +10,8 @@ from experiments.harness.scenes import running_bond
 from seqopt.errors import StepError
 from seqopt.network.build import build_network
 from seqopt.scene.arch import ArchShape, arch_scene
-from seqopt.sequence.schedule import OpenGrip, OpenStep
+from seqopt.sequence.schedule import OpenGrip, OpenStep, check_support, islands
 from seqopt.sequence.steps import Step, StepKind
-from seqopt.sequence.support import check_support, islands
 from seqopt.sequence.three_robots import open_schedule, three_robot_loop
 from seqopt.sequence.two_robots import (
     alternate,

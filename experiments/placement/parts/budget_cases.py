@@ -24,8 +24,7 @@ from seqopt.errors import InfeasibleError, SeqoptError
 from seqopt.graph.layers.costs import Budget
 from seqopt.graph.layers.layers import Layers, candidate_layers, steps_over, travel
 from seqopt.network.build import build_network
-from seqopt.plan.calling.formulation import Formulation, Selection, find_formulation
-from seqopt.plan.calling.watch import Watch
+from seqopt.plan.calling.formulation import Formulation, Selection, Watch, find_formulation
 from seqopt.plan.judge.certificate import judge
 from seqopt.plan.solving import solve
 from seqopt.sequence.three_robots import three_robot_loop

@@ -20,8 +20,7 @@ from seqopt.graph.states.states import build_states
 from seqopt.graph.states.visits import explore
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
-from seqopt.plan.posing import pose
-from seqopt.plan.solving import solve
+from seqopt.plan.solving import pose, solve
 from seqopt.problem.standing import Standing
 from seqopt.responses.table import analyze, force_column
 from seqopt.scene.arch import ArchShape, arch_scene

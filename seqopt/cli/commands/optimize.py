@@ -21,8 +21,7 @@ from seqopt.graph.states.states import States
 from seqopt.plan.calling.formulation import End, Formulation, On, as_formulation
 from seqopt.plan.out_of_sample import Trial, judge_unseen, worst_values
 from seqopt.plan.plan import Plan
-from seqopt.plan.posing import usual
-from seqopt.plan.solving import solve
+from seqopt.plan.solving import solve, usual
 from seqopt.sequence.schedule import Schedule
 from seqopt.study.published import paper_models
 from seqopt.work.progress import within

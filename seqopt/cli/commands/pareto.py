@@ -30,8 +30,8 @@ from seqopt.errors import ProblemError, StepError, did_you_mean
 from seqopt.files import csv_text, require_folder
 from seqopt.graph.states.states import States
 from seqopt.plan.front import Front, find_front, pick
-from seqopt.plan.posing import states_of
-from seqopt.problem.goals import judged_by
+from seqopt.plan.solving import states_of
+from seqopt.problem.problem import judged_by
 from seqopt.report.comparison import method_tables, shown_table, worst_of
 from seqopt.report.pages import PAGE, front_page
 from seqopt.responses.table import LinearRange, analyze, builds_in_words

@@ -14,7 +14,7 @@ import pandas as pd
 from seqopt.files import csv_text, require_apart, require_folder, write_folder
 from seqopt.graph.layers.layers import Layers
 from seqopt.graph.states.states import States
-from seqopt.plan.calling.watch import trace_rows
+from seqopt.plan.calling.formulation import trace_rows
 from seqopt.plan.out_of_sample import Trial
 from seqopt.plan.plan import Plan
 from seqopt.report.comparison import Comparison

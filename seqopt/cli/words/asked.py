@@ -24,8 +24,7 @@ from seqopt.problem.problem import Problem
 from seqopt.problem.requirements import OWN, overloads
 from seqopt.responses.staged import staged_fields
 from seqopt.responses.table import OUTSIDE, REMEDY, step_fields
-from seqopt.scene.orders import in_order
-from seqopt.scene.scene import Scene
+from seqopt.scene.scene import Scene, in_order
 from seqopt.scene.scene_file import dump_scene, load_scene
 from seqopt.sequence.steps import AnyStep, Step, idle_robots
 from seqopt.work.progress import told

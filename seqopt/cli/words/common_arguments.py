@@ -12,8 +12,7 @@ from seqopt.engines.registry import ENGINES
 from seqopt.errors import SceneError, StepError
 from seqopt.network.build import build_network
 from seqopt.problem.criteria import Among, Ranked
-from seqopt.scene.orders import ORDERS
-from seqopt.scene.scene import Scene
+from seqopt.scene.scene import ORDERS, Scene
 from seqopt.scene.scene_file import builtin_scenes
 from seqopt.sequence.schedule_file import read_plan
 from seqopt.sequence.steps import Step

@@ -24,8 +24,7 @@ from seqopt.errors import ProblemError, StepError
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.plan.calling.formulation import On, find_formulation
-from seqopt.problem.goals import RobustAim
-from seqopt.problem.problem import Orders, Problem, parse_budgets, parse_caps
+from seqopt.problem.problem import Orders, Problem, RobustAim, parse_budgets, parse_caps
 from seqopt.problem.requirements import Criterion
 from seqopt.scene.scenarios import Scenarios
 from seqopt.scene.scene import Scene

@@ -14,7 +14,7 @@ from seqopt.contact.mortar import MORTARS, Mortar, find_mortar
 from seqopt.errors import ProblemError, StepError, did_you_mean
 from seqopt.plan.calling.formulation import Formulation, as_formulation
 from seqopt.problem.criteria import Among, Ranked, RankSum
-from seqopt.problem.goals import RobustAim, parse_robust
+from seqopt.problem.problem import RobustAim, parse_robust
 from seqopt.problem.requirements import NEVER, Criterion, Limit, payload_limits
 from seqopt.problem.standing import Standing
 from seqopt.responses.choices import CHOICE_RESPONSES

@@ -10,7 +10,7 @@ import numpy as np
 
 from seqopt.arrays import Floats, FrozenValue
 from seqopt.graph.layers.costs import Budget, LayeredCosts
-from seqopt.problem.goals import Aim
+from seqopt.problem.problem import Aim
 from seqopt.sequence.steps import Step
 
 

@@ -17,7 +17,7 @@ from seqopt.engines.interface import Engine
 from seqopt.errors import InfeasibleError, ProblemError, did_you_mean
 from seqopt.graph.layers.costs import Budget, Joined, LayeredCosts
 from seqopt.problem.criteria import Among, Ranked, RankSum
-from seqopt.problem.goals import Aim
+from seqopt.problem.problem import Aim
 from seqopt.problem.requirements import (
     Criterion,
     Limit,

@@ -16,7 +16,7 @@ import numpy as np
 from seqopt.arrays import Bools, Floats, FrozenValue
 from seqopt.graph.layers.costs import LayeredCosts
 from seqopt.problem.criteria import Among, Ranked, RankSum, StepCost, WeightedSum, WorstRatio
-from seqopt.problem.goals import Aim
+from seqopt.problem.problem import Aim
 from seqopt.problem.requirements import Criterion
 
 

@@ -15,7 +15,7 @@ from seqopt.errors import ProblemError
 from seqopt.graph.scenarios import engine_for, require_alike
 from seqopt.network.network import Network
 from seqopt.problem.criteria import RankSum
-from seqopt.problem.goals import LARGEST, STATE_RESPONSES, Goal, Measure, parse_goals
+from seqopt.problem.problem import LARGEST, STATE_RESPONSES, Goal, Measure, parse_goals
 from seqopt.problem.requirements import (
     LIMIT_TOLERANCE,
     Criterion,

@@ -12,7 +12,7 @@ from seqopt.errors import SolverError
 from seqopt.graph.explore import Explorer, Moves
 from seqopt.graph.graph import Graph
 from seqopt.graph.states.states import States
-from seqopt.problem.goals import Measure
+from seqopt.problem.problem import Measure
 from seqopt.sequence import free_space
 from seqopt.sequence.free_rules import Ending
 from seqopt.sequence.free_space import FreeSpace, node_numbers

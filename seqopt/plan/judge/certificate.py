@@ -24,7 +24,7 @@ from seqopt.plan.calling.formulation import (
     as_formulation,
 )
 from seqopt.plan.judge.budget_proof import least_within
-from seqopt.problem.goals import Aim
+from seqopt.problem.problem import Aim
 from seqopt.responses.blocks import pack
 from seqopt.responses.choices import Evaluation
 from seqopt.responses.quantities import CHOSEN_BY

@@ -22,7 +22,7 @@ from seqopt.plan.judge.budget_proof import least_within
 from seqopt.plan.judge.certificate import least_sum
 from seqopt.plan.judge.proof import Proof
 from seqopt.plan.search.sturdiest import WORST, bisected, with_margin
-from seqopt.problem.goals import STATE_RESPONSES, Goal, Measure
+from seqopt.problem.problem import STATE_RESPONSES, Goal, Measure
 from seqopt.problem.standing import Standing
 from seqopt.sequence.free_rules import FreeRules, Payload
 from seqopt.sequence.schedule import Schedule
@@ -254,7 +254,7 @@ def _enough(problem: States, way: str, look: Look) -> str:
 def worst_least(problem: States, response: str, look: Look = explore) -> float:
     """Return the least worst value of a response that a plan within the other limits reaches.
 
-    ``response``: one of `seqopt.problem.goals.STATE_RESPONSES`, or ``bond``; ``look``:
+    ``response``: one of `seqopt.problem.problem.STATE_RESPONSES`, or ``bond``; ``look``:
     returns the states that a problem's plans may pass. Result: SI units; infinite if there is no
     plan.
     """

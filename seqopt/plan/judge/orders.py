@@ -24,8 +24,8 @@ from seqopt.graph.states.states import States
 from seqopt.network.build import build_network
 from seqopt.plan.judge.proof import BELOW, Asked, Passable, Tables, ask
 from seqopt.plan.judge.rule_moves import Follows, RuleTables
-from seqopt.problem.goals import Measure
-from seqopt.scene.orders import Order
+from seqopt.problem.problem import Measure
+from seqopt.scene.scene import Order
 from seqopt.sequence.free_check import RuleBook
 from seqopt.sequence.free_rules import Ending
 from seqopt.sequence.free_space import node_numbers

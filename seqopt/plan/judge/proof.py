@@ -22,7 +22,7 @@ from seqopt.graph.states.states import States
 from seqopt.graph.states.visits import move_amounts
 from seqopt.plan.judge.rule_moves import Follows, RuleTables, ScheduleTables
 from seqopt.plan.judge.standing_proof import StandingProof
-from seqopt.problem.goals import LARGEST, Goal, Measure
+from seqopt.problem.problem import LARGEST, Goal, Measure
 from seqopt.problem.requirements import LIMIT_TOLERANCE, state_costs
 from seqopt.responses.blocks import Block
 from seqopt.responses.grip_sets import KnownRows, solve_sets

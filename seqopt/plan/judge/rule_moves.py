@@ -18,9 +18,8 @@ from seqopt.errors import StepError
 from seqopt.network.network import Network
 from seqopt.sequence.free_check import RuleBook
 from seqopt.sequence.free_rules import Ending, Newest
-from seqopt.sequence.schedule import Hold, OpenGrip, Schedule, holds
+from seqopt.sequence.schedule import Hold, OpenGrip, Schedule, holds, islands
 from seqopt.sequence.steps import Step, StepKind
-from seqopt.sequence.support import islands
 
 PAIRS = 1_000_000  # of states and places that are looked at together
 

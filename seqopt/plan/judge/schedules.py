@@ -22,7 +22,7 @@ from seqopt.plan.judge.certificate import Certificate
 from seqopt.plan.judge.proof import BELOW, Hint, Proof
 from seqopt.plan.judge.rule_moves import check_scheduled
 from seqopt.plan.judge.standing_proof import proven_margins, require_margin
-from seqopt.problem.goals import LARGEST, Goal, Measure
+from seqopt.problem.problem import LARGEST, Goal, Measure
 from seqopt.problem.standing import slack
 from seqopt.responses.quantities import CHOSEN_BY
 from seqopt.responses.table import analyze, force_column

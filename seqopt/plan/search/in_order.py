@@ -20,7 +20,7 @@ from seqopt.graph.layers.interface import CostProblem, PlacementProblem
 from seqopt.graph.layers.layers import Layers, compared
 from seqopt.graph.layers.ranking import TIED_SUMS, on_a_least_path
 from seqopt.plan.judge.certificate import least_sum
-from seqopt.problem.goals import Aim
+from seqopt.problem.problem import Aim
 from seqopt.scene.checks import short
 
 

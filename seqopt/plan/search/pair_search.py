@@ -25,12 +25,11 @@ from seqopt.graph.layers.interface import CostProblem
 from seqopt.graph.layers.layers import Layers, pairs_as_moves, possible_after, window
 from seqopt.graph.layers.partial_costs import PartialCosts, floor_of
 from seqopt.interrupts import answered
-from seqopt.plan.calling.formulation import End, Formulation, FormulationKind, Selection
-from seqopt.plan.calling.selecting import select
-from seqopt.plan.calling.watch import Watch
+from seqopt.plan.calling.formulation import End, Formulation, FormulationKind, Selection, Watch
+from seqopt.plan.calling.guard import select
 from seqopt.plan.search.window_search import WindowSearch, search_windows
 from seqopt.problem.criteria import WeightedSum, WorstRatio
-from seqopt.problem.goals import Aim
+from seqopt.problem.problem import Aim
 from seqopt.responses.resources import Resources
 from seqopt.sequence.schedule import Schedule
 

@@ -10,7 +10,7 @@ from seqopt.errors import InfeasibleError
 from seqopt.graph.explore import Explorer
 from seqopt.graph.states.states import States
 from seqopt.graph.states.visits import explore
-from seqopt.problem.goals import Goal, Measure
+from seqopt.problem.problem import Goal, Measure
 from seqopt.problem.standing import Standing, slack
 from seqopt.stability.assessment import ROUGHEST
 

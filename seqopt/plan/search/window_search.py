@@ -20,7 +20,7 @@ from seqopt.arrays import Floats, Terse
 from seqopt.errors import MemoryShortError, SolverError, TimeUpError
 from seqopt.graph.layers.costs import Joined
 from seqopt.graph.layers.layers import Layers, possible_after, window
-from seqopt.plan.calling.watch import Watch
+from seqopt.plan.calling.formulation import Watch
 from seqopt.responses.choices import StepChoices
 from seqopt.responses.resources import Resources
 from seqopt.sequence.schedule import Schedule

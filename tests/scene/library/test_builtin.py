@@ -23,7 +23,7 @@ from seqopt.scene.scene_file import (
     load_scene,
     parse_scene,
 )
-from seqopt.sequence.support import islands
+from seqopt.sequence.schedule import islands
 from tests.builders import first, largest_difference
 
 PRINTED = (2.670, 4.350)  # m; sides of the plan, section 3.1 of Bruun et al.

@@ -33,7 +33,7 @@ from seqopt.scene.library import (
 from seqopt.scene.library.by_words import scene_by_words
 from seqopt.scene.library.joints import joints_between
 from seqopt.scene.scene_file import find_warnings, load_scene
-from seqopt.sequence.support import islands
+from seqopt.sequence.schedule import islands
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.sequence.two_robots import cantilever, sequential
 from tests.builders import largest_difference, small_arch
