@@ -310,15 +310,20 @@ def after_margins(problem: States, search: Search, tell: Watching) -> StatePath:
 
 
 def narrow(
-    problem: States, width: int, tell: Watching, most: Sequence[float] | None = None
+    problem: States,
+    width: int,
+    tell: Watching,
+    most: Sequence[float] | None = None,
+    enough: float = -np.inf,
 ) -> StatePath | None:
     """Return the best plan through a few states of every brick count, if there is one.
 
     Where states must stand it is asked of all of them only if the best paths fall; and if ``most``
-    is given, only where goals take no more than that without it.
+    is given, only where goals take no more than that without it; ``enough``: as of `Explorer`.
     """
     for standing in (False, True)[: 1 + bool(problem.demands)]:
-        found = Explorer(FreeStates(problem, regrips=False, standing=standing), width, tell)
+        space = FreeStates(problem, regrips=False, standing=standing)
+        found = Explorer(space, width, tell, enough)
         if found.rise():
             if most is not None and not all(map(le, _exact(problem, found)[1].values, most)):
                 return None

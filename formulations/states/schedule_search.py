@@ -16,7 +16,8 @@ in their order,
 with :math:`v` the value of a state and :math:`c` the cost of a step. A narrow search without
 regrips, which keeps the best states of every brick count, gives a first plan. It is the best if it
 takes no more than what all plans have in common: the finished structure at their end, and as many
-steps as bricks and robots call for. Where states must stand or be good in scenarios, which is dear
+steps as bricks and robots call for. Where there are many states a second one, somewhat wider, keeps
+any of those that take no more. Where states must stand or be good in scenarios, which is dear
 to ask of them all, it is sought without that, and kept only if it is then the best; what the best
 plan of the first scenario takes in all is then where the threshold starts. It rises until states
 below it connect the empty site to an end; responses are computed only for states next to those that
@@ -60,8 +61,8 @@ from seqopt.problem.problem import Measure
 from seqopt.work.progress import Tell
 
 FAR_BELOW = 4.0  # what the narrow search finds, over the first threshold
-MANY = 1_000_000  # grip sets, about: to look at all takes longer than a second narrow search
-WIDER = 20  # how many times as wide that one is
+MANY = 500_000  # grip sets, about: to look at all takes longer than a second narrow search
+WIDER = 4  # how many times as wide that one is
 
 
 def solve(
@@ -102,6 +103,7 @@ class _Options:
     width: int
     growth: float
     dear: bool
+    enough: float = -np.inf
 
 
 def _search(problem: States, options: _Options, tell: Watching) -> StatePath:
@@ -111,8 +113,9 @@ def _search(problem: States, options: _Options, tell: Watching) -> StatePath:
     wide = Explorer(FreeStates(problem), tell=tell)
     many = comb(2 * len(problem.network.inner), problem.space.robots) * problem.space.levels > MANY
     try:
-        for width in (options.width, WIDER * options.width)[: 1 + many]:
-            plans = [found, _first(problem, replace(options, width=width), floors, tell)]
+        wider = replace(options, width=WIDER * options.width, enough=floors[0])
+        for each in (options, wider)[: 1 + many]:
+            plans = [found, _first(problem, each, floors, tell)]
             found = min(filter(None, plans), key=lambda p: p.objective, default=None)
             if found and not problem.budgets and all(map(le, found.objective, floors)):
                 return found  # no plan is better
@@ -128,9 +131,11 @@ def _first(
     problem: States, options: _Options, floors: tuple[float, ...], tell: Watching
 ) -> StatePath | None:
     """Return a first plan; where that is dear, only if it takes no more than floors of goals."""
+    most, enough = floors if options.dear else None, options.enough
     if options.dear and problem.each and not problem.demands:
-        return _in_all(problem, narrow(problem.each[0], options.width, tell), floors)
-    return narrow(problem, options.width, tell, floors if options.dear else None)
+        found = narrow(problem.each[0], options.width, tell, enough=enough)
+        return _in_all(problem, found, floors)
+    return narrow(problem, options.width, tell, most, enough)
 
 
 def _require_room(problem: States, tell: Watching) -> None:
@@ -161,7 +166,8 @@ def _best(
                 pass
         if wide.excluded == np.inf:
             raise InfeasibleError("no plan is allowed")
-        proven.append(wide.excluded)  # of a state that every plan would have to pass, or a larger
+        # of a state that every plan would have to pass, or a larger
+        proven.append(max([wide.excluded, *proven[-1:]]))
         grown = threshold * growth if np.isfinite(threshold) else -np.inf
         threshold = max(wide.excluded, min(ceiling, grown))
 

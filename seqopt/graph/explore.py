@@ -240,6 +240,8 @@ class Explorer:
         only by moves that take nothing; from all by default.
     tell : callable, optional
         Called after every level on which states were visited; may raise to end the search.
+    enough : float, optional
+        Where there is a width, states of no larger value are as good as each other: some of them.
 
     Attributes
     ----------
@@ -258,8 +260,10 @@ class Explorer:
         space: Space,
         width: int | None = None,
         tell: Callable[[Explorer], object] = lambda _: None,
+        enough: float = -np.inf,
     ) -> None:
-        self._space, self._width, self._tell = space, width, tell
+        self._space, self._width, self._tell, self._enough = space, width, tell, enough
+        self._draws = np.random.default_rng(0)
         key, states = space.start()
         self._parts: list[dict[Key, Part]] = [{} for _ in range(space.levels + 1)]
         self._moves: dict[tuple[int, Key, Key], list[tuple[Rows, Rows, Floats]]] = defaultdict(list)
@@ -324,7 +328,7 @@ class Explorer:
             if self._space.floors and part.raise_floors(fresh, lambda s: self._values(key, s)):
                 continue
             if self._width is not None:
-                fresh = fresh[np.argsort(part.values[fresh, 0], kind="stable")[: self._width]]
+                fresh = fresh[self._best(part.values[fresh, 0])[: self._width]]
                 part.mark[part.mark == PENDING] = CLOSED
             if not len(fresh):
                 return np.concatenate(visited)
@@ -334,6 +338,12 @@ class Explorer:
             if level:
                 moves = self._space.within(key, part.states[fresh])
                 self._keep((level, key, key), fresh, moves, part)
+
+    def _best(self, values: Floats) -> Ints:
+        """Return places of values (n,), least first; those that are small enough in any order."""
+        enough = values <= self._enough
+        drawn = np.where(enough, self._draws.random(len(values)), np.arange(len(values)))
+        return np.lexsort((drawn, np.where(enough, -np.inf, values)))
 
     def refine(self, values: Sequence[float] | None = None) -> bool:
         """Value states exactly that are close to the worst values of a path; return if any were.

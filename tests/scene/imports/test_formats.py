@@ -272,7 +272,7 @@ def test_what_is_no_file_or_too_large_is_refused(tmp_path, monkeypatch):
 
 
 def test_an_assembly_of_nobodys_size_is_refused(read, monkeypatch):
-    monkeypatch.setattr("seqopt.scene.imports.content.MOST_CORNERS", 60)
+    monkeypatch.setattr("seqopt.scene.imports.building.MOST_CORNERS", 60)
     with pytest.raises(SceneError, match="its blocks have 72 corners; 60 is the most"):
         read("a.json", DOCUMENTS["assembly"])
 
